@@ -1,0 +1,2 @@
+//! Scarab's simulated hardware.
+#![cfg_attr(not(feature = "tool"), no_std)]

@@ -1,0 +1,27 @@
+//! Scarab: firmware of an exoskeleton leg's joint drive board that identifies the leg it moves.
+//!
+//! Everything here is pure, `no_std` and without heap; the same code runs on the board, in the emulator and,
+//! against the simulated hardware of `hal-sim`, on the host.
+//!
+//! | room | what lives there |
+//! | --- | --- |
+//! | [`real`], [`units`] | the only door to `libm`; unit newtypes |
+//! | [`hal`] | the ports a board provides |
+//! | [`model`] | serial chain, Newton-Euler, regressor, friction, base parameters |
+//! | [`motion`] | Fourier excitation, gait, ramps, and the proof that they stay within limits |
+//! | [`swarm`] | beetle antennae search, particle swarm, beetle swarm |
+//! | [`ident`] | filter chain, information factor, least squares, statistics, verdict |
+//! | [`safety`], [`servo`] | monitor and drive states; the 4 kHz tick |
+//! | [`leg`] | one leg: the activity machine, a control half and an identification half |
+#![no_std]
+
+pub mod hal;
+pub mod ident;
+pub mod leg;
+pub mod model;
+pub mod motion;
+pub mod real;
+pub mod safety;
+pub mod servo;
+pub mod swarm;
+pub mod units;

@@ -1,0 +1,244 @@
+//! The only door to `libm`: scalars in single or double precision and the few functions the rooms need.
+//!
+//! Why a door: std's inherent `f32::sqrt` silently replaces any trait method of that name in tests, so what is
+//! tested on the host would not be what runs on the board; and `libm::sinf`, `libm::cosf` compute in double
+//! precision inside, which a Cortex-M4F does in software (about 1,000 instructions). Code that is generic over
+//! [`Real`] runs in `f32` on the device and in `f64` on the host, where the second checks the first.
+//!
+//! | function | `f32` | largest error |
+//! | --- | --- | --- |
+//! | [`sin_cos`] | Cody-Waite reduction, minimax polynomials (Moshier, Cephes, 1984-1992), single precision only | 1.2e-7 for arguments up to 8,192 |
+//! | [`sqrt`] | one instruction on the device, `libm` elsewhere | correctly rounded |
+//! | [`exp`], [`ln`], [`atan2`] | `libm` | 1 ulp |
+//!
+//! `f64` is `libm` throughout.
+
+use nalgebra::RealField;
+
+/// A scalar the rooms compute with: `f32` on the device, `f64` for reference.
+pub trait Real: RealField + Copy {
+    /// Smallest number that still changes 1 when added.
+    const EPSILON: Self;
+    /// Largest finite number.
+    const LARGEST: Self;
+    /// Nearest representable number.
+    fn of(value: f64) -> Self;
+    /// The number in double precision.
+    fn to_double(self) -> f64;
+    #[doc(hidden)]
+    fn door_sin_cos(self) -> (Self, Self);
+    #[doc(hidden)]
+    fn door_sqrt(self) -> Self;
+    #[doc(hidden)]
+    fn door_exp(self) -> Self;
+    #[doc(hidden)]
+    fn door_ln(self) -> Self;
+    #[doc(hidden)]
+    fn door_atan2(self, x: Self) -> Self;
+}
+
+/// Sine and cosine of an angle in rad.
+#[must_use]
+pub fn sin_cos<T: Real>(angle: T) -> (T, T) {
+    angle.door_sin_cos()
+}
+
+/// Square root; NaN for negative numbers.
+#[must_use]
+pub fn sqrt<T: Real>(value: T) -> T {
+    value.door_sqrt()
+}
+
+/// e to the power of `value`.
+#[must_use]
+pub fn exp<T: Real>(value: T) -> T {
+    value.door_exp()
+}
+
+/// Natural logarithm; NaN for negative numbers.
+#[must_use]
+pub fn ln<T: Real>(value: T) -> T {
+    value.door_ln()
+}
+
+/// Angle of the point (`x`, `y`) from the x axis, rad, in -pi..=pi.
+#[must_use]
+pub fn atan2<T: Real>(y: T, x: T) -> T {
+    y.door_atan2(x)
+}
+
+/// Magnitude.
+#[must_use]
+pub fn abs<T: Real>(value: T) -> T {
+    if value < T::zero() { -value } else { value }
+}
+
+/// The smaller of two numbers; the other one where one is not a number.
+#[must_use]
+pub fn min<T: Real>(one: T, other: T) -> T {
+    if other < one || one != one { other } else { one }
+}
+
+/// The larger of two numbers; the other one where one is not a number.
+#[must_use]
+pub fn max<T: Real>(one: T, other: T) -> T {
+    if other > one || one != one { other } else { one }
+}
+
+/// `value` limited to `low..=high`; `low` where it is not a number.
+#[must_use]
+pub fn clamp<T: Real>(value: T, low: T, high: T) -> T {
+    if value > high {
+        high
+    } else if value >= low {
+        value
+    } else {
+        low
+    }
+}
+
+/// -1, 0 or 1.
+#[must_use]
+pub fn sign<T: Real>(value: T) -> T {
+    if value > T::zero() {
+        T::one()
+    } else if value < T::zero() {
+        -T::one()
+    } else {
+        T::zero()
+    }
+}
+
+/// Neither NaN nor infinite.
+#[must_use]
+pub fn is_finite<T: Real>(value: T) -> bool {
+    abs(value) <= T::LARGEST
+}
+
+#[expect(clippy::disallowed_methods, reason = "this file is the door to libm")]
+impl Real for f64 {
+    const EPSILON: Self = f64::EPSILON;
+    const LARGEST: Self = f64::MAX;
+    fn of(value: f64) -> Self {
+        value
+    }
+    fn to_double(self) -> f64 {
+        self
+    }
+    fn door_sin_cos(self) -> (Self, Self) {
+        libm::sincos(self)
+    }
+    fn door_sqrt(self) -> Self {
+        libm::sqrt(self)
+    }
+    fn door_exp(self) -> Self {
+        libm::exp(self)
+    }
+    fn door_ln(self) -> Self {
+        libm::log(self)
+    }
+    fn door_atan2(self, x: Self) -> Self {
+        libm::atan2(self, x)
+    }
+}
+
+#[expect(clippy::disallowed_methods, reason = "this file is the door to libm")]
+impl Real for f32 {
+    const EPSILON: Self = f32::EPSILON;
+    const LARGEST: Self = f32::MAX;
+    fn of(value: f64) -> Self {
+        value as f32
+    }
+    fn to_double(self) -> f64 {
+        f64::from(self)
+    }
+    fn door_sin_cos(self) -> (Self, Self) {
+        sin_cos_single(self)
+    }
+    fn door_sqrt(self) -> Self {
+        sqrt_single(self)
+    }
+    fn door_exp(self) -> Self {
+        libm::expf(self)
+    }
+    fn door_ln(self) -> Self {
+        libm::logf(self)
+    }
+    fn door_atan2(self, x: Self) -> Self {
+        libm::atan2f(self, x)
+    }
+}
+
+#[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]
+#[expect(clippy::disallowed_methods, reason = "this file is the door to libm")]
+fn sqrt_single(value: f32) -> f32 {
+    libm::sqrtf(value)
+}
+
+/// The FPU's own square root: `core` has none on stable, and `libm`'s is computed with integers.
+#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+#[expect(unsafe_code, reason = "two instructions that touch s0 only, as the calling convention allows")]
+#[unsafe(naked)]
+extern "C" fn sqrt_single(value: f32) -> f32 {
+    core::arch::naked_asm!("vsqrt.f32 s0, s0", "bx lr")
+}
+
+/// Beyond this angle the three-part reduction loses digits; `libm` reduces exactly, slowly.
+const LARGEST_REDUCED_ANGLE: f32 = 8192.0;
+
+#[expect(clippy::disallowed_methods, reason = "this file is the door to libm")]
+#[expect(clippy::excessive_precision, reason = "the three parts of pi/4 as published")]
+fn sin_cos_single(angle: f32) -> (f32, f32) {
+    const FOUR_OVER_PI: f32 = 1.273_239_54;
+    const PI_QUARTER: [f32; 3] = [0.785_156_25, 2.418_756_484_985_352e-4, 3.774_894_977_445_941e-8];
+    let magnitude = angle.abs();
+    if !(magnitude <= LARGEST_REDUCED_ANGLE) {
+        return (libm::sinf(angle), libm::cosf(angle));
+    }
+    let octant = (magnitude * FOUR_OVER_PI) as u32;
+    let octant = octant + (octant & 1);
+    let turns = octant as f32;
+    let x = ((magnitude - turns * PI_QUARTER[0]) - turns * PI_QUARTER[1]) - turns * PI_QUARTER[2];
+    let z = x * x;
+    let sine = ((-1.951_529_589e-4 * z + 8.332_160_873e-3) * z - 1.666_665_461e-1) * z * x + x;
+    let cosine = ((2.443_315_711e-5 * z - 1.388_731_625e-3) * z + 4.166_664_568e-2) * z * z - 0.5 * z + 1.0;
+    let (sine, cosine) = match octant & 7 {
+        0 => (sine, cosine),
+        2 => (cosine, -sine),
+        4 => (-sine, -cosine),
+        _ => (-cosine, sine),
+    };
+    (if angle < 0.0 { -sine } else { sine }, cosine)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_precision_sine_and_cosine_stay_within_their_stated_error() {
+        let mut worst = 0.0_f64;
+        for step in -400_000..400_000 {
+            let angle = step as f32 * 0.020_48;
+            let (sine, cosine) = sin_cos(angle);
+            let (true_sine, true_cosine) = sin_cos(f64::from(angle));
+            worst = worst.max((f64::from(sine) - true_sine).abs()).max((f64::from(cosine) - true_cosine).abs());
+        }
+        assert!(worst < 1.2e-7, "worst error {worst:e}");
+    }
+
+    #[test]
+    fn what_is_not_a_number_never_leaves_a_clamp() {
+        assert_eq!(clamp(f32::NAN, -1.0, 1.0), -1.0);
+        assert_eq!(min(f32::NAN, 2.0), 2.0);
+        assert_eq!(max(2.0, f32::NAN), 2.0);
+        assert!(!is_finite(f32::INFINITY) && !is_finite(f32::NAN) && is_finite(f32::MAX));
+    }
+
+    #[test]
+    fn angles_beyond_the_reduction_and_infinite_ones_do_not_panic() {
+        let (sine, cosine) = sin_cos(1.0e30_f32);
+        assert!((sine * sine + cosine * cosine - 1.0).abs() < 1e-5);
+        assert!(sin_cos(f32::INFINITY).0.is_nan());
+    }
+}

@@ -1,0 +1,56 @@
+//! Unit newtypes for numbers that cross module borders on the device.
+//!
+//! A bare `f32` says nothing about what it measures; a `Radian` cannot be handed to somebody who expects an
+//! `Ampere`. Arithmetic that keeps the unit is provided; everything else goes through the public field.
+
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+macro_rules! unit {
+    ($(#[$meta:meta] $name:ident),+ $(,)?) => {$(
+        #[$meta]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+        #[repr(transparent)]
+        pub struct $name(pub f32);
+
+        impl $name {
+            /// Nothing of it.
+            pub const ZERO: Self = Self(0.0);
+            /// The magnitude.
+            #[must_use]
+            pub const fn abs(self) -> Self { Self(self.0.abs()) }
+            /// Neither NaN nor infinite.
+            #[must_use]
+            pub const fn is_finite(self) -> bool { self.0.is_finite() }
+            /// Limited to `-bound..=bound`; zero where the value is not a number.
+            #[must_use]
+            pub fn limited(self, bound: Self) -> Self {
+                if self.0.is_nan() { return Self::ZERO; }
+                Self(self.0.max(-bound.0).min(bound.0))
+            }
+        }
+        impl Add for $name { type Output = Self; fn add(self, other: Self) -> Self { Self(self.0 + other.0) } }
+        impl Sub for $name { type Output = Self; fn sub(self, other: Self) -> Self { Self(self.0 - other.0) } }
+        impl AddAssign for $name { fn add_assign(&mut self, other: Self) { self.0 += other.0; } }
+        impl SubAssign for $name { fn sub_assign(&mut self, other: Self) { self.0 -= other.0; } }
+        impl Neg for $name { type Output = Self; fn neg(self) -> Self { Self(-self.0) } }
+        impl Mul<f32> for $name { type Output = Self; fn mul(self, factor: f32) -> Self { Self(self.0 * factor) } }
+        impl Div<f32> for $name { type Output = Self; fn div(self, factor: f32) -> Self { Self(self.0 / factor) } }
+    )+};
+}
+
+unit! {
+    /// Angle, rad.
+    Radian,
+    /// Angular velocity, rad/s.
+    RadianPerSecond,
+    /// Angular acceleration, rad/s^2.
+    RadianPerSecondSquared,
+    /// Torque at the joint, N m.
+    NewtonMetre,
+    /// Motor (quadrature) current, A.
+    Ampere,
+    /// Time, s.
+    Second,
+    /// Joint torque per motor current, N m/A.
+    NewtonMetrePerAmpere,
+}
