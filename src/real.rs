@@ -176,11 +176,12 @@ fn sqrt_single(value: f32) -> f32 {
 }
 
 /// The FPU's own square root: `core` has none on stable, and `libm`'s is computed with integers.
+/// Two instructions that touch `s0` only, as the calling convention allows.
+/// The directive names the FPU of a Cortex-M4F, which the assembler does not learn from the target.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
-#[expect(unsafe_code, reason = "two instructions that touch s0 only, as the calling convention allows")]
 #[unsafe(naked)]
 extern "C" fn sqrt_single(value: f32) -> f32 {
-    core::arch::naked_asm!("vsqrt.f32 s0, s0", "bx lr")
+    core::arch::naked_asm!(".fpu fpv4-sp-d16", "vsqrt.f32 s0, s0", "bx lr")
 }
 
 /// Beyond this angle the three-part reduction loses digits; `libm` reduces exactly, slowly.
