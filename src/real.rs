@@ -76,13 +76,17 @@ pub fn abs<T: Real>(value: T) -> T {
 /// The smaller of two numbers; the other one where one is not a number.
 #[must_use]
 pub fn min<T: Real>(one: T, other: T) -> T {
-    if other < one || one != one { other } else { one }
+    if other < one || is_nan(one) { other } else { one }
 }
 
 /// The larger of two numbers; the other one where one is not a number.
 #[must_use]
 pub fn max<T: Real>(one: T, other: T) -> T {
-    if other > one || one != one { other } else { one }
+    if other > one || is_nan(one) { other } else { one }
+}
+
+fn is_nan<T: Real>(value: T) -> bool {
+    value.partial_cmp(&value).is_none()
 }
 
 /// `value` limited to `low..=high`; `low` where it is not a number.
@@ -193,7 +197,7 @@ fn sin_cos_single(angle: f32) -> (f32, f32) {
     const FOUR_OVER_PI: f32 = 1.273_239_54;
     const PI_QUARTER: [f32; 3] = [0.785_156_25, 2.418_756_484_985_352e-4, 3.774_894_977_445_941e-8];
     let magnitude = angle.abs();
-    if !(magnitude <= LARGEST_REDUCED_ANGLE) {
+    if magnitude > LARGEST_REDUCED_ANGLE || magnitude.is_nan() {
         return (libm::sinf(angle), libm::cosf(angle));
     }
     let octant = (magnitude * FOUR_OVER_PI) as u32;
@@ -223,7 +227,8 @@ mod tests {
             let angle = step as f32 * 0.020_48;
             let (sine, cosine) = sin_cos(angle);
             let (true_sine, true_cosine) = sin_cos(f64::from(angle));
-            worst = worst.max((f64::from(sine) - true_sine).abs()).max((f64::from(cosine) - true_cosine).abs());
+            worst =
+                worst.max((f64::from(sine) - true_sine).abs()).max((f64::from(cosine) - true_cosine).abs());
         }
         assert!(worst < 1.2e-7, "worst error {worst:e}");
     }
