@@ -1,0 +1,126 @@
+//! Flexion angles and the chain's angles: the one place where they are converted.
+//!
+//! Outside, angles are anatomical (hip and knee flexion positive, zero when standing straight); inside, they are
+//! those of the Denavit-Hartenberg frames. A joint may turn the other way and start elsewhere.
+//!
+//! ```text
+//! q = direction q_anatomical + zero_offset
+//! torque = direction torque_anatomical               (speed and acceleration likewise)
+//! ```
+//!
+//! | symbol | meaning | unit |
+//! | --- | --- | --- |
+//! | direction | +1 or -1 | - |
+//! | zero_offset | the chain's angle where the anatomical one is zero | rad |
+//!
+//! Power is the same on both sides, since direction squared is 1.
+
+use crate::real::{Real, is_finite};
+
+/// Why a joint cannot be described.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AnatomyError {
+    /// The direction is neither 1 nor -1.
+    Direction,
+    /// The zero offset is NaN or infinite.
+    ZeroOffset,
+}
+
+/// How one joint's anatomical angle becomes the chain's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AnatomicalJoint<T> {
+    direction: T,
+    zero_offset: T,
+}
+
+impl<T: Real> AnatomicalJoint<T> {
+    /// A joint of `direction` 1 or -1 whose chain angle is `zero_offset` (rad) at the anatomical zero.
+    ///
+    /// # Errors
+    /// [`AnatomyError`] names the argument that is out of its range.
+    pub fn new(direction: i32, zero_offset: T) -> Result<Self, AnatomyError> {
+        let direction = match direction {
+            1 => T::one(),
+            -1 => -T::one(),
+            _ => return Err(AnatomyError::Direction),
+        };
+        if !is_finite(zero_offset) {
+            return Err(AnatomyError::ZeroOffset);
+        }
+        Ok(Self { direction, zero_offset })
+    }
+
+    /// Both angles are the same.
+    #[must_use]
+    pub fn identity() -> Self {
+        Self { direction: T::one(), zero_offset: T::zero() }
+    }
+
+    /// 1 or -1.
+    #[must_use]
+    pub fn direction(&self) -> T {
+        self.direction
+    }
+
+    /// The chain's angle at the anatomical zero, rad.
+    #[must_use]
+    pub fn zero_offset(&self) -> T {
+        self.zero_offset
+    }
+
+    /// The same joint in another precision.
+    #[must_use]
+    pub fn convert<U: Real>(&self) -> AnatomicalJoint<U> {
+        AnatomicalJoint {
+            direction: U::of(self.direction.to_double()),
+            zero_offset: U::of(self.zero_offset.to_double()),
+        }
+    }
+
+    /// The chain's angle (rad) of an anatomical one.
+    #[must_use]
+    pub fn angle_to_chain(&self, anatomical: T) -> T {
+        self.direction * anatomical + self.zero_offset
+    }
+
+    /// The anatomical angle (rad) of the chain's.
+    #[must_use]
+    pub fn angle_from_chain(&self, q: T) -> T {
+        self.direction * (q - self.zero_offset)
+    }
+
+    /// The chain's speed, acceleration or torque of an anatomical one.
+    #[must_use]
+    pub fn to_chain(&self, anatomical: T) -> T {
+        self.direction * anatomical
+    }
+
+    /// The anatomical speed, acceleration or torque of the chain's.
+    #[must_use]
+    pub fn from_chain(&self, value: T) -> T {
+        self.direction * value
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conversion_and_back_is_the_identity_and_keeps_power() {
+        let knee = AnatomicalJoint::new(-1, 0.25_f64).unwrap();
+        assert_eq!(knee.angle_to_chain(0.5), -0.25);
+        // One addition and one subtraction of numbers near 1: two roundings.
+        assert!((knee.angle_from_chain(knee.angle_to_chain(0.7)) - 0.7).abs() < 4e-16);
+        let (speed, torque) = (1.3, -20.0);
+        assert_eq!(knee.to_chain(speed) * knee.to_chain(torque), speed * torque);
+        assert_eq!(knee.from_chain(knee.to_chain(torque)), torque);
+    }
+
+    #[test]
+    fn a_direction_other_than_one_and_an_infinite_offset_are_refused() {
+        assert_eq!(AnatomicalJoint::new(0, 0.0_f32), Err(AnatomyError::Direction));
+        assert_eq!(AnatomicalJoint::new(2, 0.0_f32), Err(AnatomyError::Direction));
+        assert_eq!(AnatomicalJoint::new(1, f32::NAN), Err(AnatomyError::ZeroOffset));
+    }
+}

@@ -1,0 +1,293 @@
+//! Which combinations of parameters the torques of a leg can tell: rank and null space by numbers.
+//!
+//! The closed form of [`super::regrouping`] does not know gravity, parallel axes or friction columns that are
+//! switched off. So the regressor itself is asked: many states, all joints, one factor, and what is left of each
+//! column once those preferred to it are taken out.
+//!
+//! ```text
+//! torque = Y p = Y_B beta          beta_b = p_b + sum of terms(b) times dependent parameters
+//! ```
+//!
+//! | symbol | meaning |
+//! | --- | --- |
+//! | p | the 14 N parameters |
+//! | Y, Y_B | regressor; its independent columns |
+//! | beta | base parameters, as many as the rank |
+//!
+//! Order of preference, so that the base set reads as in the literature: XX XY XZ YZ ZZ HX HY of all links, then FC
+//! FV OFF, then IA, then YY HZ M. A link's XX thereby carries its -YY.
+//!
+//! Source: M. Gautier, Numerical calculation of the base inertial parameters of robots, 1991.
+//! Cost: 64 states; once per leg, gravity and mask. Memory in `f32` for two joints: 3.2 kB of stack while it runs;
+//! the result takes 112 N B bytes.
+//! Limits: what is independent here may still be weak on a given motion; that is for the statistics to say.
+
+use nalgebra::Vector3;
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro128PlusPlus;
+
+use super::super::chain::Chain;
+use super::super::newton_euler::JointState;
+use super::super::parameter::{LegParameters, PARAMETERS_PER_JOINT, Parameter, RegressorRow};
+use super::super::regressor::{regressor, row_torque};
+use super::echelon::{Factor, entry};
+use crate::real::{Real, abs, is_finite, max, sqrt};
+
+/// Which of the 14 N parameters are estimated at all; the others' columns are switched off.
+pub type ColumnMask<const N: usize> = [[bool; PARAMETERS_PER_JOINT]; N];
+
+/// States asked; each gives one row per joint, so there are at least four rows per column.
+const STATES: usize = 64;
+
+/// Speeds of the states asked, rad/s, and accelerations, rad/s2: gravity, inertia and friction columns of like size.
+const SPEED_BOUND: f64 = 3.0;
+const ACCELERATION_BOUND: f64 = 10.0;
+
+/// Why there is no base set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BaseError {
+    /// There are `rank` base parameters, more than the type has room for.
+    TooMany {
+        /// Room needed.
+        rank: usize,
+    },
+    /// No parameter that is switched on moves any torque.
+    NothingSeen,
+    /// Gravity or a number of the chain is NaN or too large.
+    NotFinite,
+}
+
+/// What the torques tell about one parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// Determined by itself: it is this base parameter.
+    Alone(usize),
+    /// Determined only together with others. The number is the first base parameter it stands in;
+    /// [`BaseParameters::carriers`] lists all.
+    Grouped(usize),
+    /// No torque depends on it.
+    Unseen,
+    /// Switched off by the mask.
+    Off,
+}
+
+/// How clearly the kept columns stand apart from the dropped ones, as shares of a column's length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Separation<T> {
+    /// Smallest share of a kept column that those before it do not explain.
+    pub smallest_kept: T,
+    /// Largest such share of a dropped column: rounding.
+    pub largest_dropped: T,
+}
+
+/// The base parameters of a leg of `N` joints, at most `B`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseParameters<T, const N: usize, const B: usize> {
+    rank: usize,
+    /// The first `rank` are the independent columns: joint and parameter.
+    independent: [(usize, Parameter); B],
+    /// The first `rank` are rows of the reduced echelon form: 1 on their own independent column, 0 on all others'.
+    terms: [LegParameters<T, N>; B],
+    /// Terms of a base parameter that does not exist.
+    nothing: LegParameters<T, N>,
+    mask: ColumnMask<N>,
+    separation: Separation<T>,
+}
+
+impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
+    /// Asks the chain under `gravity` (m/s2, base frame) for the parameters that `mask` switches on.
+    ///
+    /// # Errors
+    /// See [`BaseError`].
+    pub fn analyse(
+        chain: &Chain<T, N>,
+        gravity: &Vector3<T>,
+        mask: &ColumnMask<N>,
+    ) -> Result<Self, BaseError> {
+        let mut factor = collected(chain, gravity, mask);
+        let norms = factor.column_norms();
+        let largest = norms.iter().flatten().fold(T::zero(), |largest, norm| max(largest, *norm));
+        if norms.iter().flatten().any(|norm| !is_finite(*norm)) {
+            return Err(BaseError::NotFinite);
+        }
+        if largest == T::zero() {
+            return Err(BaseError::NothingSeen);
+        }
+
+        let tolerance = tolerance();
+        let smallest_norm = largest * tolerance;
+        let seen = norms.map(|joint| joint.map(|norm| if norm > smallest_norm { norm } else { T::zero() }));
+        let mut independent = [(0, Parameter::XX); B];
+        let echelon = factor.reduce(tolerance, &seen, |place, joint, parameter| {
+            if let Some(slot) = independent.get_mut(place) {
+                *slot = (joint, parameter);
+            }
+        });
+        let rank = echelon.rank;
+        if rank > B {
+            return Err(BaseError::TooMany { rank });
+        }
+        for (place, (joint, parameter)) in independent.iter().enumerate().take(rank).rev() {
+            factor.substitute(place, *joint, *parameter);
+        }
+
+        let mut base = Self {
+            rank,
+            independent,
+            terms: [[[T::zero(); PARAMETERS_PER_JOINT]; N]; B],
+            nothing: [[T::zero(); PARAMETERS_PER_JOINT]; N],
+            mask: *mask,
+            separation: Separation {
+                smallest_kept: echelon.smallest_kept,
+                largest_dropped: echelon.largest_dropped,
+            },
+        };
+        for (place, (terms, row)) in base.terms.iter_mut().zip(factor.rows()).enumerate().take(rank) {
+            *terms = cleaned(row, place, base.independent.get(..rank).unwrap_or_default(), &seen, tolerance);
+        }
+        Ok(base)
+    }
+
+    /// Number of base parameters.
+    #[must_use]
+    pub fn rank(&self) -> usize {
+        self.rank
+    }
+
+    /// How clearly the rank was decided.
+    #[must_use]
+    pub fn separation(&self) -> Separation<T> {
+        self.separation
+    }
+
+    /// Joint (from 0) and parameter whose column carries base parameter `b`; `None` from the rank on.
+    #[must_use]
+    pub fn independent(&self, b: usize) -> Option<(usize, Parameter)> {
+        self.columns().get(b).copied()
+    }
+
+    /// Factors by which parameters sum up to base parameter `b`: 1 on its independent column. All zero from the
+    /// rank on.
+    #[must_use]
+    pub fn terms(&self, b: usize) -> &LegParameters<T, N> {
+        self.terms.get(b).unwrap_or(&self.nothing)
+    }
+
+    /// The independent columns of a regressor row, so that `out` . beta = row . parameters (masked ones left out).
+    /// Entries from the rank on become 0.
+    pub fn select(&self, row: &RegressorRow<T, N>, out: &mut [T; B]) {
+        *out = [T::zero(); B];
+        for (value, (joint, parameter)) in out.iter_mut().zip(self.columns()) {
+            *value = entry(row, *joint, *parameter);
+        }
+    }
+
+    /// Base values of full parameters; 0 from the rank on.
+    #[must_use]
+    pub fn project(&self, parameters: &LegParameters<T, N>) -> [T; B] {
+        core::array::from_fn(|b| row_torque(self.terms(b), parameters))
+    }
+
+    /// Full parameters with these base values: `others`, with the independent columns' parameters moved until the
+    /// projection fits. With `others` zero the base values themselves stand in the independent columns.
+    #[must_use]
+    pub fn complete(&self, values: &[T; B], others: &LegParameters<T, N>) -> LegParameters<T, N> {
+        let present = self.project(others);
+        let mut parameters = *others;
+        for ((joint, parameter), (wanted, present)) in self.columns().iter().zip(values.iter().zip(&present))
+        {
+            if let Some(block) = parameters.get_mut(*joint) {
+                block[parameter.index()] += *wanted - *present;
+            }
+        }
+        parameters
+    }
+
+    /// What the torques tell about a parameter; [`Standing::Off`] where there is no such joint.
+    #[must_use]
+    pub fn standing(&self, joint: usize, parameter: Parameter) -> Standing {
+        if !self.mask.get(joint).is_some_and(|block| block[parameter.index()]) {
+            return Standing::Off;
+        }
+        let Some(first) = self.carriers(joint, parameter).next() else {
+            return Standing::Unseen;
+        };
+        let members = self.terms(first).iter().flatten().filter(|factor| **factor != T::zero()).count();
+        let own = self.independent(first) == Some((joint, parameter));
+        if own && members == 1 { Standing::Alone(first) } else { Standing::Grouped(first) }
+    }
+
+    /// The base parameters in which a parameter stands, ascending.
+    pub fn carriers(&self, joint: usize, parameter: Parameter) -> impl Iterator<Item = usize> + '_ {
+        (0..self.rank).filter(move |b| entry(self.terms(*b), joint, parameter) != T::zero())
+    }
+
+    fn columns(&self) -> &[(usize, Parameter)] {
+        self.independent.get(..self.rank).unwrap_or_default()
+    }
+}
+
+/// Share of a column below which it counts as explained by others, and scaled factor below which it counts as zero.
+///
+/// Halfway, in digits, between 1 and rounding: 3.5e-4 in `f32`, 1.5e-8 in `f64`.
+fn tolerance<T: Real>() -> T {
+    sqrt(T::EPSILON)
+}
+
+/// A factor of the regressor rows of many states, the same on every call.
+fn collected<T: Real, const N: usize>(
+    chain: &Chain<T, N>,
+    gravity: &Vector3<T>,
+    mask: &ColumnMask<N>,
+) -> Factor<T, N> {
+    let mut random = Xoshiro128PlusPlus::seed_from_u64(1);
+    let mut within =
+        |bound: f64| T::of((f64::from(random.next_u32()) / f64::from(u32::MAX) * 2.0 - 1.0) * bound);
+    let mut factor = Factor::new();
+    for _ in 0..STATES {
+        let state = JointState {
+            q: core::array::from_fn(|_| within(core::f64::consts::PI)),
+            qd: core::array::from_fn(|_| within(SPEED_BOUND)),
+            qdd: core::array::from_fn(|_| within(ACCELERATION_BOUND)),
+        };
+        for mut row in regressor(chain, &state, gravity) {
+            for (value, on) in row.iter_mut().flatten().zip(mask.iter().flatten()) {
+                if !on {
+                    *value = T::zero();
+                }
+            }
+            factor.collect(row);
+        }
+    }
+    factor
+}
+
+/// An echelon row with exact ones and zeros on the independent columns and without factors that are only rounding.
+///
+/// A factor is judged by what its independent column contributes to the dependent one, as a share of the latter's
+/// norm; a norm of zero means that the column is not seen.
+fn cleaned<T: Real, const N: usize>(
+    row: &RegressorRow<T, N>,
+    place: usize,
+    independent: &[(usize, Parameter)],
+    norms: &LegParameters<T, N>,
+    tolerance: T,
+) -> LegParameters<T, N> {
+    let own_norm =
+        independent.get(place).map_or(T::zero(), |(joint, parameter)| entry(norms, *joint, *parameter));
+    let mut terms = *row;
+    for (factor, norm) in terms.iter_mut().flatten().zip(norms.iter().flatten()) {
+        if *norm == T::zero() || abs(*factor) * own_norm <= tolerance * *norm {
+            *factor = T::zero();
+        }
+    }
+    for (other, (joint, parameter)) in independent.iter().enumerate() {
+        if let Some(block) = terms.get_mut(*joint) {
+            block[parameter.index()] = if other == place { T::one() } else { T::zero() };
+        }
+    }
+    terms
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,231 @@
+//! Ranks, combinations and standings of chains whose base sets are known.
+
+use super::*;
+use crate::model::chain::DenavitHartenberg;
+use crate::model::parameter::rounded;
+use crate::model::testing::{Dice, down_along_x, paper_chain, planar_leg, rounded_state};
+use Parameter::{FC, FV, HX, HY, HZ, IA, M, OFF, XX, XY, XZ, YY, YZ, ZZ};
+
+/// Everything is estimated but these.
+fn all_but<const N: usize>(off: &[Parameter]) -> ColumnMask<N> {
+    let mut mask = [[true; PARAMETERS_PER_JOINT]; N];
+    for joint in &mut mask {
+        for parameter in off {
+            joint[parameter.index()] = false;
+        }
+    }
+    mask
+}
+
+/// Gravity along -z of the base: the paper chain's first axis is parallel to it.
+fn down_along_z<T: Real>() -> Vector3<T> {
+    Vector3::new(T::zero(), T::zero(), T::of(-9.81))
+}
+
+fn rank<T: Real, const N: usize>(chain: &Chain<T, N>, gravity: Vector3<T>, off: &[Parameter]) -> usize {
+    let base = BaseParameters::<T, N, 42>::analyse(chain, &gravity, &all_but(off)).unwrap();
+    let separation = base.separation();
+    // Measured on these legs: 0.43 and 7e-16 (f64), 0.43 and 4e-7 (f32); the tolerance lies between.
+    assert!(separation.smallest_kept > T::of(0.3), "{separation:?}");
+    assert!(separation.largest_dropped < T::EPSILON * T::of(10.0), "{separation:?}");
+    base.rank()
+}
+
+fn known_ranks<T: Real>() {
+    let x = down_along_x::<T>();
+    let origin = DenavitHartenberg { alpha: T::zero(), a: T::zero(), d: T::zero() };
+    let link = Chain::new(&[origin]).unwrap();
+    assert_eq!(rank::<T, 1>(&link, x, &[OFF]), 5);
+    assert_eq!(rank::<T, 1>(&link, x, &[]), 6);
+    let leg = planar_leg::<T>(0.45);
+    assert_eq!(rank(&leg, x, &[IA, FC, FV, OFF]), 6);
+    assert_eq!(rank(&leg, x, &[IA, OFF]), 10);
+    assert_eq!(rank(&leg, x, &[]), 13);
+    let chain = paper_chain::<T>();
+    assert_eq!(rank(&chain, down_along_z(), &[IA, FC, FV, OFF]), 15);
+    assert_eq!(rank(&chain, down_along_z(), &[IA, OFF]), 21);
+    assert_eq!(rank(&chain, down_along_z(), &[]), 25);
+}
+
+#[test]
+fn ranks_of_known_chains_in_double_precision() {
+    known_ranks::<f64>();
+}
+
+#[test]
+fn ranks_of_known_chains_in_single_precision() {
+    known_ranks::<f32>();
+}
+
+/// The base set is the expected one: for each base parameter its terms, the independent column first.
+fn assert_terms<T: Real, const N: usize, const B: usize>(
+    base: &BaseParameters<T, N, B>,
+    expected: &[&[(usize, Parameter, f64)]],
+) {
+    assert_eq!(base.rank(), expected.len());
+    for (b, terms) in expected.iter().enumerate() {
+        assert_eq!(base.independent(b), Some((terms[0].0 - 1, terms[0].1)));
+        let mut wanted = [[0.0; 14]; N];
+        for (joint, parameter, factor) in *terms {
+            wanted[joint - 1][parameter.index()] = *factor;
+        }
+        for (found, wanted) in base.terms(b).iter().flatten().zip(wanted.iter().flatten()) {
+            // Rounding of a factor well conditioned to within a few tens (measured 3e-7 in f32).
+            let bound = T::EPSILON.to_double() * 20.0;
+            assert!((found.to_double() - wanted).abs() < bound, "base {b}: {:?}", base.terms(b));
+            assert_eq!(*found == T::zero(), *wanted == 0.0, "base {b}: {:?}", base.terms(b));
+        }
+    }
+}
+
+fn combinations_of_the_planar_leg<T: Real>() {
+    const L: f64 = 0.45;
+    let leg = planar_leg::<T>(L);
+    let base = BaseParameters::<T, 2, 13>::analyse(&leg, &down_along_x(), &all_but(&[])).unwrap();
+    assert_terms(
+        &base,
+        &[
+            &[(1, ZZ, 1.0), (1, IA, 1.0), (2, M, L * L)],
+            &[(1, HX, 1.0), (2, M, L)],
+            &[(1, HY, 1.0)],
+            &[(2, ZZ, 1.0)],
+            &[(2, HX, 1.0)],
+            &[(2, HY, 1.0)],
+            &[(1, FC, 1.0)],
+            &[(1, FV, 1.0)],
+            &[(1, OFF, 1.0)],
+            &[(2, FC, 1.0)],
+            &[(2, FV, 1.0)],
+            &[(2, OFF, 1.0)],
+            &[(2, IA, 1.0)],
+        ],
+    );
+    assert_eq!(base.standing(0, ZZ), Standing::Grouped(0));
+    assert_eq!(base.standing(0, IA), Standing::Grouped(0));
+    assert_eq!(base.standing(1, M), Standing::Grouped(0));
+    assert!(base.carriers(1, M).eq([0, 1]));
+    assert_eq!(base.standing(0, HY), Standing::Alone(2));
+    assert_eq!(base.standing(1, IA), Standing::Alone(12));
+    assert_eq!(base.standing(0, XX), Standing::Unseen);
+    assert_eq!(base.standing(1, YY), Standing::Unseen);
+    assert_eq!(base.standing(2, ZZ), Standing::Off);
+}
+
+#[test]
+fn the_planar_leg_groups_what_the_literature_groups() {
+    combinations_of_the_planar_leg::<f64>();
+    combinations_of_the_planar_leg::<f32>();
+}
+
+#[test]
+fn the_paper_chain_has_the_set_of_table_six_with_minus_yy_in_xx() {
+    const L: f64 = 0.45;
+    let mask = all_but(&[IA, FC, FV, OFF]);
+    let base = BaseParameters::<f64, 3, 15>::analyse(&paper_chain(), &down_along_z(), &mask).unwrap();
+    assert_terms(
+        &base,
+        &[
+            &[(1, ZZ, 1.0), (2, YY, 1.0), (3, YY, 1.0), (3, M, L * L)],
+            &[(2, XX, 1.0), (2, YY, -1.0), (3, M, -L * L)],
+            &[(2, XY, 1.0)],
+            &[(2, XZ, 1.0), (3, HZ, -L)],
+            &[(2, YZ, 1.0)],
+            &[(2, ZZ, 1.0), (3, M, L * L)],
+            &[(2, HX, 1.0), (3, M, L)],
+            &[(2, HY, 1.0)],
+            &[(3, XX, 1.0), (3, YY, -1.0)],
+            &[(3, XY, 1.0)],
+            &[(3, XZ, 1.0)],
+            &[(3, YZ, 1.0)],
+            &[(3, ZZ, 1.0)],
+            &[(3, HX, 1.0)],
+            &[(3, HY, 1.0)],
+        ],
+    );
+    let alone = [(1, XY), (1, YZ), (1, HY), (2, XY), (2, XZ), (2, YZ), (2, ZZ), (2, HX), (2, HY)];
+    for joint in 0..3 {
+        for parameter in Parameter::ALL {
+            let is_alone = matches!(base.standing(joint, parameter), Standing::Alone(_));
+            assert_eq!(is_alone, alone.contains(&(joint, parameter)), "{parameter:?} of joint {joint}");
+        }
+    }
+    assert_eq!(base.standing(0, IA), Standing::Off);
+}
+
+#[test]
+fn a_chain_without_special_angles_has_the_rank_of_the_closed_form() {
+    let mut dice = Dice::new(21);
+    for _ in 0..20 {
+        let (chain, gravity) = (dice.chain::<3>(), dice.gravity());
+        let mask = all_but(&[FC, FV, OFF]);
+        let base = BaseParameters::<f64, 3, 42>::analyse(&chain, &gravity, &mask).unwrap();
+        // 3 of the first link, 7 of every other, rotors of all but the first.
+        assert_eq!(base.rank(), 3 + 2 * 7 + 2, "{:?}", base.separation());
+        let single = chain.convert::<f32>();
+        let gravity = gravity.map(|g| g as f32);
+        let base = BaseParameters::<f32, 3, 42>::analyse(&single, &gravity, &mask).unwrap();
+        assert_eq!(base.rank(), 3 + 2 * 7 + 2, "{:?}", base.separation());
+    }
+}
+
+fn torque_from_base_values<T: Real>(bound: f64) {
+    let mut dice = Dice::new(22);
+    let (chain, gravity) = (dice.chain::<3>().convert::<T>(), dice.gravity().map(T::of));
+    let base = BaseParameters::<T, 3, 32>::analyse(&chain, &gravity, &all_but(&[])).unwrap();
+    let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+    for _ in 0..50 {
+        let leg = rounded(&dice.leg());
+        let values = base.project(&leg);
+        let bare = base.complete(&values, &[[T::zero(); 14]; 3]);
+        for row in regressor(&chain, &rounded_state(&dice.state()), &gravity) {
+            let mut columns = [T::zero(); 32];
+            base.select(&row, &mut columns);
+            let sum =
+                columns.iter().zip(&values).fold(T::zero(), |sum, (column, value)| sum + *column * *value);
+            let torque = row_torque(&row, &leg);
+            worst = worst
+                .max((sum - torque).to_double().abs())
+                .max((row_torque(&row, &bare) - torque).to_double().abs());
+            largest = largest.max(torque.to_double().abs());
+        }
+    }
+    assert!(worst < bound * largest, "{:e}", worst / largest);
+}
+
+#[test]
+fn base_values_times_independent_columns_give_the_torque() {
+    // Twenty-odd products of factors known to about ten roundings.
+    torque_from_base_values::<f64>(1e-13);
+    torque_from_base_values::<f32>(1e-4);
+}
+
+#[test]
+fn completion_keeps_the_base_values_and_whatever_is_not_independent() {
+    let mut dice = Dice::new(23);
+    let leg = planar_leg::<f64>(0.39);
+    let base = BaseParameters::<f64, 2, 13>::analyse(&leg, &down_along_x(), &all_but(&[])).unwrap();
+    let (truth, prior) = (dice.leg::<2>(), dice.leg::<2>());
+    let completed = base.complete(&base.project(&truth), &prior);
+    for (one, other) in base.project(&completed).iter().zip(&base.project(&truth)) {
+        // Three roundings of numbers up to ten.
+        assert!((one - other).abs() < 1e-14);
+    }
+    assert_eq!(completed[1][M.index()], prior[1][M.index()]);
+    assert_eq!(completed[0][HZ.index()], prior[0][HZ.index()]);
+    assert_eq!(completed[1][XZ.index()], prior[1][XZ.index()]);
+    assert_eq!(completed[1][YZ.index()], prior[1][YZ.index()]);
+    assert_eq!(completed[0][XY.index()], prior[0][XY.index()]);
+}
+
+#[test]
+fn what_cannot_be_analysed_is_refused_with_the_reason() {
+    let leg = planar_leg::<f32>(0.39);
+    let down = down_along_x::<f32>();
+    let too_small = BaseParameters::<f32, 2, 12>::analyse(&leg, &down, &all_but(&[]));
+    assert_eq!(too_small, Err(BaseError::TooMany { rank: 13 }));
+    let nothing = BaseParameters::<f32, 2, 12>::analyse(&leg, &down, &[[false; 14]; 2]);
+    assert_eq!(nothing, Err(BaseError::NothingSeen));
+    let nowhere = Vector3::new(f32::NAN, 0.0, 0.0);
+    let lost = BaseParameters::<f32, 2, 13>::analyse(&leg, &nowhere, &all_but(&[]));
+    assert_eq!(lost, Err(BaseError::NotFinite));
+}

@@ -1,0 +1,70 @@
+//! Gautier's closed-form regrouping: of every link but the first, YY, HZ and M move to the link before it.
+//!
+//! What a link shares with the one before it, however the joint between them turns, can be counted there. The
+//! result needs 7 (N - 1) + 3 inertial parameters and 4 of the drive per joint, and the torque stays the same.
+//!
+//! ```text
+//! for i = N .. 2, with s = YY_i + 2 d HZ_i + d^2 M_i and t = HZ_i + d M_i:
+//!   XX_(i-1) += s                           HX_(i-1) += a M_i
+//!   XY_(i-1) += a sin(alpha) t              HY_(i-1) -= sin(alpha) t
+//!   XZ_(i-1) -= a cos(alpha) t              HZ_(i-1) += cos(alpha) t
+//!   YY_(i-1) += cos^2(alpha) s + a^2 M_i    M_(i-1)  += M_i
+//!   YZ_(i-1) += cos(alpha) sin(alpha) s
+//!   ZZ_(i-1) += sin^2(alpha) s + a^2 M_i
+//!   XX_i -= YY_i                            YY_i = HZ_i = M_i = 0
+//! joint 1, on a fixed base: ZZ_1 += IA_1; IA_1, XX_1, XY_1, XZ_1, YY_1, YZ_1, HZ_1, M_1 = 0
+//! ```
+//!
+//! | symbol | meaning | unit |
+//! | --- | --- | --- |
+//! | alpha, a, d | Denavit-Hartenberg numbers of joint i | rad, m, m |
+//! | XX .. M, IA | parameters, tensor elements | kg m2, kg m, kg |
+//!
+//! Source: M. Gautier and W. Khalil, Direct calculation of minimum set of inertial parameters of serial robots,
+//! 1990; the paper's Eqs (8)-(17) with three corrections: 2 d HZ + d^2 M in (8) and (11)-(13), the minus sign in
+//! (10), XX - YY in (7). Cost: about 40 flops per joint.
+//! Limits: it knows neither gravity nor parallel axes. A first axis parallel to gravity hides HX1 and HY1, and
+//! parallel axes hide more; [`super::analysis`] finds those.
+
+use super::super::chain::Chain;
+use super::super::parameter::{LegParameters, Parameter};
+use crate::real::Real;
+
+/// The same leg with as few parameters as the closed form gives; torques of any motion are unchanged.
+#[must_use]
+pub fn regroup<T: Real, const N: usize>(
+    chain: &Chain<T, N>,
+    parameters: &LegParameters<T, N>,
+) -> LegParameters<T, N> {
+    use Parameter::{HX, HY, HZ, IA, M, XX, XY, XZ, YY, YZ, ZZ};
+    let mut grouped = *parameters;
+    for (link, (sin_alpha, cos_alpha, a, d)) in chain.numbers().into_iter().enumerate().skip(1).rev() {
+        let Some([before, own]) = grouped.get_mut(link - 1..=link) else {
+            continue;
+        };
+        let (yy, hz, mass) = (own[YY.index()], own[HZ.index()], own[M.index()]);
+        let t = hz + d * mass;
+        let s = yy + d * (hz + t);
+        before[XX.index()] += s;
+        before[XY.index()] += a * sin_alpha * t;
+        before[XZ.index()] -= a * cos_alpha * t;
+        before[YY.index()] += cos_alpha * cos_alpha * s + a * a * mass;
+        before[YZ.index()] += cos_alpha * sin_alpha * s;
+        before[ZZ.index()] += sin_alpha * sin_alpha * s + a * a * mass;
+        before[HX.index()] += a * mass;
+        before[HY.index()] -= sin_alpha * t;
+        before[HZ.index()] += cos_alpha * t;
+        before[M.index()] += mass;
+        own[XX.index()] -= yy;
+        for moved in [YY, HZ, M] {
+            own[moved.index()] = T::zero();
+        }
+    }
+    if let Some(first) = grouped.first_mut() {
+        first[ZZ.index()] += first[IA.index()];
+        for unseen in [IA, XX, XY, XZ, YY, YZ, HZ, M] {
+            first[unseen.index()] = T::zero();
+        }
+    }
+    grouped
+}

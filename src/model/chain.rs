@@ -1,0 +1,159 @@
+//! Geometry of a serial chain of revolute joints in modified Denavit-Hartenberg numbers.
+//!
+//! The modified convention puts frame i on joint i's own axis, so that a link's parameters do not depend on the
+//! joint after it; Gautier's closed-form regrouping ([`super::base`]) is written in it.
+//!
+//! ```text
+//! T(i-1, i) = Rx(alpha_i) Tx(a_i) Rz(q_i) Tz(d_i)
+//!
+//!         | cos q           -sin q            0         |            |  a           |
+//!     R = | sin q cos alpha  cos q cos alpha -sin alpha |        p = | -d sin alpha |
+//!         | sin q sin alpha  cos q sin alpha  cos alpha |            |  d cos alpha |
+//! ```
+//!
+//! | symbol | meaning | unit |
+//! | --- | --- | --- |
+//! | alpha | angle from z(i-1) to z(i) about x(i-1) | rad |
+//! | a | distance from z(i-1) to z(i) along x(i-1) | m |
+//! | d | distance from x(i-1) to x(i) along z(i) | m |
+//! | q | joint angle, from x(i-1) to x(i) about z(i) | rad |
+//! | R, p | frame i seen from frame i-1; p does not depend on q | -, m |
+//!
+//! Source: J. J. Craig, Introduction to Robotics, 3rd ed. 2005, Eq. (3.6); W. Khalil and J.-F. Kleinfinger, 1986.
+//! Cost: sine and cosine of alpha are computed once, here; 24 bytes per joint in `f32`.
+//! Limits: revolute joints only, one branch, fixed base.
+
+use nalgebra::Vector3;
+
+use super::kinematics::JointFrame;
+use crate::real::{Real, abs, is_finite, sin_cos};
+
+/// Where a joint's axis lies, seen from the joint before it (the base for the first).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DenavitHartenberg<T> {
+    /// Twist between the axes, rad.
+    pub alpha: T,
+    /// Length of the common normal, m.
+    pub a: T,
+    /// Offset along the joint's own axis, m.
+    pub d: T,
+}
+
+/// Why a chain cannot be built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChainError {
+    /// A Denavit-Hartenberg number of this joint (counted from 0) is NaN or infinite.
+    NotFinite {
+        /// The joint, from 0.
+        joint: usize,
+    },
+}
+
+/// What of a joint's frame does not depend on its angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Placement<T> {
+    sin_alpha: T,
+    cos_alpha: T,
+    a: T,
+    d: T,
+}
+
+/// A serial chain of `N` revolute joints; every number in it is finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chain<T, const N: usize> {
+    placements: [Placement<T>; N],
+}
+
+impl<T: Real, const N: usize> Chain<T, N> {
+    /// The chain with these numbers, proximal joint first.
+    ///
+    /// A sine or cosine of alpha below four units of rounding is taken for zero: axes meant to be parallel or
+    /// perpendicular are exactly so, and no parameter is seen through the rounding of pi/2.
+    ///
+    /// # Errors
+    /// [`ChainError::NotFinite`] names the first joint with a number that is NaN or infinite.
+    pub fn new(geometry: &[DenavitHartenberg<T>; N]) -> Result<Self, ChainError> {
+        for (joint, numbers) in geometry.iter().enumerate() {
+            if !(is_finite(numbers.alpha) && is_finite(numbers.a) && is_finite(numbers.d)) {
+                return Err(ChainError::NotFinite { joint });
+            }
+        }
+        let exact = |value: T| if abs(value) < T::EPSILON * T::of(4.0) { T::zero() } else { value };
+        let placements = geometry.map(|numbers| {
+            let (sin_alpha, cos_alpha) = sin_cos(numbers.alpha);
+            Placement { sin_alpha: exact(sin_alpha), cos_alpha: exact(cos_alpha), a: numbers.a, d: numbers.d }
+        });
+        Ok(Self { placements })
+    }
+
+    /// The same chain in another precision, each number rounded once.
+    #[must_use]
+    pub fn convert<U: Real>(&self) -> Chain<U, N> {
+        let convert = |value: T| U::of(value.to_double());
+        Chain {
+            placements: self.placements.map(|placement| Placement {
+                sin_alpha: convert(placement.sin_alpha),
+                cos_alpha: convert(placement.cos_alpha),
+                a: convert(placement.a),
+                d: convert(placement.d),
+            }),
+        }
+    }
+
+    /// Numbers of each joint: sine and cosine of alpha, a, d.
+    pub(super) fn numbers(&self) -> [(T, T, T, T); N] {
+        self.placements.map(|placement| (placement.sin_alpha, placement.cos_alpha, placement.a, placement.d))
+    }
+
+    /// Each joint's frame seen from the one before it, at the angles `q` (rad).
+    pub(super) fn frames(&self, q: &[T; N]) -> [JointFrame<T>; N] {
+        core::array::from_fn(|joint| {
+            let placement = self.placements[joint];
+            let (sin_q, cos_q) = sin_cos(q[joint]);
+            JointFrame {
+                sin_alpha: placement.sin_alpha,
+                cos_alpha: placement.cos_alpha,
+                sin_q,
+                cos_q,
+                origin: Vector3::new(
+                    placement.a,
+                    -placement.d * placement.sin_alpha,
+                    placement.d * placement.cos_alpha,
+                ),
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_that_is_not_finite_is_refused_by_joint() {
+        let good = DenavitHartenberg { alpha: 0.0_f32, a: 0.4, d: 0.0 };
+        assert!(Chain::new(&[good, good]).is_ok());
+        for bad in [
+            DenavitHartenberg { alpha: f32::NAN, ..good },
+            DenavitHartenberg { a: f32::INFINITY, ..good },
+            DenavitHartenberg { d: f32::NEG_INFINITY, ..good },
+        ] {
+            assert_eq!(Chain::new(&[good, bad]), Err(ChainError::NotFinite { joint: 1 }));
+        }
+    }
+
+    #[test]
+    fn right_angles_are_exact_in_both_precisions() {
+        let quarter = DenavitHartenberg { alpha: core::f64::consts::FRAC_PI_2, a: 0.0, d: 0.0 };
+        let half = DenavitHartenberg { alpha: core::f64::consts::PI, a: 0.0, d: 0.0 };
+        let reference = Chain::new(&[quarter, half]).unwrap();
+        let single = Chain::new(&[quarter, half].map(|numbers| DenavitHartenberg {
+            alpha: numbers.alpha as f32,
+            a: 0.0_f32,
+            d: 0.0,
+        }));
+        assert_eq!(reference.numbers()[0].1, 0.0);
+        assert_eq!(reference.numbers()[1].0, 0.0);
+        assert_eq!(single, Ok(reference.convert::<f32>()));
+    }
+}

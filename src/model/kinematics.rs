@@ -1,0 +1,126 @@
+//! How a link moves: velocities and accelerations handed from frame to frame.
+//!
+//! Newton-Euler and the regressor need the same three vectors per link, each in the link's own frame; gravity
+//! enters as an upward acceleration of the base.
+//!
+//! ```text
+//! w_i  = R' w + z qd
+//! wd_i = R' wd + (R' w) x z qd + z qdd
+//! a_i  = R' (a + wd x p + w x (w x p))              a_0 = -gravity
+//! ```
+//!
+//! | symbol | meaning | unit |
+//! | --- | --- | --- |
+//! | w, wd | angular velocity and acceleration of the link before | rad/s, rad/s2 |
+//! | a | acceleration of its frame's origin, less gravity | m/s2 |
+//! | R, p | frame i seen from the frame before, see [`super::chain`] | -, m |
+//!
+//! Source: J. Y. S. Luh, M. W. Walker and R. P. C. Paul, 1980; link frames as in Craig 2005, Eqs (6.45)-(6.47).
+//! Cost: about 70 multiplications and additions per link.
+
+use nalgebra::Vector3;
+
+use crate::real::Real;
+
+/// A joint's frame seen from the frame before it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct JointFrame<T> {
+    pub sin_alpha: T,
+    pub cos_alpha: T,
+    pub sin_q: T,
+    pub cos_q: T,
+    /// Origin of the joint's frame, m.
+    pub origin: Vector3<T>,
+}
+
+impl<T: Real> JointFrame<T> {
+    /// A vector given in the joint's frame, in the frame before it: R v = Rx(alpha) Rz(q) v.
+    #[inline]
+    pub fn to_parent(self, v: &Vector3<T>) -> Vector3<T> {
+        let y = self.sin_q * v.x + self.cos_q * v.y;
+        Vector3::new(
+            self.cos_q * v.x - self.sin_q * v.y,
+            self.cos_alpha * y - self.sin_alpha * v.z,
+            self.sin_alpha * y + self.cos_alpha * v.z,
+        )
+    }
+
+    /// A vector given in the frame before, in the joint's frame: R' v.
+    #[inline]
+    pub fn to_child(self, v: &Vector3<T>) -> Vector3<T> {
+        let y = self.cos_alpha * v.y + self.sin_alpha * v.z;
+        Vector3::new(
+            self.cos_q * v.x + self.sin_q * y,
+            self.cos_q * y - self.sin_q * v.x,
+            self.cos_alpha * v.z - self.sin_alpha * v.y,
+        )
+    }
+}
+
+/// Motion of a link in its own frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LinkMotion<T> {
+    /// rad/s.
+    pub angular_velocity: Vector3<T>,
+    /// rad/s2.
+    pub angular_acceleration: Vector3<T>,
+    /// Of the frame's origin, less gravity, m/s2.
+    pub acceleration: Vector3<T>,
+}
+
+impl<T: Real> LinkMotion<T> {
+    /// A base at rest under `gravity` (m/s2, base frame).
+    #[inline]
+    pub fn base(gravity: &Vector3<T>) -> Self {
+        let zero = Vector3::new(T::zero(), T::zero(), T::zero());
+        Self { angular_velocity: zero, angular_acceleration: zero, acceleration: -gravity }
+    }
+
+    /// The next link's motion, across a joint that turns with `qd` (rad/s) and `qdd` (rad/s2).
+    #[inline]
+    pub fn next(&self, frame: JointFrame<T>, qd: T, qdd: T) -> Self {
+        let carried = frame.to_child(&self.angular_velocity);
+        let turned = frame.to_child(&self.angular_acceleration);
+        let at_origin = self.acceleration
+            + self.angular_acceleration.cross(&frame.origin)
+            + self.angular_velocity.cross(&self.angular_velocity.cross(&frame.origin));
+        Self {
+            angular_velocity: Vector3::new(carried.x, carried.y, carried.z + qd),
+            angular_acceleration: Vector3::new(
+                turned.x + carried.y * qd,
+                turned.y - carried.x * qd,
+                turned.z + qdd,
+            ),
+            acceleration: frame.to_child(&at_origin),
+        }
+    }
+}
+
+/// Velocity of a link per unit speed of one joint before it: a column of the link's Jacobian, in the link's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct JointAxis<T> {
+    /// Direction of the joint's axis.
+    pub angular: Vector3<T>,
+    /// Velocity of the frame's origin, m.
+    pub linear: Vector3<T>,
+}
+
+impl<T: Real> JointAxis<T> {
+    /// The link's own joint: it turns about z and leaves the origin where it is.
+    #[inline]
+    pub fn own() -> Self {
+        Self {
+            angular: Vector3::new(T::zero(), T::zero(), T::one()),
+            linear: Vector3::new(T::zero(), T::zero(), T::zero()),
+        }
+    }
+
+    /// The same axis in the frame of the next link.
+    #[inline]
+    pub fn next(&self, frame: JointFrame<T>) -> Self {
+        Self {
+            angular: frame.to_child(&self.angular),
+            linear: frame.to_child(&(self.linear + self.angular.cross(&frame.origin))),
+        }
+    }
+}

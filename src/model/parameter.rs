@@ -1,0 +1,130 @@
+//! The 14 parameters of a joint and their order, fixed once.
+//!
+//! Logs, reports, regressor columns and stored models all use this order, so it never changes.
+
+use crate::real::Real;
+
+/// Parameters of one joint: ten of the link's inertia, rotor inertia, three of friction.
+pub const PARAMETERS_PER_JOINT: usize = 14;
+
+/// The parameters of one joint in the order of [`Parameter`].
+pub type JointParameters<T> = [T; PARAMETERS_PER_JOINT];
+
+/// The parameters of all joints, proximal first.
+pub type LegParameters<T, const N: usize> = [JointParameters<T>; N];
+
+/// What one torque owes to each parameter of each joint: the derivative of the torque by that parameter.
+pub type RegressorRow<T, const N: usize> = [JointParameters<T>; N];
+
+/// One of the parameters of a joint; the discriminant is its place in [`JointParameters`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Parameter {
+    /// Inertia tensor element about the joint frame's origin, integral of (y2 + z2) dm.
+    XX,
+    /// Inertia tensor element, minus the integral of x y dm.
+    XY,
+    /// Inertia tensor element, minus the integral of x z dm.
+    XZ,
+    /// Inertia tensor element, integral of (x2 + z2) dm.
+    YY,
+    /// Inertia tensor element, minus the integral of y z dm.
+    YZ,
+    /// Inertia tensor element, integral of (x2 + y2) dm.
+    ZZ,
+    /// First moment of mass along x.
+    HX,
+    /// First moment of mass along y.
+    HY,
+    /// First moment of mass along z.
+    HZ,
+    /// Mass.
+    M,
+    /// Rotor inertia seen at the joint (rotor inertia times gear ratio squared).
+    IA,
+    /// Coulomb friction.
+    FC,
+    /// Viscous friction.
+    FV,
+    /// Torque offset: a constant of the current measurement or of the friction.
+    OFF,
+}
+
+impl Parameter {
+    /// All of them, in order.
+    pub const ALL: [Self; PARAMETERS_PER_JOINT] = [
+        Self::XX,
+        Self::XY,
+        Self::XZ,
+        Self::YY,
+        Self::YZ,
+        Self::ZZ,
+        Self::HX,
+        Self::HY,
+        Self::HZ,
+        Self::M,
+        Self::IA,
+        Self::FC,
+        Self::FV,
+        Self::OFF,
+    ];
+
+    /// Place in [`JointParameters`], 0..14.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+
+    /// The symbol used in reports and files.
+    #[must_use]
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::XX => "XX",
+            Self::XY => "XY",
+            Self::XZ => "XZ",
+            Self::YY => "YY",
+            Self::YZ => "YZ",
+            Self::ZZ => "ZZ",
+            Self::HX => "HX",
+            Self::HY => "HY",
+            Self::HZ => "HZ",
+            Self::M => "M",
+            Self::IA => "IA",
+            Self::FC => "FC",
+            Self::FV => "FV",
+            Self::OFF => "OFF",
+        }
+    }
+
+    /// The unit, in ASCII.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::XX | Self::XY | Self::XZ | Self::YY | Self::YZ | Self::ZZ | Self::IA => "kg m2",
+            Self::HX | Self::HY | Self::HZ => "kg m",
+            Self::M => "kg",
+            Self::FC | Self::OFF => "N m",
+            Self::FV => "N m s/rad",
+        }
+    }
+}
+
+/// Parameters from double precision, each rounded once.
+#[must_use]
+pub fn rounded<T: Real, const N: usize>(parameters: &LegParameters<f64, N>) -> LegParameters<T, N> {
+    parameters.map(|joint| joint.map(T::of))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_parameter_stands_where_its_index_says() {
+        for (place, parameter) in Parameter::ALL.iter().enumerate() {
+            assert_eq!(parameter.index(), place);
+        }
+        let symbols = ["XX", "XY", "XZ", "YY", "YZ", "ZZ", "HX", "HY", "HZ", "M", "IA", "FC", "FV", "OFF"];
+        assert_eq!(Parameter::ALL.map(Parameter::symbol), symbols);
+    }
+}
