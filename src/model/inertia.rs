@@ -108,3 +108,76 @@ pub(super) fn first_moment<T: Real>(parameters: &JointParameters<T>) -> Vector3<
         parameters[Parameter::HZ.index()],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::Dice;
+    use super::*;
+
+    /// Ten parameters of point masses by their definition, the integrals as sums.
+    fn cloud(points: &[(f64, Vector3<f64>)]) -> InertialParameters<f64> {
+        let sum =
+            |of: &dyn Fn(&Vector3<f64>) -> f64| points.iter().map(|(mass, place)| mass * of(place)).sum();
+        [
+            sum(&|p| p.y * p.y + p.z * p.z),
+            sum(&|p| -p.x * p.y),
+            sum(&|p| -p.x * p.z),
+            sum(&|p| p.x * p.x + p.z * p.z),
+            sum(&|p| -p.y * p.z),
+            sum(&|p| p.x * p.x + p.y * p.y),
+            sum(&|p| p.x),
+            sum(&|p| p.y),
+            sum(&|p| p.z),
+            sum(&|_| 1.0),
+        ]
+    }
+
+    fn points(seed: u64) -> [(f64, Vector3<f64>); 12] {
+        let mut dice = Dice::new(seed);
+        [(); 12].map(|()| {
+            let place = Vector3::new(0.3 + dice.within(0.2), dice.within(0.2), dice.within(0.1));
+            (0.5 + dice.within(0.4), place)
+        })
+    }
+
+    #[test]
+    fn parallel_axis_moves_inertia_as_a_cloud_of_points_does() {
+        for seed in 31..41 {
+            let points = points(seed);
+            let about_origin = cloud(&points);
+            let mass = about_origin[9];
+            let centre = Vector3::new(about_origin[6], about_origin[7], about_origin[8]) / mass;
+            let centred = cloud(&points.map(|(mass, place)| (mass, place - centre)));
+            let [xx, xy, xz, yy, yz, zz, ..] = centred;
+            let body = RigidBody {
+                mass,
+                centre_of_mass: centre,
+                inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
+            };
+            for (found, expected) in body.to_parameters().iter().zip(&about_origin) {
+                // Sums of twelve numbers up to 3, rounded in another order.
+                assert!((found - expected).abs() < 1e-14, "{found} against {expected}");
+            }
+            let back = RigidBody::from_parameters(&about_origin).unwrap();
+            assert!((back.inertia - body.inertia).abs().max() < 1e-14);
+            assert!((back.centre_of_mass - centre).abs().max() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_body_without_mass_has_no_centre() {
+        let mut parameters = cloud(&points(41));
+        for mass in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            parameters[9] = mass;
+            assert_eq!(RigidBody::from_parameters(&parameters), None);
+        }
+    }
+
+    #[test]
+    fn a_joint_is_its_link_and_its_drive() {
+        let link = cloud(&points(42));
+        let parameters = joint(&link, &[0.1, 3.0, 1.2, 0.5]);
+        assert_eq!(inertial(&parameters), link);
+        assert_eq!(parameters[Parameter::IA.index()..], [0.1, 3.0, 1.2, 0.5]);
+    }
+}

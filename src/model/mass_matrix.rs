@@ -54,3 +54,54 @@ pub fn mass_matrix<T: Real, const N: usize>(
     }
     matrix
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{SVector, Vector3};
+
+    use super::super::newton_euler::{JointState, joint_torques};
+    use super::super::parameter::rounded;
+    use super::super::testing::{Dice, rounded_state};
+    use super::*;
+
+    /// Greatest difference between M qdd and the torque that acceleration adds, over the greatest such torque.
+    fn inconsistency<T: Real>(seed: u64) -> f64 {
+        let mut dice = Dice::new(seed);
+        let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+        for _ in 0..50 {
+            let (chain, leg) = (dice.chain::<3>().convert::<T>(), rounded(&dice.leg()));
+            let state: JointState<T, 3> = rounded_state(&JointState { qd: [0.0; 3], ..dice.state() });
+            let resting = JointState::at_rest(state.q);
+            let weightless = Vector3::zeros();
+            let moving = joint_torques(&chain, &leg, &state, &weightless);
+            let still = joint_torques(&chain, &leg, &resting, &weightless);
+            let added = mass_matrix(&chain, &leg, &state.q) * SVector::from(state.qdd);
+            for joint in 0..3 {
+                worst = worst.max((added[joint] + still[joint] - moving[joint]).to_double().abs());
+                largest = largest.max(moving[joint].to_double().abs());
+            }
+        }
+        worst / largest
+    }
+
+    #[test]
+    fn mass_matrix_times_acceleration_is_the_torque_of_acceleration() {
+        // Three frames and three products of rounding.
+        let (double, single) = (inconsistency::<f64>(61), inconsistency::<f32>(62));
+        assert!(double < 1e-14 && single < 3e-6, "{double:e} {single:e}");
+    }
+
+    #[test]
+    fn mass_matrix_of_bodies_is_symmetric_and_positive_definite() {
+        let mut dice = Dice::new(63);
+        for _ in 0..100 {
+            let (chain, leg) = (dice.chain::<3>(), dice.leg());
+            let matrix = mass_matrix(&chain, &leg, &dice.state().q);
+            assert_eq!(matrix, matrix.transpose());
+            let smallest_rotor =
+                leg.iter().map(|joint| joint[Parameter::IA.index()]).fold(f64::MAX, f64::min);
+            // Links add to the rotors' diagonal a positive semidefinite matrix; rounding of entries up to 50.
+            assert!(matrix.symmetric_eigenvalues().min() > smallest_rotor - 1e-13);
+        }
+    }
+}

@@ -68,3 +68,75 @@ pub fn regroup<T: Real, const N: usize>(
     }
     grouped
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::newton_euler::joint_torques;
+    use super::super::super::testing::Dice;
+    use super::*;
+
+    /// Greatest change of torque over random legs and motions when the parameters are changed so, N m.
+    fn torque_change<const N: usize>(
+        seed: u64,
+        change: impl Fn(&Chain<f64, N>, &LegParameters<f64, N>) -> LegParameters<f64, N>,
+    ) -> f64 {
+        let mut dice = Dice::new(seed);
+        let mut worst = 0.0_f64;
+        for _ in 0..100 {
+            let (chain, leg) = (dice.chain::<N>(), dice.leg::<N>());
+            let changed = change(&chain, &leg);
+            let (state, gravity) = (dice.state(), dice.gravity());
+            let before = joint_torques(&chain, &leg, &state, &gravity);
+            let after = joint_torques(&chain, &changed, &state, &gravity);
+            for joint in 0..N {
+                worst = worst.max((before[joint] - after[joint]).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn regrouping_leaves_the_torque_unchanged() {
+        // Torques reach 1e3 N m on these legs: a few units in their last place.
+        let changes = [
+            torque_change::<1>(71, regroup),
+            torque_change::<2>(72, regroup),
+            torque_change::<3>(73, regroup),
+            torque_change::<4>(74, regroup),
+        ];
+        assert!(changes.iter().all(|change| *change < 5e-12), "{changes:?}");
+    }
+
+    #[test]
+    fn regrouping_leaves_as_many_inertial_parameters_as_the_rank() {
+        let mut dice = Dice::new(75);
+        let grouped = regroup(&dice.chain::<3>(), &dice.leg());
+        let inertial = |joint: &[f64; 14]| joint[..11].iter().filter(|value| **value != 0.0).count();
+        // ZZ HX HY of the first link, seven of every other, rotors of all but the first.
+        assert_eq!(grouped.map(|joint| inertial(&joint)), [3, 8, 8]);
+    }
+
+    #[test]
+    fn the_printed_sign_of_equation_ten_changes_the_torque() {
+        let change = torque_change::<3>(73, |chain, leg| {
+            let mut printed = regroup(chain, leg);
+            let (_, cos_alpha, a, d) = chain.numbers()[2];
+            let moved = leg[2][Parameter::HZ.index()] + d * leg[2][Parameter::M.index()];
+            printed[1][Parameter::XZ.index()] += 2.0 * a * cos_alpha * moved;
+            printed
+        });
+        assert!(change > 1.0, "{change}");
+    }
+
+    #[test]
+    fn the_printed_factor_two_d_mass_changes_the_torque() {
+        let change = torque_change::<3>(73, |chain, leg| {
+            let mut printed = regroup(chain, leg);
+            let (_, _, _, d) = chain.numbers()[2];
+            let mass = leg[2][Parameter::M.index()];
+            printed[1][Parameter::XX.index()] += (2.0 * d - d * d) * mass;
+            printed
+        });
+        assert!(change > 1.0, "{change}");
+    }
+}
