@@ -1,0 +1,259 @@
+//! The shared frame of whiskers: orthonormal directions in metric coordinates, and what was smelled along them.
+//!
+//! Why: one beetle with two whiskers learns where the food is along one line. If the best beetles' whiskers point
+//! in orthonormal directions, each parabola gives one coordinate of the food, and together they give it to every
+//! beetle. This sharing is what the adaptive mode lives on.
+//!
+//! Along direction j, with f_0 at beetle j and f_r, f_l at its whiskers l away (l in metric coordinates):
+//!   g = (f_r - f_l) / (2 l),   h = (f_r - 2 f_0 + f_l) / l^2
+//!   s = -g / h where h > 0, else -sgn(g) times the usual whisker;   |s| <= step limit / |A z_j|
+//! For beetle i at metric coordinates y_i the food is q_ij = s_j - z_j.(y_i - y_j) away along z_j.
+//! Symbols: z_j unit vector, d_j = A z_j its image in box coordinates, y_j metric coordinates of beetle j.
+//!
+//! Source: own experiments; one parabola per direction is Newton's step in the subspace of the frame.
+//! Cost: per direction one or two products with the metric (2 D^2 each) and 4 D j operations of Gram-Schmidt,
+//! repeated per draw, at most 8 draws; memory N (2 D + 6) scalars.
+
+use crate::real::{Real, abs, clamp, is_finite, min, sign, sqrt};
+
+use super::super::random::Random;
+use super::super::rows::{add_scaled, dot, live, live_mut, scale};
+use super::super::search::is_usable;
+use super::metric::Metric;
+
+/// Draws per direction before a coordinate axis is taken.
+const DRAWS: u32 = 8;
+/// A direction whose part outside the frame is shorter than this share of it is drawn again.
+const LEAST_REMAINDER: f64 = 1e-2;
+/// A vector shorter than this has no direction.
+const LEAST_LENGTH: f64 = 1e-18;
+/// Curvature above minus this share of |f| / l^2 is rounding and counts as convex.
+const CURVATURE_ROUNDING: f64 = 1e-6;
+
+/// One direction of the frame and what its beetle smelled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Whisker<T> {
+    /// |d_j|: box length of a metric step of 1.
+    pub box_length: T,
+    /// l, metric coordinates.
+    pub length: T,
+    /// z_j . y_j.
+    pub coordinate: T,
+    /// `None` until both whiskers were read, and where a value was not finite.
+    pub reading: Option<Reading<T>>,
+}
+
+/// The parabola through a beetle and its two whiskers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Reading<T> {
+    /// g.
+    pub slope: T,
+    /// h.
+    pub curvature: T,
+    /// s, from the beetle to the food.
+    pub step: T,
+    /// Curved upwards, or flat within rounding.
+    pub convex: bool,
+}
+
+/// The directions of up to N beetles.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Frame<T, const N: usize, const D: usize> {
+    dimension: usize,
+    /// z_j, orthonormal, metric coordinates.
+    pub direction: [[T; D]; N],
+    /// d_j = A z_j, box coordinates.
+    pub displacement: [[T; D]; N],
+    pub whisker: [Whisker<T>; N],
+}
+
+impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
+    pub fn new(dimension: usize) -> Self {
+        let blind = Whisker { box_length: T::one(), length: T::one(), coordinate: T::zero(), reading: None };
+        Self {
+            dimension,
+            direction: [[T::zero(); D]; N],
+            displacement: [[T::zero(); D]; N],
+            whisker: [blind; N],
+        }
+    }
+
+    /// Directions in use: one per beetle, never more than an orthonormal frame can have.
+    pub fn count(&self) -> usize {
+        self.dimension.min(N)
+    }
+
+    /// Points direction `index` along `wish` (metric coordinates) as far as it is orthogonal to the earlier ones;
+    /// otherwise along something random, at the very last along a coordinate axis.
+    ///
+    /// Whisker length is the usual one, `usual_length`, where that stays within `step_limit` of box.
+    pub fn aim(
+        &mut self,
+        index: usize,
+        wish: Option<[T; D]>,
+        beetle: &[T; D],
+        metric: &Metric<T, D>,
+        usual_length: T,
+        step_limit: T,
+        random: &mut Random,
+    ) {
+        let index = index.min(N - 1);
+        let direction = self.new_direction(index, wish, random);
+        let displacement = metric.to_box(&direction);
+        let box_length = sqrt(dot(live(&displacement, self.dimension), live(&displacement, self.dimension)));
+        let coordinate =
+            dot(live(&direction, self.dimension), live(&metric.to_metric(beetle), self.dimension));
+        self.direction[index] = direction;
+        self.displacement[index] = displacement;
+        self.whisker[index] = Whisker {
+            box_length,
+            length: min(usual_length, step_limit / box_length),
+            coordinate,
+            reading: None,
+        };
+    }
+
+    fn new_direction(&self, index: usize, wish: Option<[T; D]>, random: &mut Random) -> [T; D] {
+        let mut wish = wish;
+        for _ in 0..DRAWS {
+            let candidate = wish.take().unwrap_or_else(|| self.draw(random));
+            if let Some(direction) = self.complement(index, candidate) {
+                return direction;
+            }
+        }
+        // Of D axes, fewer than D directions leave at least one with a remainder of 1 / sqrt(D).
+        for axis in 0..self.dimension.min(D) {
+            let mut candidate = [T::zero(); D];
+            candidate[axis] = T::one();
+            if let Some(direction) = self.complement(index, candidate) {
+                return direction;
+            }
+        }
+        [T::zero(); D]
+    }
+
+    fn draw(&self, random: &mut Random) -> [T; D] {
+        let mut candidate = [T::zero(); D];
+        for entry in live_mut(&mut candidate, self.dimension) {
+            *entry = random.bell();
+        }
+        candidate
+    }
+
+    /// The unit vector along the part of a candidate that is orthogonal to the first `index` directions;
+    /// `None` where too little is left.
+    fn complement(&self, index: usize, mut candidate: [T; D]) -> Option<[T; D]> {
+        let rest = live_mut(&mut candidate, self.dimension);
+        let length = sqrt(dot(rest, rest));
+        if !(length >= T::of(LEAST_LENGTH)) {
+            return None;
+        }
+        scale(rest, T::one() / length);
+        for earlier in self.direction.iter().take(index) {
+            let earlier = live(earlier, self.dimension);
+            let along = dot(rest, earlier);
+            add_scaled(rest, -along, earlier);
+        }
+        let remainder = sqrt(dot(rest, rest));
+        if !(remainder >= T::of(LEAST_REMAINDER)) {
+            return None;
+        }
+        scale(rest, T::one() / remainder);
+        Some(candidate)
+    }
+
+    /// Fits the parabola of direction `index` through the values at the beetle and at its whiskers.
+    ///
+    /// A value that is not finite leaves no reading: the direction then moves nobody and teaches nothing.
+    pub fn read(&mut self, index: usize, centre: T, right: T, left: T, usual_length: T, step_limit: T) {
+        let whisker = &mut self.whisker[index.min(N - 1)];
+        whisker.reading = None;
+        if !(is_usable(centre) && is_usable(right) && is_usable(left)) {
+            return;
+        }
+        let square = whisker.length * whisker.length;
+        let slope = (right - left) / (whisker.length + whisker.length);
+        let curvature = ((right - centre) - (centre - left)) / square;
+        if !(is_finite(slope) && is_finite(curvature)) {
+            return;
+        }
+        let step = if curvature > T::zero() { -slope / curvature } else { -sign(slope) * usual_length };
+        let longest = step_limit / whisker.box_length;
+        whisker.reading = Some(Reading {
+            slope,
+            curvature,
+            step: clamp(step, -longest, longest),
+            convex: curvature > -T::of(CURVATURE_ROUNDING) * abs(centre) / square || curvature > T::zero(),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const N: usize = 6;
+    const D: usize = 9;
+
+    fn frame_of(dimension: usize, wish: Option<[f64; D]>) -> (Frame<f64, N, D>, Metric<f64, D>) {
+        let mut random = Random::new(4);
+        let mut metric = Metric::identity(dimension);
+        let mut frame = Frame::new(dimension);
+        frame.aim(0, None, &[0.5; D], &metric, 0.1, 0.5, &mut random);
+        metric.stretch(&frame.direction[0], &frame.displacement[0], 4.0);
+        for index in 0..frame.count() {
+            frame.aim(index, wish, &[0.5; D], &metric, 0.1, 0.5, &mut random);
+        }
+        (frame, metric)
+    }
+
+    #[test]
+    fn directions_are_orthonormal_whatever_is_wished() {
+        for dimension in [1, 2, 5, D] {
+            for wish in [None, Some([1.0; D]), Some([0.0; D]), Some([f64::NAN; D]), Some([1e200; D])] {
+                let (frame, metric) = frame_of(dimension, wish);
+                for one in 0..frame.count() {
+                    for other in 0..=one {
+                        let product = dot(&frame.direction[one], &frame.direction[other]);
+                        let expected = if one == other { 1.0 } else { 0.0 };
+                        // one pass of Gram-Schmidt with a remainder of at least 1e-2: 1e2 roundings
+                        assert!(abs(product - expected) < 1e-12, "{dimension} {wish:?}: {product}");
+                    }
+                    assert_eq!(frame.displacement[one], metric.to_box(&frame.direction[one]));
+                    assert!(frame.whisker[one].length * frame.whisker[one].box_length <= 0.5 + 1e-15);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_parabola_gives_its_own_minimum() {
+        let (mut frame, _) = frame_of(4, None);
+        let length = frame.whisker[1].length;
+        let cost = |x: f64| 3.0 * (x - 0.02) * (x - 0.02) + 7.0;
+        frame.read(1, cost(0.0), cost(length), cost(-length), 0.1, 0.5);
+        let reading = frame.whisker[1].reading.expect("all values are finite");
+        // values around 7 leave 1e-15 of rounding, divided by l^2 h = 0.06
+        assert!(abs(reading.step - 0.02) < 1e-13 && abs(reading.curvature - 6.0) < 1e-11);
+        assert!(reading.convex);
+    }
+
+    #[test]
+    fn downhill_by_a_usual_whisker_where_the_cost_is_concave() {
+        let (mut frame, _) = frame_of(4, None);
+        frame.read(2, 1.0, 0.2, 0.4, 0.1, 0.5);
+        let reading = frame.whisker[2].reading.expect("all values are finite");
+        assert_eq!(reading.step, 0.1);
+        assert!(!reading.convex);
+    }
+
+    #[test]
+    fn what_is_not_finite_leaves_no_reading() {
+        let (mut frame, _) = frame_of(4, None);
+        for (centre, right, left) in [(f64::MAX, 1.0, 1.0), (1.0, f64::MAX, 2.0), (1e308, -1e308, 1e308)] {
+            frame.read(0, 1.0, 2.0, 2.0, 0.1, 0.5);
+            frame.read(0, centre, right, left, 0.1, 0.5);
+            assert_eq!(frame.whisker[0].reading, None);
+        }
+    }
+}

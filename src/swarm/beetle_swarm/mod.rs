@@ -1,0 +1,214 @@
+//! Beetle swarm search: particles with two whiskers each, in the paper's mode or, by default, the adaptive one.
+//!
+//! Why one type for both: swarm, whiskers, moves, budget and ledger are the same; a mode decides only where the
+//! whiskers point and what a beetle makes of their smell. One evaluation at a time is asked for and answered, so a
+//! run can be cut or cancelled anywhere, inside an iteration too:
+//!
+//! ```text
+//! Place 0..N --> [ Right 0, Left 0, Right 1, Left 1, ... --> Move 0..N ] --> next iteration
+//!     ^                                                                         |
+//!     +------------------------- no progress: scatter anew ---------------------+
+//! ```
+//!
+//! Memory: about 3 N D + 2 D^2 + 2 N D + 3 D + 11 N scalars (2 N D is the frame, of which min(N, D) rows are used).
+//! `size_of::<Bso<f32, 20, 13>>()` is 8,196 bytes and `size_of::<Bso<f32, 20, 28>>()` 18,804. [`Bso::new`] returns
+//! the value, and building it moves it: give `new` a stack of twice the size, or a static place and an early call.
+//! Cost: adaptive.rs, paper.rs. The longest piece of work between two evaluations is the end of an adaptive
+//! iteration, 6 D^2 min(N, D) operations (94,000 at D = 28).
+
+mod adaptive;
+mod frame;
+mod metric;
+mod paper;
+mod rules;
+mod settings;
+
+use crate::real::Real;
+
+use super::objective::{Objective, SwarmError};
+use super::particles::Particles;
+use super::random::Random;
+use super::search::{Best, Ledger, Search};
+use adaptive::AdaptiveRules;
+use paper::PaperRules;
+use rules::{Opening, Rules, Side};
+pub use settings::{AdaptiveSettings, BsoSettings, PaperSettings};
+
+/// Beetle swarm of `N` beetles (at least 2) with room for `D` coordinates.
+///
+/// ```
+/// use scarab::swarm::{Bso, BsoSettings, TestFunction, TestProblem};
+///
+/// let cost = TestProblem::new(TestFunction::Sphere, 13);
+/// let mut swarm = Bso::<f32, 20, 13>::new(&cost, BsoSettings::default(), 1)?;
+/// while swarm.iterations() < 40 {
+///     swarm.advance(&cost, 7);
+/// }
+/// assert!(swarm.best().is_some_and(|best| best.value < 0.1));
+/// # Ok::<(), scarab::swarm::SwarmError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bso<T: Real, const N: usize, const D: usize> {
+    swarm: Swarm<T, N, D>,
+    mode: Mode<T, N, D>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "without a heap the larger mode decides the size of both")]
+enum Mode<T: Real, const N: usize, const D: usize> {
+    Adaptive(AdaptiveRules<T, N, D>),
+    Paper(PaperRules<T, N>),
+}
+
+impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
+    /// A swarm scattered over the objective's box; nothing is evaluated yet.
+    pub fn new(
+        objective: &impl Objective<T>,
+        settings: BsoSettings<T>,
+        seed: u64,
+    ) -> Result<Self, SwarmError> {
+        let ledger = Ledger::open(objective)?;
+        let mode = match settings {
+            BsoSettings::Adaptive(settings) => {
+                settings.check()?;
+                Mode::Adaptive(AdaptiveRules::new(settings, ledger.dimension()))
+            }
+            BsoSettings::Paper(settings) => {
+                settings.check()?;
+                Mode::Paper(PaperRules::new(settings))
+            }
+        };
+        Ok(Self { swarm: Swarm::new(ledger, seed), mode })
+    }
+
+    /// Spends `evaluations` of the objective and returns how many were spent: all of them, or none where the
+    /// objective's dimension is not the one the swarm began with. Slicing never changes the result.
+    pub fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32 {
+        if !self.swarm.ledger.accepts(objective) {
+            return 0;
+        }
+        match &mut self.mode {
+            Mode::Adaptive(rules) => self.swarm.advance(rules, objective, evaluations),
+            Mode::Paper(rules) => self.swarm.advance(rules, objective, evaluations),
+        }
+        evaluations
+    }
+
+    /// The best of all evaluations so far, restarts included; `None` while no finite cost was seen.
+    #[must_use]
+    pub fn best(&self) -> Option<Best<'_, T>> {
+        self.swarm.ledger.best()
+    }
+
+    /// Completed iterations; placing the scattered swarm is iteration 0.
+    #[must_use]
+    pub fn iterations(&self) -> u32 {
+        self.swarm.ledger.iterations()
+    }
+
+    /// Evaluations so far, whiskers and restarts counted.
+    #[must_use]
+    pub fn evaluations(&self) -> u32 {
+        self.swarm.ledger.evaluations()
+    }
+}
+
+impl<T: Real, const N: usize, const D: usize> Search<T> for Bso<T, N, D> {
+    fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32 {
+        Self::advance(self, objective, evaluations)
+    }
+    fn best(&self) -> Option<Best<'_, T>> {
+        Self::best(self)
+    }
+    fn iterations(&self) -> u32 {
+        Self::iterations(self)
+    }
+    fn evaluations(&self) -> u32 {
+        Self::evaluations(self)
+    }
+}
+
+/// What is evaluated next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage<T> {
+    Place { beetle: usize },
+    Right { beetle: usize },
+    Left { beetle: usize, right: T },
+    Move { beetle: usize },
+}
+
+/// The part that is the same in both modes.
+#[derive(Clone, Debug, PartialEq)]
+struct Swarm<T, const N: usize, const D: usize> {
+    ledger: Ledger<T, D>,
+    random: Random,
+    beetles: Particles<T, N, D>,
+    /// Values found by the moves of the running iteration.
+    found: [T; N],
+    stage: Stage<T>,
+}
+
+impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
+    fn new(ledger: Ledger<T, D>, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let mut beetles = Particles::new(ledger.dimension());
+        beetles.scatter(&mut random);
+        Self { ledger, random, beetles, found: [T::zero(); N], stage: Stage::Place { beetle: 0 } }
+    }
+
+    fn advance(&mut self, rules: &mut impl Rules<T, N, D>, objective: &impl Objective<T>, evaluations: u32) {
+        for _ in 0..evaluations {
+            self.step(rules, objective);
+        }
+    }
+
+    /// One evaluation and everything that follows from it.
+    fn step(&mut self, rules: &mut impl Rules<T, N, D>, objective: &impl Objective<T>) {
+        self.stage = match self.stage {
+            Stage::Place { beetle } => {
+                let beetle = beetle.min(N - 1);
+                let value = self.ledger.evaluate(objective, &self.beetles.position[beetle]);
+                self.beetles.record(beetle, value);
+                if beetle + 1 < N { Stage::Place { beetle: beetle + 1 } } else { self.open(rules) }
+            }
+            Stage::Right { beetle } => {
+                rules.aim(beetle, &self.beetles, &mut self.random);
+                let tip = rules.tip(beetle, Side::Right, &self.beetles);
+                Stage::Left { beetle, right: self.ledger.evaluate(objective, &tip) }
+            }
+            Stage::Left { beetle, right } => {
+                let tip = rules.tip(beetle, Side::Left, &self.beetles);
+                let left = self.ledger.evaluate(objective, &tip);
+                rules.smell(beetle, &self.beetles, right, left);
+                if beetle + 1 < rules.whiskered() {
+                    Stage::Right { beetle: beetle + 1 }
+                } else {
+                    Stage::Move { beetle: 0 }
+                }
+            }
+            Stage::Move { beetle } => {
+                let beetle = beetle.min(N - 1);
+                rules.displace(beetle, &mut self.beetles, &mut self.random);
+                self.found[beetle] = self.ledger.evaluate(objective, &self.beetles.position[beetle]);
+                if beetle + 1 < N {
+                    Stage::Move { beetle: beetle + 1 }
+                } else {
+                    rules.close(&mut self.beetles, &self.found);
+                    self.ledger.close_iteration();
+                    self.open(rules)
+                }
+            }
+        };
+    }
+
+    /// Begins an iteration, or scatters the swarm where the rules have given up.
+    fn open(&mut self, rules: &mut impl Rules<T, N, D>) -> Stage<T> {
+        match rules.open(&mut self.beetles) {
+            Opening::Search => Stage::Right { beetle: 0 },
+            Opening::Scatter => {
+                self.beetles.scatter(&mut self.random);
+                Stage::Place { beetle: 0 }
+            }
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The two ways of a beetle swarm and their constants.
+//!
+//! Why so few are settings: one set of constants serves every function, every dimension and every identification
+//! problem; what the ablations varied can be set, everything else is a constant beside the code that uses it.
+
+use crate::real::{Real, is_finite};
+
+use super::super::objective::SwarmError;
+use super::super::particles::InertiaWeight;
+
+/// Which rules the beetles follow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BsoSettings<T> {
+    /// Shared whisker frame, learned metric, retreat, restart: the default.
+    Adaptive(AdaptiveSettings<T>),
+    /// Eqs (19)-(29) of the paper as printed, (29) corrected; kept for comparison.
+    Paper(PaperSettings<T>),
+}
+
+impl<T: Real> Default for BsoSettings<T> {
+    fn default() -> Self {
+        Self::Adaptive(AdaptiveSettings::default())
+    }
+}
+
+impl<T: Real> BsoSettings<T> {
+    /// The paper's rules with the paper's constants.
+    #[must_use]
+    pub fn paper() -> Self {
+        Self::Paper(PaperSettings::default())
+    }
+}
+
+/// Constants of the adaptive mode. All lengths are shares of the box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AdaptiveSettings<T> {
+    /// w of Eq. (19); default 0.8.
+    pub inertia_weight: T,
+    /// c1, pull towards the beetle's own best; default 1.4.
+    pub individual_learning: T,
+    /// c2, pull towards the swarm's best; default 1.4.
+    pub global_learning: T,
+    /// Largest speed per coordinate and iteration; default 0.2.
+    pub velocity_limit: T,
+    /// lambda of Eq. (29), share of the velocity in a move; default 0.2. With 0.4 the tails get longer.
+    pub velocity_share: T,
+    /// Longest whisker and longest step along one direction of the frame; default 0.5.
+    pub step_limit: T,
+    /// Directions of the frame (after the gradient's) that join two personal bests; default 12.
+    pub pair_directions: usize,
+    /// Iterations without progress after which the swarm is scattered anew; default 25, at least 1.
+    pub patience: u32,
+}
+
+impl<T: Real> Default for AdaptiveSettings<T> {
+    fn default() -> Self {
+        Self {
+            inertia_weight: T::of(0.8),
+            individual_learning: T::of(1.4),
+            global_learning: T::of(1.4),
+            velocity_limit: T::of(0.2),
+            velocity_share: T::of(0.2),
+            step_limit: T::of(0.5),
+            pair_directions: 12,
+            patience: 25,
+        }
+    }
+}
+
+impl<T: Real> AdaptiveSettings<T> {
+    pub(super) fn check(&self) -> Result<(), SwarmError> {
+        not_negative("inertia_weight", self.inertia_weight)?;
+        not_negative("individual_learning", self.individual_learning)?;
+        not_negative("global_learning", self.global_learning)?;
+        not_negative("velocity_limit", self.velocity_limit)?;
+        not_negative("velocity_share", self.velocity_share)?;
+        positive("step_limit", self.step_limit)?;
+        if self.patience == 0 { Err(SwarmError::Setting("patience")) } else { Ok(()) }
+    }
+}
+
+/// Constants of the paper's mode (its section 4.1). Lengths are shares of the box; a whisker and a step are also
+/// multiplied by the velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PaperSettings<T> {
+    /// w of Eqs (19), (20); default 0.8 throughout.
+    pub inertia_weight: InertiaWeight<T>,
+    /// c1 of Eq. (19); default 1.4.
+    pub individual_learning: T,
+    /// c2 of Eq. (19); default 1.4.
+    pub global_learning: T,
+    /// Largest speed per coordinate and iteration; demanded but not given by the paper; default 0.2.
+    pub velocity_limit: T,
+    /// lambda of Eq. (29), share of the velocity in a move; not given by the paper; default 0.4.
+    pub velocity_share: T,
+    /// delta at the first iteration; default 1.
+    pub first_step: T,
+    /// e1 of Eq. (25), factor on delta per iteration; default 0.95.
+    pub step_decay: T,
+    /// e0 of Eq. (25), added to delta per iteration; default 0.005.
+    pub step_offset: T,
+    /// e2 of Eq. (26), delta over whisker length; default 10, not zero.
+    pub step_per_whisker: T,
+}
+
+impl<T: Real> Default for PaperSettings<T> {
+    fn default() -> Self {
+        Self {
+            inertia_weight: InertiaWeight::constant(T::of(0.8)),
+            individual_learning: T::of(1.4),
+            global_learning: T::of(1.4),
+            velocity_limit: T::of(0.2),
+            velocity_share: T::of(0.4),
+            first_step: T::one(),
+            step_decay: T::of(0.95),
+            step_offset: T::of(0.005),
+            step_per_whisker: T::of(10.0),
+        }
+    }
+}
+
+impl<T: Real> PaperSettings<T> {
+    pub(super) fn check(&self) -> Result<(), SwarmError> {
+        not_negative("inertia_weight", self.inertia_weight.first)?;
+        not_negative("inertia_weight", self.inertia_weight.last)?;
+        not_negative("individual_learning", self.individual_learning)?;
+        not_negative("global_learning", self.global_learning)?;
+        not_negative("velocity_limit", self.velocity_limit)?;
+        not_negative("velocity_share", self.velocity_share)?;
+        not_negative("first_step", self.first_step)?;
+        not_negative("step_decay", self.step_decay)?;
+        not_negative("step_offset", self.step_offset)?;
+        positive("step_per_whisker", self.step_per_whisker)
+    }
+}
+
+fn not_negative<T: Real>(name: &'static str, value: T) -> Result<(), SwarmError> {
+    if value >= T::zero() && is_finite(value) { Ok(()) } else { Err(SwarmError::Setting(name)) }
+}
+
+fn positive<T: Real>(name: &'static str, value: T) -> Result<(), SwarmError> {
+    if value > T::zero() && is_finite(value) { Ok(()) } else { Err(SwarmError::Setting(name)) }
+}

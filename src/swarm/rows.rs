@@ -1,0 +1,74 @@
+//! Flat row arithmetic of the searches: the live part of a row, dot product, row plus a multiple of another.
+//!
+//! Why not matrices of the linear algebra library: the dimension is known at run time only and is usually below
+//! the capacity; loops over the live part cost what the problem costs, not what the capacity would.
+
+use crate::real::{Real, clamp};
+
+/// The first `dimension` entries of a row (all of it, should the dimension exceed it).
+pub(super) fn live<T, const D: usize>(row: &[T; D], dimension: usize) -> &[T] {
+    &row[..dimension.min(D)]
+}
+
+/// The same, to be changed.
+pub(super) fn live_mut<T, const D: usize>(row: &mut [T; D], dimension: usize) -> &mut [T] {
+    &mut row[..dimension.min(D)]
+}
+
+/// Sum of products.
+pub(super) fn dot<T: Real>(one: &[T], other: &[T]) -> T {
+    one.iter().zip(other).fold(T::zero(), |sum, (&a, &b)| sum + a * b)
+}
+
+/// `target += factor * row`.
+pub(super) fn add_scaled<T: Real>(target: &mut [T], factor: T, row: &[T]) {
+    for (entry, &value) in target.iter_mut().zip(row) {
+        *entry += factor * value;
+    }
+}
+
+/// `row *= factor`.
+pub(super) fn scale<T: Real>(row: &mut [T], factor: T) {
+    for entry in row {
+        *entry *= factor;
+    }
+}
+
+/// `value` limited to 0..=1.
+pub(super) fn clip_to_box<T: Real>(value: T) -> T {
+    clamp(value, T::zero(), T::one())
+}
+
+/// The middle of some numbers, the upper one of two; 0 of none. Sorts them.
+pub(super) fn median<T: Real>(values: &mut [T]) -> T {
+    for end in 1..values.len() {
+        for place in (1..=end).rev() {
+            if values[place - 1] <= values[place] {
+                break;
+            }
+            values.swap(place - 1, place);
+        }
+    }
+    values.get(values.len() / 2).copied().unwrap_or(T::zero())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn median_is_the_upper_middle_value() {
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), 3.0);
+        assert_eq!(median::<f64>(&mut []), 0.0);
+    }
+
+    #[test]
+    fn only_the_live_part_of_a_row_is_touched() {
+        let mut row = [1.0, 2.0, 3.0];
+        scale(live_mut(&mut row, 2), 2.0);
+        add_scaled(live_mut(&mut row, 2), 1.0, &[1.0, 1.0, 1.0]);
+        assert_eq!(row, [3.0, 5.0, 3.0]);
+        assert_eq!(dot(live(&row, 2), live(&row, 9)), 34.0);
+    }
+}

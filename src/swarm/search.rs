@@ -1,0 +1,172 @@
+//! What every search offers, and the ledger in which it keeps its box, its best and its counts.
+//!
+//! Why a ledger: that no evaluation leaves the box, that a cost which is not finite is dropped and that the best
+//! so far is available whenever a run is cancelled must hold for every search, so it is written once.
+//!
+//! Vocabulary: searches walk in box coordinates u, 0..1 per coordinate; the objective sees
+//! x = low + (high - low) clip(u, 0, 1), limited to low..high once more against rounding.
+//! Cost: 5 D operations per evaluation beside the objective's own; memory 3 D + 1 scalars.
+
+use crate::real::{Real, clamp, is_finite};
+
+use super::objective::{Objective, SwarmError};
+use super::rows::{live, live_mut};
+
+/// The best position evaluated so far and its cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Best<'a, T> {
+    /// Position in the objective's own units, one entry per coordinate.
+    pub position: &'a [T],
+    /// Cost there; finite.
+    pub value: T,
+}
+
+/// A search that can be advanced in slices of any size.
+///
+/// Slicing never changes the result: `advance(60)` and sixty times `advance(1)` leave equal searches.
+pub trait Search<T: Real> {
+    /// Spends `evaluations` of the objective and returns how many were spent: all of them, or none where the
+    /// objective's dimension is not the one the search began with.
+    fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32;
+
+    /// The best so far; `None` while no finite cost was seen.
+    fn best(&self) -> Option<Best<'_, T>>;
+
+    /// Completed iterations; the first evaluations of the scattered swarm are iteration 0.
+    fn iterations(&self) -> u32;
+
+    /// Evaluations so far, all counted.
+    fn evaluations(&self) -> u32;
+
+    /// Advances by whole iterations until the best is at most `goal` or `iterations` are complete; true where the
+    /// goal was reached. The last iteration is completed, so that searches can be compared by their counts.
+    fn reach(&mut self, objective: &impl Objective<T>, goal: T, iterations: u32) -> bool {
+        while self.iterations() < iterations {
+            let before = self.iterations();
+            while self.iterations() == before {
+                if self.advance(objective, 1) == 0 {
+                    return false;
+                }
+            }
+            if self.best().is_some_and(|best| best.value <= goal) {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Box, best and counts of one search.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Ledger<T, const D: usize> {
+    dimension: usize,
+    low: [T; D],
+    high: [T; D],
+    best_position: [T; D],
+    /// The largest finite number until a smaller value was seen.
+    best_value: T,
+    evaluations: u32,
+    iterations: u32,
+}
+
+impl<T: Real, const D: usize> Ledger<T, D> {
+    /// Reads and checks the objective's box.
+    pub fn open(objective: &impl Objective<T>) -> Result<Self, SwarmError> {
+        let dimension = objective.dimension();
+        if dimension == 0 {
+            return Err(SwarmError::NoDimension);
+        }
+        if dimension > D {
+            return Err(SwarmError::DimensionAboveCapacity { dimension, capacity: D });
+        }
+        let mut ledger = Self {
+            dimension,
+            low: [T::zero(); D],
+            high: [T::zero(); D],
+            best_position: [T::zero(); D],
+            best_value: T::LARGEST,
+            evaluations: 0,
+            iterations: 0,
+        };
+        for (coordinate, (low, high)) in
+            ledger.low.iter_mut().zip(&mut ledger.high).take(dimension).enumerate()
+        {
+            (*low, *high) = objective.bounds(coordinate);
+            let finite = is_finite(*low) && is_finite(*high) && is_finite(*high - *low);
+            if !finite || *low >= *high {
+                return Err(SwarmError::Bounds { coordinate });
+            }
+        }
+        Ok(ledger)
+    }
+
+    /// Number of coordinates, 1..=D.
+    pub fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    /// Whether an objective still is of the dimension the search began with.
+    pub fn accepts(&self, objective: &impl Objective<T>) -> bool {
+        objective.dimension() == self.dimension
+    }
+
+    /// Box coordinate 0..1 to the objective's own unit; never outside the bounds.
+    pub fn place(&self, point: &[T; D]) -> [T; D] {
+        let mut position = *point;
+        for ((entry, &low), &high) in position.iter_mut().zip(&self.low).zip(&self.high) {
+            *entry = clamp(low + (high - low) * *entry, low, high);
+        }
+        position
+    }
+
+    /// Evaluates a point given in box coordinates.
+    pub fn evaluate(&mut self, objective: &impl Objective<T>, point: &[T; D]) -> T {
+        let position = self.place(point);
+        self.evaluate_position(objective, position)
+    }
+
+    /// The point of the box that is nearest to a position, both in the objective's units.
+    pub fn nearest(&self, mut position: [T; D]) -> [T; D] {
+        for ((entry, &low), &high) in position.iter_mut().zip(&self.low).zip(&self.high) {
+            *entry = clamp(*entry, low, high);
+        }
+        position
+    }
+
+    /// Evaluates a position that [`place`](Self::place) or [`nearest`](Self::nearest) put into the box.
+    ///
+    /// Returns the largest finite number for a cost that is not finite: it sorts last and is never a best.
+    pub fn evaluate_position(&mut self, objective: &impl Objective<T>, position: [T; D]) -> T {
+        let value = objective.evaluate(live(&position, self.dimension));
+        self.evaluations = self.evaluations.saturating_add(1);
+        let value = if is_finite(value) { value } else { T::LARGEST };
+        if value < self.best_value {
+            self.best_value = value;
+            live_mut(&mut self.best_position, self.dimension)
+                .copy_from_slice(live(&position, self.dimension));
+        }
+        value
+    }
+
+    pub fn close_iteration(&mut self) {
+        self.iterations = self.iterations.saturating_add(1);
+    }
+
+    pub fn best(&self) -> Option<Best<'_, T>> {
+        (self.best_value < T::LARGEST)
+            .then(|| Best { position: live(&self.best_position, self.dimension), value: self.best_value })
+    }
+
+    pub fn iterations(&self) -> u32 {
+        self.iterations
+    }
+
+    pub fn evaluations(&self) -> u32 {
+        self.evaluations
+    }
+}
+
+/// Whether a value returned by the ledger was finite.
+pub(super) fn is_usable<T: Real>(value: T) -> bool {
+    value < T::LARGEST
+}
