@@ -1,1 +1,37 @@
-//! (being built)
+//! Identification: from logged angles and currents to parameters, their uncertainty, and a verdict.
+//!
+//! ```text
+//! q, tau 500 Hz -> smoothing: h, h', h'' -> regressor -> rows: the same h, 50 Hz -> factor   (record)
+//! factor -> estimate: noise weights, least squares, covariance
+//!        -> search: beetle swarm in the prior's box (bounds), against the constrained optimum (constrained)
+//!        -> completion: fourteen parameters of every joint, each with its status
+//!        -> verdict: accepted, or refused with reasons
+//! ```
+//!
+//! Everything is generic over the scalar: the board runs it in `f32`, tests check it in `f64`.
+
+pub mod bounds;
+pub mod completion;
+pub mod constrained;
+pub mod estimate;
+pub mod factor;
+pub mod kernel;
+pub mod record;
+pub mod rows;
+pub mod search;
+pub mod smoothing;
+pub mod solver;
+pub mod verdict;
+
+pub use bounds::{LinkPrior, prior_parameters, search_box};
+pub use completion::{Status, complete, status};
+pub use constrained::{ParameterBox, least_squares_in_box};
+pub use estimate::{Estimate, Plan, Problem, Stage, noise};
+pub use factor::{Factor, Pyramid};
+pub use kernel::{Kernel, KernelError};
+pub use record::{Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ, TorqueSize};
+pub use rows::{DECIMATION, FilteredRows, RowFilter};
+pub use search::{SearchState, SwarmSearch};
+pub use smoothing::{Smoothed, Smoother};
+pub use solver::Solver;
+pub use verdict::{Reason, Thresholds, Verdict};

@@ -26,7 +26,7 @@
 use nalgebra::Vector3;
 
 use super::kinematics::JointFrame;
-use crate::real::{Real, abs, is_finite, sin_cos};
+use crate::real::{Real, abs, is_finite, sin_cos, sqrt};
 
 /// Where a joint's axis lies, seen from the joint before it (the base for the first).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -98,6 +98,14 @@ impl<T: Real, const N: usize> Chain<T, N> {
                 d: convert(placement.d),
             }),
         }
+    }
+
+    /// Distance from the axis point of the joint before to that of `joint`, m; `None` beyond the last.
+    #[must_use]
+    pub fn distance_to(&self, joint: usize) -> Option<T> {
+        self.placements
+            .get(joint)
+            .map(|placement| sqrt(placement.a * placement.a + placement.d * placement.d))
     }
 
     /// Numbers of each joint: sine and cosine of alpha, a, d.

@@ -180,7 +180,7 @@ mod tests {
         let weight = InertiaWeight { first: 0.9, last: 0.4, iterations: 100 };
         assert_eq!(weight.at(0), 0.9);
         // single-precision share of the iterations: 6e-8 of 0.5
-        assert!((weight.at(50) - 0.65).abs() < 1e-7_f64);
+        assert!((weight.at(50) - 0.65_f64).abs() < 1e-7);
         assert_eq!(weight.at(100), 0.4);
         assert_eq!(weight.at(u32::MAX), 0.4);
         assert_eq!(InertiaWeight { iterations: 0, ..weight }.at(0), 0.4);

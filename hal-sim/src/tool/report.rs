@@ -1,0 +1,200 @@
+//! What a run found, as plain data: written as JSON, printed as tables.
+//!
+//! The names of the fields are an interface. A number that is not known is `null`, never NaN.
+
+use serde::{Serialize, Serializer};
+use std::collections::BTreeMap;
+
+/// Version of the JSON.
+pub const SCHEMA: u32 = 1;
+
+/// A number that JSON can hold: what is not finite is unknown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Number(pub Option<f64>);
+
+impl Number {
+    /// Not known.
+    pub const UNKNOWN: Self = Self(None);
+
+    /// The number, if it is finite.
+    #[must_use]
+    pub fn known(self) -> Option<f64> {
+        self.0.filter(|value| value.is_finite())
+    }
+}
+
+impl From<f64> for Number {
+    fn from(value: f64) -> Self {
+        Self(Some(value).filter(|value| value.is_finite()))
+    }
+}
+
+impl From<f32> for Number {
+    fn from(value: f32) -> Self {
+        f64::from(value).into()
+    }
+}
+
+impl<T: Into<f64>> From<Option<T>> for Number {
+    fn from(value: Option<T>) -> Self {
+        Self(value.map(Into::into).filter(|value: &f64| value.is_finite()))
+    }
+}
+
+impl Serialize for Number {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.known() {
+            Some(value) => serializer.serialize_f64(value),
+            None => serializer.serialize_none(),
+        }
+    }
+}
+
+/// One of a joint's fourteen parameters.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterReport {
+    /// `XX1`, `IA2`: symbol and joint.
+    pub name: String,
+    /// Counted from 1.
+    pub joint: usize,
+    /// Unknown where neither torque nor a prior tells.
+    pub value: Number,
+    /// SI.
+    pub unit: &'static str,
+    /// Standard deviation; unknown unless measured alone.
+    pub sigma: Number,
+    /// `identified`, `grouped`, `weak` or `prior`.
+    pub status: &'static str,
+    /// The others of its base parameters.
+    pub grouped_with: Vec<String>,
+    /// What the simulated leg has.
+    pub truth: Number,
+}
+
+/// One combination of parameters that torque determines.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BaseReport {
+    /// The carrying parameter; with an `R` where others are regrouped into it.
+    pub name: String,
+    /// Parameters and factors of the weighted sum.
+    pub terms: BTreeMap<String, f64>,
+    /// Of the swarm's result, which is the run's result.
+    pub value: Number,
+    /// SI.
+    pub unit: &'static str,
+    /// Standard deviation.
+    pub sigma: Number,
+    /// What the simulated leg has.
+    pub truth: Number,
+    /// Least standard deviation any unbiased estimator can reach from the logged samples (Cramer-Rao).
+    pub cramer_rao: Number,
+}
+
+/// How well one joint's torque on one motion is predicted.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitReport {
+    /// Counted from 1.
+    pub joint: usize,
+    /// `fourier`, `gait-6.5`, `gait-3`, `recording`.
+    pub motion: String,
+    /// Root mean square of measured minus predicted, both through the same filter.
+    pub rms_nm: Number,
+    /// Of the mean absolute filtered torque.
+    pub percent_of_mean_abs: Number,
+    /// Of the root mean square filtered torque.
+    pub percent_of_rms: Number,
+    /// Against the noise-free torque, rows left out in which the joint sticks.
+    pub percent_of_mean_abs_vs_truth: Number,
+    /// Share of rows left out there.
+    pub sticking_share: Number,
+}
+
+/// The closed-form solution.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LeastSquaresReport {
+    /// Name and value of each base parameter.
+    pub base_parameters: BTreeMap<String, Number>,
+    /// Sum of squares in chi-square units.
+    pub cost: Number,
+}
+
+/// The beetle swarm on the same data.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SwarmReport {
+    /// Of the swarm's random numbers.
+    pub seed: u64,
+    /// All stages.
+    pub iterations: u32,
+    /// All stages.
+    pub evaluations: u32,
+    /// J / J_LS - 1.
+    pub cost_over_least_squares: Number,
+    /// J - J_C, with J_C the optimum in the search box, found in double precision.
+    pub excess_chi2: Number,
+    /// Iterations until the excess was at most a half; unknown where it never was.
+    pub iterations_to_half_chi2: Option<u32>,
+}
+
+/// Position error on gait.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrackingReport {
+    /// Counted from 1.
+    pub joint: usize,
+    /// Feedback alone.
+    pub rms_deg_without_model: Number,
+    /// The same gains, the identified model in the feedforward.
+    pub rms_deg_with_model: Number,
+}
+
+/// One identification, simulated or replayed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunReport {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// Name in the leg file.
+    pub leg: String,
+    /// Of the simulated noise; unknown in a replay.
+    pub seed: Option<u64>,
+    /// Of the swarm.
+    pub swarm_seed: u64,
+    /// `none`, `file` or `wrong:P`.
+    pub prior: String,
+    /// `one-time` or `sequential`.
+    pub plan: &'static str,
+    /// `accepted` or `refused`.
+    pub verdict: &'static str,
+    /// From the closed list.
+    pub reasons: Vec<&'static str>,
+    /// Base parameters that the data determine.
+    pub rank: usize,
+    /// Parameters estimated.
+    pub columns: usize,
+    /// Of the scaled weighted problem.
+    pub condition: Number,
+    /// All fourteen of every joint.
+    pub parameters: Vec<ParameterReport>,
+    /// What torque determines.
+    pub base_parameters: Vec<BaseReport>,
+    /// The motion identified from.
+    pub training: Vec<FitReport>,
+    /// Motions not used.
+    pub validation: Vec<FitReport>,
+    /// The closed form.
+    pub least_squares: LeastSquaresReport,
+    /// The search.
+    pub bso: SwarmReport,
+    /// What the model is worth to the servo; empty in a replay.
+    pub tracking: Vec<TrackingReport>,
+    /// Simulated or recorded time, s.
+    pub simulated_s: f64,
+    /// Time it took, s.
+    pub wall_s: f64,
+}
+
+impl RunReport {
+    /// Exit code 0.
+    #[must_use]
+    pub fn accepted(&self) -> bool {
+        self.reasons.is_empty()
+    }
+}

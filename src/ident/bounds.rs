@@ -1,0 +1,199 @@
+//! The box in which the swarm searches: what the prior allows, by interval arithmetic.
+//!
+//! ```text
+//! mass            0.2 .. 5 of the prior's
+//! centre of mass  the prior's +- half the segment's length, each coordinate
+//! inertia         about the centre of mass: diagonal 0.2 .. 5 of the prior's, products +- half the largest
+//! rotor, Coulomb, viscous   0 .. 5 of the prior's
+//! offset          +- (5 |prior| + 2 Coulomb)
+//! ```
+//!
+//! Products and sums of intervals give the parameters about the joint's origin, and the base parameters' terms
+//! the box of the base set. It contains every leg the ranges allow, and more. A range of no width (a prior of
+//! zero), and everything where there is no prior, is replaced by what the measured torque could at most need:
+//! ten times the torque over the size of its column.
+
+use super::constrained::ParameterBox;
+use super::record::{Record, RowModel};
+use crate::model::{self, LegParameters, PARAMETERS_PER_JOINT, Parameter, RigidBody};
+use crate::real::{self, Real};
+
+/// What is believed of one link and joint before it is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkPrior<T> {
+    /// Mass, centre of mass and inertia about it.
+    pub body: RigidBody<T>,
+    /// At the joint, kg m^2.
+    pub rotor_inertia: T,
+    /// N m.
+    pub coulomb_friction: T,
+    /// N m s/rad.
+    pub viscous_friction: T,
+    /// N m.
+    pub offset: T,
+}
+
+/// Largest and smallest share of the prior's mass, inertia and friction.
+const SHARE: (f64, f64) = (0.2, 5.0);
+/// Torque that one base parameter may need alone, in units of the measured one.
+const TORQUE_SHARE: f64 = 10.0;
+/// No segment is shorter, m.
+const SHORTEST_SEGMENT_M: f64 = 0.05;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Interval<T>(T, T);
+
+impl<T: Real> Interval<T> {
+    fn zero() -> Self {
+        Self(T::zero(), T::zero())
+    }
+    fn around(centre: T, reach: T) -> Self {
+        Self(centre - reach, centre + reach)
+    }
+    fn shares(value: T, low: f64, high: f64) -> Self {
+        Self(value * T::of(low), value * T::of(high))
+    }
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0, self.1 + other.1)
+    }
+    fn times(self, other: Self) -> Self {
+        let products = [self.0 * other.0, self.0 * other.1, self.1 * other.0, self.1 * other.1];
+        let (mut low, mut high) = (products[0], products[0]);
+        for product in products {
+            low = real::min(low, product);
+            high = real::max(high, product);
+        }
+        Self(low, high)
+    }
+    fn square(self) -> Self {
+        let (low, high) = (self.0 * self.0, self.1 * self.1);
+        let crosses = self.0 < T::zero() && self.1 > T::zero();
+        Self(if crosses { T::zero() } else { real::min(low, high) }, real::max(low, high))
+    }
+    fn scaled(self, factor: T) -> Self {
+        self.times(Self(factor, factor))
+    }
+}
+
+impl<T: Real> LinkPrior<T> {
+    /// Ranges of the fourteen parameters for a segment of this length.
+    fn ranges(&self, length: T) -> [Interval<T>; PARAMETERS_PER_JOINT] {
+        let (least, most) = SHARE;
+        let mass = Interval::shares(self.body.mass, least, most);
+        let reach = T::of(0.5) * length;
+        let centre: [_; 3] =
+            core::array::from_fn(|axis| Interval::around(self.body.centre_of_mass[axis], reach));
+        let inertia = &self.body.inertia;
+        let largest = real::max(inertia.m11, real::max(inertia.m22, inertia.m33));
+        let product_reach = T::of(0.5 * most) * largest;
+        let diagonal = |value: T, one: usize, other: usize| {
+            Interval::shares(value, least, most)
+                .add(mass.times(centre[one].square().add(centre[other].square())))
+        };
+        let product = |value: T, one: usize, other: usize| {
+            Interval::around(value, product_reach)
+                .add(mass.times(centre[one]).times(centre[other]).scaled(-T::one()))
+        };
+        let mut ranges = [Interval::zero(); PARAMETERS_PER_JOINT];
+        let friction_share = |value: T| Interval(T::zero(), value * T::of(most));
+        let values = [
+            (Parameter::XX, diagonal(inertia.m11, 1, 2)),
+            (Parameter::XY, product(inertia.m12, 0, 1)),
+            (Parameter::XZ, product(inertia.m13, 0, 2)),
+            (Parameter::YY, diagonal(inertia.m22, 0, 2)),
+            (Parameter::YZ, product(inertia.m23, 1, 2)),
+            (Parameter::ZZ, diagonal(inertia.m33, 0, 1)),
+            (Parameter::HX, mass.times(centre[0])),
+            (Parameter::HY, mass.times(centre[1])),
+            (Parameter::HZ, mass.times(centre[2])),
+            (Parameter::M, mass),
+            (Parameter::IA, friction_share(self.rotor_inertia)),
+            (Parameter::FC, friction_share(self.coulomb_friction)),
+            (Parameter::FV, friction_share(self.viscous_friction)),
+            (
+                Parameter::OFF,
+                Interval::around(
+                    T::zero(),
+                    T::of(most) * real::abs(self.offset) + T::of(2.0) * self.coulomb_friction,
+                ),
+            ),
+        ];
+        for (parameter, range) in values {
+            ranges[parameter.index()] = range;
+        }
+        ranges
+    }
+}
+
+/// The box of the base parameters.
+#[must_use]
+pub fn search_box<T: Real, const N: usize, const B: usize>(
+    model: &RowModel<T, N, B>,
+    record: &Record<T, N, B>,
+    prior: Option<&[LinkPrior<T>; N]>,
+) -> ParameterBox<T, B> {
+    let mut bounds = measured_box(model, record);
+    let Some(prior) = prior else { return bounds };
+    let ranges: [[Interval<T>; PARAMETERS_PER_JOINT]; N] =
+        core::array::from_fn(|joint| prior[joint].ranges(segment_length(model, prior, joint)));
+    for base in 0..model.base.rank() {
+        let mut total = Interval::zero();
+        for (terms, ranges) in model.base.terms(base).iter().zip(&ranges) {
+            for (&factor, &range) in terms.iter().zip(ranges) {
+                if factor != T::zero() {
+                    total = total.add(range.scaled(factor));
+                }
+            }
+        }
+        if total.1 > total.0 && real::is_finite(total.0) && real::is_finite(total.1) {
+            (bounds.low[base], bounds.high[base]) = (total.0, total.1);
+        }
+    }
+    bounds
+}
+
+/// Distance to the next joint; of the last segment, what its centre of mass suggests.
+fn segment_length<T: Real, const N: usize, const B: usize>(
+    model: &RowModel<T, N, B>,
+    prior: &[LinkPrior<T>; N],
+    joint: usize,
+) -> T {
+    let suggested =
+        T::of(2.0) * real::sqrt(prior[joint].body.centre_of_mass.dot(&prior[joint].body.centre_of_mass));
+    let to_next = model.chain.distance_to(joint + 1).unwrap_or(T::zero());
+    real::max(to_next, real::max(suggested, T::of(SHORTEST_SEGMENT_M)))
+}
+
+/// What the measured torque could need: columns and torques have a size.
+fn measured_box<T: Real, const N: usize, const B: usize>(
+    model: &RowModel<T, N, B>,
+    record: &Record<T, N, B>,
+) -> ParameterBox<T, B> {
+    let mut bounds = ParameterBox { low: [T::zero(); B], high: [T::zero(); B] };
+    let rows = real::sqrt(T::of(f64::from(record.rows.max(1))));
+    for base in 0..model.base.rank() {
+        let mut reach = T::zero();
+        for (factor, size) in record.factors.iter().zip(&record.torque) {
+            let length = factor.column_length(base);
+            if length > T::zero() {
+                reach = real::max(reach, size.root_mean_square * rows / length);
+            }
+        }
+        bounds.high[base] = T::of(TORQUE_SHARE) * reach;
+        let parameter = model.base.independent(base).map(|(_, parameter)| parameter);
+        let never_negative =
+            matches!(parameter, Some(Parameter::IA | Parameter::FC | Parameter::FV | Parameter::ZZ));
+        bounds.low[base] = if never_negative { T::zero() } else { -bounds.high[base] };
+    }
+    bounds
+}
+
+/// The fourteen parameters of every joint as the prior has them.
+#[must_use]
+pub fn prior_parameters<T: Real, const N: usize>(prior: &[LinkPrior<T>; N]) -> LegParameters<T, N> {
+    core::array::from_fn(|joint| {
+        let link = &prior[joint];
+        let drive = [link.rotor_inertia, link.coulomb_friction, link.viscous_friction, link.offset];
+        model::inertia::joint(&link.body.to_parameters(), &drive)
+    })
+}

@@ -1,0 +1,145 @@
+//! From base parameters back to all fourteen of every joint: what is known, grouped, or only believed.
+//!
+//! ```text
+//! minimise (p - p0)' W^-1 (p - p0)  subject to  K p = beta
+//! p = p0 + W K' (K W K')^-1 (beta - K p0)
+//! ```
+//!
+//! `K` holds the base parameters' terms, `p0` the prior and `W` its variances (each parameter within half of its
+//! size, never less than a hundredth of the largest of its kind). Parameters that torque does not see keep the
+//! prior's value, grouped ones share what their group is off; nothing but a prior can tell them apart, and the
+//! status says so.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::estimate::Estimate;
+use super::record::RowModel;
+use crate::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter, Standing};
+use crate::real::{self, Real};
+
+/// Where a reported parameter's value comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// Measured alone.
+    Identified,
+    /// Measured only in a sum with others; the share is the prior's.
+    Grouped,
+    /// Measured, but the data hardly tell it from others.
+    Weak,
+    /// Not seen by the torque at all, or not estimated.
+    Prior,
+}
+
+impl Status {
+    /// The word used in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Identified => "identified",
+            Self::Grouped => "grouped",
+            Self::Weak => "weak",
+            Self::Prior => "prior",
+        }
+    }
+}
+
+/// A base parameter is weak when an error of one standard deviation, the others unchanged, would move the torque
+/// of a joint by more than this share of its size: only because others make up for it is it not seen.
+const WEAK_SHARE: f64 = 0.05;
+
+/// Whether the data hardly tell base parameter `base` from the others.
+#[must_use]
+pub fn is_weak<T: Real, const N: usize, const B: usize>(
+    record: &super::record::Record<T, N, B>,
+    estimate: &Estimate<T, B>,
+    base: usize,
+) -> bool {
+    let Some(sigma) = estimate.sigma(base) else { return true };
+    let rows = real::sqrt(T::of(f64::from(record.rows.max(1))));
+    record.factors.iter().zip(&record.torque).any(|(factor, size)| {
+        sigma * factor.column_length(base) / rows > T::of(WEAK_SHARE) * size.root_mean_square
+    })
+}
+
+/// Status of one parameter.
+#[must_use]
+pub fn status<T: Real, const N: usize, const B: usize>(
+    model: &RowModel<T, N, B>,
+    record: &super::record::Record<T, N, B>,
+    estimate: &Estimate<T, B>,
+    joint: usize,
+    parameter: Parameter,
+) -> Status {
+    match model.base.standing(joint, parameter) {
+        Standing::Alone(base) if is_weak(record, estimate, base) => Status::Weak,
+        Standing::Alone(_) => Status::Identified,
+        Standing::Grouped(..) => Status::Grouped,
+        Standing::Unseen | Standing::Off => Status::Prior,
+    }
+}
+
+/// All parameters of all joints: nearest to the prior among those with these base parameters.
+///
+/// `None` when the groups are degenerate beyond rounding.
+#[must_use]
+pub fn complete<T: Real, const N: usize, const B: usize>(
+    model: &RowModel<T, N, B>,
+    base_values: &[T; B],
+    prior: &LegParameters<T, N>,
+) -> Option<LegParameters<T, N>> {
+    let variances = prior_variances(prior);
+    let expected = model.base.project(prior);
+    let rank = model.base.rank();
+    let mut gram = SMatrix::<T, B, B>::identity();
+    let mut error = SVector::<T, B>::zeros();
+    for row in 0..rank {
+        error[row] = base_values[row] - expected[row];
+        for column in 0..rank {
+            gram[(row, column)] =
+                weighted_product(model.base.terms(row), model.base.terms(column), &variances);
+        }
+    }
+    let multipliers = gram.cholesky()?.solve(&error);
+    let mut parameters = *prior;
+    for row in 0..rank {
+        for joint in 0..N {
+            for index in 0..PARAMETERS_PER_JOINT {
+                parameters[joint][index] +=
+                    variances[joint][index] * model.base.terms(row)[joint][index] * multipliers[row];
+            }
+        }
+    }
+    Some(parameters)
+}
+
+fn prior_variances<T: Real, const N: usize>(prior: &LegParameters<T, N>) -> LegParameters<T, N> {
+    let kind = |index: usize| match index {
+        0..=5 | 10 => 0, // inertias, the rotor's included
+        6..=8 => 1,
+        9 => 2,
+        _ => 3,
+    };
+    let mut largest = [T::of(1e-3); 4];
+    for parameters in prior {
+        for (index, &value) in parameters.iter().enumerate() {
+            largest[kind(index)] = real::max(largest[kind(index)], real::abs(value));
+        }
+    }
+    let mut variances = *prior;
+    for parameters in &mut variances {
+        for (index, value) in parameters.iter_mut().enumerate() {
+            let deviation = real::max(T::of(0.5) * real::abs(*value), T::of(0.01) * largest[kind(index)]);
+            *value = deviation * deviation;
+        }
+    }
+    variances
+}
+
+fn weighted_product<T: Real, const N: usize>(
+    one: &LegParameters<T, N>,
+    other: &LegParameters<T, N>,
+    weights: &LegParameters<T, N>,
+) -> T {
+    let terms = one.iter().flatten().zip(other.iter().flatten()).zip(weights.iter().flatten());
+    terms.fold(T::zero(), |sum, ((&left, &right), &weight)| sum + left * right * weight)
+}

@@ -1,0 +1,272 @@
+//! Square-root information factor: all rows of a least-squares problem in constant memory.
+//!
+//! ```text
+//! sum over rows (y p - t)^2 = |R p - z|^2 + residual,     R upper triangular
+//! ```
+//!
+//! Each row is rotated into `R` by Givens rotations (Golub and Van Loan, Matrix Computations, 5.1.8); the cost of
+//! any parameter vector is then exact and independent of the number of rows. Feeding one factor for hours in
+//! single precision loses it (a diagonal of 1e3 swallows rows of 1): a [`Pyramid`] fills small factors and merges
+//! full ones upward, so that only numbers of like size ever meet.
+//!
+//! Cost of one row: about `2 B^2` multiplications and `B` square roots. Memory: `B (B + 1) + 2` numbers a factor.
+
+use crate::real::{self, Real};
+
+/// Upper-triangular factor of up to `B` columns with its right-hand side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Factor<T, const B: usize> {
+    /// `r[row][column]`, zero below the diagonal.
+    r: [[T; B]; B],
+    z: [T; B],
+    residual: T,
+    rows: u32,
+}
+
+impl<T: Real, const B: usize> Factor<T, B> {
+    /// A factor that has seen no row.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { r: [[T::zero(); B]; B], z: [T::zero(); B], residual: T::zero(), rows: 0 }
+    }
+
+    /// Takes one row: `row . parameters` should be `right`.
+    pub fn insert(&mut self, row: &[T; B], right: T) {
+        self.rotate(*row, right);
+        self.rows = self.rows.saturating_add(1);
+    }
+
+    /// Takes all rows of another factor.
+    pub fn merge(&mut self, other: &Self) {
+        self.merge_scaled(other, T::one());
+    }
+
+    /// Takes all rows of another factor, each multiplied by `weight`.
+    pub fn merge_scaled(&mut self, other: &Self, weight: T) {
+        for (row, &right) in other.r.iter().zip(&other.z) {
+            self.rotate(row.map(|element| element * weight), right * weight);
+        }
+        self.residual += other.residual * weight * weight;
+        self.rows = self.rows.saturating_add(other.rows);
+    }
+
+    fn rotate(&mut self, mut row: [T; B], mut right: T) {
+        for column in 0..B {
+            let entering = row[column];
+            if entering == T::zero() {
+                continue;
+            }
+            let diagonal = self.r[column][column];
+            let length = real::sqrt(diagonal * diagonal + entering * entering);
+            if !(length > T::zero()) {
+                continue; // squares that underflow carry no information
+            }
+            let (cosine, sine) = (diagonal / length, entering / length);
+            let kept = &mut self.r[column];
+            kept[column] = length;
+            for (old, new) in kept.iter_mut().zip(row.iter_mut()).skip(column + 1) {
+                (*old, *new) = (cosine * *old + sine * *new, cosine * *new - sine * *old);
+            }
+            let z = self.z[column];
+            self.z[column] = cosine * z + sine * right;
+            right = cosine * right - sine * z;
+        }
+        self.residual += right * right;
+    }
+
+    /// `|R p - z|^2`: the cost above the least-squares optimum. `parameters` beyond the slice count as zero.
+    #[must_use]
+    pub fn excess(&self, parameters: &[T]) -> T {
+        let count = parameters.len().min(B);
+        let mut total = T::zero();
+        for (index, (row, &right)) in self.r.iter().zip(&self.z).enumerate().take(count) {
+            let mut error = -right;
+            for (&element, &parameter) in row.iter().zip(parameters).skip(index) {
+                error += element * parameter;
+            }
+            total += error * error;
+        }
+        total
+    }
+
+    /// The same factor in another precision.
+    #[must_use]
+    pub fn convert<U: Real>(&self) -> Factor<U, B> {
+        let convert = |value: T| U::of(value.to_double());
+        Factor {
+            r: self.r.map(|row| row.map(convert)),
+            z: self.z.map(convert),
+            residual: convert(self.residual),
+            rows: self.rows,
+        }
+    }
+
+    /// Sum of squares that no parameter vector can explain.
+    #[must_use]
+    pub fn residual(&self) -> T {
+        self.residual
+    }
+
+    /// Number of rows taken.
+    #[must_use]
+    pub fn rows(&self) -> u32 {
+        self.rows
+    }
+
+    /// The triangular matrix, `[row][column]`.
+    #[must_use]
+    pub fn triangle(&self) -> &[[T; B]; B] {
+        &self.r
+    }
+
+    /// The rotated right-hand side.
+    #[must_use]
+    pub fn right(&self) -> &[T; B] {
+        &self.z
+    }
+
+    /// Euclidean length of one column of all rows taken.
+    #[must_use]
+    pub fn column_length(&self, column: usize) -> T {
+        real::sqrt(
+            self.r
+                .iter()
+                .filter_map(|row| row.get(column))
+                .fold(T::zero(), |sum, &element| sum + element * element),
+        )
+    }
+
+    /// The problem in which only `columns` are free and the others are held at `fixed`: a factor whose column `i`
+    /// is `columns[i]`.
+    #[must_use]
+    pub fn restricted(&self, columns: &[usize], fixed: &[T; B], weight: T) -> Self {
+        let mut result = Self::new();
+        for (row, &right) in self.r.iter().zip(&self.z) {
+            let mut compact = [T::zero(); B];
+            let mut rest = right;
+            for (&element, &value) in row.iter().zip(fixed) {
+                rest -= element * value;
+            }
+            for (slot, &column) in compact.iter_mut().zip(columns) {
+                let (element, value) = (row.get(column), fixed.get(column));
+                *slot = element.copied().unwrap_or(T::zero()) * weight;
+                // A free column is not held: what the loop above took off is given back.
+                rest += element.copied().unwrap_or(T::zero()) * value.copied().unwrap_or(T::zero());
+            }
+            result.rotate(compact, rest * weight);
+        }
+        result.residual += self.residual * weight * weight;
+        result.rows = self.rows;
+        result
+    }
+
+    /// The same rows with zero on the right.
+    #[must_use]
+    pub fn without_right(&self) -> Self {
+        Self { z: [T::zero(); B], residual: T::zero(), ..self.clone() }
+    }
+
+    /// Back substitution: the least-squares parameters of the first `count` columns; a column without
+    /// information gives zero.
+    #[must_use]
+    pub fn solve(&self, count: usize) -> [T; B] {
+        let mut parameters = [T::zero(); B];
+        for index in (0..count.min(B)).rev() {
+            let mut rest = self.z[index];
+            for column in index + 1..count.min(B) {
+                rest -= self.r[index][column] * parameters[column];
+            }
+            let diagonal = self.r[index][index];
+            if diagonal != T::zero() {
+                parameters[index] = rest / diagonal;
+            }
+        }
+        parameters
+    }
+
+    /// `R^-1` of the first `count` columns (upper triangular), zero where a diagonal is zero.
+    #[must_use]
+    pub fn inverse(&self, count: usize) -> [[T; B]; B] {
+        let count = count.min(B);
+        let mut inverse = [[T::zero(); B]; B];
+        for column in 0..count {
+            for row in (0..=column).rev() {
+                let mut rest = if row == column { T::one() } else { T::zero() };
+                for inner in row + 1..=column {
+                    rest -= self.r[row][inner] * inverse[inner][column];
+                }
+                let diagonal = self.r[row][row];
+                inverse[row][column] = if diagonal == T::zero() { T::zero() } else { rest / diagonal };
+            }
+        }
+        inverse
+    }
+}
+
+impl<T: Real, const B: usize> Default for Factor<T, B> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Levels of a [`Pyramid`]; 128^4 rows, two months at 50 Hz, fill the three lower ones once.
+pub const PYRAMID_LEVELS: usize = 4;
+/// Rows, or merged factors, that fill a level.
+pub const PYRAMID_FILL: u32 = 128;
+
+/// Factors of increasing age: rows enter the first, full factors merge into the next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pyramid<T, const B: usize> {
+    levels: [Factor<T, B>; PYRAMID_LEVELS],
+    entries: [u32; PYRAMID_LEVELS],
+}
+
+impl<T: Real, const B: usize> Pyramid<T, B> {
+    /// A pyramid that has seen no row.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { levels: core::array::from_fn(|_| Factor::new()), entries: [0; PYRAMID_LEVELS] }
+    }
+
+    /// Forgets all rows.
+    pub fn clear(&mut self) {
+        for level in &mut self.levels {
+            *level = Factor::new();
+        }
+        self.entries = [0; PYRAMID_LEVELS];
+    }
+
+    /// Takes one row.
+    pub fn insert(&mut self, row: &[T; B], right: T) {
+        self.levels[0].insert(row, right);
+        self.entries[0] += 1;
+        for lower in 0..PYRAMID_LEVELS - 1 {
+            if self.entries[lower] < PYRAMID_FILL {
+                return;
+            }
+            let (below, above) = self.levels.split_at_mut(lower + 1);
+            if let (Some(full), Some(next)) = (below.last_mut(), above.first_mut()) {
+                next.merge(full);
+                *full = Factor::new();
+            }
+            self.entries[lower] = 0;
+            self.entries[lower + 1] = self.entries[lower + 1].saturating_add(1);
+        }
+    }
+
+    /// All rows in one factor.
+    #[must_use]
+    pub fn collapse(&self) -> Factor<T, B> {
+        let mut all = Factor::new();
+        for level in &self.levels {
+            all.merge(level);
+        }
+        all
+    }
+}
+
+impl<T: Real, const B: usize> Default for Pyramid<T, B> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

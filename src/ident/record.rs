@@ -1,0 +1,253 @@
+//! From logged samples to a record of one motion, in constant memory whatever its duration.
+//!
+//! ```text
+//! angle, torque 500 Hz -> Smoother -> regressor of the smoothed motion -> RowFilter 50 Hz -> Pyramid (each joint)
+//! ```
+//!
+//! A [`Record`] holds one information factor for each joint, so that noise weights can be chosen afterwards, and
+//! the size of the filtered torque. The fit of *any* parameters to the motion follows from it without the samples:
+//! training and validation use the same type.
+
+use nalgebra::Vector3;
+
+use super::factor::{Factor, Pyramid};
+use super::kernel::{Kernel, KernelError};
+use super::rows::{DECIMATION, FilteredRows, RowFilter};
+use super::smoothing::{Smoothed, Smoother};
+use crate::model::{BaseParameters, Chain, JointState, regressor};
+use crate::real::{self, Real};
+
+/// Rate of the samples a [`Recorder`] takes.
+pub const SAMPLE_RATE_HZ: f64 = 500.0;
+
+/// What turns a motion into regressor rows: geometry, gravity, and which columns are estimated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowModel<T: Real, const N: usize, const B: usize> {
+    /// Geometry of the leg.
+    pub chain: Chain<T, N>,
+    /// Acceleration of gravity in the base frame, m/s^2.
+    pub gravity: Vector3<T>,
+    /// The columns that torque can tell apart.
+    pub base: BaseParameters<T, N, B>,
+}
+
+impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
+    /// Base columns of every joint for one instant, and its torque.
+    #[must_use]
+    pub fn rows(&self, instant: &Smoothed<T, N>) -> FilteredRows<T, N, B> {
+        let state = JointState { q: instant.position, qd: instant.velocity, qdd: instant.acceleration };
+        let full = regressor(&self.chain, &state, &self.gravity);
+        let mut rows = FilteredRows { regressor: [[T::zero(); B]; N], torque: instant.torque };
+        for (row, selected) in full.iter().zip(rows.regressor.iter_mut()) {
+            self.base.select(row, selected);
+        }
+        rows
+    }
+}
+
+/// A sum that keeps its digits over millions of terms (Neumaier 1974).
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Sum<T> {
+    total: T,
+    lost: T,
+}
+
+impl<T: Real> Sum<T> {
+    fn zero() -> Self {
+        Self { total: T::zero(), lost: T::zero() }
+    }
+    fn add(&mut self, term: T) {
+        let total = self.total + term;
+        self.lost += if real::abs(self.total) >= real::abs(term) {
+            (self.total - total) + term
+        } else {
+            (term - total) + self.total
+        };
+        self.total = total;
+    }
+    fn value(&self) -> T {
+        self.total + self.lost
+    }
+}
+
+/// What one joint's part of a motion looked like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueSize<T> {
+    /// Mean of the absolute filtered torque, N m.
+    pub mean_absolute: T,
+    /// Root mean square of the filtered torque, N m.
+    pub root_mean_square: T,
+    /// Root mean square of the smoothed speed, rad/s.
+    pub speed: T,
+}
+
+/// Everything that identification and validation need of one motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record<T, const N: usize, const B: usize> {
+    /// Rows of each joint's torque.
+    pub factors: [Factor<T, B>; N],
+    /// Size of each joint's torque.
+    pub torque: [TorqueSize<T>; N],
+    /// Filtered rows of each joint.
+    pub rows: u32,
+    /// Samples that were not finite and reset the filter.
+    pub rejected: u32,
+    /// Information of one row in units of independent ones, `m sum h^2`: below one because rows overlap.
+    pub row_information: T,
+}
+
+impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
+    /// The same record in another precision.
+    #[must_use]
+    pub fn convert<U: Real>(&self) -> Record<U, N, B> {
+        let convert = |value: T| U::of(value.to_double());
+        Record {
+            factors: core::array::from_fn(|joint| self.factors[joint].convert()),
+            torque: self.torque.map(|size| TorqueSize {
+                mean_absolute: convert(size.mean_absolute),
+                root_mean_square: convert(size.root_mean_square),
+                speed: convert(size.speed),
+            }),
+            rows: self.rows,
+            rejected: self.rejected,
+            row_information: convert(self.row_information),
+        }
+    }
+
+    /// Root mean square torque error of one joint with these base parameters, N m.
+    #[must_use]
+    pub fn torque_error(&self, joint: usize, base: &[T; B]) -> Option<T> {
+        let factor = self.factors.get(joint)?;
+        if self.rows == 0 {
+            return None;
+        }
+        let mean = (factor.excess(base) + factor.residual()) / T::of(f64::from(self.rows));
+        Some(real::sqrt(mean))
+    }
+}
+
+/// Accumulates one motion after the other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recorder<T, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
+    kernel: Kernel<T, TAPS>,
+    smoother: Smoother<T, N, TAPS>,
+    filter: RowFilter<T, N, B, PENDING>,
+    pyramids: [Pyramid<T, B>; N],
+    absolute: [Sum<T>; N],
+    squared: [Sum<T>; N],
+    speed: [Sum<T>; N],
+    instants: u32,
+    rows: u32,
+    rejected: u32,
+}
+
+/// What one sample brought.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress<T, const N: usize, const B: usize> {
+    /// The smoothed motion `reach` samples ago.
+    pub instant: Smoothed<T, N>,
+    /// The rows finished by this sample; their centre lies `2 reach` samples ago.
+    pub rows: Option<FilteredRows<T, N, B>>,
+}
+
+impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
+    Recorder<T, N, B, TAPS, PENDING>
+{
+    /// A recorder whose low-pass is 3 dB down at `bandwidth_hz`.
+    ///
+    /// # Errors
+    /// [`KernelError`] when the bandwidth is absurd or its kernel does not fit `TAPS` and `PENDING`.
+    pub fn new(bandwidth_hz: T) -> Result<Self, KernelError> {
+        let kernel = Kernel::low_pass(bandwidth_hz, T::of(SAMPLE_RATE_HZ))?;
+        if RowFilter::<T, N, B, PENDING>::outputs_needed(kernel.taps()) > PENDING {
+            return Err(KernelError::TooLong { needed: kernel.taps() });
+        }
+        Ok(Self {
+            kernel,
+            smoother: Smoother::new(),
+            filter: RowFilter::new(),
+            pyramids: core::array::from_fn(|_| Pyramid::new()),
+            absolute: [Sum::zero(); N],
+            squared: [Sum::zero(); N],
+            speed: [Sum::zero(); N],
+            instants: 0,
+            rows: 0,
+            rejected: 0,
+        })
+    }
+
+    /// The low-pass in use.
+    #[must_use]
+    pub fn kernel(&self) -> &Kernel<T, TAPS> {
+        &self.kernel
+    }
+
+    /// Forgets everything: a new motion begins.
+    pub fn clear(&mut self) {
+        self.break_off();
+        self.pyramids.iter_mut().for_each(Pyramid::clear);
+        self.absolute = [Sum::zero(); N];
+        self.squared = [Sum::zero(); N];
+        self.speed = [Sum::zero(); N];
+        (self.instants, self.rows, self.rejected) = (0, 0, 0);
+    }
+
+    /// The samples that follow do not continue those before: windows start anew, rows already taken stay.
+    pub fn break_off(&mut self) {
+        self.smoother.clear();
+        self.filter.clear();
+    }
+
+    /// Takes one 500 Hz sample: D-H angles in rad, D-H torques in N m.
+    pub fn push(
+        &mut self,
+        model: &RowModel<T, N, B>,
+        position: &[T; N],
+        torque: &[T; N],
+    ) -> Option<Progress<T, N, B>> {
+        if !position.iter().chain(torque).all(|&value| real::is_finite(value)) {
+            self.rejected = self.rejected.saturating_add(1);
+            self.break_off();
+            return None;
+        }
+        let instant = self.smoother.push(&self.kernel, position, torque)?;
+        self.instants = self.instants.saturating_add(1);
+        for (sum, &velocity) in self.speed.iter_mut().zip(&instant.velocity) {
+            sum.add(velocity * velocity);
+        }
+        let rows = self.filter.push(&self.kernel, &model.rows(&instant)).filter(FilteredRows::is_finite);
+        if let Some(rows) = &rows {
+            self.rows = self.rows.saturating_add(1);
+            for joint in 0..N {
+                self.pyramids[joint].insert(&rows.regressor[joint], rows.torque[joint]);
+                self.absolute[joint].add(real::abs(rows.torque[joint]));
+                self.squared[joint].add(rows.torque[joint] * rows.torque[joint]);
+            }
+        }
+        Some(Progress { instant, rows })
+    }
+
+    /// Rows taken so far.
+    #[must_use]
+    pub fn rows(&self) -> u32 {
+        self.rows
+    }
+
+    /// What was recorded since [`Self::clear`].
+    #[must_use]
+    pub fn record(&self) -> Record<T, N, B> {
+        let rows = T::of(f64::from(self.rows.max(1)));
+        let instants = T::of(f64::from(self.instants.max(1)));
+        Record {
+            factors: core::array::from_fn(|joint| self.pyramids[joint].collapse()),
+            torque: core::array::from_fn(|joint| TorqueSize {
+                mean_absolute: self.absolute[joint].value() / rows,
+                root_mean_square: real::sqrt(self.squared[joint].value() / rows),
+                speed: real::sqrt(self.speed[joint].value() / instants),
+            }),
+            rows: self.rows,
+            rejected: self.rejected,
+            row_information: T::of(DECIMATION as f64) * self.kernel.energy(),
+        }
+    }
+}

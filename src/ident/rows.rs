@@ -1,0 +1,149 @@
+//! Second stage of the filter chain: regressor rows and torque through one low-pass, then 50 Hz.
+//!
+//! ```text
+//! y_f(t) = sum_k h_k y(t - k T),     tau_f(t) = sum_k h_k tau(t - k T)
+//! ```
+//!
+//! The whole row goes through the filter, the sharp `sign(qd)` of Coulomb friction included: a sharp column
+//! against a smoothed torque biases friction by three standard deviations, both through the same filter by less
+//! than 0.2. Instead of storing `TAPS` rows, each open output is a running sum: a new sample is added to the
+//! `taps / decimation` outputs whose windows contain it.
+//!
+//! Cost of one sample: `PENDING N (B + 1)` multiplications. Memory: as many numbers.
+
+use super::kernel::Kernel;
+use crate::real::{self, Real};
+
+/// Samples from one output to the next: 500 Hz to 50 Hz.
+pub const DECIMATION: usize = 10;
+
+/// One filtered row for each joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilteredRows<T, const N: usize, const B: usize> {
+    /// `regressor[joint]` times base parameters is the torque.
+    pub regressor: [[T; B]; N],
+    /// N m, D-H sign.
+    pub torque: [T; N],
+}
+
+impl<T: Real, const N: usize, const B: usize> FilteredRows<T, N, B> {
+    fn empty() -> Self {
+        Self { regressor: [[T::zero(); B]; N], torque: [T::zero(); N] }
+    }
+
+    /// No NaN, no infinity.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.torque.iter().chain(self.regressor.iter().flatten()).all(|&value| real::is_finite(value))
+    }
+}
+
+/// Open outputs of the second stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowFilter<T, const N: usize, const B: usize, const PENDING: usize> {
+    open: [FilteredRows<T, N, B>; PENDING],
+    /// Samples since the start of the output that will be finished next.
+    age: usize,
+    /// Slot of that output.
+    oldest: usize,
+}
+
+impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T, N, B, PENDING> {
+    /// No sample taken yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { open: [FilteredRows::empty(); PENDING], age: 0, oldest: 0 }
+    }
+
+    /// Open outputs that a kernel of `taps` weights needs.
+    #[must_use]
+    pub const fn outputs_needed(taps: usize) -> usize {
+        taps.div_ceil(DECIMATION)
+    }
+
+    /// Forgets all samples.
+    pub fn clear(&mut self) {
+        *self = Self::new();
+    }
+
+    /// Takes the rows of one 500 Hz sample; every tenth call returns a finished output once the window is full.
+    ///
+    /// An output needs `outputs_needed(kernel.taps()) <= PENDING`; the recorder that owns both checks it.
+    pub fn push<const TAPS: usize>(
+        &mut self,
+        kernel: &Kernel<T, TAPS>,
+        rows: &FilteredRows<T, N, B>,
+    ) -> Option<FilteredRows<T, N, B>> {
+        let weights = kernel.weights();
+        let mut slot = self.oldest;
+        for behind in 0..PENDING {
+            // The output `behind` places younger began `behind * DECIMATION` samples later.
+            let Some(tap) = self.age.checked_sub(behind * DECIMATION) else { break };
+            if let (Some(output), Some(&weight)) = (self.open.get_mut(slot), weights.get(tap)) {
+                add_scaled(output, rows, weight);
+            }
+            slot = if slot + 1 >= PENDING { 0 } else { slot + 1 };
+        }
+        self.age += 1;
+        if self.age < weights.len() {
+            return None;
+        }
+        let output = self.open.get_mut(self.oldest)?;
+        let finished = *output;
+        *output = FilteredRows::empty();
+        self.oldest = if self.oldest + 1 >= PENDING { 0 } else { self.oldest + 1 };
+        self.age -= DECIMATION;
+        Some(finished)
+    }
+}
+
+impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Default for RowFilter<T, N, B, PENDING> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn add_scaled<T: Real, const N: usize, const B: usize>(
+    output: &mut FilteredRows<T, N, B>,
+    rows: &FilteredRows<T, N, B>,
+    weight: T,
+) {
+    for joint in 0..N {
+        for (sum, &element) in output.regressor[joint].iter_mut().zip(&rows.regressor[joint]) {
+            *sum += weight * element;
+        }
+        output.torque[joint] += weight * rows.torque[joint];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    extern crate std;
+    use std::vec::Vec;
+
+    #[test]
+    fn running_sums_equal_the_convolution_at_every_tenth_sample() {
+        let kernel = Kernel::<f64, 256>::low_pass(8.0, 500.0).expect("fits");
+        let mut filter = RowFilter::<f64, 1, 2, 26>::new();
+        let signal = |index: usize| ((index * 7919 % 1013) as f64 / 1013.0, (index % 17) as f64);
+        let mut outputs = Vec::new();
+        for index in 0..1500 {
+            let (left, right) = signal(index);
+            let rows = FilteredRows { regressor: [[left, 1.0]], torque: [right] };
+            outputs.extend(filter.push(&kernel, &rows));
+        }
+        assert_eq!(outputs.len(), (1500 - kernel.taps()) / DECIMATION + 1);
+        for (number, output) in outputs.iter().enumerate() {
+            let window = kernel.weights().iter().enumerate();
+            let (left, right) = window.fold((0.0, 0.0), |(left, right), (tap, weight)| {
+                let sample = signal(number * DECIMATION + tap);
+                (left + weight * sample.0, right + weight * sample.1)
+            });
+            assert!((output.regressor[0][0] - left).abs() < 1e-12);
+            assert!((output.regressor[0][1] - 1.0).abs() < 1e-12);
+            assert!((output.torque[0] - right).abs() < 1e-12);
+        }
+    }
+}

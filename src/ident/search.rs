@@ -1,0 +1,211 @@
+//! The beetle swarm on the identification cost: a plan's stages searched one after the other, in slices.
+//!
+//! On this quadratic cost least squares is exact and instant; the search is run on the same factor, in the box of
+//! the prior, from a cold start, and shown beside it. Cost of one evaluation: `B^2 / 2` multiplications.
+
+use super::constrained::ParameterBox;
+use super::estimate::{Plan, Problem, Stage};
+use crate::real::Real;
+use crate::swarm::{Bso, BsoSettings, Objective, Search, SwarmError};
+
+/// Beetles of the swarm (paper, 4.1).
+pub const BEETLES: usize = 20;
+/// A stage ends after this many iterations at the latest.
+pub const LARGEST_ITERATIONS: u32 = 300;
+/// A stage ends when the best cost fell by less than [`SMALLEST_GAIN`] in this many iterations.
+const PATIENCE: u32 = 15;
+/// Chi-square units; a tenth of a standard deviation of one parameter is 0.01.
+const SMALLEST_GAIN: f64 = 1e-3;
+
+/// One stage's cost in its box.
+struct StageCost<'a, T, const B: usize> {
+    stage: &'a Stage<T, B>,
+    bounds: &'a ParameterBox<T, B>,
+}
+
+impl<T: Real, const B: usize> Objective<T> for StageCost<'_, T, B> {
+    fn dimension(&self) -> usize {
+        self.stage.columns().len()
+    }
+    fn bounds(&self, coordinate: usize) -> (T, T) {
+        let base = self.stage.columns().get(coordinate).copied().unwrap_or(0);
+        (self.bounds.low[base], self.bounds.high[base])
+    }
+    fn evaluate(&self, position: &[T]) -> T {
+        self.stage.factor().excess(position)
+    }
+}
+
+/// Where a search stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SearchState {
+    /// More evaluations are wanted.
+    Running,
+    /// All stages ended.
+    Done,
+    /// The cost or its box cannot be searched.
+    Failed(SwarmError),
+}
+
+/// A search over all stages of a plan; plain data, cut into slices by the budget of [`Self::advance`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct SwarmSearch<T: Real, const B: usize> {
+    plan: Plan,
+    settings: BsoSettings<T>,
+    seed: u64,
+    bounds: ParameterBox<T, B>,
+    stage: Stage<T, B>,
+    stage_index: usize,
+    swarm: Option<Bso<T, BEETLES, B>>,
+    state: SearchState,
+    values: [T; B],
+    determined: [bool; B],
+    iterations: u32,
+    evaluations: u32,
+    watched_value: T,
+    watched_iteration: u32,
+}
+
+impl<T: Real, const B: usize> SwarmSearch<T, B> {
+    /// A cold start: beetles scattered uniformly over the box.
+    #[must_use]
+    pub fn new<const N: usize>(
+        problem: &Problem<'_, T, N, B>,
+        plan: Plan,
+        bounds: ParameterBox<T, B>,
+        settings: BsoSettings<T>,
+        seed: u64,
+    ) -> Self {
+        let (values, determined) = ([T::zero(); B], [false; B]);
+        let stage = problem.stage(plan, 0, &values, &determined);
+        let mut search = Self {
+            plan,
+            settings,
+            seed,
+            bounds,
+            stage,
+            stage_index: 0,
+            swarm: None,
+            state: SearchState::Running,
+            values,
+            determined,
+            iterations: 0,
+            evaluations: 0,
+            watched_value: T::LARGEST,
+            watched_iteration: 0,
+        };
+        search.start_stage();
+        search
+    }
+
+    fn start_stage(&mut self) {
+        let cost = StageCost { stage: &self.stage, bounds: &self.bounds };
+        // Each stage draws its own numbers.
+        let seed = self.seed.wrapping_add(self.stage_index as u64);
+        match Bso::new(&cost, self.settings, seed) {
+            Ok(swarm) => self.swarm = Some(swarm),
+            Err(error) => self.state = SearchState::Failed(error),
+        }
+        (self.watched_value, self.watched_iteration) = (T::LARGEST, 0);
+    }
+
+    /// Spends up to `evaluations`; any slicing gives the same result.
+    pub fn advance<const N: usize>(
+        &mut self,
+        problem: &Problem<'_, T, N, B>,
+        evaluations: u32,
+    ) -> SearchState {
+        // One evaluation at a time towards the end of an iteration would be slow, whole slices would overshoot
+        // the stop: the swarm is asked for its iteration count after every evaluation it spends.
+        for _ in 0..evaluations {
+            let (Some(swarm), SearchState::Running) = (self.swarm.as_mut(), self.state) else { break };
+            let cost = StageCost { stage: &self.stage, bounds: &self.bounds };
+            let before = swarm.iterations();
+            if swarm.advance(&cost, 1) == 0 {
+                self.state = SearchState::Failed(SwarmError::NoDimension);
+                break;
+            }
+            self.evaluations = self.evaluations.saturating_add(1);
+            let iterations = swarm.iterations();
+            if iterations > before {
+                self.iterations = self.iterations.saturating_add(1);
+                if self.stage_ends(iterations) {
+                    self.close_stage(problem);
+                }
+            }
+        }
+        self.state
+    }
+
+    fn stage_ends(&mut self, iterations: u32) -> bool {
+        let value = self.stage_excess().unwrap_or(T::LARGEST);
+        if value < self.watched_value - T::of(SMALLEST_GAIN) {
+            (self.watched_value, self.watched_iteration) = (value, iterations);
+        }
+        iterations >= LARGEST_ITERATIONS || iterations >= self.watched_iteration + PATIENCE
+    }
+
+    fn close_stage<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
+        if let Some(best) = self.swarm.as_ref().and_then(Search::best) {
+            for (&column, &value) in self.stage.columns().iter().zip(best.position) {
+                self.values[column] = value;
+                self.determined[column] = true;
+            }
+        }
+        self.swarm = None;
+        // A stage that determines nothing has nothing to search.
+        while self.swarm.is_none() && self.state == SearchState::Running {
+            self.stage_index += 1;
+            if self.stage_index >= Problem::<T, N, B>::stages(self.plan) {
+                self.state = SearchState::Done;
+                return;
+            }
+            self.stage = problem.stage(self.plan, self.stage_index, &self.values, &self.determined);
+            if !self.stage.columns().is_empty() {
+                self.start_stage();
+            }
+        }
+    }
+
+    /// Where the search stands.
+    #[must_use]
+    pub fn state(&self) -> SearchState {
+        self.state
+    }
+
+    /// Cost of the current stage's best above that stage's least-squares optimum, chi-square units.
+    #[must_use]
+    pub fn stage_excess(&self) -> Option<T> {
+        self.swarm.as_ref().and_then(Search::best).map(|best| best.value)
+    }
+
+    /// Base parameters found so far: closed stages, and the best of the open one.
+    #[must_use]
+    pub fn values(&self) -> [T; B] {
+        let mut values = self.values;
+        if let Some(best) = self.swarm.as_ref().and_then(Search::best) {
+            for (&column, &value) in self.stage.columns().iter().zip(best.position) {
+                values[column] = value;
+            }
+        }
+        values
+    }
+
+    /// Iterations of all stages.
+    #[must_use]
+    pub fn iterations(&self) -> u32 {
+        self.iterations
+    }
+
+    /// Evaluations of all stages.
+    #[must_use]
+    pub fn evaluations(&self) -> u32 {
+        self.evaluations
+    }
+
+    /// Seed of the first stage.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+}
