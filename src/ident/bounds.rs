@@ -170,10 +170,10 @@ fn measured_box<T: Real, const N: usize, const B: usize>(
     record: &Record<T, N, B>,
 ) -> ParameterBox<T, B> {
     let mut bounds = ParameterBox { low: [T::zero(); B], high: [T::zero(); B] };
-    let rows = real::sqrt(T::of(f64::from(record.rows.max(1))));
     for base in 0..model.base.rank() {
         let mut reach = T::zero();
-        for (factor, size) in record.factors.iter().zip(&record.torque) {
+        for ((factor, size), &rows) in record.factors.iter().zip(&record.torque).zip(&record.rows) {
+            let rows = real::sqrt(T::of(f64::from(rows)));
             let length = factor.column_length(base);
             if length > T::zero() {
                 reach = real::max(reach, size.root_mean_square * rows / length);

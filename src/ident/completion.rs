@@ -55,8 +55,8 @@ pub fn is_weak<T: Real, const N: usize, const B: usize>(
     base: usize,
 ) -> bool {
     let Some(sigma) = estimate.sigma(base) else { return true };
-    let rows = real::sqrt(T::of(f64::from(record.rows.max(1))));
-    record.factors.iter().zip(&record.torque).any(|(factor, size)| {
+    record.factors.iter().zip(&record.torque).zip(&record.rows).any(|((factor, size), &rows)| {
+        let rows = real::sqrt(T::of(f64::from(rows.max(1))));
         sigma * factor.column_length(base) / rows > T::of(WEAK_SHARE) * size.root_mean_square
     })
 }

@@ -47,7 +47,7 @@ pub fn noise<T: Real, const N: usize, const B: usize>(record: &Record<T, N, B>) 
         let factor = &record.factors[joint];
         let fitted = (0..B).filter(|&column| factor.triangle()[column][column] != T::zero()).count();
         let information = real::max(record.row_information, T::of(1e-3));
-        let free = T::of(f64::from(record.rows)) - T::of(fitted as f64) / information;
+        let free = T::of(f64::from(record.rows[joint])) - T::of(fitted as f64) / information;
         let variance = factor.residual() / real::max(free, T::one()) / information;
         let floor = T::of(SMALLEST_NOISE_SHARE) * record.torque[joint].root_mean_square;
         real::max(real::sqrt(variance), real::max(floor, T::of(1e-9)))

@@ -24,11 +24,13 @@ pub struct FilteredRows<T, const N: usize, const B: usize> {
     pub regressor: [[T; B]; N],
     /// N m, D-H sign.
     pub torque: [T; N],
+    /// Share of the window, weighted by the filter's magnitude, in which the joint stood still: 0..1.
+    pub still: [T; N],
 }
 
 impl<T: Real, const N: usize, const B: usize> FilteredRows<T, N, B> {
     fn empty() -> Self {
-        Self { regressor: [[T::zero(); B]; N], torque: [T::zero(); N] }
+        Self { regressor: [[T::zero(); B]; N], torque: [T::zero(); N], still: [T::zero(); N] }
     }
 
     /// No NaN, no infinity.
@@ -80,7 +82,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
             // The output `behind` places younger began `behind * DECIMATION` samples later.
             let Some(tap) = self.age.checked_sub(behind * DECIMATION) else { break };
             if let (Some(output), Some(&weight)) = (self.open.get_mut(slot), weights.get(tap)) {
-                add_scaled(output, rows, weight);
+                add_scaled(output, rows, weight, real::abs(weight) / kernel.absolute_sum());
             }
             slot = if slot + 1 >= PENDING { 0 } else { slot + 1 };
         }
@@ -107,12 +109,14 @@ fn add_scaled<T: Real, const N: usize, const B: usize>(
     output: &mut FilteredRows<T, N, B>,
     rows: &FilteredRows<T, N, B>,
     weight: T,
+    share: T,
 ) {
     for joint in 0..N {
         for (sum, &element) in output.regressor[joint].iter_mut().zip(&rows.regressor[joint]) {
             *sum += weight * element;
         }
         output.torque[joint] += weight * rows.torque[joint];
+        output.still[joint] += share * rows.still[joint];
     }
 }
 
@@ -131,7 +135,7 @@ mod tests {
         let mut outputs = Vec::new();
         for index in 0..1500 {
             let (left, right) = signal(index);
-            let rows = FilteredRows { regressor: [[left, 1.0]], torque: [right] };
+            let rows = FilteredRows { regressor: [[left, 1.0]], torque: [right], still: [0.0] };
             outputs.extend(filter.push(&kernel, &rows));
         }
         assert_eq!(outputs.len(), (1500 - kernel.taps()) / DECIMATION + 1);

@@ -161,9 +161,12 @@ impl<T: Real> Thresholds<T> {
         let mut verdict = Verdict::ACCEPTED;
         let needed = (model.base.rank() as u32).saturating_mul(self.rows_per_parameter);
         let silent = record.torque.iter().any(|size| !(size.root_mean_square > T::zero()));
-        verdict.note(Reason::Input, record.rows < needed || record.rejected > 0 || silent);
+        verdict.note(
+            Reason::Input,
+            record.rows.iter().any(|&rows| rows < needed) || record.rejected > 0 || silent,
+        );
         let still = record.torque.iter().any(|size| !(size.speed >= self.smallest_speed));
-        verdict.note(Reason::Unexcited, still && record.rows > 0);
+        verdict.note(Reason::Unexcited, still && record.rows.iter().any(|&rows| rows > 0));
         verdict
     }
 

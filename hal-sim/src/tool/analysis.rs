@@ -1,0 +1,274 @@
+//! From a solver and its records to the report of a run.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use scarab::ident::{
+    Estimate, Factor, LinkPrior, Plan, Record, RowModel, Solver, Status, Verdict, complete,
+    least_squares_in_box, noise, prior_parameters, status,
+};
+use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter};
+
+use super::report::{
+    BaseReport, FitReport, LeastSquaresReport, Number, ParameterReport, RunReport, SCHEMA, SwarmReport,
+    TrackingReport,
+};
+
+/// What is known of a leg beside the data.
+#[derive(Clone, Debug)]
+pub struct Background<const N: usize, const B: usize> {
+    /// Name in the leg file.
+    pub leg: String,
+    /// Row model in double precision.
+    pub model: RowModel<f64, N, B>,
+    /// Row model of the device.
+    pub device: RowModel<f32, N, B>,
+    /// Which columns are estimated.
+    pub columns: usize,
+    /// What was believed before.
+    pub prior: Option<[LinkPrior<f64>; N]>,
+    /// `none`, `file` or `wrong:P`.
+    pub prior_name: String,
+    /// What the simulated leg has.
+    pub truth: Option<LegParameters<f64, N>>,
+}
+
+/// A motion that was recorded, and how its noise-free torque compares, where that is known.
+#[derive(Clone, Debug)]
+pub struct Motion<const N: usize, const B: usize> {
+    /// `fourier`, `gait-6.5`, ...
+    pub name: String,
+    /// Rows of it.
+    pub record: Record<f32, N, B>,
+    /// Only of simulated motions.
+    pub truth: Option<[TruthFit; N]>,
+}
+
+/// Comparison with the noise-free torque of one joint.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TruthFit {
+    /// Root mean square error over mean absolute torque, rows left out in which the joint sticks, percent.
+    pub percent_of_mean_abs: f64,
+    /// Share of rows left out.
+    pub sticking_share: f64,
+}
+
+/// What surrounds the numbers of a run.
+#[derive(Clone, Debug, Default)]
+pub struct Circumstances<const B: usize> {
+    /// Of the simulated noise.
+    pub seed: Option<u64>,
+    /// Cramer-Rao bound of the base parameters.
+    pub cramer_rao: Option<[f64; B]>,
+    /// First iteration with an excess of at most a half.
+    pub iterations_to_half_chi2: Option<u32>,
+    /// What the model is worth to the servo.
+    pub tracking: Vec<TrackingReport>,
+    /// Simulated or recorded time, s.
+    pub simulated_s: f64,
+    /// Time it took.
+    pub wall: Duration,
+}
+
+/// Name of a parameter as reports write it.
+#[must_use]
+pub fn parameter_name(joint: usize, parameter: Parameter) -> String {
+    format!("{}{}", parameter.symbol(), joint + 1)
+}
+
+impl<const N: usize, const B: usize> Background<N, B> {
+    /// Name of a base parameter: its carrier, with an `R` where others are regrouped into it.
+    #[must_use]
+    pub fn base_name(&self, base: usize) -> String {
+        let Some((joint, parameter)) = self.model.base.independent(base) else { return String::new() };
+        let others = self.terms(base).count() > 1;
+        format!("{}{}", parameter_name(joint, parameter), if others { "R" } else { "" })
+    }
+
+    fn terms(&self, base: usize) -> impl Iterator<Item = (usize, Parameter, f64)> + '_ {
+        let terms = self.model.base.terms(base);
+        (0..N).flat_map(move |joint| {
+            Parameter::ALL
+                .into_iter()
+                .map(move |parameter| (joint, parameter, terms[joint][parameter.index()]))
+                .filter(|(_, _, factor)| *factor != 0.0)
+        })
+    }
+
+    fn unit(&self, base: usize) -> &'static str {
+        self.model.base.independent(base).map_or("", |(_, parameter)| parameter.unit())
+    }
+
+    /// The swarm's constrained optimum and both costs, in double precision and chi-square units.
+    #[must_use]
+    pub fn costs(&self, solver: &Solver<f32, N, B>) -> Costs<B> {
+        let record = solver.record().convert::<f64>();
+        let mut all = Factor::<f64, B>::new();
+        for (factor, sigma) in record.factors.iter().zip(noise(&record)) {
+            all.merge_scaled(factor, 1.0 / sigma);
+        }
+        let bounds = scarab::ident::ParameterBox {
+            low: solver.bounds().low.map(f64::from),
+            high: solver.bounds().high.map(f64::from),
+        };
+        let rank = self.model.base.rank();
+        let optimum = least_squares_in_box(&all, rank, &bounds);
+        Costs { least_squares: all.residual(), above: all.excess(&optimum), factor: all }
+    }
+
+    /// The report of a run.
+    #[must_use]
+    pub fn report(
+        &self,
+        solver: &Solver<f32, N, B>,
+        verdict: Verdict,
+        training: &[Motion<N, B>],
+        validation: &[Motion<N, B>],
+        circumstances: &Circumstances<B>,
+    ) -> RunReport {
+        let estimate = solver.estimate();
+        let costs = self.costs(solver);
+        let cost = costs.factor.excess(&estimate.values.map(f64::from));
+        RunReport {
+            schema: SCHEMA,
+            leg: self.leg.clone(),
+            seed: circumstances.seed,
+            swarm_seed: solver.search().seed(),
+            prior: self.prior_name.clone(),
+            plan: plan_name(solver.plan()),
+            verdict: if verdict.is_accepted() { "accepted" } else { "refused" },
+            reasons: verdict.reasons().map(scarab::ident::Reason::name).collect(),
+            rank: solver.least_squares().rank(),
+            columns: self.columns,
+            condition: solver.condition().into(),
+            parameters: self.parameters(solver.record(), &estimate),
+            base_parameters: self.base_parameters(&estimate, circumstances.cramer_rao.as_ref()),
+            training: fits(training, &estimate.values),
+            validation: fits(validation, &estimate.values),
+            least_squares: LeastSquaresReport {
+                base_parameters: (0..self.model.base.rank())
+                    .map(|base| (self.base_name(base), solver.least_squares().values[base].into()))
+                    .collect(),
+                cost: costs.least_squares.into(),
+            },
+            bso: SwarmReport {
+                seed: solver.search().seed(),
+                iterations: solver.search().iterations(),
+                evaluations: solver.search().evaluations(),
+                cost_over_least_squares: (cost / costs.least_squares).into(),
+                excess_chi2: (cost - costs.above).into(),
+                iterations_to_half_chi2: circumstances.iterations_to_half_chi2,
+            },
+            tracking: circumstances.tracking.clone(),
+            simulated_s: circumstances.simulated_s,
+            wall_s: circumstances.wall.as_secs_f64(),
+        }
+    }
+
+    fn base_parameters(&self, estimate: &Estimate<f32, B>, cramer_rao: Option<&[f64; B]>) -> Vec<BaseReport> {
+        let truth = self.truth.as_ref().map(|truth| self.model.base.project(truth));
+        (0..self.model.base.rank())
+            .map(|base| BaseReport {
+                name: self.base_name(base),
+                terms: self
+                    .terms(base)
+                    .map(|(joint, parameter, factor)| (parameter_name(joint, parameter), factor))
+                    .collect::<BTreeMap<_, _>>(),
+                value: estimate.determined[base].then_some(estimate.values[base]).into(),
+                unit: self.unit(base),
+                sigma: estimate.sigma(base).into(),
+                truth: truth.map(|truth| truth[base]).into(),
+                cramer_rao: cramer_rao.map(|bound| bound[base]).into(),
+            })
+            .collect()
+    }
+
+    /// Base values completed by the prior; `None` without one.
+    fn completed(&self, estimate: &Estimate<f32, B>) -> Option<LegParameters<f64, N>> {
+        let prior = prior_parameters(self.prior.as_ref()?);
+        let expected = self.model.base.project(&prior);
+        let values = core::array::from_fn(|base| {
+            if estimate.determined[base] { f64::from(estimate.values[base]) } else { expected[base] }
+        });
+        complete(&self.model, &values, &prior)
+    }
+
+    fn parameters(&self, record: &Record<f32, N, B>, estimate: &Estimate<f32, B>) -> Vec<ParameterReport> {
+        let completed = self.completed(estimate);
+        let mut reports = Vec::with_capacity(N * PARAMETERS_PER_JOINT);
+        for joint in 0..N {
+            for parameter in Parameter::ALL {
+                let status = status(&self.device, record, estimate, joint, parameter);
+                let carriers: Vec<usize> = self.model.base.carriers(joint, parameter).collect();
+                let alone =
+                    matches!(status, Status::Identified | Status::Weak).then(|| carriers.first().copied());
+                let base = alone.flatten().filter(|&base| estimate.determined[base]);
+                let mut grouped_with: Vec<String> = carriers
+                    .iter()
+                    .flat_map(|&base| self.terms(base))
+                    .filter(|&(other, symbol, _)| (other, symbol) != (joint, parameter))
+                    .map(|(other, symbol, _)| parameter_name(other, symbol))
+                    .collect();
+                grouped_with.sort();
+                grouped_with.dedup();
+                reports.push(ParameterReport {
+                    name: parameter_name(joint, parameter),
+                    joint: joint + 1,
+                    value: match (base, &completed) {
+                        (Some(base), _) => estimate.values[base].into(),
+                        (None, Some(parameters)) => parameters[joint][parameter.index()].into(),
+                        (None, None) => Number::UNKNOWN,
+                    },
+                    unit: parameter.unit(),
+                    sigma: base.and_then(|base| estimate.sigma(base)).into(),
+                    status: status.name(),
+                    grouped_with,
+                    truth: self.truth.map(|truth| truth[joint][parameter.index()]).into(),
+                });
+            }
+        }
+        reports
+    }
+}
+
+/// Costs in chi-square units.
+#[derive(Clone, Debug)]
+pub struct Costs<const B: usize> {
+    /// J_LS.
+    pub least_squares: f64,
+    /// J_C - J_LS.
+    pub above: f64,
+    /// J(p) - J_LS for any parameters.
+    pub factor: Factor<f64, B>,
+}
+
+/// The word for a plan.
+#[must_use]
+pub const fn plan_name(plan: Plan) -> &'static str {
+    match plan {
+        Plan::OneTime => "one-time",
+        Plan::Sequential => "sequential",
+    }
+}
+
+fn fits<const N: usize, const B: usize>(motions: &[Motion<N, B>], values: &[f32; B]) -> Vec<FitReport> {
+    let mut reports = Vec::new();
+    for motion in motions {
+        for joint in 0..N {
+            let error = motion.record.torque_error(joint, values).map(f64::from);
+            let size = motion.record.torque[joint];
+            let percent = |of: f32| Number::from(error.map(|error| 100.0 * error / f64::from(of)));
+            let truth = motion.truth.map(|truth| truth[joint]);
+            reports.push(FitReport {
+                joint: joint + 1,
+                motion: motion.name.clone(),
+                rms_nm: error.into(),
+                percent_of_mean_abs: percent(size.mean_absolute),
+                percent_of_rms: percent(size.root_mean_square),
+                percent_of_mean_abs_vs_truth: truth.map(|truth| truth.percent_of_mean_abs).into(),
+                sticking_share: truth.map(|truth| truth.sticking_share).into(),
+            });
+        }
+    }
+    reports
+}

@@ -1,0 +1,4 @@
+//! The host tool.
+pub mod analysis;
+pub mod report;
+pub mod tables;
