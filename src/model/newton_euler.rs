@@ -1,6 +1,6 @@
 //! Joint torques of a chain by recursive Newton-Euler, straight from the parameters.
 //!
-//! The independent check of the [`super::regressor`], and the cheaper of the two where only torque is wanted.
+//! The independent check of the [`mod@super::regressor`], and the cheaper of the two where only torque is wanted.
 //! Forces are balanced link by link from the tip; with the parameters about the joint frame's origin no centre of
 //! mass is needed and the torque is linear in all of them.
 //!
@@ -17,7 +17,8 @@
 //! | R, p | frame i+1 seen from frame i | -, m |
 //!
 //! Source: Luh, Walker and Paul 1980; this form W. Khalil and E. Dombre, Modeling, Identification and Control of
-//! Robots, 2002, Eqs (9.86)-(9.94). Cost: about 200 flops per joint. Numbers that are not finite pass through.
+//! Robots, 2002, Eqs (9.86)-(9.94). Cost: about 200 flops per joint; 570 instructions for two joints in `f32` on a
+//! Cortex-M4F (emulated). Numbers that are not finite pass through.
 
 use nalgebra::Vector3;
 

@@ -18,8 +18,8 @@
 //! FV OFF, then IA, then YY HZ M. A link's XX thereby carries its -YY.
 //!
 //! Source: M. Gautier, Numerical calculation of the base inertial parameters of robots, 1991.
-//! Cost: 64 states; once per leg, gravity and mask. Memory in `f32` for two joints: 3.2 kB of stack while it runs;
-//! the result takes 112 N B bytes.
+//! Cost: 64 states; once per leg, gravity and mask. For two joints in `f32` on a Cortex-M4F (emulated): 1.5 million
+//! instructions, 12 ms at 8 ns, and 6.2 kB of stack; the result takes about 60 N B bytes.
 //! Limits: what is independent here may still be weak on a given motion; that is for the statistics to say.
 
 use nalgebra::Vector3;
@@ -74,9 +74,9 @@ pub enum Standing {
 /// How clearly the kept columns stand apart from the dropped ones, as shares of a column's length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation<T> {
-    /// Smallest share of a kept column that those before it do not explain.
+    /// Smallest share of a kept column that those before it do not explain; above the tolerance.
     pub smallest_kept: T,
-    /// Largest such share of a dropped column: rounding.
+    /// Largest such share of a dropped column; below the tolerance, and all of it rounding if the two are far apart.
     pub largest_dropped: T,
 }
 
@@ -104,7 +104,8 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         gravity: &Vector3<T>,
         mask: &ColumnMask<N>,
     ) -> Result<Self, BaseError> {
-        let mut factor = collected(chain, gravity, mask);
+        let mut factor = Factor::new();
+        collect(&mut factor, chain, gravity, mask);
         let norms = factor.column_norms();
         let largest = norms.iter().flatten().fold(T::zero(), |largest, norm| max(largest, *norm));
         if norms.iter().flatten().any(|norm| !is_finite(*norm)) {
@@ -115,10 +116,10 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         }
 
         let tolerance = tolerance();
-        let smallest_norm = largest * tolerance;
-        let seen = norms.map(|joint| joint.map(|norm| if norm > smallest_norm { norm } else { T::zero() }));
+        let shortest = largest * tolerance * T::of(ROUNDINGS);
+        let lengths = norms.map(|joint| joint.map(|norm| max(norm, shortest)));
         let mut independent = [(0, Parameter::XX); B];
-        let echelon = factor.reduce(tolerance, &seen, |place, joint, parameter| {
+        let echelon = factor.reduce(tolerance, &lengths, |place, joint, parameter| {
             if let Some(slot) = independent.get_mut(place) {
                 *slot = (joint, parameter);
             }
@@ -143,7 +144,16 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
             },
         };
         for (place, (terms, row)) in base.terms.iter_mut().zip(factor.rows()).enumerate().take(rank) {
-            *terms = cleaned(row, place, base.independent.get(..rank).unwrap_or_default(), &seen, tolerance);
+            let columns = base.independent.get(..rank).unwrap_or_default();
+            let own =
+                columns.get(place).map_or(T::zero(), |(joint, parameter)| entry(&norms, *joint, *parameter));
+            *terms = cleaned(
+                row,
+                place,
+                columns,
+                own,
+                &lengths.map(|joint| joint.map(|length| tolerance * length)),
+            );
         }
         Ok(base)
     }
@@ -227,23 +237,27 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
     }
 }
 
-/// Share of a column below which it counts as explained by others, and scaled factor below which it counts as zero.
+/// Rounding of an entry, in units of the last place of the largest column's. Terms that cancel in a short column leave
+/// their rounding in it, so a column is judged as if it were at least `ROUNDINGS` tolerances of the longest one long.
+const ROUNDINGS: f64 = 4.0;
+
+/// Share of a column below which it counts as explained by others, and below which a contribution counts as zero.
 ///
 /// Halfway, in digits, between 1 and rounding: 3.5e-4 in `f32`, 1.5e-8 in `f64`.
 fn tolerance<T: Real>() -> T {
     sqrt(T::EPSILON)
 }
 
-/// A factor of the regressor rows of many states, the same on every call.
-fn collected<T: Real, const N: usize>(
+/// Takes the regressor rows of many states into the factor; the same states on every call.
+fn collect<T: Real, const N: usize>(
+    factor: &mut Factor<T, N>,
     chain: &Chain<T, N>,
     gravity: &Vector3<T>,
     mask: &ColumnMask<N>,
-) -> Factor<T, N> {
+) {
     let mut random = Xoshiro128PlusPlus::seed_from_u64(1);
     let mut within =
         |bound: f64| T::of((f64::from(random.next_u32()) / f64::from(u32::MAX) * 2.0 - 1.0) * bound);
-    let mut factor = Factor::new();
     for _ in 0..STATES {
         let state = JointState {
             q: core::array::from_fn(|_| within(core::f64::consts::PI)),
@@ -259,25 +273,22 @@ fn collected<T: Real, const N: usize>(
             factor.collect(row);
         }
     }
-    factor
 }
 
 /// An echelon row with exact ones and zeros on the independent columns and without factors that are only rounding.
 ///
-/// A factor is judged by what its independent column contributes to the dependent one, as a share of the latter's
-/// norm; a norm of zero means that the column is not seen.
+/// `own` is the norm of the row's independent column; a factor times it, what that column contributes to a dependent
+/// one, is rounding where it is not more than the dependent column's entry in `least`.
 fn cleaned<T: Real, const N: usize>(
     row: &RegressorRow<T, N>,
     place: usize,
     independent: &[(usize, Parameter)],
-    norms: &LegParameters<T, N>,
-    tolerance: T,
+    own: T,
+    least: &LegParameters<T, N>,
 ) -> LegParameters<T, N> {
-    let own_norm =
-        independent.get(place).map_or(T::zero(), |(joint, parameter)| entry(norms, *joint, *parameter));
     let mut terms = *row;
-    for (factor, norm) in terms.iter_mut().flatten().zip(norms.iter().flatten()) {
-        if *norm == T::zero() || abs(*factor) * own_norm <= tolerance * *norm {
+    for (factor, least) in terms.iter_mut().flatten().zip(least.iter().flatten()) {
+        if abs(*factor) * own <= *least {
             *factor = T::zero();
         }
     }

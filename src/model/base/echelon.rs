@@ -87,30 +87,26 @@ impl<T: Real, const N: usize> Factor<T, N> {
 
     /// Brings the factor to echelon form; calls `kept` with each column that is independent of those before it.
     ///
-    /// `norms` are the columns' norms, 0 for those to pass over; a column is dependent where what the kept ones leave
-    /// of it is not more than `tolerance` of its norm.
+    /// A column is dependent where what the kept ones leave of it is not more than `tolerance` of its entry in
+    /// `lengths`, all of which are more than zero.
     pub fn reduce(
         &mut self,
         tolerance: T,
-        norms: &LegParameters<T, N>,
+        lengths: &LegParameters<T, N>,
         mut kept: impl FnMut(usize, usize, Parameter),
     ) -> Echelon<T> {
         let rows = self.rows.as_flattened_mut();
         let mut echelon = Echelon { rank: 0, smallest_kept: T::LARGEST, largest_dropped: T::zero() };
         for (joint, parameter) in in_order_of_preference::<N>() {
-            let norm = entry(norms, joint, parameter);
             let Some((pivot_row, below)) =
                 rows.get_mut(echelon.rank..).and_then(<[RegressorRow<T, N>]>::split_first_mut)
             else {
                 break;
             };
-            if norm == T::zero() {
-                continue;
-            }
             for row in below {
                 rotate(pivot_row, row, joint, parameter);
             }
-            let share = abs(entry(pivot_row, joint, parameter)) / norm;
+            let share = abs(entry(pivot_row, joint, parameter)) / entry(lengths, joint, parameter);
             if share > tolerance {
                 echelon.smallest_kept = min(echelon.smallest_kept, share);
                 kept(echelon.rank, joint, parameter);

@@ -25,9 +25,11 @@ fn down_along_z<T: Real>() -> Vector3<T> {
 fn rank<T: Real, const N: usize>(chain: &Chain<T, N>, gravity: Vector3<T>, off: &[Parameter]) -> usize {
     let base = BaseParameters::<T, N, 42>::analyse(chain, &gravity, &all_but(off)).unwrap();
     let separation = base.separation();
-    // Measured on these legs: 0.43 and 7e-16 (f64), 0.43 and 4e-7 (f32); the tolerance lies between.
+    // Measured on these legs: kept 0.43 of a column or more; dropped up to 4e-10 (f64) and 1e-5 (f32), where the
+    // tolerances are 1.5e-8 and 3.5e-4.
+    let tolerance = sqrt(T::EPSILON);
     assert!(separation.smallest_kept > T::of(0.3), "{separation:?}");
-    assert!(separation.largest_dropped < T::EPSILON * T::of(10.0), "{separation:?}");
+    assert!(separation.largest_dropped < tolerance * T::of(0.05), "{separation:?}");
     base.rank()
 }
 
@@ -152,20 +154,39 @@ fn the_paper_chain_has_the_set_of_table_six_with_minus_yy_in_xx() {
     assert_eq!(base.standing(0, IA), Standing::Off);
 }
 
-#[test]
-fn a_chain_without_special_angles_has_the_rank_of_the_closed_form() {
+/// Ranks of random chains; what is dropped must be far below the tolerance.
+fn ranks_without_special_angles<T: Real, const N: usize>() {
     let mut dice = Dice::new(21);
-    for _ in 0..20 {
-        let (chain, gravity) = (dice.chain::<3>(), dice.gravity());
-        let mask = all_but(&[FC, FV, OFF]);
-        let base = BaseParameters::<f64, 3, 42>::analyse(&chain, &gravity, &mask).unwrap();
+    for _ in 0..100 {
+        let (chain, gravity) = (dice.chain::<N>().convert::<T>(), dice.gravity().map(T::of));
+        let base = BaseParameters::<T, N, 42>::analyse(&chain, &gravity, &all_but(&[FC, FV, OFF])).unwrap();
+        let separation = base.separation();
         // 3 of the first link, 7 of every other, rotors of all but the first.
-        assert_eq!(base.rank(), 3 + 2 * 7 + 2, "{:?}", base.separation());
-        let single = chain.convert::<f32>();
-        let gravity = gravity.map(|g| g as f32);
-        let base = BaseParameters::<f32, 3, 42>::analyse(&single, &gravity, &mask).unwrap();
-        assert_eq!(base.rank(), 3 + 2 * 7 + 2, "{:?}", base.separation());
+        assert_eq!(base.rank(), 3 + 8 * (N - 1), "{separation:?}");
+        // Measured over 600 chains in f32: kept 6e-4 or more, on a chain that is nearly special, dropped 5e-7 or
+        // less; the tolerance is 3.5e-4.
+        let tolerance = sqrt(T::EPSILON);
+        assert!(separation.largest_dropped < tolerance * T::of(0.05), "{separation:?}");
     }
+}
+
+#[test]
+fn chains_without_special_angles_have_the_rank_of_the_closed_form() {
+    ranks_without_special_angles::<f64, 2>();
+    ranks_without_special_angles::<f64, 3>();
+    ranks_without_special_angles::<f32, 2>();
+    ranks_without_special_angles::<f32, 3>();
+}
+
+#[test]
+fn gravity_off_the_first_axis_by_a_thousandth_shows_the_first_centre_of_mass() {
+    let tilted = Vector3::new(0.009_81_f32, 0.0, -9.81);
+    let base = BaseParameters::<f32, 3, 27>::analyse(&paper_chain(), &tilted, &all_but(&[])).unwrap();
+    assert_eq!(base.rank(), 27);
+    assert!(matches!(base.standing(0, HY), Standing::Alone(_) | Standing::Grouped(_)));
+    let upright =
+        BaseParameters::<f32, 3, 27>::analyse(&paper_chain(), &down_along_z(), &all_but(&[])).unwrap();
+    assert_eq!(upright.standing(0, HY), Standing::Unseen);
 }
 
 fn torque_from_base_values<T: Real>(bound: f64) {
