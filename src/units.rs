@@ -53,4 +53,8 @@ unit! {
     Second,
     /// Joint torque per motor current, N m/A.
     NewtonMetrePerAmpere,
+    /// Moment of inertia, kg m^2.
+    KilogramMetreSquared,
+    /// Frequency, Hz.
+    Hertz,
 }

@@ -1,1 +1,39 @@
-//! (being built)
+//! What stands between a command and the bridge: limits, drive states and the monitor that decides last.
+//!
+//! Why a room of its own: it knows no controller, no model and no motion, so nothing that goes wrong there can talk
+//! it out of its limits. Once per servo tick it is shown what was measured and what is wanted; it answers what the
+//! drives are told. It is a pure function of its state and those two.
+//!
+//! | part | what it is |
+//! | --- | --- |
+//! | [`Limits`] | what each joint may do; absurd ones are refused by name |
+//! | [`DriveState`] | the states of CiA 402, one for the whole leg, and their transitions |
+//! | [`FaultCode`], [`Fault`] | what can go wrong, with fixed numbers and the safe state each leads to |
+//! | [`StepGate`] | encoder steps that no joint can make |
+//! | [`Barrier`] | torque bounds that stop a joint before its range and speed end |
+//! | [`Monitor`] | all of it, once per tick |
+//!
+//! Safe states: *Off* releases the bridges in the same tick. *Damp* opposes every joint's velocity under its torque
+//! cap for at most 300 ms, then Off. *Limit* stays enabled with less than was asked for. An exoskeleton that goes limp
+//! may drop its wearer and one that holds may hurt him: the state is chosen per fault ([`FaultCode::reaction`]).
+//! Faults are latched until a reset is asked for, the drive is off and the cause is gone; the way back to a moving
+//! leg is shutdown, switch on, enable operation, each asked for by the operator.
+//!
+//! Here now: numbers that are not finite (N1), the range (J1), overspeed (J2), encoder steps (E2), and the torque and
+//! current caps. Not here: faults of supply, temperature, bridge, emergency stop, bus, timing and memory, whose
+//! signals the ports do not carry yet; they join as fault codes and fields of the [`Observation`]. No conformity with
+//! any safety standard is claimed.
+
+pub mod barrier;
+pub mod fault;
+pub mod limits;
+pub mod monitor;
+pub mod state;
+pub mod step_gate;
+
+pub use barrier::{Barrier, Limited};
+pub use fault::{Fault, FaultCode, Reaction};
+pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
+pub use monitor::{Decision, Monitor, Observation, Refusal, RefusalReason, Request};
+pub use state::{DriveState, Event, Permission, PowerRequest};
+pub use step_gate::{Reading, StepGate};

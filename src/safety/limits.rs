@@ -1,0 +1,173 @@
+//! What each joint may do, and the refusal of limits that make no sense.
+
+use crate::real::{abs, is_finite, min};
+use crate::units::{
+    Ampere, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
+    RadianPerSecondSquared,
+};
+
+/// Share of the torque cap that braking may count on; the rest is left to gravity, which is largest where it pulls
+/// a raised leg (64 of 100 N m for the default leg held out level, 49 at its range's end).
+const BRAKING_SHARE: f32 = 0.5;
+
+/// What one joint may do, in the model's angle and sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointLimits {
+    /// Smallest angle.
+    pub low: Radian,
+    /// Largest angle.
+    pub high: Radian,
+    /// Largest speed that is commanded; 1.1 times as much is a fault.
+    pub speed: RadianPerSecond,
+    /// Largest torque that is commanded.
+    pub torque: NewtonMetre,
+    /// Largest motor current that is commanded.
+    pub current: Ampere,
+    /// Joint torque per motor current; negative where the model's sign is opposite to the drive's.
+    pub torque_per_ampere: NewtonMetrePerAmpere,
+    /// Largest inertia the joint moves, rotor and the links beyond it included.
+    pub inertia: KilogramMetreSquared,
+}
+
+/// Limits of a whole leg that have been found to make sense.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits<const N: usize> {
+    joints: [JointLimits; N],
+}
+
+/// A limit, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LimitQuantity {
+    /// The range: each end within -2 pi..=2 pi, and at least 2 degrees between them.
+    Range,
+    /// Speed: above 0, at most 50 rad/s.
+    Speed,
+    /// Torque: above 0, at most 1,000 N m.
+    Torque,
+    /// Current: above 0, at most 300 A.
+    Current,
+    /// Torque per current: 0.001..=100 N m/A of either sign.
+    TorquePerAmpere,
+    /// Inertia: above 0.0001, at most 100 kg m^2.
+    Inertia,
+}
+
+/// A limit that makes no sense.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LimitsError {
+    /// Counted from 0.
+    pub joint: usize,
+    /// The limit in question.
+    pub quantity: LimitQuantity,
+}
+
+impl JointLimits {
+    /// Largest torque that respects both the torque and the current limit.
+    #[must_use]
+    pub fn torque_cap(&self) -> NewtonMetre {
+        NewtonMetre(min(self.torque.0, self.current.0 * abs(self.torque_per_ampere.0)))
+    }
+
+    /// Deceleration the joint is counted on to reach. A motion whose acceleration stays below is never touched by the
+    /// stopping-distance clamp on its way to the end of the range.
+    #[must_use]
+    pub fn braking_acceleration(&self) -> RadianPerSecondSquared {
+        RadianPerSecondSquared(BRAKING_SHARE * self.torque_cap().0 / self.inertia.0)
+    }
+
+    fn absurd(&self) -> Option<LimitQuantity> {
+        const LARGEST_ANGLE: f32 = core::f32::consts::TAU;
+        const SMALLEST_RANGE: f32 = 0.034_9;
+        let between = |value: f32, low: f32, high: f32| value > low && value <= high;
+        let range = self.low.0 >= -LARGEST_ANGLE
+            && self.high.0 <= LARGEST_ANGLE
+            && is_finite(self.low.0)
+            && is_finite(self.high.0)
+            && self.high.0 - self.low.0 >= SMALLEST_RANGE;
+        [
+            (range, LimitQuantity::Range),
+            (between(self.speed.0, 0.0, 50.0), LimitQuantity::Speed),
+            (between(self.torque.0, 0.0, 1000.0), LimitQuantity::Torque),
+            (between(self.current.0, 0.0, 300.0), LimitQuantity::Current),
+            (between(abs(self.torque_per_ampere.0), 0.000_999, 100.0), LimitQuantity::TorquePerAmpere),
+            (between(self.inertia.0, 0.0001, 100.0), LimitQuantity::Inertia),
+        ]
+        .into_iter()
+        .find_map(|(sensible, quantity)| (!sensible).then_some(quantity))
+    }
+}
+
+impl<const N: usize> Limits<N> {
+    /// Limits that make sense, or the first joint and quantity that do not.
+    pub fn new(joints: [JointLimits; N]) -> Result<Self, LimitsError> {
+        for (joint, limits) in joints.iter().enumerate() {
+            if let Some(quantity) = limits.absurd() {
+                return Err(LimitsError { joint, quantity });
+            }
+        }
+        Ok(Self { joints })
+    }
+
+    /// Per joint, proximal first.
+    #[must_use]
+    pub fn joints(&self) -> &[JointLimits; N] {
+        &self.joints
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// The default leg's hip: 100 N m, 4.5 rad/s, the paper's working range.
+    pub(crate) const HIP: JointLimits = JointLimits {
+        low: Radian(0.038),
+        high: Radian(0.876),
+        speed: RadianPerSecond(3.14),
+        torque: NewtonMetre(100.0),
+        current: Ampere(80.0),
+        torque_per_ampere: NewtonMetrePerAmpere(1.5),
+        inertia: KilogramMetreSquared(5.5),
+    };
+
+    /// The default leg's knee, turning against its drive.
+    pub(crate) const KNEE: JointLimits = JointLimits {
+        low: Radian(-1.667),
+        high: Radian(-0.12),
+        inertia: KilogramMetreSquared(2.53),
+        torque_per_ampere: NewtonMetrePerAmpere(-1.5),
+        ..HIP
+    };
+
+    #[test]
+    fn absurd_limits_are_refused_and_joint_and_quantity_are_named() {
+        assert!(Limits::new([HIP, KNEE]).is_ok());
+        let absurd = [
+            (LimitQuantity::Range, JointLimits { low: Radian(1.0), ..HIP }),
+            (LimitQuantity::Range, JointLimits { high: Radian(f32::NAN), ..HIP }),
+            (LimitQuantity::Range, JointLimits { low: Radian(-100.0), ..HIP }),
+            (LimitQuantity::Range, JointLimits { low: Radian(0.87), ..HIP }),
+            (LimitQuantity::Speed, JointLimits { speed: RadianPerSecond(0.0), ..HIP }),
+            (LimitQuantity::Speed, JointLimits { speed: RadianPerSecond(f32::INFINITY), ..HIP }),
+            (LimitQuantity::Torque, JointLimits { torque: NewtonMetre(-5.0), ..HIP }),
+            (LimitQuantity::Torque, JointLimits { torque: NewtonMetre(1e6), ..HIP }),
+            (LimitQuantity::Current, JointLimits { current: Ampere(f32::NAN), ..HIP }),
+            (
+                LimitQuantity::TorquePerAmpere,
+                JointLimits { torque_per_ampere: NewtonMetrePerAmpere(0.0), ..HIP },
+            ),
+            (LimitQuantity::Inertia, JointLimits { inertia: KilogramMetreSquared(0.0), ..HIP }),
+        ];
+        for (quantity, limits) in absurd {
+            assert_eq!(Limits::new([HIP, limits]), Err(LimitsError { joint: 1, quantity }), "{limits:?}");
+            assert_eq!(Limits::new([limits, HIP]), Err(LimitsError { joint: 0, quantity }), "{limits:?}");
+        }
+    }
+
+    #[test]
+    fn the_torque_cap_respects_the_current_limit_of_either_sign() {
+        assert_eq!(HIP.torque_cap(), NewtonMetre(100.0));
+        let weak = JointLimits { current: Ampere(40.0), ..KNEE };
+        assert_eq!(weak.torque_cap(), NewtonMetre(60.0));
+    }
+}

@@ -1,0 +1,289 @@
+//! The drive states of CiA 402, one for the whole leg, and their transitions as a pure function.
+//!
+//! ```text
+//!   NotReadyToSwitchOn
+//!          | first tick without a fault
+//!          v                 disable voltage, quick stop
+//!   SwitchOnDisabled <---------------------------------------+----------------+
+//!     |         ^  ^                                         |                |
+//!     | shut-   |  | disable voltage, quick stop             |                | disable voltage,
+//!     | down    |  |                                         |                | 300 ms over
+//!     v         |  |        switch on           enable       |                |
+//!   ReadyToSwitchOn ---------------> SwitchedOn ------> OperationEnabled --> QuickStopActive
+//!          ^   ^     <--------------    |   ^  <------      |     quick stop   (damping)
+//!          |   |        shutdown        |   |    disable    |
+//!          |   +------------------------+   +-- operation --+
+//!          +------------ shutdown ---------------------------
+//!
+//!   any ---- fault, drive off or reaction Off ----------------------------> Fault --- reset ---> SwitchOnDisabled
+//!   OperationEnabled, QuickStopActive --- fault ---> FaultReactionActive --- 300 ms over ---^
+//! ```
+//!
+//! Source: CiA 402-2 (IEC 61800-7-201), the state machine of the power drive system. Its optional way back from
+//! QuickStopActive to OperationEnabled is not offered: after a quick stop the operator starts over.
+//! A request that has no arrow from the present state changes nothing.
+
+use super::fault::{Fault, Reaction};
+
+/// Where the drive of a leg stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveState {
+    /// Before the first tick without a fault.
+    NotReadyToSwitchOn,
+    /// Off; waits for a shutdown request, the first of the three that enable.
+    SwitchOnDisabled,
+    /// Off; may be switched on.
+    ReadyToSwitchOn,
+    /// Still off; may be enabled.
+    SwitchedOn,
+    /// The joints follow what they are told.
+    OperationEnabled,
+    /// Damping on request, then off.
+    QuickStopActive {
+        /// Ticks of damping left, this one included.
+        remaining_ticks: u32,
+    },
+    /// Damping because of a fault, then off.
+    FaultReactionActive {
+        /// The first fault.
+        fault: Fault,
+        /// Ticks of damping left, this one included.
+        remaining_ticks: u32,
+    },
+    /// Off until reset.
+    Fault {
+        /// The first fault.
+        fault: Fault,
+    },
+}
+
+/// What an operator asks of the drive, once, at one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PowerRequest {
+    /// Control word 6.
+    Shutdown,
+    /// Control word 7.
+    SwitchOn,
+    /// Control word F, from 7.
+    EnableOperation,
+    /// Control word 7, from F.
+    DisableOperation,
+    /// Control word 0.
+    DisableVoltage,
+    /// Control word 2.
+    QuickStop,
+    /// Rising edge of bit 7.
+    ResetFault,
+}
+
+/// What moves the state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A tick went by without a new fault.
+    Tick,
+    /// The operator asked.
+    Asked(PowerRequest),
+    /// A detector fired.
+    Failed(Fault),
+}
+
+/// What the drive may do in a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Permission {
+    /// Bridges released.
+    Released,
+    /// Follow the request within limits.
+    Follow,
+    /// Damp, whatever is requested.
+    Damp,
+}
+
+impl DriveState {
+    /// What the drive may do.
+    #[must_use]
+    pub const fn permission(self) -> Permission {
+        match self {
+            Self::OperationEnabled => Permission::Follow,
+            Self::QuickStopActive { .. } | Self::FaultReactionActive { .. } => Permission::Damp,
+            _ => Permission::Released,
+        }
+    }
+
+    /// The fault that is latched or being reacted to.
+    #[must_use]
+    pub const fn fault(self) -> Option<Fault> {
+        match self {
+            Self::FaultReactionActive { fault, .. } | Self::Fault { fault } => Some(fault),
+            _ => None,
+        }
+    }
+
+    /// The state after an event; damping lasts `damp_ticks`.
+    #[must_use]
+    pub const fn after(self, event: Event, damp_ticks: u32) -> Self {
+        match event {
+            Event::Tick => self.after_tick(),
+            Event::Asked(request) => self.after_request(request, damp_ticks),
+            Event::Failed(fault) => self.after_fault(fault, damp_ticks),
+        }
+    }
+
+    const fn after_tick(self) -> Self {
+        match self {
+            Self::NotReadyToSwitchOn => Self::SwitchOnDisabled,
+            Self::QuickStopActive { remaining_ticks } if remaining_ticks > 1 => {
+                Self::QuickStopActive { remaining_ticks: remaining_ticks - 1 }
+            }
+            Self::QuickStopActive { .. } => Self::SwitchOnDisabled,
+            Self::FaultReactionActive { fault, remaining_ticks } if remaining_ticks > 1 => {
+                Self::FaultReactionActive { fault, remaining_ticks: remaining_ticks - 1 }
+            }
+            Self::FaultReactionActive { fault, .. } => Self::Fault { fault },
+            state => state,
+        }
+    }
+
+    const fn after_request(self, request: PowerRequest, damp_ticks: u32) -> Self {
+        use PowerRequest as Ask;
+        match (self, request) {
+            (Self::SwitchOnDisabled | Self::SwitchedOn | Self::OperationEnabled, Ask::Shutdown) => {
+                Self::ReadyToSwitchOn
+            }
+            (Self::ReadyToSwitchOn, Ask::SwitchOn) => Self::SwitchedOn,
+            (Self::SwitchedOn, Ask::EnableOperation) => Self::OperationEnabled,
+            (Self::OperationEnabled, Ask::DisableOperation) => Self::SwitchedOn,
+            (Self::OperationEnabled, Ask::QuickStop) => Self::QuickStopActive { remaining_ticks: damp_ticks },
+            (Self::ReadyToSwitchOn | Self::SwitchedOn, Ask::DisableVoltage | Ask::QuickStop)
+            | (Self::OperationEnabled | Self::QuickStopActive { .. }, Ask::DisableVoltage)
+            | (Self::Fault { .. }, Ask::ResetFault) => Self::SwitchOnDisabled,
+            (state, _) => state,
+        }
+    }
+
+    /// The first fault stays the one that is told. Damping is never prolonged: a fault during a quick stop or during
+    /// another fault's reaction has the ticks that are left.
+    const fn after_fault(self, fault: Fault, damp_ticks: u32) -> Self {
+        let first = match self.fault() {
+            Some(first) => first,
+            None => fault,
+        };
+        let ticks = match self {
+            Self::OperationEnabled => damp_ticks,
+            Self::QuickStopActive { remaining_ticks } | Self::FaultReactionActive { remaining_ticks, .. } => {
+                remaining_ticks.saturating_sub(1)
+            }
+            _ => 0,
+        };
+        match fault.code.reaction() {
+            Reaction::Damp if ticks > 0 => Self::FaultReactionActive { fault: first, remaining_ticks: ticks },
+            _ => Self::Fault { fault: first },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fault::FaultCode;
+    use super::*;
+
+    const DAMP_TICKS: u32 = 1200;
+    const OVERSPEED: Fault = Fault { code: FaultCode::Overspeed, joint: 1 };
+    const NOT_FINITE: Fault = Fault { code: FaultCode::NotFinite, joint: 0 };
+    const STATES: [DriveState; 8] = [
+        DriveState::NotReadyToSwitchOn,
+        DriveState::SwitchOnDisabled,
+        DriveState::ReadyToSwitchOn,
+        DriveState::SwitchedOn,
+        DriveState::OperationEnabled,
+        DriveState::QuickStopActive { remaining_ticks: 7 },
+        DriveState::FaultReactionActive { fault: OVERSPEED, remaining_ticks: 7 },
+        DriveState::Fault { fault: OVERSPEED },
+    ];
+    const REQUESTS: [PowerRequest; 7] = [
+        PowerRequest::Shutdown,
+        PowerRequest::SwitchOn,
+        PowerRequest::EnableOperation,
+        PowerRequest::DisableOperation,
+        PowerRequest::DisableVoltage,
+        PowerRequest::QuickStop,
+        PowerRequest::ResetFault,
+    ];
+
+    #[test]
+    fn every_request_in_every_state_does_what_cia_402_says() {
+        // Rows: the states above; columns: the requests above; entries: index of the next state, "." for none.
+        let table = [
+            ". . . . . . .", //
+            "2 . . . . . .",
+            ". 3 . . 1 1 .",
+            "2 . 4 . 1 1 .",
+            "2 . . 3 1 5 .",
+            ". . . . 1 . .",
+            ". . . . . . .",
+            ". . . . . . 1",
+        ];
+        for (state, row) in STATES.into_iter().zip(table) {
+            for (request, entry) in REQUESTS.into_iter().zip(row.split(' ')) {
+                let expected = match entry {
+                    "." => state,
+                    "5" => DriveState::QuickStopActive { remaining_ticks: DAMP_TICKS },
+                    index => STATES[index.parse::<usize>().expect("a digit")],
+                };
+                assert_eq!(state.after(Event::Asked(request), DAMP_TICKS), expected, "{state:?} {request:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn operation_is_enabled_only_by_shutdown_switch_on_enable_in_this_order() {
+        // Every sequence of three requests from switch-on disabled.
+        let mut ways = 0;
+        for first in REQUESTS {
+            for second in REQUESTS {
+                for third in REQUESTS {
+                    let end = [first, second, third]
+                        .into_iter()
+                        .fold(DriveState::SwitchOnDisabled, |state, request| {
+                            state.after(Event::Asked(request), DAMP_TICKS)
+                        });
+                    if end.permission() != Permission::Released {
+                        ways += 1;
+                        assert_eq!(
+                            (first, second, third),
+                            (PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation)
+                        );
+                    }
+                }
+            }
+        }
+        assert_eq!(ways, 1);
+    }
+
+    #[test]
+    fn a_fault_damps_an_enabled_drive_for_its_time_and_leaves_a_disabled_one_off() {
+        for state in STATES {
+            let failed = state.after(Event::Failed(OVERSPEED), DAMP_TICKS);
+            let expected = match state {
+                DriveState::OperationEnabled => Permission::Damp,
+                DriveState::QuickStopActive { .. } | DriveState::FaultReactionActive { .. } => {
+                    Permission::Damp
+                }
+                _ => Permission::Released,
+            };
+            assert_eq!(failed.permission(), expected, "{state:?}");
+            assert_eq!(failed.fault(), Some(OVERSPEED));
+            let off = state.after(Event::Failed(NOT_FINITE), DAMP_TICKS);
+            assert_eq!(off.permission(), Permission::Released, "{state:?}");
+        }
+        let mut state = DriveState::OperationEnabled.after(Event::Failed(OVERSPEED), DAMP_TICKS);
+        let mut damped = 0;
+        while state.permission() == Permission::Damp {
+            damped += 1;
+            // A second fault on the way neither prolongs the damping nor replaces the first.
+            let later = Fault { code: FaultCode::PositionLimit, joint: 0 };
+            let event = if damped == 100 { Event::Failed(later) } else { Event::Tick };
+            state = state.after(event, DAMP_TICKS);
+        }
+        assert_eq!((damped, state), (DAMP_TICKS, DriveState::Fault { fault: OVERSPEED }));
+    }
+}
