@@ -1,1 +1,40 @@
-//! (being built)
+//! The 4 kHz tick of a leg: from encoder counts and a commanded motion to what the drives are told.
+//!
+//! ```text
+//! counts -> step gate -> observer -> position, velocity --+
+//! commanded motion -> torque model (feedforward) ---------+-> controller -> torque -> monitor -> currents
+//! ```
+//!
+//! | part | what it is |
+//! | --- | --- |
+//! | [`JointScale`] | counts and currents to the model's angles and torques, the only place where signs change |
+//! | [`Observer`] | position and velocity from counts |
+//! | [`Controller`] | position and velocity control with an integral that cannot wind up |
+//! | [`TorqueModel`] | what the feedforward needs of a model; [`NoModel`] for none |
+//! | [`Servo`] | the tick, a pure function of its state and arguments |
+//! | [`LogAverager`] | means of eight ticks for identification, 500 Hz |
+//!
+//! Everything inside is in the model's (D-H) angles and signs. The servo never sees identification: a model's
+//! parameters arrive as a value between two ticks.
+
+pub mod configuration;
+pub mod controller;
+pub mod feedforward;
+pub mod logging;
+pub mod observer;
+pub mod scale;
+pub mod tick;
+
+pub use configuration::{JointConfiguration, ServoError};
+pub use controller::{Controller, ControllerGains};
+pub use feedforward::{NoModel, TorqueModel, smoothed_sign};
+pub use logging::{LOG_RATE_HZ, LogAverager, LogSample, TICKS_PER_LOG};
+pub use observer::{Observer, ObserverGains};
+pub use scale::{Direction, JointScale};
+pub use tick::{Servo, ServoCommand, ServoOutput};
+
+/// Ticks per second.
+pub const SERVO_RATE_HZ: u32 = 4000;
+
+/// Time between two ticks, s.
+const TICK_S: f32 = 1.0 / SERVO_RATE_HZ as f32;

@@ -1,0 +1,155 @@
+//! Position and velocity control of one joint, with an integral that cannot wind up.
+//!
+//! A cascade: the position error asks for a velocity, the velocity error for a torque; what gravity and friction leave
+//! over without a model is taken up by the integral. Feedforward comes on top.
+//!
+//! ```text
+//! torque = feedforward + D (qd_c - qd + kp (q_c - q)) + integral
+//! integral' = D kp ki (q_c - q)
+//! D = 4 kp J,   kp = 2 pi f / 1.29,   ki = kp / 8
+//! ```
+//!
+//! `q`, `qd` estimated and `q_c`, `qd_c` commanded angle (rad) and velocity (rad/s); `J` the joint's largest inertia,
+//! kg m^2; `D` N m s/rad; `kp`, `ki` 1/s; `f` the bandwidth, Hz. Without integral and delay the closed loop has a double
+//! pole at 2 kp and follows a commanded position (no velocity commanded) to -3 dB at 1.29 kp / 2 pi = f. With the
+//! commanded velocity, as the servo runs, it follows further.
+//!
+//! The integral stands still while the monitor takes torque away and the error would ask for more of it, never
+//! exceeds the torque cap, and is empty whenever the drive does not follow. Cost: about 15 operations per joint.
+
+use super::TICK_S;
+use crate::real::clamp;
+use crate::units::{Hertz, KilogramMetreSquared, NewtonMetre, Radian, RadianPerSecond};
+
+/// -3 dB of a double pole lies at 0.644 of it, the pole at 2 kp.
+const BANDWIDTH_PER_GAIN: f32 = 1.287_2;
+/// Velocity loop over position loop: both poles together.
+const DAMPING_PER_GAIN: f32 = 4.0;
+/// Position loop over integral: costs some 2 degrees of phase margin.
+const GAIN_PER_INTEGRAL: f32 = 8.0;
+
+/// The gains of one joint; see the module's equations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ControllerGains {
+    position_per_s: f32,
+    damping_nm_s_per_rad: f32,
+    integral_nm_per_rad_s: f32,
+    cap_nm: f32,
+}
+
+impl ControllerGains {
+    /// Gains for an inertia and a bandwidth; the integral stays below `cap`.
+    #[must_use]
+    pub fn new(inertia: KilogramMetreSquared, bandwidth: Hertz, cap: NewtonMetre) -> Self {
+        let position_per_s = core::f32::consts::TAU * bandwidth.0 / BANDWIDTH_PER_GAIN;
+        let damping_nm_s_per_rad = DAMPING_PER_GAIN * position_per_s * inertia.0;
+        let integral_per_s = position_per_s / GAIN_PER_INTEGRAL;
+        Self {
+            position_per_s,
+            damping_nm_s_per_rad,
+            integral_nm_per_rad_s: damping_nm_s_per_rad * position_per_s * integral_per_s,
+            cap_nm: cap.0,
+        }
+    }
+
+    /// Torque per velocity error, N m s/rad.
+    #[must_use]
+    pub fn damping_nm_s_per_rad(&self) -> f32 {
+        self.damping_nm_s_per_rad
+    }
+
+    /// Torque per position error without the integral, N m/rad.
+    #[must_use]
+    pub fn stiffness_nm_per_rad(&self) -> f32 {
+        self.damping_nm_s_per_rad * self.position_per_s
+    }
+}
+
+/// What one joint's controller remembers: the integral's torque.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Controller {
+    integral_nm: f32,
+}
+
+impl Controller {
+    /// Feedback torque for errors of position and velocity (commanded minus estimated).
+    #[must_use]
+    pub fn torque(
+        &self,
+        gains: &ControllerGains,
+        position_error: Radian,
+        velocity_error: RadianPerSecond,
+    ) -> NewtonMetre {
+        let velocity_error = velocity_error.0 + gains.position_per_s * position_error.0;
+        NewtonMetre(gains.damping_nm_s_per_rad * velocity_error + self.integral_nm)
+    }
+
+    /// Moves the integral on, told which torque was wanted and which was applied.
+    pub fn settle(
+        &mut self,
+        gains: &ControllerGains,
+        position_error: Radian,
+        wanted: NewtonMetre,
+        applied: NewtonMetre,
+    ) {
+        let taken_nm = wanted.0 - applied.0;
+        if taken_nm * position_error.0 > 0.0 {
+            return;
+        }
+        let integral_nm = self.integral_nm + gains.integral_nm_per_rad_s * TICK_S * position_error.0;
+        self.integral_nm = clamp(integral_nm, -gains.cap_nm, gains.cap_nm);
+    }
+
+    /// Empties the integral.
+    pub fn reset(&mut self) {
+        self.integral_nm = 0.0;
+    }
+
+    /// The integral's torque.
+    #[must_use]
+    pub fn integral(&self) -> NewtonMetre {
+        NewtonMetre(self.integral_nm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gains() -> ControllerGains {
+        ControllerGains::new(KilogramMetreSquared(2.0), Hertz(6.0), NewtonMetre(100.0))
+    }
+
+    #[test]
+    fn gains_give_an_inertia_a_double_pole() {
+        let gains = gains();
+        let discriminant = gains.damping_nm_s_per_rad * gains.damping_nm_s_per_rad
+            - 4.0 * 2.0 * gains.stiffness_nm_per_rad();
+        // Single precision of numbers of some 50,000.
+        assert!(discriminant.abs() < 0.1, "{discriminant}");
+        let pole_hz = gains.damping_nm_s_per_rad / (2.0 * 2.0) / core::f32::consts::TAU;
+        // (sqrt(2) - 1)^(1/2) of a double pole is its half power.
+        assert!((pole_hz * 0.643_594 - 6.0).abs() < 1e-3, "{pole_hz}");
+    }
+
+    #[test]
+    fn the_integral_does_not_grow_into_what_the_monitor_takes_away() {
+        let gains = gains();
+        let mut controller = Controller::default();
+        let error = Radian(0.1);
+        controller.settle(&gains, error, NewtonMetre(150.0), NewtonMetre(100.0));
+        assert_eq!(controller.integral(), NewtonMetre::ZERO);
+        controller.settle(&gains, error, NewtonMetre(90.0), NewtonMetre(90.0));
+        let grown = controller.integral();
+        assert!(grown.0 > 0.0);
+        // It may always shrink.
+        controller.settle(&gains, -error, NewtonMetre(150.0), NewtonMetre(100.0));
+        assert!(controller.integral() < grown);
+        for _ in 0..1_000_000 {
+            controller.settle(&gains, error, NewtonMetre(90.0), NewtonMetre(90.0));
+        }
+        assert_eq!(controller.integral(), NewtonMetre(100.0));
+        controller.reset();
+        assert_eq!(controller.integral(), NewtonMetre::ZERO);
+    }
+}

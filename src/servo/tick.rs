@@ -1,0 +1,207 @@
+//! The servo tick of a leg: sample, command and gravity in, a decision out; no clock, no log, no hardware.
+//!
+//! In this order, every tick and in every state (so the cost does not depend on what happens):
+//!
+//! 1. Each reading is judged by its step gate and moves its observer, together with the commanded acceleration while
+//!    the drive follows (held to what the joint can do).
+//! 2. Feedforward from the commanded motion, feedback from its error.
+//! 3. The monitor decides, last.
+//! 4. The integrals learn what was applied.
+//!
+//! What is not finite passes through to the monitor, which switches off in the same tick, and is kept out of every
+//! state: observers only take integers and a bounded acceleration, integrals are emptied.
+
+use super::configuration::{JointConfiguration, ServoError};
+use super::controller::{Controller, ControllerGains};
+use super::feedforward::{TorqueModel, feedforward_nm};
+use super::observer::{OBSERVER_BANDWIDTH, Observer, ObserverGains};
+use super::scale::JointScale;
+use super::{SERVO_RATE_HZ, TICK_S};
+use crate::hal::{DriveCommand, Sample};
+use crate::motion::MotionState;
+use crate::real::{clamp, is_finite};
+use crate::safety::{
+    Decision, DriveState, Limits, Monitor, Observation, Permission, PowerRequest, Reading, Request, StepGate,
+};
+use crate::units::{NewtonMetre, Radian, RadianPerSecond};
+
+/// Multiple of the speed limit that an encoder step may show, and counts on top of it for quantisation.
+const STEP_PER_SPEED: f32 = 2.0;
+const STEP_COUNTS: u32 = 2;
+
+/// What a leg is told at one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoCommand<'model, const N: usize, M> {
+    /// Where to be, model's angles.
+    pub motion: MotionState<N>,
+    /// The model for the feedforward, if there is one.
+    pub feedforward: Option<&'model M>,
+    /// What the operator asks of the drive, at the one tick at which it is asked.
+    pub power: Option<PowerRequest>,
+}
+
+/// What came of one tick, in the model's angles and signs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoOutput<const N: usize> {
+    /// Estimated angles.
+    pub position: [Radian; N],
+    /// Estimated velocities.
+    pub velocity: [RadianPerSecond; N],
+    /// Commanded minus estimated angles.
+    pub tracking_error: [Radian; N],
+    /// Torques that feedforward and feedback wanted.
+    pub wanted_torque: [NewtonMetre; N],
+    /// What the monitor made of it; its command is for the drives.
+    pub decision: Decision<N>,
+}
+
+impl<const N: usize> ServoOutput<N> {
+    /// What the drives are told.
+    #[must_use]
+    pub fn drive(&self) -> &DriveCommand<N> {
+        &self.decision.command
+    }
+}
+
+/// What does not change about one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Joint {
+    scale: JointScale,
+    count_per_radian: f32,
+    controller: ControllerGains,
+    largest_acceleration_rad_per_s2: f32,
+}
+
+/// The servo of one leg; see the module's steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Servo<const N: usize> {
+    joints: [Joint; N],
+    observer_gains: ObserverGains,
+    gates: [StepGate; N],
+    observers: [Observer; N],
+    controllers: [Controller; N],
+    monitor: Monitor<N>,
+}
+
+impl<const N: usize> Servo<N> {
+    /// A servo, drive off, or what is wrong with the first wrong joint.
+    pub fn new(joints: [JointConfiguration; N]) -> Result<Self, ServoError> {
+        for (joint, configuration) in joints.iter().enumerate() {
+            configuration.check(joint)?;
+        }
+        let limits =
+            Limits::new(joints.map(|configuration| configuration.limits())).map_err(ServoError::Limits)?;
+        Ok(Self {
+            joints: joints.map(|configuration| {
+                let cap = configuration.limits().torque_cap();
+                Joint {
+                    scale: configuration.scale,
+                    count_per_radian: 1.0 / configuration.scale.signed_radian_per_count(),
+                    controller: ControllerGains::new(configuration.inertia, configuration.bandwidth, cap),
+                    largest_acceleration_rad_per_s2: cap.0 / configuration.inertia.0,
+                }
+            }),
+            observer_gains: ObserverGains::new(OBSERVER_BANDWIDTH),
+            gates: joints.map(|configuration| {
+                let step = STEP_PER_SPEED * configuration.speed.0 * TICK_S;
+                StepGate::new((step / configuration.scale.radian_per_count.0) as u32 + STEP_COUNTS)
+            }),
+            observers: [Observer::default(); N],
+            controllers: [Controller::default(); N],
+            monitor: Monitor::new(limits, SERVO_RATE_HZ),
+        })
+    }
+
+    /// Where the drive stands.
+    #[must_use]
+    pub fn state(&self) -> DriveState {
+        self.monitor.state()
+    }
+
+    /// What each joint may do.
+    #[must_use]
+    pub fn limits(&self) -> &Limits<N> {
+        self.monitor.limits()
+    }
+
+    /// Each joint's conversion.
+    #[must_use]
+    pub fn scales(&self) -> [JointScale; N] {
+        self.joints.map(|joint| joint.scale)
+    }
+
+    /// One tick; `gravity` in the base frame, m/s^2.
+    #[must_use]
+    pub fn tick<M: TorqueModel<N>>(
+        &mut self,
+        sample: &Sample<N>,
+        command: &ServoCommand<'_, N, M>,
+        gravity: [f32; 3],
+    ) -> ServoOutput<N> {
+        let motion = &command.motion;
+        let rejected = self.observe(sample, motion);
+        let position: [Radian; N] = core::array::from_fn(|joint| {
+            self.joints[joint].scale.position(self.observers[joint].position_counts())
+        });
+        let velocity: [RadianPerSecond; N] = core::array::from_fn(|joint| {
+            let radian_per_count = self.joints[joint].scale.signed_radian_per_count();
+            RadianPerSecond(radian_per_count * self.observers[joint].velocity_counts_per_s())
+        });
+
+        let feedforward = feedforward_nm(command.feedforward, motion, gravity);
+        let tracking_error: [Radian; N] =
+            core::array::from_fn(|joint| Radian(motion.position_rad[joint]) - position[joint]);
+        let wanted_torque: [NewtonMetre; N] = core::array::from_fn(|joint| {
+            let velocity_error = RadianPerSecond(motion.velocity_rad_per_s[joint]) - velocity[joint];
+            let gains = &self.joints[joint].controller;
+            NewtonMetre(feedforward[joint])
+                + self.controllers[joint].torque(gains, tracking_error[joint], velocity_error)
+        });
+
+        let observation =
+            Observation { position, velocity, current: sample.joints.map(|joint| joint.current), rejected };
+        let request = Request { torque: wanted_torque, power: command.power };
+        let decision = self.monitor.decide(&observation, &request);
+        self.settle(&tracking_error, &wanted_torque, &decision);
+        ServoOutput { position, velocity, tracking_error, wanted_torque, decision }
+    }
+
+    /// Moves the observers by one tick and tells which readings were rejected.
+    fn observe(&mut self, sample: &Sample<N>, motion: &MotionState<N>) -> [bool; N] {
+        let follows = self.monitor.state().permission() == Permission::Follow;
+        core::array::from_fn(|joint| {
+            let Joint { count_per_radian, largest_acceleration_rad_per_s2: largest, .. } = self.joints[joint];
+            let commanded = motion.acceleration_rad_per_s2[joint];
+            let acceleration = if follows && is_finite(commanded) {
+                count_per_radian * clamp(commanded, -largest, largest)
+            } else {
+                0.0
+            };
+            let counts = sample.joints[joint].encoder_counts;
+            let reading = self.gates[joint].judge(counts);
+            let observer = &mut self.observers[joint];
+            match reading {
+                Reading::Good => observer.update(&self.observer_gains, counts, acceleration),
+                Reading::Rejected => observer.coast(acceleration),
+                Reading::Jumped => observer.reseat(counts),
+            }
+            reading != Reading::Good
+        })
+    }
+
+    fn settle(&mut self, error: &[Radian; N], wanted: &[NewtonMetre; N], decision: &Decision<N>) {
+        let follows = decision.state.permission() == Permission::Follow;
+        for joint in 0..N {
+            let controller = &mut self.controllers[joint];
+            if follows {
+                let gains = &self.joints[joint].controller;
+                controller.settle(gains, error[joint], wanted[joint], decision.torque[joint]);
+            } else {
+                controller.reset();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
