@@ -97,11 +97,11 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
 
     /// Accepted, or refused with all reasons that apply, given records of motions that were not used.
     #[must_use]
-    pub fn judge(
+    pub fn judge<'a>(
         &self,
         model: &RowModel<T, N, B>,
         thresholds: &Thresholds<T>,
-        unused: &[Record<T, N, B>],
+        unused: impl Iterator<Item = &'a Record<T, N, B>>,
     ) -> Verdict {
         let estimate = self.estimate();
         let input = match self.search.state() {

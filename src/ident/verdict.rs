@@ -226,10 +226,10 @@ impl<T: Real> Thresholds<T> {
 
     /// Whether unused motions are predicted as well as the training motion lets expect.
     #[must_use]
-    pub fn judge_validation<const N: usize, const B: usize>(
+    pub fn judge_validation<'a, const N: usize, const B: usize>(
         &self,
         training: &Record<T, N, B>,
-        motions: &[Record<T, N, B>],
+        motions: impl Iterator<Item = &'a Record<T, N, B>>,
         values: &[T; B],
     ) -> Verdict {
         let mut verdict = Verdict::ACCEPTED;

@@ -1,1 +1,87 @@
-//! (being built)
+//! One leg: what it does, and two halves that exchange values only.
+//!
+//! ```text
+//!   control (ticked at 4 kHz)                              identification (advanced when there is time)
+//!   motion -> servo -> drive command                       recorder -> solver -> verdict
+//!      |  LoggedSample, 500 Hz: angle, torque, segment  ----->
+//!      <-----  Finding: solved | judged, with the model if it was accepted
+//! ```
+//!
+//! The board runs control in an interrupt and identification at the lowest priority and carries the values from one
+//! to the other; on the host [`Leg`] holds both in one value that can be cloned, compared and run on. Host tool,
+//! emulated image and board run the same code.
+//!
+//! ```text
+//!   Idle --identify--> Approach --> Excite --> Settle --> Solve --> Validate: Approach, Run (three times) --> Judge
+//!    ^ ^                                                                                                      |
+//!    | +--track--> Track                                                                                      |
+//!    +---------------------- the drive is no longer enabled (quick stop, fault): from everywhere <-------------+
+//! ```
+
+mod activity;
+mod configuration;
+mod control;
+mod identification;
+mod model;
+
+pub use activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
+pub use configuration::{LegConfiguration, LegError};
+pub use control::{Control, ControlOutput, ControlRequest, LoggedSample};
+pub use identification::{Finding, Identification};
+pub use model::IdentifiedModel;
+
+use crate::hal::Sample;
+
+/// Both halves of a leg in one value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Leg<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
+    control: Control<N>,
+    identification: Identification<N, B, TAPS, PENDING>,
+}
+
+impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Leg<N, B, TAPS, PENDING> {
+    /// A leg at rest, drive off.
+    ///
+    /// # Errors
+    /// [`LegError`] when limits make no sense, a motion cannot be proved to stay within them, or the filter does not
+    /// fit its memory.
+    pub fn new(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
+        Ok(Self {
+            control: Control::new(configuration)?,
+            identification: Identification::new(configuration)?,
+        })
+    }
+
+    /// One servo tick, then up to `evaluations` of the search; `gravity` in the base frame, m/s^2.
+    pub fn tick(
+        &mut self,
+        sample: &Sample<N>,
+        request: Option<ControlRequest<N>>,
+        gravity: [f32; 3],
+        evaluations: u32,
+    ) -> ControlOutput<N> {
+        let output = self.control.tick(sample, request, gravity);
+        if let Some(logged) = &output.logged {
+            self.identification.push(logged);
+        }
+        if !matches!(self.control.activity(), Activity::Identify(_)) {
+            self.identification.cancel();
+        }
+        if let Some(finding) = self.identification.advance(evaluations) {
+            self.control.receive(finding);
+        }
+        output
+    }
+
+    /// The half that moves.
+    #[must_use]
+    pub fn control(&self) -> &Control<N> {
+        &self.control
+    }
+
+    /// The half that finds out.
+    #[must_use]
+    pub fn identification(&self) -> &Identification<N, B, TAPS, PENDING> {
+        &self.identification
+    }
+}

@@ -1,0 +1,274 @@
+//! The half of a leg that moves: activity, motions, servo, log. Ticked at 4 kHz.
+
+use super::activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
+use super::configuration::{LegConfiguration, LegError};
+use super::identification::Finding;
+use super::model::IdentifiedModel;
+use crate::hal::Sample;
+use crate::ident::Verdict;
+use crate::motion::{JointEnvelope, Motion, MotionState, Periodic, Ramp};
+use crate::safety::{DriveState, PowerRequest};
+use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
+use crate::units::{RadianPerSecond, RadianPerSecondSquared};
+
+/// At rest this long after a motion before the next step: half a second.
+const SETTLE_TICKS: u32 = SERVO_RATE_HZ / 2;
+
+/// What an operator asks of a leg, at one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ControlRequest<const N: usize> {
+    /// A step of the drive's power states.
+    Power(PowerRequest),
+    /// Excite, solve, validate.
+    Identify,
+    /// Follow a motion, with the identified model in the feedforward or with feedback alone.
+    Track {
+        /// Within the leg's limits, or the request is ignored.
+        motion: Periodic<N>,
+        /// Whether the model is used, if there is one.
+        with_model: bool,
+    },
+}
+
+/// A 500 Hz sample and what it is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoggedSample<const N: usize> {
+    /// Angles and torques.
+    pub sample: LogSample<N>,
+    /// What the leg was doing.
+    pub segment: Option<Segment>,
+}
+
+/// What came of one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ControlOutput<const N: usize> {
+    /// What the servo made of it; its command is for the drives.
+    pub servo: ServoOutput<N>,
+    /// Where the leg was told to be.
+    pub motion: MotionState<N>,
+    /// Every eighth tick.
+    pub logged: Option<LoggedSample<N>>,
+}
+
+/// Activity, servo and log of one leg.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Control<const N: usize> {
+    servo: Servo<N>,
+    averager: LogAverager<N>,
+    tick: u32,
+    activity: Activity,
+    /// Set when the activity changed since the last logged sample: the sample in the making belongs to neither.
+    segment: Option<Segment>,
+    motion: Motion<N>,
+    motion_tick: u32,
+    tracked: Option<Periodic<N>>,
+    excitation: Periodic<N>,
+    validation: [Periodic<N>; VALIDATION_MOTIONS],
+    limits: [JointEnvelope; N],
+    approach_speed: [RadianPerSecond; N],
+    approach_acceleration: [RadianPerSecondSquared; N],
+    model: Option<IdentifiedModel<N>>,
+    with_model: bool,
+    verdict: Option<Verdict>,
+}
+
+impl<const N: usize> Control<N> {
+    /// At rest, drive off.
+    ///
+    /// # Errors
+    /// [`LegError`] when limits make no sense or a motion cannot be proved to stay within them.
+    pub fn new<const B: usize>(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
+        configuration.prove_motions()?;
+        let (approach_speed, approach_acceleration) = configuration.approach();
+        Ok(Self {
+            servo: Servo::new(configuration.joints)?,
+            averager: LogAverager::EMPTY,
+            tick: 0,
+            activity: Activity::Idle,
+            segment: None,
+            motion: Motion::Hold([0.0; N]),
+            motion_tick: 0,
+            tracked: None,
+            excitation: configuration.excitation,
+            validation: configuration.validation,
+            limits: configuration.envelope(),
+            approach_speed,
+            approach_acceleration,
+            model: None,
+            with_model: false,
+            verdict: None,
+        })
+    }
+
+    /// One tick.
+    pub fn tick(
+        &mut self,
+        sample: &Sample<N>,
+        request: Option<ControlRequest<N>>,
+        gravity: [f32; 3],
+    ) -> ControlOutput<N> {
+        self.tick = self.tick.wrapping_add(1);
+        let power = self.accept(request);
+        let motion = self.motion.state_at(self.motion_tick);
+        let command = ServoCommand {
+            motion,
+            feedforward: self.model.as_ref().filter(|_| self.with_model),
+            power,
+        };
+        let servo = self.servo.tick(sample, &command, gravity);
+        self.motion_tick = self.motion_tick.saturating_add(1);
+        if servo.decision.state != DriveState::OperationEnabled {
+            // A leg that is not held is where it is: enabling must not pull it anywhere.
+            self.activity = Activity::Idle;
+            self.hold(servo.position.map(|angle| angle.0));
+        } else {
+            self.proceed();
+        }
+        let logged = self.averager.push(self.tick, sample, &self.servo.scales());
+        let logged = logged.map(|sample| {
+            let segment = self.segment.filter(|segment| Some(*segment) == self.activity.segment());
+            self.segment = self.activity.segment();
+            LoggedSample { sample, segment }
+        });
+        ControlOutput { servo, motion, logged }
+    }
+
+    fn accept(&mut self, request: Option<ControlRequest<N>>) -> Option<PowerRequest> {
+        let enabled = self.servo.state() == DriveState::OperationEnabled;
+        match request? {
+            ControlRequest::Power(power) => return Some(power),
+            ControlRequest::Identify if enabled => {
+                self.verdict = None;
+                self.with_model = false;
+                self.approach(Activity::Identify(IdentifyPhase::Approach), self.excitation);
+            }
+            ControlRequest::Track { motion, with_model } if enabled => {
+                if Motion::Periodic(motion).prove(&self.limits).is_ok() {
+                    self.tracked = Some(motion);
+                    self.with_model = with_model;
+                    self.approach(Activity::Track(Step::Approach), motion);
+                }
+            }
+            ControlRequest::Identify | ControlRequest::Track { .. } => {}
+        }
+        None
+    }
+
+    /// The next step of the activity where the motion has ended.
+    fn proceed(&mut self) {
+        let ended = match self.motion.duration_ticks() {
+            Some(duration) => self.motion_tick >= duration,
+            None => self.motion_tick >= SETTLE_TICKS,
+        };
+        if !ended {
+            return;
+        }
+        match self.activity {
+            Activity::Identify(IdentifyPhase::Approach) => {
+                self.run(Activity::Identify(IdentifyPhase::Excite), self.excitation);
+            }
+            Activity::Identify(IdentifyPhase::Excite) => self.rest(Activity::Identify(IdentifyPhase::Settle)),
+            Activity::Identify(IdentifyPhase::Settle) => {
+                self.activity = Activity::Identify(IdentifyPhase::Solve);
+            }
+            Activity::Identify(IdentifyPhase::Validate { motion, step }) => self.validate_after(motion, step),
+            Activity::Track(Step::Approach) => match self.tracked {
+                Some(motion) => self.run(Activity::Track(Step::Run), motion),
+                None => self.rest(Activity::Idle),
+            },
+            Activity::Track(Step::Run) => self.rest(Activity::Idle),
+            Activity::Idle | Activity::Identify(IdentifyPhase::Solve | IdentifyPhase::Judge) => {}
+        }
+    }
+
+    fn validate_after(&mut self, motion: u8, step: Step) {
+        let following = if step == Step::Run { motion.saturating_add(1) } else { motion };
+        match (step, self.validation.get(usize::from(following)).copied()) {
+            (Step::Approach, Some(periodic)) => self.run(
+                Activity::Identify(IdentifyPhase::Validate { motion, step: Step::Run }),
+                periodic,
+            ),
+            (Step::Run, Some(periodic)) => self.approach(
+                Activity::Identify(IdentifyPhase::Validate { motion: following, step: Step::Approach }),
+                periodic,
+            ),
+            (_, None) => self.rest(Activity::Identify(IdentifyPhase::Judge)),
+        }
+    }
+
+    /// Takes what the other half found.
+    pub fn receive(&mut self, finding: Finding<N>) {
+        match finding {
+            Finding::Solved => {
+                if let Activity::Identify(IdentifyPhase::Settle | IdentifyPhase::Solve) = self.activity {
+                    if let Some(first) = self.validation.first().copied() {
+                        let phase = IdentifyPhase::Validate { motion: 0, step: Step::Approach };
+                        self.approach(Activity::Identify(phase), first);
+                    }
+                }
+            }
+            Finding::Judged { verdict, model } => {
+                if let Activity::Identify(_) = self.activity {
+                    self.verdict = Some(verdict);
+                    // A refused result leaves the model that was there before.
+                    self.model = model.or(self.model);
+                    self.rest(Activity::Idle);
+                }
+            }
+        }
+    }
+
+    fn approach(&mut self, activity: Activity, motion: Periodic<N>) {
+        let start = Motion::Periodic(motion).start_rad();
+        let here = self.motion.state_at(self.motion_tick).position_rad;
+        let ramp = Ramp::between(here, start, self.approach_speed, self.approach_acceleration, SERVO_RATE_HZ);
+        match ramp {
+            Ok(ramp) => {
+                self.activity = activity;
+                self.motion = Motion::Ramp(ramp);
+                self.motion_tick = 0;
+            }
+            Err(_) => self.rest(Activity::Idle),
+        }
+    }
+
+    fn run(&mut self, activity: Activity, motion: Periodic<N>) {
+        self.activity = activity;
+        self.motion = Motion::Periodic(motion);
+        self.motion_tick = 0;
+    }
+
+    fn rest(&mut self, activity: Activity) {
+        self.activity = activity;
+        self.hold(self.motion.end_rad());
+    }
+
+    fn hold(&mut self, pose_rad: [f32; N]) {
+        self.motion = Motion::Hold(pose_rad);
+        self.motion_tick = 0;
+    }
+
+    /// What the leg is doing.
+    #[must_use]
+    pub fn activity(&self) -> Activity {
+        self.activity
+    }
+
+    /// Where the drive stands.
+    #[must_use]
+    pub fn state(&self) -> DriveState {
+        self.servo.state()
+    }
+
+    /// The verdict of the last identification.
+    #[must_use]
+    pub fn verdict(&self) -> Option<Verdict> {
+        self.verdict
+    }
+
+    /// The accepted model.
+    #[must_use]
+    pub fn model(&self) -> Option<&IdentifiedModel<N>> {
+        self.model.as_ref()
+    }
+}

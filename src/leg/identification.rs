@@ -1,0 +1,188 @@
+//! The half of a leg that finds out: records logged motions, solves in slices, judges.
+
+use super::activity::{Segment, VALIDATION_MOTIONS};
+use super::configuration::{LegConfiguration, LegError};
+use super::control::LoggedSample;
+use super::model::IdentifiedModel;
+use crate::ident::{LinkPrior, Plan, Reason, Record, Recorder, RowModel, SearchState, Solver, Thresholds, Verdict};
+
+/// What identification tells control.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Finding<const N: usize> {
+    /// The solver is done: unused motions are wanted.
+    Solved,
+    /// The verdict, and the model if it was accepted.
+    Judged {
+        /// Accepted or not, and why.
+        verdict: Verdict,
+        /// Only with an accepting verdict.
+        model: Option<IdentifiedModel<N>>,
+    },
+}
+
+/// Where the identification stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Work {
+    /// Waiting for samples.
+    Idle,
+    /// Samples of this segment come in.
+    Recording(Segment),
+    /// The solver works on the training record.
+    Solving,
+}
+
+/// Recorder, solver and records of one identification.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Identification<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
+    model: RowModel<f32, N, B>,
+    prior: Option<[LinkPrior<f32>; N]>,
+    plan: Plan,
+    swarm_seed: u64,
+    thresholds: Thresholds<f32>,
+    recorder: Recorder<f32, N, B, TAPS, PENDING>,
+    work: Work,
+    solver: Option<Solver<f32, N, B>>,
+    validation: [Option<Record<f32, N, B>>; VALIDATION_MOTIONS],
+    verdict: Option<Verdict>,
+    report_due: bool,
+}
+
+impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
+    Identification<N, B, TAPS, PENDING>
+{
+    /// Nothing recorded yet.
+    ///
+    /// # Errors
+    /// [`LegError::Kernel`] when the filter does not fit.
+    pub fn new(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
+        Ok(Self {
+            model: configuration.model.clone(),
+            prior: configuration.prior,
+            plan: configuration.plan,
+            swarm_seed: configuration.swarm_seed,
+            thresholds: configuration.thresholds,
+            recorder: Recorder::new(configuration.bandwidth_hz)?,
+            work: Work::Idle,
+            solver: None,
+            validation: [const { None }; VALIDATION_MOTIONS],
+            verdict: None,
+            report_due: false,
+        })
+    }
+
+    /// Takes a logged sample. The first one without a segment, or of another, ends the motion recorded so far.
+    pub fn push(&mut self, logged: &LoggedSample<N>) {
+        let recording = match self.work {
+            Work::Recording(segment) => Some(segment),
+            Work::Idle | Work::Solving => None,
+        };
+        if recording != logged.segment {
+            if let Some(ended) = recording {
+                self.close(ended);
+            }
+            if let Some(begun) = logged.segment {
+                self.open(begun);
+            }
+        }
+        if logged.segment.is_some() {
+            self.recorder.push(&self.model, &logged.sample.position_rad, &logged.sample.torque_nm);
+        }
+    }
+
+    fn open(&mut self, segment: Segment) {
+        self.recorder.clear();
+        self.work = Work::Recording(segment);
+        if segment == Segment::Training {
+            self.solver = None;
+            self.validation = [const { None }; VALIDATION_MOTIONS];
+            self.verdict = None;
+        }
+    }
+
+    fn close(&mut self, segment: Segment) {
+        let record = self.recorder.record();
+        match segment {
+            Segment::Training => {
+                let seed = self.swarm_seed;
+                let solver =
+                    Solver::new(&self.model, record, self.plan, self.prior.as_ref(), seed, &self.thresholds);
+                self.solver = Some(solver);
+                self.work = Work::Solving;
+            }
+            Segment::Validation(motion) => {
+                if let Some(slot) = self.validation.get_mut(usize::from(motion)) {
+                    *slot = Some(record);
+                }
+                self.work = Work::Idle;
+                self.report_due = self.validation.iter().all(Option::is_some);
+            }
+        }
+    }
+
+    /// Spends up to `evaluations` on the search; tells when something is found.
+    pub fn advance(&mut self, evaluations: u32) -> Option<Finding<N>> {
+        if self.report_due {
+            self.report_due = false;
+            return Some(self.judge());
+        }
+        if self.work != Work::Solving {
+            return None;
+        }
+        let solver = self.solver.as_mut()?;
+        match solver.advance(&self.model, evaluations) {
+            SearchState::Running => None,
+            SearchState::Done => {
+                self.work = Work::Idle;
+                Some(Finding::Solved)
+            }
+            SearchState::Failed(_) => {
+                self.work = Work::Idle;
+                Some(self.judge())
+            }
+        }
+    }
+
+    fn judge(&mut self) -> Finding<N> {
+        let verdict = self.solver.as_ref().map_or(Verdict::refused(Reason::Input), |solver| {
+            let records = self.validation.each_ref().map(Option::as_ref);
+            solver.judge(&self.model, &self.thresholds, records.into_iter().flatten())
+        });
+        self.verdict = Some(verdict);
+        let values = self.solver.as_ref().map(|solver| solver.estimate().values);
+        let model = values.filter(|_| verdict.is_accepted());
+        Finding::Judged { verdict, model: model.map(|values| IdentifiedModel::new(&self.model, &values)) }
+    }
+
+    /// Stops everything; what was found before stays.
+    pub fn cancel(&mut self) {
+        self.report_due = false;
+        if self.work != Work::Idle {
+            self.work = Work::Idle;
+            self.recorder.clear();
+        }
+    }
+
+    /// The solver of the last training motion.
+    #[must_use]
+    pub fn solver(&self) -> Option<&Solver<f32, N, B>> {
+        self.solver.as_ref()
+    }
+
+    /// Records of the motions that were predicted.
+    #[must_use]
+    pub fn validation(&self) -> &[Option<Record<f32, N, B>>; VALIDATION_MOTIONS] {
+        &self.validation
+    }
+
+    /// The last verdict.
+    #[must_use]
+    pub fn verdict(&self) -> Option<Verdict> {
+        self.verdict
+    }
+
+    /// What the rows are made with.
+    #[must_use]
+    pub fn model(&self) -> &RowModel<f32, N, B> {
+        &self.model
+    }
+}

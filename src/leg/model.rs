@@ -1,0 +1,45 @@
+//! The model that an accepted identification leaves behind, as the servo's feedforward uses it.
+
+use nalgebra::Vector3;
+
+use crate::ident::RowModel;
+use crate::model::{Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, Parameter, rigid_body_torques};
+use crate::servo::{TorqueModel, smoothed_sign};
+use crate::units::RadianPerSecond;
+
+/// Identified torque: each base value stands on its own column, which gives the same torque as all parameters would.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IdentifiedModel<const N: usize> {
+    chain: Chain<f32, N>,
+    parameters: LegParameters<f32, N>,
+}
+
+impl<const N: usize> IdentifiedModel<N> {
+    /// The model with these base parameters.
+    #[must_use]
+    pub fn new<const B: usize>(model: &RowModel<f32, N, B>, base_values: &[f32; B]) -> Self {
+        let parameters = model.base.complete(base_values, &[[0.0; PARAMETERS_PER_JOINT]; N]);
+        Self { chain: model.chain, parameters }
+    }
+
+    /// Parameters with the same torque as the leg's; not those of its links.
+    #[must_use]
+    pub fn equivalent_parameters(&self) -> &LegParameters<f32, N> {
+        &self.parameters
+    }
+}
+
+impl<const N: usize> TorqueModel<N> for IdentifiedModel<N> {
+    fn torques(&self, q: &[f32; N], qd: &[f32; N], qdd: &[f32; N], gravity: [f32; 3]) -> [f32; N] {
+        let state = JointState { q: *q, qd: *qd, qdd: *qdd };
+        let mut torque = rigid_body_torques(&self.chain, &self.parameters, &state, &Vector3::from(gravity));
+        for joint in 0..N {
+            let of = |parameter: Parameter| self.parameters[joint][parameter.index()];
+            torque[joint] += of(Parameter::IA) * qdd[joint]
+                + of(Parameter::FC) * smoothed_sign(RadianPerSecond(qd[joint]))
+                + of(Parameter::FV) * qd[joint]
+                + of(Parameter::OFF);
+        }
+        torque
+    }
+}
