@@ -1,4 +1,33 @@
-//! Scarab's simulated hardware.
+//! Scarab's simulated hardware: the physical world a leg's drive board meets, in double precision.
+//!
+//! Why it is written this way: a firmware tested against its own equations proves nothing. The plant
+//! therefore uses another formulation (Lagrange instead of Newton-Euler), other frames (axes and points in
+//! the world instead of Denavit-Hartenberg frames) and its own door to `libm`; of the firmware it knows
+//! `scarab::hal` and `scarab::units` only.
+//!
+//! | module | what lives there |
+//! | --- | --- |
+//! | [`description`] | everything a world is made from, as plain numbers |
+//! | [`conventions`] | modified Denavit-Hartenberg to world frame; anatomical to joint angles and back |
+//! | [`mechanism`] | rigid bodies: inertia matrix, Christoffel symbols, gravity, energies |
+//! | [`friction`] | Coulomb that sticks, viscous, Stribeck, offset; which joint sticks and which slides |
+//! | [`leg`] | mechanism and friction moved through time |
+//! | [`drive`], [`gear`], [`sensors`], [`wearer`] | current with lag; ratio; encoder and current sensor; pushes |
+//! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
+//!
+//! The plant needs neither `std` nor a heap; the host tool and its crates are behind the feature `tool`.
 #![cfg_attr(not(feature = "tool"), no_std)]
+
+pub mod conventions;
+pub mod description;
+pub mod drive;
+pub mod friction;
+pub mod gear;
+pub mod leg;
+mod maths;
+pub mod mechanism;
+pub mod sensors;
 #[cfg(feature = "tool")]
 pub mod tool;
+pub mod wearer;
+pub mod world;

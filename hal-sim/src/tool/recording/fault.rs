@@ -1,0 +1,116 @@
+//! Why a file is no recording: every refusal in plain words, with the place where it shows.
+
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+
+use super::{MINIMUM_DURATION_S, MINIMUM_SAMPLES};
+
+/// Why a file is no recording, and where it shows. Displays as `file:line: reason`.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{}: {fault}", .file.display(), LineSuffix(*.line))]
+pub struct RecordingError {
+    /// The file as it was named.
+    pub file: PathBuf,
+    /// Counted from 1, header included; none where the whole file is meant.
+    pub line: Option<usize>,
+    /// The reason.
+    pub fault: Fault,
+}
+
+/// What is wrong with a recording, in plain words.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault {
+    /// The file cannot be opened or read.
+    #[error("cannot be read ({0})")]
+    Unreadable(io::Error),
+    /// The bytes are not UTF-8.
+    #[error("not a text file")]
+    NotText,
+    /// Nothing, or blank lines only.
+    #[error("the file is empty")]
+    Empty,
+    /// A quotation mark that is never closed, or the like.
+    #[error("not a CSV file ({0})")]
+    NotCsv(csv::Error),
+    /// The header lacks a column that the leg needs.
+    #[error("the header has no column `{column}`; its columns are: {present}")]
+    MissingColumn {
+        /// Name looked for.
+        column: String,
+        /// Names found.
+        present: String,
+    },
+    /// Two columns of one name: nobody can know which is meant.
+    #[error("the header has the column `{0}` twice")]
+    RepeatedColumn(String),
+    /// A truncated line, or a line of another file.
+    #[error("{found} fields, but the header has {expected}: is the line truncated?")]
+    FieldCount {
+        /// In this line.
+        found: usize,
+        /// In the header.
+        expected: usize,
+    },
+    /// Letters, an empty field, a decimal comma.
+    #[error("`{text}` in column `{column}` is not a number")]
+    NotANumber {
+        /// Column name.
+        column: String,
+        /// The field as it stands in the file.
+        text: String,
+    },
+    /// `NaN` or `inf`.
+    #[error("`{text}` in column `{column}` is not finite")]
+    NotFinite {
+        /// Column name.
+        column: String,
+        /// The field as it stands in the file.
+        text: String,
+    },
+    /// A number no leg can reach.
+    #[error("{value} in column `{column}` is beyond {limit}: is it in another unit?")]
+    Absurd {
+        /// Column name.
+        column: String,
+        /// The number.
+        value: f64,
+        /// Largest magnitude accepted.
+        limit: f64,
+    },
+    /// Time does not increase.
+    #[error("time {} from {previous} s to {time} s", if *.time < *.previous { "goes back" } else { "stands still" })]
+    TimeNotIncreasing {
+        /// The stamp before.
+        previous: f64,
+        /// This line's stamp.
+        time: f64,
+    },
+    /// Samples are missing.
+    #[error("{gap:.3} s without a sample before this line; at most {limit:.3} s are bridged")]
+    Gap {
+        /// Length, s.
+        gap: f64,
+        /// Longest accepted in this recording, s.
+        limit: f64,
+    },
+    /// Too little to identify anything.
+    #[error(
+        "too short: {samples} samples over {duration:.3} s, but at least {MINIMUM_SAMPLES} over {MINIMUM_DURATION_S} s are needed"
+    )]
+    TooShort {
+        /// Number of samples.
+        samples: usize,
+        /// From first to last, s.
+        duration: f64,
+    },
+}
+
+/// `:12` after the file's name, or nothing.
+struct LineSuffix(Option<usize>);
+
+impl fmt::Display for LineSuffix {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.map_or(Ok(()), |line| write!(formatter, ":{line}"))
+    }
+}
