@@ -205,10 +205,10 @@ fn a_split_shares_no_sample_and_refuses_a_part_that_is_too_short() {
         whole.split(0.9).expect_err("0.2 s are left").fault,
         Fault::TooShort { samples: 20, .. }
     ));
-    let long: Vec<String> = (0..400).map(|k| format!("{},0,0,0,{k}", f64::from(k) * 0.01)).collect();
+    let long: Vec<String> = (0..=400).map(|k| format!("{},0,0,0,{k}", f64::from(k) * 0.01)).collect();
     let whole = Recording::parse(Path::new("walk.csv"), &text(HEADER, &long), 2).expect("a recording");
     let (first, second) = whole.split(0.5).expect("two parts");
-    assert_eq!((first.time_s.len(), second.time_s.len()), (200, 200));
+    assert_eq!((first.time_s.len(), second.time_s.len()), (200, 201));
     assert_eq!(second.joints[1].torque_nm[0], 200.0);
 }
 

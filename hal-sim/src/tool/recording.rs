@@ -70,7 +70,6 @@ impl Recording {
 
     /// Reads the first `joints` joints of a CSV text; `file` is only named in errors.
     pub fn parse(file: &Path, text: &str, joints: usize) -> Result<Self, RecordingError> {
-        let text = text.trim_start_matches('\u{feff}');
         if text.trim().is_empty() {
             return Err(refuse(file, None, Fault::Empty));
         }
