@@ -20,6 +20,8 @@
 
 mod antennae_search;
 mod beetle_swarm;
+#[cfg(test)]
+mod contract;
 mod functions;
 mod objective;
 mod particle_swarm;

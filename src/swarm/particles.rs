@@ -86,6 +86,16 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
         }
     }
 
+    /// As new, in place.
+    pub fn restart(&mut self, dimension: usize) {
+        self.dimension = dimension;
+        for rows in [&mut self.position, &mut self.velocity, &mut self.personal_best] {
+            rows.fill([T::zero(); D]);
+        }
+        self.value = [T::LARGEST; N];
+        self.personal_best_value = [T::LARGEST; N];
+    }
+
     /// Number of coordinates, 1..=D.
     pub fn dimension(&self) -> usize {
         self.dimension
@@ -157,15 +167,15 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
     /// Best personal best first; equals keep their order.
     pub fn sort(&mut self) {
         for end in 1..N {
-            for place in (1..=end).rev() {
-                if self.personal_best_value[place - 1] <= self.personal_best_value[place] {
+            for place in (0..end).rev() {
+                if self.personal_best_value[place] <= self.personal_best_value[place + 1] {
                     break;
                 }
-                self.position.swap(place - 1, place);
-                self.velocity.swap(place - 1, place);
-                self.personal_best.swap(place - 1, place);
-                self.value.swap(place - 1, place);
-                self.personal_best_value.swap(place - 1, place);
+                self.position.swap(place, place + 1);
+                self.velocity.swap(place, place + 1);
+                self.personal_best.swap(place, place + 1);
+                self.value.swap(place, place + 1);
+                self.personal_best_value.swap(place, place + 1);
             }
         }
     }
@@ -177,10 +187,10 @@ mod tests {
 
     #[test]
     fn inertia_weight_falls_linearly_to_its_last_value() {
-        let weight = InertiaWeight { first: 0.9, last: 0.4, iterations: 100 };
+        let weight = InertiaWeight { first: 0.9_f64, last: 0.4, iterations: 100 };
         assert_eq!(weight.at(0), 0.9);
         // single-precision share of the iterations: 6e-8 of 0.5
-        assert!((weight.at(50) - 0.65_f64).abs() < 1e-7);
+        assert!((weight.at(50) - 0.65).abs() < 1e-7);
         assert_eq!(weight.at(100), 0.4);
         assert_eq!(weight.at(u32::MAX), 0.4);
         assert_eq!(InertiaWeight { iterations: 0, ..weight }.at(0), 0.4);

@@ -42,11 +42,11 @@ pub(super) fn clip_to_box<T: Real>(value: T) -> T {
 /// The middle of some numbers, the upper one of two; 0 of none. Sorts them.
 pub(super) fn median<T: Real>(values: &mut [T]) -> T {
     for end in 1..values.len() {
-        for place in (1..=end).rev() {
-            if values[place - 1] <= values[place] {
+        for place in (0..end).rev() {
+            if values[place] <= values[place + 1] {
                 break;
             }
-            values.swap(place - 1, place);
+            values.swap(place, place + 1);
         }
     }
     values.get(values.len() / 2).copied().unwrap_or(T::zero())

@@ -53,7 +53,8 @@ const PROGRESS: f64 = 1e-7;
 const CONVEX_SHARE: f64 = 0.7;
 /// How far one iteration stretches towards the measured curvature, and the range of curvature over its mean.
 const METRIC_RATE: f64 = 0.7;
-const CURVATURE_RANGE: [f64; 2] = [0.25, 4.0];
+const LEAST_CURVATURE: f64 = 0.25;
+const MOST_CURVATURE: f64 = 4.0;
 /// A metric step of 1 is never stretched beyond this many boxes.
 const LONGEST_AXIS: f64 = 100.0;
 
@@ -93,6 +94,15 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
     }
 
+    /// As new, in place.
+    pub fn restart(&mut self, settings: AdaptiveSettings<T>, dimension: usize) {
+        self.settings = settings;
+        self.frame.restart(dimension);
+        self.metric.restart(dimension);
+        self.forget();
+    }
+
+    /// Everything learned, when the swarm is scattered anew.
     fn forget(&mut self) {
         self.metric.forget();
         self.gradient = None;
@@ -215,8 +225,8 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         let mean_curvature = curvature / number(curved);
         let rate = T::of(METRIC_RATE) * gate;
         let stretch = |curvature: T| {
-            let [least, most] = CURVATURE_RANGE.map(T::of);
-            T::one() + rate * (T::one() / sqrt(clamp(curvature / mean_curvature, least, most)) - T::one())
+            let relative = clamp(curvature / mean_curvature, T::of(LEAST_CURVATURE), T::of(MOST_CURVATURE));
+            T::one() + rate * (T::one() / sqrt(relative) - T::one())
         };
         let mean = readings().fold(T::zero(), |sum, reading| sum + stretch(reading.curvature)) / number(read);
         let directions = self.frame.direction.iter().zip(&self.frame.displacement);

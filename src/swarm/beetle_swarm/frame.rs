@@ -43,6 +43,12 @@ pub(super) struct Whisker<T> {
     pub reading: Option<Reading<T>>,
 }
 
+impl<T: Real> Whisker<T> {
+    fn unaimed() -> Self {
+        Self { box_length: T::one(), length: T::one(), coordinate: T::zero(), reading: None }
+    }
+}
+
 /// The parabola through a beetle and its two whiskers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reading<T> {
@@ -69,13 +75,20 @@ pub(super) struct Frame<T, const N: usize, const D: usize> {
 
 impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     pub fn new(dimension: usize) -> Self {
-        let blind = Whisker { box_length: T::one(), length: T::one(), coordinate: T::zero(), reading: None };
         Self {
             dimension,
             direction: [[T::zero(); D]; N],
             displacement: [[T::zero(); D]; N],
-            whisker: [blind; N],
+            whisker: [Whisker::unaimed(); N],
         }
+    }
+
+    /// As new, in place.
+    pub fn restart(&mut self, dimension: usize) {
+        self.dimension = dimension;
+        self.direction.fill([T::zero(); D]);
+        self.displacement.fill([T::zero(); D]);
+        self.whisker.fill(Whisker::unaimed());
     }
 
     /// Directions in use: one per beetle, never more than an orthonormal frame can have.
@@ -211,6 +224,10 @@ mod tests {
     fn directions_are_orthonormal_whatever_is_wished() {
         for dimension in [1, 2, 5, D] {
             for wish in [None, Some([1.0; D]), Some([0.0; D]), Some([f64::NAN; D]), Some([1e200; D])] {
+                let wish = wish.map(|mut wish| {
+                    wish[dimension..].fill(0.0);
+                    wish
+                });
                 let (frame, metric) = frame_of(dimension, wish);
                 for one in 0..frame.count() {
                     for other in 0..=one {

@@ -32,13 +32,20 @@ impl<T: Real, const D: usize> Metric<T, D> {
         metric
     }
 
+    /// As new, in place.
+    pub fn restart(&mut self, dimension: usize) {
+        self.dimension = dimension;
+        self.forget();
+    }
+
     /// Back to box coordinates.
     pub fn forget(&mut self) {
-        for index in 0..D {
-            self.shape[index] = [T::zero(); D];
-            self.shape[index][index] = T::one();
+        for matrix in [&mut self.shape, &mut self.inverse] {
+            for (index, row) in matrix.iter_mut().enumerate() {
+                *row = [T::zero(); D];
+                row[index] = T::one();
+            }
         }
-        self.inverse = self.shape;
     }
 
     /// A z: a displacement in box coordinates.

@@ -10,9 +10,10 @@
 //!     +------------------------- no progress: scatter anew ---------------------+
 //! ```
 //!
-//! Memory: about 3 N D + 2 D^2 + 2 N D + 3 D + 11 N scalars (2 N D is the frame, of which min(N, D) rows are used).
-//! `size_of::<Bso<f32, 20, 13>>()` is 8,196 bytes and `size_of::<Bso<f32, 20, 28>>()` 18,804. [`Bso::new`] returns
-//! the value, and building it moves it: give `new` a stack of twice the size, or a static place and an early call.
+//! Memory: 3 N D swarm, 2 D^2 metric, 2 N D frame (its first min(N, D) rows are in use), 4 D gradient, best and
+//! box, 11 N values and readings, in scalars; `size_of` is 7,712 bytes for `Bso<f32, 20, 13>` and 18,872 for
+//! `Bso<f32, 20, 28>`. Stack, Cortex-M4F, D = 28: `advance` about 1.5 kB; [`Bso::new`] builds the value there
+//! before it is moved (7 kB at opt-level 3, about 45 kB at "s"); [`Bso::restart`] begins anew in place, 1 kB.
 //! Cost: adaptive.rs, paper.rs. The longest piece of work between two evaluations is the end of an adaptive
 //! iteration, 6 D^2 min(N, D) operations (94,000 at D = 28).
 
@@ -60,6 +61,21 @@ enum Mode<T: Real, const N: usize, const D: usize> {
     Paper(PaperRules<T, N>),
 }
 
+impl<T: Real, const N: usize, const D: usize> Mode<T, N, D> {
+    fn new(settings: BsoSettings<T>, dimension: usize) -> Self {
+        match settings {
+            BsoSettings::Adaptive(settings) => Self::Adaptive(AdaptiveRules::new(settings, dimension)),
+            BsoSettings::Paper(settings) => Self::Paper(PaperRules::new(settings)),
+        }
+    }
+
+    /// Apart, so that only a change of mode pays for a second copy on the stack.
+    #[inline(never)]
+    fn replace(&mut self, settings: BsoSettings<T>, dimension: usize) {
+        *self = Self::new(settings, dimension);
+    }
+}
+
 impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
     /// A swarm scattered over the objective's box; nothing is evaluated yet.
     pub fn new(
@@ -68,17 +84,28 @@ impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
         seed: u64,
     ) -> Result<Self, SwarmError> {
         let ledger = Ledger::open(objective)?;
-        let mode = match settings {
-            BsoSettings::Adaptive(settings) => {
-                settings.check()?;
-                Mode::Adaptive(AdaptiveRules::new(settings, ledger.dimension()))
-            }
-            BsoSettings::Paper(settings) => {
-                settings.check()?;
-                Mode::Paper(PaperRules::new(settings))
-            }
-        };
+        settings.check()?;
+        let mode = Mode::new(settings, ledger.dimension());
         Ok(Self { swarm: Swarm::new(ledger, seed), mode })
+    }
+
+    /// Begins anew in place; the swarm is then equal to a [`new`](Self::new) one, and unchanged on an error.
+    pub fn restart(
+        &mut self,
+        objective: &impl Objective<T>,
+        settings: BsoSettings<T>,
+        seed: u64,
+    ) -> Result<(), SwarmError> {
+        let ledger = Ledger::open(objective)?;
+        settings.check()?;
+        match (&mut self.mode, settings) {
+            (Mode::Adaptive(rules), BsoSettings::Adaptive(settings)) => {
+                rules.restart(settings, ledger.dimension());
+            }
+            (mode, settings) => mode.replace(settings, ledger.dimension()),
+        }
+        self.swarm.restart(ledger, seed);
+        Ok(())
     }
 
     /// Spends `evaluations` of the objective and returns how many were spent: all of them, or none where the
@@ -154,6 +181,15 @@ impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
         let mut beetles = Particles::new(ledger.dimension());
         beetles.scatter(&mut random);
         Self { ledger, random, beetles, found: [T::zero(); N], stage: Stage::Place { beetle: 0 } }
+    }
+
+    fn restart(&mut self, ledger: Ledger<T, D>, seed: u64) {
+        self.random = Random::new(seed);
+        self.beetles.restart(ledger.dimension());
+        self.beetles.scatter(&mut self.random);
+        self.ledger = ledger;
+        self.found = [T::zero(); N];
+        self.stage = Stage::Place { beetle: 0 };
     }
 
     fn advance(&mut self, rules: &mut impl Rules<T, N, D>, objective: &impl Objective<T>, evaluations: u32) {

@@ -29,6 +29,13 @@ impl<T: Real> BsoSettings<T> {
     pub fn paper() -> Self {
         Self::Paper(PaperSettings::default())
     }
+
+    pub(super) fn check(&self) -> Result<(), SwarmError> {
+        match self {
+            Self::Adaptive(settings) => settings.check(),
+            Self::Paper(settings) => settings.check(),
+        }
+    }
 }
 
 /// Constants of the adaptive mode. All lengths are shares of the box.
@@ -68,7 +75,7 @@ impl<T: Real> Default for AdaptiveSettings<T> {
 }
 
 impl<T: Real> AdaptiveSettings<T> {
-    pub(super) fn check(&self) -> Result<(), SwarmError> {
+    fn check(&self) -> Result<(), SwarmError> {
         not_negative("inertia_weight", self.inertia_weight)?;
         not_negative("individual_learning", self.individual_learning)?;
         not_negative("global_learning", self.global_learning)?;
@@ -120,7 +127,7 @@ impl<T: Real> Default for PaperSettings<T> {
 }
 
 impl<T: Real> PaperSettings<T> {
-    pub(super) fn check(&self) -> Result<(), SwarmError> {
+    fn check(&self) -> Result<(), SwarmError> {
         not_negative("inertia_weight", self.inertia_weight.first)?;
         not_negative("inertia_weight", self.inertia_weight.last)?;
         not_negative("individual_learning", self.individual_learning)?;
