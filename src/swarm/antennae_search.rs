@@ -15,7 +15,7 @@
 
 use crate::real::{Real, sign, sqrt};
 
-use super::objective::{Objective, SwarmError};
+use super::objective::{Objective, SwarmError, not_negative, positive};
 use super::random::Random;
 use super::rows::{add_scaled, dot, live, live_mut, scale};
 use super::search::{Best, Ledger, Search};
@@ -73,9 +73,10 @@ impl<T: Real, const D: usize> Bas<T, D> {
         settings: BasSettings<T>,
         seed: u64,
     ) -> Result<Self, SwarmError> {
-        if !(settings.step_per_whisker > T::zero()) {
-            return Err(SwarmError::Setting("step_per_whisker"));
-        }
+        not_negative("first_step", settings.first_step)?;
+        not_negative("step_decay", settings.step_decay)?;
+        not_negative("step_offset", settings.step_offset)?;
+        positive("step_per_whisker", settings.step_per_whisker)?;
         let ledger = Ledger::<T, D>::open(objective)?;
         let mut random = Random::new(seed);
         let mut point = [T::zero(); D];

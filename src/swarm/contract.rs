@@ -285,6 +285,12 @@ fn settings_that_make_no_sense_are_refused_by_name() {
     assert_eq!(adaptive(|s| s.step_limit = 0.0), Some(SwarmError::Setting("step_limit")));
     assert_eq!(adaptive(|s| s.velocity_share = f64::NAN), Some(SwarmError::Setting("velocity_share")));
     assert_eq!(adaptive(|s| s.patience = 0), Some(SwarmError::Setting("patience")));
+    let pso = PsoSettings { velocity_limit: f64::INFINITY, ..PsoSettings::default() };
+    let error = TestPso::new(&RIPPLES, pso, 1).err();
+    assert_eq!(error, Some(SwarmError::Setting("velocity_limit")));
+    let bas = BasSettings { step_per_whisker: 0.0, ..BasSettings::default() };
+    let error = TestBas::<f64>::new(&RIPPLES, bas, 1).err();
+    assert_eq!(error, Some(SwarmError::Setting("step_per_whisker")));
     let paper = PaperSettings { step_per_whisker: 0.0, ..PaperSettings::default() };
     let error = TestBso::<f64>::new(&RIPPLES, BsoSettings::Paper(paper), 1).err();
     assert_eq!(error, Some(SwarmError::Setting("step_per_whisker")));

@@ -2,7 +2,7 @@
 //!
 //! Why a trait: the swarm must not know a leg, and the identification must not know a beetle.
 
-use crate::real::Real;
+use crate::real::{Real, is_finite};
 
 /// A cost to be minimised over a box. It knows no leg, and a search knows nothing else of it.
 pub trait Objective<T: Real> {
@@ -50,4 +50,14 @@ pub enum SwarmError {
     },
     /// A setting that is negative or not finite, or a divisor that is zero.
     Setting(&'static str),
+}
+
+/// A setting that must be finite and at least zero.
+pub(super) fn not_negative<T: Real>(name: &'static str, value: T) -> Result<(), SwarmError> {
+    if value >= T::zero() && is_finite(value) { Ok(()) } else { Err(SwarmError::Setting(name)) }
+}
+
+/// A setting that must be finite and above zero.
+pub(super) fn positive<T: Real>(name: &'static str, value: T) -> Result<(), SwarmError> {
+    if value > T::zero() && is_finite(value) { Ok(()) } else { Err(SwarmError::Setting(name)) }
 }

@@ -10,7 +10,7 @@
 
 use crate::real::Real;
 
-use super::objective::{Objective, SwarmError};
+use super::objective::{Objective, SwarmError, not_negative};
 use super::particles::{InertiaWeight, Particles, VelocityRule};
 use super::random::Random;
 use super::rows::clip_to_box;
@@ -61,6 +61,11 @@ impl<T: Real, const N: usize, const D: usize> Pso<T, N, D> {
         settings: PsoSettings<T>,
         seed: u64,
     ) -> Result<Self, SwarmError> {
+        not_negative("inertia_weight", settings.inertia_weight.first)?;
+        not_negative("inertia_weight", settings.inertia_weight.last)?;
+        not_negative("individual_learning", settings.individual_learning)?;
+        not_negative("global_learning", settings.global_learning)?;
+        not_negative("velocity_limit", settings.velocity_limit)?;
         let ledger = Ledger::open(objective)?;
         let mut random = Random::new(seed);
         let mut particles = Particles::new(ledger.dimension());

@@ -28,7 +28,7 @@ use crate::real::{Real, abs, clamp, max, min, sqrt};
 use super::super::particles::{Particles, VelocityRule};
 use super::super::random::Random;
 use super::super::rows::{add_scaled, dot, live, live_mut, median};
-use super::frame::Frame;
+use super::frame::{Frame, Reach};
 use super::metric::Metric;
 use super::rules::{Opening, Rules, Side};
 use super::settings::AdaptiveSettings;
@@ -131,6 +131,10 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
     }
 
+    fn reach(&self) -> Reach<T> {
+        Reach { whisker: self.whisker, limit: self.settings.step_limit }
+    }
+
     /// om_i: beetles take turns in trusting more and less.
     fn trust_of(&self, beetle: usize) -> T {
         let levels = T::of(TRUST_LEVELS);
@@ -219,7 +223,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         };
         self.convex_share = Some(share);
         let gate = (share - T::of(CONVEX_SHARE)) / T::of(1.0 - CONVEX_SHARE);
-        if !(gate > T::zero()) || curved == 0 || read < 2 {
+        if gate <= T::zero() || curved == 0 || read < 2 {
             return;
         }
         let mean_curvature = curvature / number(curved);
@@ -288,8 +292,7 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
     fn aim(&mut self, beetle: usize, beetles: &Particles<T, N, D>, random: &mut Random) {
         let wish = self.wish(beetle, beetles, random);
         let position = &beetles.position[beetle.min(N - 1)];
-        let limit = self.settings.step_limit;
-        self.frame.aim(beetle, wish, position, &self.metric, self.whisker, limit, random);
+        self.frame.aim(beetle, wish, position, &self.metric, self.reach(), random);
     }
 
     fn tip(&self, beetle: usize, side: Side, beetles: &Particles<T, N, D>) -> [T; D] {
@@ -304,7 +307,7 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
 
     fn smell(&mut self, beetle: usize, beetles: &Particles<T, N, D>, right: T, left: T) {
         let centre = beetles.value[beetle.min(N - 1)];
-        self.frame.read(beetle, centre, right, left, self.whisker, self.settings.step_limit);
+        self.frame.read(beetle, centre, right, left, self.reach());
     }
 
     fn displace(&mut self, beetle: usize, beetles: &mut Particles<T, N, D>, random: &mut Random) {

@@ -30,6 +30,15 @@ const LEAST_LENGTH: f64 = 1e-18;
 /// Curvature above minus this share of |f| / l^2 is rounding and counts as convex.
 const CURVATURE_ROUNDING: f64 = 1e-6;
 
+/// How far whiskers and steps may reach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Reach<T> {
+    /// Usual whisker length, metric coordinates.
+    pub whisker: T,
+    /// Longest whisker and step, box coordinates.
+    pub limit: T,
+}
+
 /// One direction of the frame and what its beetle smelled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Whisker<T> {
@@ -99,15 +108,14 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     /// Points direction `index` along `wish` (metric coordinates) as far as it is orthogonal to the earlier ones;
     /// otherwise along something random, at the very last along a coordinate axis.
     ///
-    /// Whisker length is the usual one, `usual_length`, where that stays within `step_limit` of box.
+    /// The whisker has its usual length where that stays within the limit.
     pub fn aim(
         &mut self,
         index: usize,
         wish: Option<[T; D]>,
         beetle: &[T; D],
         metric: &Metric<T, D>,
-        usual_length: T,
-        step_limit: T,
+        reach: Reach<T>,
         random: &mut Random,
     ) {
         let index = index.min(N - 1);
@@ -120,7 +128,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         self.displacement[index] = displacement;
         self.whisker[index] = Whisker {
             box_length,
-            length: min(usual_length, step_limit / box_length),
+            length: min(reach.whisker, reach.limit / box_length),
             coordinate,
             reading: None,
         };
@@ -157,28 +165,21 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     /// `None` where too little is left.
     fn complement(&self, index: usize, mut candidate: [T; D]) -> Option<[T; D]> {
         let rest = live_mut(&mut candidate, self.dimension);
-        let length = sqrt(dot(rest, rest));
-        if !(length >= T::of(LEAST_LENGTH)) {
+        if !normalise(rest, T::of(LEAST_LENGTH)) {
             return None;
         }
-        scale(rest, T::one() / length);
         for earlier in self.direction.iter().take(index) {
             let earlier = live(earlier, self.dimension);
             let along = dot(rest, earlier);
             add_scaled(rest, -along, earlier);
         }
-        let remainder = sqrt(dot(rest, rest));
-        if !(remainder >= T::of(LEAST_REMAINDER)) {
-            return None;
-        }
-        scale(rest, T::one() / remainder);
-        Some(candidate)
+        normalise(rest, T::of(LEAST_REMAINDER)).then_some(candidate)
     }
 
     /// Fits the parabola of direction `index` through the values at the beetle and at its whiskers.
     ///
     /// A value that is not finite leaves no reading: the direction then moves nobody and teaches nothing.
-    pub fn read(&mut self, index: usize, centre: T, right: T, left: T, usual_length: T, step_limit: T) {
+    pub fn read(&mut self, index: usize, centre: T, right: T, left: T, reach: Reach<T>) {
         let whisker = &mut self.whisker[index.min(N - 1)];
         whisker.reading = None;
         if !(is_usable(centre) && is_usable(right) && is_usable(left)) {
@@ -190,8 +191,8 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         if !(is_finite(slope) && is_finite(curvature)) {
             return;
         }
-        let step = if curvature > T::zero() { -slope / curvature } else { -sign(slope) * usual_length };
-        let longest = step_limit / whisker.box_length;
+        let step = if curvature > T::zero() { -slope / curvature } else { -sign(slope) * reach.whisker };
+        let longest = reach.limit / whisker.box_length;
         whisker.reading = Some(Reading {
             slope,
             curvature,
@@ -201,21 +202,32 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     }
 }
 
+/// Scales a row to length 1; false, and the row as it was, where it is shorter than `least` or not finite.
+fn normalise<T: Real>(row: &mut [T], least: T) -> bool {
+    let length = sqrt(dot(row, row));
+    let long_enough = length >= least && is_finite(length);
+    if long_enough {
+        scale(row, T::one() / length);
+    }
+    long_enough
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const N: usize = 6;
     const D: usize = 9;
+    const REACH: Reach<f64> = Reach { whisker: 0.1, limit: 0.5 };
 
     fn frame_of(dimension: usize, wish: Option<[f64; D]>) -> (Frame<f64, N, D>, Metric<f64, D>) {
         let mut random = Random::new(4);
         let mut metric = Metric::identity(dimension);
         let mut frame = Frame::new(dimension);
-        frame.aim(0, None, &[0.5; D], &metric, 0.1, 0.5, &mut random);
+        frame.aim(0, None, &[0.5; D], &metric, REACH, &mut random);
         metric.stretch(&frame.direction[0], &frame.displacement[0], 4.0);
         for index in 0..frame.count() {
-            frame.aim(index, wish, &[0.5; D], &metric, 0.1, 0.5, &mut random);
+            frame.aim(index, wish, &[0.5; D], &metric, REACH, &mut random);
         }
         (frame, metric)
     }
@@ -248,7 +260,7 @@ mod tests {
         let (mut frame, _) = frame_of(4, None);
         let length = frame.whisker[1].length;
         let cost = |x: f64| 3.0 * (x - 0.02) * (x - 0.02) + 7.0;
-        frame.read(1, cost(0.0), cost(length), cost(-length), 0.1, 0.5);
+        frame.read(1, cost(0.0), cost(length), cost(-length), REACH);
         let reading = frame.whisker[1].reading.expect("all values are finite");
         // values around 7 leave 1e-15 of rounding, divided by l^2 h = 0.06
         assert!(abs(reading.step - 0.02) < 1e-13 && abs(reading.curvature - 6.0) < 1e-11);
@@ -258,7 +270,7 @@ mod tests {
     #[test]
     fn downhill_by_a_usual_whisker_where_the_cost_is_concave() {
         let (mut frame, _) = frame_of(4, None);
-        frame.read(2, 1.0, 0.2, 0.4, 0.1, 0.5);
+        frame.read(2, 1.0, 0.2, 0.4, REACH);
         let reading = frame.whisker[2].reading.expect("all values are finite");
         assert_eq!(reading.step, 0.1);
         assert!(!reading.convex);
@@ -268,8 +280,8 @@ mod tests {
     fn what_is_not_finite_leaves_no_reading() {
         let (mut frame, _) = frame_of(4, None);
         for (centre, right, left) in [(f64::MAX, 1.0, 1.0), (1.0, f64::MAX, 2.0), (1e308, -1e308, 1e308)] {
-            frame.read(0, 1.0, 2.0, 2.0, 0.1, 0.5);
-            frame.read(0, centre, right, left, 0.1, 0.5);
+            frame.read(0, 1.0, 2.0, 2.0, REACH);
+            frame.read(0, centre, right, left, REACH);
             assert_eq!(frame.whisker[0].reading, None);
         }
     }

@@ -55,7 +55,6 @@ pub struct Bso<T: Real, const N: usize, const D: usize> {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "without a heap the larger mode decides the size of both")]
 enum Mode<T: Real, const N: usize, const D: usize> {
     Adaptive(AdaptiveRules<T, N, D>),
     Paper(PaperRules<T, N>),

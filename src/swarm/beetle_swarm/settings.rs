@@ -3,9 +3,9 @@
 //! Why so few are settings: one set of constants serves every function, every dimension and every identification
 //! problem; what the ablations varied can be set, everything else is a constant beside the code that uses it.
 
-use crate::real::{Real, is_finite};
+use crate::real::Real;
 
-use super::super::objective::SwarmError;
+use super::super::objective::{SwarmError, not_negative, positive};
 use super::super::particles::InertiaWeight;
 
 /// Which rules the beetles follow.
@@ -139,12 +139,4 @@ impl<T: Real> PaperSettings<T> {
         not_negative("step_offset", self.step_offset)?;
         positive("step_per_whisker", self.step_per_whisker)
     }
-}
-
-fn not_negative<T: Real>(name: &'static str, value: T) -> Result<(), SwarmError> {
-    if value >= T::zero() && is_finite(value) { Ok(()) } else { Err(SwarmError::Setting(name)) }
-}
-
-fn positive<T: Real>(name: &'static str, value: T) -> Result<(), SwarmError> {
-    if value > T::zero() && is_finite(value) { Ok(()) } else { Err(SwarmError::Setting(name)) }
 }
