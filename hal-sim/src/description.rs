@@ -1,0 +1,137 @@
+//! Everything a simulated leg is made from, as plain numbers without heap or text.
+//!
+//! A host tool fills these from a leg file, an emulated image from constants. Bodies are stated as the firmware's
+//! users state them, in modified Denavit-Hartenberg frames; `conventions` translates. Nothing is checked here:
+//! whoever reads numbers from outside checks them (`tool::leg_file` does).
+
+/// One leg of `N` joints (1 to 3), proximal first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LegDescription<const N: usize> {
+    /// Gravity's acceleration in the base frame, m/s^2.
+    pub gravity: [f64; 3],
+    /// Proximal first.
+    pub joints: [JointDescription; N],
+    /// Pushes by the wearer; none by default.
+    pub pushes: Option<PushDescription>,
+}
+
+/// One joint with the link it moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointDescription {
+    /// Where the joint's frame lies in the previous one.
+    pub frame: DenavitHartenberg,
+    /// +1 or -1: sign of the joint (D-H) angle's rate in the anatomical one's.
+    pub direction: f64,
+    /// D-H angle at the anatomical zero, rad.
+    pub zero_offset: f64,
+    /// The link beyond the joint.
+    pub body: BodyDescription,
+    /// Rotor inertia as the joint feels it (gear ratio squared times the rotor's own), kg m^2.
+    pub rotor_inertia: f64,
+    /// What resists the joint.
+    pub friction: FrictionDescription,
+    /// Motor and current loop.
+    pub drive: DriveDescription,
+    /// Angle sensor.
+    pub encoder: EncoderDescription,
+    /// Current sensor.
+    pub current_sensor: CurrentSensorDescription,
+}
+
+/// Modified (Khalil, Craig) parameters: T(i-1, i) = Rx(alpha) Tx(a) Rz(q) Tz(d).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DenavitHartenberg {
+    /// Twist, rad.
+    pub alpha: f64,
+    /// Length, m.
+    pub a: f64,
+    /// Offset along the joint's axis, m.
+    pub d: f64,
+}
+
+/// A rigid link in its own D-H frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BodyDescription {
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centre of mass, m.
+    pub com: [f64; 3],
+    /// Tensor elements XX XY XZ YY YZ ZZ about the centre of mass, kg m^2.
+    pub inertia_com: [f64; 6],
+}
+
+/// Friction of one joint, all at the joint, D-H sign.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrictionDescription {
+    /// Coulomb level, N m.
+    pub coulomb: f64,
+    /// Viscous coefficient, N m s/rad.
+    pub viscous: f64,
+    /// Constant torque the motor must add whatever the motion, N m.
+    pub offset: f64,
+    /// A higher level at rest, if there is one.
+    pub stribeck: Option<Stribeck>,
+}
+
+/// Level at rest and how fast it falls to Coulomb's with speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stribeck {
+    /// Torque at which a resting joint breaks away, N m; at least the Coulomb level.
+    pub static_level: f64,
+    /// Speed at which the surplus has fallen to 1/e, rad/s.
+    pub speed: f64,
+}
+
+/// Ideal drive: a current that follows its target with a lag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveDescription {
+    /// Torque at the joint per ampere of motor current, N m/A.
+    pub torque_per_ampere: f64,
+    /// The current never exceeds this, A.
+    pub current_limit: f64,
+    /// Time constant of the first-order lag, s; 0 for none.
+    pub lag: f64,
+}
+
+/// On which side of the gear the encoder sits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EncoderSide {
+    /// On the motor, which turns `ratio` times per joint turn.
+    Motor,
+    /// On the joint.
+    Joint,
+}
+
+/// Encoder; its count 0 lies at the anatomical zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EncoderDescription {
+    /// Motor or joint.
+    pub side: EncoderSide,
+    /// Counts per encoder turn.
+    pub counts: f64,
+    /// Encoder turns per joint turn.
+    pub ratio: f64,
+}
+
+/// Motor current sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CurrentSensorDescription {
+    /// Standard deviation of the mean of eight samples, that is per logged 500 Hz sample, A. A single 4 kHz sample
+    /// has sqrt(8) times as much; the noise is white and Gaussian.
+    pub noise: f64,
+    /// Constant error, A.
+    pub offset: f64,
+    /// Width of a conversion step, A; 0 for none.
+    pub step: f64,
+}
+
+/// Pushes by the wearer: half-sine torque pulses on random joints at random instants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PushDescription {
+    /// Mean number of pushes per second (between the end of one and the start of the next).
+    pub rate: f64,
+    /// Largest peak, N m; peaks are uniform in 0..=this, of either sign.
+    pub torque: f64,
+    /// Mean duration, s; durations are uniform in half to one and a half of this.
+    pub duration: f64,
+}

@@ -1,0 +1,43 @@
+//! The plant's own door to `libm`, apart from the firmware's.
+//!
+//! Double precision throughout. The same functions run on the host, in the emulator and without `std`, so a seed
+//! gives the same bits everywhere.
+
+/// Sine and cosine of an angle in rad.
+#[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]
+pub(crate) fn sin_cos(angle: f64) -> (f64, f64) {
+    libm::sincos(angle)
+}
+
+/// e to the power of `value`.
+#[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]
+pub(crate) fn exp(value: f64) -> f64 {
+    libm::exp(value)
+}
+
+/// Natural logarithm.
+#[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]
+pub(crate) fn ln(value: f64) -> f64 {
+    libm::log(value)
+}
+
+/// Nearest whole number, halves upward; saturates at the ends of `i64`, 0 for NaN.
+pub(crate) fn nearest(value: f64) -> i64 {
+    let shifted = value + 0.5;
+    let truncated = shifted as i64;
+    if (truncated as f64) > shifted { truncated.saturating_sub(1) } else { truncated }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest;
+
+    #[test]
+    fn nearest_rounds_both_signs_alike() {
+        let cases =
+            [(0.49, 0), (0.5, 1), (-0.5, 0), (-0.51, -1), (-7.9, -8), (1e300, i64::MAX), (f64::NAN, 0)];
+        for (value, whole) in cases {
+            assert_eq!(nearest(value), whole, "{value}");
+        }
+    }
+}

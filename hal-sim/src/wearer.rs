@@ -1,0 +1,71 @@
+//! The wearer's pushes: torque pulses that no sensor sees.
+//!
+//! ```text
+//! torque(t) = peak sin(pi (t - start) / duration)    while start <= t <= start + duration, on one joint
+//! ```
+//!
+//! Pauses between pushes are exponential with the mean 1 / rate, peaks uniform in -torque..=torque, durations
+//! uniform in half to one and a half of the mean, joints equally likely. The generator is the wearer's own, so sensor
+//! noise does not change with the pushes. Known limits: no stiffness, no intention, one joint at a time.
+
+use crate::description::PushDescription;
+use crate::maths::{ln, sin_cos};
+use core::f64::consts::PI;
+use rand_core::Rng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+#[derive(Clone, Debug, PartialEq)]
+struct Push {
+    start: f64,
+    duration: f64,
+    peak: f64,
+    joint: usize,
+}
+
+/// A wearer who pushes now and then, or never.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wearer {
+    habits: Option<PushDescription>,
+    next: Option<Push>,
+    generator: Xoshiro256PlusPlus,
+}
+
+impl Wearer {
+    /// At time 0, with a generator of their own.
+    #[must_use]
+    pub fn new(habits: Option<PushDescription>, joints: usize, generator: Xoshiro256PlusPlus) -> Self {
+        let mut wearer = Self { habits, next: None, generator };
+        wearer.plan(0.0, joints);
+        wearer
+    }
+
+    /// Torque on each joint, N m, at a time in s that never decreases from call to call.
+    pub fn torque<const N: usize>(&mut self, time: f64) -> [f64; N] {
+        let mut torque = [0.0; N];
+        if self.next.as_ref().is_some_and(|push| time > push.start + push.duration) {
+            self.plan(time, N);
+        }
+        if let Some(push) = &self.next
+            && time >= push.start
+            && let Some(joint) = torque.get_mut(push.joint)
+        {
+            *joint = push.peak * sin_cos(PI * (time - push.start) / push.duration).0;
+        }
+        torque
+    }
+
+    fn plan(&mut self, now: f64, joints: usize) {
+        let Some(habits) = self.habits else { return };
+        let pause = -ln(1.0 - self.uniform()) / habits.rate;
+        let duration = habits.duration * (0.5 + self.uniform());
+        let peak = habits.torque * (2.0 * self.uniform() - 1.0);
+        let joint = (self.uniform() * joints as f64) as usize;
+        self.next = Some(Push { start: now + pause, duration, peak, joint });
+    }
+
+    /// Uniform in 0..1 with 53 bits.
+    fn uniform(&mut self) -> f64 {
+        const UNIT: f64 = 1.0 / (1_u64 << 53) as f64;
+        (self.generator.next_u64() >> 11) as f64 * UNIT
+    }
+}

@@ -1,0 +1,181 @@
+//! A leg with drives, sensors and wearer as one seeded value.
+//!
+//! Why one value: the firmware is tested by running it against a world, by cloning both anywhere and letting
+//! the copies go different ways, and by comparing copies bit for bit. A world holds no clock, no file and no
+//! shared state; the same seed and the same commands give the same bits.
+//!
+//! The exchange, once per servo tick of 250 us: read [`LegDrives::sample`] (sensors at this instant), hand over
+//! [`LegDrives::command`] (acts from this instant), [`World::advance`] to the next; or [`World::tick`], which does
+//! the last two and reads. All public angles and torques are anatomical.
+
+use crate::conventions::Anatomy;
+use crate::description::LegDescription;
+use crate::drive::Drive;
+use crate::leg::{Leg, LegState};
+use crate::sensors::{CurrentSensor, Encoder};
+use crate::wearer::Wearer;
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use scarab::hal::{DriveCommand, JointSample, LegDrives, Sample};
+use scarab::units::Ampere;
+
+/// Servo rate, Hz.
+pub const TICK_RATE_HZ: f64 = 4000.0;
+/// Duration of a servo tick, s.
+pub const TICK_S: f64 = 1.0 / TICK_RATE_HZ;
+
+/// What really happens in a world, without noise, at the present instant; anatomical, proximal joint first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth<const N: usize> {
+    /// Since the world began, s.
+    pub time_s: f64,
+    /// Joint angles, rad.
+    pub position: [f64; N],
+    /// Joint rates, rad/s; exactly 0 while a joint sticks.
+    pub velocity: [f64; N],
+    /// Joint accelerations, rad/s^2, under the motor torque of this instant (pushes left out).
+    pub acceleration: [f64; N],
+    /// Torque of the motors at the joints, N m.
+    pub motor_torque: [f64; N],
+    /// Joints that friction holds.
+    pub sticking: [bool; N],
+}
+
+/// The physical world of one leg of `N` joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct World<const N: usize> {
+    leg: Leg<N>,
+    state: LegState<N>,
+    anatomy: [Anatomy; N],
+    drives: [Drive; N],
+    encoders: [Encoder; N],
+    current_sensors: [CurrentSensor; N],
+    wearer: Wearer,
+    sensor_noise: Xoshiro256PlusPlus,
+    tick: u64,
+    newest: Sample<N>,
+}
+
+impl<const N: usize> World<N> {
+    /// A leg at rest at its anatomical zero, bridges released.
+    #[must_use]
+    pub fn new(description: &LegDescription<N>, seed: u64) -> Self {
+        let joints = &description.joints;
+        let sensor_noise = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut pushes = sensor_noise.clone();
+        pushes.jump();
+        let mut world = Self {
+            leg: Leg::new(description),
+            state: LegState { angles: joints.map(|joint| joint.zero_offset), rates: [0.0; N] },
+            anatomy: joints.map(|joint| Anatomy::of(&joint)),
+            drives: joints.map(|joint| Drive::new(&joint.drive, TICK_S)),
+            encoders: joints.map(|joint| Encoder::new(&joint.encoder)),
+            current_sensors: joints.map(|joint| CurrentSensor::new(&joint.current_sensor)),
+            wearer: Wearer::new(description.pushes, N, pushes),
+            sensor_noise,
+            tick: 0,
+            newest: Sample { joints: [JointSample::default(); N] },
+        };
+        world.read_sensors();
+        world
+    }
+
+    /// Puts the leg at rest at anatomical angles, rad; the encoders' reference stays where it was.
+    pub fn place(&mut self, position: &[f64; N]) {
+        let anatomy = &self.anatomy;
+        self.state = LegState {
+            angles: core::array::from_fn(|joint| anatomy[joint].to_joint_angle(position[joint])),
+            rates: [0.0; N],
+        };
+        self.read_sensors();
+    }
+
+    /// Sets each joint's current noise: standard deviation per logged 500 Hz sample, A.
+    pub fn set_current_noise(&mut self, noise: &[f64; N]) {
+        for (sensor, noise) in self.current_sensors.iter_mut().zip(noise) {
+            sensor.set_noise(*noise);
+        }
+    }
+
+    /// One servo tick: commands act, time passes, sensors are read.
+    pub fn tick(&mut self, command: &DriveCommand<N>) -> Sample<N> {
+        self.command(command);
+        self.advance();
+        self.newest
+    }
+
+    /// To the next servo tick.
+    pub fn advance(&mut self) {
+        let pushed: [f64; N] = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
+        let from = self.joint_torque(&pushed);
+        for drive in &mut self.drives {
+            drive.advance();
+        }
+        let to = self.joint_torque(&pushed);
+        self.leg.advance(&mut self.state, &from, &to, TICK_S);
+        self.tick += 1;
+        self.read_sensors();
+    }
+
+    /// Motors and pushes on the joints, N m, joint sign.
+    fn joint_torque(&self, pushed: &[f64; N]) -> [f64; N] {
+        core::array::from_fn(|joint| self.anatomy[joint].flip(self.drives[joint].torque() + pushed[joint]))
+    }
+
+    fn read_sensors(&mut self) {
+        for joint in 0..N {
+            let angle = self.anatomy[joint].to_anatomical_angle(self.state.angles[joint]);
+            let current =
+                self.current_sensors[joint].read(self.drives[joint].current(), &mut self.sensor_noise);
+            self.newest.joints[joint] = JointSample {
+                encoder_counts: self.encoders[joint].read(angle),
+                current: Ampere(current as f32),
+            };
+        }
+    }
+
+    /// What really happens now. Costs about as much as a tick.
+    #[must_use]
+    pub fn truth(&self) -> Truth<N> {
+        let (anatomy, state) = (&self.anatomy, &self.state);
+        let acceleration = self.leg.forward_dynamics(state, &self.joint_torque(&[0.0; N]));
+        Truth {
+            time_s: self.tick as f64 * TICK_S,
+            position: core::array::from_fn(|joint| anatomy[joint].to_anatomical_angle(state.angles[joint])),
+            velocity: core::array::from_fn(|joint| anatomy[joint].flip(state.rates[joint])),
+            acceleration: core::array::from_fn(|joint| anatomy[joint].flip(acceleration[joint])),
+            motor_torque: core::array::from_fn(|joint| self.drives[joint].torque()),
+            sticking: state.rates.map(|rate| rate == 0.0),
+        }
+    }
+
+    /// Motor torque, N m, that makes a motion (rad, rad/s, rad/s^2), friction and offset included; of a joint at rest
+    /// dry friction is undetermined and left out.
+    #[must_use]
+    pub fn inverse_dynamics(
+        &self,
+        position: &[f64; N],
+        velocity: &[f64; N],
+        acceleration: &[f64; N],
+    ) -> [f64; N] {
+        let anatomy = &self.anatomy;
+        let angles = core::array::from_fn(|joint| anatomy[joint].to_joint_angle(position[joint]));
+        let rates = core::array::from_fn(|joint| anatomy[joint].flip(velocity[joint]));
+        let accelerations = core::array::from_fn(|joint| anatomy[joint].flip(acceleration[joint]));
+        let torque = self.leg.inverse_dynamics(&angles, &rates, &accelerations);
+        core::array::from_fn(|joint| anatomy[joint].flip(torque[joint]))
+    }
+}
+
+impl<const N: usize> LegDrives<N> for World<N> {
+    /// Read at the last tick; reading again changes nothing.
+    fn sample(&mut self) -> Sample<N> {
+        self.newest
+    }
+
+    fn command(&mut self, command: &DriveCommand<N>) {
+        for (drive, current) in self.drives.iter_mut().zip(command.currents) {
+            drive.command(command.enabled, f64::from(current.0));
+        }
+    }
+}
