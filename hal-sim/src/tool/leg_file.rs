@@ -1,1 +1,326 @@
+//! Leg files: a leg in TOML, as users write it.
+//!
+//! Why a file: what the tool simulates and what it identifies must be stated in one place that can be read, compared
+//! and sent along. Keys are an interface; unknown ones are errors. Every fault names file, line and reason.
+//!
+//! | key | unit, meaning | default |
+//! | --- | --- | --- |
+//! | `name` | | required |
+//! | `gravity` | m/s^2, base frame | required |
+//! | `torque_noise_percent` | white, per logged 500 Hz sample, of each joint's mean absolute torque, on the logged current only | 0 |
+//! | `pushes` | `{ per_minute, torque_nm, duration_s }`: the wearer pushes at random | none |
+//! | `joint.name`, `joint.dh` | `dh = { alpha, a, d }`, modified D-H, rad and m | required |
+//! | `direction`, `zero_offset_deg` | joint angle = direction * anatomical angle + zero offset | 1, 0 |
+//! | `range_deg` | anatomical, lower and upper | -90, 90 |
+//! | `speed_limit_deg_s`, `acceleration_limit_deg_s2`, `torque_limit_nm` | | 180, 2000, 100 |
+//! | `torque_per_ampere` | N m/A at the joint | 1.5 |
+//! | `current_limit_a` | the drive's | torque limit / torque per ampere |
+//! | `drive_lag_s` | time constant of the current | 0.0005 |
+//! | `encoder` | `{ side = "motor" or "joint", counts, ratio }` | motor, 8192, 50 |
+//! | `current_noise_a` | standard deviation per logged 500 Hz sample, besides `torque_noise_percent` | 0 |
+//! | `current_offset_a`, `current_step_a` | error and conversion step of the current sensor | 0, 0 (none) |
+//! | `offset`, `rotor` | `"on"` or `"off"`: whether a torque offset, a rotor inertia is estimated | on, on |
+//! | `stribeck` | `{ static_nm, speed_rad_s }`: simulated friction at rest and where it has fallen | none |
+//! | `truth`, `prior` | `{ mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset }`, the last four 0 unless given | none |
+//! | `[joint.motor]` | reserved | |
+//!
+//! `inertia_com` holds the tensor elements XX XY XZ YY YZ ZZ about the centre of mass. Everything in `truth` and `prior`
+//! is in the joint's D-H frame with the D-H sign. `truth` is only needed to simulate.
 
+mod check;
+mod convert;
+mod error;
+
+pub use error::LegFileError;
+
+use serde::de::{Deserializer, Error as _};
+use serde::{Deserialize, Serialize};
+
+/// The leg that is meant when none is named.
+pub const DEFAULT_LEG: &str = "x2-wearer-75kg";
+
+/// Shipped legs by name, with their text.
+pub const SHIPPED_LEGS: [(&str, &str); 5] = [
+    (DEFAULT_LEG, include_str!("../../legs/x2-wearer-75kg.toml")),
+    ("mujoco-leg", include_str!("../../legs/mujoco-leg.toml")),
+    ("dp-a0", include_str!("../../legs/dp-a0.toml")),
+    ("sp", include_str!("../../legs/sp.toml")),
+    ("paper-chain", include_str!("../../legs/paper-chain.toml")),
+];
+
+/// A checked leg: 1 to 3 joints, physically possible, limits in order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LegFile {
+    /// What the leg is called.
+    pub name: String,
+    /// Gravity's acceleration in the base frame, m/s^2.
+    pub gravity: [f64; 3],
+    /// Noise of the logged torque in percent of each joint's mean absolute torque.
+    #[serde(default)]
+    pub torque_noise_percent: f64,
+    /// The wearer's pushes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pushes: Option<PushesFile>,
+    /// Proximal first.
+    #[serde(rename = "joint")]
+    pub joints: Vec<JointFile>,
+}
+
+/// Random pushes by the wearer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PushesFile {
+    /// Mean number per minute.
+    pub per_minute: f64,
+    /// Largest peak, N m.
+    pub torque_nm: f64,
+    /// Mean duration, s.
+    pub duration_s: f64,
+}
+
+/// One joint and the link beyond it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointFile {
+    /// What the joint is called.
+    pub name: String,
+    /// Where its frame lies in the previous one.
+    pub dh: DhFile,
+    /// 1 or -1: joint angle = direction * anatomical angle + zero offset.
+    #[serde(default = "one")]
+    pub direction: i64,
+    /// Joint angle at the anatomical zero, degrees.
+    #[serde(default)]
+    pub zero_offset_deg: f64,
+    /// Anatomical range, degrees.
+    #[serde(default = "default_range")]
+    pub range_deg: [f64; 2],
+    /// Degrees per second.
+    #[serde(default = "default_speed_limit")]
+    pub speed_limit_deg_s: f64,
+    /// Degrees per second squared.
+    #[serde(default = "default_acceleration_limit")]
+    pub acceleration_limit_deg_s2: f64,
+    /// N m at the joint.
+    #[serde(default = "default_torque_limit")]
+    pub torque_limit_nm: f64,
+    /// N m/A at the joint.
+    #[serde(default = "default_torque_per_ampere")]
+    pub torque_per_ampere: f64,
+    /// Limit of the drive, A; torque limit / torque per ampere unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub current_limit_a: Option<f64>,
+    /// Time constant of the current, s.
+    #[serde(default = "default_lag")]
+    pub drive_lag_s: f64,
+    /// Angle sensor.
+    #[serde(default = "default_encoder")]
+    pub encoder: EncoderFile,
+    /// Standard deviation of the current per logged 500 Hz sample, A.
+    #[serde(default)]
+    pub current_noise_a: f64,
+    /// Constant error of the current sensor, A.
+    #[serde(default)]
+    pub current_offset_a: f64,
+    /// Conversion step of the current sensor, A; 0 for none.
+    #[serde(default)]
+    pub current_step_a: f64,
+    /// Whether a torque offset is estimated.
+    #[serde(default)]
+    pub offset: Switch,
+    /// Whether a rotor inertia is estimated.
+    #[serde(default)]
+    pub rotor: Switch,
+    /// Friction at rest above Coulomb's, simulated only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stribeck: Option<StribeckFile>,
+    /// What the simulated leg is made of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<LinkParameters>,
+    /// What is believed before measuring.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior: Option<LinkParameters>,
+    #[serde(default, rename = "motor", skip_serializing)]
+    reserved: Reserved,
+}
+
+/// Modified Denavit-Hartenberg parameters, rad and m.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DhFile {
+    /// Twist, rad.
+    pub alpha: f64,
+    /// Length, m.
+    pub a: f64,
+    /// Offset along the axis, m.
+    pub d: f64,
+}
+
+/// Encoder of a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EncoderFile {
+    /// Motor or joint.
+    pub side: Side,
+    /// Per encoder turn.
+    pub counts: u32,
+    /// Encoder turns per joint turn.
+    pub ratio: f64,
+}
+
+/// Side of the gear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// On the motor.
+    Motor,
+    /// On the joint.
+    Joint,
+}
+
+/// Whether something is estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Switch {
+    /// It is.
+    #[default]
+    On,
+    /// It is not.
+    Off,
+}
+
+/// Stribeck friction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StribeckFile {
+    /// Breakaway torque, N m.
+    pub static_nm: f64,
+    /// Speed at which the surplus has fallen to 1/e, rad/s.
+    pub speed_rad_s: f64,
+}
+
+/// A link with rotor and friction, in the joint's D-H frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinkParameters {
+    /// kg.
+    pub mass: f64,
+    /// Centre of mass, m.
+    pub com: [f64; 3],
+    /// Tensor elements XX XY XZ YY YZ ZZ about the centre of mass, kg m^2.
+    pub inertia_com: [f64; 6],
+    /// At the joint, kg m^2.
+    #[serde(default)]
+    pub rotor_inertia: f64,
+    /// N m.
+    #[serde(default)]
+    pub coulomb: f64,
+    /// N m s/rad.
+    #[serde(default)]
+    pub viscous: f64,
+    /// N m.
+    #[serde(default)]
+    pub offset: f64,
+}
+
+/// A key that must not be used yet.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Reserved;
+
+impl<'de> Deserialize<'de> for Reserved {
+    fn deserialize<D: Deserializer<'de>>(_: D) -> Result<Self, D::Error> {
+        Err(D::Error::custom("`[joint.motor]` is reserved for a later description of the motor"))
+    }
+}
+
+fn one() -> i64 {
+    1
+}
+
+fn default_range() -> [f64; 2] {
+    [-90.0, 90.0]
+}
+
+fn default_speed_limit() -> f64 {
+    180.0
+}
+
+fn default_acceleration_limit() -> f64 {
+    2000.0
+}
+
+fn default_torque_limit() -> f64 {
+    100.0
+}
+
+fn default_torque_per_ampere() -> f64 {
+    1.5
+}
+
+fn default_lag() -> f64 {
+    5e-4
+}
+
+fn default_encoder() -> EncoderFile {
+    EncoderFile { side: Side::Motor, counts: 8192, ratio: 50.0 }
+}
+
+impl JointFile {
+    /// A joint with the defaults of every key but these.
+    #[must_use]
+    pub fn new(name: &str, dh: DhFile) -> Self {
+        Self {
+            name: name.to_owned(),
+            dh,
+            direction: one(),
+            zero_offset_deg: 0.0,
+            range_deg: default_range(),
+            speed_limit_deg_s: default_speed_limit(),
+            acceleration_limit_deg_s2: default_acceleration_limit(),
+            torque_limit_nm: default_torque_limit(),
+            torque_per_ampere: default_torque_per_ampere(),
+            current_limit_a: None,
+            drive_lag_s: default_lag(),
+            encoder: default_encoder(),
+            current_noise_a: 0.0,
+            current_offset_a: 0.0,
+            current_step_a: 0.0,
+            offset: Switch::On,
+            rotor: Switch::On,
+            stribeck: None,
+            truth: None,
+            prior: None,
+            reserved: Reserved,
+        }
+    }
+}
+
+impl LegFile {
+    /// A shipped leg by name, or the file at a path.
+    pub fn load(name_or_path: &str) -> Result<Self, LegFileError> {
+        if let Some((name, text)) = SHIPPED_LEGS.iter().find(|(name, _)| *name == name_or_path) {
+            return Self::parse(text, &format!("{name} (shipped)"));
+        }
+        let text = std::fs::read_to_string(name_or_path).map_err(|fault| {
+            let names = SHIPPED_LEGS.map(|(name, _)| name).join(", ");
+            let reason = format!("cannot be read ({fault}), and no shipped leg is called so ({names})");
+            LegFileError::of_file(name_or_path, reason)
+        })?;
+        Self::parse(&text, name_or_path)
+    }
+
+    /// A leg from TOML text; `file` is what faults are reported under.
+    pub fn parse(text: &str, file: &str) -> Result<Self, LegFileError> {
+        let leg: Self = toml::from_str(text).map_err(|fault| LegFileError::of_text(file, text, &fault))?;
+        check::leg(&leg).map_err(|fault| LegFileError::of_value(file, text, &fault))?;
+        Ok(leg)
+    }
+
+    /// The leg as TOML text that [`LegFile::parse`] reads back unchanged.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self)
+            .unwrap_or_else(|fault| unreachable!("a leg is plain tables and numbers: {fault}"))
+    }
+}

@@ -1,0 +1,75 @@
+//! From a leg file to the numbers the plant is made from.
+
+use super::{JointFile, LegFile, LegFileError, LinkParameters, PushesFile, Side};
+use crate::description::{
+    BodyDescription, CurrentSensorDescription, DenavitHartenberg, DriveDescription, EncoderDescription,
+    EncoderSide, FrictionDescription, JointDescription, LegDescription, PushDescription, Stribeck,
+};
+
+impl LegFile {
+    /// The simulated leg. Its sensors have `current_noise_a` only: `torque_noise_percent` refers to a motion, so whoever
+    /// knows the motion adds it with `World::set_current_noise`. Fails where the leg has not `N` joints or a joint has
+    /// no `truth`.
+    pub fn description<const N: usize>(&self) -> Result<LegDescription<N>, LegFileError> {
+        let refused = |reason: String| LegFileError::of_file(&self.name, reason);
+        let mut joints = Vec::with_capacity(N);
+        for joint in &self.joints {
+            let truth = joint.truth.as_ref().ok_or_else(|| {
+                refused(format!("joint `{}` has no `truth`: the leg cannot be simulated", joint.name))
+            })?;
+            joints.push(joint.description(truth));
+        }
+        let count = joints.len();
+        let joints = joints.try_into().map_err(|_| refused(format!("has {count} joints, not {N}")))?;
+        Ok(LegDescription { gravity: self.gravity, joints, pushes: self.pushes.as_ref().map(pushes) })
+    }
+}
+
+impl JointFile {
+    /// Limit of the drive's current, A.
+    #[must_use]
+    pub fn current_limit(&self) -> f64 {
+        self.current_limit_a.unwrap_or(self.torque_limit_nm / self.torque_per_ampere)
+    }
+
+    fn description(&self, truth: &LinkParameters) -> JointDescription {
+        JointDescription {
+            frame: DenavitHartenberg { alpha: self.dh.alpha, a: self.dh.a, d: self.dh.d },
+            direction: self.direction as f64,
+            zero_offset: self.zero_offset_deg.to_radians(),
+            body: BodyDescription { mass: truth.mass, com: truth.com, inertia_com: truth.inertia_com },
+            rotor_inertia: truth.rotor_inertia,
+            friction: FrictionDescription {
+                coulomb: truth.coulomb,
+                viscous: truth.viscous,
+                offset: truth.offset,
+                stribeck: self.stribeck.map(|stribeck| Stribeck {
+                    static_level: stribeck.static_nm,
+                    speed: stribeck.speed_rad_s,
+                }),
+            },
+            drive: DriveDescription {
+                torque_per_ampere: self.torque_per_ampere,
+                current_limit: self.current_limit(),
+                lag: self.drive_lag_s,
+            },
+            encoder: EncoderDescription {
+                side: match self.encoder.side {
+                    Side::Motor => EncoderSide::Motor,
+                    Side::Joint => EncoderSide::Joint,
+                },
+                counts: f64::from(self.encoder.counts),
+                ratio: self.encoder.ratio,
+            },
+            current_sensor: CurrentSensorDescription {
+                noise: self.current_noise_a,
+                offset: self.current_offset_a,
+                step: self.current_step_a,
+            },
+        }
+    }
+}
+
+fn pushes(file: &PushesFile) -> PushDescription {
+    PushDescription { rate: file.per_minute / 60.0, torque: file.torque_nm, duration: file.duration_s }
+}
