@@ -1,14 +1,14 @@
 //! The only place where the plant's conventions meet anybody else's.
 //!
 //! Two translations live here.
-//! 1. **Frames.** Links are described in modified Denavit-Hartenberg frames. The plant wants, in the base (world)
-//!    frame and at the reference pose (all joint angles 0): the unit vector of each axis, the vector from one joint's
-//!    point to the next, the vector from the joint to the link's centre of mass, and the inertia tensor. With
-//!    A(i) = A(i-1) Rx(alpha_i) the link's orientation at the reference pose,
-//!    axis = A e_z, point = previous point + A(i-1) e_x a + axis d, everything of the link turned by A.
-//!    At other poses a link has been turned about its own axis and all axes before it; no frame is carried along.
-//! 2. **Signs.** Ports speak anatomical angles (flexion positive), the plant joint angles:
-//!    joint angle = direction * anatomical angle + zero offset, torque likewise without the offset.
+//! 1. **Frames.** Links are described in modified Denavit-Hartenberg frames. The plant wants, in the base
+//!    (world) frame and at the reference pose (all joint angles 0): the unit vector of each axis, the vector from
+//!    one joint's point to the next, the vector from the joint to the link's centre of mass, and the inertia
+//!    tensor. With A(i) = A(i-1) Rx(alpha_i) the link's orientation at the reference pose, axis = A e_z,
+//!    point = previous point + A(i-1) e_x a + axis d, everything of the link turned by A. At other poses a link
+//!    has been turned about its own axis and all axes before it; no frame is carried along.
+//! 2. **Signs.** Ports speak anatomical angles (flexion positive), the plant joint angles: joint angle =
+//!    direction * anatomical angle + zero offset, torque likewise without the offset.
 
 use crate::description::{DenavitHartenberg, JointDescription};
 use crate::maths::sin_cos;

@@ -1,8 +1,8 @@
 //! Everything a simulated leg is made from, as plain numbers without heap or text.
 //!
-//! A host tool fills these from a leg file, an emulated image from constants. Bodies are stated as the firmware's
-//! users state them, in modified Denavit-Hartenberg frames; `conventions` translates. Nothing is checked here:
-//! whoever reads numbers from outside checks them (`tool::leg_file` does).
+//! A host tool fills these from a leg file, an emulated image from constants. Bodies are stated as the
+//! firmware's users state them, in modified Denavit-Hartenberg frames; `conventions` translates. Nothing is
+//! checked here: whoever reads numbers from outside checks them (`tool::leg_file` does).
 
 /// One leg of `N` joints (1 to 3), proximal first.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,8 +116,8 @@ pub struct EncoderDescription {
 /// Motor current sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CurrentSensorDescription {
-    /// Standard deviation of the mean of eight samples, that is per logged 500 Hz sample, A. A single 4 kHz sample
-    /// has sqrt(8) times as much; the noise is white and Gaussian.
+    /// Standard deviation of the mean of eight samples, that is per logged 500 Hz sample, A. A single 4 kHz
+    /// sample has sqrt(8) times as much; the noise is white and Gaussian.
     pub noise: f64,
     /// Constant error, A.
     pub offset: f64,

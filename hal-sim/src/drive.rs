@@ -5,11 +5,11 @@
 //! torque at the joint = torque per ampere * current
 //! ```
 //!
-//! Why no more: the servo and the identification are meant to be tested apart from a current loop. Between servo
-//! ticks the current is taken as the straight line between its exact values at the ticks, so that the current
-//! read at the ticks and the torque the leg feels belong together without a shift in time (the exponential would
-//! shift the torque by 4 % of a tick at the default lag).
-//! Known limits: no bus voltage, no back-EMF limit, no saturation. Cost: 4 operations per tick.
+//! Why no more: the servo and the identification are meant to be tested apart from a current loop. Between
+//! servo ticks the current is taken as the straight line between its exact values at the ticks, so that the
+//! current read at the ticks and the torque the leg feels belong together without a shift in time (the
+//! exponential would shift the torque by 4 % of a tick at the default lag). Known limits: no bus voltage, no
+//! back-EMF limit, no saturation. Cost: 4 operations per tick.
 
 use crate::description::DriveDescription;
 use crate::maths::exp;
@@ -39,8 +39,8 @@ impl Drive {
         }
     }
 
-    /// Sets the target, A, limited; what is not a number counts as 0. A released bridge carries no current, so
-    /// release acts at once.
+    /// Sets the target, A, limited; what is not a number counts as 0. A released bridge carries no current,
+    /// so release acts at once.
     pub fn command(&mut self, enabled: bool, target: f64) {
         let target = if enabled && !target.is_nan() { target } else { 0.0 };
         self.target = target.clamp(-self.current_limit, self.current_limit);

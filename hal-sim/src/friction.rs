@@ -1,7 +1,8 @@
 //! Joint friction: Coulomb that really sticks, viscous, Stribeck, and a constant offset.
 //!
-//! Why not a steep tanh: identification is judged by what it makes of rows near zero speed, so there the plant must
-//! do what a machine does. A joint stays exactly where it is while less than the breakaway torque acts on it.
+//! Why not a steep tanh: identification is judged by what it makes of rows near zero speed, so there the
+//! plant must do what a machine does. A joint stays exactly where it is while less than the breakaway torque
+//! acts on it.
 //!
 //! ```text
 //! torque(v)  = level(v) sign(v) + viscous v + offset                         v != 0
@@ -9,15 +10,16 @@
 //! at rest    |applied| <= static: v stays 0 and friction is whatever balances
 //! ```
 //!
-//! Joints are coupled: one that breaks away may drag another along or set it free. Over one time step the end rates
-//! u obey A u = b - f with friction impulses f, where each joint slides (f = level sign(u)) or sticks (u = 0 and
-//! |f| <= static). All 3^N assignments are few for N <= 3, so the consistent one is found exactly, trying first the
-//! one that continues the present motion. A is the inertia matrix with small additions of the order of the step, so
-//! exactly one assignment is consistent where static = coulomb; with Stribeck's surplus both sticking and
-//! sliding may be, and then the present motion goes on.
+//! Joints are coupled: one that breaks away may drag another along or set it free. Over one time step the end
+//! rates u obey A u = b - f with friction impulses f, where each joint slides (f = level sign(u)) or sticks
+//! (u = 0 and the magnitude of f at most static). All 3^N assignments are few for N <= 3, so the consistent one
+//! is found exactly, trying first the one that continues the present motion. A is the inertia matrix with small
+//! additions of the order of the step, so exactly one assignment is consistent where static = coulomb; with
+//! Stribeck's surplus both sticking and sliding may be, and then the present motion goes on.
+//!
 //! Source: Moreau's time stepping in its box-constrained form (Stewart and Trinkle, 1996); Stribeck's curve in
 //! the Gaussian form of Armstrong-Helouvry et al. (1994).
-//! Cost for two joints: about 30 operations while nothing changes, at most nine times that.
+//! Cost for two joints: about 30 operations while nothing changes, at most ten times that.
 
 use crate::description::FrictionDescription;
 use crate::maths::exp;
@@ -90,14 +92,16 @@ pub(crate) struct Slide<const N: usize> {
 }
 
 impl<const N: usize> Slide<N> {
-    /// The rates; those of sticking joints are exactly 0. `present` is tried first and kept by committed joints.
+    /// The rates; those of sticking joints are exactly 0. `present` is tried first and kept by committed
+    /// joints.
     #[inline(always)]
     pub(crate) fn solve(&self, present: &[Contact; N]) -> [f64; N] {
         let (rates, violation) = self.attempt(present);
         if violation <= 0.0 { rates } else { self.search(present) }
     }
 
-    /// Every other assignment, sticking ones first; rounding may leave none consistent, then the nearest is taken.
+    /// Every other assignment, sticking ones first; rounding may leave none consistent, then the nearest is
+    /// taken.
     #[cold]
     fn search(&self, present: &[Contact; N]) -> [f64; N] {
         const CHOICES: [Contact; 3] = [Contact::Sticks, Contact::Forward, Contact::Backward];

@@ -1,8 +1,9 @@
 //! Rigid gear between motor and joint.
 //!
-//! motor angle = ratio * joint angle. Whatever turns with the motor is felt at the
-//! joint multiplied by the ratio squared, and is described there (`rotor_inertia`), so the gear carries angles only, and
-//! `torque_per_ampere` is stated at the joint. Known limits: no elasticity, no backlash, no loss that depends on load.
+//! motor angle = ratio * joint angle. Whatever turns with the motor is felt at the joint multiplied by the
+//! ratio squared, and is described there (`rotor_inertia`), so the gear carries angles only, and
+//! `torque_per_ampere` is stated at the joint. Known limits: no elasticity, no backlash, no loss that depends
+//! on load.
 
 /// Motor turns per joint turn.
 #[derive(Clone, Copy, Debug, PartialEq)]

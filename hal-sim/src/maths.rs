@@ -1,7 +1,7 @@
 //! The plant's own door to `libm`, apart from the firmware's.
 //!
-//! Double precision throughout. The same functions run on the host, in the emulator and without `std`, so a seed
-//! gives the same bits everywhere.
+//! Double precision throughout. The same functions run on the host, in the emulator and without `std`, so a
+//! seed gives the same bits everywhere.
 
 /// Sine and cosine of an angle in rad.
 #[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]

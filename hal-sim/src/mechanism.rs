@@ -1,24 +1,25 @@
 //! Rigid bodies of a leg by Lagrange's equations, in world coordinates.
 //!
-//! Why another formulation than the firmware's: where Newton-Euler recursion and a D-H frame go wrong, energies and
-//! world vectors do not go wrong with them.
+//! Why another formulation than the firmware's: where Newton-Euler recursion and a D-H frame go wrong,
+//! energies and world vectors do not go wrong with them.
 //!
-//! At joint angles q, with z_j the unit vector of axis j, p_j a point on it, c_i the centre of mass of link i and
-//! I_i its tensor about it, all in the world frame, and g gravity's acceleration:
+//! At joint angles q, with z_j the unit vector of axis j, p_j a point on it, c_i the centre of mass of link i
+//! and I_i its tensor about it, all in the world frame, and g gravity's acceleration:
 //!
 //! ```text
 //! a_ij   = z_j x (c_i - p_j)                                  how c_i moves with q_j (j <= i)
 //! w_ij   = I_i z_j
 //! M_jk   = sum_i m_i a_ij . a_ik + z_j . w_ik   (+ rotor inertia where j = k)
-//! dM_jk/dq_l:  d(z_j)/dq_l = z_l x z_j for l < j, else 0;    d(a_ij)/dq_l = z_min(j,l) x a_i,max(j,l) for l <= i;
-//!              d(I_i)/dq_l = [z_l] I_i - I_i [z_l];          all of it cancels for l <= min(j, k)
+//! dM_jk/dq_l from  d(z_j)/dq_l  = z_l x z_j for l < j, else 0
+//!                  d(a_ij)/dq_l = z_min(j,l) x a_i,max(j,l) for l <= i
+//!                  d(I_i)/dq_l  = [z_l] I_i - I_i [z_l] for l <= i;  all of it cancels for l <= min(j, k)
 //! C_jl   = sum_k 1/2 (dM_jl/dq_k + dM_jk/dq_l - dM_kl/dq_j) v_k         Christoffel symbols times velocity
 //! G_j    = dV/dq_j = -sum_i m_i g . a_ij,   V = -sum_i m_i g . c_i
 //! torque = M qdd + C(q, v) v + G
 //! ```
 //!
-//! Angles rad, torques N m. Source: any text on analytical mechanics; the closed derivatives are derived above. The
-//! rotor turns with its own joint only (no gyroscopic torque of a rotor carried by another link).
+//! Angles rad, torques N m. Source: any text on analytical mechanics; the closed derivatives are derived
+//! above. The rotor turns with its own joint only (no gyroscopic torque of a rotor carried by another link).
 //! Cost for two joints: about 700 floating-point operations and two sine-cosine pairs.
 
 use crate::conventions::links_at_reference;

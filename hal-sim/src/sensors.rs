@@ -1,13 +1,14 @@
 //! Encoder and current sensor of one joint, read at the same instant.
 //!
 //! ```text
-//! counts  = nearest whole number of  angle / 2 pi * counts per turn * turns per joint turn, wrapping in 32 bits
+//! counts  = nearest whole number of  angle / 2 pi * counts per turn * turns per joint turn, 32 bits, wrapping
 //! current = nearest step of (true current + offset + sigma * standard normal)
-//! sigma   = sqrt(8) * noise           noise is stated for the mean of eight 4 kHz samples, as it is logged at 500 Hz
+//! sigma   = sqrt(8) * noise    noise is stated for the mean of eight 4 kHz samples, as logged at 500 Hz
 //! ```
 //!
-//! Count 0 is centred on the anatomical zero (the reference pose). Known limits: no missed counts, no eccentricity,
-//! no saturation of the converter; other modules inject faults. Cost: one draw per joint and tick while noise is on.
+//! Count 0 is centred on the anatomical zero (the reference pose). Known limits: no missed counts, no
+//! eccentricity, no saturation of the converter; other modules inject faults. Cost: one draw per joint and
+//! tick while noise is on.
 
 use crate::description::{CurrentSensorDescription, EncoderDescription, EncoderSide};
 use crate::gear::Gear;
@@ -27,8 +28,8 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// On the motor side the gear's ratio multiplies the joint's angle; on the joint side an encoder that turns
-    /// faster than the joint has its ratio in its counts.
+    /// On the motor side the gear's ratio multiplies the joint's angle; on the joint side an encoder that
+    /// turns faster than the joint has its ratio in its counts.
     #[must_use]
     pub fn new(description: &EncoderDescription) -> Self {
         let (gear, counts) = match description.side {

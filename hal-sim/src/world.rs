@@ -4,9 +4,9 @@
 //! the copies go different ways, and by comparing copies bit for bit. A world holds no clock, no file and no
 //! shared state; the same seed and the same commands give the same bits.
 //!
-//! The exchange, once per servo tick of 250 us: read [`LegDrives::sample`] (sensors at this instant), hand over
-//! [`LegDrives::command`] (acts from this instant), [`World::advance`] to the next; or [`World::tick`], which does
-//! the last two and reads. All public angles and torques are anatomical.
+//! The exchange, once per servo tick of 250 us: read [`LegDrives::sample`] (sensors at this instant), hand
+//! over [`LegDrives::command`] (acts from this instant), [`World::advance`] to the next; or [`World::tick`],
+//! which does the last two and reads. All public angles and torques are anatomical.
 
 use crate::conventions::Anatomy;
 use crate::description::LegDescription;
@@ -149,8 +149,8 @@ impl<const N: usize> World<N> {
         }
     }
 
-    /// Motor torque, N m, that makes a motion (rad, rad/s, rad/s^2), friction and offset included; of a joint at rest
-    /// dry friction is undetermined and left out.
+    /// Motor torque, N m, that makes a motion (rad, rad/s, rad/s^2), friction and offset included; of a joint
+    /// at rest dry friction is undetermined and left out.
     #[must_use]
     pub fn inverse_dynamics(
         &self,

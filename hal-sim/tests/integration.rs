@@ -126,9 +126,10 @@ fn fit(rows: impl Iterator<Item = ([f64; 3], f64)>) -> SVector<f64, 3> {
     normal.cholesky().expect("the motion excites all columns").solve(&right)
 }
 
-/// What a motion's torque lacks against inverse dynamics, explained by inertia, viscous and Coulomb friction of the
-/// joint itself. Rates and accelerations are eighth-order differences of the positions: what the leg really did.
-/// `smoothing` ticks of Hann window on both sides, so that turning points may stay in; without, rows near them go.
+/// What a motion's torque lacks against inverse dynamics, explained by inertia, viscous and Coulomb friction
+/// of the joint itself. Rates and accelerations are eighth-order differences of the positions: what the leg
+/// really did. `smoothing` ticks of Hann window on both sides, so that turning points may stay in; without,
+/// rows near them go.
 fn bias(description: &LegDescription<2>, record: &Record, smoothing: usize) -> [SVector<f64, 3>; 2] {
     const FIRST: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
     const SECOND: [f64; 5] = [-205.0 / 72.0, 8.0 / 5.0, -1.0 / 5.0, 8.0 / 315.0, -1.0 / 560.0];
@@ -141,7 +142,7 @@ fn bias(description: &LegDescription<2>, record: &Record, smoothing: usize) -> [
     let inner = settled..record.len() - 4;
     let rows: Vec<[([f64; 3], f64, bool); 2]> = inner
         .map(|tick| {
-            let at = |offset: isize| record[tick.strict_add_signed(offset)].0;
+            let at = |offset: isize| record[(tick as isize + offset) as usize].0;
             let mut rate = [0.0; 2];
             let mut acceleration = at(0).map(|position| SECOND[0] * position / (TICK_S * TICK_S));
             for distance in 1..=4 {

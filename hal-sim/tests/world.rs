@@ -1,4 +1,5 @@
 //! A world as the firmware meets it: sensors, drives, seeds, copies and signs.
+#![expect(clippy::disallowed_methods, reason = "expected values by another library than the plant's")]
 
 mod common;
 
@@ -131,8 +132,8 @@ fn drive_follows_its_target_with_the_exact_lag_and_never_beyond_its_limit() {
 #[test]
 fn a_mirrored_and_turned_joint_behaves_alike_at_its_ports() {
     let plain = worn_leg();
-    // The same leg, described with the knee's axis the other way round (its frame turned half about x) and with the hip's
-    // angle counted from elsewhere (the base turned about the hip's axis).
+    // The same leg, described with the knee's axis the other way round (its frame turned half about x) and
+    // with the hip's angle counted from elsewhere (the base turned about the hip's axis).
     let mut described = plain;
     let (sine, cosine) = 0.3_f64.sin_cos();
     described.gravity = [9.81 * cosine, 9.81 * sine, 0.0];

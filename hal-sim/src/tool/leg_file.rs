@@ -1,7 +1,8 @@
 //! Leg files: a leg in TOML, as users write it.
 //!
-//! Why a file: what the tool simulates and what it identifies must be stated in one place that can be read, compared
-//! and sent along. Keys are an interface; unknown ones are errors. Every fault names file, line and reason.
+//! Why a file: what the tool simulates and what it identifies must be stated in one place that can be read,
+//! compared and sent along. Keys are an interface; unknown ones are errors. Every fault names file, line and
+//! reason.
 //!
 //! | key | unit, meaning | default |
 //! | --- | --- | --- |
@@ -24,8 +25,8 @@
 //! | `truth`, `prior` | `{ mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset }`, the last four 0 unless given | none |
 //! | `[joint.motor]` | reserved | |
 //!
-//! `inertia_com` holds the tensor elements XX XY XZ YY YZ ZZ about the centre of mass. Everything in `truth` and `prior`
-//! is in the joint's D-H frame with the D-H sign. `truth` is only needed to simulate.
+//! `inertia_com` holds the tensor elements XX XY XZ YY YZ ZZ about the centre of mass. Everything in `truth`
+//! and `prior` is in the joint's D-H frame with the D-H sign. `truth` is only needed to simulate.
 
 mod check;
 mod convert;

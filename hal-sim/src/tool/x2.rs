@@ -1,20 +1,21 @@
 //! The default leg, derived: a Fourier X2 exoskeleton leg with a wearer of a given mass.
 //!
-//! Why derived: the leg file's numbers are sums over seven bodies; here they can be checked against their sources and
-//! made for another wearer.
+//! Why derived: the leg file's numbers are sums over seven bodies; here they can be checked against their
+//! sources and made for another wearer.
 //!
-//! - Exoskeleton: masses, sagittal inertias, centres of mass, friction and rotor inertia after the parameter file of
-//!   CANOpenRobotController (University of Melbourne, Apache-2.0, `config/x2_params.yaml`); some are marked there as not
-//!   yet investigated. "From hip" and "from knee" of the lower parts are read as in the constants below.
-//! - Wearer: segment masses, centres of mass and radii of gyration as fractions after Winter, Biomechanics and Motor
-//!   Control of Human Movement. Segments as long as the exoskeleton's, ankle held at a right angle, so shank and foot
-//!   are one body.
-//! - Only sagittal inertias are given, so each segment is completed as a solid of revolution: about its long axis it has
-//!   mass * radius^2 / 2 with the radii stated below (ours).
+//! - Exoskeleton: masses, sagittal inertias, centres of mass, friction and rotor inertia after the parameter
+//!   file of CANOpenRobotController (University of Melbourne, Apache-2.0, `config/x2_params.yaml`); some are marked
+//!   there as not yet investigated. "From hip" and "from knee" of the lower parts are read as in the constants
+//!   below.
+//! - Wearer: segment masses, centres of mass and radii of gyration as fractions after Winter, Biomechanics and
+//!   Motor Control of Human Movement. Segments as long as the exoskeleton's, ankle held at a right angle, so shank
+//!   and foot are one body.
+//! - Only sagittal inertias are given, so each segment is completed as a solid of revolution: about its long axis
+//!   it has mass * radius^2 / 2 with the radii stated below (ours).
 //!
-//! Frames: x down the segment, y forward, z along the joint's axis; everything lies in the plane z = 0.
-//! For 75 kg: M1 10.34 kg, HX1 2.039 kg m, ZZ1 0.585 kg m^2 about the hip; M2 6.94, HX2 1.759, HY2 0.201, ZZ2 0.633
-//! about the knee.
+//! Frames: x down the segment, y forward, z along the joint's axis; everything lies in the plane z = 0. For
+//! 75 kg: M1 10.34 kg, HX1 2.039 kg m, ZZ1 0.585 kg m^2 about the hip; M2 6.94, HX2 1.759, HY2 0.201, ZZ2
+//! 0.633 about the knee.
 
 use super::leg_file::{DhFile, EncoderFile, JointFile, LegFile, LinkParameters, Side};
 
@@ -85,7 +86,8 @@ fn limb(mass: f64, length: f64, gyration: f64, radius: f64) -> Segment {
     Segment { mass, x: 0.433 * length, y: 0.0, sagittal: mass * gyration * gyration, radius, along: Along::X }
 }
 
-/// One rigid body of several segments, about their common centre of mass; rounded to six decimals, as it is printed.
+/// One rigid body of several segments, about their common centre of mass; rounded to six decimals, as it is
+/// printed.
 fn joined(segments: &[Segment], rotor_inertia: f64, coulomb: f64, viscous: f64) -> LinkParameters {
     let mass: f64 = segments.iter().map(|segment| segment.mass).sum();
     let x = segments.iter().map(|segment| segment.mass * segment.x).sum::<f64>() / mass;
@@ -127,9 +129,10 @@ fn shank(body_mass: f64, rotor_inertia: f64, coulomb: f64, viscous: f64) -> Link
     joined(&[upper, lower, foot, wearer, wearer_foot], rotor_inertia, coulomb, viscous)
 }
 
-/// Hip and knee worn by somebody of `body_mass` kg. The prior is what a designer would write down: the same exoskeleton
-/// on a standard wearer of 70 kg, round figures for rotor inertia and friction. Torque is capped at 85 N m: the 100 N m
-/// of the exoskeleton would be 66.7 A, beyond the 60.75 A that the board measures at its finer gain.
+/// Hip and knee worn by somebody of `body_mass` kg. The prior is what a designer would write down: the same
+/// exoskeleton on a standard wearer of 70 kg, round figures for rotor inertia and friction. Torque is capped
+/// at 85 N m: the 100 N m of the exoskeleton would be 66.7 A, beyond the 60.75 A that the board measures at
+/// its finer gain.
 #[must_use]
 pub fn leg_file(body_mass: f64) -> LegFile {
     let drive = |joint: &mut JointFile| {

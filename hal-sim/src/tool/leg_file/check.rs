@@ -1,8 +1,8 @@
 //! What a leg must fulfil beyond its types.
 //!
-//! Bounds are wide: they refuse what no leg and no test stand can be (a slipped decimal point, a wrong unit), not
-//! what is unusual. A body is possible if its mass is positive, its inertia about the centre of mass positive definite
-//! and no principal moment as large as the sum of the two others.
+//! Bounds are wide: they refuse what no leg and no test stand can be (a slipped decimal point, a wrong unit),
+//! not what is unusual. A body is possible if its mass is positive, its inertia about the centre of mass
+//! positive definite and no principal moment as large as the sum of the two others.
 
 use super::{JointFile, LegFile, LinkParameters};
 use nalgebra::Matrix3;

@@ -7,9 +7,9 @@ use crate::description::{
 };
 
 impl LegFile {
-    /// The simulated leg. Its sensors have `current_noise_a` only: `torque_noise_percent` refers to a motion, so whoever
-    /// knows the motion adds it with `World::set_current_noise`. Fails where the leg has not `N` joints or a joint has
-    /// no `truth`.
+    /// The simulated leg. Its sensors have `current_noise_a` only: `torque_noise_percent` refers to a motion,
+    /// so whoever knows the motion adds it with `World::set_current_noise`. Fails where the leg has not `N`
+    /// joints or a joint has no `truth`.
     pub fn description<const N: usize>(&self) -> Result<LegDescription<N>, LegFileError> {
         let refused = |reason: String| LegFileError::of_file(&self.name, reason);
         let mut joints = Vec::with_capacity(N);
