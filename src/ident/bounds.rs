@@ -76,6 +76,23 @@ impl<T: Real> Interval<T> {
 }
 
 impl<T: Real> LinkPrior<T> {
+    /// The same in another precision.
+    #[must_use]
+    pub fn convert<U: Real>(&self) -> LinkPrior<U> {
+        let convert = |value: T| U::of(value.to_double());
+        LinkPrior {
+            body: RigidBody {
+                mass: convert(self.body.mass),
+                centre_of_mass: self.body.centre_of_mass.map(convert),
+                inertia: self.body.inertia.map(convert),
+            },
+            rotor_inertia: convert(self.rotor_inertia),
+            coulomb_friction: convert(self.coulomb_friction),
+            viscous_friction: convert(self.viscous_friction),
+            offset: convert(self.offset),
+        }
+    }
+
     /// Ranges of the fourteen parameters for a segment of this length.
     fn ranges(&self, length: T) -> [Interval<T>; PARAMETERS_PER_JOINT] {
         let (least, most) = SHARE;

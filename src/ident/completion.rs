@@ -10,9 +10,8 @@
 //! prior's value, grouped ones share what their group is off; nothing but a prior can tell them apart, and the
 //! status says so.
 
-use nalgebra::{SMatrix, SVector};
-
 use super::estimate::Estimate;
+use super::factor::Factor;
 use super::record::RowModel;
 use crate::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter, Standing};
 use crate::real::{self, Real};
@@ -90,16 +89,19 @@ pub fn complete<T: Real, const N: usize, const B: usize>(
     let variances = prior_variances(prior);
     let expected = model.base.project(prior);
     let rank = model.base.rank();
-    let mut gram = SMatrix::<T, B, B>::identity();
-    let mut error = SVector::<T, B>::zeros();
+    // As many equations as multipliers: the factor solves them exactly.
+    let mut equations = Factor::<T, B>::new();
     for row in 0..rank {
-        error[row] = base_values[row] - expected[row];
-        for column in 0..rank {
-            gram[(row, column)] =
-                weighted_product(model.base.terms(row), model.base.terms(column), &variances);
+        let mut products = [T::zero(); B];
+        for (column, product) in products.iter_mut().enumerate().take(rank) {
+            *product = weighted_product(model.base.terms(row), model.base.terms(column), &variances);
         }
+        equations.insert(&products, base_values[row] - expected[row]);
     }
-    let multipliers = gram.cholesky()?.solve(&error);
+    let multipliers = equations.solve(rank);
+    if !multipliers.iter().all(|&multiplier| real::is_finite(multiplier)) {
+        return None;
+    }
     let mut parameters = *prior;
     for row in 0..rank {
         for joint in 0..N {

@@ -50,6 +50,7 @@ pub fn least_squares_in_box<T: Real, const B: usize>(
 }
 
 /// Moves the free parameters towards their optimum; true when a bound stopped them.
+#[inline(never)]
 fn step_to_free_solution<T: Real, const B: usize>(
     factor: &Factor<T, B>,
     count: usize,
@@ -93,6 +94,7 @@ fn step_to_free_solution<T: Real, const B: usize>(
 }
 
 /// Releases the held parameter that gains most by moving inside; false when none does.
+#[inline(never)]
 fn release_one<T: Real, const B: usize>(
     factor: &Factor<T, B>,
     count: usize,
@@ -121,6 +123,7 @@ fn release_one<T: Real, const B: usize>(
 }
 
 /// `R' (R p - z)`.
+#[inline(never)]
 fn gradient<T: Real, const B: usize>(factor: &Factor<T, B>, values: &[T; B]) -> [T; B] {
     let mut gradient = [T::zero(); B];
     for (row, &right) in factor.triangle().iter().zip(factor.right()) {

@@ -108,17 +108,18 @@ impl<T: Real, const B: usize> Stage<T, B> {
         if self.count == 0 {
             return None;
         }
-        let inverse = self.factor.inverse(self.count);
-        let lengths: [T; B] = core::array::from_fn(|column| self.factor.column_length(column));
         // S = R / lengths and S^-1 = lengths * R^-1.
-        let scaled: [[T; B]; B] = core::array::from_fn(|row| {
-            core::array::from_fn(|column| {
-                let inside = row < self.count && column < self.count;
-                if inside { self.factor.triangle()[row][column] / lengths[column] } else { T::zero() }
-            })
-        });
-        let inverse: [[T; B]; B] =
-            core::array::from_fn(|row| inverse[row].map(|element| element * lengths[row]));
+        let mut inverse = self.factor.inverse(self.count);
+        let mut scaled = *self.factor.triangle();
+        for column in 0..B {
+            let length = self.factor.column_length(column);
+            for element in &mut inverse[column] {
+                *element *= length;
+            }
+            for row in &mut scaled {
+                row[column] = if column < self.count { row[column] / length } else { T::zero() };
+            }
+        }
         Some(spectral_norm(&scaled) * spectral_norm(&inverse))
     }
 }
@@ -128,19 +129,27 @@ const POWER_ITERATIONS: usize = 40;
 
 /// Largest singular value.
 fn spectral_norm<T: Real, const B: usize>(matrix: &[[T; B]; B]) -> T {
-    let mut vector: [T; B] = core::array::from_fn(|index| T::of(1.0 + 0.1 * (index as f64)));
+    let mut vector = [T::one(); B];
+    for (index, element) in vector.iter_mut().enumerate() {
+        *element += T::of(0.1 * index as f64);
+    }
     let mut norm = T::zero();
     for _ in 0..POWER_ITERATIONS {
-        let image = matrix.map(|row| dot(&row, &vector));
-        let back: [T; B] = core::array::from_fn(|column| {
-            matrix.iter().zip(&image).fold(T::zero(), |sum, (row, &element)| sum + row[column] * element)
-        });
+        let mut back = [T::zero(); B];
+        for row in matrix {
+            let image = dot(row, &vector);
+            for (sum, &element) in back.iter_mut().zip(row) {
+                *sum += element * image;
+            }
+        }
         let length = real::sqrt(dot(&back, &back));
         if !(length > T::zero()) {
             return T::zero();
         }
         norm = real::sqrt(length);
-        vector = back.map(|element| element / length);
+        for (element, &image) in vector.iter_mut().zip(&back) {
+            *element = image / length;
+        }
     }
     norm
 }

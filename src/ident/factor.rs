@@ -42,14 +42,20 @@ impl<T: Real, const B: usize> Factor<T, B> {
     }
 
     /// Takes all rows of another factor, each multiplied by `weight`.
+    #[inline(never)]
     pub fn merge_scaled(&mut self, other: &Self, weight: T) {
         for (row, &right) in other.r.iter().zip(&other.z) {
-            self.rotate(row.map(|element| element * weight), right * weight);
+            let mut scaled = *row;
+            for element in &mut scaled {
+                *element *= weight;
+            }
+            self.rotate(scaled, right * weight);
         }
         self.residual += other.residual * weight * weight;
         self.rows = self.rows.saturating_add(other.rows);
     }
 
+    #[inline(never)]
     fn rotate(&mut self, mut row: [T; B], mut right: T) {
         for column in 0..B {
             let entering = row[column];
@@ -92,13 +98,17 @@ impl<T: Real, const B: usize> Factor<T, B> {
     /// The same factor in another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Factor<U, B> {
-        let convert = |value: T| U::of(value.to_double());
-        Factor {
-            r: self.r.map(|row| row.map(convert)),
-            z: self.z.map(convert),
-            residual: convert(self.residual),
-            rows: self.rows,
+        // Element by element: a large array handled by value is taken apart by the compiler at great cost.
+        let mut converted = Factor::new();
+        for (to, from) in converted.r.iter_mut().flatten().zip(self.r.iter().flatten()) {
+            *to = U::of(from.to_double());
         }
+        for (to, from) in converted.z.iter_mut().zip(&self.z) {
+            *to = U::of(from.to_double());
+        }
+        converted.residual = U::of(self.residual.to_double());
+        converted.rows = self.rows;
+        converted
     }
 
     /// Sum of squares that no parameter vector can explain.
@@ -139,6 +149,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
     /// The problem in which only `columns` are free and the others are held at `fixed`: a factor whose column `i`
     /// is `columns[i]`.
     #[must_use]
+    #[inline(never)]
     pub fn restricted(&self, columns: &[usize], fixed: &[T; B], weight: T) -> Self {
         let mut result = Self::new();
         for (row, &right) in self.r.iter().zip(&self.z) {
@@ -169,6 +180,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
     /// Back substitution: the least-squares parameters of the first `count` columns; a column without
     /// information gives zero.
     #[must_use]
+    #[inline(never)]
     pub fn solve(&self, count: usize) -> [T; B] {
         let mut parameters = [T::zero(); B];
         for index in (0..count.min(B)).rev() {
@@ -186,6 +198,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
 
     /// `R^-1` of the first `count` columns (upper triangular), zero where a diagonal is zero.
     #[must_use]
+    #[inline(never)]
     pub fn inverse(&self, count: usize) -> [[T; B]; B] {
         let count = count.min(B);
         let mut inverse = [[T::zero(); B]; B];

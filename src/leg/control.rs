@@ -110,11 +110,8 @@ impl<const N: usize> Control<N> {
         self.tick = self.tick.wrapping_add(1);
         let power = self.accept(request);
         let motion = self.motion.state_at(self.motion_tick);
-        let command = ServoCommand {
-            motion,
-            feedforward: self.model.as_ref().filter(|_| self.with_model),
-            power,
-        };
+        let command =
+            ServoCommand { motion, feedforward: self.model.as_ref().filter(|_| self.with_model), power };
         let servo = self.servo.tick(sample, &command, gravity);
         self.motion_tick = self.motion_tick.saturating_add(1);
         if servo.decision.state != DriveState::OperationEnabled {
@@ -184,10 +181,9 @@ impl<const N: usize> Control<N> {
     fn validate_after(&mut self, motion: u8, step: Step) {
         let following = if step == Step::Run { motion.saturating_add(1) } else { motion };
         match (step, self.validation.get(usize::from(following)).copied()) {
-            (Step::Approach, Some(periodic)) => self.run(
-                Activity::Identify(IdentifyPhase::Validate { motion, step: Step::Run }),
-                periodic,
-            ),
+            (Step::Approach, Some(periodic)) => {
+                self.run(Activity::Identify(IdentifyPhase::Validate { motion, step: Step::Run }), periodic)
+            }
             (Step::Run, Some(periodic)) => self.approach(
                 Activity::Identify(IdentifyPhase::Validate { motion: following, step: Step::Approach }),
                 periodic,

@@ -4,7 +4,9 @@ use super::activity::{Segment, VALIDATION_MOTIONS};
 use super::configuration::{LegConfiguration, LegError};
 use super::control::LoggedSample;
 use super::model::IdentifiedModel;
-use crate::ident::{LinkPrior, Plan, Reason, Record, Recorder, RowModel, SearchState, Solver, Thresholds, Verdict};
+use crate::ident::{
+    LinkPrior, Plan, Reason, Record, Recorder, RowModel, SearchState, Solver, Thresholds, Verdict,
+};
 
 /// What identification tells control.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,2 +1,5 @@
 //! The host tool: `cargo sim`.
-fn main() {}
+
+fn main() -> std::process::ExitCode {
+    hal_sim::tool::cli::main()
+}

@@ -1,8 +1,22 @@
-//! The host tool.
+//! The host tool: everything that needs `std`.
+//!
+//! | module | what lives there |
+//! | --- | --- |
+//! | [`cli`] | the command line |
+//! | [`leg_file`], [`x2`] | leg files and the derivation of the default leg |
+//! | [`setup`] | from a leg file to what the firmware is built from |
+//! | [`recording`], [`resample`], [`replay`] | identification on recordings |
+//! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
+//! | [`error`] | bad input and exit codes |
+
 pub mod analysis;
+pub mod cli;
+pub mod error;
 pub mod leg_file;
 pub mod recording;
+pub mod replay;
 pub mod report;
 pub mod resample;
+pub mod setup;
 pub mod tables;
 pub mod x2;

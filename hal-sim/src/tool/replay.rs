@@ -1,0 +1,219 @@
+//! `replay`: the firmware's identification on recordings.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use scarab::ident::{KernelError, Plan, Recorder, SearchState, Solver, Thresholds};
+use scarab::model::AnatomicalJoint;
+
+use super::analysis::{Background, Circumstances, Motion};
+use super::error::ToolError;
+use super::leg_file::LegFile;
+use super::recording::Recording;
+use super::report::RunReport;
+use super::resample::Resampled;
+use super::setup::{PriorChoice, anatomy, background};
+
+/// Taps the host sets aside: bandwidths from 1 Hz.
+const TAPS: usize = 2048;
+/// Open outputs that go with them.
+const PENDING: usize = 205;
+/// Evaluations between two looks at the search.
+const SLICE: u32 = 1000;
+
+/// What to replay.
+#[derive(Clone, Debug)]
+pub struct ReplayOptions {
+    /// One training set.
+    pub files: Vec<PathBuf>,
+    /// Held out.
+    pub validate: Vec<PathBuf>,
+    /// The first part of each file trains, the rest validates.
+    pub split: Option<f64>,
+    /// Where the low-pass is 3 dB down, Hz.
+    pub bandwidth_hz: f64,
+    /// One-time or sequential.
+    pub plan: Plan,
+    /// Prior for the search box.
+    pub prior: PriorChoice,
+    /// Of the swarm.
+    pub swarm_seed: u64,
+    /// Predicted torque of the validation part.
+    pub csv: Option<PathBuf>,
+}
+
+type HostRecorder<const N: usize, const B: usize> = Recorder<f32, N, B, TAPS, PENDING>;
+
+/// One file on the firmware's grid, D-H angles and torques.
+struct Samples<const N: usize> {
+    start_s: f64,
+    position: Vec<[f32; N]>,
+    torque: Vec<[f32; N]>,
+}
+
+impl<const N: usize> Samples<N> {
+    fn of(recording: &Recording, anatomy: &[AnatomicalJoint<f64>; N], bandwidth_hz: f64) -> Self {
+        let grid = Resampled::of(recording);
+        if let Some(warning) = grid.bandwidth_warning(bandwidth_hz) {
+            eprintln!("{}: {warning}", recording.file.display());
+        }
+        let points = 0..grid.len();
+        let position = points.clone().filter_map(|point| grid.position_rad::<N>(point));
+        let torque = points.filter_map(|point| grid.torque_nm::<N>(point));
+        Self {
+            start_s: grid.start_s,
+            position: position
+                .map(|q| core::array::from_fn(|joint| anatomy[joint].angle_to_chain(q[joint]) as f32))
+                .collect(),
+            torque: torque
+                .map(|tau| core::array::from_fn(|joint| anatomy[joint].to_chain(tau[joint]) as f32))
+                .collect(),
+        }
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.position.len() as f64 / 500.0
+    }
+}
+
+/// Identifies from recordings and validates on what was held out.
+pub fn replay<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &ReplayOptions,
+) -> Result<RunReport, ToolError> {
+    let started = Instant::now();
+    let background = background::<N, B>(leg, options.prior, options.swarm_seed)?;
+    let anatomy = anatomy::<N>(leg)?;
+    let (training, held_out) = read_all(options, N)?;
+    let on_grid = |recordings: &[Recording]| -> Vec<Samples<N>> {
+        recordings.iter().map(|recording| Samples::of(recording, &anatomy, options.bandwidth_hz)).collect()
+    };
+    let (training, held_out) = (on_grid(&training), on_grid(&held_out));
+
+    let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
+    feed(&mut recorder, &background, &training, |_, _, _| {});
+    let thresholds = Thresholds::default();
+    let record = recorder.record();
+    let prior = background.prior.map(|prior| prior.map(|link| link.convert()));
+    let mut solver = Solver::new(
+        &background.device,
+        record.clone(),
+        options.plan,
+        prior.as_ref(),
+        options.swarm_seed,
+        &thresholds,
+    );
+    let optimum = background.costs(&solver);
+    let mut to_half = None;
+    while solver.advance(&background.device, SLICE) == SearchState::Running {
+        let excess = optimum.factor.excess(&solver.search().values().map(f64::from)) - optimum.above;
+        if excess <= 0.5 && to_half.is_none() {
+            to_half = Some(solver.search().iterations());
+        }
+    }
+
+    recorder.clear();
+    let mut predictions = Vec::new();
+    let values = solver.estimate().values;
+    feed(&mut recorder, &background, &held_out, |file, time_s, instant| {
+        let rows = background.device.rows(instant);
+        predictions.push(Prediction {
+            file,
+            time_s,
+            measured: instant.torque,
+            predicted: core::array::from_fn(|joint| {
+                rows.regressor[joint].iter().zip(&values).map(|(element, value)| element * value).sum()
+            }),
+        });
+    });
+    let unused = recorder.record();
+    let validated = !held_out.is_empty();
+    let verdict = solver.judge(&background.device, &thresholds, validated.then_some(&unused).into_iter());
+    if let Some(path) = &options.csv {
+        write_predictions(path, &predictions, &anatomy)
+            .map_err(|error| ToolError::cannot_write(path, &error))?;
+    }
+    let motion = |record| Motion { name: "recording".into(), record, truth: None };
+    let circumstances = Circumstances {
+        iterations_to_half_chi2: to_half,
+        simulated_s: training.iter().chain(&held_out).map(Samples::duration_s).sum(),
+        wall: started.elapsed(),
+        ..Circumstances::default()
+    };
+    let validation = if validated { vec![motion(unused)] } else { Vec::new() };
+    Ok(background.report(&solver, verdict, &[motion(record)], &validation, &circumstances))
+}
+
+fn new_recorder<const N: usize, const B: usize>(bandwidth_hz: f64) -> Result<HostRecorder<N, B>, ToolError> {
+    HostRecorder::new(bandwidth_hz as f32).map_err(|error| {
+        ToolError::input(match error {
+            KernelError::Bandwidth => format!("--bandwidth {bandwidth_hz}: must be a positive number"),
+            KernelError::TooLong { .. } => format!("--bandwidth {bandwidth_hz}: at least 1 Hz"),
+            KernelError::TooShort => format!("--bandwidth {bandwidth_hz}: at most 100 Hz"),
+        })
+    })
+}
+
+fn read_all(options: &ReplayOptions, joints: usize) -> Result<(Vec<Recording>, Vec<Recording>), ToolError> {
+    let read = |path: &PathBuf| Recording::read(path, joints);
+    let mut training = options.files.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    let mut held_out = options.validate.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    if let Some(fraction) = options.split {
+        let parts = training.iter().map(|whole| whole.split(fraction)).collect::<Result<Vec<_>, _>>()?;
+        let (first, rest): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        training = first;
+        held_out.extend(rest);
+    }
+    Ok((training, held_out))
+}
+
+/// Every file is a motion of its own: windows never reach across.
+fn feed<const N: usize, const B: usize>(
+    recorder: &mut HostRecorder<N, B>,
+    background: &Background<N, B>,
+    files: &[Samples<N>],
+    mut seen: impl FnMut(usize, f64, &scarab::ident::Smoothed<f32, N>),
+) {
+    for (number, samples) in files.iter().enumerate() {
+        recorder.break_off();
+        let reach = recorder.kernel().reach();
+        for (index, (position, torque)) in samples.position.iter().zip(&samples.torque).enumerate() {
+            if let Some(progress) = recorder.push(&background.device, position, torque) {
+                let time_s = samples.start_s + (index - reach) as f64 / 500.0;
+                seen(number + 1, time_s, &progress.instant);
+            }
+        }
+    }
+}
+
+struct Prediction<const N: usize> {
+    file: usize,
+    time_s: f64,
+    measured: [f32; N],
+    predicted: [f32; N],
+}
+
+fn write_predictions<const N: usize>(
+    path: &Path,
+    predictions: &[Prediction<N>],
+    anatomy: &[AnatomicalJoint<f64>; N],
+) -> std::io::Result<()> {
+    let mut out = std::io::BufWriter::new(std::fs::File::create(path)?);
+    write!(out, "t_s")?;
+    for joint in 1..=N {
+        write!(out, ",tau{joint}_measured_Nm,tau{joint}_predicted_Nm")?;
+    }
+    writeln!(out, ",file")?;
+    for prediction in predictions {
+        write!(out, "{:.6}", prediction.time_s)?;
+        for joint in 0..N {
+            let anatomical = |torque: f32| anatomy[joint].from_chain(f64::from(torque));
+            let (measured, predicted) =
+                (anatomical(prediction.measured[joint]), anatomical(prediction.predicted[joint]));
+            write!(out, ",{measured:.7},{predicted:.7}")?;
+        }
+        writeln!(out, ",{}", prediction.file)?;
+    }
+    out.flush()
+}

@@ -1,0 +1,273 @@
+//! From a leg file to what the firmware is built from.
+
+use nalgebra::{Matrix3, Vector3};
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use scarab::ident::{LinkPrior, RowModel, prior_parameters};
+use scarab::model::{
+    AnatomicalJoint, BaseError, BaseParameters, Chain, ColumnMask, DenavitHartenberg, LegParameters,
+    PARAMETERS_PER_JOINT, Parameter, RigidBody, is_physically_consistent, mass_matrix,
+};
+
+use super::analysis::Background;
+use super::leg_file::{JointFile, LegFile, LinkParameters, Switch};
+
+/// Bandwidth of the identification's low-pass unless another is asked for, Hz.
+pub const DEFAULT_BANDWIDTH_HZ: f64 = 8.0;
+/// Seed unless another is asked for.
+pub const DEFAULT_SEED: u64 = 1;
+
+/// Which prior an identification starts from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum PriorChoice {
+    /// The leg file's where it has one, else none.
+    #[default]
+    Default,
+    /// None.
+    None,
+    /// The leg file's.
+    File,
+    /// The truth, off by so many percent.
+    Wrong(f64),
+}
+
+impl core::str::FromStr for PriorChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.strip_prefix("wrong:")) {
+            ("none", _) => Ok(Self::None),
+            ("file", _) => Ok(Self::File),
+            (_, Some(percent)) => match percent.parse::<f64>() {
+                Ok(percent) if (0.0..100.0).contains(&percent) => Ok(Self::Wrong(percent)),
+                _ => Err(format!("`{percent}` is not a percentage from 0 to below 100")),
+            },
+            _ => Err(format!("`{text}` is none of none, file, wrong:PERCENT")),
+        }
+    }
+}
+
+/// A leg that cannot be worked with, in words.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{leg}: {reason}")]
+pub struct SetupError {
+    /// Name in the leg file.
+    pub leg: String,
+    /// In words.
+    pub reason: String,
+}
+
+impl SetupError {
+    /// What is wrong with a leg.
+    #[must_use]
+    pub fn new(leg: &LegFile, reason: impl Into<String>) -> Self {
+        Self { leg: leg.name.clone(), reason: reason.into() }
+    }
+}
+
+/// Base parameters a leg of `joints` joints may have: room for two parallel axes, or for any axes.
+///
+/// Runs `$body` with the constants `N` (joints) and `B` (room for base parameters).
+#[macro_export]
+macro_rules! with_leg_size {
+    ($leg:expr, $body:ident ( $($argument:expr),* )) => {
+        match ($leg.joints.len(), $crate::tool::setup::base_rank($leg)) {
+            (1, _) => $body::<1, 6>($($argument),*),
+            (2, 0..=13) => $body::<2, 13>($($argument),*),
+            (2, _) => $body::<2, 18>($($argument),*),
+            _ => $body::<3, 28>($($argument),*),
+        }
+    };
+}
+
+/// Base parameters of a leg of two joints; zero where the leg has another number or none can be found.
+#[must_use]
+pub fn base_rank(leg: &LegFile) -> usize {
+    row_model::<2, 18>(leg).map_or(0, |model| model.base.rank())
+}
+
+/// Geometry of a leg.
+pub fn chain<const N: usize>(leg: &LegFile) -> Result<Chain<f64, N>, SetupError> {
+    let geometry: Vec<_> = leg
+        .joints
+        .iter()
+        .map(|joint| DenavitHartenberg { alpha: joint.dh.alpha, a: joint.dh.a, d: joint.dh.d })
+        .collect();
+    let count = geometry.len();
+    let geometry: [_; N] = geometry
+        .try_into()
+        .map_err(|_| SetupError::new(leg, format!("{count} joints where {N} were expected")))?;
+    Chain::new(&geometry).map_err(|_| SetupError::new(leg, "a D-H number is not finite"))
+}
+
+/// The columns a leg file asks to estimate.
+#[must_use]
+pub fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
+    core::array::from_fn(|joint| {
+        let mut columns = [true; PARAMETERS_PER_JOINT];
+        if let Some(joint) = leg.joints.get(joint) {
+            columns[Parameter::OFF.index()] = joint.offset == Switch::On;
+            columns[Parameter::IA.index()] = joint.rotor == Switch::On;
+        }
+        columns
+    })
+}
+
+/// Geometry, gravity and base parameters of a leg.
+pub fn row_model<const N: usize, const B: usize>(leg: &LegFile) -> Result<RowModel<f64, N, B>, SetupError> {
+    let (chain, gravity) = (chain(leg)?, Vector3::from(leg.gravity));
+    let base = BaseParameters::analyse(&chain, &gravity, &column_mask(leg)).map_err(|error| {
+        let reason = match error {
+            BaseError::TooMany { rank } => format!("{rank} base parameters, room for {B}"),
+            BaseError::NothingSeen => "no torque depends on any parameter".into(),
+            BaseError::NotFinite => "a number is not finite".into(),
+        };
+        SetupError::new(leg, reason)
+    })?;
+    Ok(RowModel { chain, gravity, base })
+}
+
+/// The same in the device's precision, analysed there.
+pub fn device_model<const N: usize, const B: usize>(
+    leg: &LegFile,
+    reference: &RowModel<f64, N, B>,
+) -> Result<RowModel<f32, N, B>, SetupError> {
+    let (chain, gravity) = (reference.chain.convert(), reference.gravity.map(|element| element as f32));
+    let base = BaseParameters::analyse(&chain, &gravity, &column_mask(leg))
+        .map_err(|_| SetupError::new(leg, "base parameters cannot be told apart in single precision"))?;
+    if (0..B).any(|index| base.independent(index) != reference.base.independent(index)) {
+        return Err(SetupError::new(leg, "base parameters differ between single and double precision"));
+    }
+    Ok(RowModel { chain, gravity, base })
+}
+
+/// Anatomical to D-H angles of every joint.
+pub fn anatomy<const N: usize>(leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N], SetupError> {
+    let mut joints = [AnatomicalJoint::identity(); N];
+    for (slot, joint) in joints.iter_mut().zip(&leg.joints) {
+        let direction = if joint.direction < 0 { -1 } else { 1 };
+        *slot = AnatomicalJoint::new(direction, joint.zero_offset_deg.to_radians())
+            .map_err(|_| SetupError::new(leg, format!("joint {}: direction or zero offset", joint.name)))?;
+    }
+    Ok(joints)
+}
+
+fn link_prior(link: &LinkParameters) -> LinkPrior<f64> {
+    let [xx, xy, xz, yy, yz, zz] = link.inertia_com;
+    LinkPrior {
+        body: RigidBody {
+            mass: link.mass,
+            centre_of_mass: Vector3::from(link.com),
+            inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
+        },
+        rotor_inertia: link.rotor_inertia,
+        coulomb_friction: link.coulomb,
+        viscous_friction: link.viscous,
+        offset: link.offset,
+    }
+}
+
+/// `truth` or `prior` of every joint; `None` unless all have it.
+pub fn links<const N: usize>(
+    leg: &LegFile,
+    of: impl Fn(&JointFile) -> Option<&LinkParameters>,
+) -> Option<[LinkPrior<f64>; N]> {
+    let links: Option<Vec<_>> = leg.joints.iter().map(|joint| of(joint).map(link_prior)).collect();
+    links?.try_into().ok()
+}
+
+/// Keeps the signs of a wrong prior apart from the noise of the same seed.
+const PRIOR_STREAM: u64 = 0x7072_696f_72;
+
+/// A prior that is off by `percent` in every number, signs from the seed, kept physically possible; offset zero.
+#[must_use]
+pub fn wrong_prior<const N: usize>(
+    truth: &[LinkPrior<f64>; N],
+    percent: f64,
+    seed: u64,
+) -> [LinkPrior<f64>; N] {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed ^ PRIOR_STREAM);
+    let mut off = |value: f64| {
+        let sign = if random.next_u64() >> 63 == 1 { 1.0 } else { -1.0 };
+        value * (1.0 + sign * percent / 100.0)
+    };
+    truth.map(|link| {
+        let mass = off(link.body.mass);
+        let centre_of_mass = link.body.centre_of_mass.map(&mut off);
+        let inertia =
+            Matrix3::from_fn(
+                |row, column| if row <= column { off(link.body.inertia[(row, column)]) } else { 0.0 },
+            );
+        let mut inertia = inertia + inertia.transpose() - Matrix3::from_diagonal(&inertia.diagonal());
+        // Independent signs may break the triangle inequality of the principal moments: move towards the truth's
+        // shape, which keeps it.
+        for _ in 0..60 {
+            let body = RigidBody { mass, centre_of_mass, inertia };
+            if is_physically_consistent(&body.to_parameters()) {
+                break;
+            }
+            inertia = inertia * 0.9 + link.body.inertia * 0.1;
+        }
+        LinkPrior {
+            body: RigidBody { mass, centre_of_mass, inertia },
+            rotor_inertia: off(link.rotor_inertia),
+            coulomb_friction: off(link.coulomb_friction),
+            viscous_friction: off(link.viscous_friction),
+            offset: 0.0,
+        }
+    })
+}
+
+/// What is known of a leg beside its data.
+pub fn background<const N: usize, const B: usize>(
+    leg: &LegFile,
+    prior: PriorChoice,
+    seed: u64,
+) -> Result<Background<N, B>, SetupError> {
+    let model = row_model::<N, B>(leg)?;
+    let device = device_model(leg, &model)?;
+    let truth = links::<N>(leg, |joint| joint.truth.as_ref());
+    let from_file = links::<N>(leg, |joint| joint.prior.as_ref());
+    let (prior, prior_name) = match prior {
+        PriorChoice::None => (None, "none".to_owned()),
+        PriorChoice::Default => (from_file, if from_file.is_some() { "file" } else { "none" }.to_owned()),
+        PriorChoice::File => (
+            Some(from_file.ok_or_else(|| SetupError::new(leg, "has no prior for every joint"))?),
+            "file".to_owned(),
+        ),
+        PriorChoice::Wrong(percent) => {
+            let truth =
+                truth.ok_or_else(|| SetupError::new(leg, "a wrong prior needs a truth to be wrong about"))?;
+            (Some(wrong_prior(&truth, percent, seed)), format!("wrong:{percent}"))
+        }
+    };
+    let columns = column_mask::<N>(leg).iter().flatten().filter(|on| **on).count();
+    Ok(Background {
+        leg: leg.name.clone(),
+        model,
+        device,
+        columns,
+        prior,
+        prior_name,
+        truth: truth.map(|truth| prior_parameters(&truth)),
+    })
+}
+
+/// Largest inertia each joint moves, kg m2, over postures of the whole circle.
+#[must_use]
+pub fn largest_inertia<const N: usize>(
+    chain: &Chain<f64, N>,
+    parameters: &LegParameters<f64, N>,
+) -> [f64; N] {
+    let mut largest = [0.0_f64; N];
+    for step in 0..64 {
+        let q = core::array::from_fn(|joint| {
+            f64::from(step) * core::f64::consts::TAU / 64.0 * (joint + 1) as f64
+        });
+        let mass = mass_matrix(chain, parameters, &q);
+        for joint in 0..N {
+            largest[joint] = largest[joint].max(mass[(joint, joint)]);
+        }
+    }
+    largest
+}
