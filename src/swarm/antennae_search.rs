@@ -161,3 +161,47 @@ impl<T: Real, const D: usize> Search<T> for Bas<T, D> {
         self.ledger.evaluations()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use core::cell::RefCell;
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::real::abs;
+
+    /// A slope along a line; remembers where it was evaluated.
+    struct Slope(RefCell<Vec<f64>>);
+
+    impl Objective<f64> for Slope {
+        fn dimension(&self) -> usize {
+            1
+        }
+        fn bounds(&self, _coordinate: usize) -> (f64, f64) {
+            (-1e3, 1e3)
+        }
+        fn evaluate(&self, position: &[f64]) -> f64 {
+            self.0.borrow_mut().push(position[0]);
+            position[0]
+        }
+    }
+
+    #[test]
+    fn whiskers_and_steps_follow_their_equations() {
+        let slope = Slope(RefCell::default());
+        let mut beetle = Bas::<f64, 1>::new(&slope, BasSettings::default(), 2).expect("a valid box");
+        beetle.advance(&slope, 1 + 3 * 20);
+        assert_eq!(beetle.iterations(), 20);
+        let places = slope.0.borrow();
+        let (mut at, mut step) = (places[0], 1.0);
+        for iteration in places[1..].chunks(3) {
+            // positions up to 1e3 leave 1e-13 of rounding
+            assert!(abs(abs(iteration[0] - iteration[1]) - 0.2 * step) < 1e-12, "Eqs (21), (26)");
+            assert!(abs(iteration[0] + iteration[1] - 2.0 * at) < 1e-12, "Eq. (21)");
+            assert!(abs(iteration[2] - (at - step)) < 1e-12, "Eq. (24): downhill by one step");
+            at = iteration[2];
+            step = 0.95 * step + 0.005;
+        }
+    }
+}

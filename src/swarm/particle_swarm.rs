@@ -127,3 +127,27 @@ impl<T: Real, const N: usize, const D: usize> Search<T> for Pso<T, N, D> {
         self.ledger.evaluations()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::functions::{TestFunction, TestProblem};
+    use super::*;
+
+    #[test]
+    fn a_particle_moves_by_its_velocity_and_stops_at_the_wall() {
+        let problem = TestProblem::new(TestFunction::Sphere, 3);
+        let mut swarm = Pso::<f64, 6, 3>::new(&problem, PsoSettings::default(), 8).expect("a valid box");
+        swarm.advance(&problem, 6);
+        for _ in 0..30 {
+            let before = swarm.particles.position;
+            swarm.advance(&problem, 6);
+            for (particle, row) in before.iter().enumerate() {
+                for (coordinate, entry) in row.iter().enumerate() {
+                    let moved = entry + swarm.particles.velocity[particle][coordinate];
+                    assert_eq!(swarm.particles.position[particle][coordinate], moved.clamp(0.0, 1.0));
+                }
+            }
+        }
+        assert_eq!((swarm.iterations(), swarm.evaluations()), (30, 6 * 31));
+    }
+}

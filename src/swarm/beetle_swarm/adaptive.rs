@@ -18,59 +18,44 @@
 //! Source: own experiments on test functions and identification problems; kept of the beetle swarm: x, v, P, G,
 //! Eq. (19), two whiskers, the weighted move.
 //! Cost: N + 2 min(N, D) evaluations per iteration and, without them, 1 kflop (D = 2), 174 (21), 285 (28);
-//! one square root per direction is the only call into `libm`.
+//! up to five square roots per direction are the only calls into `libm`.
 //! Known limits: a fast exploiter. Global search is the restart only: it fails on Rastrigin's function in 10
 //! dimensions, and needs more evaluations there than a particle swarm in 2. On a quadratic cost least squares is
 //! exact and instant. Noise in the cost of 1e-4 of its value spoils the last digits: meant for fixed data.
 
-use crate::real::{Real, abs, clamp, max, min, sqrt};
+use crate::real::{Real, abs, clamp, max, min};
 
 use super::super::particles::{Particles, VelocityRule};
 use super::super::random::Random;
-use super::super::rows::{add_scaled, dot, live, live_mut, median};
+use super::super::rows::{add_scaled, dot, live, live_mut};
 use super::frame::{Frame, Reach};
 use super::metric::Metric;
 use super::rules::{Opening, Rules, Side};
 use super::settings::AdaptiveSettings;
 
-/// Whisker length of a scattered swarm and its range, metric coordinates.
+/// Whisker length of a scattered swarm, metric coordinates.
 const FIRST_WHISKER: f64 = 0.1;
-const SHORTEST_WHISKER: f64 = 3e-4;
-const LONGEST_WHISKER: f64 = 0.3;
-/// Weight of the latest iteration in whisker length and convex share.
-const SMOOTHING: f64 = 0.3;
-/// Trust in the others' whiskers: first value, least value, factor between the two levels that are compared, and
-/// change per compared pair.
+/// Trust in the others' whiskers: first value, and factor between the two levels that are compared.
 const FIRST_TRUST: f64 = 0.3;
-const LEAST_TRUST: f64 = 0.02;
 const TRUST_LEVELS: f64 = 1.6;
-const TRUST_CHANGE: f64 = 0.1;
 /// How far a beetle may stand outside the box (it is evaluated at the nearest point inside).
 const MARGIN: f64 = 0.02;
 /// Progress below this share of the best value does not count.
 const PROGRESS: f64 = 1e-7;
-/// Share of convex readings from which the metric learns; in full at 1.
-const CONVEX_SHARE: f64 = 0.7;
-/// How far one iteration stretches towards the measured curvature, and the range of curvature over its mean.
-const METRIC_RATE: f64 = 0.7;
-const LEAST_CURVATURE: f64 = 0.25;
-const MOST_CURVATURE: f64 = 4.0;
-/// A metric step of 1 is never stretched beyond this many boxes.
-const LONGEST_AXIS: f64 = 100.0;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct AdaptiveRules<T, const N: usize, const D: usize> {
     settings: AdaptiveSettings<T>,
-    frame: Frame<T, N, D>,
-    metric: Metric<T, D>,
+    pub(super) frame: Frame<T, N, D>,
+    pub(super) metric: Metric<T, D>,
     /// Gradient of the latest frame, box coordinates; `None` before the first.
-    gradient: Option<[T; D]>,
+    pub(super) gradient: Option<[T; D]>,
     /// Usual whisker length, metric coordinates.
-    whisker: T,
+    pub(super) whisker: T,
     /// om.
-    trust: T,
+    pub(super) trust: T,
     /// Smoothed share of convex readings; `None` before the first.
-    convex_share: Option<T>,
+    pub(super) convex_share: Option<T>,
     /// Iterations since the swarm was scattered, the running one included.
     iteration: u32,
     /// The best value that counted as progress, and the iterations since.
@@ -142,7 +127,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         min(trust, T::one())
     }
 
-    fn trusts_more(&self, beetle: usize) -> bool {
+    pub(super) fn trusts_more(&self, beetle: usize) -> bool {
         (beetle as u32 ^ self.iteration) & 1 == 0
     }
 
@@ -168,103 +153,6 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
         psi
     }
-
-    /// om follows the level whose beetles gained more, pair by pair.
-    fn learn_trust(&mut self, before: &[T; N], found: &[T; N]) {
-        let mut vote = T::zero();
-        for pair in 0..N / 2 {
-            let (even, odd) = (2 * pair, 2 * pair + 1);
-            let (even_gain, odd_gain) = (before[even] - found[even], before[odd] - found[odd]);
-            let (more, less) =
-                if self.trusts_more(even) { (even_gain, odd_gain) } else { (odd_gain, even_gain) };
-            if more > less {
-                vote += T::of(TRUST_CHANGE);
-            } else if more < less {
-                vote -= T::of(TRUST_CHANGE);
-            }
-        }
-        let trust =
-            if vote > T::zero() { self.trust * (T::one() + vote) } else { self.trust / (T::one() - vote) };
-        self.trust = clamp(trust, T::of(LEAST_TRUST), T::one());
-    }
-
-    /// Gradient in box coordinates from the slopes along the frame: A^-T sum_j g_j z_j.
-    fn learn_gradient(&mut self, dimension: usize) {
-        let mut gradient = [T::zero(); D];
-        for (whisker, direction) in
-            self.frame.whisker.iter().zip(&self.frame.direction).take(self.frame.count())
-        {
-            if let Some(reading) = whisker.reading {
-                add_scaled(live_mut(&mut gradient, dimension), reading.slope, live(direction, dimension));
-            }
-        }
-        self.gradient = Some(self.metric.gradient_to_box(&gradient));
-    }
-
-    /// Stretches the metric where the cost curves less than on average along the frame, and shrinks it where it
-    /// curves more. Directions without a reading keep their length.
-    fn learn_metric(&mut self) {
-        let count = self.frame.count();
-        let readings = || self.frame.whisker.iter().take(count).filter_map(|whisker| whisker.reading);
-        let (mut read, mut convex, mut curved, mut curvature) = (0_u16, 0_u16, 0_u16, T::zero());
-        for reading in readings() {
-            read += 1;
-            convex += u16::from(reading.convex);
-            if reading.curvature > T::zero() {
-                curved += 1;
-                curvature += reading.curvature;
-            }
-        }
-        let number = |count: u16| nalgebra::convert::<f32, T>(f32::from(count));
-        let share = number(convex) / nalgebra::convert(count as f32);
-        let share = match self.convex_share {
-            None => share,
-            Some(before) => smoothed(before, share),
-        };
-        self.convex_share = Some(share);
-        let gate = (share - T::of(CONVEX_SHARE)) / T::of(1.0 - CONVEX_SHARE);
-        if gate <= T::zero() || curved == 0 || read < 2 {
-            return;
-        }
-        let mean_curvature = curvature / number(curved);
-        let rate = T::of(METRIC_RATE) * gate;
-        let stretch = |curvature: T| {
-            let relative = clamp(curvature / mean_curvature, T::of(LEAST_CURVATURE), T::of(MOST_CURVATURE));
-            T::one() + rate * (T::one() / sqrt(relative) - T::one())
-        };
-        let mean = readings().fold(T::zero(), |sum, reading| sum + stretch(reading.curvature)) / number(read);
-        let directions = self.frame.direction.iter().zip(&self.frame.displacement);
-        for (whisker, (direction, displacement)) in self.frame.whisker.iter().zip(directions).take(count) {
-            let Some(reading) = whisker.reading else { continue };
-            let factor = stretch(reading.curvature) / mean;
-            if factor <= T::one() || factor * whisker.box_length <= T::of(LONGEST_AXIS) {
-                self.metric.stretch(direction, displacement, factor);
-            }
-        }
-    }
-
-    /// The usual whisker follows the usual step.
-    fn learn_whisker(&mut self, dimension: usize) {
-        let mut steps = [T::zero(); N];
-        let mut read = 0;
-        for whisker in self.frame.whisker.iter().take(self.frame.count()) {
-            if let Some(reading) = whisker.reading {
-                steps[read.min(N - 1)] = abs(reading.step);
-                read += 1;
-            }
-        }
-        if read == 0 {
-            return;
-        }
-        let median = median(live_mut(&mut steps, read));
-        let root = sqrt(nalgebra::convert::<f32, T>(dimension as f32));
-        let length = smoothed(self.whisker, root * median);
-        self.whisker = clamp(length, T::of(SHORTEST_WHISKER), T::of(LONGEST_WHISKER));
-    }
-}
-
-fn smoothed<T: Real>(before: T, now: T) -> T {
-    T::of(1.0 - SMOOTHING) * before + T::of(SMOOTHING) * now
 }
 
 impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T, N, D> {
@@ -343,5 +231,85 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
         self.learn_gradient(dimension);
         self.learn_metric();
         self.learn_whisker(dimension);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const N: usize = 6;
+    const D: usize = 4;
+
+    /// A coupled bowl with its food at 0.3, 0.4, 0.5, 0.6 of the box.
+    fn bowl(point: &[f64; D]) -> f64 {
+        let offset = |index: usize| point[index] - (0.3 + 0.1 * index as f64);
+        (0..D).map(|index| square(offset(index))).sum::<f64>() + 0.5 * square(offset(0) + offset(3))
+    }
+
+    fn square(value: f64) -> f64 {
+        value * value
+    }
+
+    #[test]
+    fn every_beetle_finds_the_food_of_a_bowl_by_the_whiskers_of_all() {
+        // Full trust and directions along the bowl's axes make the shared step Newton's: one move is enough.
+        let settings =
+            AdaptiveSettings { velocity_share: 0.0, pair_directions: 0, ..AdaptiveSettings::default() };
+        let mut rules = AdaptiveRules::<f64, N, D>::new(settings, D);
+        rules.trust = TRUST_LEVELS;
+        let mut random = Random::new(3);
+        let mut beetles = Particles::<f64, N, D>::new(D);
+        beetles.scatter(&mut random);
+        for beetle in 0..N {
+            beetles.record(beetle, bowl(&beetles.position[beetle]));
+        }
+        assert_eq!(rules.open(&mut beetles), Opening::Search);
+        let half = core::f64::consts::FRAC_1_SQRT_2;
+        let axes =
+            [[half, 0.0, 0.0, half], [half, 0.0, 0.0, -half], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+        for (beetle, axis) in axes.into_iter().enumerate() {
+            let (reach, metric) = (rules.reach(), Metric::identity(D));
+            rules.frame.aim(beetle, Some(axis), &beetles.position[beetle], &metric, reach, &mut random);
+            let tip = |side| bowl(&rules.tip(beetle, side, &beetles));
+            let (right, left) = (tip(Side::Right), tip(Side::Left));
+            rules.smell(beetle, &beetles, right, left);
+        }
+        for beetle in 0..N {
+            let within_reach = beetles.position[beetle]
+                .iter()
+                .enumerate()
+                .all(|(index, &entry)| abs(entry - (0.3 + 0.1 * index as f64)) < 0.3);
+            rules.displace(beetle, &mut beetles, &mut random);
+            if within_reach {
+                // parabolas over whiskers of 0.1: 1e-16 / 0.01 of rounding
+                assert!(bowl(&beetles.position[beetle]) < 1e-24, "beetle {beetle}");
+            }
+        }
+        let best = bowl(&beetles.position[0]);
+        assert!(best < 1e-24, "{best:e}");
+    }
+
+    #[test]
+    fn a_bad_move_is_taken_back_and_a_tolerable_one_is_kept() {
+        let mut rules = AdaptiveRules::<f64, N, D>::new(AdaptiveSettings::default(), D);
+        let mut random = Random::new(5);
+        let mut beetles = Particles::<f64, N, D>::new(D);
+        beetles.scatter(&mut random);
+        for beetle in 0..N {
+            beetles.record(beetle, 1.0);
+        }
+        let before = beetles.clone();
+        // beetle 1 stands somewhere worse than its best
+        beetles.value[1] = 3.0;
+        for beetle in 0..N {
+            beetles.position[beetle] = [0.5; D];
+        }
+        rules.close(&mut beetles, &[2.0, 2.0, 0.5, 1.0, 2.0, 2.0]);
+        assert_eq!(beetles.position[0], before.position[0], "worse than before and than its best");
+        assert_eq!((beetles.velocity[0], beetles.value[0]), ([0.0; D], 1.0));
+        assert_eq!((beetles.position[1], beetles.value[1]), ([0.5; D], 2.0), "better than before");
+        assert_eq!((beetles.personal_best[2], beetles.personal_best_value[2]), ([0.5; D], 0.5));
+        assert_eq!((beetles.position[3], beetles.velocity[3]), ([0.5; D], before.velocity[3]));
     }
 }

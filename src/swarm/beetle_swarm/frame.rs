@@ -279,7 +279,10 @@ mod tests {
     #[test]
     fn what_is_not_finite_leaves_no_reading() {
         let (mut frame, _) = frame_of(4, None);
-        for (centre, right, left) in [(f64::MAX, 1.0, 1.0), (1.0, f64::MAX, 2.0), (1e308, -1e308, 1e308)] {
+        let most = f64::MAX;
+        for (centre, right, left) in
+            [(most, 1.0, 1.0), (1.0, most, 2.0), (most, most, most), (1e308, -1e308, 1e308)]
+        {
             frame.read(0, 1.0, 2.0, 2.0, REACH);
             frame.read(0, centre, right, left, REACH);
             assert_eq!(frame.whisker[0].reading, None);

@@ -19,6 +19,7 @@
 
 mod adaptive;
 mod frame;
+mod learning;
 mod metric;
 mod paper;
 mod rules;

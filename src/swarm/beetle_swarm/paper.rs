@@ -92,3 +92,43 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for PaperRules<T, N
         self.iteration = self.iteration.saturating_add(1);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::particles::InertiaWeight;
+    use super::*;
+    use crate::real::abs;
+
+    #[test]
+    fn whiskers_moves_and_decay_follow_their_equations() {
+        // without pulls and with w = 0.5 the velocity is known
+        let settings = PaperSettings {
+            inertia_weight: InertiaWeight::constant(0.5),
+            individual_learning: 0.0,
+            global_learning: 0.0,
+            ..PaperSettings::default()
+        };
+        let mut rules = PaperRules::<f64, 2>::new(settings);
+        let mut beetles = Particles::<f64, 2, 1>::new(1);
+        beetles.position = [[0.4], [0.6]];
+        let mut random = Random::new(1);
+        let (mut velocity, mut step, mut at) = (0.08, 1.0, 0.4);
+        beetles.velocity = [[velocity]; 2];
+        for smell in [1.0, -1.0, 0.0, 1.0] {
+            let tip = |side| Rules::<f64, 2, 1>::tip(&rules, 0, side, &beetles)[0];
+            // sums of a few numbers below 1
+            let close = |one: f64, other: f64| abs(one - other) < 1e-15;
+            assert!(close(tip(Side::Right), at + velocity * step / 10.0), "Eqs (26), (27)");
+            assert!(close(tip(Side::Left), at - velocity * step / 10.0), "Eqs (26), (27)");
+            rules.smell(0, &beetles, smell, 0.0);
+            rules.displace(0, &mut beetles, &mut random);
+            let psi = -step * velocity * smell;
+            velocity *= 0.5;
+            at += 0.4 * velocity + 0.6 * psi;
+            assert!(close(beetles.velocity[0][0], velocity), "Eq. (19)");
+            assert!(close(beetles.position[0][0], at), "Eqs (28), (29)");
+            rules.close(&mut beetles, &[1.0, 2.0]);
+            step = 0.95 * step + 0.005;
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! What the adaptive beetle swarm learns at the end of an iteration: trust, gradient, metric, whisker length.
+//!
+//! Why apart from the moves: this is what makes one set of constants serve every function.
+//!   om    grows or shrinks by 10 % per pair of beetles in which the more or the less trusting one gained more
+//!   grad  = A^-T sum_j g_j z_j, the next frame's first direction
+//!   al_j  = 1 + rate gate (1 / sqrt(h_j / mean h) - 1), over its mean: stretch of A along z_j; gate is 0 up to
+//!           70 % of convex readings and 1 at 100 %, so that ripples teach nothing
+//!   l     = 0.7 l + 0.3 sqrt(D) median |s_j|: whiskers as long as the usual step average ripples of its size
+//! Symbols as in adaptive.rs and frame.rs; h_j relative to the mean of the positive ones, limited to 1/4..4.
+//!
+//! Source: own experiments. Cost: 6 D^2 min(N, D) operations, the metric's; two square roots per direction.
+
+use crate::real::{Real, abs, clamp, sqrt};
+
+use super::super::rows::{add_scaled, live, live_mut, median};
+use super::adaptive::AdaptiveRules;
+
+/// Least trust in the others' whiskers, and its change per compared pair.
+const LEAST_TRUST: f64 = 0.02;
+const TRUST_CHANGE: f64 = 0.1;
+/// Range of the usual whisker length, metric coordinates. Shorter ones cancel in single precision.
+const SHORTEST_WHISKER: f64 = 3e-4;
+const LONGEST_WHISKER: f64 = 0.3;
+/// Weight of the latest iteration in whisker length and convex share.
+const SMOOTHING: f64 = 0.3;
+/// Share of convex readings from which the metric learns; in full at 1.
+const CONVEX_SHARE: f64 = 0.7;
+/// How far one iteration stretches towards the measured curvature, and the range of curvature over its mean.
+const METRIC_RATE: f64 = 0.7;
+const LEAST_CURVATURE: f64 = 0.25;
+const MOST_CURVATURE: f64 = 4.0;
+/// A metric step of 1 is never stretched beyond this many boxes.
+const LONGEST_AXIS: f64 = 100.0;
+
+impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
+    /// om follows the level whose beetles gained more, pair by pair.
+    pub(super) fn learn_trust(&mut self, before: &[T; N], found: &[T; N]) {
+        let mut vote = T::zero();
+        for pair in 0..N / 2 {
+            let (even, odd) = (2 * pair, 2 * pair + 1);
+            let (even_gain, odd_gain) = (before[even] - found[even], before[odd] - found[odd]);
+            let (more, less) =
+                if self.trusts_more(even) { (even_gain, odd_gain) } else { (odd_gain, even_gain) };
+            if more > less {
+                vote += T::of(TRUST_CHANGE);
+            } else if more < less {
+                vote -= T::of(TRUST_CHANGE);
+            }
+        }
+        let trust =
+            if vote > T::zero() { self.trust * (T::one() + vote) } else { self.trust / (T::one() - vote) };
+        self.trust = clamp(trust, T::of(LEAST_TRUST), T::one());
+    }
+
+    /// Gradient in box coordinates from the slopes along the frame: A^-T sum_j g_j z_j.
+    pub(super) fn learn_gradient(&mut self, dimension: usize) {
+        let mut gradient = [T::zero(); D];
+        for (whisker, direction) in
+            self.frame.whisker.iter().zip(&self.frame.direction).take(self.frame.count())
+        {
+            if let Some(reading) = whisker.reading {
+                add_scaled(live_mut(&mut gradient, dimension), reading.slope, live(direction, dimension));
+            }
+        }
+        self.gradient = Some(self.metric.gradient_to_box(&gradient));
+    }
+
+    /// Stretches the metric where the cost curves less than on average along the frame, and shrinks it where it
+    /// curves more. Directions without a reading keep their length.
+    pub(super) fn learn_metric(&mut self) {
+        let count = self.frame.count();
+        let readings = || self.frame.whisker.iter().take(count).filter_map(|whisker| whisker.reading);
+        let (mut read, mut convex, mut curved, mut curvature) = (0_u16, 0_u16, 0_u16, T::zero());
+        for reading in readings() {
+            read += 1;
+            convex += u16::from(reading.convex);
+            if reading.curvature > T::zero() {
+                curved += 1;
+                curvature += reading.curvature;
+            }
+        }
+        let number = |count: u16| nalgebra::convert::<f32, T>(f32::from(count));
+        let share = number(convex) / nalgebra::convert(count as f32);
+        let share = match self.convex_share {
+            None => share,
+            Some(before) => smoothed(before, share),
+        };
+        self.convex_share = Some(share);
+        let gate = (share - T::of(CONVEX_SHARE)) / T::of(1.0 - CONVEX_SHARE);
+        if gate <= T::zero() || curved == 0 || read < 2 {
+            return;
+        }
+        let mean_curvature = curvature / number(curved);
+        let rate = T::of(METRIC_RATE) * gate;
+        let stretch = |curvature: T| {
+            let relative = clamp(curvature / mean_curvature, T::of(LEAST_CURVATURE), T::of(MOST_CURVATURE));
+            T::one() + rate * (T::one() / sqrt(relative) - T::one())
+        };
+        let mean = readings().fold(T::zero(), |sum, reading| sum + stretch(reading.curvature)) / number(read);
+        let directions = self.frame.direction.iter().zip(&self.frame.displacement);
+        for (whisker, (direction, displacement)) in self.frame.whisker.iter().zip(directions).take(count) {
+            let Some(reading) = whisker.reading else { continue };
+            let factor = stretch(reading.curvature) / mean;
+            if factor <= T::one() || factor * whisker.box_length <= T::of(LONGEST_AXIS) {
+                self.metric.stretch(direction, displacement, factor);
+            }
+        }
+    }
+
+    /// The usual whisker follows the usual step.
+    pub(super) fn learn_whisker(&mut self, dimension: usize) {
+        let mut steps = [T::zero(); N];
+        let mut read = 0;
+        for whisker in self.frame.whisker.iter().take(self.frame.count()) {
+            if let Some(reading) = whisker.reading {
+                steps[read.min(N - 1)] = abs(reading.step);
+                read += 1;
+            }
+        }
+        if read == 0 {
+            return;
+        }
+        let median = median(live_mut(&mut steps, read));
+        let root = sqrt(nalgebra::convert::<f32, T>(dimension as f32));
+        let length = smoothed(self.whisker, root * median);
+        self.whisker = clamp(length, T::of(SHORTEST_WHISKER), T::of(LONGEST_WHISKER));
+    }
+}
+
+fn smoothed<T: Real>(before: T, now: T) -> T {
+    T::of(1.0 - SMOOTHING) * before + T::of(SMOOTHING) * now
+}
