@@ -196,6 +196,19 @@ mod tests {
     }
 
     #[test]
+    fn the_bound_of_acceleration_covers_a_quick_blend_and_is_tight_there() {
+        // A sine is fastest where the blend ends, and a blend of 0.2 s in a period of 10 s outweighs its curvature.
+        let sine = Fourier::<1, 1>::new(Second(10.0), [0.0], [[0.5]], [[0.0]]).expect("finite");
+        let motion = Periodic::new(sine, Second(0.2), 1, RATE_HZ).expect("positive times");
+        let peak = (0..motion.duration_ticks())
+            .map(|tick| motion.state_at(tick).acceleration_rad_per_s2[0].abs())
+            .fold(0.0, f32::max);
+        let bound = motion.envelope()[0].acceleration.0;
+        // The bound adds the curvature w^2 A (0.2) to the blend's 1.5 w A / 0.2 s (2.36).
+        assert!(peak <= bound && peak > 0.9 * bound, "{peak} {bound}");
+    }
+
+    #[test]
     fn hours_of_cycles_do_not_move_the_phase() {
         let curve = random_curve(2).with_period(Second(6.5)).expect("positive");
         let cycles = 6 * 3600 * 2 / 13;

@@ -128,21 +128,21 @@ mod tests {
 
     /// An inertia with gravity, pushed by a wanted torque through the barrier, whose velocity is sensed late and whose
     /// drive is late as well; semi-implicit Euler at 16 kHz, double precision. Returns the farthest excursion beyond
-    /// either end (negative inside) and the greatest speed.
+    /// either end (negative inside), the greatest speed, and the greatest speed in the last of four seconds.
     fn push(
         limits: &JointLimits,
         inertia: f64,
         gravity_nm: f64,
         wanted_nm: f32,
         start: (f64, f64),
-    ) -> (f64, f64) {
+    ) -> (f64, f64, f64) {
         let barrier = Barrier::new(limits);
         let (mut position, mut velocity) = start;
         let mut drive_torque = 0.0;
         // 3.25 ms of velocity delay.
         let mut sensed: VecDeque<f64> = [velocity; 14].into_iter().collect();
-        let (mut excursion, mut fastest) = (f64::NEG_INFINITY, 0.0_f64);
-        for _ in 0..16_000 {
+        let (mut excursion, mut fastest, mut late_fastest) = (f64::NEG_INFINITY, 0.0_f64, 0.0_f64);
+        for tick in 0..16_000 {
             sensed.push_back(velocity);
             let late = sensed.pop_front().expect("fourteen stay");
             let (torque, _) =
@@ -157,8 +157,11 @@ mod tests {
             excursion =
                 excursion.max(position - f64::from(limits.high.0)).max(f64::from(limits.low.0) - position);
             fastest = fastest.max(velocity.abs());
+            if tick >= 12_000 {
+                late_fastest = late_fastest.max(velocity.abs());
+            }
         }
-        (excursion, fastest)
+        (excursion, fastest, late_fastest)
     }
 
     #[test]
@@ -180,7 +183,7 @@ mod tests {
                                 if start < low || start > high {
                                     continue;
                                 }
-                                let (excursion, fastest) = push(
+                                let (excursion, fastest, _) = push(
                                     &limits,
                                     inertia,
                                     gravity,
@@ -198,6 +201,20 @@ mod tests {
                         }
                     }
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn a_joint_pressed_against_its_end_comes_to_rest_there() {
+        for limits in [HIP, KNEE] {
+            for inertia_share in [0.5, 0.75, 1.0] {
+                let inertia = f64::from(limits.inertia.0) * inertia_share;
+                let middle = 0.5 * f64::from(limits.low.0 + limits.high.0);
+                let (excursion, _, late_fastest) = push(&limits, inertia, 0.0, 60.0, (middle, 0.0));
+                // Without gravity it stands at the end itself, and neither bounces nor hums.
+                assert!(excursion.abs() < 0.05_f64.to_radians(), "{excursion}");
+                assert!(late_fastest < 1e-3, "{inertia_share}: {late_fastest} rad/s");
             }
         }
     }

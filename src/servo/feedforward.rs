@@ -62,6 +62,8 @@ mod tests {
     fn the_smoothed_sign_is_odd_monotonous_and_one_outside_its_band() {
         let sign = |velocity: f32| smoothed_sign(RadianPerSecond(velocity));
         assert_eq!((sign(0.0), sign(0.02), sign(-5.0), sign(f32::INFINITY)), (0.0, 1.0, -1.0, 1.0));
+        // It arrives without a kink: at 99 % of the band 1.5e-4 are missing.
+        assert!(sign(0.0198) > 0.9998);
         let mut before = sign(-0.03);
         for step in -300..=300 {
             let velocity = step as f32 * 1e-4;

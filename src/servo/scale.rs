@@ -72,8 +72,7 @@ impl JointScale {
     /// Between a ten-millionth and a tenth of a radian per count, offset within 2 pi, a positive torque constant.
     pub(super) fn is_sensible(&self) -> bool {
         let step = self.radian_per_count.0;
-        step >= 1e-7
-            && step <= 0.1
+        (1e-7..=0.1).contains(&step)
             && abs(self.zero_offset.0) <= core::f32::consts::TAU
             && self.torque_per_ampere.0 > 0.0
             && is_finite(self.torque_per_ampere.0)
