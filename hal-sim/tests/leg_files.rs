@@ -183,10 +183,9 @@ fn the_mujoco_leg_has_the_torques_of_its_simulation() {
     for [q1, q2, v1, v2, a1, a2, tau1, tau2] in rows {
         // At the ports the knee's flexion is positive.
         let torque = world.inverse_dynamics(&[q1, -q2], &[v1, -v2], &[a1, -a2]);
-        // Its stiction is regularised (solreffriction 2 ms), so Coulomb friction is not quite saturated
-        // there.
+        // The record has eight digits.
         assert!(
-            (torque[0] - tau1).abs() < 0.02 && (torque[1] + tau2).abs() < 0.02,
+            (torque[0] - tau1).abs() < 1e-7 && (torque[1] + tau2).abs() < 1e-7,
             "{torque:?} {tau1} {tau2}"
         );
     }
