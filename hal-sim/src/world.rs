@@ -149,6 +149,24 @@ impl<const N: usize> World<N> {
         }
     }
 
+    /// Torque of the motors at the joints now, N m, without noise; what [`Truth`] holds, at no cost.
+    #[must_use]
+    pub fn motor_torque(&self) -> [f64; N] {
+        core::array::from_fn(|joint| self.drives[joint].torque())
+    }
+
+    /// Joint angles now, rad, anatomical; what [`Truth`] holds, at no cost.
+    #[must_use]
+    pub fn anatomical_position(&self) -> [f64; N] {
+        core::array::from_fn(|joint| self.anatomy[joint].to_anatomical_angle(self.state.angles[joint]))
+    }
+
+    /// Joints that friction holds now; what [`Truth`] holds, at no cost.
+    #[must_use]
+    pub fn sticking(&self) -> [bool; N] {
+        self.state.rates.map(|rate| rate == 0.0)
+    }
+
     /// Motor torque, N m, that makes a motion (rad, rad/s, rad/s^2), friction and offset included; of a joint
     /// at rest dry friction is undetermined and left out.
     #[must_use]

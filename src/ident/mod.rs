@@ -29,7 +29,7 @@ pub use constrained::{ParameterBox, least_squares_in_box};
 pub use estimate::{Estimate, Plan, Problem, Stage, noise};
 pub use factor::{Factor, Pyramid};
 pub use kernel::{Kernel, KernelError};
-pub use record::{Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ, TorqueSize};
+pub use record::{LARGEST_STILL_SHARE, Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ, TorqueSize};
 pub use rows::{DECIMATION, FilteredRows, RowFilter};
 pub use search::{SearchState, SwarmSearch};
 pub use smoothing::{Smoothed, Smoother};

@@ -7,10 +7,12 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use scarab::ident::Plan;
 
 use super::error::{EXIT_ACCEPTED, EXIT_INPUT, EXIT_REFUSED, ToolError};
+use super::identify::{identify_many, identify_one, print_runs};
 use super::leg_file::{DEFAULT_LEG, LegFile};
 use super::replay::{ReplayOptions, replay};
 use super::report::RunReport;
-use super::setup::PriorChoice;
+use super::setup::{DEFAULT_SEED, PriorChoice};
+use super::simulate::SimulationOptions;
 use super::tables;
 use crate::with_leg_size;
 
@@ -24,6 +26,8 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    /// Identify a simulated leg: drive it, log it, solve, validate, track.
+    Identify(IdentifyArguments),
     /// Identify a leg from recordings.
     Replay(ReplayArguments),
 }
@@ -70,6 +74,40 @@ struct Common {
 }
 
 #[derive(Args, Debug)]
+struct IdentifyArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Of noise, pushes and a wrong prior.
+    #[arg(long, conflicts_with = "seeds")]
+    seed: Option<u64>,
+    /// A run for each seed, A..B with both ends.
+    #[arg(long, value_parser = parse_seeds, conflicts_with = "log")]
+    seeds: Option<(u64, u64)>,
+    /// Noise of the logged torque in percent of each joint's mean absolute torque; the leg file's unless given.
+    #[arg(long)]
+    torque_noise: Option<f64>,
+    /// Write the training motion here, in the format that replay reads.
+    #[arg(long)]
+    log: Option<PathBuf>,
+}
+
+fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
+    let ends = text
+        .split_once("..")
+        .map(|(first, last)| (first.parse::<u64>(), last.trim_start_matches('=').parse::<u64>()));
+    match ends {
+        Some((Ok(first), Ok(last))) if first <= last && last - first < LARGEST_SEED_COUNT => {
+            Ok((first, last))
+        }
+        Some((Ok(first), Ok(last))) if first <= last => Err(format!("at most {LARGEST_SEED_COUNT} runs")),
+        _ => Err(format!("`{text}` is not A..B with A at most B")),
+    }
+}
+
+/// More runs at once are a mistake.
+const LARGEST_SEED_COUNT: u64 = 100_000;
+
+#[derive(Args, Debug)]
 struct ReplayArguments {
     /// Recordings: t_s, q1_rad[, q2_rad..], tau1_Nm[, tau2_Nm..]; several are one training set.
     #[arg(required = true)]
@@ -96,7 +134,11 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome = match cli.command {
         Some(Command::Replay(arguments)) => run_replay(&arguments),
-        None => Err(ToolError::input("not yet")),
+        Some(Command::Identify(arguments)) => run_identify(&arguments),
+        None => match Cli::try_parse_from(["scarab-sim", "identify"]) {
+            Ok(Cli { command: Some(Command::Identify(arguments)) }) => run_identify(&arguments),
+            _ => Err(ToolError::input("see --help")),
+        },
     };
     match outcome {
         Ok(code) => ExitCode::from(code),
@@ -105,6 +147,33 @@ pub fn main() -> ExitCode {
             ExitCode::from(EXIT_INPUT)
         }
     }
+}
+
+fn run_identify(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
+    let leg = &LegFile::load(&arguments.common.leg)?;
+    if arguments.torque_noise.is_some_and(|percent| !(0.0..=1000.0).contains(&percent)) {
+        return Err(ToolError::input("--torque-noise: a percentage from 0 to 1000"));
+    }
+    let options = |seed: u64| SimulationOptions {
+        seed,
+        swarm_seed: arguments.common.swarm_seed.unwrap_or(seed),
+        torque_noise_percent: arguments.torque_noise,
+        plan: arguments.common.plan.into(),
+        prior: arguments.common.prior.unwrap_or_default(),
+    };
+    let Some((first, last)) = arguments.seeds else {
+        let options = &options(arguments.seed.unwrap_or(DEFAULT_SEED));
+        let log = arguments.log.as_deref();
+        let run = with_leg_size!(leg, identify_one(leg, options, log))?;
+        return finish(&run, &arguments.common);
+    };
+    let options: &Vec<_> = &(first..=last).map(options).collect();
+    let runs = with_leg_size!(leg, identify_many(leg, options))?;
+    if let Some(path) = &arguments.common.json {
+        write_json(path, &runs)?;
+    }
+    print_runs(&runs);
+    Ok(if runs.runs.iter().all(RunReport::accepted) { EXIT_ACCEPTED } else { EXIT_REFUSED })
 }
 
 fn run_replay(arguments: &ReplayArguments) -> Result<u8, ToolError> {
@@ -119,7 +188,7 @@ fn run_replay(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         bandwidth_hz: arguments.bandwidth,
         plan: arguments.common.plan.into(),
         prior: arguments.common.prior.unwrap_or_default(),
-        swarm_seed: arguments.common.swarm_seed.unwrap_or(super::setup::DEFAULT_SEED),
+        swarm_seed: arguments.common.swarm_seed.unwrap_or(DEFAULT_SEED),
         csv: arguments.csv.clone(),
     };
     let run = with_leg_size!(leg, replay(leg, options))?;

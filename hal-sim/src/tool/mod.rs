@@ -12,11 +12,14 @@
 pub mod analysis;
 pub mod cli;
 pub mod error;
+pub mod identify;
 pub mod leg_file;
+pub mod motions;
 pub mod recording;
 pub mod replay;
 pub mod report;
 pub mod resample;
 pub mod setup;
+pub mod simulate;
 pub mod tables;
 pub mod x2;

@@ -3,17 +3,28 @@
 use nalgebra::{Matrix3, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use scarab::ident::{LinkPrior, RowModel, prior_parameters};
+use scarab::ident::{LinkPrior, Plan, RowModel, Thresholds, prior_parameters};
+use scarab::leg::LegConfiguration;
 use scarab::model::{
     AnatomicalJoint, BaseError, BaseParameters, Chain, ColumnMask, DenavitHartenberg, LegParameters,
     PARAMETERS_PER_JOINT, Parameter, RigidBody, is_physically_consistent, mass_matrix,
 };
 
+use scarab::motion::JointEnvelope;
+use scarab::servo::{Direction, JointConfiguration, JointScale};
+use scarab::units::{
+    Ampere, Hertz, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
+    RadianPerSecondSquared,
+};
+
 use super::analysis::Background;
 use super::leg_file::{JointFile, LegFile, LinkParameters, Switch};
+use super::motions::{Motions, motions};
 
 /// Bandwidth of the identification's low-pass unless another is asked for, Hz.
 pub const DEFAULT_BANDWIDTH_HZ: f64 = 8.0;
+/// Bandwidth of the position loop.
+const POSITION_BANDWIDTH: Hertz = Hertz(6.0);
 /// Seed unless another is asked for.
 pub const DEFAULT_SEED: u64 = 1;
 
@@ -270,4 +281,70 @@ pub fn largest_inertia<const N: usize>(
         }
     }
     largest
+}
+
+/// The firmware's configuration of a leg, and its motions.
+pub fn configuration<const N: usize, const B: usize>(
+    leg: &LegFile,
+    background: &Background<N, B>,
+    plan: Plan,
+    swarm_seed: u64,
+) -> Result<(LegConfiguration<N, B>, Motions<N>), SetupError> {
+    let inertia = servo_inertia(leg, background)?;
+    let joints: [JointConfiguration; N] = core::array::from_fn(|index| {
+        let joint = &leg.joints[index];
+        let opposite = joint.direction < 0;
+        let sign = if opposite { -1.0 } else { 1.0 };
+        let ends = joint.range_deg.map(|end| (sign * end + joint.zero_offset_deg).to_radians() as f32);
+        JointConfiguration {
+            scale: JointScale {
+                radian_per_count: Radian(
+                    (core::f64::consts::TAU / (f64::from(joint.encoder.counts) * joint.encoder.ratio)) as f32,
+                ),
+                direction: if opposite { Direction::Opposite } else { Direction::Same },
+                zero_offset: Radian(joint.zero_offset_deg.to_radians() as f32),
+                torque_per_ampere: NewtonMetrePerAmpere(joint.torque_per_ampere as f32),
+            },
+            low: Radian(ends[0].min(ends[1])),
+            high: Radian(ends[0].max(ends[1])),
+            speed: RadianPerSecond(joint.speed_limit_deg_s.to_radians() as f32),
+            torque: NewtonMetre(joint.torque_limit_nm as f32),
+            current: Ampere(joint.current_limit() as f32),
+            inertia: KilogramMetreSquared(inertia[index] as f32),
+            bandwidth: POSITION_BANDWIDTH,
+        }
+    });
+    let acceleration = core::array::from_fn(|index| {
+        RadianPerSecondSquared(leg.joints[index].acceleration_limit_deg_s2.to_radians() as f32)
+    });
+    let limits = core::array::from_fn(|index| JointEnvelope {
+        low: joints[index].low,
+        high: joints[index].high,
+        speed: joints[index].speed,
+        acceleration: acceleration[index],
+    });
+    let motions = motions(leg, &background.model, &limits)?;
+    let configuration = LegConfiguration {
+        joints,
+        acceleration,
+        model: background.device.clone(),
+        prior: background.prior.map(|prior| prior.map(|link| link.convert())),
+        plan,
+        swarm_seed,
+        thresholds: Thresholds::default(),
+        bandwidth_hz: DEFAULT_BANDWIDTH_HZ as f32,
+        excitation: motions.excitation,
+        validation: motions.validation,
+    };
+    Ok((configuration, motions))
+}
+
+/// Largest inertia of each joint after the leg file's prior, else its truth: the servo's gains follow it.
+fn servo_inertia<const N: usize, const B: usize>(
+    leg: &LegFile,
+    background: &Background<N, B>,
+) -> Result<[f64; N], SetupError> {
+    let links = links::<N>(leg, |joint| joint.prior.as_ref().or(joint.truth.as_ref()))
+        .ok_or_else(|| SetupError::new(leg, "neither prior nor truth tells how heavy the leg is"))?;
+    Ok(largest_inertia(&background.model.chain, &prior_parameters(&links)))
 }

@@ -4,7 +4,9 @@ use comfy_table::{CellAlignment, Table, presets};
 
 use super::report::{FitReport, Number, RunReport};
 
-fn table(header: &[&str]) -> Table {
+/// An empty table without frames.
+#[must_use]
+pub fn headed(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header(header.to_vec());
     table
@@ -35,7 +37,7 @@ pub fn number(value: Number) -> String {
 /// What torque determines: value, sigma, truth and how many sigma lie between.
 #[must_use]
 pub fn base_parameters(run: &RunReport) -> Table {
-    let mut rows = table(&["base parameter", "value", "sigma", "unit", "truth", "error/sigma", "= sum of"]);
+    let mut rows = headed(&["base parameter", "value", "sigma", "unit", "truth", "error/sigma", "= sum of"]);
     for base in &run.base_parameters {
         let off = match (base.value.known(), base.truth.known(), base.sigma.known()) {
             (Some(value), Some(truth), Some(sigma)) if sigma > 0.0 => {
@@ -71,7 +73,7 @@ pub fn base_parameters(run: &RunReport) -> Table {
 /// Which of all parameters were measured.
 #[must_use]
 pub fn parameters(run: &RunReport) -> Table {
-    let mut rows = table(&["parameter", "value", "sigma", "unit", "status", "grouped with", "truth"]);
+    let mut rows = headed(&["parameter", "value", "sigma", "unit", "status", "grouped with", "truth"]);
     for parameter in &run.parameters {
         rows.add_row(vec![
             parameter.name.clone(),
@@ -94,7 +96,7 @@ pub fn parameters(run: &RunReport) -> Table {
 /// Torque errors on all motions.
 #[must_use]
 pub fn fits(run: &RunReport) -> Table {
-    let mut rows = table(&[
+    let mut rows = headed(&[
         "motion",
         "use",
         "joint",
