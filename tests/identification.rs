@@ -93,7 +93,7 @@ fn record(recorder: &mut LegRecorder, seconds: f64, noise_share: f64, seed: u64)
 fn estimate(seconds: f64, noise_share: f64, seed: u64, plan: Plan) -> Estimate<f32, BASE> {
     let mut recorder = LegRecorder::new(8.0).expect("fits");
     record(&mut recorder, seconds, noise_share, seed);
-    let record = recorder.record();
+    let record = recorder.finish();
     Problem::new(&record, &model()).least_squares(plan)
 }
 
@@ -167,8 +167,8 @@ fn ten_hours_of_rows_in_single_precision_keep_the_parameters() {
     assert!((residual / double.residual() - 1.0).abs() < 1e-3);
 }
 
-fn judge(recorder: &LegRecorder) -> Verdict {
-    let (record, model, thresholds) = (recorder.record(), model(), Thresholds::default());
+fn judge(recorder: &mut LegRecorder) -> Verdict {
+    let (record, model, thresholds) = (recorder.finish(), model(), Thresholds::default());
     let problem = Problem::new(&record, &model);
     thresholds
         .judge_input(&model, &record)
@@ -180,27 +180,29 @@ fn judge(recorder: &LegRecorder) -> Verdict {
 fn an_honest_motion_is_accepted() {
     let mut recorder = LegRecorder::new(8.0).expect("fits");
     record(&mut recorder, 21.0, 0.07, 3);
-    assert_eq!(judge(&recorder), Verdict::ACCEPTED);
+    assert_eq!(judge(&mut recorder), Verdict::ACCEPTED);
 }
 
 #[test]
 fn no_samples_and_a_short_log_are_refused_as_input() {
     let mut recorder = LegRecorder::new(8.0).expect("fits");
-    assert!(judge(&recorder).has(Reason::Input));
+    assert!(judge(&mut recorder).has(Reason::Input));
     record(&mut recorder, 1.5, 0.07, 3);
-    assert!(judge(&recorder).has(Reason::Input));
+    assert!(judge(&mut recorder).has(Reason::Input));
 }
 
 #[test]
 fn a_sample_that_is_not_a_number_is_refused_as_input_and_loses_only_its_window() {
     let mut recorder = LegRecorder::new(8.0).expect("fits");
     record(&mut recorder, 12.0, 0.07, 3);
+    recorder.break_off();
     let before = recorder.rows();
     assert!(recorder.push(&model(), &[f32::NAN, 0.0], &[0.0; 2]).is_none());
     record(&mut recorder, 12.0, 0.07, 4);
-    assert!(judge(&recorder).has(Reason::Input));
-    assert_eq!(recorder.rows(), before.map(|rows| 2 * rows));
-    let found = Problem::new(&recorder.record(), &model()).least_squares(Plan::OneTime);
+    let record_of_both = recorder.finish();
+    assert!(judge(&mut recorder).has(Reason::Input));
+    assert_eq!(record_of_both.rows, before.map(|rows| 2 * rows));
+    let found = Problem::new(&record_of_both, &model()).least_squares(Plan::OneTime);
     assert!((f64::from(found.values[0]) / true_base()[0] - 1.0).abs() < 0.1);
 }
 
@@ -216,7 +218,7 @@ fn a_joint_that_does_not_move_is_refused_as_unexcited() {
         let flicker = (3.8e-4 * (0.5 + 0.5 * normal.next()).round()) as f32;
         recorder.push(&model, &[state.q[0] as f32 + flicker, state.q[1] as f32], &noisy);
     }
-    assert!(judge(&recorder).has(Reason::Unexcited));
+    assert!(judge(&mut recorder).has(Reason::Unexcited));
 }
 
 #[test]
@@ -227,5 +229,5 @@ fn torque_that_feeds_itself_is_refused_as_unphysical() {
         let against = torque(&state).map(|exact| -exact as f32);
         recorder.push(&model, &state.q.map(|angle| angle as f32), &against);
     }
-    assert!(judge(&recorder).has(Reason::Unphysical));
+    assert!(judge(&mut recorder).has(Reason::Unphysical));
 }

@@ -210,7 +210,21 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     /// The samples that follow do not continue those before: windows start anew, rows already taken stay.
     pub fn break_off(&mut self) {
         self.smoother.clear();
-        self.filter.clear();
+        while let Some(rows) = self.filter.finish(&self.kernel) {
+            self.take(&rows);
+        }
+    }
+
+    fn take(&mut self, rows: &FilteredRows<T, N, B>) {
+        for joint in 0..N {
+            if rows.still[joint] > T::of(LARGEST_STILL_SHARE) {
+                continue;
+            }
+            self.rows[joint] = self.rows[joint].saturating_add(1);
+            self.pyramids[joint].insert(&rows.regressor[joint], rows.torque[joint]);
+            self.absolute[joint].add(real::abs(rows.torque[joint]));
+            self.squared[joint].add(rows.torque[joint] * rows.torque[joint]);
+        }
     }
 
     /// Takes one 500 Hz sample: D-H angles in rad, D-H torques in N m.
@@ -232,15 +246,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         }
         let rows = self.filter.push(&self.kernel, &model.rows(&instant)).filter(FilteredRows::is_finite);
         if let Some(rows) = &rows {
-            for joint in 0..N {
-                if rows.still[joint] > T::of(LARGEST_STILL_SHARE) {
-                    continue;
-                }
-                self.rows[joint] = self.rows[joint].saturating_add(1);
-                self.pyramids[joint].insert(&rows.regressor[joint], rows.torque[joint]);
-                self.absolute[joint].add(real::abs(rows.torque[joint]));
-                self.squared[joint].add(rows.torque[joint] * rows.torque[joint]);
-            }
+            self.take(rows);
         }
         Some(Progress { instant, rows })
     }
@@ -251,9 +257,13 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         self.rows
     }
 
-    /// What was recorded since [`Self::clear`].
-    #[must_use]
-    pub fn record(&self) -> Record<T, N, B> {
+    /// What was recorded since [`Self::clear`], the last samples included.
+    pub fn finish(&mut self) -> Record<T, N, B> {
+        self.break_off();
+        self.record()
+    }
+
+    fn record(&self) -> Record<T, N, B> {
         let rows = self.rows.map(|rows| T::of(f64::from(rows.max(1))));
         let instants = T::of(f64::from(self.instants.max(1)));
         Record {

@@ -9,7 +9,11 @@
 //! than 0.2. Instead of storing `TAPS` rows, each open output is a running sum: a new sample is added to the
 //! `taps / decimation` outputs whose windows contain it.
 //!
-//! Cost of one sample: `PENDING N (B + 1)` multiplications. Memory: as many numbers.
+//! At the ends of a motion windows are cut short instead of waited for: whatever weights are used, used on both sides
+//! they leave the equation true. Only the half without the centre may be missing, so a row keeps at least half of its
+//! information.
+//!
+//! Cost of one sample: `PENDING N (B + 2)` multiplications. Memory: as many numbers.
 
 use super::kernel::Kernel;
 use crate::real::{self, Real};
@@ -44,8 +48,8 @@ impl<T: Real, const N: usize, const B: usize> FilteredRows<T, N, B> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowFilter<T, const N: usize, const B: usize, const PENDING: usize> {
     open: [FilteredRows<T, N, B>; PENDING],
-    /// Samples since the start of the output that will be finished next.
-    age: usize,
+    /// Samples since the start of the window of the output that will be finished next; `None` before the first.
+    age: Option<usize>,
     /// Slot of that output.
     oldest: usize,
 }
@@ -54,7 +58,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
     /// No sample taken yet.
     #[must_use]
     pub fn new() -> Self {
-        Self { open: [FilteredRows::empty(); PENDING], age: 0, oldest: 0 }
+        Self { open: [FilteredRows::empty(); PENDING], age: None, oldest: 0 }
     }
 
     /// Open outputs that a kernel of `taps` weights needs.
@@ -77,24 +81,36 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
         rows: &FilteredRows<T, N, B>,
     ) -> Option<FilteredRows<T, N, B>> {
         let weights = kernel.weights();
+        // The first output's centre is the first sample: the half of its window before that is missing.
+        let age = self.age.unwrap_or(kernel.reach());
         let mut slot = self.oldest;
         for behind in 0..PENDING {
             // The output `behind` places younger began `behind * DECIMATION` samples later.
-            let Some(tap) = self.age.checked_sub(behind * DECIMATION) else { break };
+            let Some(tap) = age.checked_sub(behind * DECIMATION) else { break };
             if let (Some(output), Some(&weight)) = (self.open.get_mut(slot), weights.get(tap)) {
                 add_scaled(output, rows, weight, real::abs(weight) / kernel.absolute_sum());
             }
             slot = if slot + 1 >= PENDING { 0 } else { slot + 1 };
         }
-        self.age += 1;
-        if self.age < weights.len() {
-            return None;
+        self.age = Some(age + 1);
+        if age + 1 < weights.len() { None } else { self.take_oldest() }
+    }
+
+    /// After the last sample: the outputs whose centre was seen, one at a call; then `None`, and the filter is empty.
+    pub fn finish<const TAPS: usize>(&mut self, kernel: &Kernel<T, TAPS>) -> Option<FilteredRows<T, N, B>> {
+        if self.age.is_some_and(|age| age > kernel.reach()) {
+            return self.take_oldest();
         }
+        self.clear();
+        None
+    }
+
+    fn take_oldest(&mut self) -> Option<FilteredRows<T, N, B>> {
+        self.age = self.age.map(|age| age.saturating_sub(DECIMATION));
         let output = self.open.get_mut(self.oldest)?;
         let finished = *output;
         *output = FilteredRows::empty();
         self.oldest = if self.oldest + 1 >= PENDING { 0 } else { self.oldest + 1 };
-        self.age -= DECIMATION;
         Some(finished)
     }
 }
@@ -138,15 +154,28 @@ mod tests {
             let rows = FilteredRows { regressor: [[left, 1.0]], torque: [right], still: [0.0] };
             outputs.extend(filter.push(&kernel, &rows));
         }
-        assert_eq!(outputs.len(), (1500 - kernel.taps()) / DECIMATION + 1);
+        while let Some(output) = filter.finish(&kernel) {
+            outputs.push(output);
+        }
+        assert_eq!(
+            outputs.len(),
+            1500_usize.div_ceil(DECIMATION),
+            "one for every tenth sample, ends included"
+        );
+        assert_eq!(filter, RowFilter::new());
         for (number, output) in outputs.iter().enumerate() {
             let window = kernel.weights().iter().enumerate();
-            let (left, right) = window.fold((0.0, 0.0), |(left, right), (tap, weight)| {
-                let sample = signal(number * DECIMATION + tap);
-                (left + weight * sample.0, right + weight * sample.1)
-            });
+            let (mut left, mut right, mut ones) = (0.0, 0.0, 0.0);
+            for (tap, weight) in window {
+                let Some(index) = (number * DECIMATION + tap).checked_sub(kernel.reach()) else { continue };
+                if index < 1500 {
+                    let sample = signal(index);
+                    (left, right, ones) =
+                        (left + weight * sample.0, right + weight * sample.1, ones + weight);
+                }
+            }
             assert!((output.regressor[0][0] - left).abs() < 1e-12);
-            assert!((output.regressor[0][1] - 1.0).abs() < 1e-12);
+            assert!((output.regressor[0][1] - ones).abs() < 1e-12);
             assert!((output.torque[0] - right).abs() < 1e-12);
         }
     }

@@ -102,7 +102,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     }
 
     fn close(&mut self, segment: Segment) {
-        let record = self.recorder.record();
+        let record = self.recorder.finish();
         match segment {
             Segment::Training => {
                 let seed = self.swarm_seed;

@@ -120,9 +120,9 @@ struct ReplayArguments {
     /// The first fraction of each file trains, the rest validates.
     #[arg(long)]
     split: Option<f64>,
-    /// Where the low-pass of the filter chain is 3 dB down, Hz.
-    #[arg(long, default_value_t = super::setup::DEFAULT_BANDWIDTH_HZ)]
-    bandwidth: f64,
+    /// Where the low-pass of the filter chain is 3 dB down, Hz; the leg file's (8 unless it says otherwise) unless given.
+    #[arg(long)]
+    bandwidth: Option<f64>,
     /// Write measured and predicted torque of the validation part here.
     #[arg(long)]
     csv: Option<PathBuf>,
@@ -185,7 +185,7 @@ fn run_replay(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         files: arguments.files.clone(),
         validate: arguments.validate.clone(),
         split: arguments.split,
-        bandwidth_hz: arguments.bandwidth,
+        bandwidth_hz: arguments.bandwidth.unwrap_or(leg.bandwidth_hz),
         plan: arguments.common.plan.into(),
         prior: arguments.common.prior.unwrap_or_default(),
         swarm_seed: arguments.common.swarm_seed.unwrap_or(DEFAULT_SEED),

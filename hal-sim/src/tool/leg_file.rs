@@ -9,6 +9,7 @@
 //! | `name` | | required |
 //! | `gravity` | m/s^2, base frame | required |
 //! | `torque_noise_percent` | white, per logged 500 Hz sample, of each joint's mean absolute torque, on the logged current only | 0 |
+//! | `bandwidth_hz` | where the low-pass of the identification is 3 dB down | 8 |
 //! | `pushes` | `{ per_minute, torque_nm, duration_s }`: the wearer pushes at random | none |
 //! | `joint.name`, `joint.dh` | `dh = { alpha, a, d }`, modified D-H, rad and m | required |
 //! | `direction`, `zero_offset_deg` | joint angle = direction * anatomical angle + zero offset | 1, 0 |
@@ -60,6 +61,9 @@ pub struct LegFile {
     /// Noise of the logged torque in percent of each joint's mean absolute torque.
     #[serde(default)]
     pub torque_noise_percent: f64,
+    /// Where the low-pass of the identification is 3 dB down, Hz.
+    #[serde(default = "default_bandwidth")]
+    pub bandwidth_hz: f64,
     /// The wearer's pushes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pushes: Option<PushesFile>,
@@ -233,6 +237,10 @@ impl<'de> Deserialize<'de> for Reserved {
     fn deserialize<D: Deserializer<'de>>(_: D) -> Result<Self, D::Error> {
         Err(D::Error::custom("`[joint.motor]` is reserved for a later description of the motor"))
     }
+}
+
+fn default_bandwidth() -> f64 {
+    8.0
 }
 
 fn one() -> i64 {

@@ -94,7 +94,7 @@ pub fn replay<const N: usize, const B: usize>(
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
     feed(&mut recorder, &background, &training, |_, _, _| {});
     let thresholds = Thresholds::default();
-    let record = recorder.record();
+    let record = recorder.finish();
     let prior = background.prior.map(|prior| prior.map(|link| link.convert()));
     let mut solver = Solver::new(
         &background.device,
@@ -127,7 +127,7 @@ pub fn replay<const N: usize, const B: usize>(
             }),
         });
     });
-    let unused = recorder.record();
+    let unused = recorder.finish();
     let validated = !held_out.is_empty();
     let verdict = solver.judge(&background.device, &thresholds, validated.then_some(&unused).into_iter());
     if let Some(path) = &options.csv {

@@ -21,8 +21,6 @@ use super::analysis::Background;
 use super::leg_file::{JointFile, LegFile, LinkParameters, Switch};
 use super::motions::{Motions, motions};
 
-/// Bandwidth of the identification's low-pass unless another is asked for, Hz.
-pub const DEFAULT_BANDWIDTH_HZ: f64 = 8.0;
 /// Bandwidth of the position loop.
 const POSITION_BANDWIDTH: Hertz = Hertz(6.0);
 /// Seed unless another is asked for.
@@ -332,7 +330,7 @@ pub fn configuration<const N: usize, const B: usize>(
         plan,
         swarm_seed,
         thresholds: Thresholds::default(),
-        bandwidth_hz: DEFAULT_BANDWIDTH_HZ as f32,
+        bandwidth_hz: leg.bandwidth_hz as f32,
         excitation: motions.excitation,
         validation: motions.validation,
     };

@@ -156,6 +156,7 @@ pub fn leg_file(body_mass: f64) -> LegFile {
         name: format!("x2-wearer-{body_mass}kg"),
         gravity: [9.81, 0.0, 0.0],
         torque_noise_percent: 7.0,
+        bandwidth_hz: 16.0,
         pushes: None,
         joints: vec![hip, knee],
     }

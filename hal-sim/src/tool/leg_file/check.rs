@@ -65,6 +65,8 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
         top.within("gravity", component, -30.0, 30.0)?;
     }
     top.within("torque_noise_percent", leg.torque_noise_percent, 0.0, 100.0)?;
+    // Above 25 Hz the rows at 50 Hz would be independent, and noise would alias into them.
+    top.within("bandwidth_hz", leg.bandwidth_hz, 1.0, 25.0)?;
     if let Some(pushes) = &leg.pushes {
         let place = Place { joint: None, table: Some("pushes") };
         place.positive("per_minute", pushes.per_minute, 600.0)?;
