@@ -17,7 +17,8 @@
 //! reach 1.967 periods. The weights are samples of these functions: the discrete derivative is exact but for the
 //! aliased stopband, and the remaining 1e-5 of a constant, a ramp and a parabola are normalised away.
 //!
-//! Cost: built once; about 60 flops for each tap. Memory: 3 `TAPS` numbers.
+//! Cost: built once; about 60 flops for each tap. Memory: `TAPS` numbers for [`LowPass`], three times as many for
+//! [`Kernel`].
 
 use crate::real::{self, Real};
 
@@ -42,28 +43,27 @@ pub enum KernelError {
     TooShort,
 }
 
-/// Weights of a low-pass and of its first two derivatives, oldest sample first.
+/// The low-pass alone.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Kernel<T, const TAPS: usize> {
+pub struct LowPass<T, const TAPS: usize> {
     reach: usize,
-    low_pass: [T; TAPS],
-    first_derivative: [T; TAPS],
-    second_derivative: [T; TAPS],
+    /// `W` in samples.
+    half_width: T,
+    weights: [T; TAPS],
     energy: T,
-    absolute: T,
-    bandwidth_hz: T,
+    absolute_sum: T,
 }
 
-impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
+impl<T: Real, const TAPS: usize> LowPass<T, TAPS> {
     /// The low-pass that is 3 dB down at `bandwidth_hz`, for samples at `sample_rate_hz`.
     ///
     /// # Errors
     /// [`KernelError`] when the bandwidth is absurd or does not fit `TAPS`.
-    pub fn low_pass(bandwidth_hz: T, sample_rate_hz: T) -> Result<Self, KernelError> {
+    pub fn new(bandwidth_hz: T, sample_rate_hz: T) -> Result<Self, KernelError> {
         if !(bandwidth_hz > T::zero() && real::is_finite(bandwidth_hz)) {
             return Err(KernelError::Bandwidth);
         }
-        let half_width = T::of(REACH_IN_PERIODS) * sample_rate_hz / bandwidth_hz; // in samples
+        let half_width = T::of(REACH_IN_PERIODS) * sample_rate_hz / bandwidth_hz;
         let reach = whole_samples_below(half_width, TAPS);
         if reach < SMALLEST_REACH {
             return Err(KernelError::TooShort);
@@ -71,67 +71,20 @@ impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
         if 2 * reach + 1 > TAPS {
             return Err(KernelError::TooLong { needed: 2 * reach + 1 });
         }
-        let mut kernel = Self {
-            reach,
-            low_pass: [T::zero(); TAPS],
-            first_derivative: [T::zero(); TAPS],
-            second_derivative: [T::zero(); TAPS],
-            energy: T::zero(),
-            absolute: T::one(),
-            bandwidth_hz,
-        };
-        kernel.sample(half_width, sample_rate_hz);
-        kernel.normalise(sample_rate_hz);
-        Ok(kernel)
-    }
-
-    fn sample(&mut self, half_width: T, sample_rate_hz: T) {
-        let taps = self.taps();
-        let fundamental = T::of(core::f64::consts::PI) / half_width; // rad per sample
-        let rate = fundamental * sample_rate_hz; // rad/s
+        let zero = T::zero();
+        let mut low_pass =
+            Self { reach, half_width, weights: [zero; TAPS], energy: zero, absolute_sum: zero };
+        let taps = low_pass.taps();
         for index in 0..taps {
-            let offset = signed(index, self.reach);
-            let (sine_one, cosine_one) = real::sin_cos(fundamental * offset);
-            let (mut sine, mut cosine) = (T::zero(), T::one());
-            let (mut value, mut slope, mut curvature) = (T::of(0.5 * GAINS[0]), T::zero(), T::zero());
-            for (order, &gain) in GAINS.iter().enumerate().skip(1) {
-                (sine, cosine) =
-                    (sine * cosine_one + cosine * sine_one, cosine * cosine_one - sine * sine_one);
-                let angular = T::of(order as f64) * rate;
-                value += T::of(gain) * cosine;
-                slope += T::of(gain) * angular * sine;
-                curvature -= T::of(gain) * angular * angular * cosine;
-            }
-            // Weights of a correlation: the sign of the odd one is that of a rising ramp.
-            self.low_pass[index] = value / half_width;
-            self.first_derivative[index] = slope / half_width;
-            self.second_derivative[index] = curvature / half_width;
+            low_pass.weights[index] = function_and_derivatives(signed(index, reach), half_width, T::one()).0;
         }
-    }
-
-    /// Makes the response to 1, t and t^2/2 exact.
-    fn normalise(&mut self, sample_rate_hz: T) {
-        let taps = self.taps();
-        let gain: T = sum(&self.low_pass[..taps]);
-        self.low_pass[..taps].iter_mut().for_each(|weight| *weight /= gain);
-        let constant: T = sum(&self.second_derivative[..taps]);
-        let (mut ramp, mut parabola) = (T::zero(), T::zero());
-        for index in 0..taps {
-            let time = signed::<T>(index, self.reach) / sample_rate_hz;
-            self.second_derivative[index] -= constant * self.low_pass[index];
-            ramp += self.first_derivative[index] * time;
-            parabola += self.second_derivative[index] * time * time * T::of(0.5);
+        let gain: T = sum(low_pass.weights());
+        for weight in &mut low_pass.weights[..taps] {
+            *weight /= gain;
+            low_pass.energy += *weight * *weight;
+            low_pass.absolute_sum += real::abs(*weight);
         }
-        for index in 0..taps {
-            self.first_derivative[index] /= ramp;
-            self.second_derivative[index] /= parabola;
-        }
-        let mut absolute = T::zero();
-        for &weight in &self.low_pass[..taps] {
-            self.energy += weight * weight;
-            absolute += real::abs(weight);
-        }
-        self.absolute = absolute;
+        Ok(low_pass)
     }
 
     /// Taps to each side of the centre; the output belongs to the sample this many before the newest.
@@ -146,28 +99,96 @@ impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
         2 * self.reach + 1
     }
 
-    /// Sum of the squared low-pass weights: the variance that is left of white noise.
+    /// Oldest sample first.
+    #[must_use]
+    pub fn weights(&self) -> &[T] {
+        &self.weights[..self.taps()]
+    }
+
+    /// Sum of the squared weights: the variance that is left of white noise.
     #[must_use]
     pub fn energy(&self) -> T {
         self.energy
     }
 
-    /// Sum of the absolute low-pass weights, a little above one.
+    /// Sum of the absolute weights, a little above one.
     #[must_use]
     pub fn absolute_sum(&self) -> T {
-        self.absolute
+        self.absolute_sum
+    }
+}
+
+/// `h`, `h'` and `h''` a number of samples from the centre, derivatives with the sign of a correlation: that of a
+/// rising ramp.
+fn function_and_derivatives<T: Real>(offset: T, half_width: T, sample_rate_hz: T) -> (T, T, T) {
+    let fundamental = T::of(core::f64::consts::PI) / half_width; // rad per sample
+    let (sine_one, cosine_one) = real::sin_cos(fundamental * offset);
+    let (mut sine, mut cosine) = (T::zero(), T::one());
+    let (mut value, mut slope, mut curvature) = (T::of(0.5 * GAINS[0]), T::zero(), T::zero());
+    for (order, &gain) in GAINS.iter().enumerate().skip(1) {
+        (sine, cosine) = (sine * cosine_one + cosine * sine_one, cosine * cosine_one - sine * sine_one);
+        let angular = T::of(order as f64) * fundamental * sample_rate_hz;
+        value += T::of(gain) * cosine;
+        slope += T::of(gain) * angular * sine;
+        curvature -= T::of(gain) * angular * angular * cosine;
+    }
+    (value / half_width, slope / half_width, curvature / half_width)
+}
+
+/// A low-pass with its first two derivatives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kernel<T, const TAPS: usize> {
+    low_pass: LowPass<T, TAPS>,
+    first_derivative: [T; TAPS],
+    second_derivative: [T; TAPS],
+}
+
+impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
+    /// The low-pass that is 3 dB down at `bandwidth_hz`, for samples at `sample_rate_hz`, and its derivatives.
+    ///
+    /// # Errors
+    /// [`KernelError`] when the bandwidth is absurd or does not fit `TAPS`.
+    pub fn new(bandwidth_hz: T, sample_rate_hz: T) -> Result<Self, KernelError> {
+        let low_pass = LowPass::new(bandwidth_hz, sample_rate_hz)?;
+        let mut kernel =
+            Self { low_pass, first_derivative: [T::zero(); TAPS], second_derivative: [T::zero(); TAPS] };
+        for index in 0..kernel.taps() {
+            let offset = signed(index, kernel.reach());
+            let (_, slope, curvature) =
+                function_and_derivatives(offset, kernel.low_pass.half_width, sample_rate_hz);
+            (kernel.first_derivative[index], kernel.second_derivative[index]) = (slope, curvature);
+        }
+        kernel.normalise(sample_rate_hz);
+        Ok(kernel)
     }
 
-    /// Where the low-pass is 3 dB down, Hz.
-    #[must_use]
-    pub fn bandwidth_hz(&self) -> T {
-        self.bandwidth_hz
+    /// Makes the response to 1, t and t^2/2 exact.
+    fn normalise(&mut self, sample_rate_hz: T) {
+        let taps = self.taps();
+        let constant: T = sum(&self.second_derivative[..taps]);
+        let (mut ramp, mut parabola) = (T::zero(), T::zero());
+        for index in 0..taps {
+            let time = signed::<T>(index, self.reach()) / sample_rate_hz;
+            self.second_derivative[index] -= constant * self.low_pass.weights[index];
+            ramp += self.first_derivative[index] * time;
+            parabola += self.second_derivative[index] * time * time * T::of(0.5);
+        }
+        for index in 0..taps {
+            self.first_derivative[index] /= ramp;
+            self.second_derivative[index] /= parabola;
+        }
     }
 
-    /// Weights of the low-pass.
+    /// Taps to each side of the centre.
     #[must_use]
-    pub fn weights(&self) -> &[T] {
-        &self.low_pass[..self.taps()]
+    pub const fn reach(&self) -> usize {
+        self.low_pass.reach()
+    }
+
+    /// Number of weights of each of the three.
+    #[must_use]
+    pub const fn taps(&self) -> usize {
+        self.low_pass.taps()
     }
 
     /// Value, slope (1/s) and curvature (1/s^2) at the centre of a window of [`Self::taps`] samples, given in two
@@ -176,7 +197,7 @@ impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
     pub fn apply(&self, older: &[T], newer: &[T], centre: T) -> (T, T, T) {
         // Differences from the centre: what the weights must cancel is cancelled before it can cost digits.
         let (mut value, mut slope, mut curvature) = (T::zero(), T::zero(), T::zero());
-        let weights = self.low_pass.iter().zip(&self.first_derivative).zip(&self.second_derivative);
+        let weights = self.low_pass.weights.iter().zip(&self.first_derivative).zip(&self.second_derivative);
         for (&sample, ((&low, &first), &second)) in older.iter().chain(newer).zip(weights) {
             let difference = sample - centre;
             value += low * difference;
@@ -209,7 +230,7 @@ mod tests {
     extern crate std;
 
     fn response<T: Real>(bandwidth: f64, frequency: f64) -> (f64, f64, f64) {
-        let kernel = Kernel::<T, 512>::low_pass(T::of(bandwidth), T::of(500.0)).expect("fits");
+        let kernel = Kernel::<T, 512>::new(T::of(bandwidth), T::of(500.0)).expect("fits");
         let omega = 2.0 * core::f64::consts::PI * frequency;
         let mut window = [T::zero(); 512];
         let mut sine_window = [T::zero(); 512];
@@ -254,11 +275,11 @@ mod tests {
 
     #[test]
     fn absurd_bandwidths_are_named_errors() {
-        type Short = Kernel<f32, 64>;
-        assert_eq!(Short::low_pass(f32::NAN, 500.0), Err(KernelError::Bandwidth));
-        assert_eq!(Short::low_pass(0.0, 500.0), Err(KernelError::Bandwidth));
-        assert_eq!(Short::low_pass(200.0, 500.0), Err(KernelError::TooShort));
-        assert!(matches!(Short::low_pass(1e-30, 500.0), Err(KernelError::TooLong { .. })));
-        assert!(matches!(Short::low_pass(8.0, 500.0), Err(KernelError::TooLong { .. })));
+        type Short = LowPass<f32, 64>;
+        assert_eq!(Short::new(f32::NAN, 500.0), Err(KernelError::Bandwidth));
+        assert_eq!(Short::new(0.0, 500.0), Err(KernelError::Bandwidth));
+        assert_eq!(Short::new(200.0, 500.0), Err(KernelError::TooShort));
+        assert!(matches!(Short::new(1e-30, 500.0), Err(KernelError::TooLong { .. })));
+        assert!(matches!(Short::new(8.0, 500.0), Err(KernelError::TooLong { .. })));
     }
 }

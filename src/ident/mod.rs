@@ -1,7 +1,7 @@
 //! Identification: from logged angles and currents to parameters, their uncertainty, and a verdict.
 //!
 //! ```text
-//! q, tau 500 Hz -> smoothing: h, h', h'' -> regressor -> rows: the same h, 50 Hz -> factor   (record)
+//! q, tau 500 Hz -> smoothing: g, g', g'' -> regressor; regressor and tau -> rows: one h, 50 Hz -> factor   (record)
 //! factor -> estimate: noise weights, least squares, covariance
 //!        -> search: beetle swarm in the prior's box (bounds), against the constrained optimum (constrained)
 //!        -> completion: fourteen parameters of every joint, each with its status
@@ -28,9 +28,12 @@ pub use completion::{Status, complete, status};
 pub use constrained::{ParameterBox, least_squares_in_box};
 pub use estimate::{Estimate, Plan, Problem, Stage, noise};
 pub use factor::{Factor, Pyramid};
-pub use kernel::{Kernel, KernelError};
-pub use record::{LARGEST_STILL_SHARE, Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ, TorqueSize};
-pub use rows::{DECIMATION, FilteredRows, RowFilter};
+pub use kernel::{Kernel, KernelError, LowPass};
+pub use record::{
+    LARGEST_STILL_SHARE, Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS,
+    TorqueSize,
+};
+pub use rows::{DECIMATION, Ends, FilteredRows, RowFilter};
 pub use search::{SearchState, SwarmSearch};
 pub use smoothing::{Smoothed, Smoother};
 pub use solver::Solver;

@@ -9,13 +9,14 @@
 //! than 0.2. Instead of storing `TAPS` rows, each open output is a running sum: a new sample is added to the
 //! `taps / decimation` outputs whose windows contain it.
 //!
-//! At the ends of a motion windows are cut short instead of waited for: whatever weights are used, used on both sides
-//! they leave the equation true. Only the half without the centre may be missing, so a row keeps at least half of its
-//! information.
+//! At the ends of a motion windows may be cut short ([`Ends::Cut`]): whatever weights are used, used on both sides they
+//! leave the equation true, and no information is lost. Only the half without the centre may be missing. A cut window
+//! has a sharp edge and lets through what the low-pass keeps out, so errors are measured on whole windows
+//! ([`Ends::Whole`]).
 //!
 //! Cost of one sample: `PENDING N (B + 2)` multiplications. Memory: as many numbers.
 
-use super::kernel::Kernel;
+use super::kernel::LowPass;
 use crate::real::{self, Real};
 
 /// Samples from one output to the next: 500 Hz to 50 Hz.
@@ -44,6 +45,15 @@ impl<T: Real, const N: usize, const B: usize> FilteredRows<T, N, B> {
     }
 }
 
+/// What happens where a motion begins and ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ends {
+    /// Windows are cut short: nothing is lost.
+    Cut,
+    /// Only whole windows count.
+    Whole,
+}
+
 /// Open outputs of the second stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowFilter<T, const N: usize, const B: usize, const PENDING: usize> {
@@ -52,13 +62,14 @@ pub struct RowFilter<T, const N: usize, const B: usize, const PENDING: usize> {
     age: Option<usize>,
     /// Slot of that output.
     oldest: usize,
+    ends: Ends,
 }
 
 impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T, N, B, PENDING> {
     /// No sample taken yet.
     #[must_use]
-    pub fn new() -> Self {
-        Self { open: [FilteredRows::empty(); PENDING], age: None, oldest: 0 }
+    pub fn new(ends: Ends) -> Self {
+        Self { open: [FilteredRows::empty(); PENDING], age: None, oldest: 0, ends }
     }
 
     /// Open outputs that a kernel of `taps` weights needs.
@@ -69,26 +80,29 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
 
     /// Forgets all samples.
     pub fn clear(&mut self) {
-        *self = Self::new();
+        *self = Self::new(self.ends);
     }
 
     /// Takes the rows of one 500 Hz sample; every tenth call returns a finished output once the window is full.
     ///
-    /// An output needs `outputs_needed(kernel.taps()) <= PENDING`; the recorder that owns both checks it.
+    /// An output needs `outputs_needed(low_pass.taps()) <= PENDING`; the recorder that owns both checks it.
     pub fn push<const TAPS: usize>(
         &mut self,
-        kernel: &Kernel<T, TAPS>,
+        low_pass: &LowPass<T, TAPS>,
         rows: &FilteredRows<T, N, B>,
     ) -> Option<FilteredRows<T, N, B>> {
-        let weights = kernel.weights();
-        // The first output's centre is the first sample: the half of its window before that is missing.
-        let age = self.age.unwrap_or(kernel.reach());
+        let weights = low_pass.weights();
+        let age = self.age.unwrap_or(match self.ends {
+            // The first output's centre is the first sample.
+            Ends::Cut => low_pass.reach(),
+            Ends::Whole => 0,
+        });
         let mut slot = self.oldest;
         for behind in 0..PENDING {
             // The output `behind` places younger began `behind * DECIMATION` samples later.
             let Some(tap) = age.checked_sub(behind * DECIMATION) else { break };
             if let (Some(output), Some(&weight)) = (self.open.get_mut(slot), weights.get(tap)) {
-                add_scaled(output, rows, weight, real::abs(weight) / kernel.absolute_sum());
+                add_scaled(output, rows, weight, real::abs(weight) / low_pass.absolute_sum());
             }
             slot = if slot + 1 >= PENDING { 0 } else { slot + 1 };
         }
@@ -97,8 +111,11 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
     }
 
     /// After the last sample: the outputs whose centre was seen, one at a call; then `None`, and the filter is empty.
-    pub fn finish<const TAPS: usize>(&mut self, kernel: &Kernel<T, TAPS>) -> Option<FilteredRows<T, N, B>> {
-        if self.age.is_some_and(|age| age > kernel.reach()) {
+    pub fn finish<const TAPS: usize>(
+        &mut self,
+        low_pass: &LowPass<T, TAPS>,
+    ) -> Option<FilteredRows<T, N, B>> {
+        if self.ends == Ends::Cut && self.age.is_some_and(|age| age > low_pass.reach()) {
             return self.take_oldest();
         }
         self.clear();
@@ -112,12 +129,6 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
         *output = FilteredRows::empty();
         self.oldest = if self.oldest + 1 >= PENDING { 0 } else { self.oldest + 1 };
         Some(finished)
-    }
-}
-
-impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Default for RowFilter<T, N, B, PENDING> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -145,16 +156,16 @@ mod tests {
 
     #[test]
     fn running_sums_equal_the_convolution_at_every_tenth_sample() {
-        let kernel = Kernel::<f64, 256>::low_pass(8.0, 500.0).expect("fits");
-        let mut filter = RowFilter::<f64, 1, 2, 26>::new();
+        let low_pass = LowPass::<f64, 256>::new(8.0, 500.0).expect("fits");
+        let mut filter = RowFilter::<f64, 1, 2, 26>::new(Ends::Cut);
         let signal = |index: usize| ((index * 7919 % 1013) as f64 / 1013.0, (index % 17) as f64);
         let mut outputs = Vec::new();
         for index in 0..1500 {
             let (left, right) = signal(index);
             let rows = FilteredRows { regressor: [[left, 1.0]], torque: [right], still: [0.0] };
-            outputs.extend(filter.push(&kernel, &rows));
+            outputs.extend(filter.push(&low_pass, &rows));
         }
-        while let Some(output) = filter.finish(&kernel) {
+        while let Some(output) = filter.finish(&low_pass) {
             outputs.push(output);
         }
         assert_eq!(
@@ -162,12 +173,12 @@ mod tests {
             1500_usize.div_ceil(DECIMATION),
             "one for every tenth sample, ends included"
         );
-        assert_eq!(filter, RowFilter::new());
+        assert_eq!(filter, RowFilter::new(Ends::Cut));
         for (number, output) in outputs.iter().enumerate() {
-            let window = kernel.weights().iter().enumerate();
+            let window = low_pass.weights().iter().enumerate();
             let (mut left, mut right, mut ones) = (0.0, 0.0, 0.0);
             for (tap, weight) in window {
-                let Some(index) = (number * DECIMATION + tap).checked_sub(kernel.reach()) else { continue };
+                let Some(index) = (number * DECIMATION + tap).checked_sub(low_pass.reach()) else { continue };
                 if index < 1500 {
                     let sample = signal(index);
                     (left, right, ones) =

@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn a_slow_sine_comes_back_with_its_derivatives_at_the_right_instant() {
-        let kernel = Kernel::<f32, 256>::low_pass(8.0, 500.0).expect("fits");
+        let kernel = Kernel::<f32, 256>::new(8.0, 500.0).expect("fits");
         let mut smoother = Smoother::<f32, 1, 256>::new();
         let omega = 2.0 * core::f32::consts::PI * 0.5;
         let mut seen = 0;

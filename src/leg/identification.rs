@@ -5,7 +5,7 @@ use super::configuration::{LegConfiguration, LegError};
 use super::control::LoggedSample;
 use super::model::IdentifiedModel;
 use crate::ident::{
-    LinkPrior, Plan, Reason, Record, Recorder, RowModel, SearchState, Solver, Thresholds, Verdict,
+    Ends, LinkPrior, Plan, Reason, Record, Recorder, RowModel, SearchState, Solver, Thresholds, Verdict,
 };
 
 /// What identification tells control.
@@ -92,7 +92,10 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     }
 
     fn open(&mut self, segment: Segment) {
-        self.recorder.clear();
+        self.recorder.clear(match segment {
+            Segment::Training => Ends::Cut,
+            Segment::Validation(_) => Ends::Whole,
+        });
         self.work = Work::Recording(segment);
         if segment == Segment::Training {
             self.solver = None;
@@ -160,7 +163,6 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         self.report_due = false;
         if self.work != Work::Idle {
             self.work = Work::Idle;
-            self.recorder.clear();
         }
     }
 

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use scarab::ident::{KernelError, Plan, Recorder, SearchState, Solver, Thresholds};
+use scarab::ident::{Ends, KernelError, Plan, Recorder, SearchState, Solver, Thresholds};
 use scarab::model::AnatomicalJoint;
 
 use super::analysis::{Background, Circumstances, Motion};
@@ -113,7 +113,7 @@ pub fn replay<const N: usize, const B: usize>(
         }
     }
 
-    recorder.clear();
+    recorder.clear(Ends::Whole);
     let mut predictions = Vec::new();
     let values = solver.estimate().values;
     feed(&mut recorder, &background, &held_out, |file, time_s, instant| {
@@ -177,7 +177,7 @@ fn feed<const N: usize, const B: usize>(
 ) {
     for (number, samples) in files.iter().enumerate() {
         recorder.break_off();
-        let reach = recorder.kernel().reach();
+        let reach = recorder.delay();
         for (index, (position, torque)) in samples.position.iter().zip(&samples.torque).enumerate() {
             if let Some(progress) = recorder.push(&background.device, position, torque) {
                 let time_s = samples.start_s + (index - reach) as f64 / 500.0;

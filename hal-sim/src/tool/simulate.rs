@@ -3,7 +3,10 @@
 use std::time::Instant;
 
 use scarab::hal::{LegDrives, Sample};
-use scarab::ident::{Factor, FilteredRows, LARGEST_STILL_SHARE, Plan, RowFilter, Smoothed, Smoother};
+use scarab::ident::{
+    Ends, Factor, FilteredRows, Kernel, LARGEST_STILL_SHARE, LowPass, Plan, RowFilter, SAMPLE_RATE_HZ,
+    SMOOTHING_BANDWIDTHS, Smoothed, Smoother,
+};
 use scarab::leg::{Activity, ControlRequest, Leg, LegConfiguration, LoggedSample, Segment, Step};
 use scarab::motion::Periodic;
 use scarab::safety::{DriveState, PowerRequest};
@@ -62,7 +65,12 @@ struct TruthChain<const N: usize, const B: usize> {
 
 impl<const N: usize, const B: usize> TruthChain<N, B> {
     fn new() -> Self {
-        Self { torque: Box::default(), sticking: Box::default(), filter: Box::default(), rows: Vec::new() }
+        Self {
+            torque: Box::default(),
+            sticking: Box::default(),
+            filter: Box::new(RowFilter::new(Ends::Whole)),
+            rows: Vec::new(),
+        }
     }
 
     fn start(&mut self) -> Vec<FilteredRows<f32, N, B>> {
@@ -73,12 +81,12 @@ impl<const N: usize, const B: usize> TruthChain<N, B> {
     }
 
     fn push(&mut self, context: &Context<N, B>, position: &[f32; N], torque: &[f32; N], sticking: &[f32; N]) {
-        let sticking = self.sticking.push(&context.kernel, position, sticking);
-        let instant: Option<Smoothed<f32, N>> = self.torque.push(&context.kernel, position, torque);
+        let sticking = self.sticking.push(&context.smoothing, position, sticking);
+        let instant: Option<Smoothed<f32, N>> = self.torque.push(&context.smoothing, position, torque);
         if let (Some(instant), Some(sticking)) = (instant, sticking) {
             let mut rows = context.background.device.rows(&instant);
             rows.still = sticking.torque;
-            self.rows.extend(self.filter.push(&context.kernel, &rows));
+            self.rows.extend(self.filter.push(&context.low_pass, &rows));
         }
     }
 }
@@ -109,7 +117,8 @@ struct Context<const N: usize, const B: usize> {
     background: Background<N, B>,
     configuration: LegConfiguration<N, B>,
     motions: Motions<N>,
-    kernel: scarab::ident::Kernel<f32, TAPS>,
+    smoothing: Kernel<f32, TAPS>,
+    low_pass: LowPass<f32, TAPS>,
     gravity: [f32; 3],
     /// Standard deviation of each joint's logged torque, N m.
     noise: [f64; N],
@@ -190,8 +199,10 @@ fn context<const N: usize, const B: usize>(
 ) -> Result<Context<N, B>, super::error::ToolError> {
     let background = background::<N, B>(leg, options.prior, options.seed)?;
     let (configuration, motions) = configuration(leg, &background, options.plan, options.swarm_seed)?;
-    let kernel = scarab::ident::Kernel::low_pass(configuration.bandwidth_hz, 500.0)
-        .map_err(|_| SetupError::new(leg, "the filter does not fit the device"))?;
+    let unfit = |_| SetupError::new(leg, "the filter does not fit the device");
+    let (bandwidth, rate) = (configuration.bandwidth_hz, SAMPLE_RATE_HZ as f32);
+    let smoothing = Kernel::new(SMOOTHING_BANDWIDTHS as f32 * bandwidth, rate).map_err(unfit)?;
+    let low_pass = LowPass::new(bandwidth, rate).map_err(unfit)?;
     let world = World::<N>::new(&leg.description()?, options.seed);
     let percent = options.torque_noise_percent.unwrap_or(leg.torque_noise_percent);
     let mean = mean_absolute_torque(leg, &world, &motions.excitation);
@@ -200,7 +211,7 @@ fn context<const N: usize, const B: usize>(
         (percent / 100.0 * mean[joint]).hypot(own)
     });
     let gravity = leg.gravity.map(|element| element as f32);
-    Ok(Context { background, configuration, motions, kernel, gravity, noise })
+    Ok(Context { background, configuration, motions, smoothing, low_pass, gravity, noise })
 }
 
 /// Of the motor torque along a motion, anatomical.
