@@ -196,11 +196,11 @@ impl<const N: usize> Control<N> {
     pub fn receive(&mut self, finding: Finding<N>) {
         match finding {
             Finding::Solved => {
-                if let Activity::Identify(IdentifyPhase::Settle | IdentifyPhase::Solve) = self.activity {
-                    if let Some(first) = self.validation.first().copied() {
-                        let phase = IdentifyPhase::Validate { motion: 0, step: Step::Approach };
-                        self.approach(Activity::Identify(phase), first);
-                    }
+                if let (Activity::Identify(IdentifyPhase::Settle | IdentifyPhase::Solve), Some(first)) =
+                    (self.activity, self.validation.first().copied())
+                {
+                    let phase = IdentifyPhase::Validate { motion: 0, step: Step::Approach };
+                    self.approach(Activity::Identify(phase), first);
                 }
             }
             Finding::Judged { verdict, model } => {

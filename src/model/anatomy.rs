@@ -33,6 +33,13 @@ pub struct AnatomicalJoint<T> {
     zero_offset: T,
 }
 
+impl AnatomicalJoint<f32> {
+    /// Both angles are the same.
+    pub const SAME: Self = Self { direction: 1.0, zero_offset: 0.0 };
+    /// The chain's angle grows against the anatomical one.
+    pub const OPPOSITE: Self = Self { direction: -1.0, zero_offset: 0.0 };
+}
+
 impl<T: Real> AnatomicalJoint<T> {
     /// A joint of `direction` 1 or -1 whose chain angle is `zero_offset` (rad) at the anatomical zero.
     ///

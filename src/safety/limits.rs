@@ -123,7 +123,7 @@ pub(crate) mod tests {
     pub(crate) const HIP: JointLimits = JointLimits {
         low: Radian(0.038),
         high: Radian(0.876),
-        speed: RadianPerSecond(3.14),
+        speed: RadianPerSecond(3.125),
         torque: NewtonMetre(100.0),
         current: Ampere(80.0),
         torque_per_ampere: NewtonMetrePerAmpere(1.5),

@@ -30,7 +30,7 @@ pub use controller::{Controller, ControllerGains};
 pub use feedforward::{NoModel, TorqueModel, smoothed_sign};
 pub use logging::{LOG_RATE_HZ, LogAverager, LogSample, TICKS_PER_LOG};
 pub use observer::{Observer, ObserverGains};
-pub use scale::{Direction, JointScale};
+pub use scale::JointScale;
 pub use tick::{Servo, ServoCommand, ServoOutput};
 
 /// Ticks per second.

@@ -98,6 +98,7 @@ impl Observer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::real::sqrt;
     use crate::real::{sin_cos, sqrt};
     use core::f64::consts::TAU;
     use rand_core::{Rng, SeedableRng};
@@ -149,7 +150,7 @@ mod tests {
     #[test]
     fn position_and_velocity_follow_as_far_as_stated() {
         // The discrete loop differs from the continuous figures by some w T / 4: 4 %.
-        let half_power = 0.5_f64.sqrt();
+        let half_power = core::f64::consts::FRAC_1_SQRT_2;
         assert!((response(64.5)[1].0 - half_power).abs() < 0.03, "{:?}", response(64.5));
         assert!((response(250.0)[0].0 - half_power).abs() < 0.06, "{:?}", response(250.0));
     }
@@ -217,7 +218,7 @@ mod tests {
             }
         }
         let deviation = sqrt(square / f64::from(ticks - 1000));
-        let gain = deviation / (1001.0 * 1001.0 / 12.0_f64).sqrt();
+        let gain = deviation / sqrt(1001.0 * 1001.0 / 12.0);
         // 200,000 samples, correlated over some 13: 1 %, and three times that.
         assert!((gain / 124.1 - 1.0).abs() < 0.03, "{gain}");
         assert!((sum / f64::from(ticks)).abs() < 1000.0);

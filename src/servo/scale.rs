@@ -8,38 +8,17 @@
 //! Counts, currents and the sign they have are the joint's (anatomical, flexion positive); `q`, `tau` are the
 //! model's (D-H). Counts are exact in `f32` up to 2^24, some 40 turns of a joint with 409,600 counts per turn.
 
+use crate::model::AnatomicalJoint;
 use crate::real::{abs, is_finite};
 use crate::units::{Ampere, NewtonMetre, NewtonMetrePerAmpere, Radian};
-
-/// Sense of a joint's own angle in the model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
-    /// The joint's angle grows with the model's.
-    Same,
-    /// The joint's angle grows against the model's.
-    Opposite,
-}
-
-impl Direction {
-    /// 1 or -1.
-    #[must_use]
-    pub const fn sign(self) -> f32 {
-        match self {
-            Self::Same => 1.0,
-            Self::Opposite => -1.0,
-        }
-    }
-}
 
 /// The conversion of one joint; see the module's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointScale {
     /// Joint angle per encoder count, positive; gear ratio and counts per turn included.
     pub radian_per_count: Radian,
-    /// Sense of the joint's angle, and of its torque, in the model.
-    pub direction: Direction,
-    /// The model's angle where the joint's angle is zero.
-    pub zero_offset: Radian,
+    /// Sense and zero of the joint's angle in the model.
+    pub anatomy: AnatomicalJoint<f32>,
     /// Joint torque per motor current, positive.
     pub torque_per_ampere: NewtonMetrePerAmpere,
 }
@@ -48,7 +27,7 @@ impl JointScale {
     /// The model's angle of a place given in counts; fractions of a count are welcome.
     #[must_use]
     pub fn position(&self, counts: f32) -> Radian {
-        Radian(self.signed_radian_per_count() * counts + self.zero_offset.0)
+        Radian(self.anatomy.angle_to_chain(self.radian_per_count.0 * counts))
     }
 
     /// The model's torque of a motor current.
@@ -60,20 +39,20 @@ impl JointScale {
     /// The model's angle per count, of either sign.
     #[must_use]
     pub fn signed_radian_per_count(&self) -> f32 {
-        self.direction.sign() * self.radian_per_count.0
+        self.anatomy.to_chain(self.radian_per_count.0)
     }
 
     /// The model's torque per motor current, of either sign.
     #[must_use]
     pub fn signed_torque_per_ampere(&self) -> NewtonMetrePerAmpere {
-        self.torque_per_ampere * self.direction.sign()
+        NewtonMetrePerAmpere(self.anatomy.to_chain(self.torque_per_ampere.0))
     }
 
     /// Between a ten-millionth and a tenth of a radian per count, offset within 2 pi, a positive torque constant.
     pub(super) fn is_sensible(&self) -> bool {
         let step = self.radian_per_count.0;
         (1e-7..=0.1).contains(&step)
-            && abs(self.zero_offset.0) <= core::f32::consts::TAU
+            && abs(self.anatomy.zero_offset()) <= core::f32::consts::TAU
             && self.torque_per_ampere.0 > 0.0
             && is_finite(self.torque_per_ampere.0)
     }
@@ -86,13 +65,12 @@ pub(super) mod tests {
     /// The default leg: 8,192 counts at the motor, 50:1, 1.5 N m/A; the hip's sense is the model's.
     pub(in crate::servo) const HIP: JointScale = JointScale {
         radian_per_count: Radian(core::f32::consts::TAU / 409_600.0),
-        direction: Direction::Same,
-        zero_offset: Radian(0.0),
+        anatomy: AnatomicalJoint::SAME,
         torque_per_ampere: NewtonMetrePerAmpere(1.5),
     };
 
     /// As [`HIP`], but flexion is negative in the model.
-    pub(in crate::servo) const KNEE: JointScale = JointScale { direction: Direction::Opposite, ..HIP };
+    pub(in crate::servo) const KNEE: JointScale = JointScale { anatomy: AnatomicalJoint::OPPOSITE, ..HIP };
 
     #[test]
     fn angle_and_torque_change_sign_together_and_power_does_not() {
@@ -100,7 +78,8 @@ pub(super) mod tests {
         // A radian is 65,189.9 counts.
         assert!((HIP.position(flexed).0 - 1.0).abs() < 1e-5 && (KNEE.position(flexed).0 + 1.0).abs() < 1e-5);
         assert_eq!((HIP.torque(current), KNEE.torque(current)), (NewtonMetre(15.0), NewtonMetre(-15.0)));
-        let offset = JointScale { zero_offset: Radian(0.5), ..KNEE };
+        let anatomy = AnatomicalJoint::new(-1, 0.5).expect("a direction and a finite offset");
+        let offset = JointScale { anatomy, ..KNEE };
         assert_eq!(offset.position(0.0), Radian(0.5));
     }
 

@@ -9,6 +9,11 @@
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
 //! | [`error`] | bad input and exit codes |
 
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the tool runs on the host only and may use std's mathematics"
+)]
+
 pub mod analysis;
 pub mod cli;
 pub mod error;

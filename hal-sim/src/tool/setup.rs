@@ -11,7 +11,7 @@ use scarab::model::{
 };
 
 use scarab::motion::JointEnvelope;
-use scarab::servo::{Direction, JointConfiguration, JointScale};
+use scarab::servo::{JointConfiguration, JointScale};
 use scarab::units::{
     Ampere, Hertz, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
     RadianPerSecondSquared,
@@ -186,7 +186,7 @@ pub fn links<const N: usize>(
 }
 
 /// Keeps the signs of a wrong prior apart from the noise of the same seed.
-const PRIOR_STREAM: u64 = 0x7072_696f_72;
+const PRIOR_STREAM: u64 = 0x0070_7269_6f72;
 
 /// A prior that is off by `percent` in every number, signs from the seed, kept physically possible; offset zero.
 #[must_use]
@@ -289,18 +289,16 @@ pub fn configuration<const N: usize, const B: usize>(
     swarm_seed: u64,
 ) -> Result<(LegConfiguration<N, B>, Motions<N>), SetupError> {
     let inertia = servo_inertia(leg, background)?;
+    let anatomy = anatomy::<N>(leg)?;
     let joints: [JointConfiguration; N] = core::array::from_fn(|index| {
         let joint = &leg.joints[index];
-        let opposite = joint.direction < 0;
-        let sign = if opposite { -1.0 } else { 1.0 };
-        let ends = joint.range_deg.map(|end| (sign * end + joint.zero_offset_deg).to_radians() as f32);
+        let ends = joint.range_deg.map(|end| anatomy[index].angle_to_chain(end.to_radians()) as f32);
         JointConfiguration {
             scale: JointScale {
                 radian_per_count: Radian(
                     (core::f64::consts::TAU / (f64::from(joint.encoder.counts) * joint.encoder.ratio)) as f32,
                 ),
-                direction: if opposite { Direction::Opposite } else { Direction::Same },
-                zero_offset: Radian(joint.zero_offset_deg.to_radians() as f32),
+                anatomy: anatomy[index].convert(),
                 torque_per_ampere: NewtonMetrePerAmpere(joint.torque_per_ampere as f32),
             },
             low: Radian(ends[0].min(ends[1])),

@@ -309,7 +309,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         }
         if logged.segment.is_some() {
             let direction =
-                |joint: usize| f64::from(self.context.configuration.joints[joint].scale.direction.sign());
+                |joint: usize| f64::from(self.context.configuration.joints[joint].scale.anatomy.direction());
             let torque = core::array::from_fn(|joint| (direction(joint) * self.torque_sum[joint]) as f32);
             let sticking = self.sticking_sum.map(|share| share as f32);
             self.chain.push(self.context, &logged.sample.position_rad, &torque, &sticking);
@@ -325,10 +325,10 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
     fn inform(&mut self, pair: &Pair<N, B>) {
         let truth = pair.world.truth();
         let scales = self.context.configuration.joints.map(|joint| joint.scale);
-        let sign = |joint: usize| f64::from(scales[joint].direction.sign());
+        let sign = |joint: usize| f64::from(scales[joint].anatomy.direction());
         let rows = self.context.background.model.rows(&Smoothed {
             position: core::array::from_fn(|joint| {
-                sign(joint) * truth.position[joint] + f64::from(scales[joint].zero_offset.0)
+                sign(joint) * truth.position[joint] + f64::from(scales[joint].anatomy.zero_offset())
             }),
             velocity: core::array::from_fn(|joint| sign(joint) * truth.velocity[joint]),
             acceleration: core::array::from_fn(|joint| sign(joint) * truth.acceleration[joint]),
@@ -450,8 +450,8 @@ fn tracking_error<const N: usize, const B: usize>(
             Activity::Track(Step::Run) => {
                 for joint in 0..N {
                     let scale = &scales[joint];
-                    let angle =
-                        f64::from(scale.direction.sign()) * truth[joint] + f64::from(scale.zero_offset.0);
+                    let angle = f64::from(scale.anatomy.direction()) * truth[joint]
+                        + f64::from(scale.anatomy.zero_offset());
                     squared[joint] += (f64::from(output.motion.position_rad[joint]) - angle).powi(2);
                 }
                 count += 1;

@@ -149,7 +149,11 @@ fn bandwidth(with_velocity: bool) -> f64 {
     let (mut low, mut high) = (1.0, 64.0);
     for _ in 0..10 {
         let middle = sqrt(low * high);
-        if closed_loop(middle, with_velocity).0 > 0.5_f64.sqrt() { low = middle } else { high = middle }
+        if closed_loop(middle, with_velocity).0 > core::f64::consts::FRAC_1_SQRT_2 {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     low
 }

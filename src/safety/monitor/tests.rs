@@ -1,0 +1,190 @@
+//! What the monitor promises.
+
+use super::*;
+use crate::safety::limits::tests::{HIP, KNEE};
+
+const RATE_HZ: u32 = 4000;
+const MIDDLE: [Radian; 2] = [Radian(0.45), Radian(-0.9)];
+const STANDING: Observation<2> = Observation {
+    position: MIDDLE,
+    velocity: [RadianPerSecond::ZERO; 2],
+    current: [Ampere::ZERO; 2],
+    rejected: [false; 2],
+};
+
+fn request(torque: f32) -> Request<2> {
+    Request { torque: [NewtonMetre(torque); 2], power: None }
+}
+
+fn ask(power: PowerRequest) -> Request<2> {
+    Request { power: Some(power), ..request(0.0) }
+}
+
+fn enabled() -> Monitor<2> {
+    let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), RATE_HZ);
+    for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
+        let _ = monitor.decide(&STANDING, &ask(power));
+    }
+    assert_eq!(monitor.state(), DriveState::OperationEnabled);
+    monitor
+}
+
+#[test]
+fn nothing_that_is_not_finite_reaches_the_bridge() {
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for joint in 0..2 {
+            for field in 0..4 {
+                let (mut observation, mut wanted) = (STANDING, request(5.0));
+                match field {
+                    0 => observation.position[joint].0 = bad,
+                    1 => observation.velocity[joint].0 = bad,
+                    2 => observation.current[joint].0 = bad,
+                    _ => wanted.torque[joint].0 = bad,
+                }
+                let mut monitor = enabled();
+                let decision = monitor.decide(&observation, &wanted);
+                let fault = Fault { code: FaultCode::NotFinite, joint: joint as u8 };
+                assert_eq!(decision.command, DriveCommand::RELEASED, "field {field}");
+                assert_eq!((decision.fault, decision.state), (Some(fault), DriveState::Fault { fault }));
+                // And it stays off when the number is fine again.
+                let decision = monitor.decide(&STANDING, &request(5.0));
+                assert_eq!(decision.command, DriveCommand::RELEASED);
+            }
+        }
+    }
+}
+
+#[test]
+fn torque_and_current_never_exceed_their_caps() {
+    let mut monitor = enabled();
+    let mut random = 1_u32;
+    for _ in 0..20_000 {
+        let mut uniform = |bound: f32| {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (random >> 8) as f32 / (1 << 23) as f32 * bound - bound
+        };
+        let observation = Observation {
+            position: [Radian(0.45 + uniform(0.4)), Radian(-0.9 + uniform(0.7))],
+            velocity: [RadianPerSecond(uniform(3.0)), RadianPerSecond(uniform(3.0))],
+            ..STANDING
+        };
+        let wanted = [NewtonMetre(uniform(1e4)), NewtonMetre(uniform(300.0))];
+        let decision = monitor.decide(&observation, &Request { torque: wanted, power: None });
+        assert!(decision.command.enabled);
+        for joint in 0..2 {
+            assert!(decision.torque[joint].abs().0 <= 100.0);
+            assert!(decision.command.currents[joint].abs().0 <= 80.0);
+            assert_eq!(decision.limited[joint].torque, wanted[joint].abs().0 > 100.0);
+        }
+    }
+}
+
+#[test]
+fn currents_have_the_drives_sign() {
+    let mut monitor = enabled();
+    let decision = monitor.decide(&STANDING, &request(15.0));
+    // 1.5 N m/A; the knee turns against its drive. One rounding of the reciprocal.
+    assert!((decision.command.currents[0].0 - 10.0).abs() < 1e-5);
+    assert!((decision.command.currents[1].0 + 10.0).abs() < 1e-5);
+}
+
+#[test]
+fn overspeed_damps_in_the_same_tick_for_300_ms_and_then_releases() {
+    let mut monitor = enabled();
+    let fast = Observation { velocity: [RadianPerSecond::ZERO, RadianPerSecond(3.5)], ..STANDING };
+    let decision = monitor.decide(&fast, &request(30.0));
+    let fault = Fault { code: FaultCode::Overspeed, joint: 1 };
+    assert_eq!(decision.fault, Some(fault));
+    assert!(decision.command.enabled && decision.torque[1] == NewtonMetre(-100.0));
+    assert_eq!(decision.torque[0], NewtonMetre::ZERO);
+    let mut damped = 1;
+    while monitor.decide(&STANDING, &request(30.0)).command.enabled {
+        damped += 1;
+    }
+    assert_eq!(damped, RATE_HZ * 3 / 10);
+    assert_eq!(monitor.state(), DriveState::Fault { fault });
+}
+
+#[test]
+fn leaving_the_range_by_half_a_degree_is_a_fault_and_less_is_not() {
+    for (position, faulty) in [
+        (HIP.high + Radian(0.0085), false),
+        (HIP.low - Radian(0.0085), false),
+        (HIP.high + Radian(0.0089), true),
+        (HIP.low - Radian(0.0089), true),
+    ] {
+        let mut monitor = enabled();
+        let outside = Observation { position: [position, MIDDLE[1]], ..STANDING };
+        let fault = monitor.decide(&outside, &request(0.0)).fault;
+        assert_eq!(fault.map(|fault| fault.code), faulty.then_some(FaultCode::PositionLimit));
+    }
+}
+
+#[test]
+fn a_fault_is_latched_until_reset_and_enabling_starts_over() {
+    let mut monitor = enabled();
+    let broken = Observation { current: [Ampere(f32::NAN); 2], ..STANDING };
+    let _ = monitor.decide(&broken, &request(0.0));
+    for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
+        assert!(!monitor.decide(&STANDING, &ask(power)).command.enabled);
+    }
+    // Reset is not heard while the cause lasts.
+    let _ = monitor.decide(&broken, &ask(PowerRequest::ResetFault));
+    assert!(monitor.state().fault().is_some());
+    let _ = monitor.decide(&STANDING, &ask(PowerRequest::ResetFault));
+    assert_eq!(monitor.state(), DriveState::SwitchOnDisabled);
+    assert!(!monitor.decide(&STANDING, &ask(PowerRequest::EnableOperation)).command.enabled);
+    let _ = monitor.decide(&STANDING, &ask(PowerRequest::Shutdown));
+    let _ = monitor.decide(&STANDING, &ask(PowerRequest::SwitchOn));
+    assert!(monitor.decide(&STANDING, &ask(PowerRequest::EnableOperation)).command.enabled);
+}
+
+#[test]
+fn three_rejected_readings_in_ten_milliseconds_are_a_fault_and_sparser_ones_are_not() {
+    let glitch = Observation { rejected: [true, false], ..STANDING };
+    for (gap, faulty) in [(0, true), (18, true), (19, false), (100, false)] {
+        let mut monitor = enabled();
+        let mut fault = None;
+        for _ in 0..3 {
+            for _ in 0..gap {
+                fault = fault.or(monitor.decide(&STANDING, &request(0.0)).fault);
+            }
+            fault = fault.or(monitor.decide(&glitch, &request(0.0)).fault);
+        }
+        // Three readings with 18 good ones between span 39 of the 40 ticks.
+        assert_eq!(fault.map(|fault| fault.code), faulty.then_some(FaultCode::EncoderStep), "gap {gap}");
+    }
+}
+
+#[test]
+fn a_leg_out_of_range_or_moving_too_fast_is_not_enabled_and_told_why() {
+    let cases = [
+        (Observation { position: [MIDDLE[0], Radian(0.1)], ..STANDING }, RefusalReason::OutOfRange),
+        (
+            Observation { velocity: [RadianPerSecond::ZERO, RadianPerSecond(3.2)], ..STANDING },
+            RefusalReason::Moving,
+        ),
+        (Observation { rejected: [false, true], ..STANDING }, RefusalReason::Encoder),
+    ];
+    for (observation, reason) in cases {
+        let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), RATE_HZ);
+        let _ = monitor.decide(&STANDING, &ask(PowerRequest::Shutdown));
+        let _ = monitor.decide(&STANDING, &ask(PowerRequest::SwitchOn));
+        let decision = monitor.decide(&observation, &ask(PowerRequest::EnableOperation));
+        assert_eq!(decision.refused, Some(Refusal { joint: 1, reason }));
+        assert_eq!((decision.state, decision.command.enabled), (DriveState::SwitchedOn, false));
+    }
+}
+
+#[test]
+fn a_quick_stop_damps_and_does_not_come_back_by_itself() {
+    let mut monitor = enabled();
+    let turning = Observation { velocity: [RadianPerSecond(0.01); 2], ..STANDING };
+    let decision =
+        monitor.decide(&turning, &Request { power: Some(PowerRequest::QuickStop), ..request(50.0) });
+    assert!(decision.command.enabled && decision.torque[0].0 < 0.0);
+    for _ in 0..RATE_HZ {
+        let _ = monitor.decide(&STANDING, &request(50.0));
+    }
+    assert_eq!(monitor.state(), DriveState::SwitchOnDisabled);
+}
