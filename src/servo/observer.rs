@@ -98,7 +98,6 @@ impl Observer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::real::sqrt;
     use crate::real::{sin_cos, sqrt};
     use core::f64::consts::TAU;
     use rand_core::{Rng, SeedableRng};
