@@ -89,7 +89,13 @@ struct IdentifyArguments {
     /// Write the training motion here, in the format that replay reads.
     #[arg(long)]
     log: Option<PathBuf>,
+    /// Draw the run into this directory, as SVG; a run without any arguments draws into target/sim.
+    #[arg(long, conflicts_with = "seeds")]
+    figures: Option<PathBuf>,
 }
+
+/// Where a run without any arguments is drawn.
+const DEFAULT_FIGURES: &str = "target/sim";
 
 fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
     let ends = text
@@ -135,7 +141,7 @@ pub fn main() -> ExitCode {
     let outcome = match cli.command {
         Some(Command::Replay(arguments)) => run_replay(&arguments),
         Some(Command::Identify(arguments)) => run_identify(&arguments),
-        None => match Cli::try_parse_from(["scarab-sim", "identify"]) {
+        None => match Cli::try_parse_from(["scarab-sim", "identify", "--figures", DEFAULT_FIGURES]) {
             Ok(Cli { command: Some(Command::Identify(arguments)) }) => run_identify(&arguments),
             _ => Err(ToolError::input("see --help")),
         },
@@ -160,12 +166,17 @@ fn run_identify(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
         torque_noise_percent: arguments.torque_noise,
         plan: arguments.common.plan.into(),
         prior: arguments.common.prior.unwrap_or_default(),
+        with_series: false,
     };
     let Some((first, last)) = arguments.seeds else {
         let options = &options(arguments.seed.unwrap_or(DEFAULT_SEED));
-        let log = arguments.log.as_deref();
-        let run = with_leg_size!(leg, identify_one(leg, options, log))?;
-        return finish(&run, &arguments.common);
+        let (log, figures) = (arguments.log.as_deref(), arguments.figures.as_deref());
+        let run = with_leg_size!(leg, identify_one(leg, options, log, figures))?;
+        let code = finish(&run, &arguments.common);
+        if let Some(directory) = figures {
+            println!("figures: {}", directory.display());
+        }
+        return code;
     };
     let options: &Vec<_> = &(first..=last).map(options).collect();
     let runs = with_leg_size!(leg, identify_many(leg, options))?;

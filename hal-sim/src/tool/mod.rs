@@ -6,6 +6,8 @@
 //! | [`leg_file`], [`x2`] | leg files and the derivation of the default leg |
 //! | [`setup`] | from a leg file to what the firmware is built from |
 //! | [`recording`], [`resample`], [`replay`] | identification on recordings |
+//! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
+//! | [`series`], [`figures`] | a run as curves, drawn |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
 //! | [`error`] | bad input and exit codes |
 
@@ -17,14 +19,18 @@
 pub mod analysis;
 pub mod cli;
 pub mod error;
+pub mod figures;
 pub mod identify;
 pub mod leg_file;
 pub mod motions;
+pub mod pair;
 pub mod recording;
 pub mod replay;
 pub mod report;
 pub mod resample;
+pub mod series;
 pub mod setup;
 pub mod simulate;
 pub mod tables;
+pub mod watch;
 pub mod x2;

@@ -1,0 +1,141 @@
+//! Leg and plant ticked together, and what both are made from.
+//!
+//! One value that can be cloned at any tick and run on: the copies go the same way bit for bit until they are given
+//! different requests.
+
+use scarab::hal::{LegDrives, Sample};
+use scarab::ident::{Kernel, LowPass, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
+use scarab::leg::{ControlOutput, ControlRequest, Leg, LegConfiguration};
+use scarab::motion::Periodic;
+use scarab::safety::{DriveState, PowerRequest};
+
+use super::analysis::Background;
+use super::error::ToolError;
+use super::leg_file::LegFile;
+use super::motions::Motions;
+use super::setup::{SetupError, background, configuration};
+use super::simulate::SimulationOptions;
+use crate::world::World;
+
+/// Taps of the device's filter.
+pub const TAPS: usize = 256;
+/// Open outputs that go with them.
+pub const PENDING: usize = 26;
+/// The leg as the device holds it.
+pub type DeviceLeg<const N: usize, const B: usize> = Leg<N, B, TAPS, PENDING>;
+
+/// Evaluations of the search in the time left by one servo tick: 8,000 per second, which 26 base parameters take
+/// about 30 % of the processor for.
+pub const EVALUATIONS_PER_TICK: u32 = 2;
+
+/// What a run is made from, before it starts.
+#[derive(Clone, Debug)]
+pub struct Context<const N: usize, const B: usize> {
+    /// What is known beside the data.
+    pub background: Background<N, B>,
+    /// What the firmware is built from.
+    pub configuration: LegConfiguration<N, B>,
+    /// The motions of the run.
+    pub motions: Motions<N>,
+    /// First stage of the identification's filter chain.
+    pub smoothing: Kernel<f32, TAPS>,
+    /// Second stage.
+    pub low_pass: LowPass<f32, TAPS>,
+    /// In the base frame, m/s^2.
+    pub gravity: [f32; 3],
+    /// Standard deviation of each joint's logged torque, N m.
+    pub noise: [f64; N],
+}
+
+impl<const N: usize, const B: usize> Context<N, B> {
+    /// What a run of this leg is made from.
+    pub fn new(leg: &LegFile, options: &SimulationOptions) -> Result<Self, ToolError> {
+        let background = background::<N, B>(leg, options.prior, options.seed)?;
+        let (configuration, motions) = configuration(leg, &background, options.plan, options.swarm_seed)?;
+        let unfit = |_| SetupError::new(leg, "the filter does not fit the device");
+        let (bandwidth, rate) = (configuration.bandwidth_hz, SAMPLE_RATE_HZ as f32);
+        let smoothing = Kernel::new(SMOOTHING_BANDWIDTHS as f32 * bandwidth, rate).map_err(unfit)?;
+        let low_pass = LowPass::new(bandwidth, rate).map_err(unfit)?;
+        let world = World::<N>::new(&leg.description()?, options.seed);
+        let percent = options.torque_noise_percent.unwrap_or(leg.torque_noise_percent);
+        let mean = mean_absolute_torque(leg, &world, &motions.excitation);
+        let noise = core::array::from_fn(|joint| {
+            let own = leg.joints[joint].current_noise_a * leg.joints[joint].torque_per_ampere;
+            (percent / 100.0 * mean[joint]).hypot(own)
+        });
+        let gravity = leg.gravity.map(|element| element as f32);
+        Ok(Self { background, configuration, motions, smoothing, low_pass, gravity, noise })
+    }
+}
+
+/// Of the motor torque along a motion, anatomical.
+fn mean_absolute_torque<const N: usize>(leg: &LegFile, world: &World<N>, motion: &Periodic<N>) -> [f64; N] {
+    let mut sum = [0.0; N];
+    let ticks = (motion.blend_ticks()..motion.duration_ticks() - motion.blend_ticks()).step_by(8);
+    let count = ticks.len().max(1) as f64;
+    for tick in ticks {
+        let state = motion.state_at(tick);
+        let sign = |joint: usize| if leg.joints[joint].direction < 0 { -1.0 } else { 1.0 };
+        let offset = |joint: usize| leg.joints[joint].zero_offset_deg.to_radians();
+        let torque = world.inverse_dynamics(
+            &core::array::from_fn(|joint| {
+                sign(joint) * (f64::from(state.position_rad[joint]) - offset(joint))
+            }),
+            &core::array::from_fn(|joint| sign(joint) * f64::from(state.velocity_rad_per_s[joint])),
+            &core::array::from_fn(|joint| sign(joint) * f64::from(state.acceleration_rad_per_s2[joint])),
+        );
+        sum = core::array::from_fn(|joint| sum[joint] + torque[joint].abs() / count);
+    }
+    sum
+}
+
+/// Leg and plant, ticked together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pair<const N: usize, const B: usize> {
+    /// The firmware.
+    pub leg: Box<DeviceLeg<N, B>>,
+    /// The plant.
+    pub world: World<N>,
+    /// What the sensors said last.
+    pub sample: Sample<N>,
+    /// So far.
+    pub ticks: u64,
+    /// Evaluations of the search at each tick.
+    pub evaluations: u32,
+}
+
+impl<const N: usize, const B: usize> Pair<N, B> {
+    /// A leg at rest a tenth into its range, drive off.
+    pub fn new(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
+        let mut world = World::new(&leg.description()?, seed);
+        world.set_current_noise(&core::array::from_fn(|joint| {
+            context.noise[joint] / leg.joints[joint].torque_per_ampere
+        }));
+        // A tenth into the range: inside it, and near to hanging for a leg that hangs at its lower end.
+        world.place(&core::array::from_fn(|joint| {
+            let [low, high] = leg.joints[joint].range_deg;
+            (low + 0.1 * (high - low)).to_radians()
+        }));
+        let device = DeviceLeg::new(&context.configuration)
+            .map_err(|error| SetupError::new(leg, format!("the firmware refuses this leg: {error:?}")))?;
+        let sample = world.sample();
+        Ok(Self { leg: Box::new(device), world, sample, ticks: 0, evaluations: EVALUATIONS_PER_TICK })
+    }
+
+    /// One servo tick of both.
+    pub fn tick(&mut self, request: Option<ControlRequest<N>>, gravity: [f32; 3]) -> ControlOutput<N> {
+        let output = self.leg.tick(&self.sample, request, gravity, self.evaluations);
+        self.sample = self.world.tick(output.servo.drive());
+        self.ticks += 1;
+        output
+    }
+
+    /// From off to enabled; tells whether the drive is.
+    pub fn enable(&mut self, gravity: [f32; 3]) -> bool {
+        self.tick(None, gravity);
+        for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
+            self.tick(Some(ControlRequest::Power(power)), gravity);
+        }
+        self.leg.control().state() == DriveState::OperationEnabled
+    }
+}

@@ -1,0 +1,247 @@
+//! Everything that is looked at during a run and that the firmware does not know.
+
+use std::time::Instant;
+
+use scarab::ident::{Ends, Factor, FilteredRows, LARGEST_STILL_SHARE, RowFilter, Smoothed, Smoother};
+use scarab::leg::{LoggedSample, Segment};
+use scarab::real::sqrt;
+
+use super::analysis::{Circumstances, Costs, Motion as RecordedMotion, TruthFit};
+use super::error::ToolError;
+use super::motions::VALIDATION_NAMES;
+use super::pair::{Context, PENDING, Pair, TAPS};
+use super::report::TrackingReport;
+use super::series::Series;
+use super::simulate::{SimulatedRun, SimulationOptions};
+use crate::world::TICK_S;
+
+/// Noise-free torque and sticking, through the same filter chain as the measured torque.
+struct TruthChain<const N: usize, const B: usize> {
+    torque: Box<Smoother<f32, N, TAPS>>,
+    sticking: Box<Smoother<f32, N, TAPS>>,
+    filter: Box<RowFilter<f32, N, B, PENDING>>,
+    rows: Vec<FilteredRows<f32, N, B>>,
+}
+
+impl<const N: usize, const B: usize> TruthChain<N, B> {
+    fn new() -> Self {
+        Self {
+            torque: Box::default(),
+            sticking: Box::default(),
+            filter: Box::new(RowFilter::new(Ends::Whole)),
+            rows: Vec::new(),
+        }
+    }
+
+    fn start(&mut self) -> Vec<FilteredRows<f32, N, B>> {
+        self.torque.clear();
+        self.sticking.clear();
+        self.filter.clear();
+        core::mem::take(&mut self.rows)
+    }
+
+    fn push(&mut self, context: &Context<N, B>, position: &[f32; N], torque: &[f32; N], sticking: &[f32; N]) {
+        let sticking = self.sticking.push(&context.smoothing, position, sticking);
+        let instant: Option<Smoothed<f32, N>> = self.torque.push(&context.smoothing, position, torque);
+        if let (Some(instant), Some(sticking)) = (instant, sticking) {
+            let mut rows = context.background.device.rows(&instant);
+            rows.still = sticking.torque;
+            self.rows.extend(self.filter.push(&context.low_pass, &rows));
+        }
+    }
+}
+
+/// Comparison of base values with the noise-free torque of one motion.
+fn truth_fit<const N: usize, const B: usize>(
+    rows: &[FilteredRows<f32, N, B>],
+    values: &[f32; B],
+) -> [TruthFit; N] {
+    core::array::from_fn(|joint| {
+        let (mut squared, mut absolute, mut used) = (0.0, 0.0, 0_usize);
+        for row in rows.iter().filter(|row| f64::from(row.still[joint]) <= LARGEST_STILL_SHARE) {
+            let predicted: f32 =
+                row.regressor[joint].iter().zip(values).map(|(element, value)| element * value).sum();
+            let error = f64::from(predicted - row.torque[joint]);
+            squared += error * error;
+            absolute += f64::from(row.torque[joint].abs());
+            used += 1;
+        }
+        let count = used.max(1) as f64;
+        TruthFit {
+            percent_of_mean_abs: 100.0 * sqrt(squared / count) / (absolute / count),
+            sticking_share: 1.0 - used as f64 / rows.len().max(1) as f64,
+        }
+    })
+}
+
+/// Everything that is looked at during a run and that the firmware does not know.
+pub struct Watch<'a, const N: usize, const B: usize> {
+    context: &'a Context<N, B>,
+    chain: TruthChain<N, B>,
+    torque_sum: [f64; N],
+    sticking_sum: [f64; N],
+    segment: Option<Segment>,
+    training_rows: Vec<FilteredRows<f32, N, B>>,
+    validation_rows: [Vec<FilteredRows<f32, N, B>>; VALIDATION_NAMES.len()],
+    log: Vec<LoggedSample<N>>,
+    information: Factor<f64, B>,
+    costs: Option<Costs<B>>,
+    excess: Vec<(u32, f64)>,
+}
+
+impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
+    /// Nothing seen yet.
+    pub fn new(context: &'a Context<N, B>) -> Self {
+        Self {
+            context,
+            chain: TruthChain::new(),
+            torque_sum: [0.0; N],
+            sticking_sum: [0.0; N],
+            segment: None,
+            training_rows: Vec::new(),
+            validation_rows: Default::default(),
+            log: Vec::new(),
+            information: Factor::new(),
+            costs: None,
+            excess: Vec::new(),
+        }
+    }
+
+    /// Looks at the tick that was just run, `torque` and `sticking` from before it.
+    pub fn see(
+        &mut self,
+        pair: &Pair<N, B>,
+        torque: &[f64; N],
+        sticking: &[bool; N],
+        logged: Option<&LoggedSample<N>>,
+    ) {
+        for joint in 0..N {
+            self.torque_sum[joint] += torque[joint] / 8.0;
+            self.sticking_sum[joint] += f64::from(u8::from(sticking[joint])) / 8.0;
+        }
+        self.watch_search(pair);
+        let Some(logged) = logged else { return };
+        if logged.segment != self.segment {
+            let rows = self.chain.start();
+            self.keep(rows);
+            self.segment = logged.segment;
+        }
+        if logged.segment.is_some() {
+            let direction =
+                |joint: usize| f64::from(self.context.configuration.joints[joint].scale.anatomy.direction());
+            let torque = core::array::from_fn(|joint| (direction(joint) * self.torque_sum[joint]) as f32);
+            let sticking = self.sticking_sum.map(|share| share as f32);
+            self.chain.push(self.context, &logged.sample.position_rad, &torque, &sticking);
+        }
+        if logged.segment.is_some() {
+            self.log.push(*logged);
+        }
+        if logged.segment == Some(Segment::Training) {
+            self.inform(pair);
+        }
+        (self.torque_sum, self.sticking_sum) = ([0.0; N], [0.0; N]);
+    }
+
+    /// Adds what the noise-free motion of this sample tells of the base parameters.
+    fn inform(&mut self, pair: &Pair<N, B>) {
+        let truth = pair.world.truth();
+        let scales = self.context.configuration.joints.map(|joint| joint.scale);
+        let sign = |joint: usize| f64::from(scales[joint].anatomy.direction());
+        let rows = self.context.background.model.rows(&Smoothed {
+            position: core::array::from_fn(|joint| {
+                sign(joint) * truth.position[joint] + f64::from(scales[joint].anatomy.zero_offset())
+            }),
+            velocity: core::array::from_fn(|joint| sign(joint) * truth.velocity[joint]),
+            acceleration: core::array::from_fn(|joint| sign(joint) * truth.acceleration[joint]),
+            torque: [0.0; N],
+        });
+        for joint in 0..N {
+            if !truth.sticking[joint] {
+                let weight = 1.0 / self.context.noise[joint].max(1e-12);
+                self.information.insert(&rows.regressor[joint].map(|element| element * weight), 0.0);
+            }
+        }
+    }
+
+    fn keep(&mut self, rows: Vec<FilteredRows<f32, N, B>>) {
+        match self.segment {
+            Some(Segment::Training) => self.training_rows = rows,
+            Some(Segment::Validation(motion)) => {
+                if let Some(slot) = self.validation_rows.get_mut(usize::from(motion)) {
+                    *slot = rows;
+                }
+            }
+            None => {}
+        }
+    }
+
+    fn watch_search(&mut self, pair: &Pair<N, B>) {
+        let Some(solver) = pair.leg.identification().solver() else { return };
+        let iterations = solver.search().iterations();
+        if self.excess.last().is_some_and(|(seen, _)| *seen == iterations) {
+            return;
+        }
+        let costs = self.costs.get_or_insert_with(|| self.context.background.costs(solver));
+        let excess = costs.factor.excess(&solver.search().values().map(f64::from)) - costs.above;
+        self.excess.push((iterations, excess));
+    }
+
+    /// What was seen, once the verdict is there.
+    pub fn report(
+        mut self,
+        pair: &Pair<N, B>,
+        options: &SimulationOptions,
+        tracking: Vec<TrackingReport>,
+        started: Instant,
+    ) -> Result<SimulatedRun<N>, ToolError> {
+        let rows = self.chain.start();
+        self.keep(rows);
+        let identification = pair.leg.identification();
+        let (Some(solver), Some(verdict)) = (identification.solver(), pair.leg.control().verdict()) else {
+            return Err(ToolError::input("the identification ended without a result"));
+        };
+        let values = solver.estimate().values;
+        let training = RecordedMotion {
+            name: "fourier".into(),
+            record: solver.record().clone(),
+            truth: Some(truth_fit(&self.training_rows, &values)),
+        };
+        let validation: Vec<_> = VALIDATION_NAMES
+            .iter()
+            .zip(identification.validation())
+            .zip(&self.validation_rows)
+            .filter_map(|((name, record), rows)| {
+                let record = record.clone()?;
+                Some(RecordedMotion { name: (*name).into(), record, truth: Some(truth_fit(rows, &values)) })
+            })
+            .collect();
+        let rank = self.context.background.model.base.rank();
+        let inverse = self.information.inverse(rank);
+        let cramer_rao =
+            core::array::from_fn(|base| sqrt(inverse[base].iter().map(|element| element * element).sum()));
+        let circumstances = Circumstances {
+            seed: Some(options.seed),
+            cramer_rao: Some(cramer_rao),
+            iterations_to_half_chi2: self
+                .excess
+                .iter()
+                .find(|(_, excess)| *excess <= 0.5)
+                .map(|(seen, _)| *seen),
+            tracking,
+            simulated_s: pair.ticks as f64 * TICK_S,
+            wall: started.elapsed(),
+        };
+        let report =
+            self.context.background.report(solver, verdict, &[training], &validation, &circumstances);
+        let series = if options.with_series {
+            Series {
+                torque: self.context.torque_series(&self.log, &self.validation_rows, &values)?,
+                commanded: self.context.commanded_series(),
+                excess: self.excess,
+            }
+        } else {
+            Series::default()
+        };
+        Ok(SimulatedRun { report, log: self.log, series })
+    }
+}
