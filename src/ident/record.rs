@@ -217,12 +217,16 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         (self.instants, self.rows, self.rejected) = (0, [0; N], 0);
     }
 
-    /// The samples that follow do not continue those before: windows start anew, rows already taken stay.
-    pub fn break_off(&mut self) {
+    /// The samples that follow do not continue those before: windows start anew, rows already taken stay. Returns how
+    /// many rows the cut windows at the end gave.
+    pub fn break_off(&mut self) -> u32 {
         self.smoother.clear();
+        let mut finished = 0;
         while let Some(rows) = self.filter.finish(&self.low_pass) {
             self.take(&rows);
+            finished += 1;
         }
+        finished
     }
 
     fn take(&mut self, rows: &FilteredRows<T, N, B>) {

@@ -9,6 +9,7 @@ use scarab::ident::Plan;
 use super::error::{EXIT_ACCEPTED, EXIT_INPUT, EXIT_REFUSED, ToolError};
 use super::identify::{identify_many, identify_one, print_runs};
 use super::leg_file::{DEFAULT_LEG, LegFile};
+use super::regressor::{self, RegressorOptions};
 use super::replay::{ReplayOptions, replay};
 use super::report::RunReport;
 use super::setup::{DEFAULT_SEED, PriorChoice};
@@ -30,6 +31,8 @@ enum Command {
     Identify(IdentifyArguments),
     /// Identify a leg from recordings.
     Replay(ReplayArguments),
+    /// Print torques and regressor of given states: rigid bodies only, CSV.
+    Regressor(RegressorArguments),
 }
 
 /// How parameters are found from the joints' rows.
@@ -65,7 +68,7 @@ struct Common {
     /// none, file, or wrong:PERCENT; the leg file's unless given.
     #[arg(long)]
     prior: Option<PriorChoice>,
-    /// Write the report here.
+    /// Write the report here, for exit codes 0 and 3.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Print all fourteen parameters of every joint with their status.
@@ -124,14 +127,27 @@ struct ReplayArguments {
     #[arg(long, num_args = 1.., conflicts_with = "split")]
     validate: Vec<PathBuf>,
     /// The first fraction of each file trains, the rest validates.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     split: Option<f64>,
     /// Where the low-pass of the filter chain is 3 dB down, Hz; the leg file's (8 unless it says otherwise) unless given.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     bandwidth: Option<f64>,
     /// Write measured and predicted torque of the validation part here.
     #[arg(long)]
     csv: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+struct RegressorArguments {
+    /// Name of a shipped leg, or a leg file.
+    #[arg(long, default_value = DEFAULT_LEG)]
+    leg: String,
+    /// States: columns q1.., qd1.., qdd1.. in rad and s, D-H angles.
+    #[arg(long)]
+    states: PathBuf,
+    /// Compute in the device's single precision.
+    #[arg(long)]
+    f32: bool,
 }
 
 /// Runs the tool on the process's arguments.
@@ -140,6 +156,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome = match cli.command {
         Some(Command::Replay(arguments)) => run_replay(&arguments),
+        Some(Command::Regressor(arguments)) => run_regressor(&arguments),
         Some(Command::Identify(arguments)) => run_identify(&arguments),
         None => match Cli::try_parse_from(["scarab-sim", "identify", "--figures", DEFAULT_FIGURES]) {
             Ok(Cli { command: Some(Command::Identify(arguments)) }) => run_identify(&arguments),
@@ -202,17 +219,25 @@ fn run_replay(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         swarm_seed: arguments.common.swarm_seed.unwrap_or(DEFAULT_SEED),
         csv: arguments.csv.clone(),
     };
-    let run = with_leg_size!(leg, replay(leg, options))?;
-    finish(&run, &arguments.common)
+    let replayed = with_leg_size!(leg, replay(leg, options))?;
+    tables::print(&tables::sources(&replayed.sources))?;
+    finish(&replayed.run, &arguments.common)
+}
+
+fn run_regressor(arguments: &RegressorArguments) -> Result<u8, ToolError> {
+    let leg = LegFile::load(&arguments.leg)?;
+    let options = RegressorOptions { states: arguments.states.clone(), single_precision: arguments.f32 };
+    tables::print(&regressor::table(&leg, &options)?)?;
+    Ok(EXIT_ACCEPTED)
 }
 
 fn finish(run: &RunReport, common: &Common) -> Result<u8, ToolError> {
     if let Some(path) = &common.json {
         write_json(path, run)?;
     }
-    tables::print_run(run);
+    tables::print_run(run)?;
     if common.parameters {
-        println!("\n{}", tables::parameters(run));
+        tables::print(&format!("\n{}", tables::parameters(run)))?;
     }
     Ok(if run.accepted() { EXIT_ACCEPTED } else { EXIT_REFUSED })
 }

@@ -8,6 +8,7 @@
 //! | [`recording`], [`resample`], [`replay`] | identification on recordings |
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
 //! | [`series`], [`figures`] | a run as curves, drawn |
+//! | [`regressor`] | torques and regressor of given states |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
 //! | [`error`] | bad input and exit codes |
 
@@ -25,6 +26,7 @@ pub mod leg_file;
 pub mod motions;
 pub mod pair;
 pub mod recording;
+pub mod regressor;
 pub mod replay;
 pub mod report;
 pub mod resample;

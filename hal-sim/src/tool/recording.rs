@@ -15,14 +15,15 @@
 //! Limits: columns that were swapped, or a command recorded as if it were measured, look like any other numbers
 //! here; only the fit can tell. Cost: 16 bytes per joint and sample and 16 per sample.
 
-use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
 
+pub(super) mod columns;
 mod fault;
 
+use columns::{Column, for_each_row, line_at, read_text, refuse};
 pub use fault::{Fault, RecordingError};
 
 /// A recording has at least this many samples...
@@ -63,52 +64,33 @@ pub struct Recording {
 impl Recording {
     /// Reads the first `joints` joints of a CSV file.
     pub fn read(file: &Path, joints: usize) -> Result<Self, RecordingError> {
-        let bytes = fs::read(file).map_err(|error| refuse(file, None, Fault::Unreadable(error)))?;
-        let text = String::from_utf8(bytes).map_err(|_| refuse(file, None, Fault::NotText))?;
-        Self::parse(file, &text, joints)
+        Self::parse(file, &read_text(file)?, joints)
     }
 
     /// Reads the first `joints` joints of a CSV text; `file` is only named in errors.
     pub fn parse(file: &Path, text: &str, joints: usize) -> Result<Self, RecordingError> {
-        if text.trim().is_empty() {
-            return Err(refuse(file, None, Fault::Empty));
-        }
-        // Lines are found again from byte offsets: the reader's own count stops at blank lines.
-        let refuse_at = |offset: usize, fault| refuse(file, Some(line_at(text, offset)), fault);
-        let mut reader = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .trim(csv::Trim::All)
-            .from_reader(text.as_bytes());
-        let mut row = StringRecord::new();
-        let mut offsets = Vec::new();
-        let mut columns: Option<Columns> = None;
         let mut recording = Self {
             file: file.to_owned(),
             time_s: Vec::new(),
             joints: vec![JointSeries::default(); joints],
             joints_in_file: 0,
         };
-        loop {
-            let offset = reader.position().byte() as usize;
-            match reader.read_record(&mut row) {
-                Ok(true) => {}
-                Ok(false) => break,
-                Err(error) => return Err(refuse_at(offset, Fault::NotCsv(error))),
-            }
-            match &columns {
-                None => {
-                    let found = Columns::find(&row, joints).map_err(|fault| refuse_at(offset, fault))?;
-                    recording.joints_in_file = found.joints_in_file;
-                    columns = Some(found);
-                }
-                Some(columns) => {
-                    recording.push(columns, &row).map_err(|fault| refuse_at(offset, fault))?;
-                    offsets.push(offset);
-                }
-            }
-        }
-        recording.check_gaps().map_err(|(sample, fault)| refuse_at(offsets[sample], fault))?;
+        let mut joints_in_file = 0;
+        let offsets = for_each_row(
+            file,
+            text,
+            |header| {
+                let found = Columns::find(header, joints)?;
+                joints_in_file = found.joints_in_file;
+                Ok(found)
+            },
+            |columns, row| recording.push(columns, row),
+        )?;
+        recording.joints_in_file = joints_in_file;
+        recording.check_gaps().map_err(|(sample, fault)| {
+            let line = offsets.get(sample).map(|&offset| line_at(text, offset));
+            refuse(file, line, fault)
+        })?;
         recording.check_length()?;
         Ok(recording)
     }
@@ -167,9 +149,6 @@ impl Recording {
     }
 
     fn push(&mut self, columns: &Columns, row: &StringRecord) -> Result<(), Fault> {
-        if row.len() != columns.count {
-            return Err(Fault::FieldCount { found: row.len(), expected: columns.count });
-        }
         let time = columns.time.number(row, f64::INFINITY)?;
         if let Some(&previous) = self.time_s.last()
             && time <= previous
@@ -203,50 +182,8 @@ impl Recording {
     }
 }
 
-fn refuse(file: &Path, line: Option<usize>, fault: Fault) -> RecordingError {
-    RecordingError { file: file.to_owned(), line, fault }
-}
-
-/// The line, from 1, of the first row at or after a byte of the text.
-fn line_at(text: &str, offset: usize) -> usize {
-    let blank = text[offset..].bytes().take_while(|byte| matches!(byte, b'\r' | b'\n')).count();
-    1 + text[..offset + blank].matches('\n').count()
-}
-
-/// A column of the file: where it stands and what it is called.
-struct Column {
-    index: usize,
-    name: String,
-}
-
-impl Column {
-    fn find(header: &StringRecord, name: String) -> Result<Self, Fault> {
-        let mut places = header.iter().enumerate().filter(|(_, present)| *present == name);
-        match (places.next(), places.next()) {
-            (Some((index, _)), None) => Ok(Self { index, name }),
-            (Some(_), Some(_)) => Err(Fault::RepeatedColumn(name)),
-            (None, _) => {
-                let present = header.iter().collect::<Vec<_>>().join(", ");
-                Err(Fault::MissingColumn { column: name, present })
-            }
-        }
-    }
-
-    fn number(&self, row: &StringRecord, limit: f64) -> Result<f64, Fault> {
-        let text = row.get(self.index).unwrap_or("");
-        let (column, text) = (self.name.clone(), text.to_owned());
-        match text.parse::<f64>() {
-            Err(_) => Err(Fault::NotANumber { column, text }),
-            Ok(value) if !value.is_finite() => Err(Fault::NotFinite { column, text }),
-            Ok(value) if value.abs() > limit => Err(Fault::Absurd { column, value, limit }),
-            Ok(value) => Ok(value),
-        }
-    }
-}
-
 /// Where everything that is read stands in a row.
 struct Columns {
-    count: usize,
     time: Column,
     /// Angle and torque of each joint.
     joints: Vec<(Column, Column)>,
@@ -260,7 +197,6 @@ impl Columns {
             Ok((position, Column::find(header, format!("tau{joint}_Nm"))?))
         };
         Ok(Self {
-            count: header.len(),
             time: Column::find(header, "t_s".to_owned())?,
             joints: (1..=joints).map(pair).collect::<Result<_, _>>()?,
             joints_in_file: (1..=header.len()).take_while(|&joint| pair(joint).is_ok()).count(),

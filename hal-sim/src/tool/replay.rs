@@ -4,13 +4,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use scarab::ident::{Ends, KernelError, Plan, Recorder, SearchState, Solver, Thresholds};
+use scarab::ident::{Ends, KernelError, Plan, Recorder, SearchState, Smoothed, Solver, Thresholds};
 use scarab::model::AnatomicalJoint;
 
 use super::analysis::{Background, Circumstances, Motion};
 use super::error::ToolError;
 use super::leg_file::LegFile;
-use super::recording::Recording;
+use super::recording::{Recording, RecordingError};
 use super::report::RunReport;
 use super::resample::Resampled;
 use super::setup::{PriorChoice, anatomy, background};
@@ -21,6 +21,8 @@ const TAPS: usize = 2048;
 const PENDING: usize = 205;
 /// Evaluations between two looks at the search.
 const SLICE: u32 = 1000;
+/// A recording may go this far beyond the leg's range before that is worth a warning.
+const RANGE_MARGIN_DEG: f64 = 5.0;
 
 /// What to replay.
 #[derive(Clone, Debug)]
@@ -45,8 +47,38 @@ pub struct ReplayOptions {
 
 type HostRecorder<const N: usize, const B: usize> = Recorder<f32, N, B, TAPS, PENDING>;
 
+/// What a replay found and from which files.
+#[derive(Clone, Debug)]
+pub struct Replayed {
+    /// Report of the identification.
+    pub run: RunReport,
+    /// Training first.
+    pub sources: Vec<Source>,
+}
+
+/// One file, or a part of one, and what became of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Source {
+    /// As it was named.
+    pub file: PathBuf,
+    /// `training` or `validation`.
+    pub role: &'static str,
+    /// On the recording's clock, s.
+    pub start_s: f64,
+    /// Length, s.
+    pub duration_s: f64,
+    /// The recording's own rate, Hz.
+    pub rate_hz: f64,
+    /// Filtered rows at 50 Hz, each joint's alike.
+    pub rows: u32,
+    /// Those of each joint that were used; it stood still in the others.
+    pub used: Vec<u32>,
+}
+
 /// One file on the firmware's grid, D-H angles and torques.
 struct Samples<const N: usize> {
+    file: PathBuf,
+    rate_hz: f64,
     start_s: f64,
     position: Vec<[f32; N]>,
     torque: Vec<[f32; N]>,
@@ -56,12 +88,14 @@ impl<const N: usize> Samples<N> {
     fn of(recording: &Recording, anatomy: &[AnatomicalJoint<f64>; N], bandwidth_hz: f64) -> Self {
         let grid = Resampled::of(recording);
         if let Some(warning) = grid.bandwidth_warning(bandwidth_hz) {
-            eprintln!("{}: {warning}", recording.file.display());
+            warn(&recording.file, &warning);
         }
         let points = 0..grid.len();
         let position = points.clone().filter_map(|point| grid.position_rad::<N>(point));
         let torque = points.filter_map(|point| grid.torque_nm::<N>(point));
         Self {
+            file: recording.file.clone(),
+            rate_hz: grid.native_rate_hz,
             start_s: grid.start_s,
             position: position
                 .map(|q| core::array::from_fn(|joint| anatomy[joint].angle_to_chain(q[joint]) as f32))
@@ -81,18 +115,18 @@ impl<const N: usize> Samples<N> {
 pub fn replay<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ReplayOptions,
-) -> Result<RunReport, ToolError> {
+) -> Result<Replayed, ToolError> {
     let started = Instant::now();
     let background = background::<N, B>(leg, options.prior, options.swarm_seed)?;
     let anatomy = anatomy::<N>(leg)?;
-    let (training, held_out) = read_all(options, N)?;
+    let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
+    let (training, held_out) = read_all(options, leg)?;
     let on_grid = |recordings: &[Recording]| -> Vec<Samples<N>> {
         recordings.iter().map(|recording| Samples::of(recording, &anatomy, options.bandwidth_hz)).collect()
     };
     let (training, held_out) = (on_grid(&training), on_grid(&held_out));
 
-    let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
-    feed(&mut recorder, &background, &training, |_, _, _| {});
+    let mut sources = feed(&mut recorder, &background, &training, "training", |_, _, _| {});
     let thresholds = Thresholds::default();
     let record = recorder.finish();
     let prior = background.prior.map(|prior| prior.map(|link| link.convert()));
@@ -116,7 +150,7 @@ pub fn replay<const N: usize, const B: usize>(
     recorder.clear(Ends::Whole);
     let mut predictions = Vec::new();
     let values = solver.estimate().values;
-    feed(&mut recorder, &background, &held_out, |file, time_s, instant| {
+    sources.extend(feed(&mut recorder, &background, &held_out, "validation", |file, time_s, instant| {
         let rows = background.device.rows(instant);
         predictions.push(Prediction {
             file,
@@ -126,7 +160,7 @@ pub fn replay<const N: usize, const B: usize>(
                 rows.regressor[joint].iter().zip(&values).map(|(element, value)| element * value).sum()
             }),
         });
-    });
+    }));
     let unused = recorder.finish();
     let validated = !held_out.is_empty();
     let verdict = solver.judge(&background.device, &thresholds, validated.then_some(&unused).into_iter());
@@ -142,7 +176,8 @@ pub fn replay<const N: usize, const B: usize>(
         ..Circumstances::default()
     };
     let validation = if validated { vec![motion(unused)] } else { Vec::new() };
-    Ok(background.report(&solver, verdict, &[motion(record)], &validation, &circumstances))
+    let run = background.report(&solver, verdict, &[motion(record)], &validation, &circumstances);
+    Ok(Replayed { run, sources })
 }
 
 fn new_recorder<const N: usize, const B: usize>(bandwidth_hz: f64) -> Result<HostRecorder<N, B>, ToolError> {
@@ -155,8 +190,16 @@ fn new_recorder<const N: usize, const B: usize>(bandwidth_hz: f64) -> Result<Hos
     })
 }
 
-fn read_all(options: &ReplayOptions, joints: usize) -> Result<(Vec<Recording>, Vec<Recording>), ToolError> {
-    let read = |path: &PathBuf| Recording::read(path, joints);
+fn warn(file: &Path, warning: &dyn std::fmt::Display) {
+    eprintln!("warning: {}: {warning}", file.display());
+}
+
+fn read_all(options: &ReplayOptions, leg: &LegFile) -> Result<(Vec<Recording>, Vec<Recording>), ToolError> {
+    let read = |path: &PathBuf| {
+        let recording = Recording::read(path, leg.joints.len())?;
+        warn_of_another_leg(&recording, leg);
+        Ok::<_, RecordingError>(recording)
+    };
     let mut training = options.files.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     let mut held_out = options.validate.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     if let Some(fraction) = options.split {
@@ -168,23 +211,65 @@ fn read_all(options: &ReplayOptions, joints: usize) -> Result<(Vec<Recording>, V
     Ok((training, held_out))
 }
 
+/// What can be another machine's recording but need not be.
+fn warn_of_another_leg(recording: &Recording, leg: &LegFile) {
+    let (in_file, in_leg) = (recording.joints_in_file, leg.joints.len());
+    if in_file > in_leg {
+        let warning = format!(
+            "holds {in_file} joints, the leg `{}` has {in_leg}: the others are ignored, as if they did not move",
+            leg.name
+        );
+        warn(&recording.file, &warning);
+    }
+    for (number, (series, joint)) in recording.joints.iter().zip(&leg.joints).enumerate() {
+        let angles = series.position_rad.iter().map(|angle| angle.to_degrees());
+        let (low, high) =
+            angles.fold((f64::MAX, f64::MIN), |(low, high), angle| (low.min(angle), high.max(angle)));
+        let [lower, upper] = joint.range_deg;
+        if low < lower - RANGE_MARGIN_DEG || high > upper + RANGE_MARGIN_DEG {
+            let warning = format!(
+                "q{}_rad goes from {low:.0} to {high:.0} deg, the range of `{}` is {lower:.0} to {upper:.0} deg: are \
+                 column, unit, direction and zero right?",
+                number + 1,
+                joint.name
+            );
+            warn(&recording.file, &warning);
+        }
+    }
+}
+
 /// Every file is a motion of its own: windows never reach across.
 fn feed<const N: usize, const B: usize>(
     recorder: &mut HostRecorder<N, B>,
     background: &Background<N, B>,
     files: &[Samples<N>],
-    mut seen: impl FnMut(usize, f64, &scarab::ident::Smoothed<f32, N>),
-) {
+    role: &'static str,
+    mut seen: impl FnMut(usize, f64, &Smoothed<f32, N>),
+) -> Vec<Source> {
+    let mut sources = Vec::with_capacity(files.len());
+    let reach = recorder.delay();
     for (number, samples) in files.iter().enumerate() {
-        recorder.break_off();
-        let reach = recorder.delay();
+        let (mut rows, before) = (0, recorder.rows());
         for (index, (position, torque)) in samples.position.iter().zip(&samples.torque).enumerate() {
             if let Some(progress) = recorder.push(&background.device, position, torque) {
                 let time_s = samples.start_s + (index - reach) as f64 / 500.0;
                 seen(number + 1, time_s, &progress.instant);
+                rows += u32::from(progress.rows.is_some());
             }
         }
+        rows += recorder.break_off();
+        let used = recorder.rows().iter().zip(before).map(|(after, before)| after - before).collect();
+        sources.push(Source {
+            file: samples.file.clone(),
+            role,
+            start_s: samples.start_s,
+            duration_s: samples.duration_s(),
+            rate_hz: samples.rate_hz,
+            rows,
+            used,
+        });
     }
+    sources
 }
 
 struct Prediction<const N: usize> {

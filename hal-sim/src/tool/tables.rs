@@ -1,8 +1,23 @@
 //! The report of a run as plain tables.
 
-use comfy_table::{CellAlignment, Table, presets};
+use std::io::{ErrorKind, Write};
 
+use comfy_table::{CellAlignment, ColumnConstraint, Table, presets};
+
+use super::error::ToolError;
+use super::replay::Source;
 use super::report::{FitReport, Number, RunReport};
+
+/// Writes to standard output; a reader that has seen enough and closed the pipe is no fault.
+pub fn print(text: &str) -> Result<(), ToolError> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(ToolError::input(format!("standard output cannot be written: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
 
 /// An empty table without frames.
 #[must_use]
@@ -12,8 +27,18 @@ pub fn headed(header: &[&str]) -> Table {
     table
 }
 
-fn align_numbers(table: &mut Table, from: usize) {
-    for index in from..table.column_count() {
+/// A table without the columns that nothing is known for, one line each.
+fn text(mut table: Table, unknown: &[usize]) -> String {
+    for &index in unknown {
+        if let Some(column) = table.column_mut(index) {
+            column.set_constraint(ColumnConstraint::Hidden);
+        }
+    }
+    table.trim_fmt() + "\n"
+}
+
+fn align_numbers(table: &mut Table, columns: impl IntoIterator<Item = usize>) {
+    for index in columns {
         if let Some(column) = table.column_mut(index) {
             column.set_cell_alignment(CellAlignment::Right);
         }
@@ -36,7 +61,7 @@ pub fn number(value: Number) -> String {
 
 /// What torque determines: value, sigma, truth and how many sigma lie between.
 #[must_use]
-pub fn base_parameters(run: &RunReport) -> Table {
+pub fn base_parameters(run: &RunReport) -> String {
     let mut rows = headed(&["base parameter", "value", "sigma", "unit", "truth", "error/sigma", "= sum of"]);
     for base in &run.base_parameters {
         let off = match (base.value.known(), base.truth.known(), base.sigma.known()) {
@@ -62,17 +87,14 @@ pub fn base_parameters(run: &RunReport) -> Table {
             if terms.len() > 1 { terms.join(" + ").replace("+ -", "- ") } else { String::new() },
         ]);
     }
-    for column in [1, 2, 4, 5] {
-        if let Some(column) = rows.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    rows
+    align_numbers(&mut rows, [1, 2, 4, 5]);
+    let known = run.base_parameters.iter().any(|base| base.truth.known().is_some());
+    text(rows, if known { &[] } else { &[4, 5] })
 }
 
 /// Which of all parameters were measured.
 #[must_use]
-pub fn parameters(run: &RunReport) -> Table {
+pub fn parameters(run: &RunReport) -> String {
     let mut rows = headed(&["parameter", "value", "sigma", "unit", "status", "grouped with", "truth"]);
     for parameter in &run.parameters {
         rows.add_row(vec![
@@ -85,17 +107,16 @@ pub fn parameters(run: &RunReport) -> Table {
             number(parameter.truth),
         ]);
     }
-    for column in [1, 2, 6] {
-        if let Some(column) = rows.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    rows
+    align_numbers(&mut rows, [1, 2, 6]);
+    let known = run.parameters.iter().any(|parameter| parameter.truth.known().is_some());
+    text(rows, if known { &[] } else { &[6] })
+        + "\nidentified: measured alone. grouped: only sums with the parameters beside it are measured, the prior \
+           splits them.\nweak: measured with little certainty. prior: does not show in the torque.\n"
 }
 
 /// Torque errors on all motions.
 #[must_use]
-pub fn fits(run: &RunReport) -> Table {
+pub fn fits(run: &RunReport) -> String {
     let mut rows = headed(&[
         "motion",
         "use",
@@ -120,46 +141,108 @@ pub fn fits(run: &RunReport) -> Table {
     };
     run.training.iter().for_each(|fit| add(fit, "training"));
     run.validation.iter().for_each(|fit| add(fit, "validation"));
-    align_numbers(&mut rows, 3);
-    rows
+    align_numbers(&mut rows, 3..8);
+    let mut all = run.training.iter().chain(&run.validation);
+    let known = all.any(|fit| fit.percent_of_mean_abs_vs_truth.known().is_some());
+    text(rows, if known { &[] } else { &[6, 7] })
+}
+
+/// Which files trained and validated, and how many of their rows each joint could use.
+#[must_use]
+pub fn sources(sources: &[Source]) -> String {
+    let joints = sources.first().map_or(0, |source| source.used.len());
+    let mut header = vec!["file".to_owned(), "use".into(), "from s".into(), "length s".into(), "Hz".into()];
+    (1..=joints).for_each(|joint| header.extend([format!("rows {joint}"), format!("still {joint}")]));
+    let mut rows = headed(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    for source in sources {
+        let mut cells = vec![
+            source.file.display().to_string(),
+            source.role.into(),
+            format!("{:.2}", source.start_s),
+            format!("{:.2}", source.duration_s),
+            format!("{:.0}", source.rate_hz),
+        ];
+        for used in &source.used {
+            cells.extend([used.to_string(), (source.rows - used).to_string()]);
+        }
+        rows.add_row(cells);
+    }
+    align_numbers(&mut rows, 2..5 + 2 * joints);
+    text(rows, &[])
+        + "rows: filtered to 50 a second and used for that joint's torque; still: left out, because friction at rest \
+           is undetermined.\n\n"
 }
 
 /// One run on standard output.
-pub fn print_run(run: &RunReport) {
-    println!(
-        "{}: {} of {} parameters determined in {} sums, condition {}",
-        run.leg,
-        run.rank,
-        run.columns,
-        run.rank,
-        number(run.condition)
-    );
-    println!("\n{}\n", base_parameters(run));
-    println!("{}\n", fits(run));
-    println!(
-        "least squares: cost {} chi-square units, exact. beetle swarm: {} iterations, {} evaluations, {} above the \
-         optimum in its box",
-        number(run.least_squares.cost),
-        run.bso.iterations,
-        run.bso.evaluations,
-        number(run.bso.excess_chi2),
-    );
-    for tracking in &run.tracking {
-        println!(
+pub fn print_run(run: &RunReport) -> Result<(), ToolError> {
+    print(&run_text(run))
+}
+
+fn run_text(run: &RunReport) -> String {
+    let combinations = run.base_parameters.len();
+    let determined = if run.rank == combinations {
+        "all of them determined".to_owned()
+    } else {
+        format!("only {} of them determined", run.rank)
+    };
+    let mut lines = vec![
+        format!(
+            "{}: torque depends on {combinations} combinations of {} parameters; {determined}, condition {}",
+            run.leg,
+            run.columns,
+            number(run.condition)
+        ),
+        String::new(),
+        base_parameters(run),
+        fits(run),
+        format!(
+            "least squares: cost {} chi-square units. beetle swarm: {} iterations, {} evaluations, ends {} units \
+             above the optimum of its box",
+            number(run.least_squares.cost),
+            run.bso.iterations,
+            run.bso.evaluations,
+            number(run.bso.excess_chi2),
+        ),
+    ];
+    lines.extend(run.tracking.iter().map(|tracking| {
+        format!(
             "tracking on gait, joint {}: {} deg rms without the model, {} with it",
             tracking.joint,
             number(tracking.rms_deg_without_model),
             number(tracking.rms_deg_with_model)
-        );
+        )
+    }));
+    lines.push(String::new());
+    lines.push(verdict_line(run));
+    lines.extend(run.reasons.iter().map(|reason| format!("  {reason}: {}", explanation(reason))));
+    if run.validation.is_empty() {
+        lines.push("  not validated: no motion was held out (--validate, --split)".into());
     }
-    println!("\n{}", verdict_line(run));
+    lines.join("\n") + "\n"
+}
+
+/// A reason of the closed list in words.
+fn explanation(reason: &str) -> &'static str {
+    match reason {
+        "unphysical" => "no leg can have these parameters (negative friction, inertia or kinetic energy)",
+        "unexcited" => "a joint hardly moved, or the motion does not tell the parameters apart",
+        "residual" => "what the model leaves unexplained is not noise",
+        "validation" => {
+            "torque of the motion held out is predicted worse than the training motion lets expect"
+        }
+        "not_a_measurement" => "the torque was computed, not measured",
+        "outliers" => "too many outliers",
+        "contact" => "the leg touched something",
+        "input" => "too few rows in which the joints move, or a torque that is always zero",
+        _ => "",
+    }
 }
 
 /// The verdict in words.
 #[must_use]
 pub fn verdict_line(run: &RunReport) -> String {
     let seconds = if run.simulated_s > 0.0 && run.wall_s > 0.0 {
-        format!(" ({:.1} s in {:.2} s)", run.simulated_s, run.wall_s)
+        format!(" ({:.1} s of motion in {:.2} s)", run.simulated_s, run.wall_s)
     } else {
         String::new()
     };

@@ -78,6 +78,9 @@ pub enum Fault {
         /// Largest magnitude accepted.
         limit: f64,
     },
+    /// Finite numbers whose torque is not.
+    #[error("the torque of this state is beyond the range of the numbers computed with")]
+    OutOfRange,
     /// Time does not increase.
     #[error("time {} from {previous} s to {time} s", if *.time < *.previous { "goes back" } else { "stands still" })]
     TimeNotIncreasing {

@@ -1,0 +1,165 @@
+//! `regressor`: torques and regressor of given states, for comparison with other rigid-body software.
+//!
+//! Only the rigid bodies: ten inertial parameters of each link, no rotor inertia, friction or offset. The torques
+//! come from Newton-Euler and the regressor from its own equations, so that whoever reads the table can check one
+//! against the other as well as both against theirs.
+//!
+//! | | columns |
+//! | --- | --- |
+//! | in, found by name, others ignored | `q1..qN` rad, `qd1..qdN` rad/s, `qdd1..qddN` rad/s2: D-H angles |
+//! | out | `k` from 0; `tau1..tauN` N m; `y1_XX1..y1_M1, y1_XX2..`: row of torque 1, then of torque 2 |
+//!
+//! Numbers are written with the digits that restore the f64 exactly; in the device's arithmetic, the f64 that
+//! equals the f32. All states are read and computed before anything is written.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use scarab::ident::prior_parameters;
+use scarab::model::{Chain, JointState, LegParameters, Parameter, regressor, rigid_body_torques};
+use scarab::real::Real;
+
+use super::error::ToolError;
+use super::leg_file::LegFile;
+use super::recording::columns::{Column, for_each_row, line_at, read_text, refuse};
+use super::recording::{Fault, RecordingError};
+use super::setup::{chain, links};
+
+/// Parameters of a rigid body; the first of a joint's fourteen.
+const INERTIAL: usize = 10;
+
+/// What to compute.
+#[derive(Clone, Debug)]
+pub struct RegressorOptions {
+    /// States of motion.
+    pub states: PathBuf,
+    /// In the device's arithmetic.
+    pub single_precision: bool,
+}
+
+/// The table for a leg of any size, as CSV text.
+pub fn table(leg: &LegFile, options: &RegressorOptions) -> Result<String, ToolError> {
+    match leg.joints.len() {
+        1 => table_of::<1>(leg, options),
+        2 => table_of::<2>(leg, options),
+        _ => table_of::<3>(leg, options),
+    }
+}
+
+fn table_of<const N: usize>(leg: &LegFile, options: &RegressorOptions) -> Result<String, ToolError> {
+    let text = read_text(&options.states)?;
+    let bodies = Bodies::<N>::of(leg)?;
+    let (states, offsets) = read_states::<N>(&options.states, &text)?;
+    let mut out = header::<N>();
+    for (k, state) in states.iter().enumerate() {
+        let row = if options.single_precision { bodies.row::<f32>(state) } else { bodies.row::<f64>(state) };
+        if !row.is_finite() {
+            let line = offsets.get(k).map(|&offset| line_at(&text, offset));
+            return Err(refuse(&options.states, line, Fault::OutOfRange).into());
+        }
+        out += &row.line(k);
+    }
+    Ok(out)
+}
+
+fn header<const N: usize>() -> String {
+    let mut text = String::from("k");
+    (1..=N).for_each(|joint| text += &format!(",tau{joint}"));
+    for row in 1..=N {
+        for link in 1..=N {
+            for parameter in &Parameter::ALL[..INERTIAL] {
+                text += &format!(",y{row}_{}{link}", parameter.symbol());
+            }
+        }
+    }
+    text.push('\n');
+    text
+}
+
+/// States in double precision and where each stands in the text.
+type States<const N: usize> = (Vec<JointState<f64, N>>, Vec<usize>);
+
+fn read_states<const N: usize>(file: &Path, text: &str) -> Result<States<N>, RecordingError> {
+    let mut states = Vec::new();
+    let offsets = for_each_row(
+        file,
+        text,
+        |header| {
+            let group = |symbol: &str| {
+                (1..=N)
+                    .map(|joint| Column::find(header, format!("{symbol}{joint}")))
+                    .collect::<Result<Vec<_>, _>>()
+            };
+            Ok([group("q")?, group("qd")?, group("qdd")?])
+        },
+        |columns, row| {
+            let mut numbers = [[0.0; N]; 3];
+            for (group, columns) in numbers.iter_mut().zip(columns) {
+                for (number, column) in group.iter_mut().zip(columns) {
+                    *number = column.number(row, f64::INFINITY)?;
+                }
+            }
+            let [q, qd, qdd] = numbers;
+            states.push(JointState { q, qd, qdd });
+            Ok(())
+        },
+    )?;
+    Ok((states, offsets))
+}
+
+/// Geometry, gravity and, where the leg file has them for every joint, parameters.
+struct Bodies<const N: usize> {
+    chain: Chain<f64, N>,
+    gravity: Vector3<f64>,
+    parameters: Option<LegParameters<f64, N>>,
+}
+
+impl<const N: usize> Bodies<N> {
+    fn of(leg: &LegFile) -> Result<Self, ToolError> {
+        let truth = links::<N>(leg, |joint| joint.truth.as_ref());
+        let parameters = truth.or_else(|| links::<N>(leg, |joint| joint.prior.as_ref()));
+        Ok(Self {
+            chain: chain(leg)?,
+            gravity: Vector3::from(leg.gravity),
+            parameters: parameters.map(|links| prior_parameters(&links)),
+        })
+    }
+
+    /// One line of the table, computed in precision `T`.
+    fn row<T: Real>(&self, state: &JointState<f64, N>) -> Row<N> {
+        let chain = self.chain.convert::<T>();
+        let gravity = self.gravity.map(T::of);
+        let [q, qd, qdd] = [state.q, state.qd, state.qdd].map(|numbers| numbers.map(T::of));
+        let state = JointState { q, qd, qdd };
+        let torques = self.parameters.map(|parameters| {
+            rigid_body_torques(&chain, &parameters.map(|joint| joint.map(T::of)), &state, &gravity)
+        });
+        let elements = regressor(&chain, &state, &gravity)
+            .map(|row| row.map(|link| core::array::from_fn(|column| link[column].to_double())));
+        Row { torques: torques.map(|torques| torques.map(T::to_double)), elements }
+    }
+}
+
+struct Row<const N: usize> {
+    /// N m.
+    torques: Option<[f64; N]>,
+    /// By torque, link and inertial parameter.
+    elements: [[[f64; INERTIAL]; N]; N],
+}
+
+impl<const N: usize> Row<N> {
+    fn is_finite(&self) -> bool {
+        let elements = self.elements.as_flattened().as_flattened();
+        self.torques.iter().flatten().chain(elements).all(|number| number.is_finite())
+    }
+
+    fn line(&self, k: usize) -> String {
+        // Adding 0 turns -0 into 0.
+        let number = |number: f64| format!("{:e}", number + 0.0);
+        let torque = |joint: usize| self.torques.map_or_else(String::new, |torques| number(torques[joint]));
+        let elements = self.elements.as_flattened().as_flattened().iter().copied().map(number);
+        let fields: Vec<String> =
+            std::iter::once(k.to_string()).chain((0..N).map(torque)).chain(elements).collect();
+        fields.join(",") + "\n"
+    }
+}
