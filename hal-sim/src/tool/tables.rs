@@ -228,7 +228,7 @@ fn explanation(reason: &str) -> &'static str {
         "unexcited" => "a joint hardly moved, or the motion does not tell the parameters apart",
         "residual" => "what the model leaves unexplained is not noise",
         "validation" => {
-            "torque of the motion held out is predicted worse than the training motion lets expect"
+            "torque of the motion held out is predicted worse than the training lets expect, or not at all"
         }
         "not_a_measurement" => "the torque was computed, not measured",
         "outliers" => "too many outliers",
