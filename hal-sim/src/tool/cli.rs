@@ -220,8 +220,7 @@ fn run_replay(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         csv: arguments.csv.clone(),
     };
     let replayed = with_leg_size!(leg, replay(leg, options))?;
-    tables::print(&tables::sources(&replayed.sources))?;
-    finish(&replayed.run, &arguments.common)
+    finish(&replayed.run, &arguments.common, &tables::sources(&replayed.sources))
 }
 
 fn run_regressor(arguments: &RegressorArguments) -> Result<u8, ToolError> {
@@ -231,10 +230,12 @@ fn run_regressor(arguments: &RegressorArguments) -> Result<u8, ToolError> {
     Ok(EXIT_ACCEPTED)
 }
 
-fn finish(run: &RunReport, common: &Common) -> Result<u8, ToolError> {
+/// Writes and prints what was found; `preface` stands before it.
+fn finish(run: &RunReport, common: &Common, preface: &str) -> Result<u8, ToolError> {
     if let Some(path) = &common.json {
         write_json(path, run)?;
     }
+    tables::print(preface)?;
     tables::print_run(run)?;
     if common.parameters {
         tables::print(&format!("\n{}", tables::parameters(run)))?;

@@ -1,0 +1,96 @@
+//! A pendulum whose recording can be written down: torque in closed form, any stamps, a little noise.
+
+use scarab::real::sin_cos;
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+
+/// Base parameters of the pendulum as reports name them, SI.
+pub const TRUTH: [(&str, f64); 6] =
+    [("ZZ1R", 0.8), ("HX1", 1.5), ("HY1", 0.1), ("FC1", 0.6), ("FV1", 0.3), ("OFF1", 0.2)];
+
+/// A leg file without truth and prior; `more` are further keys of its joint.
+pub fn leg(more: &str) -> String {
+    format!(
+        "name = \"pendulum\"\ngravity = [9.81, 0.0, 0.0]\n[[joint]]\nname = \"only\"\n\
+         dh = {{ alpha = 0.0, a = 0.0, d = 0.0 }}\nrange_deg = [-200.0, 200.0]\n{more}"
+    )
+}
+
+/// How the pendulum is moved and recorded.
+#[derive(Clone, Copy)]
+pub struct Motion {
+    /// Angle about which it swings, rad. It reverses with 20 rad/s2 at least, so hardly any time is spent near
+    /// standstill.
+    pub centre: f64,
+    /// Nominal, Hz.
+    pub rate_hz: f64,
+    /// Largest error of a stamp, s.
+    pub jitter_s: f64,
+    /// Half the range of the torque's noise, N m.
+    pub noise_nm: f64,
+    /// Anatomical angle and torque are these of the joint times this, after the zero offset (rad) is taken off.
+    pub direction: f64,
+    pub zero_offset: f64,
+    pub seed: u64,
+}
+
+impl Default for Motion {
+    fn default() -> Self {
+        Self {
+            centre: 0.4,
+            rate_hz: 500.0,
+            jitter_s: 0.0,
+            noise_nm: 0.2,
+            direction: 1.0,
+            zero_offset: 0.0,
+            seed: 1,
+        }
+    }
+}
+
+impl Motion {
+    /// Lines `t,q,tau` of ten seconds.
+    pub fn samples(&self) -> Vec<[f64; 3]> {
+        let mut random = self.seed;
+        // Uniform in +-1 (constants of Knuth's MMIX generator; its high bits).
+        let mut uniform = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (random >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
+        let [inertia, hx, hy, coulomb, viscous, offset] = TRUTH.map(|(_, value)| value);
+        (0..(10.0 * self.rate_hz) as u32)
+            .map(|sample| {
+                let time = f64::from(sample) / self.rate_hz + self.jitter_s * uniform();
+                let (mut q, mut qd, mut qdd) = (self.centre, 0.0, 0.0);
+                for (amplitude, frequency, phase) in [(1.2, 0.9, 0.0), (0.15, 1.7, 1.0)] {
+                    let speed = TAU * frequency;
+                    let (sine, cosine) = sin_cos(speed * time + phase);
+                    q += amplitude * sine;
+                    qd += amplitude * speed * cosine;
+                    qdd -= amplitude * speed * speed * sine;
+                }
+                let (sine, cosine) = sin_cos(q);
+                let torque = inertia * qdd
+                    + 9.81 * (hx * sine + hy * cosine)
+                    + coulomb * qd.signum()
+                    + viscous * qd
+                    + offset
+                    + self.noise_nm * uniform();
+                [time, self.direction * (q - self.zero_offset), self.direction * torque]
+            })
+            .collect()
+    }
+
+    /// As a recording.
+    pub fn csv(&self) -> String {
+        csv(&self.samples())
+    }
+}
+
+pub fn csv(samples: &[[f64; 3]]) -> String {
+    let mut text = String::from("t_s,q1_rad,tau1_Nm\n");
+    for [time, angle, torque] in samples {
+        writeln!(text, "{time:.7},{angle:.9},{torque:.7}").expect("memory");
+    }
+    text
+}
