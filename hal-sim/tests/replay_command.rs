@@ -7,7 +7,8 @@ mod pendulum;
 
 use command::{Folder, MUJOCO, base, fit, reasons, scarab};
 use pendulum::{Motion, TRUTH, leg};
-use scarab::ident::Kernel;
+use scarab::ident::record::SMOOTHING_BANDWIDTHS;
+use scarab::ident::{Kernel, LowPass};
 use scarab::real::sqrt;
 use serde_json::Value;
 use std::path::Path;
@@ -98,11 +99,13 @@ fn several_files_are_one_training_set_and_no_window_reaches_across() {
         let difference = (base(&both, name, "value") - base(&reversed, name, "value")).abs();
         assert!(difference < 0.05 * sigma, "{name}: {difference} of {sigma}");
     }
-    // 5000 samples less two windows of 245 taps, every tenth.
+    // The samples less the window of the smoothing, every tenth; rows are cut short at the ends of a file.
+    let smoothing = Kernel::<f64, 512>::new(8.0 * SMOOTHING_BANDWIDTHS, 500.0).expect("fits");
+    let rows = (5000 - smoothing.taps() + 1).div_ceil(10).to_string();
     for name in ["a.csv", "b.csv"] {
         let line = run.printed.lines().find(|line| line.contains(name)).expect("a line for the file");
         let cells: Vec<&str> = line.split_whitespace().collect();
-        assert_eq!(cells[1..], ["training", "0.00", "10.00", "500", "452", "0"], "{line}");
+        assert_eq!(cells[1..], ["training", "0.00", "10.00", "500", &rows, "0"], "{line}");
     }
 }
 
@@ -131,20 +134,25 @@ fn filtering_both_columns_of_the_table_gives_the_printed_error() {
     let table = folder.table("torque.csv");
     assert_eq!(table.header, ["t_s", "tau1_measured_Nm", "tau1_predicted_Nm", "file"]);
 
-    let kernel = Kernel::<f64, 512>::low_pass(6.0, 500.0).expect("fits");
+    let low_pass = LowPass::<f64, 512>::new(6.0, 500.0).expect("fits");
+    let smoothing = Kernel::<f64, 512>::new(6.0 * SMOOTHING_BANDWIDTHS, 500.0).expect("fits");
     let filtered = |window: &[Vec<f64>], column: usize| -> f64 {
-        window.iter().zip(kernel.weights()).map(|(row, weight)| row[column] * weight).sum()
+        window.iter().zip(low_pass.weights()).map(|(row, weight)| row[column] * weight).sum()
     };
     let (mut errors, mut size, mut rows) = (0.0, 0.0, 0.0);
     for (file, motion) in [(1.0, motions[1]), (2.0, motions[2])] {
         let samples = motion.samples();
         let part: Vec<_> = table.rows.iter().filter(|row| row[3] == file).cloned().collect();
-        assert_eq!(part.len(), samples.len() - kernel.taps() + 1, "a prediction wherever the window is full");
-        for (row, sample) in part.iter().zip(&samples[kernel.reach()..]) {
+        assert_eq!(
+            part.len(),
+            samples.len() - smoothing.taps() + 1,
+            "a prediction wherever the window is full"
+        );
+        for (row, sample) in part.iter().zip(&samples[smoothing.reach()..]) {
             assert!((row[0] - sample[0]).abs() < 2e-6, "time {} {}", row[0], sample[0]);
             assert!((row[1] - sample[2]).abs() < 1e-5, "measured {} {}", row[1], sample[2]);
         }
-        for window in part.windows(kernel.taps()).step_by(10) {
+        for window in part.windows(low_pass.taps()).step_by(10) {
             let (measured, predicted) = (filtered(window, 1), filtered(window, 2));
             errors += (measured - predicted) * (measured - predicted);
             size += measured.abs();

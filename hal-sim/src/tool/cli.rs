@@ -189,9 +189,9 @@ fn run_identify(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
         let options = &options(arguments.seed.unwrap_or(DEFAULT_SEED));
         let (log, figures) = (arguments.log.as_deref(), arguments.figures.as_deref());
         let run = with_leg_size!(leg, identify_one(leg, options, log, figures))?;
-        let code = finish(&run, &arguments.common);
+        let code = finish(&run, &arguments.common, "");
         if let Some(directory) = figures {
-            println!("figures: {}", directory.display());
+            tables::print(&format!("figures: {}\n", directory.display()))?;
         }
         return code;
     };
@@ -200,7 +200,7 @@ fn run_identify(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
     if let Some(path) = &arguments.common.json {
         write_json(path, &runs)?;
     }
-    print_runs(&runs);
+    print_runs(&runs)?;
     Ok(if runs.runs.iter().all(RunReport::accepted) { EXIT_ACCEPTED } else { EXIT_REFUSED })
 }
 

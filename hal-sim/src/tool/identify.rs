@@ -13,7 +13,7 @@ use super::leg_file::LegFile;
 use super::recording::{JointSeries, Recording};
 use super::report::{RunReport, SCHEMA};
 use super::simulate::{SimulatedRun, SimulationOptions, simulate};
-use super::tables;
+use super::tables::{self, say};
 use scarab::leg::{LoggedSample, Segment};
 use scarab::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
 
@@ -160,12 +160,12 @@ fn coverage(report: &RunsReport, sigmas: f64) -> f64 {
 }
 
 /// Statistics of many runs on standard output.
-pub fn print_runs(report: &RunsReport) {
+pub fn print_runs(report: &RunsReport) -> Result<(), ToolError> {
     let runs = &report.runs;
-    let Some(first) = runs.first() else { return };
-    println!("{}: {} runs, prior {}, plan {}\n", first.leg, runs.len(), first.prior, first.plan);
-    println!("{}\n", spread_table(report));
-    println!(
+    let Some(first) = runs.first() else { return Ok(()) };
+    say!("{}: {} runs, prior {}, plan {}\n", first.leg, runs.len(), first.prior, first.plan);
+    say!("{}\n", spread_table(report));
+    say!(
         "sigma covers {:.1} % within one and {:.1} % within three (68.3, 99.7 for a normal distribution)",
         coverage(report, 1.0),
         coverage(report, 3.0)
@@ -191,12 +191,12 @@ pub fn print_runs(report: &RunsReport) {
             format!("{:.3}", quantile(&mut measured, 0.5)),
         ]);
     }
-    println!("\n{fits}\n");
+    say!("\n{fits}\n");
     let excess: Vec<f64> = runs.iter().filter_map(|run| run.bso.excess_chi2.known()).collect();
     let mut to_half: Vec<f64> =
         runs.iter().map(|run| run.bso.iterations_to_half_chi2.map_or(f64::INFINITY, f64::from)).collect();
     let mut iterations: Vec<f64> = runs.iter().map(|run| f64::from(run.bso.iterations)).collect();
-    println!(
+    say!(
         "beetle swarm, cold start: excess <= 0.5 chi-square units in {} of {} runs (worst {}); iterations to there {} \
          median, {} in 95 %; to the end {} median, {} in 95 %",
         excess.iter().filter(|excess| **excess <= 0.5).count(),
@@ -213,7 +213,7 @@ pub fn print_runs(report: &RunsReport) {
                 runs.iter().filter_map(|run| value(run.tracking.get(joint)?)).collect();
             quantile(&mut values, 0.5)
         };
-        println!(
+        say!(
             "tracking on gait, joint {}: {:.3} deg rms without the model, {:.3} with it (medians)",
             joint + 1,
             of(&|tracking| tracking.rms_deg_without_model.known()),
@@ -221,12 +221,13 @@ pub fn print_runs(report: &RunsReport) {
         );
     }
     let accepted = runs.iter().filter(|run| run.accepted()).count();
-    println!("\naccepted: {accepted} of {}", runs.len());
+    say!("\naccepted: {accepted} of {}", runs.len());
     for run in runs.iter().filter(|run| !run.accepted()) {
-        println!("seed {}: refused, {}", run.seed.unwrap_or(0), run.reasons.join(", "));
+        say!("seed {}: refused, {}", run.seed.unwrap_or(0), run.reasons.join(", "));
     }
     let (simulated, wall) = runs
         .iter()
         .fold((0.0, 0.0), |(simulated, wall), run| (simulated + run.simulated_s, wall + run.wall_s));
-    println!("simulated time over time on one core: {:.0} times real time", simulated / wall);
+    say!("simulated time over time on one core: {:.0} times real time", simulated / wall);
+    Ok(())
 }

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use scarab::ident::record::SMOOTHING_BANDWIDTHS;
 use scarab::ident::{Ends, KernelError, Plan, Recorder, SearchState, Smoothed, Solver, Thresholds};
 use scarab::model::AnatomicalJoint;
 
@@ -17,6 +18,8 @@ use super::setup::{PriorChoice, anatomy, background};
 
 /// Taps the host sets aside: bandwidths from 1 Hz.
 const TAPS: usize = 2048;
+/// The smoothing, at a multiple of the bandwidth, has eight taps to each side up to here.
+const LARGEST_SMOOTHING_HZ: f64 = 120.0;
 /// Open outputs that go with them.
 const PENDING: usize = 205;
 /// Evaluations between two looks at the search.
@@ -185,7 +188,12 @@ fn new_recorder<const N: usize, const B: usize>(bandwidth_hz: f64) -> Result<Hos
         ToolError::input(match error {
             KernelError::Bandwidth => format!("--bandwidth {bandwidth_hz}: must be a positive number"),
             KernelError::TooLong { .. } => format!("--bandwidth {bandwidth_hz}: at least 1 Hz"),
-            KernelError::TooShort => format!("--bandwidth {bandwidth_hz}: at most 100 Hz"),
+            KernelError::TooShort => {
+                format!(
+                    "--bandwidth {bandwidth_hz}: at most {:.0} Hz",
+                    LARGEST_SMOOTHING_HZ / SMOOTHING_BANDWIDTHS
+                )
+            }
         })
     })
 }

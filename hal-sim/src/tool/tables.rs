@@ -19,6 +19,12 @@ pub fn print(text: &str) -> Result<(), ToolError> {
     }
 }
 
+/// `println!` by way of [`print`]: leaves the function where standard output cannot be written.
+macro_rules! say {
+    ($($text:tt)*) => { $crate::tool::tables::print(&format!("{}\n", format_args!($($text)*)))? };
+}
+pub(crate) use say;
+
 /// An empty table without frames.
 #[must_use]
 pub fn headed(header: &[&str]) -> Table {
