@@ -26,7 +26,7 @@ pub const SAMPLE_RATE_HZ: f64 = 500.0;
 
 /// Below this smoothed speed a joint may stick, rad/s. One flickering count of a resting 14-bit encoder at the joint
 /// reaches at most 0.0096 rad/s of the speed smoothed at 8 Hz, in proportion to the bandwidth.
-pub const STILL_SPEED: f64 = 0.02;
+pub const STILL_SPEED: f64 = 0.03;
 /// A row in whose window a joint stood still for a larger share says nothing reliable of that joint: friction at
 /// rest takes any value up to breakaway. On the MuJoCo leg, whose hip sticks a fifth of the time, leaving such
 /// rows in costs 14 % of Coulomb friction and twelve times the torque error; on the simulated default leg a share of
