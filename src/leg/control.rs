@@ -204,7 +204,9 @@ impl<const N: usize> Control<N> {
                 }
             }
             Finding::Judged { verdict, model } => {
-                if let Activity::Identify(_) = self.activity {
+                use IdentifyPhase::{Judge, Settle, Solve};
+                // In any other phase it is about an identification that was begun anew since.
+                if let Activity::Identify(Settle | Solve | Judge) = self.activity {
                     self.verdict = Some(verdict);
                     // A refused result leaves the model that was there before.
                     self.model = model.or(self.model);

@@ -1,0 +1,79 @@
+//! Legs that are not as the firmware believes, and wearers who do not hold still.
+
+use hal_sim::tool::leg_file::PushesFile;
+use hal_sim::tool::report::{Number, RunReport};
+use hal_sim::tool::simulate::simulate;
+use scarab::ident::Reason;
+
+use super::*;
+
+/// The firmware of the default leg on another leg.
+fn outcome(leg: &LegFile) -> (Option<Verdict>, DriveState) {
+    let mut pair = enabled(leg, 1);
+    let verdict = identify(&mut pair);
+    let reasons: Vec<_> = verdict.iter().flat_map(|verdict| verdict.reasons()).map(Reason::name).collect();
+    println!("verdict {reasons:?}, drive {:?}", pair.leg.control().state());
+    assert_eq!(pair.leg.control().model(), None);
+    (verdict, pair.leg.control().state())
+}
+
+#[test]
+fn a_dead_motor_is_never_accepted() {
+    for joint in 0..JOINTS {
+        let mut leg = default_leg();
+        leg.joints[joint].torque_per_ampere = 1e-3;
+        let (verdict, state) = outcome(&leg);
+        assert!(verdict.map_or(state.fault().is_some(), |verdict| !verdict.is_accepted()), "joint {joint}");
+    }
+}
+
+#[test]
+fn a_seized_joint_is_refused_as_unexcited() {
+    for joint in 0..JOINTS {
+        let mut leg = default_leg();
+        // More than its motor can overcome.
+        leg.joints[joint].truth.as_mut().expect("simulated").coulomb = 1000.0;
+        let (verdict, _) = outcome(&leg);
+        assert!(verdict.is_some_and(|verdict| verdict.has(Reason::Unexcited)), "joint {joint}");
+    }
+}
+
+#[test]
+fn a_joint_that_moves_a_third_less_than_its_current_tells_is_refused() {
+    for joint in 0..JOINTS {
+        let mut leg = default_leg();
+        leg.joints[joint].torque_per_ampere = 1.0;
+        let (verdict, _) = outcome(&leg);
+        assert!(verdict.is_some_and(|verdict| !verdict.is_accepted()), "joint {joint}");
+    }
+}
+
+fn pushed(per_minute: f64, torque_nm: f64) -> Result<RunReport, String> {
+    let leg =
+        LegFile { pushes: Some(PushesFile { per_minute, torque_nm, duration_s: 0.5 }), ..default_leg() };
+    simulate::<JOINTS, BASE>(&leg, &options(1)).map(|run| run.report).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_wearer_who_pushes_hard_is_refused_with_every_number_known() {
+    let report = pushed(60.0, 60.0).expect("the drive holds against 60 N m");
+    assert_eq!(report.reasons, ["validation"]);
+    let known = |number: &Number| number.known().is_some();
+    for base in &report.base_parameters {
+        assert!([base.value, base.sigma, base.truth, base.cramer_rao].iter().all(known), "{}", base.name);
+    }
+    for fit in report.training.iter().chain(&report.validation) {
+        let numbers =
+            [fit.rms_nm, fit.percent_of_mean_abs, fit.percent_of_rms, fit.percent_of_mean_abs_vs_truth];
+        assert!(numbers.iter().all(known), "{} {}", fit.motion, fit.joint);
+    }
+    assert!(known(&report.condition) && known(&report.bso.excess_chi2));
+    // No model, so nothing was tracked with it.
+    assert!(report.tracking.iter().all(|joint| !known(&joint.rms_deg_with_model)));
+}
+
+#[test]
+fn a_wearer_who_overpowers_the_drive_ends_in_a_fault_that_is_told() {
+    let error = pushed(200.0, 400.0).expect_err("400 N m against 85");
+    assert!(error.contains("the drive stopped during identification: FaultReactionActive"), "{error}");
+}

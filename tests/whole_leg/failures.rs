@@ -1,0 +1,158 @@
+//! Stops and faults in the middle of an identification.
+
+use scarab::hal::DriveCommand;
+use scarab::safety::{FaultCode, PowerRequest};
+use scarab::units::Ampere;
+
+use super::*;
+
+/// Damping lasts 300 ms.
+const DAMPING: u64 = 1200;
+
+/// While the swarm searches: slowly enough to be met at it.
+fn during_the_search() -> Pair {
+    let mut pair = before_the_search();
+    pair.evaluations = 1;
+    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(IdentifyPhase::Solve)));
+    let solver = pair.leg.identification().solver().expect("recorded");
+    assert_eq!(solver.search().state(), scarab::ident::SearchState::Running);
+    pair
+}
+
+/// A second identification in the middle of its exciting motion, the first one's model in use.
+fn identifying_again() -> Pair {
+    static PAIR: OnceLock<Pair> = OnceLock::new();
+    PAIR.get_or_init(|| {
+        let mut pair = identified();
+        tick(&mut pair, Some(ControlRequest::Identify));
+        assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(IdentifyPhase::Excite)));
+        for _ in 0..5 * SECOND {
+            tick(&mut pair, None);
+        }
+        pair
+    })
+    .clone()
+}
+
+/// Ticks on and sees that nothing comes of what was broken off, and that no command is absurd.
+fn nothing_comes_of_it(pair: &mut Pair, ticks: u64) {
+    let before = (pair.leg.control().model().copied(), pair.leg.control().verdict());
+    for _ in 0..ticks {
+        let output = tick(pair, None);
+        assert!(output.servo.drive().currents.iter().all(|current| current.is_finite()));
+        assert_eq!(activity(pair), Activity::Idle);
+    }
+    assert_eq!((pair.leg.control().model().copied(), pair.leg.control().verdict()), before);
+}
+
+#[test]
+fn a_quick_stop_at_any_phase_damps_then_releases_and_a_later_identification_works() {
+    let phases =
+        [("excite", during_excitation()), ("solve", during_the_search()), ("validate", during_validation())];
+    for (phase, mut pair) in phases {
+        let output = tick(&mut pair, Some(ControlRequest::Power(PowerRequest::QuickStop)));
+        assert_eq!(activity(&pair), Activity::Idle, "{phase}");
+        assert!(matches!(output.servo.decision.state, DriveState::QuickStopActive { .. }), "{phase}");
+        for _ in 0..DAMPING {
+            // Damping takes energy out: torque against motion, or none.
+            let output = tick(&mut pair, None);
+            for (torque, speed) in output.servo.decision.torque.iter().zip(output.servo.velocity) {
+                assert!(torque.0 * speed.0 <= 0.0, "{phase}: {torque:?} at {speed:?}");
+            }
+        }
+        assert_eq!(pair.leg.control().state(), DriveState::SwitchOnDisabled, "{phase}");
+        nothing_comes_of_it(&mut pair, 4 * SECOND);
+        assert_eq!((pair.leg.control().verdict(), pair.leg.control().model()), (None, None), "{phase}");
+        pair.evaluations = pair::EVALUATIONS_PER_TICK;
+        // The released leg has come to rest within its range.
+        assert!(pair.enable(context().gravity), "{phase}");
+        assert!(identify(&mut pair).is_some_and(Verdict::is_accepted), "{phase}");
+    }
+}
+
+#[test]
+fn a_current_that_is_not_a_number_releases_the_bridges_in_the_same_tick_and_keeps_the_old_model() {
+    for absurd in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for joint in 0..JOINTS {
+            let mut pair = identifying_again();
+            let model = pair.leg.control().model().copied();
+            assert!(is_enabled(&pair) && model.is_some());
+            pair.sample.joints[joint].current = Ampere(absurd);
+            let output = tick(&mut pair, None);
+            assert_eq!(*output.servo.drive(), DriveCommand::RELEASED);
+            assert_eq!(output.servo.decision.fault.map(|fault| fault.code), Some(FaultCode::NotFinite));
+            assert_eq!(activity(&pair), Activity::Idle);
+            nothing_comes_of_it(&mut pair, SECOND);
+            assert_eq!((pair.leg.control().model().copied(), pair.leg.control().verdict()), (model, None));
+        }
+    }
+}
+
+#[test]
+fn absurd_counts_end_the_identification_within_three_ticks_and_keep_the_old_model() {
+    for absurd in [i32::MAX, i32::MIN, i32::MAX / 2] {
+        for joint in 0..JOINTS {
+            let mut pair = identifying_again();
+            let model = pair.leg.control().model().copied();
+            for _ in 0..3 {
+                assert!(matches!(activity(&pair), Activity::Identify(_)));
+                pair.sample.joints[joint].encoder_counts = absurd;
+                let output = tick(&mut pair, None);
+                assert!(output.servo.drive().currents.iter().all(|current| current.is_finite()));
+            }
+            // One or two impossible readings are bridged; the third damps.
+            let fault = pair.leg.control().state().fault().expect("it is seen");
+            assert_eq!((fault.code, usize::from(fault.joint)), (FaultCode::EncoderStep, joint));
+            assert_eq!(activity(&pair), Activity::Idle);
+            for _ in 0..=DAMPING {
+                pair.sample.joints[joint].encoder_counts = absurd;
+                let output = tick(&mut pair, None);
+                assert!(output.servo.drive().currents.iter().all(|current| current.is_finite()));
+            }
+            assert_eq!(pair.leg.control().state(), DriveState::Fault { fault });
+            nothing_comes_of_it(&mut pair, SECOND);
+            assert_eq!((pair.leg.control().model().copied(), pair.leg.control().verdict()), (model, None));
+        }
+    }
+}
+
+#[test]
+fn a_single_absurd_count_is_bridged_and_never_accepted_wrong() {
+    let mut pair = during_excitation();
+    pair.sample.joints[1].encoder_counts = i32::MAX;
+    tick(&mut pair, None);
+    assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Excite));
+    assert!(run_until(&mut pair, |pair| !matches!(activity(pair), Activity::Identify(_))));
+    assert!(is_enabled(&pair));
+    let verdict = pair.leg.control().verdict().expect("the motion went on");
+    if verdict.is_accepted() {
+        let estimate = pair.leg.identification().solver().expect("solved").estimate();
+        let background = &context().background;
+        let truth = background.model.base.project(background.truth.as_ref().expect("simulated"));
+        for (base, truth) in truth.iter().enumerate() {
+            let sigma = f64::from(estimate.sigma(base).expect("determined"));
+            assert!((f64::from(estimate.values[base]) - truth).abs() < 4.0 * sigma, "base {base}");
+        }
+    }
+}
+
+#[test]
+fn an_identification_asked_for_again_starts_over() {
+    let mut pair = during_validation();
+    let phase = IdentifyPhase::Validate { motion: 2, step: Step::Run };
+    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(phase)));
+    for _ in 0..4 * SECOND {
+        tick(&mut pair, None);
+    }
+    tick(&mut pair, Some(ControlRequest::Identify));
+    for _ in 0..8 {
+        tick(&mut pair, None);
+    }
+    assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Approach));
+    assert_eq!(pair.leg.control().verdict(), None);
+    let before = pair.ticks;
+    assert!(run_until(&mut pair, |pair| !matches!(activity(pair), Activity::Identify(_))));
+    assert!(pair.leg.control().verdict().is_some_and(Verdict::is_accepted));
+    // Another whole run of 53 s.
+    assert!(pair.ticks - before > 50 * SECOND, "{}", pair.ticks - before);
+}

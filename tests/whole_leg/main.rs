@@ -1,0 +1,146 @@
+//! The whole firmware of a leg against the simulated leg, from the first tick to the verdict.
+//!
+//! Leg and plant are one value that can be cloned at any tick: tests that begin in the middle of an identification
+//! share the way there.
+
+mod conditions;
+mod failures;
+mod identification;
+mod memory;
+mod servo;
+
+use std::sync::OnceLock;
+
+use hal_sim::tool::leg_file::{DEFAULT_LEG, LegFile};
+use hal_sim::tool::pair;
+use hal_sim::tool::setup::PriorChoice;
+use hal_sim::tool::simulate::SimulationOptions;
+use scarab::ident::{Plan, Verdict};
+use scarab::leg::{Activity, ControlRequest, IdentifyPhase, Step};
+use scarab::safety::DriveState;
+
+/// Joints and base parameters of the default leg.
+const JOINTS: usize = 2;
+const BASE: usize = 13;
+
+type Pair = pair::Pair<JOINTS, BASE>;
+type Context = pair::Context<JOINTS, BASE>;
+
+/// Ticks of one second.
+const SECOND: u64 = 4000;
+/// An identification takes 53 s.
+const LONGEST_IDENTIFICATION: u64 = 100 * SECOND;
+
+fn options(seed: u64) -> SimulationOptions {
+    SimulationOptions {
+        seed,
+        swarm_seed: seed,
+        torque_noise_percent: None,
+        plan: Plan::OneTime,
+        prior: PriorChoice::Default,
+        with_series: false,
+    }
+}
+
+fn default_leg() -> LegFile {
+    LegFile::load(DEFAULT_LEG).expect("shipped")
+}
+
+fn context() -> &'static Context {
+    static CONTEXT: OnceLock<Context> = OnceLock::new();
+    CONTEXT
+        .get_or_init(|| Context::new(&default_leg(), &options(1)).expect("the default leg can be simulated"))
+}
+
+/// Enabled, at rest, in a world with this seed.
+fn enabled(leg: &LegFile, seed: u64) -> Pair {
+    let mut pair = Pair::new(leg, context(), seed).expect("the firmware takes the default leg");
+    assert!(pair.enable(context().gravity));
+    pair
+}
+
+fn tick(pair: &mut Pair, request: Option<ControlRequest<JOINTS>>) -> scarab::leg::ControlOutput<JOINTS> {
+    pair.tick(request, context().gravity)
+}
+
+fn activity(pair: &Pair) -> Activity {
+    pair.leg.control().activity()
+}
+
+/// Ticks until `reached`, at most as long as an identification takes; tells whether it was.
+fn run_until(pair: &mut Pair, reached: impl Fn(&Pair) -> bool) -> bool {
+    for _ in 0..LONGEST_IDENTIFICATION {
+        if reached(pair) {
+            return true;
+        }
+        tick(pair, None);
+    }
+    false
+}
+
+/// Identifies; `None` where the leg gave up without a verdict.
+fn identify(pair: &mut Pair) -> Option<Verdict> {
+    tick(pair, Some(ControlRequest::Identify));
+    assert!(run_until(pair, |pair| !matches!(activity(pair), Activity::Identify(_))), "without end");
+    pair.leg.control().verdict()
+}
+
+/// In the middle of the exciting motion.
+fn during_excitation() -> Pair {
+    static PAIR: OnceLock<Pair> = OnceLock::new();
+    PAIR.get_or_init(|| {
+        let mut pair = enabled(&default_leg(), 1);
+        tick(&mut pair, Some(ControlRequest::Identify));
+        assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(IdentifyPhase::Excite)));
+        for _ in 0..10 * SECOND {
+            tick(&mut pair, None);
+        }
+        pair
+    })
+    .clone()
+}
+
+/// At the first tick after the training motion was closed, the search not yet begun.
+fn before_the_search() -> Pair {
+    static PAIR: OnceLock<Pair> = OnceLock::new();
+    PAIR.get_or_init(|| {
+        let mut pair = during_excitation();
+        pair.evaluations = 0;
+        assert!(run_until(&mut pair, |pair| pair.leg.identification().solver().is_some()));
+        pair
+    })
+    .clone()
+}
+
+/// In the second motion of the validation.
+fn during_validation() -> Pair {
+    static PAIR: OnceLock<Pair> = OnceLock::new();
+    PAIR.get_or_init(|| {
+        let mut pair = before_the_search();
+        pair.evaluations = pair::EVALUATIONS_PER_TICK;
+        let phase = IdentifyPhase::Validate { motion: 1, step: Step::Run };
+        assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(phase)));
+        for _ in 0..2 * SECOND {
+            tick(&mut pair, None);
+        }
+        pair
+    })
+    .clone()
+}
+
+/// With an accepted model.
+fn identified() -> Pair {
+    static PAIR: OnceLock<Pair> = OnceLock::new();
+    PAIR.get_or_init(|| {
+        let mut pair = during_validation();
+        assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Idle));
+        assert!(pair.leg.control().verdict().is_some_and(Verdict::is_accepted));
+        assert!(pair.leg.control().model().is_some());
+        pair
+    })
+    .clone()
+}
+
+fn is_enabled(pair: &Pair) -> bool {
+    pair.leg.control().state() == DriveState::OperationEnabled
+}

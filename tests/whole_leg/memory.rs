@@ -1,0 +1,31 @@
+//! What the device has to hold.
+
+use std::mem::size_of;
+
+use hal_sim::tool::pair::{PENDING, TAPS};
+use scarab::ident::{Recorder, Solver, SwarmSearch};
+use scarab::leg::{Control, Identification, Leg};
+
+use super::*;
+
+/// Static memory of the board, beside 64 KB that only the processor reaches; on the host pointers are wider, but a leg
+/// holds none.
+const STATIC_BYTES: usize = 48 * 1024;
+
+#[test]
+fn a_leg_fits_the_memory_set_aside_for_it() {
+    let sizes = [
+        ("Leg", size_of::<Leg<JOINTS, BASE, TAPS, PENDING>>(), 40_000),
+        ("Control", size_of::<Control<JOINTS>>(), 2_000),
+        ("Identification", size_of::<Identification<JOINTS, BASE, TAPS, PENDING>>(), 38_000),
+        ("Recorder", size_of::<Recorder<f32, JOINTS, BASE, TAPS, PENDING>>(), 18_000),
+        ("Solver", size_of::<Solver<f32, JOINTS, BASE>>(), 13_000),
+        ("SwarmSearch", size_of::<SwarmSearch<f32, BASE>>(), 10_000),
+    ];
+    for (name, bytes, largest) in sizes {
+        println!("{name}: {bytes} bytes");
+        assert!(bytes <= largest, "{name}: {bytes} bytes");
+    }
+    assert!(sizes[0].1 <= STATIC_BYTES);
+    println!("Leg of three joints: {} bytes", size_of::<Leg<3, 28, TAPS, PENDING>>());
+}
