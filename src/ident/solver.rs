@@ -112,6 +112,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
             .and(input)
             .and(thresholds.judge_physics(model, &self.record, &self.least_squares))
             .and(thresholds.judge_physics(model, &self.record, &estimate))
+            .and(thresholds.judge_residual(&self.record, &estimate.values))
             .and(thresholds.judge_validation(&self.record, unused, &estimate.values))
     }
 }

@@ -5,9 +5,10 @@
 //! | `input` | too few rows, samples that are not finite, a joint whose torque never differs from zero |
 //! | `unexcited` | a joint hardly moved, base parameters are not determined, or the problem is ill-conditioned |
 //! | `unphysical` | negative friction, rotor inertia or kinetic energy, by more than three standard deviations |
+//! | `residual` | the motion identified from is not explained itself |
 //! | `validation` | torque on a motion that was not used is predicted worse than the training's noise explains |
 //!
-//! `residual`, `not_a_measurement`, `outliers` and `contact` complete the closed list; nothing raises them yet.
+//! `not_a_measurement`, `outliers` and `contact` complete the closed list; nothing raises them yet.
 //! Every threshold is a field of [`Thresholds`] with the reason for its default.
 
 use nalgebra::{SMatrix, Vector3};
@@ -222,6 +223,23 @@ impl<T: Real> Thresholds<T> {
             let weights = energy_weights(model, q, &direction);
             energy >= -self.largest_negative_sigmas * estimate.sigma_of(&weights)
         })
+    }
+
+    /// Whether the motion identified from is explained at all.
+    #[must_use]
+    pub fn judge_residual<const N: usize, const B: usize>(
+        &self,
+        training: &Record<T, N, B>,
+        values: &[T; B],
+    ) -> Verdict {
+        let mut verdict = Verdict::ACCEPTED;
+        for (joint, size) in training.torque.iter().enumerate() {
+            let error = training.torque_error(joint, values);
+            let explained =
+                error.is_some_and(|error| error <= self.largest_error_share * size.root_mean_square);
+            verdict.note(Reason::Residual, !explained);
+        }
+        verdict
     }
 
     /// Whether unused motions are predicted as well as the training motion lets expect.

@@ -139,7 +139,7 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
         csv: None,
     };
     let replayed = replay::<JOINTS, BASE>(&leg, &options).expect("what the tool writes it reads");
-    for (online, offline) in report.base_parameters.iter().zip(&replayed.base_parameters) {
+    for (online, offline) in report.base_parameters.iter().zip(&replayed.run.base_parameters) {
         assert_eq!(online.name, offline.name);
         let difference = online.value.known().expect("known") - offline.value.known().expect("known");
         // The log holds angles to a fraction of a count and torque to single precision.

@@ -37,7 +37,7 @@ fn amplitude_ratio(joint: usize, frequency_hz: f32) -> f64 {
         let output = tick(&mut pair, None);
         let phase = f64::from(index) / f64::from(motion.period_ticks()) * core::f64::consts::TAU;
         let (sine, cosine) = scarab::real::sin_cos(phase);
-        let angle = f64::from(scale.direction.sign()) * truth + f64::from(scale.zero_offset.0);
+        let angle = f64::from(scale.anatomy.direction()) * truth + f64::from(scale.anatomy.zero_offset());
         for (sums, value) in
             [(&mut commanded, f64::from(output.motion.position_rad[joint])), (&mut followed, angle)]
         {
