@@ -19,13 +19,13 @@ use crate::real::{self, Real};
 
 /// Bandwidth of the smoothing over that of the rows: the motion is undisturbed where the rows are sensitive, so that
 /// only one low-pass shapes the equation. With one bandwidth for both, large fast swings are predicted worse (double
-/// pendulum's swing-up 0.130 and 0.087 against 0.111 and 0.080 N m; 3 Hz on the simple one 0.110 against 0.068).
+/// pendulum's swing-up 0.137 and 0.093 against 0.117 and 0.085 N m; simple pendulum at 3 Hz 0.165 against 0.056).
 pub const SMOOTHING_BANDWIDTHS: f64 = 2.0;
 /// Rate of the samples a [`Recorder`] takes.
 pub const SAMPLE_RATE_HZ: f64 = 500.0;
 
 /// Below this smoothed speed a joint may stick, rad/s. One flickering count of a resting 14-bit encoder at the joint
-/// reaches at most 0.0096 rad/s of the speed smoothed at 8 Hz, in proportion to the bandwidth.
+/// reaches at most 0.0096 rad/s of the speed smoothed at 8 Hz, in proportion to the bandwidth: 0.019 with rows at 8 Hz.
 pub const STILL_SPEED: f64 = 0.03;
 /// A row in whose window a joint stood still for a larger share says nothing reliable of that joint: friction at
 /// rest takes any value up to breakaway. On the MuJoCo leg, whose hip sticks a fifth of the time, leaving such

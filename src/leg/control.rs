@@ -1,12 +1,12 @@
 //! The half of a leg that moves: activity, motions, servo, log. Ticked at 4 kHz.
 
 use super::activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
-use super::configuration::{LegConfiguration, LegError};
+use super::configuration::{LegConfiguration, LegError, ProvedMotion};
 use super::identification::Finding;
 use super::model::IdentifiedModel;
 use crate::hal::Sample;
 use crate::ident::Verdict;
-use crate::motion::{JointEnvelope, Motion, MotionState, Periodic, Ramp};
+use crate::motion::{Motion, MotionState, Periodic, Ramp};
 use crate::safety::{DriveState, PowerRequest};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
@@ -23,8 +23,8 @@ pub enum ControlRequest<const N: usize> {
     Identify,
     /// Follow a motion, with the identified model in the feedforward or with feedback alone.
     Track {
-        /// Within the leg's limits, or the request is ignored.
-        motion: Periodic<N>,
+        /// Proved against this leg's limits, see [`LegConfiguration::prove`].
+        motion: ProvedMotion<N>,
         /// Whether the model is used, if there is one.
         with_model: bool,
     },
@@ -64,7 +64,6 @@ pub struct Control<const N: usize> {
     tracked: Option<Periodic<N>>,
     excitation: Periodic<N>,
     validation: [Periodic<N>; VALIDATION_MOTIONS],
-    limits: [JointEnvelope; N],
     approach_speed: [RadianPerSecond; N],
     approach_acceleration: [RadianPerSecondSquared; N],
     model: Option<IdentifiedModel<N>>,
@@ -78,7 +77,10 @@ impl<const N: usize> Control<N> {
     /// # Errors
     /// [`LegError`] when limits make no sense or a motion cannot be proved to stay within them.
     pub fn new<const B: usize>(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
-        configuration.prove_motions()?;
+        configuration.prove(configuration.excitation)?;
+        for motion in configuration.validation {
+            configuration.prove(motion)?;
+        }
         let (approach_speed, approach_acceleration) = configuration.approach();
         Ok(Self {
             servo: Servo::new(configuration.joints)?,
@@ -91,7 +93,6 @@ impl<const N: usize> Control<N> {
             tracked: None,
             excitation: configuration.excitation,
             validation: configuration.validation,
-            limits: configuration.envelope(),
             approach_speed,
             approach_acceleration,
             model: None,
@@ -140,11 +141,9 @@ impl<const N: usize> Control<N> {
                 self.approach(Activity::Identify(IdentifyPhase::Approach), self.excitation);
             }
             ControlRequest::Track { motion, with_model } if enabled => {
-                if Motion::Periodic(motion).prove(&self.limits).is_ok() {
-                    self.tracked = Some(motion);
-                    self.with_model = with_model;
-                    self.approach(Activity::Track(Step::Approach), motion);
-                }
+                self.tracked = Some(*motion.motion());
+                self.with_model = with_model;
+                self.approach(Activity::Track(Step::Approach), *motion.motion());
             }
             ControlRequest::Identify | ControlRequest::Track { .. } => {}
         }

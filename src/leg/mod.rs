@@ -25,7 +25,7 @@ mod identification;
 mod model;
 
 pub use activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
-pub use configuration::{LegConfiguration, LegError};
+pub use configuration::{LegConfiguration, LegError, ProvedMotion};
 pub use control::{Control, ControlOutput, ControlRequest, LoggedSample};
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;

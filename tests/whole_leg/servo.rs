@@ -1,6 +1,6 @@
 //! How well the leg follows.
 
-use scarab::motion::{Fourier, HARMONICS, Motion, Periodic};
+use scarab::motion::{Fourier, HARMONICS, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::Second;
 
@@ -23,8 +23,8 @@ fn amplitude_ratio(joint: usize, frequency_hz: f32) -> f64 {
     amplitudes[joint][0] = AMPLITUDE_RAD;
     let curve = Fourier::new(Second(1.0 / frequency_hz), centre, amplitudes, [[0.0; HARMONICS]; JOINTS]);
     let motion = Periodic::new(curve.expect("finite"), Second(1.0), CYCLES, SERVO_RATE_HZ).expect("sensible");
-    Motion::Periodic(motion).prove(&context().configuration.envelope()).expect("small");
-    tick(&mut pair, Some(ControlRequest::Track { motion, with_model: false }));
+    let proved = context().configuration.prove(motion).expect("small");
+    tick(&mut pair, Some(ControlRequest::Track { motion: proved, with_model: false }));
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
     for _ in 0..motion.blend_ticks() + (CYCLES - 8) * motion.period_ticks() {
         tick(&mut pair, None);

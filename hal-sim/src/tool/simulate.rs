@@ -111,6 +111,7 @@ fn tracking_error<const N: usize, const B: usize>(
     with_model: bool,
 ) -> Option<[f64; N]> {
     let scales = context.configuration.joints.map(|joint| joint.scale);
+    let motion = context.configuration.prove(motion).ok()?;
     let mut request = Some(ControlRequest::Track { motion, with_model });
     let (mut squared, mut count) = ([0.0; N], 0_u32);
     let end = pair.ticks + (60.0 / TICK_S) as u64;
