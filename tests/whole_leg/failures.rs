@@ -37,12 +37,15 @@ fn identifying_again() -> Pair {
 /// Ticks on and sees that nothing comes of what was broken off, and that no command is absurd.
 fn nothing_comes_of_it(pair: &mut Pair, ticks: u64) {
     let before = (pair.leg.control().model().copied(), pair.leg.control().verdict());
+    let found = pair.leg.identification().clone();
     for _ in 0..ticks {
         let output = tick(pair, None);
         assert!(output.servo.drive().currents.iter().all(|current| current.is_finite()));
         assert_eq!(activity(pair), Activity::Idle);
     }
     assert_eq!((pair.leg.control().model().copied(), pair.leg.control().verdict()), before);
+    // Not a single evaluation is spent on it.
+    assert_eq!(*pair.leg.identification(), found);
 }
 
 #[test]
@@ -134,6 +137,24 @@ fn a_single_absurd_count_is_bridged_and_never_accepted_wrong() {
             assert!((f64::from(estimate.values[base]) - truth).abs() < 4.0 * sigma, "base {base}");
         }
     }
+}
+
+#[test]
+fn a_refused_result_leaves_the_model_that_was_there() {
+    let mut pair = identified();
+    let model = pair.leg.control().model().copied();
+    assert!(model.is_some());
+    tick(&mut pair, Some(ControlRequest::Identify));
+    while matches!(activity(&pair), Activity::Identify(_)) {
+        if let Activity::Identify(IdentifyPhase::Validate { .. }) = activity(&pair) {
+            // A sensor that changes its mind after the excitation.
+            pair.sample.joints[1].current = pair.sample.joints[1].current * 2.0;
+        }
+        tick(&mut pair, None);
+    }
+    let verdict = pair.leg.control().verdict().expect("it ran to its end");
+    assert!(verdict.has(scarab::ident::Reason::Validation));
+    assert_eq!(pair.leg.control().model().copied(), model);
 }
 
 #[test]
