@@ -122,7 +122,12 @@ impl<const N: usize> Control<N> {
         } else {
             self.proceed();
         }
-        let logged = self.averager.push(self.tick, sample, &self.servo.scales());
+        // A glitch that the servo did not believe must not enter the log either.
+        let mut believed = *sample;
+        for (joint, counts) in believed.joints.iter_mut().zip(servo.believed_counts) {
+            joint.encoder_counts = counts;
+        }
+        let logged = self.averager.push(self.tick, &believed, &self.servo.scales());
         let logged = logged.map(|sample| {
             let segment = self.segment.filter(|segment| Some(*segment) == self.activity.segment());
             self.segment = self.activity.segment();

@@ -88,6 +88,13 @@ impl Observer {
         self.reading.unwrap_or(0) as f32 + self.deviation
     }
 
+    /// Estimated position as an encoder would show it.
+    #[must_use]
+    pub fn nearest_counts(&self) -> i32 {
+        let rounded = if self.deviation < 0.0 { self.deviation - 0.5 } else { self.deviation + 0.5 };
+        self.reading.unwrap_or(0).wrapping_add(rounded as i32)
+    }
+
     /// Estimated velocity, counts/s.
     #[must_use]
     pub fn velocity_counts_per_s(&self) -> f32 {

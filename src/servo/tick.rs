@@ -50,6 +50,8 @@ pub struct ServoOutput<const N: usize> {
     pub position: [Radian; N],
     /// Estimated velocities.
     pub velocity: [RadianPerSecond; N],
+    /// Encoder counts as far as they are believed: the observer's where the reading was impossible.
+    pub believed_counts: [i32; N],
     /// Commanded minus estimated angles.
     pub tracking_error: [Radian; N],
     /// Torques that feedforward and feedback wanted.
@@ -143,6 +145,10 @@ impl<const N: usize> Servo<N> {
     ) -> ServoOutput<N> {
         let motion = &command.motion;
         let rejected = self.observe(sample, motion);
+        let believed_counts = core::array::from_fn(|joint| {
+            let reading = sample.joints[joint].encoder_counts;
+            if rejected[joint] { self.observers[joint].nearest_counts() } else { reading }
+        });
         let position: [Radian; N] = core::array::from_fn(|joint| {
             self.joints[joint].scale.position(self.observers[joint].position_counts())
         });
@@ -166,7 +172,7 @@ impl<const N: usize> Servo<N> {
         let request = Request { torque: wanted_torque, power: command.power };
         let decision = self.monitor.decide(&observation, &request);
         self.settle(&tracking_error, &wanted_torque, &decision);
-        ServoOutput { position, velocity, tracking_error, wanted_torque, decision }
+        ServoOutput { position, velocity, believed_counts, tracking_error, wanted_torque, decision }
     }
 
     /// Moves the observers by one tick and tells which readings were rejected.

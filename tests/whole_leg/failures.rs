@@ -121,8 +121,16 @@ fn absurd_counts_end_the_identification_within_three_ticks_and_keep_the_old_mode
 
 #[test]
 fn a_single_absurd_count_is_bridged_and_never_accepted_wrong() {
+    // 30,000 counts are 26 degrees: a mean of eight that held them would move parameters by 20 sigma.
+    for (joint, glitch) in [(1, i32::MAX), (0, 30_000), (1, -30_000), (0, 10_000), (1, 3_000)] {
+        glitch_is_bridged(joint, glitch);
+    }
+}
+
+fn glitch_is_bridged(joint: usize, glitch: i32) {
     let mut pair = during_excitation();
-    pair.sample.joints[1].encoder_counts = i32::MAX;
+    let counts = &mut pair.sample.joints[joint].encoder_counts;
+    *counts = counts.wrapping_add(glitch);
     tick(&mut pair, None);
     assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Excite));
     assert!(run_until(&mut pair, |pair| !matches!(activity(pair), Activity::Identify(_))));
@@ -134,7 +142,10 @@ fn a_single_absurd_count_is_bridged_and_never_accepted_wrong() {
         let truth = background.model.base.project(background.truth.as_ref().expect("simulated"));
         for (base, truth) in truth.iter().enumerate() {
             let sigma = f64::from(estimate.sigma(base).expect("determined"));
-            assert!((f64::from(estimate.values[base]) - truth).abs() < 4.0 * sigma, "base {base}");
+            assert!(
+                (f64::from(estimate.values[base]) - truth).abs() < 4.0 * sigma,
+                "joint {joint}, {glitch} counts: base {base}"
+            );
         }
     }
 }
