@@ -44,7 +44,7 @@ impl Status {
 
 /// A base parameter is weak when an error of one standard deviation, the others unchanged, would move the torque
 /// of a joint by more than this share of its size: only because others make up for it is it not seen.
-const WEAK_SHARE: f64 = 0.05;
+const WEAK_SHARE: f64 = 0.02;
 
 /// Whether the data hardly tell base parameter `base` from the others.
 #[must_use]
