@@ -101,7 +101,7 @@ impl<T: Real, const B: usize> Stage<T, B> {
 
     /// Largest over smallest singular value of the stage with columns scaled to unit length; `None` without columns.
     ///
-    /// Power iteration on `S'S` and on its inverse, [`POWER_ITERATIONS`] rounds each: a lower bound, within a few
+    /// Power iteration on `S'S` and on its inverse, forty rounds each: a lower bound, within a few
     /// percent.
     #[must_use]
     pub fn condition(&self) -> Option<T> {
