@@ -7,14 +7,20 @@ use super::model::IdentifiedModel;
 use crate::hal::Sample;
 use crate::ident::Verdict;
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
+use crate::real::clamp;
 use crate::safety::{DriveState, PowerRequest};
-use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
+use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput, TorqueModel};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
 /// At rest this long after a motion before the next step: half a second.
 const SETTLE_TICKS: u32 = SERVO_RATE_HZ / 2;
 
-/// What an operator asks of a leg, at one tick.
+/// The model fades into and out of the feedforward over half a second, while the controller's integral makes room: no
+/// step of torque when a model is taken into use.
+const FADE_PER_TICK: f32 = 1.0 / (SERVO_RATE_HZ / 2) as f32;
+
+/// What an operator asks of a leg, at one tick. `Identify` and `Track` are refused unless the drive is enabled and the
+/// commanded motion is at rest; a leg in motion is stopped by a quick stop, or by waiting for the motion's end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ControlRequest<const N: usize> {
     /// A step of the drive's power states.
@@ -48,6 +54,8 @@ pub struct ControlOutput<const N: usize> {
     pub motion: MotionState<N>,
     /// Every eighth tick.
     pub logged: Option<LoggedSample<N>>,
+    /// The request of this tick was refused.
+    pub refused: bool,
 }
 
 /// Activity, servo and log of one leg.
@@ -57,7 +65,7 @@ pub struct Control<const N: usize> {
     averager: LogAverager<N>,
     tick: u32,
     activity: Activity,
-    /// Set when the activity changed since the last logged sample: the sample in the making belongs to neither.
+    /// What the last logged sample was for: a sample in whose ticks that changed belongs to neither.
     segment: Option<Segment>,
     motion: Motion<N>,
     motion_tick: u32,
@@ -68,7 +76,21 @@ pub struct Control<const N: usize> {
     approach_acceleration: [RadianPerSecondSquared; N],
     model: Option<IdentifiedModel<N>>,
     with_model: bool,
+    /// Share of the model in the feedforward, 0..1.
+    model_share: f32,
     verdict: Option<Verdict>,
+}
+
+/// A model at a share of its torque.
+struct Faded<'a, const N: usize> {
+    model: &'a IdentifiedModel<N>,
+    share: f32,
+}
+
+impl<const N: usize> TorqueModel<N> for Faded<'_, N> {
+    fn torques(&self, q: &[f32; N], qd: &[f32; N], qdd: &[f32; N], gravity: [f32; 3]) -> [f32; N] {
+        self.model.torques(q, qd, qdd, gravity).map(|torque| self.share * torque)
+    }
 }
 
 impl<const N: usize> Control<N> {
@@ -97,6 +119,7 @@ impl<const N: usize> Control<N> {
             approach_acceleration,
             model: None,
             with_model: false,
+            model_share: 0.0,
             verdict: None,
         })
     }
@@ -109,11 +132,14 @@ impl<const N: usize> Control<N> {
         gravity: [f32; 3],
     ) -> ControlOutput<N> {
         self.tick = self.tick.wrapping_add(1);
-        let power = self.accept(request);
+        let refused = request.as_ref().is_some_and(|request| !self.may_begin(request));
+        let power = self.accept(request.filter(|_| !refused));
         let motion = self.motion.state_at(self.motion_tick);
-        let command =
-            ServoCommand { motion, feedforward: self.model.as_ref().filter(|_| self.with_model), power };
-        let servo = self.servo.tick(sample, &command, gravity);
+        let wanted = if self.with_model { FADE_PER_TICK } else { -FADE_PER_TICK };
+        self.model_share = clamp(self.model_share + wanted, 0.0, 1.0);
+        let faded = self.model.as_ref().map(|model| Faded { model, share: self.model_share });
+        let feedforward = faded.as_ref().filter(|faded| faded.share > 0.0);
+        let servo = self.servo.tick(sample, &ServoCommand { motion, feedforward, power }, gravity);
         self.motion_tick = self.motion_tick.saturating_add(1);
         if servo.decision.state != DriveState::OperationEnabled {
             // A leg that is not held is where it is: enabling must not pull it anywhere.
@@ -133,24 +159,30 @@ impl<const N: usize> Control<N> {
             self.segment = self.activity.segment();
             LoggedSample { sample, segment }
         });
-        ControlOutput { servo, motion, logged }
+        ControlOutput { servo, motion, logged, refused }
+    }
+
+    /// Power requests always; a new activity only from rest, since the way to it starts at rest.
+    fn may_begin(&self, request: &ControlRequest<N>) -> bool {
+        let still =
+            self.motion.state_at(self.motion_tick).velocity_rad_per_s.iter().all(|&speed| speed == 0.0);
+        let enabled = self.servo.state() == DriveState::OperationEnabled;
+        matches!(request, ControlRequest::Power(_)) || (enabled && still)
     }
 
     fn accept(&mut self, request: Option<ControlRequest<N>>) -> Option<PowerRequest> {
-        let enabled = self.servo.state() == DriveState::OperationEnabled;
         match request? {
             ControlRequest::Power(power) => return Some(power),
-            ControlRequest::Identify if enabled => {
+            ControlRequest::Identify => {
                 self.verdict = None;
                 self.with_model = false;
                 self.approach(Activity::Identify(IdentifyPhase::Approach), self.excitation);
             }
-            ControlRequest::Track { motion, with_model } if enabled => {
+            ControlRequest::Track { motion, with_model } => {
                 self.tracked = Some(*motion.motion());
                 self.with_model = with_model;
                 self.approach(Activity::Track(Step::Approach), *motion.motion());
             }
-            ControlRequest::Identify | ControlRequest::Track { .. } => {}
         }
         None
     }
@@ -230,7 +262,10 @@ impl<const N: usize> Control<N> {
                 self.motion = Motion::Ramp(ramp);
                 self.motion_tick = 0;
             }
-            Err(_) => self.rest(Activity::Idle),
+            Err(_) => {
+                self.activity = Activity::Idle;
+                self.hold(here);
+            }
         }
     }
 

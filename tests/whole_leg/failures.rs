@@ -169,22 +169,42 @@ fn a_refused_result_leaves_the_model_that_was_there() {
 }
 
 #[test]
-fn an_identification_asked_for_again_starts_over() {
+fn a_request_while_the_leg_moves_is_refused_and_the_command_stays_continuous() {
     let mut pair = during_validation();
     let phase = IdentifyPhase::Validate { motion: 2, step: Step::Run };
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(phase)));
     for _ in 0..4 * SECOND {
         tick(&mut pair, None);
     }
-    tick(&mut pair, Some(ControlRequest::Identify));
-    for _ in 0..8 {
-        tick(&mut pair, None);
-    }
-    assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Approach));
-    assert_eq!(pair.leg.control().verdict(), None);
-    let before = pair.ticks;
+    let before = pair.tick(None, context().gravity);
+    let asked = pair.tick(Some(ControlRequest::Identify), context().gravity);
+    assert!(asked.refused && !before.refused);
+    assert_eq!(activity(&pair), Activity::Identify(phase));
     assert!(run_until(&mut pair, |pair| !matches!(activity(pair), Activity::Identify(_))));
     assert!(pair.leg.control().verdict().is_some_and(Verdict::is_accepted));
-    // Another whole run of 53 s.
-    assert!(pair.ticks - before > 50 * SECOND, "{}", pair.ticks - before);
+}
+
+#[test]
+fn commanded_speed_and_torque_never_jump_from_power_up_to_tracking_with_the_model() {
+    let mut pair = enabled(&default_leg(), 1);
+    let mut before = pair.tick(None, context().gravity);
+    let mut request = Some(ControlRequest::Identify);
+    let gait = context().configuration.prove(context().motions.validation[1]).expect("proved at the start");
+    for second_half in [false, true] {
+        while pair.ticks == 0 || request.is_some() || activity(&pair) != Activity::Idle {
+            let output = pair.tick(request.take(), context().gravity);
+            for joint in 0..JOINTS {
+                let speed = output.motion.velocity_rad_per_s[joint] - before.motion.velocity_rad_per_s[joint];
+                // The gait's largest acceleration is 25 rad/s2: 0.006 rad/s in a tick.
+                assert!(speed.abs() < 0.008, "joint {joint}, tick {}: {speed}", pair.ticks);
+                let torque = output.servo.decision.torque[joint].0 - before.servo.decision.torque[joint].0;
+                // Coulomb friction's feedforward turns round by 9.3 N m within 0.04 rad/s; gravity is 20 N m and more.
+                assert!(torque.abs() < 4.0, "joint {joint}, tick {}: {torque}", pair.ticks);
+            }
+            before = output;
+        }
+        if !second_half {
+            request = Some(ControlRequest::Track { motion: gait, with_model: true });
+        }
+    }
 }
