@@ -2,7 +2,7 @@
 //!
 //! A leg of `N` joints is sampled once per servo tick and answered once per servo tick. Angles arrive as encoder
 //! counts, torques leave as motor currents, both with the anatomical sign (flexion positive) of the joint they
-//! belong to; the firmware converts to the model's angles in one place (`leg::configuration`).
+//! belong to; the firmware converts to the model's angles in one place (`servo::scale`).
 
 use crate::units::Ampere;
 

@@ -170,10 +170,11 @@ fn ten_hours_of_rows_in_single_precision_keep_the_parameters() {
 fn judge(recorder: &mut LegRecorder) -> Verdict {
     let (record, model, thresholds) = (recorder.finish(), model(), Thresholds::default());
     let problem = Problem::new(&record, &model);
+    let found = problem.least_squares(Plan::OneTime);
     thresholds
         .judge_input(&model, &record)
-        .and(thresholds.judge_excitation(&model, &problem.whole()))
-        .and(thresholds.judge_physics(&model, &record, &problem.least_squares(Plan::OneTime)))
+        .and(thresholds.judge_excitation(&model, &problem.whole(), found.rank()))
+        .and(thresholds.judge_physics(&model, &record, &found))
 }
 
 #[test]
@@ -204,6 +205,18 @@ fn a_sample_that_is_not_a_number_is_refused_as_input_and_loses_only_its_window()
     assert_eq!(record_of_both.rows, before.map(|rows| 2 * rows));
     let found = Problem::new(&record_of_both, &model()).least_squares(Plan::OneTime);
     assert!((f64::from(found.values[0]) / true_base()[0] - 1.0).abs() < 0.1);
+}
+
+#[test]
+fn a_finite_but_absurd_angle_at_the_end_is_refused_as_input_and_leaves_no_nan() {
+    let mut recorder = LegRecorder::new(8.0).expect("fits");
+    record(&mut recorder, 12.0, 0.07, 3);
+    for _ in 0..200 {
+        recorder.push(&model(), &[3e38, 0.0], &[0.0; 2]);
+    }
+    let record = recorder.finish();
+    assert!(record.rejected > 0 && record.factors.iter().all(|factor| factor.residual().is_finite()));
+    assert!(Thresholds::default().judge_input(&model(), &record).has(Reason::Input));
 }
 
 #[test]

@@ -5,7 +5,7 @@
 //! centre of mass  the prior's +- half the segment's length, each coordinate
 //! inertia         about the centre of mass: diagonal 0.2 .. 5 of the prior's, products +- half the largest
 //! rotor, Coulomb, viscous   0 .. 5 of the prior's
-//! offset          +- (5 |prior| + 2 Coulomb)
+//! offset          +- 5 (|prior| + Coulomb)
 //! ```
 //!
 //! Products and sums of intervals give the parameters about the joint's origin, and the base parameters' terms
@@ -129,10 +129,7 @@ impl<T: Real> LinkPrior<T> {
             (Parameter::FV, friction_share(self.viscous_friction)),
             (
                 Parameter::OFF,
-                Interval::around(
-                    T::zero(),
-                    T::of(most) * real::abs(self.offset) + T::of(2.0) * self.coulomb_friction,
-                ),
+                Interval::around(T::zero(), T::of(most) * (real::abs(self.offset) + self.coulomb_friction)),
             ),
         ];
         for (parameter, range) in values {

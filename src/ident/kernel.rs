@@ -51,7 +51,6 @@ pub struct LowPass<T, const TAPS: usize> {
     half_width: T,
     weights: [T; TAPS],
     energy: T,
-    absolute_sum: T,
 }
 
 impl<T: Real, const TAPS: usize> LowPass<T, TAPS> {
@@ -72,8 +71,7 @@ impl<T: Real, const TAPS: usize> LowPass<T, TAPS> {
             return Err(KernelError::TooLong { needed: 2 * reach + 1 });
         }
         let zero = T::zero();
-        let mut low_pass =
-            Self { reach, half_width, weights: [zero; TAPS], energy: zero, absolute_sum: zero };
+        let mut low_pass = Self { reach, half_width, weights: [zero; TAPS], energy: zero };
         let taps = low_pass.taps();
         for index in 0..taps {
             low_pass.weights[index] = function_and_derivatives(signed(index, reach), half_width, T::one()).0;
@@ -82,7 +80,6 @@ impl<T: Real, const TAPS: usize> LowPass<T, TAPS> {
         for weight in &mut low_pass.weights[..taps] {
             *weight /= gain;
             low_pass.energy += *weight * *weight;
-            low_pass.absolute_sum += real::abs(*weight);
         }
         Ok(low_pass)
     }
@@ -109,12 +106,6 @@ impl<T: Real, const TAPS: usize> LowPass<T, TAPS> {
     #[must_use]
     pub fn energy(&self) -> T {
         self.energy
-    }
-
-    /// Sum of the absolute weights, a little above one.
-    #[must_use]
-    pub fn absolute_sum(&self) -> T {
-        self.absolute_sum
     }
 }
 

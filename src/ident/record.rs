@@ -109,7 +109,7 @@ pub struct Record<T, const N: usize, const B: usize> {
     pub torque: [TorqueSize<T>; N],
     /// Filtered rows of each joint.
     pub rows: [u32; N],
-    /// Samples that were not finite and reset the filter.
+    /// Samples and rows that were not finite.
     pub rejected: u32,
     /// Information of one row in units of independent ones, `m sum h^2`: below one because rows overlap.
     pub row_information: T,
@@ -230,6 +230,10 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     }
 
     fn take(&mut self, rows: &FilteredRows<T, N, B>) {
+        if !rows.is_finite() {
+            self.rejected = self.rejected.saturating_add(1);
+            return;
+        }
         for joint in 0..N {
             if rows.still[joint] > T::of(LARGEST_STILL_SHARE) {
                 continue;
@@ -258,7 +262,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         for (sum, &velocity) in self.speed.iter_mut().zip(&instant.velocity) {
             sum.add(velocity * velocity);
         }
-        let rows = self.filter.push(&self.low_pass, &model.rows(&instant)).filter(FilteredRows::is_finite);
+        let rows = self.filter.push(&self.low_pass, &model.rows(&instant));
         if let Some(rows) = &rows {
             self.take(rows);
         }

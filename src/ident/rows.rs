@@ -14,7 +14,7 @@
 //! has a sharp edge and lets through what the low-pass keeps out, so errors are measured on whole windows
 //! ([`Ends::Whole`]).
 //!
-//! Cost of one sample: `PENDING N (B + 2)` multiplications. Memory: as many numbers.
+//! Cost of one sample: `PENDING (N (B + 2) + 1)` multiplications. Memory: as many numbers.
 
 use super::kernel::LowPass;
 use crate::real::{self, Real};
@@ -54,10 +54,38 @@ pub enum Ends {
     Whole,
 }
 
+/// An output in the making.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Open<T, const N: usize, const B: usize> {
+    rows: FilteredRows<T, N, B>,
+    /// Sum of the absolute weights used so far.
+    weight: T,
+}
+
+impl<T: Real, const N: usize, const B: usize> Open<T, N, B> {
+    fn empty() -> Self {
+        Self { rows: FilteredRows::empty(), weight: T::zero() }
+    }
+
+    fn add(&mut self, rows: &FilteredRows<T, N, B>, weight: T) {
+        add_scaled(&mut self.rows, rows, weight, real::abs(weight));
+        self.weight += real::abs(weight);
+    }
+
+    /// The rows, the shares of stillness related to the window that was there.
+    fn close(&self) -> FilteredRows<T, N, B> {
+        let mut rows = self.rows;
+        for still in &mut rows.still {
+            *still /= real::max(self.weight, T::EPSILON);
+        }
+        rows
+    }
+}
+
 /// Open outputs of the second stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowFilter<T, const N: usize, const B: usize, const PENDING: usize> {
-    open: [FilteredRows<T, N, B>; PENDING],
+    open: [Open<T, N, B>; PENDING],
     /// Samples since the start of the window of the output that will be finished next; `None` before the first.
     age: Option<usize>,
     /// Slot of that output.
@@ -69,7 +97,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
     /// No sample taken yet.
     #[must_use]
     pub fn new(ends: Ends) -> Self {
-        Self { open: [FilteredRows::empty(); PENDING], age: None, oldest: 0, ends }
+        Self { open: [Open::empty(); PENDING], age: None, oldest: 0, ends }
     }
 
     /// Open outputs that a kernel of `taps` weights needs.
@@ -102,7 +130,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
             // The output `behind` places younger began `behind * DECIMATION` samples later.
             let Some(tap) = age.checked_sub(behind * DECIMATION) else { break };
             if let (Some(output), Some(&weight)) = (self.open.get_mut(slot), weights.get(tap)) {
-                add_scaled(output, rows, weight, real::abs(weight) / low_pass.absolute_sum());
+                output.add(rows, weight);
             }
             slot = if slot + 1 >= PENDING { 0 } else { slot + 1 };
         }
@@ -125,8 +153,8 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
     fn take_oldest(&mut self) -> Option<FilteredRows<T, N, B>> {
         self.age = self.age.map(|age| age.saturating_sub(DECIMATION));
         let output = self.open.get_mut(self.oldest)?;
-        let finished = *output;
-        *output = FilteredRows::empty();
+        let finished = output.close();
+        *output = Open::empty();
         self.oldest = if self.oldest + 1 >= PENDING { 0 } else { self.oldest + 1 };
         Some(finished)
     }

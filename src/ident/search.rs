@@ -94,7 +94,11 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
             watched_value: T::LARGEST,
             watched_iteration: 0,
         };
-        search.start_stage();
+        if search.stage.columns().is_empty() {
+            search.next_stage(problem);
+        } else {
+            search.start_stage();
+        }
         search
     }
 
@@ -115,8 +119,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
         problem: &Problem<'_, T, N, B>,
         evaluations: u32,
     ) -> SearchState {
-        // One evaluation at a time towards the end of an iteration would be slow, whole slices would overshoot
-        // the stop: the swarm is asked for its iteration count after every evaluation it spends.
+        // One at a time: the rule that ends a stage looks at whole iterations, wherever a slice ends.
         for _ in 0..evaluations {
             let (Some(swarm), SearchState::Running) = (self.swarm.as_mut(), self.state) else { break };
             let cost = StageCost { stage: &self.stage, bounds: &self.bounds };
@@ -152,6 +155,11 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
                 self.determined[column] = true;
             }
         }
+        self.next_stage(problem);
+    }
+
+    /// Starts the next stage that has something to search, or ends.
+    fn next_stage<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
         self.swarm = None;
         // A stage that determines nothing has nothing to search.
         while self.swarm.is_none() && self.state == SearchState::Running {

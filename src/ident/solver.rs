@@ -41,8 +41,10 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         let least_squares = problem.least_squares(plan);
         let bounds = search_box(model, &record, prior);
         let search = SwarmSearch::new(&problem, plan, bounds, BsoSettings::default(), swarm_seed);
-        let before_search =
-            thresholds.judge_input(model, &record).and(thresholds.judge_excitation(model, &whole));
+        let before_search = {
+            let rank = least_squares.rank();
+            thresholds.judge_input(model, &record).and(thresholds.judge_excitation(model, &whole, rank))
+        };
         let condition = whole.condition();
         Self { record, plan, least_squares, condition, before_search, search, bounds }
     }
@@ -95,6 +97,19 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         Estimate { values: self.search.values(), ..self.least_squares.clone() }
     }
 
+    /// Cost of the result above that of the plan's least squares, chi-square units of all rows together.
+    fn excess(&self, model: &RowModel<T, N, B>) -> T {
+        let whole = Problem::new(&self.record, model).whole();
+        let cost = |values: &[T; B]| {
+            let mut compact = [T::zero(); B];
+            for (slot, &column) in compact.iter_mut().zip(whole.columns()) {
+                *slot = values[column];
+            }
+            whole.factor().excess(&compact)
+        };
+        cost(&self.search.values()) - cost(&self.least_squares.values)
+    }
+
     /// Accepted, or refused with all reasons that apply, given records of motions that were not used.
     #[must_use]
     pub fn judge<'a>(
@@ -112,6 +127,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
             .and(input)
             .and(thresholds.judge_physics(model, &self.record, &self.least_squares))
             .and(thresholds.judge_physics(model, &self.record, &estimate))
+            .and(thresholds.judge_box(self.excess(model), model.base.rank()))
             .and(thresholds.judge_residual(&self.record, &estimate.values))
             .and(thresholds.judge_validation(&self.record, unused, &estimate.values))
     }

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | `input` | too few rows, samples that are not finite, a joint whose torque never differs from zero |
 //! | `unexcited` | a joint hardly moved, base parameters are not determined, or the problem is ill-conditioned |
-//! | `unphysical` | negative friction, rotor inertia or kinetic energy, by more than three standard deviations |
+//! | `unphysical` | negative friction, rotor inertia or kinetic energy, by more than three standard deviations; or the data contradict every leg that the prior allows |
 //! | `residual` | the motion identified from is not explained itself |
 //! | `validation` | torque on a motion that was not used is predicted worse than the training's noise explains |
 //!
@@ -127,6 +127,8 @@ pub struct Thresholds<T> {
     pub largest_condition: T,
     /// Standard deviations by which a quantity that cannot be negative may be so.
     pub largest_negative_sigmas: T,
+    /// Spreads of chi-square by which the result in the prior's box may be worse than least squares: five are not noise.
+    pub largest_excess_spreads: T,
     /// Error on an unused motion over that on the training motion: noise alone gives one; twice leaves room for
     /// friction that depends on speed and load.
     pub largest_error_ratio: T,
@@ -144,6 +146,7 @@ impl<T: Real> Default for Thresholds<T> {
             smallest_speed: T::of(0.05),
             largest_condition: T::of(1000.0),
             largest_negative_sigmas: T::of(3.0),
+            largest_excess_spreads: T::of(5.0),
             largest_error_ratio: T::of(2.0),
             harmless_error_share: T::of(0.05),
             largest_error_share: T::of(0.7),
@@ -171,15 +174,17 @@ impl<T: Real> Thresholds<T> {
         verdict
     }
 
-    /// Whether a motion told all base parameters apart.
+    /// Whether a motion told all base parameters apart, in all rows together (`stage`) and in the plan that was followed,
+    /// which found `determined` of them.
     #[must_use]
     pub fn judge_excitation<const N: usize, const B: usize>(
         &self,
         model: &RowModel<T, N, B>,
         stage: &Stage<T, B>,
+        determined: usize,
     ) -> Verdict {
         let mut verdict = Verdict::ACCEPTED;
-        let singular = stage.columns().len() < model.base.rank();
+        let singular = stage.columns().len() < model.base.rank() || determined < model.base.rank();
         let ill = stage.condition().is_none_or(|condition| !(condition <= self.largest_condition));
         verdict.note(Reason::Unexcited, singular || ill);
         verdict
@@ -239,6 +244,17 @@ impl<T: Real> Thresholds<T> {
                 error.is_some_and(|error| error <= self.largest_error_share * size.root_mean_square);
             verdict.note(Reason::Residual, !explained);
         }
+        verdict
+    }
+
+    /// Whether what was found in the box explains the data as well as least squares does, up to what noise makes of
+    /// `rank` parameters: if not, the data contradict every leg that the prior allows.
+    #[must_use]
+    pub fn judge_box(&self, excess: T, rank: usize) -> Verdict {
+        let rank = T::of(rank as f64);
+        let spread = real::sqrt(rank + rank); // of chi-square with `rank` degrees of freedom
+        let mut verdict = Verdict::ACCEPTED;
+        verdict.note(Reason::Unphysical, !(excess <= rank + self.largest_excess_spreads * spread));
         verdict
     }
 

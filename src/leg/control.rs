@@ -205,6 +205,8 @@ impl<const N: usize> Control<N> {
                 self.activity = Activity::Identify(IdentifyPhase::Solve);
             }
             Activity::Identify(IdentifyPhase::Validate { motion, step }) => self.validate_after(motion, step),
+            // The model is wholly in use, or wholly out of it, before the motion begins.
+            Activity::Track(Step::Approach) if self.is_fading() => {}
             Activity::Track(Step::Approach) => match self.tracked {
                 Some(motion) => self.run(Activity::Track(Step::Run), motion),
                 None => self.rest(Activity::Idle),
@@ -212,6 +214,10 @@ impl<const N: usize> Control<N> {
             Activity::Track(Step::Run) => self.rest(Activity::Idle),
             Activity::Idle | Activity::Identify(IdentifyPhase::Solve | IdentifyPhase::Judge) => {}
         }
+    }
+
+    fn is_fading(&self) -> bool {
+        self.model.is_some() && self.model_share != if self.with_model { 1.0 } else { 0.0 }
     }
 
     fn validate_after(&mut self, motion: u8, step: Step) {

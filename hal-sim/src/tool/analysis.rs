@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use scarab::ident::{
-    Estimate, Factor, LinkPrior, Plan, Record, RowModel, Solver, Status, Verdict, complete,
+    Estimate, Factor, LinkPrior, Plan, Record, RowModel, SearchState, Solver, Status, Verdict, complete,
     least_squares_in_box, noise, prior_parameters, status,
 };
 use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter};
@@ -129,6 +129,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
         let estimate = solver.estimate();
         let costs = self.costs(solver);
         let cost = costs.factor.excess(&estimate.values.map(f64::from));
+        let searched = solver.search().state() == SearchState::Done;
         RunReport {
             schema: SCHEMA,
             leg: self.leg.clone(),
@@ -155,9 +156,9 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 seed: solver.search().seed(),
                 iterations: solver.search().iterations(),
                 evaluations: solver.search().evaluations(),
-                cost_over_least_squares: (cost / costs.least_squares).into(),
-                excess_chi2: (cost - costs.above).into(),
-                iterations_to_half_chi2: circumstances.iterations_to_half_chi2,
+                cost_over_least_squares: searched.then_some(cost / costs.least_squares).into(),
+                excess_chi2: searched.then_some(cost - costs.above).into(),
+                iterations_to_half_chi2: circumstances.iterations_to_half_chi2.filter(|_| searched),
             },
             tracking: circumstances.tracking.clone(),
             simulated_s: circumstances.simulated_s,

@@ -22,7 +22,7 @@ use crate::with_leg_size;
 #[command(name = "scarab-sim", version)]
 struct Cli {
     #[command(subcommand)]
-    command: Option<Command>,
+    command: Command,
 }
 
 #[derive(Subcommand, Debug)]
@@ -153,15 +153,19 @@ struct RegressorArguments {
 /// Runs the tool on the process's arguments.
 #[must_use]
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let outcome = match cli.command {
-        Some(Command::Replay(arguments)) => run_replay(&arguments),
-        Some(Command::Regressor(arguments)) => run_regressor(&arguments),
-        Some(Command::Identify(arguments)) => run_identify(&arguments),
-        None => match Cli::try_parse_from(["scarab-sim", "identify", "--figures", DEFAULT_FIGURES]) {
-            Ok(Cli { command: Some(Command::Identify(arguments)) }) => run_identify(&arguments),
-            _ => Err(ToolError::input("see --help")),
-        },
+    let mut words: Vec<_> = std::env::args_os().collect();
+    match words.get(1).and_then(|word| word.to_str()) {
+        // Without a subcommand the main job is meant.
+        None => words.extend(["identify", "--figures", DEFAULT_FIGURES].map(Into::into)),
+        Some(option) if option.starts_with("--") && !["--help", "--version"].contains(&option) => {
+            words.insert(1, "identify".into());
+        }
+        Some(_) => {}
+    }
+    let outcome = match Cli::parse_from(words).command {
+        Command::Replay(arguments) => run_replay(&arguments),
+        Command::Regressor(arguments) => run_regressor(&arguments),
+        Command::Identify(arguments) => run_identify(&arguments),
     };
     match outcome {
         Ok(code) => ExitCode::from(code),

@@ -214,10 +214,10 @@ pub fn print_runs(report: &RunsReport) -> Result<(), ToolError> {
             quantile(&mut values, 0.5)
         };
         say!(
-            "tracking on gait, joint {}: {:.3} deg rms without the model, {:.3} with it (medians)",
+            "tracking on gait, joint {}: {} deg rms without the model, {} with it (medians)",
             joint + 1,
-            of(&|tracking| tracking.rms_deg_without_model.known()),
-            of(&|tracking| tracking.rms_deg_with_model.known()),
+            tables::number(of(&|tracking| tracking.rms_deg_without_model.known()).into()),
+            tables::number(of(&|tracking| tracking.rms_deg_with_model.known()).into()),
         );
     }
     let accepted = runs.iter().filter(|run| run.accepted()).count();

@@ -10,7 +10,7 @@
 //! | [`series`], [`figures`] | a run as curves, drawn |
 //! | [`regressor`] | torques and regressor of given states |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
-//! | [`error`] | bad input and exit codes |
+//! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
 
 #![expect(
     clippy::disallowed_methods,
@@ -35,4 +35,5 @@ pub mod setup;
 pub mod simulate;
 pub mod tables;
 pub mod watch;
+pub mod words;
 pub mod x2;

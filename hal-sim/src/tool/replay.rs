@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use scarab::ident::record::SMOOTHING_BANDWIDTHS;
 use scarab::ident::{Ends, KernelError, Plan, Recorder, SearchState, Smoothed, Solver, Thresholds};
 use scarab::model::AnatomicalJoint;
 
@@ -18,12 +17,10 @@ use super::setup::{PriorChoice, anatomy, background};
 
 /// Taps the host sets aside: bandwidths from 1 Hz.
 const TAPS: usize = 2048;
-/// The smoothing, at a multiple of the bandwidth, has eight taps to each side up to here.
-const LARGEST_SMOOTHING_HZ: f64 = 120.0;
 /// Open outputs that go with them.
 const PENDING: usize = 205;
 /// Evaluations between two looks at the search.
-const SLICE: u32 = 1000;
+const SLICE: u32 = 20;
 /// A recording may go this far beyond the leg's range before that is worth a warning.
 const RANGE_MARGIN_DEG: f64 = 5.0;
 
@@ -143,10 +140,14 @@ pub fn replay<const N: usize, const B: usize>(
     );
     let optimum = background.costs(&solver);
     let mut to_half = None;
-    while solver.advance(&background.device, SLICE) == SearchState::Running {
+    loop {
+        let state = solver.advance(&background.device, SLICE);
         let excess = optimum.factor.excess(&solver.search().values().map(f64::from)) - optimum.above;
-        if excess <= 0.5 && to_half.is_none() {
+        if excess <= 0.5 && to_half.is_none() && !matches!(state, SearchState::Failed(_)) {
             to_half = Some(solver.search().iterations());
+        }
+        if state != SearchState::Running {
+            break;
         }
     }
 
@@ -183,17 +184,20 @@ pub fn replay<const N: usize, const B: usize>(
     Ok(Replayed { run, sources })
 }
 
+/// Above this bandwidth rows at 50 Hz alias the noise that the low-pass lets through, and sigma comes out too small.
+const LARGEST_BANDWIDTH_HZ: f64 = 25.0;
+
 fn new_recorder<const N: usize, const B: usize>(bandwidth_hz: f64) -> Result<HostRecorder<N, B>, ToolError> {
+    if bandwidth_hz > LARGEST_BANDWIDTH_HZ {
+        return Err(ToolError::input(format!(
+            "--bandwidth {bandwidth_hz}: at most {LARGEST_BANDWIDTH_HZ} Hz"
+        )));
+    }
     HostRecorder::new(bandwidth_hz as f32).map_err(|error| {
         ToolError::input(match error {
             KernelError::Bandwidth => format!("--bandwidth {bandwidth_hz}: must be a positive number"),
             KernelError::TooLong { .. } => format!("--bandwidth {bandwidth_hz}: at least 1 Hz"),
-            KernelError::TooShort => {
-                format!(
-                    "--bandwidth {bandwidth_hz}: at most {:.0} Hz",
-                    LARGEST_SMOOTHING_HZ / SMOOTHING_BANDWIDTHS
-                )
-            }
+            KernelError::TooShort => format!("--bandwidth {bandwidth_hz}: at most {LARGEST_BANDWIDTH_HZ} Hz"),
         })
     })
 }

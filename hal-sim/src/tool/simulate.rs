@@ -14,6 +14,7 @@ use super::report::{RunReport, TrackingReport};
 use super::series::Series;
 use super::setup::{PriorChoice, SetupError};
 use super::watch::Watch;
+use super::words::drive_stop;
 use crate::world::TICK_S;
 
 /// No run takes longer, s.
@@ -71,11 +72,7 @@ pub fn simulate<const N: usize, const B: usize>(
             _ if pair.leg.control().verdict().is_some() => break,
             _ => {
                 let state = pair.leg.control().state();
-                return Err(SetupError::new(
-                    leg,
-                    format!("the drive stopped during identification: {state:?}"),
-                )
-                .into());
+                return Err(SetupError::new(leg, drive_stop(leg, state)).into());
             }
         }
         if pair.ticks > largest {

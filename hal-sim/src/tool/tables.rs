@@ -221,7 +221,7 @@ fn run_text(run: &RunReport) -> String {
     lines.push(String::new());
     lines.push(verdict_line(run));
     lines.extend(run.reasons.iter().map(|reason| format!("  {reason}: {}", explanation(reason))));
-    if run.validation.is_empty() {
+    if run.validation.is_empty() && run.seed.is_none() {
         lines.push("  not validated: no motion was held out (--validate, --split)".into());
     }
     lines.join("\n") + "\n"
@@ -230,7 +230,9 @@ fn run_text(run: &RunReport) -> String {
 /// A reason of the closed list in words.
 fn explanation(reason: &str) -> &'static str {
     match reason {
-        "unphysical" => "no leg can have these parameters (negative friction, inertia or kinetic energy)",
+        "unphysical" => {
+            "no leg can have these parameters (negative friction, inertia or kinetic energy), or none that the prior allows"
+        }
         "unexcited" => "a joint hardly moved, or the motion does not tell the parameters apart",
         "residual" => "what the model leaves unexplained is not noise",
         "validation" => {
