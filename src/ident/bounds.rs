@@ -194,9 +194,8 @@ fn measured_box<T: Real, const N: usize, const B: usize>(
             }
         }
         bounds.high[base] = T::of(TORQUE_SHARE) * reach;
-        let parameter = model.base.independent(base).map(|(_, parameter)| parameter);
         let never_negative =
-            matches!(parameter, Some(Parameter::IA | Parameter::FC | Parameter::FV | Parameter::ZZ));
+            model.base.independent(base).is_some_and(|(_, parameter)| parameter.is_never_negative());
         bounds.low[base] = if never_negative { T::zero() } else { -bounds.high[base] };
     }
     bounds

@@ -229,14 +229,25 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
         &self.noise
     }
 
-    /// All joints' rows, weighted, over all base parameters.
+    /// All joints' rows, weighted: chi-square units.
     #[must_use]
-    pub fn whole(&self) -> Stage<T, B> {
+    pub fn weighted(&self) -> Factor<T, B> {
         let mut all = Factor::new();
         for (factor, &sigma) in self.record.factors.iter().zip(&self.noise) {
             all.merge_scaled(factor, T::one() / sigma);
         }
-        Stage::new(&all, T::one(), &core::array::from_fn(|base| base < self.rank), &[T::zero(); B])
+        all
+    }
+
+    /// The same as a stage over all base parameters.
+    #[must_use]
+    pub fn whole(&self) -> Stage<T, B> {
+        Stage::new(
+            &self.weighted(),
+            T::one(),
+            &core::array::from_fn(|base| base < self.rank),
+            &[T::zero(); B],
+        )
     }
 
     /// Number of stages of a plan.

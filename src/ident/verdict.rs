@@ -200,10 +200,8 @@ impl<T: Real> Thresholds<T> {
     ) -> Verdict {
         let mut verdict = Verdict::ACCEPTED;
         for base in 0..model.base.rank() {
-            let never_negative = matches!(
-                model.base.independent(base),
-                Some((_, Parameter::FC | Parameter::FV | Parameter::IA | Parameter::M))
-            );
+            let never_negative =
+                model.base.independent(base).is_some_and(|(_, parameter)| parameter.is_never_negative());
             let sigma = estimate.sigma(base).unwrap_or(T::zero());
             let negative = estimate.values[base] < -self.largest_negative_sigmas * sigma;
             verdict.note(Reason::Unphysical, never_negative && negative && !is_weak(record, estimate, base));

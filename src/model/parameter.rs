@@ -96,6 +96,12 @@ impl Parameter {
         }
     }
 
+    /// Of a leg that can exist this is never below zero, regrouped or not.
+    #[must_use]
+    pub const fn is_never_negative(self) -> bool {
+        matches!(self, Self::ZZ | Self::M | Self::IA | Self::FC | Self::FV)
+    }
+
     /// The unit, in ASCII.
     #[must_use]
     pub const fn unit(self) -> &'static str {

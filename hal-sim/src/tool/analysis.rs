@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use scarab::ident::{
-    Estimate, Factor, LinkPrior, Plan, Record, RowModel, SearchState, Solver, Status, Verdict, complete,
-    least_squares_in_box, noise, prior_parameters, status,
+    Estimate, Factor, LinkPrior, Plan, Problem, Record, RowModel, SearchState, Solver, Status, Verdict,
+    complete, least_squares_in_box, prior_parameters, status,
 };
 use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter};
 
@@ -103,10 +103,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
     #[must_use]
     pub fn costs(&self, solver: &Solver<f32, N, B>) -> Costs<B> {
         let record = solver.record().convert::<f64>();
-        let mut all = Factor::<f64, B>::new();
-        for (factor, sigma) in record.factors.iter().zip(noise(&record)) {
-            all.merge_scaled(factor, 1.0 / sigma);
-        }
+        let all = Problem::new(&record, &self.model).weighted();
         let bounds = scarab::ident::ParameterBox {
             low: solver.bounds().low.map(f64::from),
             high: solver.bounds().high.map(f64::from),
