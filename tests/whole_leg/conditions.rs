@@ -78,3 +78,14 @@ fn a_wearer_who_overpowers_the_drive_ends_in_a_fault_that_is_told() {
     let error = pushed(200.0, 400.0).expect_err("400 N m against 85");
     assert!(error.contains("the drive stopped during identification with fault 0x8400: joint "), "{error}");
 }
+
+#[test]
+fn a_leg_that_no_prior_allows_is_refused_and_not_pinned_at_the_edge_of_the_box() {
+    let mut leg = default_leg();
+    // The box reaches 5 times the prior's Coulomb friction of 4 N m.
+    leg.joints[1].truth.as_mut().expect("simulated").offset = 25.0;
+    let report = simulate::<JOINTS, BASE>(&leg, &options(1)).expect("it runs").report;
+    assert_eq!(report.reasons, ["unphysical"]);
+    leg.joints[1].truth.as_mut().expect("simulated").offset = 9.0;
+    assert!(simulate::<JOINTS, BASE>(&leg, &options(1)).expect("it runs").report.accepted());
+}
