@@ -1,0 +1,73 @@
+//! What several commands have in common.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use scarab::ident::Plan;
+
+use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::leg_file::DEFAULT_LEG;
+use crate::tool::report::RunReport;
+use crate::tool::setup::PriorChoice;
+use crate::tool::tables;
+
+/// How parameters are found from the joints' rows.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum PlanArgument {
+    /// All joints at once, weighted by their noise.
+    OneTime,
+    /// Distal joint first, then substitution.
+    Sequential,
+}
+
+impl From<PlanArgument> for Plan {
+    fn from(plan: PlanArgument) -> Self {
+        match plan {
+            PlanArgument::OneTime => Self::OneTime,
+            PlanArgument::Sequential => Self::Sequential,
+        }
+    }
+}
+
+/// What identification and replay have in common.
+#[derive(Args, Debug)]
+pub struct Common {
+    /// Name of a shipped leg, or a leg file.
+    #[arg(long, default_value = DEFAULT_LEG)]
+    pub leg: String,
+    /// Of the swarm's random numbers.
+    #[arg(long)]
+    pub swarm_seed: Option<u64>,
+    /// One-time or sequential.
+    #[arg(long, value_enum, default_value = "one-time")]
+    pub plan: PlanArgument,
+    /// none, file, or wrong:PERCENT; the leg file's unless given.
+    #[arg(long)]
+    pub prior: Option<PriorChoice>,
+    /// Write the report here, for exit codes 0 and 3.
+    #[arg(long)]
+    pub json: Option<PathBuf>,
+    /// Print all fourteen parameters of every joint with their status.
+    #[arg(long)]
+    pub parameters: bool,
+}
+
+/// Writes and prints what was found; `preface` stands before it.
+pub fn finish(run: &RunReport, common: &Common, preface: &str) -> Result<u8, ToolError> {
+    if let Some(path) = &common.json {
+        write_json(path, run)?;
+    }
+    tables::print(preface)?;
+    tables::print_run(run)?;
+    if common.parameters {
+        tables::print(&format!("\n{}", tables::parameters(run)))?;
+    }
+    Ok(if run.accepted() { EXIT_ACCEPTED } else { EXIT_REFUSED })
+}
+
+pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), ToolError> {
+    let mut text =
+        serde_json::to_string_pretty(value).map_err(|error| ToolError::cannot_write(path, &error))?;
+    text.push('\n');
+    std::fs::write(path, text).map_err(|error| ToolError::cannot_write(path, &error))
+}

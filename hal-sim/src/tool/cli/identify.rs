@@ -1,0 +1,86 @@
+//! `identify`: a simulated leg, from excitation to verdict.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::common::{Common, finish, write_json};
+use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::identify::{identify_many, identify_one, print_runs};
+use crate::tool::leg_file::LegFile;
+use crate::tool::report::RunReport;
+use crate::tool::setup::DEFAULT_SEED;
+use crate::tool::simulate::SimulationOptions;
+use crate::tool::tables;
+use crate::with_leg_size;
+
+/// What to identify and what to keep of it.
+#[derive(Args, Debug)]
+pub struct IdentifyArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Of noise, pushes and a wrong prior.
+    #[arg(long, conflicts_with = "seeds")]
+    seed: Option<u64>,
+    /// A run for each seed, A..B with both ends.
+    #[arg(long, value_parser = parse_seeds, conflicts_with = "log")]
+    seeds: Option<(u64, u64)>,
+    /// Noise of the logged torque in percent of each joint's mean absolute torque; the leg file's unless given.
+    #[arg(long)]
+    torque_noise: Option<f64>,
+    /// Write the training motion here, in the format that replay reads.
+    #[arg(long)]
+    log: Option<PathBuf>,
+    /// Draw the run into this directory, as SVG; a run without any arguments draws into target/sim.
+    #[arg(long, conflicts_with = "seeds")]
+    figures: Option<PathBuf>,
+}
+
+fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
+    let ends = text
+        .split_once("..")
+        .map(|(first, last)| (first.parse::<u64>(), last.trim_start_matches('=').parse::<u64>()));
+    match ends {
+        Some((Ok(first), Ok(last))) if first <= last && last - first < LARGEST_SEED_COUNT => {
+            Ok((first, last))
+        }
+        Some((Ok(first), Ok(last))) if first <= last => Err(format!("at most {LARGEST_SEED_COUNT} runs")),
+        _ => Err(format!("`{text}` is not A..B with A at most B")),
+    }
+}
+
+/// More runs at once are a mistake.
+const LARGEST_SEED_COUNT: u64 = 100_000;
+
+/// Identifies and reports; the exit code.
+pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
+    let leg = &LegFile::load(&arguments.common.leg)?;
+    if arguments.torque_noise.is_some_and(|percent| !(0.0..=1000.0).contains(&percent)) {
+        return Err(ToolError::input("--torque-noise: a percentage from 0 to 1000"));
+    }
+    let options = |seed: u64| SimulationOptions {
+        seed,
+        swarm_seed: arguments.common.swarm_seed.unwrap_or(seed),
+        torque_noise_percent: arguments.torque_noise,
+        plan: arguments.common.plan.into(),
+        prior: arguments.common.prior.unwrap_or_default(),
+        with_series: false,
+    };
+    let Some((first, last)) = arguments.seeds else {
+        let options = &options(arguments.seed.unwrap_or(DEFAULT_SEED));
+        let (log, figures) = (arguments.log.as_deref(), arguments.figures.as_deref());
+        let run = with_leg_size!(leg, identify_one(leg, options, log, figures))?;
+        let code = finish(&run, &arguments.common, "");
+        if let Some(directory) = figures {
+            tables::print(&format!("figures: {}\n", directory.display()))?;
+        }
+        return code;
+    };
+    let options: &Vec<_> = &(first..=last).map(options).collect();
+    let runs = with_leg_size!(leg, identify_many(leg, options))?;
+    if let Some(path) = &arguments.common.json {
+        write_json(path, &runs)?;
+    }
+    print_runs(&runs)?;
+    Ok(if runs.runs.iter().all(RunReport::accepted) { EXIT_ACCEPTED } else { EXIT_REFUSED })
+}

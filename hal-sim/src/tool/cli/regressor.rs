@@ -1,0 +1,32 @@
+//! `regressor`: torques and regressor of given states.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::leg_file::{DEFAULT_LEG, LegFile};
+use crate::tool::regressor::{self, RegressorOptions};
+use crate::tool::tables;
+
+/// Which states of which leg.
+#[derive(Args, Debug)]
+pub struct RegressorArguments {
+    /// Name of a shipped leg, or a leg file.
+    #[arg(long, default_value = DEFAULT_LEG)]
+    leg: String,
+    /// States: columns q1.., qd1.., qdd1.. in rad and s, D-H angles.
+    #[arg(long)]
+    states: PathBuf,
+    /// Compute in the device's single precision.
+    #[arg(long)]
+    f32: bool,
+}
+
+/// Prints the table; the exit code.
+pub fn run(arguments: &RegressorArguments) -> Result<u8, ToolError> {
+    let leg = LegFile::load(&arguments.leg)?;
+    let options = RegressorOptions { states: arguments.states.clone(), single_precision: arguments.f32 };
+    tables::print(&regressor::table(&leg, &options)?)?;
+    Ok(EXIT_ACCEPTED)
+}

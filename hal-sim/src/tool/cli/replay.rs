@@ -1,0 +1,55 @@
+//! `replay`: a leg identified from recordings.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::common::{Common, finish};
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::LegFile;
+use crate::tool::replay::{ReplayOptions, replay};
+use crate::tool::setup::DEFAULT_SEED;
+use crate::tool::tables;
+use crate::with_leg_size;
+
+/// What to identify from and what to keep of it.
+#[derive(Args, Debug)]
+pub struct ReplayArguments {
+    /// Recordings: t_s, q1_rad[, q2_rad..], tau1_Nm[, tau2_Nm..]; several are one training set.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+    /// Held-out recordings.
+    #[arg(long, num_args = 1.., conflicts_with = "split")]
+    validate: Vec<PathBuf>,
+    /// The first fraction of each file trains, the rest validates.
+    #[arg(long, allow_negative_numbers = true)]
+    split: Option<f64>,
+    /// Where the low-pass of the filter chain is 3 dB down, Hz; the leg file's (8 unless it says otherwise) unless given.
+    #[arg(long, allow_negative_numbers = true)]
+    bandwidth: Option<f64>,
+    /// Write measured and predicted torque of the validation part here.
+    #[arg(long)]
+    csv: Option<PathBuf>,
+}
+
+/// Identifies and reports; the exit code.
+pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
+    let leg = &LegFile::load(&arguments.common.leg)?;
+    if arguments.split.is_some_and(|fraction| !(fraction > 0.0 && fraction < 1.0)) {
+        return Err(ToolError::input("--split: a fraction above 0 and below 1"));
+    }
+    let options = &ReplayOptions {
+        files: arguments.files.clone(),
+        validate: arguments.validate.clone(),
+        split: arguments.split,
+        bandwidth_hz: arguments.bandwidth.unwrap_or(leg.bandwidth_hz),
+        plan: arguments.common.plan.into(),
+        prior: arguments.common.prior.unwrap_or_default(),
+        swarm_seed: arguments.common.swarm_seed.unwrap_or(DEFAULT_SEED),
+        csv: arguments.csv.clone(),
+    };
+    let replayed = with_leg_size!(leg, replay(leg, options))?;
+    finish(&replayed.run, &arguments.common, &tables::sources(&replayed.sources))
+}
