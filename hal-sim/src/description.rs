@@ -60,6 +60,26 @@ pub struct BodyDescription {
     pub inertia_com: [f64; 6],
 }
 
+impl BodyDescription {
+    /// The body with a point mass (kg) fixed to it at a place (m) in its D-H frame; inertia by the parallel axis
+    /// theorem about the common centre of mass. A negative mass takes one off again.
+    #[must_use]
+    pub fn with_point_mass(&self, mass: f64, at: [f64; 3]) -> Self {
+        let whole = self.mass + mass;
+        let com: [f64; 3] =
+            core::array::from_fn(|axis| (self.mass * self.com[axis] + mass * at[axis]) / whole);
+        let mut inertia_com = self.inertia_com;
+        for (part, place) in [(self.mass, self.com), (mass, at)] {
+            let [x, y, z]: [f64; 3] = core::array::from_fn(|axis| place[axis] - com[axis]);
+            let about = [y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y];
+            for (element, square) in inertia_com.iter_mut().zip(about) {
+                *element += part * square;
+            }
+        }
+        Self { mass: whole, com, inertia_com }
+    }
+}
+
 /// Friction of one joint, all at the joint, D-H sign.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrictionDescription {

@@ -44,6 +44,7 @@ pub struct Truth<const N: usize> {
 /// The physical world of one leg of `N` joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct World<const N: usize> {
+    description: LegDescription<N>,
     leg: Leg<N>,
     state: LegState<N>,
     anatomy: [Anatomy; N],
@@ -65,6 +66,7 @@ impl<const N: usize> World<N> {
         let mut pushes = sensor_noise.clone();
         pushes.jump();
         let mut world = Self {
+            description: *description,
             leg: Leg::new(description),
             state: LegState { angles: joints.map(|joint| joint.zero_offset), rates: [0.0; N] },
             anatomy: joints.map(|joint| Anatomy::of(&joint)),
@@ -88,6 +90,15 @@ impl<const N: usize> World<N> {
             rates: [0.0; N],
         };
         self.read_sensors();
+    }
+
+    /// Fixes a point mass (kg) to a link, at a place (m) in its joint's D-H frame, from this instant on; the motion goes
+    /// on at the same speed. Nothing happens where there is no such joint.
+    pub fn attach(&mut self, joint: usize, mass: f64, at: [f64; 3]) {
+        if let Some(joint) = self.description.joints.get_mut(joint) {
+            joint.body = joint.body.with_point_mass(mass, at);
+            self.leg = Leg::new(&self.description);
+        }
     }
 
     /// Sets each joint's current noise: standard deviation per logged 500 Hz sample, A.

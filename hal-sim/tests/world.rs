@@ -180,3 +180,35 @@ fn pushes_move_the_leg_without_showing_in_the_motor_torque_and_only_when_asked_f
     assert_eq!(world.truth().motor_torque, [0.0; 2]);
     assert_eq!(quiet.truth().velocity, [0.0; 2]);
 }
+
+#[test]
+fn a_mass_fixed_to_a_link_costs_its_own_weight_and_inertia() {
+    let description = worn_leg();
+    let bare = World::new(&description, 1);
+    let mut loaded = bare.clone();
+    let (mass, along, across) = (3.0, 0.2, 0.05);
+    loaded.attach(1, mass, [along, across, 0.0]);
+    // A body of its own, carried by the second link without mass: what is added is what it costs alone.
+    let mut alone = description;
+    for joint in &mut alone.joints {
+        joint.body = hal_sim::description::BodyDescription { mass: 1e-9, ..Default::default() };
+        joint.rotor_inertia = 0.0;
+        joint.friction = Default::default();
+    }
+    let mut alone = World::new(&alone, 1);
+    alone.attach(1, mass, [along, across, 0.0]);
+    for (angle, rate) in [(0.3, 0.0), (0.9, 1.5), (1.4, -2.0)] {
+        let state = ([angle, 0.7 * angle], [rate, 0.5 - rate], [3.0, -4.0 * rate]);
+        let torque = |world: &World<2>| world.inverse_dynamics(&state.0, &state.1, &state.2);
+        for joint in 0..2 {
+            let added = torque(&loaded)[joint] - torque(&bare)[joint];
+            // Rounding of torques up to some tens of N m.
+            assert!((added - torque(&alone)[joint]).abs() < 1e-6, "{added}");
+        }
+    }
+    loaded.attach(1, -mass, [along, across, 0.0]);
+    let state = ([0.3, 0.4], [1.0, 1.0], [2.0, 2.0]);
+    let difference = loaded.inverse_dynamics(&state.0, &state.1, &state.2)[0]
+        - bare.inverse_dynamics(&state.0, &state.1, &state.2)[0];
+    assert!(difference.abs() < 1e-9, "{difference:e}");
+}
