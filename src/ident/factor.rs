@@ -177,6 +177,20 @@ impl<T: Real, const B: usize> Factor<T, B> {
         Self { z: [T::zero(); B], residual: T::zero(), ..self.clone() }
     }
 
+    /// The same rows with each right-hand side times `scale`, less the row times `shift`.
+    #[must_use]
+    pub fn with_right(&self, scale: T, shift: &[T; B]) -> Self {
+        let mut result = self.clone();
+        for (right, row) in result.z.iter_mut().zip(&self.r) {
+            *right *= scale;
+            for (&element, &value) in row.iter().zip(shift) {
+                *right -= element * value;
+            }
+        }
+        result.residual = self.residual * scale * scale;
+        result
+    }
+
     /// Back substitution: the least-squares parameters of the first `count` columns; a column without
     /// information gives zero.
     #[must_use]

@@ -6,6 +6,7 @@
 //!        -> search: beetle swarm in the prior's box (bounds), against the constrained optimum (constrained)
 //!        -> completion: fourteen parameters of every joint, each with its status
 //!        -> verdict: accepted, or refused with reasons
+//! scale: torque constants from two records, without and with a known mass
 //! ```
 //!
 //! Everything is generic over the scalar: the board runs it in `f32`, tests check it in `f64`.
@@ -18,6 +19,7 @@ pub mod factor;
 pub mod kernel;
 pub mod record;
 pub mod rows;
+pub mod scale;
 pub mod search;
 pub mod smoothing;
 pub mod solver;
@@ -34,6 +36,7 @@ pub use record::{
     TorqueSize,
 };
 pub use rows::{DECIMATION, Ends, FilteredRows, RowFilter};
+pub use scale::{ConstantRatio, torque_constant_ratio, widen};
 pub use search::{SearchState, SwarmSearch};
 pub use smoothing::{Smoothed, Smoother};
 pub use solver::Solver;

@@ -25,6 +25,7 @@ pub mod log_cholesky;
 pub mod mass_matrix;
 pub mod newton_euler;
 pub mod parameter;
+pub mod payload;
 pub mod regressor;
 #[cfg(test)]
 mod testing;
@@ -37,4 +38,5 @@ pub use log_cholesky::{LogCholesky, is_physically_consistent};
 pub use mass_matrix::mass_matrix;
 pub use newton_euler::{JointState, joint_torques, rigid_body_torques};
 pub use parameter::{JointParameters, LegParameters, PARAMETERS_PER_JOINT, Parameter, RegressorRow};
+pub use payload::Payload;
 pub use regressor::{regressor, row_torque};
