@@ -17,6 +17,8 @@ fn drawn(directory: &Path) -> RunReport {
         torque_noise_percent: None,
         plan: Plan::OneTime,
         prior: PriorChoice::Default,
+        payload: None,
+        load: None,
         with_series: false,
     };
     identify_one::<2, 13>(&leg, &options, None, Some(directory)).expect("it runs")

@@ -8,6 +8,7 @@ use super::bounds::{LinkPrior, search_box};
 use super::constrained::ParameterBox;
 use super::estimate::{Estimate, Plan, Problem};
 use super::record::{Record, RowModel};
+use super::scale::widen;
 use super::search::{SearchState, SwarmSearch};
 use super::verdict::{Thresholds, Verdict};
 use crate::real::Real;
@@ -71,6 +72,12 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     #[must_use]
     pub fn least_squares(&self) -> &Estimate<T, B> {
         &self.least_squares
+    }
+
+    /// Adds to the covariance what one more uncertain number does to the result: `moved` is the closed form with that number
+    /// one standard deviation larger.
+    pub fn widen(&mut self, moved: &Estimate<T, B>) {
+        widen(&mut self.least_squares, moved);
     }
 
     /// The swarm.

@@ -3,7 +3,9 @@
 use nalgebra::Vector3;
 
 use crate::ident::RowModel;
-use crate::model::{Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, Parameter, rigid_body_torques};
+use crate::model::{
+    Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, Parameter, Payload, rigid_body_torques,
+};
 use crate::servo::{TorqueModel, smoothed_sign};
 use crate::units::RadianPerSecond;
 
@@ -20,6 +22,14 @@ impl<const N: usize> IdentifiedModel<N> {
     pub fn new<const B: usize>(model: &RowModel<f32, N, B>, base_values: &[f32; B]) -> Self {
         let parameters = model.base.complete(base_values, &[[0.0; PARAMETERS_PER_JOINT]; N]);
         Self { chain: model.chain, parameters }
+    }
+
+    /// The model of the same leg carrying a known load; a negative mass takes one off. The load need not be identified.
+    #[must_use]
+    pub fn with_load(&self, load: &Payload<f32>) -> Self {
+        let mut loaded = *self;
+        load.add_to(&mut loaded.parameters);
+        loaded
     }
 
     /// Parameters with the same torque as the leg's; not those of its links.

@@ -7,6 +7,7 @@ mod conditions;
 mod failures;
 mod identification;
 mod memory;
+mod scale;
 mod servo;
 
 use std::sync::OnceLock;
@@ -38,6 +39,8 @@ fn options(seed: u64) -> SimulationOptions {
         torque_noise_percent: None,
         plan: Plan::OneTime,
         prior: PriorChoice::Default,
+        payload: None,
+        load: None,
         with_series: false,
     }
 }

@@ -13,6 +13,7 @@ use super::report::{
     BaseReport, FitReport, LeastSquaresReport, Number, ParameterReport, RunReport, SCHEMA, SwarmReport,
     TrackingReport,
 };
+use super::scale::ScaleReport;
 
 /// What is known of a leg beside the data.
 #[derive(Clone, Debug)]
@@ -158,6 +159,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 iterations_to_half_chi2: circumstances.iterations_to_half_chi2.filter(|_| searched),
             },
             tracking: circumstances.tracking.clone(),
+            scale: ScaleReport::default(),
             simulated_s: circumstances.simulated_s,
             wall_s: circumstances.wall.as_secs_f64(),
         }

@@ -220,6 +220,9 @@ pub fn print_runs(report: &RunsReport) -> Result<(), ToolError> {
             tables::number(of(&|tracking| tracking.rms_deg_with_model.known()).into()),
         );
     }
+    for line in super::scale::summary(runs) {
+        say!("{line}");
+    }
     let accepted = runs.iter().filter(|run| run.accepted()).count();
     say!("\naccepted: {accepted} of {}", runs.len());
     for run in runs.iter().filter(|run| !run.accepted()) {

@@ -32,6 +32,7 @@
 mod check;
 mod convert;
 mod error;
+mod segments;
 
 pub use error::LegFileError;
 

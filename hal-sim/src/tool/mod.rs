@@ -8,6 +8,7 @@
 //! | [`recording`], [`resample`], [`replay`] | identification on recordings |
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
 //! | [`series`], [`figures`] | a run as curves, drawn |
+//! | [`placed_mass`], [`scale`] | known masses: torque constants and loads |
 //! | [`regressor`] | torques and regressor of given states |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
 //! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
@@ -25,11 +26,13 @@ pub mod identify;
 pub mod leg_file;
 pub mod motions;
 pub mod pair;
+pub mod placed_mass;
 pub mod recording;
 pub mod regressor;
 pub mod replay;
 pub mod report;
 pub mod resample;
+pub mod scale;
 pub mod series;
 pub mod setup;
 pub mod simulate;

@@ -2,6 +2,7 @@
 //!
 //! The names of the fields are an interface. A number that is not known is `null`, never NaN.
 
+use super::scale::ScaleReport;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
@@ -185,6 +186,9 @@ pub struct RunReport {
     pub bso: SwarmReport,
     /// What the model is worth to the servo; empty in a replay.
     pub tracking: Vec<TrackingReport>,
+    /// What the parameters are measured in, and what the leg carried.
+    #[serde(flatten)]
+    pub scale: ScaleReport,
     /// Simulated or recorded time, s.
     pub simulated_s: f64,
     /// Time it took, s.

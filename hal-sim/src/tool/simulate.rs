@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use scarab::ident::Plan;
 use scarab::leg::{Activity, ControlRequest, LoggedSample, Step};
+use scarab::model::Payload;
 use scarab::motion::Periodic;
 use scarab::real::sqrt;
 
@@ -11,6 +12,7 @@ use super::error::ToolError;
 use super::leg_file::LegFile;
 use super::pair::{Context, Pair};
 use super::report::{RunReport, TrackingReport};
+use super::scale::Scale;
 use super::series::Series;
 use super::setup::{PriorChoice, SetupError};
 use super::watch::Watch;
@@ -33,6 +35,10 @@ pub struct SimulationOptions {
     pub plan: Plan,
     /// Prior for the search box.
     pub prior: PriorChoice,
+    /// A known mass for a second run that tells the torque constants.
+    pub payload: Option<Payload<f64>>,
+    /// A known mass that the leg carries all the time.
+    pub load: Option<Payload<f64>>,
     /// Whether to keep the run's curves.
     pub with_series: bool,
 }
@@ -56,6 +62,9 @@ pub fn simulate<const N: usize, const B: usize>(
     let started = Instant::now();
     let context = Context::<N, B>::new(leg, options)?;
     let mut pair = Pair::new(leg, &context, options.seed)?;
+    if let Some(load) = &options.load {
+        pair.world.attach(load.joint, load.mass, load.place.into());
+    }
     if !pair.enable(context.gravity) {
         return Err(SetupError::new(leg, "the drive refused to be enabled at the start").into());
     }
@@ -80,6 +89,7 @@ pub fn simulate<const N: usize, const B: usize>(
         }
     }
     let tracking = track(&context, &pair);
+    run.scale = Some(Scale::find(&context, &pair, options.payload.as_ref(), options.load.as_ref())?);
     run.report(&pair, options, tracking, started)
 }
 

@@ -218,6 +218,7 @@ fn run_text(run: &RunReport) -> String {
             number(tracking.rms_deg_with_model)
         )
     }));
+    lines.extend(super::scale::lines(run));
     lines.push(String::new());
     lines.push(verdict_line(run));
     lines.extend(run.reasons.iter().map(|reason| format!("  {reason}: {}", explanation(reason))));

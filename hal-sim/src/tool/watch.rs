@@ -11,6 +11,7 @@ use super::error::ToolError;
 use super::motions::VALIDATION_NAMES;
 use super::pair::{Context, PENDING, Pair, TAPS};
 use super::report::TrackingReport;
+use super::scale::{Scale, ScaleReport, loaded};
 use super::series::Series;
 use super::simulate::{SimulatedRun, SimulationOptions};
 use crate::world::TICK_S;
@@ -87,6 +88,8 @@ pub struct Watch<'a, const N: usize, const B: usize> {
     information: Factor<f64, B>,
     costs: Option<Costs<B>>,
     excess: Vec<(u32, f64)>,
+    /// What a known mass and a known load said, once they were asked.
+    pub scale: Option<Scale<N, B>>,
 }
 
 impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
@@ -104,6 +107,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             information: Factor::new(),
             costs: None,
             excess: Vec::new(),
+            scale: None,
         }
     }
 
@@ -201,18 +205,28 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             return Err(ToolError::input("the identification ended without a result"));
         };
         let values = solver.estimate().values;
+        let scale = self.scale.take();
+        let corrected = scale
+            .as_ref()
+            .and_then(|scale| scale.corrected(self.context, solver, identification.validation()));
+        let (found, verdict, unused) = match &corrected {
+            Some(run) => (&*run.solver, run.verdict, &run.unused),
+            None => (solver, verdict, identification.validation()),
+        };
+        // The plant's torque is that of the leg with what it carries.
+        let carrying = loaded(scale.as_ref(), &found.estimate().values);
         let training = RecordedMotion {
             name: "fourier".into(),
-            record: solver.record().clone(),
-            truth: Some(truth_fit(&self.training_rows, &values)),
+            record: found.record().clone(),
+            truth: Some(truth_fit(&self.training_rows, &carrying)),
         };
         let validation: Vec<_> = VALIDATION_NAMES
             .iter()
-            .zip(identification.validation())
+            .zip(unused)
             .zip(&self.validation_rows)
             .filter_map(|((name, record), rows)| {
                 let record = record.clone()?;
-                Some(RecordedMotion { name: (*name).into(), record, truth: Some(truth_fit(rows, &values)) })
+                Some(RecordedMotion { name: (*name).into(), record, truth: Some(truth_fit(rows, &carrying)) })
             })
             .collect();
         let rank = self.context.background.model.base.rank();
@@ -222,17 +236,17 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         let circumstances = Circumstances {
             seed: Some(options.seed),
             cramer_rao: Some(cramer_rao),
-            iterations_to_half_chi2: self
-                .excess
-                .iter()
-                .find(|(_, excess)| *excess <= 0.5)
-                .map(|(seen, _)| *seen),
+            iterations_to_half_chi2: match &corrected {
+                Some(run) => run.iterations_to_half_chi2,
+                None => self.excess.iter().find(|(_, excess)| *excess <= 0.5).map(|(seen, _)| *seen),
+            },
             tracking,
             simulated_s: pair.ticks as f64 * TICK_S,
             wall: started.elapsed(),
         };
-        let report =
-            self.context.background.report(solver, verdict, &[training], &validation, &circumstances);
+        let mut report =
+            self.context.background.report(found, verdict, &[training], &validation, &circumstances);
+        report.scale = scale.map_or_else(ScaleReport::default, |scale| ScaleReport::of(&scale, self.context));
         let series = if options.with_series {
             Series {
                 torque: self.context.torque_series(&self.log, &self.validation_rows, &values)?,

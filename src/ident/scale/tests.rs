@@ -79,7 +79,7 @@ fn record<T: Real>(
         }
     }
     let torque = squares.map(|square| {
-        let size = T::of(square.sqrt());
+        let size = T::of(real::sqrt(square));
         TorqueSize { mean_absolute: size, root_mean_square: size, speed: T::one() }
     });
     record_of(factors, torque)
@@ -131,7 +131,7 @@ fn the_reported_sigma_of_the_ratio_is_its_spread_and_honest_runs_are_consistent(
             consistent += u32::from(found.is_consistent());
         }
     }
-    let spread = (pulls.iter().map(|pull| pull * pull).sum::<f64>() / 400.0).sqrt();
+    let spread = real::sqrt(pulls.iter().map(|pull| pull * pull).sum::<f64>() / 400.0);
     // 400 draws: 3.5 % of spread each way, three of them.
     assert!((spread - 1.0).abs() < 0.105, "{spread}");
     let mean = pulls.iter().sum::<f64>() / 400.0;
@@ -193,7 +193,7 @@ fn a_widened_covariance_holds_the_spread_that_an_uncertain_constant_adds() {
     for _ in 0..400 {
         let drawn = solve([1.0 + sigma * dice.normal(), 1.0 + sigma * dice.normal()]);
         for (sum, (value, middle)) in squares.iter_mut().zip(drawn.values.iter().zip(&narrow.values)) {
-            *sum += (value - middle).powi(2) / 400.0;
+            *sum += (value - middle) * (value - middle) / 400.0;
         }
     }
     for base in 0..BASE {

@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use scarab::model::Payload;
 
 use super::common::{Common, finish, write_json};
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::identify::{identify_many, identify_one, print_runs};
 use crate::tool::leg_file::LegFile;
+use crate::tool::placed_mass::PlacedMass;
 use crate::tool::report::RunReport;
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::simulate::SimulationOptions;
@@ -28,6 +30,12 @@ pub struct IdentifyArguments {
     /// Noise of the logged torque in percent of each joint's mean absolute torque; the leg file's unless given.
     #[arg(long)]
     torque_noise: Option<f64>,
+    /// Identify again with a known mass, KG@JOINT:X_M[:Y_M] (JOINT: name or number; X along the link): tells the torque constants.
+    #[arg(long)]
+    payload: Option<PlacedMass>,
+    /// The leg carries a known mass all the time, stated likewise; the parameters are those of the leg without it.
+    #[arg(long)]
+    load: Option<PlacedMass>,
     /// Write the training motion here, in the format that replay reads.
     #[arg(long)]
     log: Option<PathBuf>,
@@ -58,12 +66,19 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
     if arguments.torque_noise.is_some_and(|percent| !(0.0..=1000.0).contains(&percent)) {
         return Err(ToolError::input("--torque-noise: a percentage from 0 to 1000"));
     }
+    let on_leg = |mass: &Option<PlacedMass>, option: &str| -> Result<Option<Payload<f64>>, ToolError> {
+        mass.as_ref().map(|mass| mass.on(leg, option)).transpose()
+    };
+    let payload = on_leg(&arguments.payload, "--payload")?;
+    let load = on_leg(&arguments.load, "--load")?;
     let options = |seed: u64| SimulationOptions {
         seed,
         swarm_seed: arguments.common.swarm_seed.unwrap_or(seed),
         torque_noise_percent: arguments.torque_noise,
         plan: arguments.common.plan.into(),
         prior: arguments.common.prior.unwrap_or_default(),
+        payload,
+        load,
         with_series: false,
     };
     let Some((first, last)) = arguments.seeds else {

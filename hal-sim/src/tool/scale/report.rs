@@ -1,0 +1,166 @@
+//! What is said about scale and load.
+
+use scarab::ident::ConstantRatio;
+use scarab::model::Payload;
+use serde::Serialize;
+
+use super::super::pair::Context;
+use super::super::report::{Number, RunReport};
+use super::super::tables::number;
+use super::Scale;
+
+/// What the parameters of a run are measured in, and what the leg carried.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScaleReport {
+    /// `relative` to the torque constants that were used, or `absolute`.
+    pub scale: &'static str,
+    /// One per joint of a simulated leg; empty in a replay, whose torques come as such.
+    pub torque_constant: Vec<TorqueConstantReport>,
+    /// The known mass of the second run.
+    pub payload: Option<MassReport>,
+    /// What the leg carried in every run; the parameters are those without it.
+    pub load: Option<MassReport>,
+}
+
+/// The torque constant of one joint, N m/A at the joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TorqueConstantReport {
+    /// Counted from 1.
+    pub joint: usize,
+    /// By the firmware.
+    pub used: Number,
+    /// From the known mass; unknown where the joint does not feel it.
+    pub identified: Number,
+    /// Of that.
+    pub sigma: Number,
+    /// Whether the two runs differ by the stated mass at the stated place, as far as the joint tells.
+    pub consistent: Option<bool>,
+}
+
+/// A known mass.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MassReport {
+    /// kg.
+    pub mass: f64,
+    /// Counted from 1: the one whose link carries it.
+    pub joint: usize,
+    /// In the joint's frame, m.
+    pub place: [f64; 3],
+}
+
+impl From<&Payload<f64>> for MassReport {
+    fn from(payload: &Payload<f64>) -> Self {
+        Self { mass: payload.mass, joint: payload.joint + 1, place: payload.place.into() }
+    }
+}
+
+impl Default for ScaleReport {
+    fn default() -> Self {
+        Self { scale: "relative", torque_constant: Vec::new(), payload: None, load: None }
+    }
+}
+
+impl ScaleReport {
+    /// What was found by a firmware with the constants of `context`.
+    #[must_use]
+    pub fn of<const N: usize, const B: usize>(scale: &Scale<N, B>, context: &Context<N, B>) -> Self {
+        let of = |joint: usize, ratio: &Option<ConstantRatio<f32>>| {
+            let used = f64::from(context.configuration.joints[joint].scale.torque_per_ampere.0);
+            let (found, sigma) =
+                ratio.map_or((f64::NAN, 0.0), |ratio| (f64::from(ratio.ratio), f64::from(ratio.sigma)));
+            TorqueConstantReport {
+                joint: joint + 1,
+                used: used.into(),
+                identified: (used / found).into(),
+                sigma: (used * sigma / (found * found)).into(),
+                consistent: ratio.map(|ratio| ratio.is_consistent()),
+            }
+        };
+        Self {
+            scale: if scale.trusted().is_some() { "absolute" } else { "relative" },
+            torque_constant: scale.ratios.iter().enumerate().map(|(joint, ratio)| of(joint, ratio)).collect(),
+            payload: scale.payload.as_ref().map(MassReport::from),
+            load: scale.load.as_ref().map(MassReport::from),
+        }
+    }
+}
+
+/// Scale and load of a run in words, a line each; nothing for a replay.
+#[must_use]
+pub fn lines(run: &RunReport) -> Vec<String> {
+    let scale = &run.scale;
+    let mut lines = Vec::new();
+    if scale.torque_constant.is_empty() {
+        return lines;
+    }
+    let joints: Vec<String> = scale.torque_constant.iter().map(constant).collect();
+    lines.push(format!("torque constants, N m/A: {}", joints.join("; ")));
+    lines.push(match (scale.scale, &scale.payload) {
+        ("absolute", _) => "scale: absolute, every torque corrected; sigma includes the constants' own".into(),
+        (_, None) => "scale: relative to the torque constants used; a wrong constant scales every parameter and does not \
+                      show in one run (--payload tells)"
+            .into(),
+        (_, Some(_)) if scale.torque_constant.iter().any(|joint| joint.consistent == Some(false)) => {
+            "scale: relative to the torque constants used; the two runs do not differ by the stated mass at the stated \
+             place, so what they say is not used"
+                .into()
+        }
+        (_, Some(mass)) => format!(
+            "scale: relative to the torque constants used; a mass on link {} does not load every joint",
+            mass.joint
+        ),
+    });
+    if let Some(load) = &scale.load {
+        lines.push(format!(
+            "load: {} kg on link {} at x {}, y {} m taken off; the parameters are those of the leg without it",
+            load.mass, load.joint, load.place[0], load.place[1]
+        ));
+    }
+    lines
+}
+
+fn constant(joint: &TorqueConstantReport) -> String {
+    let used = number(joint.used);
+    match (joint.identified.known(), joint.consistent) {
+        (Some(_), Some(consistent)) => format!(
+            "joint {} used {used}, identified {} +- {}{}",
+            joint.joint,
+            number(joint.identified),
+            number(joint.sigma),
+            if consistent { "" } else { " (contradicted)" }
+        ),
+        _ => format!("joint {} used {used}", joint.joint),
+    }
+}
+
+/// The constants of many runs, a line per joint; nothing without a known mass.
+#[must_use]
+pub fn summary(runs: &[RunReport]) -> Vec<String> {
+    let joints = runs.first().map_or(0, |run| run.scale.torque_constant.len());
+    (0..joints)
+        .filter_map(|joint| {
+            let found: Vec<&TorqueConstantReport> =
+                runs.iter().filter_map(|run| run.scale.torque_constant.get(joint)).collect();
+            let values: Vec<f64> = found.iter().filter_map(|joint| joint.identified.known()).collect();
+            let (least, most) = values
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| (least.min(*value), most.max(*value)));
+            let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+            let sigma = found.iter().filter_map(|joint| joint.sigma.known()).sum::<f64>() / values.len().max(1) as f64;
+            let contradicted = found.iter().filter(|joint| joint.consistent == Some(false)).count();
+            (!values.is_empty()).then(|| {
+                format!(
+                    "torque constant of joint {}, N m/A: identified {} on average ({} to {} in {} runs), sigma {}; used \
+                     {}; contradicted in {contradicted}",
+                    joint + 1,
+                    number(mean.into()),
+                    number(least.into()),
+                    number(most.into()),
+                    values.len(),
+                    number(sigma.into()),
+                    number(found.first().map_or(Number::UNKNOWN, |joint| joint.used)),
+                )
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,160 @@
+//! Torque constants that are not what the firmware believes, known masses that tell them, known loads.
+
+use hal_sim::tool::scale::{Corrected, Scale};
+use hal_sim::world::World;
+use nalgebra::Vector3;
+use scarab::leg::IdentifiedModel;
+use scarab::model::Payload;
+use scarab::servo::TorqueModel;
+
+use super::*;
+
+const ON_THE_KNEE: Payload<f64> = Payload { joint: 1, mass: 5.0, place: Vector3::new(0.2, 0.0, 0.0) };
+
+/// The default leg whose motors make `factors` times the torque that the firmware believes.
+fn leg_with_constants(factors: [f64; JOINTS]) -> LegFile {
+    let mut leg = default_leg();
+    for (joint, factor) in leg.joints.iter_mut().zip(factors) {
+        joint.current_limit_a = Some(joint.current_limit());
+        joint.torque_per_ampere *= factor;
+    }
+    leg
+}
+
+/// Identified once; the verdict on that alone.
+fn first_run(factors: [f64; JOINTS], seed: u64) -> (Pair, Option<Verdict>) {
+    let mut pair = enabled(&leg_with_constants(factors), seed);
+    let verdict = identify(&mut pair);
+    (pair, verdict)
+}
+
+fn corrected(pair: &Pair, stated: &Payload<f64>) -> (Scale<JOINTS, BASE>, Option<Corrected<JOINTS, BASE>>) {
+    let scale = second_run(pair, &ON_THE_KNEE, stated);
+    let identification = pair.leg.identification();
+    let solver = identification.solver().expect("solved");
+    let corrected = scale.corrected(context(), solver, identification.validation());
+    (scale, corrected)
+}
+
+/// The second run with one mass on the leg and another, or the same, stated.
+fn second_run(pair: &Pair, carried: &Payload<f64>, stated: &Payload<f64>) -> Scale<JOINTS, BASE> {
+    Scale::find_with(context(), pair, carried, stated).expect("the drive holds 5 kg")
+}
+
+fn true_base() -> [f64; BASE] {
+    let background = &context().background;
+    background.model.base.project(background.truth.as_ref().expect("simulated"))
+}
+
+/// Largest error of the base parameters in units of their sigma.
+fn worst_pull(run: &Corrected<JOINTS, BASE>) -> f64 {
+    let estimate = run.solver.estimate();
+    let pull = |(base, truth): (usize, &f64)| {
+        let sigma = estimate.sigma(base).expect("determined");
+        (f64::from(estimate.values[base]) - truth).abs() / f64::from(sigma)
+    };
+    true_base().iter().enumerate().map(pull).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_wrong_torque_constant_is_not_seen_in_one_run_and_found_with_a_known_mass() {
+    for seed in 1..=3 {
+        let (pair, verdict) = first_run([1.2; JOINTS], seed);
+        assert_eq!(verdict, Some(Verdict::ACCEPTED), "nothing in one run tells");
+        let relative = pair.leg.identification().solver().expect("solved").estimate().values;
+        let rotor = BASE - 1;
+        // Everything is too small by the factor; sigma of this rotor's inertia is 0.3 %.
+        assert!((f64::from(relative[rotor]) * 1.2 / true_base()[rotor] - 1.0).abs() < 0.02);
+
+        let (scale, corrected) = corrected(&pair, &ON_THE_KNEE);
+        let ratios = scale.trusted().expect("both joints feel the mass");
+        for ratio in ratios {
+            let constant = 1.5 / f64::from(ratio.ratio);
+            println!(
+                "seed {seed}: {constant:.4} N m/A, sigma {:.4}",
+                constant * f64::from(ratio.sigma / ratio.ratio)
+            );
+            // 1.8 N m/A within 1 %: four sigma of 0.22 %.
+            assert!((constant / 1.8 - 1.0).abs() < 0.01, "{constant}");
+        }
+        let corrected = corrected.expect("to be corrected");
+        assert!(corrected.verdict.is_accepted());
+        // Of 39 pulls one beyond 4 is a chance of 0.2 %.
+        assert!(worst_pull(&corrected) < 4.0, "{}", worst_pull(&corrected));
+    }
+}
+
+#[test]
+fn constants_that_differ_from_joint_to_joint_are_found_each() {
+    let (pair, _) = first_run([0.8, 1.15], 4);
+    let (scale, corrected) = corrected(&pair, &ON_THE_KNEE);
+    let ratios = scale.trusted().expect("both joints feel the mass").map(|ratio| f64::from(ratio.ratio));
+    assert!((ratios[0] * 0.8 - 1.0).abs() < 0.01 && (ratios[1] * 1.15 - 1.0).abs() < 0.01, "{ratios:?}");
+    let corrected = corrected.expect("to be corrected");
+    assert!(corrected.verdict.is_accepted(), "{:?}", corrected.verdict.reasons().collect::<Vec<_>>());
+    assert!(worst_pull(&corrected) < 4.0);
+}
+
+#[test]
+fn a_mass_stated_wrongly_scales_the_result_and_a_place_stated_wrongly_is_noticed() {
+    let (pair, _) = first_run([1.0; JOINTS], 5);
+    let (heavy, _) = corrected(&pair, &Payload { mass: 5.5, ..ON_THE_KNEE });
+    for ratio in heavy.trusted().expect("nothing contradicts") {
+        assert!((f64::from(ratio.ratio) * 1.1 - 1.0).abs() < 0.01, "10 % of mass are 10 % of the constant");
+    }
+    let far = Payload { place: Vector3::new(0.3, 0.0, 0.0), ..ON_THE_KNEE };
+    let (contradicted, corrected) = corrected(&pair, &far);
+    assert!(contradicted.trusted().is_none() && corrected.is_none());
+}
+
+#[test]
+fn a_mass_on_the_thigh_tells_the_hip_alone_and_nothing_is_corrected() {
+    let (pair, _) = first_run([1.2; JOINTS], 6);
+    let thigh = Payload { joint: 0, mass: 5.0, place: Vector3::new(0.3, 0.0, 0.0) };
+    let scale = second_run(&pair, &thigh, &thigh);
+    let hip = scale.ratios[0].expect("felt");
+    assert!((f64::from(hip.ratio) * 1.2 - 1.0).abs() < 0.02, "{}", hip.ratio);
+    assert!(scale.ratios[1].is_none() && scale.trusted().is_none());
+}
+
+#[test]
+fn a_model_with_a_known_load_predicts_as_one_that_was_identified_with_it() {
+    let load = Payload { joint: 1, mass: 3.0, place: Vector3::new(0.3, 0.02, 0.0) };
+    let pair = identified();
+    let model = pair.leg.control().model().expect("accepted");
+    let mut carrying = enabled(&default_leg(), 1);
+    carrying.world.attach(load.joint, load.mass, load.place.into());
+    let plant = carrying.world.clone();
+    assert!(identify(&mut carrying).is_some_and(Verdict::is_accepted));
+    let again = carrying.leg.control().model().expect("accepted");
+    let [without, with, identified_again] =
+        [*model, model.with_load(&load.convert()), *again].map(|model| prediction_error(&model, &plant));
+    println!("N m rms without {without:?}, added {with:?}, identified again {identified_again:?}");
+    for joint in 0..JOINTS {
+        // Both are estimates of one noise level; they differ by what that noise did, never by several times.
+        assert!(with[joint] < 2.0 * identified_again[joint], "joint {joint}");
+        assert!(without[joint] > 10.0 * with[joint], "the load is felt, or this shows nothing");
+    }
+}
+
+/// Root mean square of predicted minus noise-free torque over the 3 s gait, where the joint moves.
+fn prediction_error(model: &IdentifiedModel<JOINTS>, plant: &World<JOINTS>) -> [f64; JOINTS] {
+    let motion = context().motions.validation[1];
+    let mut squares = [(0.0, 0_u32); JOINTS];
+    for tick in (motion.blend_ticks()..motion.duration_ticks() - motion.blend_ticks()).step_by(40) {
+        let state = motion.state_at(tick);
+        let (q, qd, qdd) = (state.position_rad, state.velocity_rad_per_s, state.acceleration_rad_per_s2);
+        // The knee's chain angle is minus the anatomical one.
+        let anatomical = |values: [f32; JOINTS]| [f64::from(values[0]), -f64::from(values[1])];
+        let real = plant.inverse_dynamics(&anatomical(q), &anatomical(qd), &anatomical(qdd));
+        let predicted = model.torques(&q, &qd, &qdd, context().gravity);
+        for (joint, (sum, count)) in squares.iter_mut().enumerate() {
+            if qd[joint].abs() > 0.05 {
+                let error = anatomical(predicted)[joint] - real[joint];
+                *sum += error * error;
+                *count += 1;
+            }
+        }
+    }
+    squares.map(|(sum, count)| scarab::real::sqrt(sum / f64::from(count.max(1))))
+}
