@@ -11,6 +11,8 @@ pub struct LegDescription<const N: usize> {
     pub gravity: [f64; 3],
     /// Proximal first.
     pub joints: [JointDescription; N],
+    /// Drives are mounted mirrored, as on a left leg: motors and encoders turn against the anatomical sense.
+    pub mirrored: bool,
     /// Pushes by the wearer; none by default.
     pub pushes: Option<PushDescription>,
 }

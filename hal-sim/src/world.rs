@@ -51,6 +51,8 @@ pub struct World<const N: usize> {
     drives: [Drive; N],
     encoders: [Encoder; N],
     current_sensors: [CurrentSensor; N],
+    /// Sense of motors and encoders in the anatomical one, 1 or -1.
+    mounting: f64,
     wearer: Wearer,
     sensor_noise: Xoshiro256PlusPlus,
     tick: u64,
@@ -73,6 +75,7 @@ impl<const N: usize> World<N> {
             drives: joints.map(|joint| Drive::new(&joint.drive, TICK_S)),
             encoders: joints.map(|joint| Encoder::new(&joint.encoder)),
             current_sensors: joints.map(|joint| CurrentSensor::new(&joint.current_sensor)),
+            mounting: if description.mirrored { -1.0 } else { 1.0 },
             wearer: Wearer::new(description.pushes, N, pushes),
             sensor_noise,
             tick: 0,
@@ -130,7 +133,8 @@ impl<const N: usize> World<N> {
 
     /// Motors and pushes on the joints, N m, joint sign.
     fn joint_torque(&self, pushed: &[f64; N]) -> [f64; N] {
-        core::array::from_fn(|joint| self.anatomy[joint].flip(self.drives[joint].torque() + pushed[joint]))
+        let motor = self.motor_torque();
+        core::array::from_fn(|joint| self.anatomy[joint].flip(motor[joint] + pushed[joint]))
     }
 
     fn read_sensors(&mut self) {
@@ -139,7 +143,7 @@ impl<const N: usize> World<N> {
             let current =
                 self.current_sensors[joint].read(self.drives[joint].current(), &mut self.sensor_noise);
             self.newest.joints[joint] = JointSample {
-                encoder_counts: self.encoders[joint].read(angle),
+                encoder_counts: self.encoders[joint].read(self.mounting * angle),
                 current: Ampere(current as f32),
             };
         }
@@ -155,7 +159,7 @@ impl<const N: usize> World<N> {
             position: core::array::from_fn(|joint| anatomy[joint].to_anatomical_angle(state.angles[joint])),
             velocity: core::array::from_fn(|joint| anatomy[joint].flip(state.rates[joint])),
             acceleration: core::array::from_fn(|joint| anatomy[joint].flip(acceleration[joint])),
-            motor_torque: core::array::from_fn(|joint| self.drives[joint].torque()),
+            motor_torque: self.motor_torque(),
             sticking: state.rates.map(|rate| rate == 0.0),
         }
     }
@@ -163,7 +167,7 @@ impl<const N: usize> World<N> {
     /// Torque of the motors at the joints now, N m, without noise; what [`Truth`] holds, at no cost.
     #[must_use]
     pub fn motor_torque(&self) -> [f64; N] {
-        core::array::from_fn(|joint| self.drives[joint].torque())
+        core::array::from_fn(|joint| self.mounting * self.drives[joint].torque())
     }
 
     /// Joint angles now, rad, anatomical; what [`Truth`] holds, at no cost.

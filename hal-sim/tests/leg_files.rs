@@ -59,6 +59,12 @@ fn every_fault_is_told_with_file_line_and_reason() {
         ))
     };
     let body = "[0.01, 0.0, 0.0, 0.05, 0.0, 0.05]";
+    let above = |line: &str| MINIMAL.replace("[[joint]]", &format!("{line}\n[[joint]]"));
+    let segments = |shank: &str, wearer: &str| {
+        above(&format!(
+            "segments = {{ shank_m = {shank}, foot_m = 0.27, wearer_kg = {wearer}, prior_wearer_kg = 70.0 }}"
+        ))
+    };
     let cases = [
         ("name = \"x\"\ngravity = [9.81, 0.0]\n".to_owned(), Some(2), "length 2"),
         ("name = \"x\"\ngravity = [9.81, 0.0, 0.0\n".to_owned(), Some(2), "array"),
@@ -69,6 +75,10 @@ fn every_fault_is_told_with_file_line_and_reason() {
         (MINIMAL.replace("\"small\"", "\"\""), Some(1), "`name` must be one line that is not empty"),
         (MINIMAL.replace("9.81", "nan"), Some(2), "`gravity` is NaN, outside -30..30"),
         (MINIMAL.replace("9.81", "981.0"), Some(2), "`gravity` is 981, outside -30..30"),
+        (segments("0.4", "75.0"), Some(4), "`segments` needs two joints, a hip and a knee"),
+        (segments("40.0", "75.0"), Some(4), "`segments.shank_m` is 40, outside 0.1..1"),
+        (segments("0.4", "7500.0"), Some(4), "`segments.wearer_kg` is 7500, outside 10..300"),
+        (above("side = \"middle\""), Some(4), "unknown variant `middle`"),
         (
             "name = \"x\"\ngravity = [0.0, 0.0, 0.0]\njoint = []\n".to_owned(),
             Some(3),

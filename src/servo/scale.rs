@@ -1,12 +1,12 @@
 //! Counts and currents of a joint's drive to the model's angles and torques.
 //!
 //! ```text
-//! q   = direction * radian_per_count * counts + zero_offset
-//! tau = direction * torque_per_ampere * current
+//! q   = direction * mounting * radian_per_count * counts + zero_offset
+//! tau = direction * mounting * torque_per_ampere * current
 //! ```
 //!
-//! Counts, currents and the sign they have are the joint's (anatomical, flexion positive); `q`, `tau` are the
-//! model's (D-H). Counts are exact in `f32` up to 2^24, some 40 turns of a joint with 409,600 counts per turn.
+//! Counts and currents grow with the joint's angle and torque (anatomical, flexion positive); `mounting` is 1, or -1 where
+//! the drive is mounted mirrored, as on a left leg, and they fall. `q`, `tau` are the model's (D-H). Counts are exact in `f32` up to 2^24, some 40 turns of a joint with 409,600 counts per turn.
 
 use crate::model::AnatomicalJoint;
 use crate::real::{abs, is_finite};
@@ -19,6 +19,8 @@ pub struct JointScale {
     pub radian_per_count: Radian,
     /// Sense and zero of the joint's angle in the model.
     pub anatomy: AnatomicalJoint<f32>,
+    /// Motor and encoder turn against the joint, as on a left leg.
+    pub mirrored: bool,
     /// Joint torque per motor current, positive.
     pub torque_per_ampere: NewtonMetrePerAmpere,
 }
@@ -27,7 +29,7 @@ impl JointScale {
     /// The model's angle of a place given in counts; fractions of a count are welcome.
     #[must_use]
     pub fn position(&self, counts: f32) -> Radian {
-        Radian(self.anatomy.angle_to_chain(self.radian_per_count.0 * counts))
+        Radian(self.anatomy.angle_to_chain(self.mounted(self.radian_per_count.0) * counts))
     }
 
     /// The model's torque of a motor current.
@@ -39,13 +41,17 @@ impl JointScale {
     /// The model's angle per count, of either sign.
     #[must_use]
     pub fn signed_radian_per_count(&self) -> f32 {
-        self.anatomy.to_chain(self.radian_per_count.0)
+        self.anatomy.to_chain(self.mounted(self.radian_per_count.0))
     }
 
     /// The model's torque per motor current, of either sign.
     #[must_use]
     pub fn signed_torque_per_ampere(&self) -> NewtonMetrePerAmpere {
-        NewtonMetrePerAmpere(self.anatomy.to_chain(self.torque_per_ampere.0))
+        NewtonMetrePerAmpere(self.anatomy.to_chain(self.mounted(self.torque_per_ampere.0)))
+    }
+
+    fn mounted(&self, value: f32) -> f32 {
+        if self.mirrored { -value } else { value }
     }
 
     /// Between a ten-millionth and a tenth of a radian per count, offset within 2 pi, a positive torque constant.
@@ -66,6 +72,7 @@ pub(super) mod tests {
     pub(in crate::servo) const HIP: JointScale = JointScale {
         radian_per_count: Radian(core::f32::consts::TAU / 409_600.0),
         anatomy: AnatomicalJoint::SAME,
+        mirrored: false,
         torque_per_ampere: NewtonMetrePerAmpere(1.5),
     };
 
@@ -81,6 +88,18 @@ pub(super) mod tests {
         let anatomy = AnatomicalJoint::new(-1, 0.5).expect("a direction and a finite offset");
         let offset = JointScale { anatomy, ..KNEE };
         assert_eq!(offset.position(0.0), Radian(0.5));
+    }
+
+    #[test]
+    fn a_mirrored_drive_turns_counts_and_currents_and_nothing_else() {
+        let anatomy = AnatomicalJoint::new(-1, 0.5).expect("a direction and a finite offset");
+        let right = JointScale { anatomy, ..HIP };
+        let left = JointScale { mirrored: true, ..right };
+        assert_eq!(left.position(-1000.0), right.position(1000.0));
+        assert_eq!(left.torque(Ampere(-3.0)), right.torque(Ampere(3.0)));
+        assert_eq!(left.signed_radian_per_count(), -right.signed_radian_per_count());
+        assert_eq!(left.signed_torque_per_ampere().0, -right.signed_torque_per_ampere().0);
+        assert!(left.is_sensible());
     }
 
     #[test]

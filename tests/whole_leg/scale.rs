@@ -1,5 +1,7 @@
 //! Torque constants that are not what the firmware believes, known masses that tell them, known loads.
 
+use hal_sim::tool::leg_file::BodySide;
+use hal_sim::tool::posture::on_side;
 use hal_sim::tool::scale::{Corrected, Scale};
 use hal_sim::world::World;
 use nalgebra::Vector3;
@@ -157,4 +159,12 @@ fn prediction_error(model: &IdentifiedModel<JOINTS>, plant: &World<JOINTS>) -> [
         }
     }
     squares.map(|(sum, count)| scarab::real::sqrt(sum / f64::from(count.max(1))))
+}
+
+#[test]
+fn the_firmware_of_a_right_leg_refuses_to_drive_a_left_one() {
+    let left = on_side(&default_leg(), BodySide::Left).expect("parallel axes");
+    let mut pair = Pair::new(&left, context(), 1).expect("the firmware takes the default leg");
+    // A bent leg reads as one bent backwards, outside its range.
+    assert!(!pair.enable(context().gravity) && !is_enabled(&pair));
 }

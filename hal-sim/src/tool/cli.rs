@@ -2,6 +2,7 @@
 
 mod common;
 mod identify;
+mod leg_options;
 mod regressor;
 mod replay;
 

@@ -86,7 +86,7 @@ fn write_log<const N: usize>(path: &Path, leg: &LegFile, log: &[LoggedSample<N>]
                 core::f64::consts::TAU / (f64::from(file.encoder.counts) * file.encoder.ratio);
             let counts = f64::from(logged.sample.counts_sum[joint]) / f64::from(TICKS_PER_LOG);
             let direction = if file.direction < 0 { -1.0 } else { 1.0 };
-            series.position_rad.push(counts * radian_per_count);
+            series.position_rad.push(leg.side.mounting() * counts * radian_per_count);
             series.torque_nm.push(direction * f64::from(logged.sample.torque_nm[joint]));
         }
     }

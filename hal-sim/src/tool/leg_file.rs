@@ -11,6 +11,8 @@
 //! | `torque_noise_percent` | white, per logged 500 Hz sample, of each joint's mean absolute torque, on the logged current only | 0 |
 //! | `bandwidth_hz` | where the low-pass of the identification is 3 dB down | 8 |
 //! | `pushes` | `{ per_minute, torque_nm, duration_s }`: the wearer pushes at random | none |
+//! | `side` | `"right"` or `"left"`: on the left the drives are mounted mirrored | right |
+//! | `segments` | `{ shank_m, foot_m, wearer_kg, prior_wearer_kg }`: the last two links are a thigh and a shank, and whose | none |
 //! | `joint.name`, `joint.dh` | `dh = { alpha, a, d }`, modified D-H, rad and m | required |
 //! | `direction`, `zero_offset_deg` | joint angle = direction * anatomical angle + zero offset | 1, 0 |
 //! | `range_deg` | anatomical, lower and upper | -90, 90 |
@@ -35,6 +37,7 @@ mod error;
 mod segments;
 
 pub use error::LegFileError;
+pub use segments::{BodySide, SegmentsFile};
 
 use serde::de::{Deserializer, Error as _};
 use serde::{Deserialize, Serialize};
@@ -68,6 +71,12 @@ pub struct LegFile {
     /// The wearer's pushes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pushes: Option<PushesFile>,
+    /// Side of the body.
+    #[serde(default, skip_serializing_if = "BodySide::is_default")]
+    pub side: BodySide,
+    /// What thigh and shank are made of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub segments: Option<SegmentsFile>,
     /// Proximal first.
     #[serde(rename = "joint")]
     pub joints: Vec<JointFile>,

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`cli`] | the command line |
 //! | [`leg_file`], [`x2`] | leg files and the derivation of the default leg |
+//! | [`size`], [`anthropometry`], [`posture`] | a leg file for other lengths, another wearer, side or trunk |
 //! | [`setup`] | from a leg file to what the firmware is built from |
 //! | [`recording`], [`resample`], [`replay`] | identification on recordings |
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
@@ -19,6 +20,7 @@
 )]
 
 pub mod analysis;
+pub mod anthropometry;
 pub mod cli;
 pub mod error;
 pub mod figures;
@@ -27,6 +29,7 @@ pub mod leg_file;
 pub mod motions;
 pub mod pair;
 pub mod placed_mass;
+pub mod posture;
 pub mod recording;
 pub mod regressor;
 pub mod replay;
@@ -36,6 +39,7 @@ pub mod scale;
 pub mod series;
 pub mod setup;
 pub mod simulate;
+pub mod size;
 pub mod tables;
 pub mod watch;
 pub mod words;

@@ -18,7 +18,7 @@ use scarab::units::{
 };
 
 use super::analysis::Background;
-use super::leg_file::{JointFile, LegFile, LinkParameters, Switch};
+use super::leg_file::{BodySide, JointFile, LegFile, LinkParameters, Switch};
 use super::motions::{Motions, motions};
 
 /// Bandwidth of the position loop.
@@ -299,6 +299,7 @@ pub fn configuration<const N: usize, const B: usize>(
                     (core::f64::consts::TAU / (f64::from(joint.encoder.counts) * joint.encoder.ratio)) as f32,
                 ),
                 anatomy: anatomy[index].convert(),
+                mirrored: leg.side == BodySide::Left,
                 torque_per_ampere: NewtonMetrePerAmpere(joint.torque_per_ampere as f32),
             },
             low: Radian(ends[0].min(ends[1])),

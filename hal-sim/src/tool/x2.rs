@@ -7,9 +7,7 @@
 //!   file of CANOpenRobotController (University of Melbourne, Apache-2.0, `config/x2_params.yaml`); some are marked
 //!   there as not yet investigated. "From hip" and "from knee" of the lower parts are read as in the constants
 //!   below.
-//! - Wearer: segment masses, centres of mass and radii of gyration as fractions after Winter, Biomechanics and
-//!   Motor Control of Human Movement. Segments as long as the exoskeleton's, ankle held at a right angle, so shank
-//!   and foot are one body.
+//! - Wearer: anthropometry after Winter ([`super::anthropometry`]), segments as long as the exoskeleton's.
 //! - Only sagittal inertias are given, so each segment is completed as a solid of revolution: about its long axis
 //!   it has mass * radius^2 / 2 with the radii stated below (ours).
 //!
@@ -17,7 +15,10 @@
 //! 75 kg: M1 10.34 kg, HX1 2.039 kg m, ZZ1 0.585 kg m^2 about the hip; M2 6.94, HX2 1.759, HY2 0.201, ZZ2
 //! 0.633 about the knee.
 
-use super::leg_file::{DhFile, EncoderFile, JointFile, LegFile, LinkParameters, Side};
+use super::anthropometry::{Along, Segment, Wearer, joined};
+use super::leg_file::{
+    BodySide, DhFile, EncoderFile, JointFile, LegFile, LinkParameters, SegmentsFile, Side,
+};
 
 const THIGH_M: f64 = 0.39;
 const SHANK_M: f64 = 0.40;
@@ -28,89 +29,50 @@ pub const DEFAULT_WEARER_KG: f64 = 75.0;
 /// Body mass of the standard wearer a designer would have assumed, kg.
 const STANDARD_WEARER_KG: f64 = 70.0;
 
-/// Long axis of a solid of revolution.
-#[derive(Clone, Copy)]
-enum Along {
-    X,
-    Y,
+/// Exoskeleton: upper and lower thigh of this length, m. It is a telescope: the upper part keeps its place below the hip,
+/// the lower one above the knee.
+fn exoskeleton_thigh(length: f64) -> [Segment; 2] {
+    [
+        Segment { mass: 0.70, x: 0.0811, y: 0.0, sagittal: 0.002_197, radius: 0.05, along: Along::X },
+        Segment {
+            mass: 2.14,
+            x: length - 0.055_64,
+            y: 0.0,
+            sagittal: 0.005_901,
+            radius: 0.05,
+            along: Along::X,
+        },
+    ]
 }
 
-/// A solid of revolution in the plane of motion.
-#[derive(Clone, Copy)]
-struct Segment {
-    mass: f64,
-    /// Centre of mass, m.
-    x: f64,
-    y: f64,
-    /// About the joint's axis through the centre of mass, kg m^2.
-    sagittal: f64,
-    /// m.
-    radius: f64,
-    along: Along,
+/// Exoskeleton: upper and lower shank, foot; a telescope likewise.
+fn exoskeleton_shank(length: f64) -> [Segment; 3] {
+    [
+        Segment { mass: 0.64, x: 0.0908, y: 0.0, sagittal: 0.002_346, radius: 0.05, along: Along::X },
+        Segment {
+            mass: 0.47,
+            x: length - 0.0562,
+            y: 0.0,
+            sagittal: 0.000_794_1,
+            radius: 0.04,
+            along: Along::X,
+        },
+        Segment { mass: 1.25, x: length, y: 0.088_34, sagittal: 0.004_441, radius: 0.05, along: Along::Y },
+    ]
 }
 
-/// Exoskeleton: upper and lower thigh.
-const EXOSKELETON_THIGH: [Segment; 2] = [
-    Segment { mass: 0.70, x: 0.0811, y: 0.0, sagittal: 0.002_197, radius: 0.05, along: Along::X },
-    Segment { mass: 2.14, x: THIGH_M - 0.055_64, y: 0.0, sagittal: 0.005_901, radius: 0.05, along: Along::X },
-];
+/// Rotor inertia, Coulomb and viscous friction of a joint.
+type Drive = [f64; 3];
 
-/// Exoskeleton: upper and lower shank, foot.
-const EXOSKELETON_SHANK: [Segment; 3] = [
-    Segment { mass: 0.64, x: 0.0908, y: 0.0, sagittal: 0.002_346, radius: 0.05, along: Along::X },
-    Segment { mass: 0.47, x: SHANK_M - 0.0562, y: 0.0, sagittal: 0.000_794_1, radius: 0.04, along: Along::X },
-    Segment { mass: 1.25, x: SHANK_M, y: 0.088_34, sagittal: 0.004_441, radius: 0.05, along: Along::Y },
-];
-
-fn wearer_thigh(body_mass: f64) -> Segment {
-    limb(0.100 * body_mass, THIGH_M, 0.323, 0.08)
-}
-
-fn wearer_shank(body_mass: f64) -> [Segment; 2] {
-    let mass = 0.0145 * body_mass;
-    let gyration = 0.475 * WEARER_FOOT_M;
-    let foot = Segment {
-        mass,
-        x: SHANK_M,
-        y: 0.083,
-        sagittal: mass * gyration * gyration,
-        radius: 0.04,
-        along: Along::Y,
-    };
-    [limb(0.0465 * body_mass, SHANK_M, 0.302, 0.055), foot]
-}
-
-/// Thigh or shank: centre of mass at 0.433 of the length from the upper joint.
-fn limb(mass: f64, length: f64, gyration: f64, radius: f64) -> Segment {
-    let gyration = gyration * length;
-    Segment { mass, x: 0.433 * length, y: 0.0, sagittal: mass * gyration * gyration, radius, along: Along::X }
-}
-
-/// One rigid body of several segments, about their common centre of mass; rounded to six decimals, as it is
-/// printed.
-fn joined(segments: &[Segment], rotor_inertia: f64, coulomb: f64, viscous: f64) -> LinkParameters {
-    let mass: f64 = segments.iter().map(|segment| segment.mass).sum();
-    let x = segments.iter().map(|segment| segment.mass * segment.x).sum::<f64>() / mass;
-    let y = segments.iter().map(|segment| segment.mass * segment.y).sum::<f64>() / mass;
-    let mut inertia = [0.0; 6];
-    for segment in segments {
-        let (dx, dy) = (segment.x - x, segment.y - y);
-        let axial = 0.5 * segment.mass * segment.radius * segment.radius;
-        let (xx, yy) = match segment.along {
-            Along::X => (axial, segment.sagittal),
-            Along::Y => (segment.sagittal, axial),
-        };
-        inertia[0] += xx + segment.mass * dy * dy;
-        inertia[1] -= segment.mass * dx * dy;
-        inertia[3] += yy + segment.mass * dx * dx;
-        inertia[5] += segment.sagittal + segment.mass * (dx * dx + dy * dy);
-    }
+/// A link of several segments, rounded to six decimals, as it is printed.
+fn link(segments: &[Segment], [rotor_inertia, coulomb, viscous]: Drive) -> LinkParameters {
+    let (mass, com, inertia_com) = joined(segments);
     let rounded = |value: f64| (value * 1e6).round() / 1e6;
     LinkParameters {
         mass: rounded(mass),
-        com: [x, y, 0.0].map(rounded),
+        com: com.map(rounded),
         // Adding 0 turns -0 into 0.
-        inertia_com: inertia.map(|element| rounded(element) + 0.0),
+        inertia_com: inertia_com.map(|element| rounded(element) + 0.0),
         rotor_inertia,
         coulomb,
         viscous,
@@ -118,15 +80,15 @@ fn joined(segments: &[Segment], rotor_inertia: f64, coulomb: f64, viscous: f64) 
     }
 }
 
-fn thigh(body_mass: f64, rotor_inertia: f64, coulomb: f64, viscous: f64) -> LinkParameters {
-    let [upper, lower] = EXOSKELETON_THIGH;
-    joined(&[upper, lower, wearer_thigh(body_mass)], rotor_inertia, coulomb, viscous)
+fn thigh(wearer: &Wearer, drive: Drive) -> LinkParameters {
+    let [upper, lower] = exoskeleton_thigh(wearer.thigh);
+    link(&[upper, lower, wearer.thigh()], drive)
 }
 
-fn shank(body_mass: f64, rotor_inertia: f64, coulomb: f64, viscous: f64) -> LinkParameters {
-    let [upper, lower, foot] = EXOSKELETON_SHANK;
-    let [wearer, wearer_foot] = wearer_shank(body_mass);
-    joined(&[upper, lower, foot, wearer, wearer_foot], rotor_inertia, coulomb, viscous)
+fn shank(wearer: &Wearer, drive: Drive) -> LinkParameters {
+    let [upper, lower, foot] = exoskeleton_shank(wearer.shank);
+    let [calf, wearer_foot] = wearer.shank();
+    link(&[upper, lower, foot, calf, wearer_foot], drive)
 }
 
 /// Hip and knee worn by somebody of `body_mass` kg. The prior is what a designer would write down: the same
@@ -135,6 +97,14 @@ fn shank(body_mass: f64, rotor_inertia: f64, coulomb: f64, viscous: f64) -> Link
 /// its finer gain.
 #[must_use]
 pub fn leg_file(body_mass: f64) -> LegFile {
+    let wearer = Wearer { mass: body_mass, thigh: THIGH_M, shank: SHANK_M, foot: WEARER_FOOT_M };
+    leg_file_of(&wearer, STANDARD_WEARER_KG)
+}
+
+/// The same set to a wearer's lengths, with a prior that assumes another body mass.
+#[must_use]
+pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
+    let standard = Wearer { mass: prior_mass, ..*wearer };
     let drive = |joint: &mut JointFile| {
         joint.speed_limit_deg_s = 257.8;
         joint.torque_limit_nm = 85.0;
@@ -144,20 +114,27 @@ pub fn leg_file(body_mass: f64) -> LegFile {
     let mut hip = JointFile::new("hip", DhFile { alpha: 0.0, a: 0.0, d: 0.0 });
     drive(&mut hip);
     hip.range_deg = [2.17, 50.18];
-    hip.truth = Some(thigh(body_mass, 1.9, 4.58, 5.01));
-    hip.prior = Some(thigh(STANDARD_WEARER_KG, 1.7, 4.0, 4.0));
-    let mut knee = JointFile::new("knee", DhFile { alpha: 0.0, a: THIGH_M, d: 0.0 });
+    hip.truth = Some(thigh(wearer, [1.9, 4.58, 5.01]));
+    hip.prior = Some(thigh(&standard, [1.7, 4.0, 4.0]));
+    let mut knee = JointFile::new("knee", DhFile { alpha: 0.0, a: wearer.thigh, d: 0.0 });
     drive(&mut knee);
     knee.direction = -1;
     knee.range_deg = [6.85, 95.53];
-    knee.truth = Some(shank(body_mass, 1.9, 4.67, 3.26));
-    knee.prior = Some(shank(STANDARD_WEARER_KG, 1.7, 4.0, 4.0));
+    knee.truth = Some(shank(wearer, [1.9, 4.67, 3.26]));
+    knee.prior = Some(shank(&standard, [1.7, 4.0, 4.0]));
     LegFile {
-        name: format!("x2-wearer-{body_mass}kg"),
+        name: format!("x2-wearer-{}kg", wearer.mass),
         gravity: [9.81, 0.0, 0.0],
         torque_noise_percent: 7.0,
         bandwidth_hz: 16.0,
         pushes: None,
+        side: BodySide::Right,
+        segments: Some(SegmentsFile {
+            shank_m: wearer.shank,
+            foot_m: wearer.foot,
+            wearer_kg: wearer.mass,
+            prior_wearer_kg: prior_mass,
+        }),
         joints: vec![hip, knee],
     }
 }

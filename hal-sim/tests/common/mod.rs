@@ -24,7 +24,7 @@ pub fn joint(frame: [f64; 3], mass: f64, com: [f64; 3], inertia_com: [f64; 6]) -
 }
 
 pub fn leg<const N: usize>(gravity: [f64; 3], joints: [JointDescription; N]) -> LegDescription<N> {
-    LegDescription { gravity, joints, pushes: None }
+    LegDescription { gravity, joints, mirrored: false, pushes: None }
 }
 
 /// The two links of the reference torque vectors (about the centres of mass), without friction.

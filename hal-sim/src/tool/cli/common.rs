@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use scarab::ident::Plan;
 
+use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
-use crate::tool::leg_file::DEFAULT_LEG;
 use crate::tool::report::RunReport;
 use crate::tool::setup::PriorChoice;
 use crate::tool::tables;
@@ -32,9 +32,8 @@ impl From<PlanArgument> for Plan {
 /// What identification and replay have in common.
 #[derive(Args, Debug)]
 pub struct Common {
-    /// Name of a shipped leg, or a leg file.
-    #[arg(long, default_value = DEFAULT_LEG)]
-    pub leg: String,
+    #[command(flatten)]
+    pub leg: LegOptions,
     /// Of the swarm's random numbers.
     #[arg(long)]
     pub swarm_seed: Option<u64>,

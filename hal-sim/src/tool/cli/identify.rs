@@ -8,7 +8,6 @@ use scarab::model::Payload;
 use super::common::{Common, finish, write_json};
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::identify::{identify_many, identify_one, print_runs};
-use crate::tool::leg_file::LegFile;
 use crate::tool::placed_mass::PlacedMass;
 use crate::tool::report::RunReport;
 use crate::tool::setup::DEFAULT_SEED;
@@ -62,7 +61,7 @@ const LARGEST_SEED_COUNT: u64 = 100_000;
 
 /// Identifies and reports; the exit code.
 pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
-    let leg = &LegFile::load(&arguments.common.leg)?;
+    let leg = &arguments.common.leg.load()?;
     if arguments.torque_noise.is_some_and(|percent| !(0.0..=1000.0).contains(&percent)) {
         return Err(ToolError::input("--torque-noise: a percentage from 0 to 1000"));
     }

@@ -6,7 +6,6 @@ use clap::Args;
 
 use super::common::{Common, finish};
 use crate::tool::error::ToolError;
-use crate::tool::leg_file::LegFile;
 use crate::tool::replay::{ReplayOptions, replay};
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
@@ -36,7 +35,7 @@ pub struct ReplayArguments {
 
 /// Identifies and reports; the exit code.
 pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
-    let leg = &LegFile::load(&arguments.common.leg)?;
+    let leg = &arguments.common.leg.load()?;
     if arguments.split.is_some_and(|fraction| !(fraction > 0.0 && fraction < 1.0)) {
         return Err(ToolError::input("--split: a fraction above 0 and below 1"));
     }

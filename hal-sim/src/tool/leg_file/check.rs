@@ -73,6 +73,16 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
         place.positive("torque_nm", pushes.torque_nm, 1000.0)?;
         place.positive("duration_s", pushes.duration_s, 60.0)?;
     }
+    if let Some(segments) = &leg.segments {
+        let place = Place { joint: None, table: Some("segments") };
+        place.within("shank_m", segments.shank_m, 0.1, 1.0)?;
+        place.within("foot_m", segments.foot_m, 0.05, 0.6)?;
+        place.within("wearer_kg", segments.wearer_kg, 10.0, 300.0)?;
+        place.within("prior_wearer_kg", segments.prior_wearer_kg, 10.0, 300.0)?;
+        if leg.joints.len() < 2 {
+            return Err(top.fault("segments", "needs two joints, a hip and a knee"));
+        }
+    }
     if !(1..=3).contains(&leg.joints.len()) {
         return Err(top.fault("joint", &format!("occurs {} times; a leg has 1 to 3", leg.joints.len())));
     }

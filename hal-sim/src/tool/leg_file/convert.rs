@@ -1,6 +1,6 @@
 //! From a leg file to the numbers the plant is made from.
 
-use super::{JointFile, LegFile, LegFileError, LinkParameters, PushesFile, Side};
+use super::{BodySide, JointFile, LegFile, LegFileError, LinkParameters, PushesFile, Side};
 use crate::description::{
     BodyDescription, CurrentSensorDescription, DenavitHartenberg, DriveDescription, EncoderDescription,
     EncoderSide, FrictionDescription, JointDescription, LegDescription, PushDescription, Stribeck,
@@ -21,7 +21,12 @@ impl LegFile {
         }
         let count = joints.len();
         let joints = joints.try_into().map_err(|_| refused(format!("has {count} joints, not {N}")))?;
-        Ok(LegDescription { gravity: self.gravity, joints, pushes: self.pushes.as_ref().map(pushes) })
+        Ok(LegDescription {
+            gravity: self.gravity,
+            joints,
+            mirrored: self.side == BodySide::Left,
+            pushes: self.pushes.as_ref().map(pushes),
+        })
     }
 }
 

@@ -1,17 +1,73 @@
-//! Links as segments of a body: how long they are.
+//! Links as segments of a body: how long they are, who is in them, on which side.
+
+use serde::{Deserialize, Serialize};
 
 use super::LegFile;
+use crate::tool::anthropometry::Wearer;
+
+/// What the last two links are made of, a thigh and a shank with its foot: an exoskeleton on a wearer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentsFile {
+    /// Knee to ankle, m. The thigh is as long as the way to the last joint.
+    pub shank_m: f64,
+    /// The wearer's foot, m.
+    pub foot_m: f64,
+    /// Body mass of the wearer in `truth`, kg.
+    pub wearer_kg: f64,
+    /// Body mass of the wearer that `prior` assumes, kg.
+    pub prior_wearer_kg: f64,
+}
+
+impl SegmentsFile {
+    /// Somebody of this mass (kg) with these segments and a thigh of this length (m).
+    #[must_use]
+    pub fn wearer(&self, thigh: f64, mass: f64) -> Wearer {
+        Wearer { mass, thigh, shank: self.shank_m, foot: self.foot_m }
+    }
+}
+
+/// Side of the body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BodySide {
+    /// As the drives are described.
+    #[default]
+    Right,
+    /// Drives mounted mirrored.
+    Left,
+}
+
+impl BodySide {
+    /// Whether this is the side that is meant unless another is stated.
+    #[must_use]
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Sense of motors and encoders in the anatomical one.
+    #[must_use]
+    pub fn mounting(self) -> f64 {
+        match self {
+            Self::Right => 1.0,
+            Self::Left => -1.0,
+        }
+    }
+}
 
 /// A link is at least so long, m.
 const SHORTEST_LINK_M: f64 = 0.05;
 
 impl LegFile {
-    /// Length of the link beyond a joint, m: to the next joint's axis; of the last link twice the distance of its centre of
-    /// mass, as far as that is known.
+    /// Length of the link beyond a joint, m: to the next joint's axis; of the last link the shank's where that is stated,
+    /// else twice the distance of its centre of mass, as far as that is known.
     #[must_use]
     pub fn link_length(&self, joint: usize) -> f64 {
         if let Some(next) = self.joints.get(joint + 1) {
             return next.dh.a.hypot(next.dh.d);
+        }
+        if let Some(segments) = &self.segments {
+            return segments.shank_m;
         }
         let link = self.joints.get(joint).and_then(|joint| joint.prior.as_ref().or(joint.truth.as_ref()));
         let reach = link.map_or(0.0, |link| link.com.iter().map(|place| place * place).sum::<f64>().sqrt());

@@ -1,0 +1,121 @@
+//! A wearer's thigh, shank and foot from body mass and lengths.
+//!
+//! Why: a prior for a person nobody has measured, and simulated persons of any size.
+//!
+//! - Mass, centre of mass and radius of gyration of a segment as fractions of body mass and segment length, and lengths as
+//!   fractions of height, after Winter, Biomechanics and Motor Control of Human Movement (lengths there after Drillis and
+//!   Contini): thigh 0.245, shank 0.246, foot 0.152 of the height.
+//! - Ankle held at a right angle, so shank and foot are one body; the foot's centre of mass lies at 0.307 of its length in
+//!   front of the ankle (ours: 0.083 m of 0.27 m).
+//! - Only sagittal inertias are given, so each segment is completed as a solid of revolution: about its long axis it has
+//!   mass * radius^2 / 2 with the radii stated below (ours).
+//!
+//! Frames: x down the segment, y forward, z along the joint's axis; everything lies in the plane z = 0. Limits: adults;
+//! a single person differs from the fractions by some 10 %.
+
+/// Thigh, shank and foot of a standing height.
+const THIGH_OF_HEIGHT: f64 = 0.245;
+const SHANK_OF_HEIGHT: f64 = 0.246;
+const FOOT_OF_HEIGHT: f64 = 0.152;
+
+/// A person as far as a leg is concerned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wearer {
+    /// Body mass, kg.
+    pub mass: f64,
+    /// Hip to knee, m.
+    pub thigh: f64,
+    /// Knee to ankle, m.
+    pub shank: f64,
+    /// Heel to toe, m.
+    pub foot: f64,
+}
+
+impl Wearer {
+    /// Somebody of this mass (kg) and height (m).
+    #[must_use]
+    pub fn of_height(mass: f64, height: f64) -> Self {
+        Self {
+            mass,
+            thigh: THIGH_OF_HEIGHT * height,
+            shank: SHANK_OF_HEIGHT * height,
+            foot: FOOT_OF_HEIGHT * height,
+        }
+    }
+
+    /// The thigh.
+    #[must_use]
+    pub fn thigh(&self) -> Segment {
+        limb(0.100 * self.mass, self.thigh, 0.323, 0.08)
+    }
+
+    /// Shank and foot.
+    #[must_use]
+    pub fn shank(&self) -> [Segment; 2] {
+        let mass = 0.0145 * self.mass;
+        let gyration = 0.475 * self.foot;
+        let foot = Segment {
+            mass,
+            x: self.shank,
+            y: 0.083 / 0.27 * self.foot,
+            sagittal: mass * gyration * gyration,
+            radius: 0.04,
+            along: Along::Y,
+        };
+        [limb(0.0465 * self.mass, self.shank, 0.302, 0.055), foot]
+    }
+}
+
+/// Long axis of a solid of revolution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Along {
+    /// Down the segment.
+    X,
+    /// Forward.
+    Y,
+}
+
+/// A solid of revolution in the plane of motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// kg.
+    pub mass: f64,
+    /// Centre of mass, m.
+    pub x: f64,
+    /// Centre of mass, m.
+    pub y: f64,
+    /// About the joint's axis through the centre of mass, kg m^2.
+    pub sagittal: f64,
+    /// m.
+    pub radius: f64,
+    /// Its long axis.
+    pub along: Along,
+}
+
+/// Thigh or shank: centre of mass at 0.433 of the length from the upper joint.
+fn limb(mass: f64, length: f64, gyration: f64, radius: f64) -> Segment {
+    let gyration = gyration * length;
+    Segment { mass, x: 0.433 * length, y: 0.0, sagittal: mass * gyration * gyration, radius, along: Along::X }
+}
+
+/// One rigid body of several segments: mass, centre of mass, and tensor elements XX XY XZ YY YZ ZZ about that.
+#[must_use]
+pub fn joined(segments: &[Segment]) -> (f64, [f64; 3], [f64; 6]) {
+    let mass: f64 = segments.iter().map(|segment| segment.mass).sum();
+    let x = segments.iter().map(|segment| segment.mass * segment.x).sum::<f64>() / mass;
+    let y = segments.iter().map(|segment| segment.mass * segment.y).sum::<f64>() / mass;
+    let mut inertia = [0.0; 6];
+    for segment in segments {
+        let (dx, dy) = (segment.x - x, segment.y - y);
+        let axial = 0.5 * segment.mass * segment.radius * segment.radius;
+        let (xx, yy) = match segment.along {
+            Along::X => (axial, segment.sagittal),
+            Along::Y => (segment.sagittal, axial),
+        };
+        inertia[0] += xx + segment.mass * dy * dy;
+        inertia[1] -= segment.mass * dx * dy;
+        inertia[3] += yy + segment.mass * dx * dx;
+        inertia[5] += segment.sagittal + segment.mass * (dx * dx + dy * dy);
+    }
+    (mass, [x, y, 0.0], inertia)
+}

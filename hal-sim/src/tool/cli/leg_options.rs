@@ -1,0 +1,69 @@
+//! Which leg, set to which wearer, on which side, below which trunk.
+
+use clap::{Args, ValueEnum};
+
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::{BodySide, DEFAULT_LEG, LegFile};
+use crate::tool::posture::{on_side, pitched};
+use crate::tool::size::{Person, Size};
+
+/// Side of the body.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum SideArgument {
+    /// Drives mounted mirrored.
+    Left,
+    /// As the drives are described.
+    Right,
+}
+
+/// A leg and how it is set.
+#[derive(Args, Clone, Debug)]
+pub struct LegOptions {
+    /// Name of a shipped leg, or a leg file.
+    #[arg(long, default_value = DEFAULT_LEG)]
+    pub leg: String,
+    /// Set the thigh to this length, m (0.402 to 0.505).
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    thigh: Option<f64>,
+    /// Set the shank to this length, m (0.397 to 0.506).
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    shank: Option<f64>,
+    /// On a wearer of this body mass and height, who sets the lengths that are not given.
+    #[arg(long, value_name = "KG,M")]
+    wearer: Option<Person>,
+    /// The leg's side of the body; the leg file's unless given.
+    #[arg(long, value_enum)]
+    side: Option<SideArgument>,
+    /// The trunk leans forward by so many degrees and is known to.
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    trunk_pitch: Option<f64>,
+}
+
+impl LegOptions {
+    /// The leg as it is set. What was changed is part of its name.
+    pub fn load(&self) -> Result<LegFile, ToolError> {
+        let mut leg = LegFile::load(&self.leg)?;
+        let mut changes = Vec::new();
+        let size = Size { thigh: self.thigh, shank: self.shank, wearer: self.wearer };
+        leg = size.of(&leg)?;
+        changes.extend(self.thigh.map(|length| format!(" --thigh {length}")));
+        changes.extend(self.shank.map(|length| format!(" --shank {length}")));
+        changes.extend(self.wearer.map(|person| format!(" --wearer {},{}", person.mass, person.height)));
+        if let Some(side) = self.side {
+            let (side, word) = match side {
+                SideArgument::Left => (BodySide::Left, "left"),
+                SideArgument::Right => (BodySide::Right, "right"),
+            };
+            if side != leg.side {
+                leg = on_side(&leg, side)?;
+                changes.push(format!(" --side {word}"));
+            }
+        }
+        if let Some(degrees) = self.trunk_pitch {
+            leg = pitched(&leg, degrees)?;
+            changes.push(format!(" --trunk-pitch {degrees}"));
+        }
+        leg.name.extend(changes);
+        Ok(leg)
+    }
+}
