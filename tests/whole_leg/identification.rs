@@ -127,7 +127,7 @@ fn noise_free_torque_leaves_a_bias_below_a_seventh_of_the_sigma_of_noisy_torque(
 fn a_logged_run_replays_to_the_same_base_parameters() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("whole_leg_log.csv");
     let leg = default_leg();
-    let report = identify_one::<JOINTS, BASE>(&leg, &options(3), Some(&path), None).expect("it runs");
+    let (report, _) = identify_one::<JOINTS, BASE>(&leg, &options(3), Some(&path)).expect("it runs");
     let options = ReplayOptions {
         files: vec![path],
         validate: Vec::new(),

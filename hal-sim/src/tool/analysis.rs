@@ -195,6 +195,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
 
     fn parameters(&self, record: &Record<f32, N, B>, estimate: &Estimate<f32, B>) -> Vec<ParameterReport> {
         let completed = self.completed(estimate);
+        let prior = self.prior.as_ref().map(prior_parameters);
         let mut reports = Vec::with_capacity(N * PARAMETERS_PER_JOINT);
         for joint in 0..N {
             for parameter in Parameter::ALL {
@@ -224,6 +225,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
                     status: status.name(),
                     grouped_with,
                     truth: self.truth.map(|truth| truth[joint][parameter.index()]).into(),
+                    prior: prior.map(|prior| prior[joint][parameter.index()]).into(),
                 });
             }
         }

@@ -30,8 +30,8 @@ enum Command {
     Regressor(regressor::RegressorArguments),
 }
 
-/// Where a run without any arguments is drawn.
-const DEFAULT_FIGURES: &str = "target/sim";
+/// What a run without any arguments is.
+const MAIN_JOB: [&str; 5] = ["identify", "--figures", "target/sim", "--report", "target/sim/report.html"];
 
 /// Runs the tool on the process's arguments.
 #[must_use]
@@ -39,7 +39,7 @@ pub fn main() -> ExitCode {
     let mut words: Vec<_> = std::env::args_os().collect();
     match words.get(1).and_then(|word| word.to_str()) {
         // Without a subcommand the main job is meant.
-        None => words.extend(["identify", "--figures", DEFAULT_FIGURES].map(Into::into)),
+        None => words.extend(MAIN_JOB.map(Into::into)),
         Some(option) if option.starts_with("--") && !["--help", "--version"].contains(&option) => {
             words.insert(1, "identify".into());
         }

@@ -1,58 +1,146 @@
-//! Figures of a run as SVG, 900 pixels wide.
+//! Figures of a run as SVG, 900 pixels wide: one set for the files and for the report.
 //!
 //! | file | shows |
 //! | --- | --- |
-//! | `torque-1.svg`, ... | a joint's measured, predicted and noise-free torque on the unused motions, residuals below |
-//! | `base-parameters.svg` | errors of the base parameters in reported standard deviations |
+//! | `identify.svg` | at a glance: torque on one motion and the base parameters |
+//! | `motions.svg` | commanded and measured angles, and what lies between them |
+//! | `torque-1.svg`, ... | a joint's measured, predicted and noise-free torque on every motion, residuals below |
+//! | `residuals.svg` | how the residuals are distributed and correlated, against noise through the filter |
 //! | `search.svg` | the swarm's cost above the optimum in its box over its iterations |
-//! | `motions.svg` | commanded angles |
-//! | `identify.svg` | one unused motion and the base parameters, small |
+//! | `base-parameters.svg` | errors of the base parameters in reported standard deviations, or those of the value |
 //!
+//! More than four motions are continued in `motions-b.svg`, `torque-1-b.svg` and so on.
 //! `docs/figures/identify.svg` is this `identify.svg`: `cargo sim && cp target/sim/identify.svg docs/figures/`.
 //!
-//! Curves differ in lightness and width, so they can be told apart in grey. Drawn at four times the size with a
-//! `viewBox` of that size, since the backend rounds to whole pixels.
+//! Colours are those of Okabe and Ito (2008) or tints of them, which the colour-blind can tell apart; curves differ in
+//! lightness and width as well, so that they can be told apart in grey. Drawn at four times the size with a `viewBox`
+//! of that size, since the backend rounds to whole pixels.
 
 mod canvas;
+mod curve;
 mod parameters;
+mod residuals;
 mod search;
 mod torque;
+mod trajectories;
 
 use std::path::Path;
 
 use super::error::ToolError;
 use super::report::RunReport;
-use super::series::Series;
+use super::series::{Role, Series};
 use canvas::{Area, DrawingError, render};
 
 /// Width of every figure, pixels.
 const WIDTH: u32 = 900;
+/// Motions in one figure.
+const MOTIONS_PER_FIGURE: usize = 4;
 
-/// Draws all figures of a run into a directory, which is made if need be; `joints` are their names.
-pub fn write(directory: &Path, joints: &[&str], run: &RunReport, series: &Series) -> Result<(), ToolError> {
-    std::fs::create_dir_all(directory).map_err(|error| ToolError::cannot_write(directory, &error))?;
-    let save = |name: &str, height: u32, draw: &dyn Fn(&Area<'_>) -> Result<(), DrawingError>| {
-        let path = directory.join(name);
-        let svg = render(WIDTH, height, draw).map_err(|error| ToolError::cannot_write(&path, &error))?;
-        std::fs::write(&path, svg).map_err(|error| ToolError::cannot_write(&path, &error))
-    };
-    for (joint, name) in joints.iter().enumerate() {
-        save(&format!("torque-{}.svg", joint + 1), 440, &|area| {
-            let motions: Vec<_> = series.torque.iter().filter_map(|motion| motion.get(joint)).collect();
-            torque::whole(area, name, &motions)
-        })?;
-    }
-    let rows = run.base_parameters.len() as u32;
-    save("base-parameters.svg", 90 + 24 * rows, &|area| parameters::whole(area, run))?;
-    save("search.svg", 340, &|area| search::whole(area, &series.excess))?;
-    save("motions.svg", 460, &|area| search::motions(area, joints, &series.commanded))?;
-    save("identify.svg", torque::small_height(joints.len()), &|area| {
-        let motion = series.torque.get(SHOWN_MOTION).map_or(&[][..], Vec::as_slice);
-        let (left, right) = area.split_horizontally(canvas::px(480));
-        torque::small(&left, joints, motion)?;
-        parameters::small(&right, run)
-    })
+/// Where a figure belongs in a report.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// At a glance.
+    Summary,
+    /// Angles.
+    Trajectories,
+    /// Torques.
+    Torque,
+    /// Statistics of what is left.
+    Residuals,
+    /// The swarm's way.
+    Search,
+    /// What torque determines.
+    BaseParameters,
 }
 
-/// The motion of `identify.svg`: gait at 3 s, where inertia, gravity and friction all matter.
-const SHOWN_MOTION: usize = 1;
+/// One figure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// Name of its file.
+    pub file: String,
+    /// Where it belongs.
+    pub group: Group,
+    /// What it is read out as.
+    pub title: String,
+    /// The drawing.
+    pub svg: String,
+}
+
+/// All figures of a run; `joints` are their names.
+pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figure>, ToolError> {
+    let mut figures = Vec::new();
+    let mut add = |group, file: String, title: String, height, draw: Draw<'_>| {
+        let svg = render(WIDTH, height, draw)
+            .map_err(|error| ToolError::input(format!("{file}: cannot be drawn: {error}")))?;
+        figures.push(Figure { file, group, title, svg });
+        Ok::<_, ToolError>(())
+    };
+    let shown = shown_motion(series);
+    let glance = torque::small_height(joints.len());
+    let title = format!("Torque on one motion and base parameters of {}", run.leg);
+    add(Group::Summary, "identify.svg".into(), title, glance, &|area| {
+        let (left, right) = area.split_horizontally(canvas::px(480));
+        if let Some(motion) = shown {
+            torque::small(&left, joints, motion)?;
+        }
+        parameters::small(&right, run)
+    })?;
+    for (part, motions) in series.motions.chunks(MOTIONS_PER_FIGURE).enumerate() {
+        let height = trajectories::height(motions);
+        add(Group::Trajectories, name("motions", part), "Angles of every motion".into(), height, &|area| {
+            trajectories::whole(area, joints, motions)
+        })?;
+    }
+    for (joint, words) in joints.iter().enumerate() {
+        for (part, motions) in series.motions.chunks(MOTIONS_PER_FIGURE).enumerate() {
+            let sigma = series.noise_nm.get(joint).copied();
+            let (file, title) =
+                (name(&format!("torque-{}", joint + 1), part), format!("Torque of the {words}"));
+            add(Group::Torque, file, title, torque::height(motions), &|area| {
+                torque::whole(area, words, joint, sigma, motions)
+            })?;
+        }
+    }
+    let (file, title) = ("residuals.svg".into(), "Distribution and autocorrelation of the residuals".into());
+    add(Group::Residuals, file, title, residuals::height(joints.len()), &|area| {
+        residuals::whole(area, joints, series)
+    })?;
+    let title = "Cost of the beetle swarm above the optimum".into();
+    add(Group::Search, "search.svg".into(), title, 330, &|area| search::whole(area, series))?;
+    let rows = run.base_parameters.len() as u32;
+    let title = "Errors of the base parameters".into();
+    add(Group::BaseParameters, "base-parameters.svg".into(), title, 90 + 24 * rows, &|area| {
+        parameters::whole(area, run)
+    })?;
+    Ok(figures)
+}
+
+type Draw<'d> = &'d dyn Fn(&Area<'_>) -> Result<(), DrawingError>;
+
+/// Writes figures into a directory, which is made if need be.
+pub fn write(directory: &Path, figures: &[Figure]) -> Result<(), ToolError> {
+    std::fs::create_dir_all(directory).map_err(|error| ToolError::cannot_write(directory, &error))?;
+    for figure in figures {
+        let path = directory.join(&figure.file);
+        std::fs::write(&path, &figure.svg).map_err(|error| ToolError::cannot_write(&path, &error))?;
+    }
+    Ok(())
+}
+
+/// `motions.svg`, then `motions-b.svg` and so on.
+fn name(stem: &str, part: usize) -> String {
+    match part {
+        0 => format!("{stem}.svg"),
+        1..26 => format!("{stem}-{}.svg", char::from(b'a' + part as u8)),
+        _ => format!("{stem}-{}.svg", part + 1),
+    }
+}
+
+/// The motion of `identify.svg`: gait at 3 s, where inertia, gravity and friction all matter; else the last unused one.
+fn shown_motion(series: &Series) -> Option<&super::series::MotionSeries> {
+    let unused = || series.motions.iter().filter(|motion| motion.role == Role::Validation);
+    unused()
+        .find(|motion| motion.name == "gait-3")
+        .or_else(|| unused().next_back())
+        .or(series.motions.first())
+}

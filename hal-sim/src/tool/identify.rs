@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::error::ToolError;
-use super::figures;
 use super::leg_file::LegFile;
 use super::recording::{JointSeries, Recording};
 use super::report::{RunReport, SCHEMA};
+use super::series::Series;
 use super::simulate::{SimulatedRun, SimulationOptions, simulate};
 use super::tables::{self, say};
 use scarab::leg::{LoggedSample, Segment};
@@ -26,25 +26,19 @@ pub struct RunsReport {
     pub runs: Vec<RunReport>,
 }
 
-/// One run; writes its log and its figures where paths are given.
+/// One run with its curves, if options ask for them; writes its log where a path is given.
 pub fn identify_one<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &SimulationOptions,
     log: Option<&Path>,
-    figures: Option<&Path>,
-) -> Result<RunReport, ToolError> {
-    let options = SimulationOptions { with_series: figures.is_some(), ..options.clone() };
-    let run: SimulatedRun<N> = simulate::<N, B>(leg, &options)?;
+) -> Result<(RunReport, Series), ToolError> {
+    let run: SimulatedRun<N> = simulate::<N, B>(leg, options)?;
     if let Some(path) = log {
         let training: Vec<_> =
             run.log.iter().filter(|logged| logged.segment == Some(Segment::Training)).copied().collect();
         write_log(path, leg, &training)?;
     }
-    if let Some(directory) = figures {
-        let names: Vec<_> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
-        figures::write(directory, &names, &run.report, &run.series)?;
-    }
-    Ok(run.report)
+    Ok((run.report, run.series))
 }
 
 /// One run for each seed, in parallel.

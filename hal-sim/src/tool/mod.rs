@@ -8,7 +8,7 @@
 //! | [`setup`] | from a leg file to what the firmware is built from |
 //! | [`recording`], [`resample`], [`replay`] | identification on recordings |
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
-//! | [`series`], [`figures`] | a run as curves, drawn |
+//! | [`series`], [`figures`], [`html`] | a run as curves, drawn, and on one page |
 //! | [`placed_mass`], [`scale`] | known masses: torque constants and loads |
 //! | [`regressor`] | torques and regressor of given states |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
@@ -24,6 +24,7 @@ pub mod anthropometry;
 pub mod cli;
 pub mod error;
 pub mod figures;
+pub mod html;
 pub mod identify;
 pub mod leg_file;
 pub mod motions;

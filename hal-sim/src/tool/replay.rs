@@ -13,6 +13,7 @@ use super::leg_file::LegFile;
 use super::recording::{Recording, RecordingError};
 use super::report::RunReport;
 use super::resample::Resampled;
+use super::series::{Anatomy, Reader, Role, Series};
 use super::setup::{PriorChoice, anatomy, background};
 
 /// Taps the host sets aside: bandwidths from 1 Hz.
@@ -54,6 +55,8 @@ pub struct Replayed {
     pub run: RunReport,
     /// Training first.
     pub sources: Vec<Source>,
+    /// Curves of every file.
+    pub series: Series,
 }
 
 /// One file, or a part of one, and what became of it.
@@ -139,10 +142,14 @@ pub fn replay<const N: usize, const B: usize>(
         &thresholds,
     );
     let optimum = background.costs(&solver);
-    let mut to_half = None;
+    let (mut to_half, mut progress) = (None, Vec::<(u32, f64)>::new());
     loop {
         let state = solver.advance(&background.device, SLICE);
         let excess = optimum.factor.excess(&solver.search().values().map(f64::from)) - optimum.above;
+        let seen = solver.search().iterations();
+        if !matches!(state, SearchState::Failed(_)) && progress.last().is_none_or(|(last, _)| *last != seen) {
+            progress.push((seen, excess));
+        }
         if excess <= 0.5 && to_half.is_none() && !matches!(state, SearchState::Failed(_)) {
             to_half = Some(solver.search().iterations());
         }
@@ -181,7 +188,39 @@ pub fn replay<const N: usize, const B: usize>(
     };
     let validation = if validated { vec![motion(unused)] } else { Vec::new() };
     let run = background.report(&solver, verdict, &[motion(record)], &validation, &circumstances);
-    Ok(Replayed { run, sources })
+    let series = Series {
+        excess: progress,
+        floor_chi2: Some(optimum.above),
+        ..series(&background, &anatomy, &solver, options.bandwidth_hz, &training, &held_out)?
+    };
+    Ok(Replayed { run, sources, series })
+}
+
+/// Every file as curves.
+fn series<const N: usize, const B: usize>(
+    background: &Background<N, B>,
+    anatomy: &[AnatomicalJoint<f64>; N],
+    solver: &Solver<f32, N, B>,
+    bandwidth_hz: f64,
+    training: &[Samples<N>],
+    held_out: &[Samples<N>],
+) -> Result<Series, ToolError> {
+    let anatomy = Anatomy {
+        direction: anatomy.map(|joint| joint.direction()),
+        zero_rad: anatomy.map(|joint| joint.zero_offset()),
+    };
+    let (model, values) = (&background.device, solver.estimate().values);
+    let mut reader = Reader::<N, B, TAPS, PENDING>::new(model, anatomy, values, bandwidth_hz as f32)
+        .map_err(|error| bandwidth_error(bandwidth_hz, error))?;
+    let parts = training.iter().map(|file| (file, Role::Training));
+    let parts = parts.chain(held_out.iter().map(|file| (file, Role::Validation)));
+    let motions = parts.map(|(file, role)| {
+        let name = file.file.file_name().unwrap_or(file.file.as_os_str()).to_string_lossy();
+        let samples = file.position.iter().copied().zip(file.torque.iter().copied());
+        reader.motion(name, role, file.start_s, samples)
+    });
+    let motions = motions.collect();
+    Ok(reader.series(solver, motions))
 }
 
 /// Above this bandwidth rows at 50 Hz alias the noise that the low-pass lets through, and sigma comes out too small.
@@ -193,12 +232,14 @@ fn new_recorder<const N: usize, const B: usize>(bandwidth_hz: f64) -> Result<Hos
             "--bandwidth {bandwidth_hz}: at most {LARGEST_BANDWIDTH_HZ} Hz"
         )));
     }
-    HostRecorder::new(bandwidth_hz as f32).map_err(|error| {
-        ToolError::input(match error {
-            KernelError::Bandwidth => format!("--bandwidth {bandwidth_hz}: must be a positive number"),
-            KernelError::TooLong { .. } => format!("--bandwidth {bandwidth_hz}: at least 1 Hz"),
-            KernelError::TooShort => format!("--bandwidth {bandwidth_hz}: at most {LARGEST_BANDWIDTH_HZ} Hz"),
-        })
+    HostRecorder::new(bandwidth_hz as f32).map_err(|error| bandwidth_error(bandwidth_hz, error))
+}
+
+fn bandwidth_error(bandwidth_hz: f64, error: KernelError) -> ToolError {
+    ToolError::input(match error {
+        KernelError::Bandwidth => format!("--bandwidth {bandwidth_hz}: must be a positive number"),
+        KernelError::TooLong { .. } => format!("--bandwidth {bandwidth_hz}: at least 1 Hz"),
+        KernelError::TooShort => format!("--bandwidth {bandwidth_hz}: at most {LARGEST_BANDWIDTH_HZ} Hz"),
     })
 }
 

@@ -70,6 +70,8 @@ pub struct ParameterReport {
     pub grouped_with: Vec<String>,
     /// What the simulated leg has.
     pub truth: Number,
+    /// What was believed before.
+    pub prior: Number,
 }
 
 /// One combination of parameters that torque determines.

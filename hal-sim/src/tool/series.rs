@@ -1,141 +1,237 @@
 //! A run as curves over time, for figures: anatomical angles and torques.
+//!
+//! Every motion goes once more through the filter chain of the identification, whole windows only, and its rows are
+//! multiplied by the result: what is drawn is what least squares saw.
 
-use scarab::ident::{Ends, FilteredRows, LARGEST_STILL_SHARE, Recorder};
-use scarab::leg::{LoggedSample, Segment};
-use scarab::motion::Periodic;
-use scarab::servo::SERVO_RATE_HZ;
+use scarab::ident::{
+    DECIMATION, Ends, KernelError, LARGEST_STILL_SHARE, LowPass, Recorder, RowModel, SAMPLE_RATE_HZ, Solver,
+    noise,
+};
 
-use super::error::ToolError;
-use super::motions::VALIDATION_NAMES;
-use super::pair::{Context, PENDING, TAPS};
-
-/// Rate of the logged samples over that of the filtered rows.
-const SAMPLES_PER_ROW: usize = scarab::ident::DECIMATION;
-/// Seconds between two points of a commanded motion.
-const COMMANDED_STEP_S: f64 = 0.05;
+/// Longest lag of the autocorrelation, s.
+const LONGEST_LAG_S: f64 = 0.6;
 
 /// Curves of a run.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
-    /// Torque of every joint on every motion that was predicted, motions outside.
-    pub torque: Vec<Vec<TorqueSeries>>,
-    /// Commanded angles of the motions identified from and predicted.
-    pub commanded: Vec<CommandedSeries>,
+    /// The motions identified from first.
+    pub motions: Vec<MotionSeries>,
     /// Cost of the swarm's best above the optimum in its box, chi-square units, after each iteration.
     pub excess: Vec<(u32, f64)>,
+    /// J_C - J_LS: that optimum above least squares, chi-square units.
+    pub floor_chi2: Option<f64>,
+    /// Noise of each joint's filtered torque as the identification estimates it: standard deviation, N m.
+    pub noise_nm: Vec<f64>,
+    /// Autocorrelation, lag by lag of a row, that white noise of the logged torque has after the filter.
+    pub white_correlation: Vec<f64>,
 }
 
-/// One joint's torque on one motion, all through the filter of the identification.
-#[derive(Clone, Debug, Default)]
-pub struct TorqueSeries {
-    /// Of the motion.
-    pub motion: &'static str,
-    /// Since the motion began, s.
-    pub time_s: Vec<f64>,
-    /// From the noisy current, N m.
-    pub measured: Vec<f64>,
-    /// By the result of the identification, N m.
-    pub predicted: Vec<f64>,
-    /// Of the plant's motor, N m.
-    pub noise_free: Vec<f64>,
-    /// Whether the joint sticks: friction takes any value there, and nothing can be predicted.
-    pub sticks: Vec<bool>,
+/// What a motion was good for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Identified from.
+    Training,
+    /// Predicted only.
+    Validation,
 }
 
-/// Angles of one motion.
-#[derive(Clone, Debug)]
-pub struct CommandedSeries {
-    /// Of the motion.
-    pub motion: &'static str,
-    /// Since the motion began, s.
-    pub time_s: Vec<f64>,
-    /// Of each joint, degrees.
-    pub position_deg: Vec<Vec<f64>>,
-}
-
-impl<const N: usize, const B: usize> Context<N, B> {
-    fn direction(&self, joint: usize) -> f64 {
-        f64::from(self.configuration.joints[joint].scale.anatomy.direction())
-    }
-
-    /// Torques of the predicted motions; `truth` holds their noise-free rows in the same order.
-    pub(super) fn torque_series(
-        &self,
-        log: &[LoggedSample<N>],
-        truth: &[Vec<FilteredRows<f32, N, B>>],
-        values: &[f32; B],
-    ) -> Result<Vec<Vec<TorqueSeries>>, ToolError> {
-        let mut motions = Vec::new();
-        for (index, (motion, truth)) in VALIDATION_NAMES.into_iter().zip(truth).enumerate() {
-            let segment = Some(Segment::Validation(index as u8));
-            let samples = log.iter().filter(|logged| logged.segment == segment);
-            motions.push(self.motion_torque(motion, samples, truth, values)?);
+impl Role {
+    /// As reports write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Training => "identified from",
+            Self::Validation => "unused, predicted",
         }
-        Ok(motions)
+    }
+}
+
+/// One motion, a point for each filtered row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionSeries {
+    /// As the tables name it.
+    pub name: String,
+    /// What it was good for.
+    pub role: Role,
+    /// Since the motion began, or the recording's clock, s.
+    pub time_s: Vec<f64>,
+    /// Proximal first.
+    pub joints: Vec<JointCurves>,
+}
+
+/// One joint on one motion: all of the same length as the times, empty where nothing is known.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointCurves {
+    /// Logged angle, degrees.
+    pub measured_deg: Vec<f64>,
+    /// Where it was told to be, degrees.
+    pub commanded_deg: Vec<f64>,
+    /// From the noisy current, filtered, N m.
+    pub measured_nm: Vec<f64>,
+    /// By the result of the identification, filtered, N m.
+    pub predicted_nm: Vec<f64>,
+    /// Of the plant's motor, filtered, N m.
+    pub noise_free_nm: Vec<f64>,
+    /// Whether the joint stands still, so that the row is left out.
+    pub still: Vec<bool>,
+}
+
+impl JointCurves {
+    /// Measured minus predicted torque; `None` where the joint stands still.
+    pub fn residual_nm(&self) -> impl Iterator<Item = Option<f64>> + '_ {
+        let errors = self.measured_nm.iter().zip(&self.predicted_nm).map(|(measured, own)| measured - own);
+        errors.zip(&self.still).map(|(error, still)| (!still).then_some(error))
+    }
+}
+
+/// From model angles and torques to anatomical ones.
+#[derive(Clone, Copy, Debug)]
+pub struct Anatomy<const N: usize> {
+    /// Of each joint, 1 or -1.
+    pub direction: [f64; N],
+    /// Model angle at the anatomical zero, rad.
+    pub zero_rad: [f64; N],
+}
+
+impl<const N: usize> Anatomy<N> {
+    /// Anatomical angle, degrees.
+    #[must_use]
+    pub fn degrees(&self, joint: usize, model_rad: f64) -> f64 {
+        (self.direction[joint] * (model_rad - self.zero_rad[joint])).to_degrees()
+    }
+}
+
+/// Sends motions through the filter chain and multiplies their rows by a result.
+pub struct Reader<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
+    recorder: Box<Recorder<f32, N, B, TAPS, PENDING>>,
+    model: &'a RowModel<f32, N, B>,
+    anatomy: Anatomy<N>,
+    values: [f32; B],
+    /// Samples between the newest one and the centre of the rows it finishes.
+    lag: usize,
+    white_correlation: Vec<f64>,
+}
+
+impl<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
+    Reader<'a, N, B, TAPS, PENDING>
+{
+    /// A reader with the filter chain of a bandwidth.
+    pub fn new(
+        model: &'a RowModel<f32, N, B>,
+        anatomy: Anatomy<N>,
+        values: [f32; B],
+        bandwidth_hz: f32,
+    ) -> Result<Self, KernelError> {
+        let recorder = Box::new(Recorder::new(bandwidth_hz)?);
+        let low_pass = LowPass::<f32, TAPS>::new(bandwidth_hz, SAMPLE_RATE_HZ as f32)?;
+        let lag = recorder.delay() + low_pass.reach();
+        Ok(Self {
+            recorder,
+            model,
+            anatomy,
+            values,
+            lag,
+            white_correlation: white_correlation(low_pass.weights()),
+        })
     }
 
-    fn motion_torque<'a>(
-        &self,
-        motion: &'static str,
-        samples: impl Iterator<Item = &'a LoggedSample<N>>,
-        truth: &[FilteredRows<f32, N, B>],
-        values: &[f32; B],
-    ) -> Result<Vec<TorqueSeries>, ToolError> {
-        let mut recorder =
-            Box::new(Recorder::<f32, N, B, TAPS, PENDING>::new(self.configuration.bandwidth_hz).map_err(
-                |error| ToolError::input(format!("the filter does not fit the device: {error:?}")),
-            )?);
-        recorder.clear(Ends::Whole);
-        let first_centre = self.smoothing.reach() + self.low_pass.reach();
-        let mut curves = vec![TorqueSeries { motion, ..TorqueSeries::default() }; N];
-        let measured = samples.filter_map(|logged| {
-            let sample = &logged.sample;
-            recorder.push(&self.background.device, &sample.position_rad, &sample.torque_nm)?.rows
-        });
-        for (row, (measured, truth)) in measured.zip(truth).enumerate() {
-            for (joint, curve) in curves.iter_mut().enumerate() {
-                let predicted: f32 = measured.regressor[joint]
+    /// One motion: `samples` are model angles, rad, and torques, N m, at 500 Hz from `start_s` on.
+    pub fn motion(
+        &mut self,
+        name: impl Into<String>,
+        role: Role,
+        start_s: f64,
+        samples: impl Iterator<Item = ([f32; N], [f32; N])>,
+    ) -> MotionSeries {
+        self.recorder.clear(Ends::Whole);
+        let mut positions = Vec::new();
+        let mut motion = MotionSeries {
+            name: name.into(),
+            role,
+            time_s: Vec::new(),
+            joints: vec![JointCurves::default(); N],
+        };
+        for (index, (position, torque)) in samples.enumerate() {
+            positions.push(position);
+            let rows = self.recorder.push(self.model, &position, &torque).and_then(|progress| progress.rows);
+            let centre = index.checked_sub(self.lag);
+            let (Some(rows), Some(centre)) = (rows, centre) else { continue };
+            motion.time_s.push(start_s + centre as f64 / SAMPLE_RATE_HZ);
+            for (joint, curves) in motion.joints.iter_mut().enumerate() {
+                let predicted: f32 = rows.regressor[joint]
                     .iter()
-                    .zip(values)
+                    .zip(&self.values)
                     .map(|(element, value)| element * value)
                     .sum();
-                let sign = self.direction(joint);
-                curve
-                    .time_s
-                    .push((first_centre + row * SAMPLES_PER_ROW) as f64 / scarab::ident::SAMPLE_RATE_HZ);
-                curve.measured.push(sign * f64::from(measured.torque[joint]));
-                curve.predicted.push(sign * f64::from(predicted));
-                curve.noise_free.push(sign * f64::from(truth.torque[joint]));
-                curve.sticks.push(f64::from(truth.still[joint]) > LARGEST_STILL_SHARE);
+                let direction = self.anatomy.direction[joint];
+                curves.measured_deg.push(self.anatomy.degrees(joint, f64::from(positions[centre][joint])));
+                curves.measured_nm.push(direction * f64::from(rows.torque[joint]));
+                curves.predicted_nm.push(direction * f64::from(predicted));
+                curves.still.push(f64::from(rows.still[joint]) > LARGEST_STILL_SHARE);
             }
         }
-        Ok(curves)
+        motion
     }
 
-    /// The motion identified from and those predicted.
-    pub(super) fn commanded_series(&self) -> Vec<CommandedSeries> {
-        let predicted = VALIDATION_NAMES.into_iter().zip(&self.motions.validation);
-        core::iter::once(("excitation", &self.motions.excitation))
-            .chain(predicted)
-            .map(|(name, motion)| self.commanded(name, motion))
-            .collect()
-    }
-
-    fn commanded(&self, name: &'static str, motion: &Periodic<N>) -> CommandedSeries {
-        let ticks_per_point = (COMMANDED_STEP_S * f64::from(SERVO_RATE_HZ)) as usize;
-        let ticks: Vec<u32> = (0..=motion.duration_ticks()).step_by(ticks_per_point).collect();
-        let position_deg = |joint: usize| {
-            let zero = f64::from(self.configuration.joints[joint].scale.anatomy.zero_offset());
-            let anatomical = |tick: &u32| {
-                let angle = f64::from(motion.state_at(*tick).position_rad[joint]);
-                (self.direction(joint) * (angle - zero)).to_degrees()
-            };
-            ticks.iter().map(anatomical).collect()
-        };
-        CommandedSeries {
-            motion: name,
-            position_deg: (0..N).map(position_deg).collect(),
-            time_s: ticks.iter().map(|tick| f64::from(*tick) / f64::from(SERVO_RATE_HZ)).collect(),
+    /// The curves of a run.
+    #[must_use]
+    pub fn series(self, solver: &Solver<f32, N, B>, motions: Vec<MotionSeries>) -> Series {
+        let record = solver.record();
+        let overlap = f64::from(record.row_information).sqrt();
+        Series {
+            motions,
+            noise_nm: noise(record).iter().map(|independent| f64::from(*independent) * overlap).collect(),
+            white_correlation: self.white_correlation,
+            ..Series::default()
         }
+    }
+}
+
+/// Sum of h_k h_(k + lag) over that without lag, at the rate of the rows.
+fn white_correlation(weights: &[f32]) -> Vec<f64> {
+    let sum = |lag: usize| -> f64 {
+        let later = weights.iter().skip(lag);
+        weights.iter().zip(later).map(|(early, late)| f64::from(*early) * f64::from(*late)).sum()
+    };
+    let lags = (LONGEST_LAG_S * SAMPLE_RATE_HZ) as usize / DECIMATION;
+    (0..=lags).map(|lag| sum(lag * DECIMATION) / sum(0)).collect()
+}
+
+/// Autocorrelation of a joint's residuals over its motions, pairs with a joint at rest left out; lag by lag of a row.
+#[must_use]
+pub fn autocorrelation(residuals: &[Vec<Option<f64>>], lags: usize) -> Vec<f64> {
+    let mean_product = |lag: usize| -> f64 {
+        let pairs = residuals.iter().flat_map(|motion| motion.iter().zip(motion.iter().skip(lag)));
+        let (sum, count) = pairs
+            .filter_map(|(early, late)| Some((*early)? * (*late)?))
+            .fold((0.0, 0_u32), |(sum, count), product| (sum + product, count + 1));
+        sum / f64::from(count.max(1))
+    };
+    let variance = mean_product(0);
+    if !(variance > 0.0) {
+        return Vec::new();
+    }
+    (0..lags).map(|lag| mean_product(lag) / variance).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_at_rest_break_the_autocorrelation_and_nothing_else() {
+        // Alternating signs: -1 at odd lags, 1 at even ones, whatever is left out.
+        let mut alternating: Vec<Option<f64>> =
+            (0..40).map(|index| Some(if index % 2 == 0 { 2.0 } else { -2.0 })).collect();
+        alternating[7] = None;
+        let found = autocorrelation(&[alternating, vec![None; 3]], 4);
+        assert_eq!(found, [1.0, -1.0, 1.0, -1.0]);
+        assert!(autocorrelation(&[vec![Some(0.0); 9]], 3).is_empty(), "no residual has no correlation");
+    }
+
+    #[test]
+    fn white_noise_stays_correlated_as_long_as_the_filter_is_and_no_longer() {
+        let correlation = white_correlation(&[1.0; 20]);
+        assert_eq!(&correlation[..3], [1.0, 0.5, 0.0]);
     }
 }

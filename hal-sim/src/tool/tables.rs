@@ -229,7 +229,8 @@ fn run_text(run: &RunReport) -> String {
 }
 
 /// A reason of the closed list in words.
-fn explanation(reason: &str) -> &'static str {
+#[must_use]
+pub fn explanation(reason: &str) -> &'static str {
     match reason {
         "unphysical" => {
             "no leg can have these parameters (negative friction, inertia or kinetic energy), or none that the prior allows"

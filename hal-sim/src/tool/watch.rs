@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use scarab::ident::{Ends, Factor, FilteredRows, LARGEST_STILL_SHARE, RowFilter, Smoothed, Smoother};
+use scarab::ident::{Ends, Factor, FilteredRows, LARGEST_STILL_SHARE, RowFilter, Smoothed, Smoother, Solver};
 use scarab::leg::{LoggedSample, Segment};
 use scarab::real::sqrt;
 
@@ -12,9 +12,12 @@ use super::motions::VALIDATION_NAMES;
 use super::pair::{Context, PENDING, Pair, TAPS};
 use super::report::TrackingReport;
 use super::scale::{Scale, ScaleReport, loaded};
-use super::series::Series;
+use super::series::{Anatomy, Reader, Role, Series};
 use super::simulate::{SimulatedRun, SimulationOptions};
 use crate::world::TICK_S;
+
+/// A logged sample is the mean of eight ticks and begins with the motion's first.
+const MIDDLE_OF_A_SAMPLE_TICKS: f64 = 3.5;
 
 /// Noise-free torque and sticking, through the same filter chain as the measured torque.
 struct TruthChain<const N: usize, const B: usize> {
@@ -190,6 +193,62 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         self.excess.push((iterations, excess));
     }
 
+    /// The run as curves, with what only a simulation knows: noise-free torque and commands. `values` are those of the leg
+    /// with what it carries, the torque is put right where a known mass told the constants.
+    fn series(
+        &self,
+        solver: &Solver<f32, N, B>,
+        scale: Option<&Scale<N, B>>,
+        values: &[f32; B],
+    ) -> Result<Series, ToolError> {
+        let ratios = scale.and_then(Scale::trusted).map_or([1.0; N], |found| found.map(|ratio| ratio.ratio));
+        let scales = self.context.configuration.joints.map(|joint| joint.scale);
+        let anatomy = Anatomy {
+            direction: scales.map(|scale| f64::from(scale.anatomy.direction())),
+            zero_rad: scales.map(|scale| f64::from(scale.anatomy.zero_offset())),
+        };
+        let (model, bandwidth_hz) =
+            (&self.context.background.device, self.context.configuration.bandwidth_hz);
+        let mut reader = Reader::<N, B, TAPS, PENDING>::new(model, anatomy, *values, bandwidth_hz)
+            .map_err(|error| ToolError::input(format!("the filter does not fit the device: {error:?}")))?;
+        let unused = (0..VALIDATION_NAMES.len()).map(|index| {
+            (VALIDATION_NAMES[index], Segment::Validation(index as u8), &self.validation_rows[index])
+        });
+        let motions = core::iter::once(("excitation", Segment::Training, &self.training_rows)).chain(unused);
+        let motions = motions.map(|(name, segment, truth)| {
+            let (role, commanded) = match segment {
+                Segment::Training => (Role::Training, Some(&self.context.motions.excitation)),
+                Segment::Validation(index) => {
+                    (Role::Validation, self.context.motions.validation.get(usize::from(index)))
+                }
+            };
+            let samples = self.log.iter().filter(|logged| logged.segment == Some(segment));
+            let samples = samples.map(|logged| {
+                let torque = core::array::from_fn(|joint| ratios[joint] * logged.sample.torque_nm[joint]);
+                (logged.sample.position_rad, torque)
+            });
+            let mut motion = reader.motion(name, role, 0.0, samples);
+            for (joint, curves) in motion.joints.iter_mut().enumerate() {
+                let noise_free =
+                    truth.iter().map(|row| anatomy.direction[joint] * f64::from(row.torque[joint]));
+                curves.noise_free_nm = noise_free.collect();
+                let angle = |time_s: &f64| {
+                    let tick = (time_s / TICK_S + MIDDLE_OF_A_SAMPLE_TICKS).round() as u32;
+                    let angle = commanded?.state_at(tick).position_rad[joint];
+                    Some(anatomy.degrees(joint, f64::from(angle)))
+                };
+                curves.commanded_deg = motion.time_s.iter().filter_map(angle).collect();
+            }
+            motion
+        });
+        let motions = motions.collect();
+        Ok(Series {
+            excess: self.excess.clone(),
+            floor_chi2: self.costs.as_ref().map(|costs| costs.above),
+            ..reader.series(solver, motions)
+        })
+    }
+
     /// What was seen, once the verdict is there.
     pub fn report(
         mut self,
@@ -204,7 +263,6 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         let (Some(solver), Some(verdict)) = (identification.solver(), pair.leg.control().verdict()) else {
             return Err(ToolError::input("the identification ended without a result"));
         };
-        let values = solver.estimate().values;
         let scale = self.scale.take();
         let corrected = scale
             .as_ref()
@@ -244,18 +302,14 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             simulated_s: pair.ticks as f64 * TICK_S,
             wall: started.elapsed(),
         };
-        let mut report =
-            self.context.background.report(found, verdict, &[training], &validation, &circumstances);
-        report.scale = scale.map_or_else(ScaleReport::default, |scale| ScaleReport::of(&scale, self.context));
         let series = if options.with_series {
-            Series {
-                torque: self.context.torque_series(&self.log, &self.validation_rows, &values)?,
-                commanded: self.context.commanded_series(),
-                excess: self.excess,
-            }
+            self.series(found, scale.as_ref(), &carrying)?
         } else {
             Series::default()
         };
+        let mut report =
+            self.context.background.report(found, verdict, &[training], &validation, &circumstances);
+        report.scale = scale.map_or_else(ScaleReport::default, |scale| ScaleReport::of(&scale, self.context));
         Ok(SimulatedRun { report, log: self.log, series })
     }
 }

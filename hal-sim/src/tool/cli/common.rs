@@ -7,9 +7,12 @@ use scarab::ident::Plan;
 
 use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::leg_file::LegFile;
+use crate::tool::replay::Source;
 use crate::tool::report::RunReport;
+use crate::tool::series::Series;
 use crate::tool::setup::PriorChoice;
-use crate::tool::tables;
+use crate::tool::{figures, html, tables};
 
 /// How parameters are found from the joints' rows.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -49,6 +52,45 @@ pub struct Common {
     /// Print all fourteen parameters of every joint with their status.
     #[arg(long)]
     pub parameters: bool,
+    /// Draw the run into this directory, as SVG; a run without any arguments draws into target/sim.
+    #[arg(long)]
+    pub figures: Option<PathBuf>,
+    /// Write the run as one HTML page here: figures, tables, verdict; needs no network, can be printed.
+    #[arg(long)]
+    pub report: Option<PathBuf>,
+}
+
+impl Common {
+    /// Whether curves are wanted.
+    pub fn is_drawn(&self) -> bool {
+        self.figures.is_some() || self.report.is_some()
+    }
+}
+
+/// Draws figures and page where they are asked for, and says where they are.
+pub fn draw(
+    leg: &LegFile,
+    common: &Common,
+    run: &RunReport,
+    series: &Series,
+    sources: &[Source],
+) -> Result<(), ToolError> {
+    if !common.is_drawn() {
+        return Ok(());
+    }
+    let names: Vec<_> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let drawn = figures::all(&names, run, series)?;
+    if let Some(directory) = &common.figures {
+        figures::write(directory, &drawn)?;
+        tables::print(&format!("figures: {}\n", directory.display()))?;
+    }
+    if let Some(path) = &common.report {
+        let circumstances = html::Circumstances::now(leg);
+        let page = html::page(&circumstances, run, sources, &drawn)?;
+        std::fs::write(path, page).map_err(|error| ToolError::cannot_write(path, &error))?;
+        tables::print(&format!("report: {}\n", path.display()))?;
+    }
+    Ok(())
 }
 
 /// Writes and prints what was found; `preface` stands before it.

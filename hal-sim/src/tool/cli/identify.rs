@@ -5,14 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use scarab::model::Payload;
 
-use super::common::{Common, finish, write_json};
+use super::common::{Common, draw, finish, write_json};
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::identify::{identify_many, identify_one, print_runs};
 use crate::tool::placed_mass::PlacedMass;
 use crate::tool::report::RunReport;
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::simulate::SimulationOptions;
-use crate::tool::tables;
 use crate::with_leg_size;
 
 /// What to identify and what to keep of it.
@@ -38,9 +37,6 @@ pub struct IdentifyArguments {
     /// Write the training motion here, in the format that replay reads.
     #[arg(long)]
     log: Option<PathBuf>,
-    /// Draw the run into this directory, as SVG; a run without any arguments draws into target/sim.
-    #[arg(long, conflicts_with = "seeds")]
-    figures: Option<PathBuf>,
 }
 
 fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
@@ -78,18 +74,19 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
         prior: arguments.common.prior.unwrap_or_default(),
         payload,
         load,
-        with_series: false,
+        with_series: arguments.common.is_drawn(),
     };
     let Some((first, last)) = arguments.seeds else {
         let options = &options(arguments.seed.unwrap_or(DEFAULT_SEED));
-        let (log, figures) = (arguments.log.as_deref(), arguments.figures.as_deref());
-        let run = with_leg_size!(leg, identify_one(leg, options, log, figures))?;
-        let code = finish(&run, &arguments.common, "");
-        if let Some(directory) = figures {
-            tables::print(&format!("figures: {}\n", directory.display()))?;
-        }
-        return code;
+        let log = arguments.log.as_deref();
+        let (run, series) = with_leg_size!(leg, identify_one(leg, options, log))?;
+        let code = finish(&run, &arguments.common, "")?;
+        draw(leg, &arguments.common, &run, &series, &[])?;
+        return Ok(code);
     };
+    if arguments.common.is_drawn() {
+        return Err(ToolError::input("--figures and --report show one run: give --seed instead of --seeds"));
+    }
     let options: &Vec<_> = &(first..=last).map(options).collect();
     let runs = with_leg_size!(leg, identify_many(leg, options))?;
     if let Some(path) = &arguments.common.json {

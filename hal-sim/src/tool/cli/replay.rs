@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::common::{Common, finish};
+use super::common::{Common, draw, finish};
 use crate::tool::error::ToolError;
 use crate::tool::replay::{ReplayOptions, replay};
 use crate::tool::setup::DEFAULT_SEED;
@@ -50,5 +50,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         csv: arguments.csv.clone(),
     };
     let replayed = with_leg_size!(leg, replay(leg, options))?;
-    finish(&replayed.run, &arguments.common, &tables::sources(&replayed.sources))
+    let code = finish(&replayed.run, &arguments.common, &tables::sources(&replayed.sources))?;
+    draw(leg, &arguments.common, &replayed.run, &replayed.series, &replayed.sources)?;
+    Ok(code)
 }

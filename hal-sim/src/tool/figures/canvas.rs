@@ -1,4 +1,4 @@
-//! What all figures share: size, fonts, axes, legend.
+//! What all figures share: size, palette, fonts, axes, legend.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
-use plotters::element::{PathElement, Text};
+use plotters::element::{PathElement, Rectangle, Text};
 use plotters::prelude::{Cartesian2d, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{BLACK, Color, IntoFont, RGBColor, ShapeStyle, TextStyle, WHITE};
@@ -15,15 +15,23 @@ use plotters::style::{BLACK, Color, IntoFont, RGBColor, ShapeStyle, TextStyle, W
 const OVERSAMPLING: u32 = 4;
 
 /// Lines of the grid.
-pub const GRID: RGBColor = RGBColor(225, 225, 225);
-/// What is pale and wide.
-pub const PALE: RGBColor = RGBColor(170, 195, 225);
-/// What is darker and less wide.
-pub const MIDDLE: RGBColor = RGBColor(205, 100, 10);
+pub const GRID: RGBColor = RGBColor(228, 228, 228);
+/// Lines of the axes.
+const AXIS: RGBColor = RGBColor(90, 90, 90);
+/// What is pale and wide: a tint of Okabe and Ito's blue.
+pub const PALE: RGBColor = RGBColor(158, 198, 230);
+/// Okabe and Ito's blue.
+pub const BLUE: RGBColor = RGBColor(0, 114, 178);
+/// Okabe and Ito's vermilion.
+pub const VERMILION: RGBColor = RGBColor(213, 94, 0);
+/// Okabe and Ito's bluish green, darkened for thin lines.
+pub const GREEN: RGBColor = RGBColor(0, 128, 95);
 /// What is thin.
 pub const DARK: RGBColor = BLACK;
 /// Background of what is left out.
-pub const SHADE: RGBColor = RGBColor(235, 235, 235);
+pub const SHADE: RGBColor = RGBColor(222, 222, 222);
+/// Background of what is expected.
+pub const BAND: RGBColor = RGBColor(224, 237, 248);
 
 /// Part of a figure.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -77,21 +85,43 @@ pub fn text(
     area.draw(&Text::new(words.into(), (px(x), px(y)), style))
 }
 
-/// Lines with their meaning from left to right; one takes the width of its words.
+/// What a legend explains.
+pub enum Key {
+    /// A curve.
+    Curve(ShapeStyle),
+    /// A background.
+    Field(RGBColor),
+}
+
+/// Meanings from left to right, one below the other where the width ends; each takes the width of its words.
 pub fn legend(
     area: &Area<'_>,
-    (mut x, y): (i32, i32),
-    entries: &[(&str, ShapeStyle)],
+    (left, mut y): (i32, i32),
+    entries: &[(&str, Key)],
 ) -> Result<(), DrawingError> {
-    for (words, style) in entries {
-        area.draw(&PathElement::new(vec![(px(x), px(y)), (px(x + 28), px(y))], *style))?;
-        text(area, (x + 33, y), 12, HPos::Left, *words)?;
-        x += 55 + 6 * words.chars().count() as i32;
+    let end = area.dim_in_pixel().0 as i32 / OVERSAMPLING as i32;
+    let mut x = left;
+    for (words, key) in entries {
+        let width = 48 + 13 * words.chars().count() as i32 / 2;
+        if x > left && x + width > end {
+            (x, y) = (left, y + 16);
+        }
+        match key {
+            Key::Curve(style) => {
+                area.draw(&PathElement::new(vec![(px(x), px(y)), (px(x + 24), px(y))], *style))?;
+            }
+            Key::Field(colour) => {
+                area.draw(&Rectangle::new([(px(x), px(y - 5)), (px(x + 24), px(y + 5))], colour.filled()))?;
+            }
+        }
+        text(area, (x + 30, y), 12, HPos::Left, *words)?;
+        x += width;
     }
     Ok(())
 }
 
-/// How two axes are drawn.
+/// How two axes are drawn; a label that is empty takes no room.
+#[derive(Clone)]
 pub struct Axes<'s> {
     pub x: Range<f64>,
     pub y: Range<f64>,
@@ -101,26 +131,30 @@ pub struct Axes<'s> {
     pub y_ticks: usize,
 }
 
-/// Axes with a light grid.
+/// Room to the left of a frame, pixels.
+pub const LEFT: i32 = 58;
+/// Part of it beyond the axis label.
+const EDGE: i32 = 8;
+
+/// Axes with a light grid; all frames begin at the same distance from the left.
 pub fn axes<'a, 'b>(area: &'a Area<'b>, axes: &Axes<'_>) -> Result<Chart<'a, 'b>, DrawingError> {
-    let below = if axes.x_label.is_empty() { 18 } else { 36 };
-    let left = if axes.y_label.is_empty() { 34 } else { 52 };
+    let below = if axes.x_label.is_empty() { 18 } else { 34 };
     let mut chart = ChartBuilder::on(area)
-        .margin_left(px(6))
-        .margin_right(px(10))
+        .margin_left(px(EDGE))
+        .margin_right(px(12))
         .margin_top(px(6))
         .x_label_area_size(px(below))
-        .y_label_area_size(px(left))
+        .y_label_area_size(px(LEFT - EDGE))
         .build_cartesian_2d(axes.x.clone(), axes.y.clone())?;
     chart
         .configure_mesh()
         .max_light_lines(0)
         .bold_line_style(line(GRID, 3))
-        .axis_style(line(RGBColor(90, 90, 90), 4))
+        .axis_style(line(AXIS, 3))
         .set_all_tick_mark_size(px(3))
         .x_labels(axes.x_ticks)
         .y_labels(axes.y_ticks)
-        .label_style(font(11))
+        .label_style(font(12))
         .axis_desc_style(font(12))
         .x_desc(axes.x_label)
         .y_desc(axes.y_label)
@@ -130,10 +164,11 @@ pub fn axes<'a, 'b>(area: &'a Area<'b>, axes: &Axes<'_>) -> Result<Chart<'a, 'b>
     Ok(chart)
 }
 
-/// A number on an axis, without the last digits of a sum of tenths.
-fn short(value: f64) -> String {
+/// A number on an axis, with a true minus and without the last digits of a sum of tenths.
+pub fn short(value: f64) -> String {
     let rounded = (value * 1e6).round() / 1e6;
-    format!("{}", if rounded == 0.0 { 0.0 } else { rounded })
+    let words = format!("{}", if rounded == 0.0 { 0.0 } else { rounded });
+    words.replace('-', "\u{2212}")
 }
 
 /// Smallest range of all values, a twentieth wider to both sides.
@@ -145,4 +180,11 @@ pub fn range<'a>(values: impl Iterator<Item = &'a f64>) -> Range<f64> {
     }
     let margin = (high - low) / 20.0;
     low - margin..high + margin
+}
+
+/// From minus to plus the largest size of any value, a tenth wider; at least `least`.
+pub fn symmetric(values: impl Iterator<Item = f64>, least: f64) -> Range<f64> {
+    let largest = values.map(f64::abs).filter(|size| size.is_finite()).fold(least, f64::max);
+    let end = if largest > 0.0 { 1.1 * largest } else { 1.0 };
+    -end..end
 }

@@ -1,7 +1,12 @@
-//! Errors of the base parameters in reported standard deviations.
+//! Errors of the base parameters in reported standard deviations; where no truth is known, those deviations in percent
+//! of the value.
 
-use plotters::chart::ChartBuilder;
+use plotters::chart::{ChartBuilder, ChartContext};
+use plotters::coord::combinators::IntoLogRange;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
 use plotters::element::{Circle, PathElement, Rectangle, Text};
+use plotters::prelude::{Cartesian2d, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, RGBColor};
 
@@ -14,20 +19,36 @@ const THREE_SIGMA: RGBColor = RGBColor(228, 235, 244);
 
 /// With values, standard deviations and truths.
 pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
-    let title = format!("{}: errors of the base parameters, bands of one and three sigma", run.leg);
-    text(area, (12, 16), 14, HPos::Left, title)?;
+    let what = if truth_is_known(run) { WITH_TRUTH } else { WITHOUT_TRUTH };
+    text(area, (12, 14), 13, HPos::Left, format!("{}: {what}", run.leg))?;
     let (_, area) = area.split_vertically(px(30));
     dots(&area, run, (90, 260), &|base| {
         let (value, sigma) = (number(base.value), number(base.sigma));
-        format!("{value} \u{b1} {sigma} {}, truth {}", base.unit, number(base.truth))
+        let truth =
+            base.truth.known().map_or(String::new(), |truth| format!(", truth {}", number(truth.into())));
+        format!("{value} \u{b1} {sigma} {}{truth}", base.unit)
     })
 }
 
 /// With values alone.
 pub fn small(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
-    text(area, (12, 14), 13, HPos::Left, "Base parameters: errors, bands of one and three sigma")?;
+    let what = if truth_is_known(run) { WITH_TRUTH } else { WITHOUT_TRUTH };
+    text(area, (12, 14), 13, HPos::Left, format!("Base parameters: {what}"))?;
     let (_, area) = area.split_vertically(px(30));
     dots(&area, run, (56, 136), &|base| format!("{} {}", number(base.value), base.unit))
+}
+
+const WITH_TRUTH: &str = "errors, bands of one and three sigma";
+const WITHOUT_TRUTH: &str = "sigma in percent of the value";
+
+fn truth_is_known(run: &RunReport) -> bool {
+    run.base_parameters.iter().any(|base| base.truth.known().is_some())
+}
+
+/// Standard deviation in percent of the value.
+fn uncertainty(base: &BaseReport) -> Option<f64> {
+    let (value, sigma) = (base.value.known()?, base.sigma.known().filter(|sigma| *sigma > 0.0)?);
+    Some(100.0 * sigma / value.abs()).filter(|percent| percent.is_finite())
 }
 
 fn error(base: &BaseReport) -> Option<f64> {
@@ -39,20 +60,52 @@ fn error(base: &BaseReport) -> Option<f64> {
 fn dots(
     area: &Area<'_>,
     run: &RunReport,
-    (left, right): (i32, i32),
+    margins: (i32, i32),
     values: &dyn Fn(&BaseReport) -> String,
 ) -> Result<(), DrawingError> {
     let bases = &run.base_parameters;
-    let largest = bases.iter().filter_map(error).map(f64::abs).fold(3.5, f64::max);
-    let (end, rows) = ((largest + 0.3).min(20.0), bases.len().max(1) as f64);
-    let mut chart = ChartBuilder::on(area)
-        .margin_left(px(left))
-        .margin_right(px(right))
-        .x_label_area_size(px(38))
-        .build_cartesian_2d(-end..end, 0.0..rows)?;
-    for (half, colour) in [(3.0, THREE_SIGMA), (1.0, ONE_SIGMA)] {
-        chart.draw_series([Rectangle::new([(-half, 0.0), (half, rows)], colour.filled())])?;
+    let rows = bases.len().max(1) as f64;
+    if truth_is_known(run) {
+        let largest = bases.iter().filter_map(error).map(f64::abs).fold(3.5, f64::max);
+        let end = (largest + 0.3).min(20.0);
+        let mut chart = frame(area, margins).build_cartesian_2d(-end..end, 0.0..rows)?;
+        for (half, colour) in [(3.0, THREE_SIGMA), (1.0, ONE_SIGMA)] {
+            chart.draw_series([Rectangle::new([(-half, 0.0), (half, rows)], colour.filled())])?;
+        }
+        mesh(&mut chart, "(value \u{2212} truth) / sigma", &|value| {
+            format!("{value:.0}").replace('-', "\u{2212}")
+        })?;
+        chart.draw_series([PathElement::new(vec![(0.0, 0.0), (0.0, rows)], line(DARK, 3))])?;
+        let place = |base: &BaseReport| error(base).map(|error| error.clamp(-end, end));
+        rows_of(area, &mut chart, bases, margins, &place, values)
+    } else {
+        let mut chart =
+            frame(area, margins).build_cartesian_2d((PERCENT.0..PERCENT.1).log_scale(), 0.0..rows)?;
+        for (limit, colour) in [(100.0, THREE_SIGMA), (5.0, ONE_SIGMA)] {
+            chart.draw_series([Rectangle::new([(PERCENT.0, 0.0), (limit, rows)], colour.filled())])?;
+        }
+        mesh(&mut chart, "sigma, % of the value (bands: below 5 % and below 100 %)", &|value| {
+            format!("{value}")
+        })?;
+        let place = |base: &BaseReport| uncertainty(base).map(|percent| percent.clamp(PERCENT.0, PERCENT.1));
+        rows_of(area, &mut chart, bases, margins, &place, values)
     }
+}
+
+/// Of the logarithmic axis.
+const PERCENT: (f64, f64) = (0.01, 1000.0);
+
+fn frame<'a, 'b>(area: &'a Area<'b>, (left, right): (i32, i32)) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
+    let mut builder = ChartBuilder::on(area);
+    builder.margin_left(px(left)).margin_right(px(right)).x_label_area_size(px(36));
+    builder
+}
+
+fn mesh<'b, X: Ranged<ValueType = f64> + ValueFormatter<f64>>(
+    chart: &mut ChartContext<'_, SVGBackend<'b>, Cartesian2d<X, RangedCoordf64>>,
+    label: &str,
+    numbers: &dyn Fn(&f64) -> String,
+) -> Result<(), DrawingError> {
     chart
         .configure_mesh()
         .disable_y_mesh()
@@ -61,26 +114,37 @@ fn dots(
         .bold_line_style(line(GRID, 3))
         .x_labels(7)
         .set_all_tick_mark_size(px(3))
-        .label_style(font(11))
+        .label_style(font(12))
         .axis_desc_style(font(12))
-        .x_desc("(value - truth) / sigma")
-        .x_label_formatter(&|value| format!("{value:.0}"))
-        .draw()?;
-    chart.draw_series([PathElement::new(vec![(0.0, 0.0), (0.0, rows)], line(DARK, 3))])?;
+        .x_desc(label)
+        .x_label_formatter(numbers)
+        .draw()
+}
+
+fn rows_of<X: Ranged<ValueType = f64>>(
+    area: &Area<'_>,
+    chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, RangedCoordf64>>,
+    bases: &[BaseReport],
+    (left, right): (i32, i32),
+    place: &dyn Fn(&BaseReport) -> Option<f64>,
+    values: &dyn Fn(&BaseReport) -> String,
+) -> Result<(), DrawingError> {
+    let rows = bases.len().max(1) as f64;
+    let (width, _) = area.dim_in_pixel();
     for (row, base) in bases.iter().enumerate() {
         let middle = rows - row as f64 - 0.5;
-        if let Some(error) = error(base) {
-            let dot = Circle::new((error.clamp(-end, end), middle), px(4), DARK.filled());
-            chart.draw_series([dot])?;
+        let at = place(base);
+        let (_, y) = chart.backend_coord(&(at.unwrap_or(1.0), middle));
+        if let Some(at) = at {
+            chart.draw_series([Circle::new((at, middle), px(4), DARK.filled())])?;
         }
         // From the figure's corner to the area's own.
-        let (x, y) = chart.backend_coord(&(end, middle));
-        let (x0, y0) = area.get_base_pixel();
+        let (_, y0) = area.get_base_pixel();
         let words = |words: String, x: i32, anchor| {
             Text::new(words, (x, y - y0), font(12).pos(Pos::new(anchor, VPos::Center)))
         };
         area.draw(&words(base.name.clone(), px(left - 8), HPos::Right))?;
-        area.draw(&words(values(base), x - x0 + px(8), HPos::Left))?;
+        area.draw(&words(values(base).replace('-', "\u{2212}"), width as i32 - px(right - 8), HPos::Left))?;
     }
     Ok(())
 }

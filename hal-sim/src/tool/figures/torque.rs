@@ -1,31 +1,42 @@
 //! Torque over time: measured, predicted, noise-free, and what is left.
 
 use plotters::element::Rectangle;
-use plotters::series::LineSeries;
 use plotters::style::text_anchor::HPos;
 use plotters::style::{Color, ShapeStyle};
 
-use super::super::series::TorqueSeries;
+use super::super::series::{JointCurves, MotionSeries};
 use super::canvas::{
-    Area, Axes, Chart, DARK, DrawingError, MIDDLE, PALE, SHADE, axes, legend, line, px, range, text,
+    Area, Axes, BAND, BLUE, DARK, DrawingError, Key, LEFT, PALE, SHADE, VERMILION, axes, legend, line, px,
+    range, symmetric, text,
 };
+use super::curve;
 
+/// Of one motion: its title, its torque, its residual; pixels.
+const CELL: (i32, i32, i32) = (20, 150, 102);
+/// Of title and legend.
+const HEAD: i32 = 56;
 /// Of one joint in the small figure, pixels.
 const JOINT_HEIGHT: i32 = 181;
 /// Of title and legends there.
-const REST_HEIGHT: i32 = 68;
+const REST_HEIGHT: i32 = 74;
 
 /// Of the small figure, pixels.
 pub fn small_height(joints: usize) -> u32 {
-    (REST_HEIGHT + JOINT_HEIGHT * joints as i32).unsigned_abs()
+    (REST_HEIGHT + JOINT_HEIGHT * joints.max(1) as i32).unsigned_abs()
+}
+
+/// Of the whole figure, pixels.
+pub fn height(motions: &[MotionSeries]) -> u32 {
+    let (title, upper, lower) = CELL;
+    (HEAD + (title + upper + lower) * motions.len().div_ceil(2) as i32).unsigned_abs()
 }
 
 fn measured() -> ShapeStyle {
-    line(PALE, 20)
+    line(PALE, 18)
 }
 
 fn noise_free() -> ShapeStyle {
-    line(MIDDLE, 10)
+    line(VERMILION, 7)
 }
 
 fn predicted() -> ShapeStyle {
@@ -34,163 +45,159 @@ fn predicted() -> ShapeStyle {
 
 /// Of measured minus predicted.
 fn measured_error() -> ShapeStyle {
-    line(PALE, 5)
+    line(BLUE, 3)
 }
 
-/// One joint on all motions.
-pub fn whole(area: &Area<'_>, joint: &str, motions: &[&TorqueSeries]) -> Result<(), DrawingError> {
-    text(
-        area,
-        (12, 16),
-        14,
-        HPos::Left,
-        format!("{joint}: torque on motions that were not identified from"),
-    )?;
-    curve_legend(area, 38)?;
-    let (_, charts) = area.split_vertically(px(52));
-    let (upper, lower) = charts.split_vertically(px(222));
-    let (lower, foot) = lower.split_vertically(px(140));
-    error_legend(&foot, 12)?;
-    let torque = common_range(motions.iter().copied());
-    let error = error_range(motions.iter().copied());
-    let count = motions.len().max(1);
-    for (index, ((upper, lower), motion)) in
-        upper.split_evenly((1, count)).iter().zip(lower.split_evenly((1, count))).zip(motions).enumerate()
-    {
-        let label = |words| if index == 0 { words } else { "" };
+/// One joint on all motions, two side by side; `sigma` is the noise of its filtered torque.
+pub fn whole(
+    area: &Area<'_>,
+    name: &str,
+    joint: usize,
+    sigma: Option<f64>,
+    motions: &[MotionSeries],
+) -> Result<(), DrawingError> {
+    text(area, (12, 14), 13, HPos::Left, format!("{name}: torque through the filter, and residual below"))?;
+    let curves: Vec<_> =
+        motions.iter().filter_map(|motion| Some((motion, motion.joints.get(joint)?))).collect();
+    let simulated = curves.iter().any(|(_, curves)| !curves.noise_free_nm.is_empty());
+    let mut entries = vec![("measured", Key::Curve(measured())), ("predicted", Key::Curve(predicted()))];
+    if simulated {
+        entries.push(("noise-free", Key::Curve(noise_free())));
+    }
+    entries.extend([
+        ("residual", Key::Curve(measured_error())),
+        ("\u{b1}2 sigma of the noise", Key::Field(BAND)),
+        ("stands still, left out", Key::Field(SHADE)),
+    ]);
+    legend(area, (LEFT, 35), &entries)?;
+    let (_, cells) = area.split_vertically(px(HEAD));
+    let torque = range(curves.iter().flat_map(|(_, curves)| torques(curves)));
+    let error =
+        symmetric(curves.iter().flat_map(|(_, curves)| errors_seen(curves)), 2.5 * sigma.unwrap_or(0.0));
+    let columns = curves.len().clamp(1, 2);
+    let parts = cells.split_evenly((curves.len().div_ceil(2).max(1), columns));
+    for (index, (part, (motion, curves))) in parts.iter().zip(&curves).enumerate() {
+        let label = |words| if index % 2 == 0 { words } else { "" };
+        text(part, (LEFT, 10), 12, HPos::Left, format!("{} ({})", motion.name, motion.role.name()))?;
+        let (_, part) = part.split_vertically(px(CELL.0));
+        let (upper, lower) = part.split_vertically(px(CELL.1));
         let top = Axes {
-            x: 0.0..end(motion),
+            x: ends(motion),
             y: torque.clone(),
             x_label: "",
             y_label: label("torque, N m"),
-            x_ticks: 6,
-            y_ticks: 7,
+            x_ticks: 8 / columns + 3,
+            y_ticks: 6,
         };
-        curves(upper, &top, motion)?;
-        let x_label = format!("time, s ({})", motion.motion);
+        draw_torque(&upper, &top, motion, curves)?;
         let bottom =
-            Axes { y: error.clone(), x_label: &x_label, y_label: label("error, N m"), y_ticks: 5, ..top };
-        errors(&lower, &bottom, motion)?;
+            Axes { y: error.clone(), x_label: "time, s", y_label: label("residual, N m"), y_ticks: 4, ..top };
+        draw_error(&lower, &bottom, motion, curves, sigma)?;
     }
     Ok(())
 }
 
 /// All joints on one motion.
-pub fn small(area: &Area<'_>, joints: &[&str], motion: &[TorqueSeries]) -> Result<(), DrawingError> {
-    let name = motion.first().map_or("", |curve| curve.motion);
-    text(area, (12, 14), 13, HPos::Left, format!("Torque on an unused motion ({name})"))?;
-    curve_legend(area, 34)?;
-    let (_, charts) = area.split_vertically(px(46));
-    let (charts, foot) = charts.split_vertically(px(JOINT_HEIGHT * joints.len() as i32));
-    error_legend(&foot, 10)?;
+pub fn small(area: &Area<'_>, joints: &[&str], motion: &MotionSeries) -> Result<(), DrawingError> {
+    text(area, (12, 14), 13, HPos::Left, format!("Torque on {} ({})", motion.name, motion.role.name()))?;
+    let mut entries = vec![("measured", Key::Curve(measured())), ("predicted", Key::Curve(predicted()))];
+    if motion.joints.iter().any(|curves| !curves.noise_free_nm.is_empty()) {
+        entries.push(("noise-free", Key::Curve(noise_free())));
+    }
+    legend(area, (LEFT, 34), &entries)?;
+    let (_, charts) = area.split_vertically(px(44));
+    let (charts, foot) = charts.split_vertically(px(JOINT_HEIGHT * joints.len().max(1) as i32));
+    let entries = [("residual", Key::Curve(measured_error())), ("stands still, left out", Key::Field(SHADE))];
+    legend(&foot, (LEFT, 14), &entries)?;
     let parts = charts.split_evenly((joints.len().max(1), 1));
-    for (index, ((part, joint), curve)) in parts.iter().zip(joints).zip(motion).enumerate() {
+    for (index, ((part, joint), curves)) in parts.iter().zip(joints).zip(&motion.joints).enumerate() {
         let last = index + 1 == joints.len();
         let (upper, lower) = part.split_vertically(px(JOINT_HEIGHT * 3 / 5));
         let y_label = format!("{joint}, N m");
         let top = Axes {
-            x: 0.0..end(curve),
-            y: common_range([curve].into_iter()),
+            x: ends(motion),
+            y: range(torques(curves)),
             x_label: "",
             y_label: &y_label,
             x_ticks: 8,
             y_ticks: 5,
         };
-        curves(&upper, &top, curve)?;
+        draw_torque(&upper, &top, motion, curves)?;
         let x_label = if last { "time, s" } else { "" };
-        errors(
+        let error = symmetric(errors_seen(curves), 0.0);
+        draw_error(
             &lower,
-            &Axes { y: error_range([curve].into_iter()), x_label, y_label: "error, N m", y_ticks: 3, ..top },
-            curve,
+            &Axes { y: error, x_label, y_label: "residual, N m", y_ticks: 3, ..top },
+            motion,
+            curves,
+            None,
         )?;
     }
     Ok(())
 }
 
-fn curve_legend(area: &Area<'_>, y: i32) -> Result<(), DrawingError> {
-    let entries = [("measured", measured()), ("noise-free", noise_free()), ("predicted", predicted())];
-    legend(area, (56, y), &entries)
-}
-
-fn error_legend(area: &Area<'_>, y: i32) -> Result<(), DrawingError> {
-    let entries = [
-        ("measured - predicted", measured_error()),
-        ("noise-free - predicted", noise_free()),
-        ("joint sticks", line(SHADE, 40)),
-    ];
-    legend(area, (14, y), &entries)
-}
-
-fn end(motion: &TorqueSeries) -> f64 {
-    motion.time_s.last().copied().unwrap_or(1.0)
-}
-
-fn common_range<'a>(motions: impl Iterator<Item = &'a TorqueSeries>) -> std::ops::Range<f64> {
-    range(
-        motions.flat_map(|motion| motion.measured.iter().chain(&motion.predicted).chain(&motion.noise_free)),
-    )
-}
-
-/// Symmetric, of the instants at which the joint moves.
-fn error_range<'a>(motions: impl Iterator<Item = &'a TorqueSeries>) -> std::ops::Range<f64> {
-    let largest = motions
-        .flat_map(|motion| {
-            let errors = motion.measured.iter().zip(&motion.predicted).zip(&motion.sticks);
-            errors
-                .filter(|(_, sticks)| !**sticks)
-                .map(|((measured, predicted), _)| (measured - predicted).abs())
-        })
-        .fold(0.0, f64::max);
-    let end = if largest > 0.0 { 1.1 * largest } else { 1.0 };
-    -end..end
-}
-
-fn curves(area: &Area<'_>, frame: &Axes<'_>, motion: &TorqueSeries) -> Result<(), DrawingError> {
-    let mut chart = axes(area, frame)?;
-    shade(&mut chart, frame, motion)?;
-    let time = || motion.time_s.iter().copied();
-    chart.draw_series(LineSeries::new(time().zip(motion.measured.iter().copied()), measured()))?;
-    chart.draw_series(LineSeries::new(time().zip(motion.noise_free.iter().copied()), noise_free()))?;
-    chart.draw_series(LineSeries::new(time().zip(motion.predicted.iter().copied()), predicted()))?;
-    Ok(())
-}
-
-fn errors(area: &Area<'_>, frame: &Axes<'_>, motion: &TorqueSeries) -> Result<(), DrawingError> {
-    let mut chart = axes(area, frame)?;
-    shade(&mut chart, frame, motion)?;
-    // What leaves the frame, where the joint sticks, stops at its edge.
-    let error = |torque: &[f64]| -> Vec<(f64, f64)> {
-        let errors = torque.iter().zip(&motion.predicted).map(|(torque, predicted)| torque - predicted);
-        motion
-            .time_s
-            .iter()
-            .copied()
-            .zip(errors.map(|error| error.clamp(frame.y.start, frame.y.end)))
-            .collect()
-    };
-    chart.draw_series(LineSeries::new(error(&motion.measured), measured_error()))?;
-    chart.draw_series(LineSeries::new(error(&motion.noise_free), noise_free()))?;
-    Ok(())
-}
-
-/// Marks the stretches in which the joint sticks.
-fn shade(chart: &mut Chart<'_, '_>, frame: &Axes<'_>, motion: &TorqueSeries) -> Result<(), DrawingError> {
-    let mut from: Option<f64> = None;
-    let mut stretches = Vec::new();
-    for (time, sticks) in motion.time_s.iter().zip(&motion.sticks) {
-        match (from, sticks) {
-            (None, true) => from = Some(*time),
-            (Some(begun), false) => {
-                stretches.push((begun, *time));
-                from = None;
-            }
-            _ => {}
+fn ends(motion: &MotionSeries) -> std::ops::Range<f64> {
+    match (motion.time_s.first(), motion.time_s.last()) {
+        (Some(first), Some(last)) if last > first => {
+            first.min(if *first < 2.0 { 0.0 } else { *first })..*last
         }
+        _ => 0.0..1.0,
     }
-    stretches.extend(from.map(|begun| (begun, end(motion))));
-    let bars = stretches
-        .into_iter()
-        .map(|(begun, ended)| Rectangle::new([(begun, frame.y.start), (ended, frame.y.end)], SHADE.filled()));
-    chart.draw_series(bars)?;
+}
+
+fn torques(curves: &JointCurves) -> impl Iterator<Item = &f64> {
+    curves.measured_nm.iter().chain(&curves.predicted_nm).chain(&curves.noise_free_nm)
+}
+
+/// Residuals that the range must hold: measured ones of the instants at which the joint moves.
+fn errors_seen(curves: &JointCurves) -> impl Iterator<Item = f64> + '_ {
+    curves.residual_nm().flatten()
+}
+
+fn draw_torque(
+    area: &Area<'_>,
+    frame: &Axes<'_>,
+    motion: &MotionSeries,
+    curves: &JointCurves,
+) -> Result<(), DrawingError> {
+    let mut chart = axes(area, frame)?;
+    curve::shade(&mut chart, &frame.y, &motion.time_s, &curves.still, SHADE)?;
+    for (values, style) in [
+        (&curves.measured_nm, measured()),
+        (&curves.noise_free_nm, noise_free()),
+        (&curves.predicted_nm, predicted()),
+    ] {
+        curve::draw(&mut chart, &motion.time_s, values.iter().copied().map(Some), style)?;
+    }
     Ok(())
+}
+
+fn draw_error(
+    area: &Area<'_>,
+    frame: &Axes<'_>,
+    motion: &MotionSeries,
+    curves: &JointCurves,
+    sigma: Option<f64>,
+) -> Result<(), DrawingError> {
+    let mut chart = axes(area, frame)?;
+    let ends = (frame.x.start, frame.x.end);
+    if let Some(sigma) = sigma {
+        let half = (2.0 * sigma).min(frame.y.end);
+        chart.draw_series([Rectangle::new([(ends.0, -half), (ends.1, half)], BAND.filled())])?;
+    }
+    curve::shade(&mut chart, &frame.y, &motion.time_s, &curves.still, SHADE)?;
+    let within = |error: f64| error.clamp(frame.y.start, frame.y.end);
+    curve::draw(
+        &mut chart,
+        &motion.time_s,
+        curves.residual_nm().map(|error| error.map(within)),
+        measured_error(),
+    )?;
+    let noise_free_error = curves
+        .noise_free_nm
+        .iter()
+        .zip(&curves.predicted_nm)
+        .zip(&curves.still)
+        .map(|((torque, predicted), still)| (!still).then(|| within(torque - predicted)));
+    curve::draw(&mut chart, &motion.time_s, noise_free_error, noise_free())
 }

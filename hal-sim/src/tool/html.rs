@@ -1,0 +1,170 @@
+//! A run as one HTML page: what is known, how well, and what is not.
+//!
+//! Why one page: a result must be something that can be looked at, printed, sent along and kept. The page needs no
+//! network, no font, no script; its figures are the SVG drawings of [`super::figures`] themselves. Everything that
+//! comes from a file, a leg's name for one, passes through maud's escaping; only the drawings go in as they are, and
+//! their texts were escaped by the backend.
+//!
+//! What the page does not know by name, a key that a later report has, it shows as a table all the same
+//! ([`generic`]).
+
+mod generic;
+mod head;
+mod limits;
+mod parameters;
+mod results;
+
+use jiff::{Timestamp, Unit};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::error::ToolError;
+use super::figures::{Figure, Group};
+use super::leg_file::LegFile;
+use super::replay::Source;
+use super::report::{Number, RunReport};
+use super::tables;
+
+/// Colours, print rules, narrow screens.
+const STYLE: &str = include_str!("html/style.css");
+/// Nothing may be fetched and nothing may run, whatever a file's text contains.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
+
+/// What surrounds a run.
+#[derive(Clone, Debug)]
+pub struct Circumstances {
+    /// When, UTC.
+    pub time_utc: String,
+    /// How it was called.
+    pub command: String,
+    /// What was identified.
+    pub leg: LegFile,
+}
+
+impl Circumstances {
+    /// This moment and this process's arguments.
+    #[must_use]
+    pub fn now(leg: &LegFile) -> Self {
+        let now = Timestamp::now();
+        let words: Vec<String> = std::env::args().skip(1).map(quoted).collect();
+        Self {
+            time_utc: now.round(Unit::Second).unwrap_or(now).to_string(),
+            command: format!("cargo sim {}", words.join(" ")).trim_end().to_owned(),
+            leg: leg.clone(),
+        }
+    }
+}
+
+/// As a shell takes it as one word.
+fn quoted(word: String) -> String {
+    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./:=,+".contains(letter);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word;
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+/// The whole page.
+pub fn page(
+    circumstances: &Circumstances,
+    run: &RunReport,
+    sources: &[Source],
+    figures: &[Figure],
+) -> Result<String, ToolError> {
+    let rest = generic::unknown_keys(run)?;
+    let group = |group: Group| -> Markup {
+        html! { @for figure in figures.iter().filter(|figure| figure.group == group) { (drawing(figure)) } }
+    };
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta name="color-scheme" content="light";
+                link rel="icon" href="data:,";
+                title { "Identification of " (run.leg) ": " (run.verdict) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                main {
+                    (head::title(circumstances, run))
+                    (head::verdict(run, rest.findings.as_ref()))
+                    (head::facts(circumstances, run))
+                    section { h2 { "At a glance" } (head::numbers(run)) (group(Group::Summary)) }
+                    @if !sources.is_empty() { (results::sources(sources)) }
+                    section {
+                        h2 { "Parameters" }
+                        (parameters::base(run))
+                        (group(Group::BaseParameters))
+                        (parameters::all(run, &circumstances.leg))
+                    }
+                    section { h2 { "Trajectories" } (results::trajectory_words(run)) (group(Group::Trajectories)) }
+                    section { h2 { "Torque" } (results::torque_words(run)) (group(Group::Torque)) (results::fits(run)) }
+                    section { h2 { "Residuals" } (results::residual_words()) (group(Group::Residuals)) }
+                    section { h2 { "Search" } (results::search(run)) (group(Group::Search)) }
+                    @if !run.tracking.is_empty() { (results::tracking(run)) }
+                    (results::scale(run))
+                    @for (name, value) in &rest.others { (generic::section(name, value)) }
+                    (limits::section(run))
+                    (head::colophon(run))
+                }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+/// A drawing, to be read out by its title.
+fn drawing(figure: &Figure) -> Markup {
+    let svg = figure.svg.replacen("<svg ", "<svg role=\"img\" aria-labelledby=\"", 1);
+    let identity = figure.file.replace('.', "-");
+    let svg = svg.replacen("aria-labelledby=\"", &format!("aria-labelledby=\"{identity}\" "), 1);
+    html! {
+        figure {
+            div.drawing { (PreEscaped(svg)) }
+            figcaption id=(identity) { (figure.title) " " span.file { (figure.file) } }
+        }
+    }
+}
+
+/// Four significant digits with a true minus; a dash where nothing is known.
+fn number(value: Number) -> String {
+    match tables::number(value).as_str() {
+        "-" => "\u{2013}".into(),
+        known => known.replace('-', "\u{2212}"),
+    }
+}
+
+/// A number with its sign.
+fn signed(value: f64) -> String {
+    format!("{value:+.1}").replace('-', "\u{2212}")
+}
+
+/// Exponents of a unit raised, factors apart: `kg m2` becomes `kg m²`.
+fn unit(plain: &str) -> String {
+    plain.replace("m2", "m\u{b2}").replace(' ', "\u{a0}")
+}
+
+/// `1 thing`, `2 things`.
+fn count(number: usize, thing: &str) -> String {
+    format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_known_is_a_dash_and_a_minus_is_a_minus() {
+        assert_eq!(number(Number::UNKNOWN), "\u{2013}");
+        assert_eq!(number((-0.79941).into()), "\u{2212}0.7994");
+        assert_eq!(number(f64::NAN.into()), "\u{2013}");
+    }
+
+    #[test]
+    fn a_command_can_be_given_again_as_it_is_printed() {
+        assert_eq!(quoted("--prior=wrong:40".into()), "--prior=wrong:40");
+        assert_eq!(quoted("my leg's.toml".into()), r"'my leg'\''s.toml'");
+    }
+}

@@ -1,0 +1,175 @@
+//! What is read first: the verdict in words, what was run, the few numbers that matter.
+
+use maud::{Markup, html};
+use serde_json::Value;
+
+use super::super::report::{FitReport, RunReport};
+use super::super::tables;
+use super::{Circumstances, count, generic, number, signed};
+
+/// Name of the leg and date.
+pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
+    let kind = if run.seed.is_some() { "simulated run" } else { "recording" };
+    html! {
+        header {
+            p.over { "Scarab \u{b7} identification report \u{b7} " (kind) }
+            h1 { (run.leg) }
+            p.when { (circumstances.time_utc) " (UTC)" }
+        }
+    }
+}
+
+/// The verdict, large and in words, with each reason and what it was measured against.
+pub fn verdict(run: &RunReport, findings: Option<&Value>) -> Markup {
+    let validated = !run.validation.is_empty();
+    html! {
+        section.verdict.accepted[run.accepted()].refused[!run.accepted()] {
+            @if run.accepted() {
+                p.word { "Accepted" }
+                p { "The model explains the motion it was identified from" @if validated {
+                    ", and predicts the motions that were not used"
+                } ". Nothing of what was tested speaks against it." }
+                @if !validated {
+                    p { strong { "Not validated: " } "no motion was held out, so nothing is known of its predictions." }
+                }
+            } @else {
+                p.word { "Refused" }
+                p { "Do not use this model, because " (list_of(&run.reasons)) ":" }
+                ul { @for reason in &run.reasons {
+                    li { strong { (reason.replace('_', " ")) } ": " (tables::explanation(reason)) "." (evidence(reason, run)) }
+                } }
+            }
+        }
+        @if let Some(findings) = findings { section { h2 { "Tests of the verdict" } (generic::content(findings, 0)) } }
+    }
+}
+
+fn list_of(reasons: &[&str]) -> String {
+    format!("of {}", count(reasons.len(), "reason"))
+}
+
+/// What the report holds that shows a reason.
+fn evidence(reason: &str, run: &RunReport) -> Markup {
+    let worst = |fits: &[FitReport]| -> Option<(String, f64)> {
+        fits.iter()
+            .filter_map(|fit| {
+                let share = fit.percent_of_rms.known()?;
+                let words = format!(
+                    "{}, joint {}: {} N m rms, {} % of the motion's rms torque",
+                    fit.motion,
+                    fit.joint,
+                    number(fit.rms_nm),
+                    number(fit.percent_of_rms)
+                );
+                Some((words, share))
+            })
+            .max_by(|one, other| one.1.total_cmp(&other.1))
+    };
+    let words = match reason {
+        "validation" => worst(&run.validation).map(|(words, _)| format!("Worst is {words}.")),
+        "residual" => worst(&run.training).map(|(words, _)| format!("Worst is {words}.")),
+        "unexcited" => Some(format!(
+            "{} of {} base parameters are determined, condition {}.",
+            run.rank,
+            run.base_parameters.len(),
+            number(run.condition)
+        )),
+        _ => None,
+    };
+    html! { @if let Some(words) = words { " " (words) } }
+}
+
+/// What was run.
+pub fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
+    let leg = &circumstances.leg;
+    let joints: Vec<&str> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let gravity: Vec<String> = leg.gravity.iter().map(|element| number((*element).into())).collect();
+    let rows = [
+        ("Leg", format!("{}: {}", run.leg, joints.join(", "))),
+        ("Gravity in the base frame", format!("{} m/s\u{b2}", gravity.join(", "))),
+        (
+            "Scale",
+            format!(
+                "{} torque constants",
+                if run.scale.scale == "absolute" { "absolute: identified" } else { "relative to the" }
+            ),
+        ),
+        ("Noise seed", run.seed.map_or("\u{2013} (recorded)".into(), |seed| seed.to_string())),
+        ("Swarm seed", run.swarm_seed.to_string()),
+        ("Prior", prior(&run.prior)),
+        ("Plan", run.plan.into()),
+        (
+            if run.seed.is_some() { "Simulated time" } else { "Recorded time" },
+            format!("{:.1} s", run.simulated_s),
+        ),
+        ("Version", format!("scarab {}, report schema {}", env!("CARGO_PKG_VERSION"), run.schema)),
+    ];
+    html! {
+        section {
+            h2 { "What was run" }
+            dl.facts {
+                @for (name, value) in rows { div { dt { (name) } dd { (value) } } }
+                div.command { dt { "Command" } dd { code { (circumstances.command) } } }
+            }
+        }
+    }
+}
+
+fn prior(name: &str) -> String {
+    match (name, name.strip_prefix("wrong:")) {
+        ("none", _) => "none".into(),
+        ("file", _) => "the leg file's".into(),
+        (_, Some(percent)) => format!("wrong by {percent} % in every number"),
+        _ => name.into(),
+    }
+}
+
+/// The worst of each kind, and its motion.
+pub fn numbers(run: &RunReport) -> Markup {
+    let worst = |value: &dyn Fn(&FitReport) -> Option<f64>| -> Option<(f64, String)> {
+        let known = run
+            .validation
+            .iter()
+            .filter_map(|fit| Some((value(fit)?, format!("{}, joint {}", fit.motion, fit.joint))));
+        known.max_by(|one, other| one.0.total_cmp(&other.0))
+    };
+    let percent = |found: Option<(f64, String)>| match found {
+        Some((value, place)) => (format!("{} %", number(value.into())), place),
+        None => ("\u{2013}".into(), "no motion was held out".into()),
+    };
+    let measured = percent(worst(&|fit| fit.percent_of_mean_abs.known()));
+    let noise_free = worst(&|fit| fit.percent_of_mean_abs_vs_truth.known());
+    let errors = run.base_parameters.iter().filter_map(|base| {
+        let sigma = base.sigma.known().filter(|sigma| *sigma > 0.0)?;
+        Some(((base.value.known()? - base.truth.known()?) / sigma, base.name.clone()))
+    });
+    let farthest = errors.max_by(|one, other| one.0.abs().total_cmp(&other.0.abs()));
+    let combinations = run.base_parameters.len();
+    let mut cards =
+        vec![("worst torque error on unused motions, of mean absolute torque", measured.0, measured.1)];
+    if noise_free.is_some() {
+        let (value, place) = percent(noise_free);
+        cards.push(("the same against the noise-free torque", value, place));
+    }
+    cards.push((
+        "combinations of parameters that the data determine",
+        format!("{} of {combinations}", run.rank),
+        format!("of {} parameters; condition {}", run.columns, number(run.condition)),
+    ));
+    if let Some((sigmas, name)) = farthest {
+        cards.push(("largest error of a base parameter", format!("{} sigma", signed(sigmas)), name));
+    }
+    html! { dl.cards { @for (what, value, place) in cards {
+        div { dt { (what) } dd { span.value { (value) } span.place { (place) } } }
+    } } }
+}
+
+/// The last line.
+pub fn colophon(run: &RunReport) -> Markup {
+    html! {
+        footer {
+            p { "Made by Scarab " (env!("CARGO_PKG_VERSION")) " in " (format!("{:.2}", run.wall_s)) " s. Values are SI; sigma \
+                is one standard deviation, of the torque's noise alone." }
+        }
+    }
+}

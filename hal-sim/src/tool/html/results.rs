@@ -1,0 +1,146 @@
+//! Motions, torques, search and tracking: words and tables beside their figures.
+
+use maud::{Markup, html};
+
+use super::super::replay::Source;
+use super::super::report::{FitReport, Number, RunReport};
+use super::super::scale;
+use super::number;
+
+/// Files of a replay.
+pub fn sources(sources: &[Source]) -> Markup {
+    html! {
+        section {
+            h2 { "Recordings" }
+            div.wide { table {
+                thead { tr {
+                    th scope="col" { "file" } th scope="col" { "use" }
+                    th.n scope="col" { "from, s" } th.n scope="col" { "length, s" } th.n scope="col" { "rate, Hz" }
+                    th.n scope="col" { "rows" } th.n scope="col" { "used, by joint" }
+                } }
+                tbody { @for source in sources { tr {
+                    td { (source.file.display()) } td { (source.role) }
+                    td.n { (format!("{:.2}", source.start_s)) } td.n { (format!("{:.2}", source.duration_s)) }
+                    td.n { (format!("{:.0}", source.rate_hz)) } td.n { (source.rows) }
+                    td.n { (source.used.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")) }
+                } } }
+            } }
+            p.note { "Rows are filtered to 50 a second. Those in which a joint stands still are not used for it: friction at \
+                rest is undetermined." }
+        }
+    }
+}
+
+/// What the figure of the angles shows.
+pub fn trajectory_words(run: &RunReport) -> Markup {
+    let words = if run.seed.is_some() {
+        "The first motion is identified from, the others are only predicted. The deviation is that of the position loop \
+         without a model."
+    } else {
+        "Angles as recorded, on the firmware's grid of 500 samples a second. A recording does not tell what was commanded."
+    };
+    html! { p { (words) } }
+}
+
+/// What the figures of the torque show.
+pub fn torque_words(run: &RunReport) -> Markup {
+    html! { p {
+        "Measured and predicted torque, both through the filter of the identification. The blue band is two standard \
+        deviations of the filtered noise to both sides, as the identification estimates it: nineteen of twenty residuals \
+        of a perfect model lie within it. Grey: the joint stands still, and the row is left out."
+        @if run.seed.is_some() { " The noise-free torque is known because the leg is simulated." }
+    } }
+}
+
+/// What the figure of the residuals shows.
+pub fn residual_words() -> Markup {
+    html! { p {
+        "A model that lacks nothing leaves noise. Then the bars follow the normal curve, and the autocorrelation that of \
+        white noise behind the same filter; correlation beyond it is motion that the model does not explain."
+    } }
+}
+
+/// How well every motion is explained.
+pub fn fits(run: &RunReport) -> Markup {
+    let all = || run.training.iter().chain(&run.validation);
+    let truth = all().any(|fit| fit.percent_of_mean_abs_vs_truth.known().is_some());
+    let row = |fit: &FitReport, role: &str| {
+        html! { tr {
+            td { (fit.motion) } td { (role) } td.n { (fit.joint) }
+            td.n { (number(fit.rms_nm)) } td.n { (number(fit.percent_of_mean_abs)) } td.n { (number(fit.percent_of_rms)) }
+            @if truth {
+                td.n { (number(fit.percent_of_mean_abs_vs_truth)) }
+                td.n { (number(Number(fit.sticking_share.known().map(|share| 100.0 * share)))) }
+            }
+        } }
+    };
+    html! {
+        h3 { "Torque errors" }
+        div.wide { table {
+            thead { tr {
+                th scope="col" { "motion" } th scope="col" { "use" } th.n scope="col" { "joint" }
+                th.n scope="col" { "rms, N\u{a0}m" } th.n scope="col" { "% of mean abs" } th.n scope="col" { "% of rms" }
+                @if truth { th.n scope="col" { "% of mean abs, noise-free" } th.n scope="col" { "sticking, %" } }
+            } }
+            tbody {
+                @for fit in &run.training { (row(fit, "training")) }
+                @for fit in &run.validation { (row(fit, "validation")) }
+            }
+        } }
+    }
+}
+
+/// What the search did.
+pub fn search(run: &RunReport) -> Markup {
+    let half = run.bso.iterations_to_half_chi2;
+    html! { p {
+        "The beetle swarm started cold and took " (run.bso.iterations) " iterations and " (run.bso.evaluations)
+        " evaluations. It ends " (number(run.bso.excess_chi2)) " chi-square units above the optimum J"
+        sub { "C" } " of its box, which double precision finds exactly; one unit is a shift by one standard deviation in one \
+        direction."
+        @if let Some(iterations) = half { " Half a unit was reached after " (iterations) " iterations." }
+        " Least squares costs " (number(run.least_squares.cost)) " units; the swarm's cost over that, less one, is "
+        (number(run.bso.cost_over_least_squares)) "."
+    } }
+}
+
+/// What the parameters are measured in, and what the leg carried; nothing for a recording, whose torques come as such.
+pub fn scale(run: &RunReport) -> Markup {
+    let lines = scale::lines(run);
+    html! { @if !lines.is_empty() {
+        section { h2 { "Scale and load" } @for line in lines { p { (capital(&line)) "." } } }
+    } }
+}
+
+fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// What the model is worth to the servo.
+pub fn tracking(run: &RunReport) -> Markup {
+    html! {
+        section {
+            h2 { "Tracking" }
+            p { "Position error on gait with a cycle of 3 s, same gains: feedback alone, and with the identified model in the \
+                feedforward." }
+            div.wide { table {
+                thead { tr {
+                    th.n scope="col" { "joint" } th.n scope="col" { "without the model, deg rms" }
+                    th.n scope="col" { "with it, deg rms" } th.n scope="col" { "smaller by" }
+                } }
+                tbody { @for tracking in &run.tracking {
+                    @let ratio = tracking.rms_deg_without_model.known().zip(tracking.rms_deg_with_model.known());
+                    tr {
+                        td.n { (tracking.joint) }
+                        td.n { (number(tracking.rms_deg_without_model)) } td.n { (number(tracking.rms_deg_with_model)) }
+                        td.n { @match ratio {
+                            Some((without, with)) if with > 0.0 => { (format!("{:.1} times", without / with)) },
+                            _ => { "\u{2013}" },
+                        } }
+                    }
+                } }
+            } }
+        }
+    }
+}
