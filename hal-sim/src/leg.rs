@@ -33,6 +33,8 @@ pub const FINE_STEPS: u32 = 8;
 pub struct Leg<const N: usize> {
     mechanism: Mechanism<N>,
     friction: [FrictionDescription; N],
+    /// Joints that something blocks: no torque moves them.
+    blocked: [bool; N],
 }
 
 /// Angles, rad, and rates, rad/s, of the joints; a rate of exactly 0 is a joint at rest.
@@ -51,7 +53,20 @@ impl<const N: usize> Leg<N> {
         Self {
             mechanism: Mechanism::new(description),
             friction: core::array::from_fn(|joint| description.joints[joint].friction),
+            blocked: [false; N],
         }
+    }
+
+    /// The same leg with these joints mechanically blocked; their rates must be 0.
+    #[must_use]
+    pub fn with_blocked(mut self, blocked: [bool; N]) -> Self {
+        self.blocked = blocked;
+        self
+    }
+
+    /// What it takes to move a resting joint; a blocked one never does.
+    fn breakaway(&self, levels: [f64; N]) -> [f64; N] {
+        core::array::from_fn(|joint| if self.blocked[joint] { f64::INFINITY } else { levels[joint] })
     }
 
     /// The rigid bodies alone.
@@ -87,7 +102,7 @@ impl<const N: usize> Leg<N> {
                 torque[joint] - coriolis[joint] - dynamics.gravity[joint] - smooth
             }),
             sliding: levels,
-            breakaway: levels,
+            breakaway: self.breakaway(levels),
             committed: state.rates.map(|rate| rate != 0.0),
         };
         slide.solve(&state.rates.map(Contact::of))
@@ -132,7 +147,7 @@ impl<const N: usize> Leg<N> {
             core::array::from_fn(|joint| duration * self.friction[joint].dry_level(rate[joint]))
         };
         let present = rates.map(Contact::of);
-        let breakaway = impulse(&[0.0; N]);
+        let breakaway = self.breakaway(impulse(&[0.0; N]));
         let mut slide = Slide { matrix, momentum, sliding: impulse(rates), breakaway, committed: [false; N] };
         let mut after = slide.solve(&present);
         if self.friction.iter().any(|friction| friction.stribeck.is_some()) {

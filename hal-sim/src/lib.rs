@@ -12,6 +12,7 @@
 //! | [`mechanism`] | rigid bodies: inertia matrix, Christoffel symbols, gravity, energies |
 //! | [`friction`] | Coulomb that sticks, viscous, Stribeck, offset; which joint sticks and which slides |
 //! | [`leg`] | mechanism and friction moved through time |
+//! | [`floor`] | contact under the foot |
 //! | [`drive`], [`gear`], [`sensors`], [`wearer`] | current with lag; ratio; encoder and current sensor; pushes |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 //!
@@ -21,6 +22,7 @@
 pub mod conventions;
 pub mod description;
 pub mod drive;
+pub mod floor;
 pub mod friction;
 pub mod gear;
 pub mod leg;

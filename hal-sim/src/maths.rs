@@ -21,6 +21,12 @@ pub(crate) fn ln(value: f64) -> f64 {
     libm::log(value)
 }
 
+/// Square root.
+#[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]
+pub(crate) fn sqrt(value: f64) -> f64 {
+    libm::sqrt(value)
+}
+
 /// Nearest whole number, halves upward; saturates at the ends of `i64`, 0 for NaN.
 pub(crate) fn nearest(value: f64) -> i64 {
     let shifted = value + 0.5;

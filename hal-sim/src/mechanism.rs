@@ -158,6 +158,33 @@ impl<const N: usize> Mechanism<N> {
         core::array::from_fn(|j| inertial[j] + coriolis[j] + dynamics.gravity[j])
     }
 
+    /// A point of the last link, given from its joint in the world frame at the reference pose (m): where it is at joint
+    /// angles (rad), and how it moves with each joint, m/rad.
+    #[must_use]
+    pub fn point_of_last_link(
+        &self,
+        angles: &[f64; N],
+        from_joint: &Vector3<f64>,
+    ) -> (Vector3<f64>, [Vector3<f64>; N]) {
+        let mut orientation = Matrix3::identity();
+        let (mut points, mut axes) = ([Vector3::zeros(); N], [Vector3::zeros(); N]);
+        let mut point = Vector3::zeros();
+        for (joint, link) in self.links.iter().enumerate() {
+            point += orientation * link.from_previous;
+            points[joint] = point;
+            axes[joint] = orientation * link.axis;
+            orientation *= turn_about(&link.axis, angles[joint]);
+        }
+        let place = point + orientation * from_joint;
+        (place, core::array::from_fn(|joint| axes[joint].cross(&(place - points[joint]))))
+    }
+
+    /// Unit vector against gravity; zero without gravity.
+    #[must_use]
+    pub fn up(&self) -> Vector3<f64> {
+        self.gravity.try_normalize(0.0).map_or_else(Vector3::zeros, |down| -down)
+    }
+
     /// Kinetic energy of bodies and rotors, J.
     #[must_use]
     pub fn kinetic_energy(&self, angles: &[f64; N], rates: &[f64; N]) -> f64 {

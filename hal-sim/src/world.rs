@@ -8,9 +8,10 @@
 //! over [`LegDrives::command`] (acts from this instant), [`World::advance`] to the next; or [`World::tick`],
 //! which does the last two and reads. All public angles and torques are anatomical.
 
-use crate::conventions::Anatomy;
+use crate::conventions::{Anatomy, links_at_reference};
 use crate::description::LegDescription;
 use crate::drive::Drive;
+use crate::floor::Floor;
 use crate::leg::{Leg, LegState};
 use crate::sensors::{CurrentSensor, Encoder};
 use crate::wearer::Wearer;
@@ -33,7 +34,7 @@ pub struct Truth<const N: usize> {
     pub position: [f64; N],
     /// Joint rates, rad/s; exactly 0 while a joint sticks.
     pub velocity: [f64; N],
-    /// Joint accelerations, rad/s^2, under the motor torque of this instant (pushes left out).
+    /// Joint accelerations, rad/s^2, under the motor torque of this instant (pushes and floor left out).
     pub acceleration: [f64; N],
     /// Torque of the motors at the joints, N m.
     pub motor_torque: [f64; N],
@@ -54,6 +55,8 @@ pub struct World<const N: usize> {
     /// Sense of motors and encoders in the anatomical one, 1 or -1.
     mounting: f64,
     wearer: Wearer,
+    blocked: [bool; N],
+    floor: Option<Floor>,
     sensor_noise: Xoshiro256PlusPlus,
     tick: u64,
     newest: Sample<N>,
@@ -77,6 +80,8 @@ impl<const N: usize> World<N> {
             current_sensors: joints.map(|joint| CurrentSensor::new(&joint.current_sensor)),
             mounting: if description.mirrored { -1.0 } else { 1.0 },
             wearer: Wearer::new(description.pushes, N, pushes),
+            blocked: [false; N],
+            floor: None,
             sensor_noise,
             tick: 0,
             newest: Sample { joints: [JointSample::default(); N] },
@@ -100,8 +105,27 @@ impl<const N: usize> World<N> {
     pub fn attach(&mut self, joint: usize, mass: f64, at: [f64; 3]) {
         if let Some(joint) = self.description.joints.get_mut(joint) {
             joint.body = joint.body.with_point_mass(mass, at);
-            self.leg = Leg::new(&self.description);
+            self.leg = Leg::new(&self.description).with_blocked(self.blocked);
         }
+    }
+
+    /// Blocks a joint where it stands, from this instant on. Nothing happens where there is no such joint.
+    pub fn block(&mut self, joint: usize) {
+        if let (Some(blocked), Some(rate)) = (self.blocked.get_mut(joint), self.state.rates.get_mut(joint)) {
+            (*blocked, *rate) = (true, 0.0);
+            self.leg = self.leg.with_blocked(self.blocked);
+        }
+    }
+
+    /// The foot, at a place (m) of the last link in its D-H frame, stands on the floor ([`Floor`]) from `delay` s after
+    /// this instant, for `duration` s.
+    pub fn touch(&mut self, foot: [f64; 3], delay: f64, duration: f64) {
+        let mut joints = self.description.joints;
+        if let Some(last) = joints.last_mut() {
+            last.body.com = foot;
+        }
+        let foot = links_at_reference(&joints).last().map(|link| link.to_centre);
+        self.floor = foot.map(|foot| Floor::new(foot, self.tick as f64 * TICK_S + delay, duration));
     }
 
     /// Sets each joint's current noise: standard deviation per logged 500 Hz sample, A.
@@ -121,11 +145,17 @@ impl<const N: usize> World<N> {
     /// To the next servo tick.
     pub fn advance(&mut self) {
         let pushed: [f64; N] = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
-        let from = self.joint_torque(&pushed);
+        let stood: [f64; N] = match &mut self.floor {
+            Some(floor) => floor.torque(self.leg.mechanism(), &self.state, self.tick as f64 * TICK_S),
+            None => [0.0; N],
+        };
+        let with_floor =
+            |torque: [f64; N]| -> [f64; N] { core::array::from_fn(|joint| torque[joint] + stood[joint]) };
+        let from = with_floor(self.joint_torque(&pushed));
         for drive in &mut self.drives {
             drive.advance();
         }
-        let to = self.joint_torque(&pushed);
+        let to = with_floor(self.joint_torque(&pushed));
         self.leg.advance(&mut self.state, &from, &to, TICK_S);
         self.tick += 1;
         self.read_sensors();
