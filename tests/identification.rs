@@ -6,7 +6,8 @@ use nalgebra::Vector3;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::ident::{
-    Estimate, Factor, Plan, Problem, Pyramid, Reason, Recorder, RowModel, Thresholds, Verdict,
+    Docket, Estimate, Evidence, Factor, Plan, Problem, Pyramid, Reason, Recorder, RowModel, Thresholds,
+    Verdict,
 };
 use scarab::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, joint_torques};
 
@@ -171,10 +172,12 @@ fn judge(recorder: &mut LegRecorder) -> Verdict {
     let (record, model, thresholds) = (recorder.finish(), model(), Thresholds::default());
     let problem = Problem::new(&record, &model);
     let found = problem.least_squares(Plan::OneTime);
-    thresholds
-        .judge_input(&model, &record)
-        .and(thresholds.judge_excitation(&model, &problem.whole(), found.rank()))
-        .and(thresholds.judge_physics(&model, &record, &found))
+    let mut unheard = |_: &Evidence<f32>| {};
+    let mut docket = Docket::new(&mut unheard);
+    thresholds.judge_input(&model, &record, &mut docket);
+    thresholds.judge_excitation(&model, &problem.whole(), found.rank(), &mut docket);
+    thresholds.judge_physics(&model, &record, &found, &mut docket);
+    docket.verdict()
 }
 
 #[test]
@@ -216,7 +219,10 @@ fn a_finite_but_absurd_angle_at_the_end_is_refused_as_input_and_leaves_no_nan() 
     }
     let record = recorder.finish();
     assert!(record.rejected > 0 && record.factors.iter().all(|factor| factor.residual().is_finite()));
-    assert!(Thresholds::default().judge_input(&model(), &record).has(Reason::Input));
+    let mut unheard = |_: &Evidence<f32>| {};
+    let mut docket = Docket::new(&mut unheard);
+    Thresholds::default().judge_input(&model(), &record, &mut docket);
+    assert!(docket.verdict().has(Reason::Input));
 }
 
 #[test]

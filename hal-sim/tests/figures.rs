@@ -25,6 +25,7 @@ fn identified() -> (RunReport, Series) {
         payload: None,
         load: None,
         with_series: true,
+        perturbations: Vec::new(),
     };
     identify_one::<2, 13>(&leg, &options, None).expect("it runs")
 }

@@ -144,7 +144,7 @@ fn a_motionless_joint_is_refused_as_unexcited() {
         .collect();
     let still = folder.write("still.csv", &pendulum::csv(&still));
     let run = scarab("replay", &[&still, Path::new("--leg"), &leg, Path::new("--json"), &json]).ends_with(3);
-    assert!(run.printed.contains("unexcited: a joint hardly moved"), "{}", run.printed);
+    assert!(run.printed.contains("unexcited: joint 1 hardly moved"), "{}", run.printed);
     assert!(reasons(&folder.json("report.json")).contains(&"unexcited"));
 
     // One joint of two: the knee's column repeats its first angle.

@@ -5,19 +5,24 @@
 //! factor -> estimate: noise weights, least squares, covariance
 //!        -> search: beetle swarm in the prior's box (bounds), against the constrained optimum (constrained)
 //!        -> completion: fourteen parameters of every joint, each with its status
+//! held-out motions -> residual, alignment (held_out): its order in time, and what it asks for
 //!        -> verdict: accepted, or refused with reasons
 //! scale: torque constants from two records, without and with a known mass
 //! ```
 //!
 //! Everything is generic over the scalar: the board runs it in `f32`, tests check it in `f64`.
 
+pub mod alignment;
 pub mod bounds;
 pub mod completion;
 pub mod constrained;
 pub mod estimate;
 pub mod factor;
+pub mod held_out;
 pub mod kernel;
+pub mod noise;
 pub mod record;
+pub mod residual;
 pub mod rows;
 pub mod scale;
 pub mod search;
@@ -25,19 +30,22 @@ pub mod smoothing;
 pub mod solver;
 pub mod verdict;
 
+pub use alignment::{Alignment, Direction, Misalignment, Misalignments};
 pub use bounds::{LinkPrior, prior_parameters, search_box};
 pub use completion::{Status, complete, status};
 pub use constrained::{ParameterBox, least_squares_in_box};
 pub use estimate::{Estimate, Plan, Problem, Stage, noise};
 pub use factor::{Factor, Pyramid};
+pub use held_out::HeldOut;
 pub use kernel::{Kernel, KernelError, LowPass};
 pub use record::{
     LARGEST_STILL_SHARE, Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS,
     TorqueSize,
 };
+pub use residual::{JointResidual, Residual};
 pub use rows::{DECIMATION, Ends, FilteredRows, RowFilter};
 pub use scale::{ConstantRatio, torque_constant_ratio, widen};
 pub use search::{SearchState, SwarmSearch};
 pub use smoothing::{Smoothed, Smoother};
 pub use solver::Solver;
-pub use verdict::{Reason, Thresholds, Verdict};
+pub use verdict::{Docket, Evidence, Reason, Test, Thresholds, Unused, Verdict};

@@ -10,8 +10,10 @@
 
 use nalgebra::Vector3;
 
+use super::estimate::Estimate;
 use super::factor::{Factor, Pyramid};
 use super::kernel::{Kernel, KernelError, LowPass};
+use super::noise::NoiseLevel;
 use super::rows::{DECIMATION, Ends, FilteredRows, RowFilter};
 use super::smoothing::{Smoothed, Smoother};
 use crate::model::{BaseParameters, Chain, JointState, regressor};
@@ -113,6 +115,8 @@ pub struct Record<T, const N: usize, const B: usize> {
     pub rejected: u32,
     /// Information of one row in units of independent ones, `m sum h^2`: below one because rows overlap.
     pub row_information: T,
+    /// Standard deviation of the torque noise of one 500 Hz sample, from its own scatter, N m; zero where not known.
+    pub noise: [T; N],
 }
 
 impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
@@ -130,7 +134,34 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
             rows: self.rows,
             rejected: self.rejected,
             row_information: convert(self.row_information),
+            noise: self.noise.map(convert),
         }
+    }
+
+    /// Standard deviation that noise alone leaves of one joint's filtered torque, N m; `None` where it is not known.
+    #[must_use]
+    pub fn filtered_noise(&self, joint: usize) -> Option<T> {
+        let energy = self.row_information / T::of(DECIMATION as f64); // sum h^2
+        self.noise.get(joint).filter(|&&noise| noise > T::zero()).map(|&noise| noise * real::sqrt(energy))
+    }
+
+    /// Root mean square of what the parameters' covariance leaves uncertain of one joint's torque, N m:
+    /// `tr(R Cov R') / rows`.
+    #[must_use]
+    #[inline(never)]
+    pub fn uncertainty(&self, joint: usize, estimate: &Estimate<T, B>) -> T {
+        let (Some(factor), Some(&rows)) = (self.factors.get(joint), self.rows.get(joint)) else {
+            return T::zero();
+        };
+        let mut sum = T::zero();
+        for row in factor.triangle() {
+            for (one, covariances) in row.iter().zip(&estimate.covariance) {
+                for (other, &covariance) in row.iter().zip(covariances) {
+                    sum += *one * covariance * *other;
+                }
+            }
+        }
+        real::sqrt(real::max(sum, T::zero()) / T::of(f64::from(rows.max(1))))
     }
 
     /// Root mean square torque error of one joint with these base parameters, N m.
@@ -154,6 +185,7 @@ pub struct Recorder<T, const N: usize, const B: usize, const TAPS: usize, const 
     smoother: Smoother<T, N, TAPS>,
     filter: RowFilter<T, N, B, PENDING>,
     pyramids: [Pyramid<T, B>; N],
+    noise: [NoiseLevel<T>; N],
     absolute: [Sum<T>; N],
     squared: [Sum<T>; N],
     speed: [Sum<T>; N],
@@ -191,6 +223,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             smoother: Smoother::new(),
             filter: RowFilter::new(Ends::Cut),
             pyramids: core::array::from_fn(|_| Pyramid::new()),
+            noise: [NoiseLevel::new(); N],
             absolute: [Sum::zero(); N],
             squared: [Sum::zero(); N],
             speed: [Sum::zero(); N],
@@ -206,11 +239,18 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         self.smoothing.reach()
     }
 
+    /// Taps of the low-pass to each side of a row's centre.
+    #[must_use]
+    pub fn reach(&self) -> usize {
+        self.low_pass.reach()
+    }
+
     /// Forgets everything: a new motion begins.
     pub fn clear(&mut self, ends: Ends) {
         self.smoother.clear();
         self.filter = RowFilter::new(ends);
         self.pyramids.iter_mut().for_each(Pyramid::clear);
+        self.noise = [NoiseLevel::new(); N];
         self.absolute = [Sum::zero(); N];
         self.squared = [Sum::zero(); N];
         self.speed = [Sum::zero(); N];
@@ -221,6 +261,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     /// many rows the cut windows at the end gave.
     pub fn break_off(&mut self) -> u32 {
         self.smoother.clear();
+        self.noise.iter_mut().for_each(NoiseLevel::break_off);
         let mut finished = 0;
         while let Some(rows) = self.filter.finish(&self.low_pass) {
             self.take(&rows);
@@ -256,6 +297,9 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             self.rejected = self.rejected.saturating_add(1);
             self.break_off();
             return None;
+        }
+        for (noise, &torque) in self.noise.iter_mut().zip(torque) {
+            noise.push(torque);
         }
         let instant = self.smoother.push(&self.smoothing, position, torque)?;
         self.instants = self.instants.saturating_add(1);
@@ -294,6 +338,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             rows: self.rows,
             rejected: self.rejected,
             row_information: T::of(DECIMATION as f64) * self.low_pass.energy(),
+            noise: self.noise.map(|noise| noise.sigma()),
         }
     }
 }

@@ -174,6 +174,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
                 size.mean_absolute *= root_mean_square / size.root_mean_square;
             }
             size.root_mean_square = root_mean_square;
+            record.noise[joint] /= ratio;
         }
         record
     }

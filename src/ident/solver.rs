@@ -4,13 +4,15 @@
 //! its end. The result is the swarm's, in the box the prior allows; the covariance is that of the least-squares
 //! problem, whose optimum the swarm is measured against.
 
+use super::alignment::{Alignment, Misalignments};
 use super::bounds::{LinkPrior, search_box};
 use super::constrained::ParameterBox;
 use super::estimate::{Estimate, Plan, Problem};
+use super::factor::Factor;
 use super::record::{Record, RowModel};
 use super::scale::widen;
 use super::search::{SearchState, SwarmSearch};
-use super::verdict::{Thresholds, Verdict};
+use super::verdict::{Docket, Evidence, Reason, Test, Thresholds, Unused, Verdict};
 use crate::real::Real;
 use crate::swarm::BsoSettings;
 
@@ -21,9 +23,10 @@ pub struct Solver<T: Real, const N: usize, const B: usize> {
     plan: Plan,
     least_squares: Estimate<T, B>,
     condition: Option<T>,
-    before_search: Verdict,
     search: SwarmSearch<T, B>,
     bounds: ParameterBox<T, B>,
+    /// Values to be judged instead of those found.
+    given: Option<[T; B]>,
 }
 
 impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
@@ -35,19 +38,14 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         plan: Plan,
         prior: Option<&[LinkPrior<T>; N]>,
         swarm_seed: u64,
-        thresholds: &Thresholds<T>,
     ) -> Self {
         let problem = Problem::new(&record, model);
         let whole = problem.whole();
         let least_squares = problem.least_squares(plan);
         let bounds = search_box(model, &record, prior);
         let search = SwarmSearch::new(&problem, plan, bounds, BsoSettings::default(), swarm_seed);
-        let before_search = {
-            let rank = least_squares.rank();
-            thresholds.judge_input(model, &record).and(thresholds.judge_excitation(model, &whole, rank))
-        };
         let condition = whole.condition();
-        Self { record, plan, least_squares, condition, before_search, search, bounds }
+        Self { record, plan, least_squares, condition, search, bounds, given: None }
     }
 
     /// Spends up to `evaluations` of the cost on the search; any slicing gives the same result.
@@ -98,10 +96,22 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         self.condition
     }
 
-    /// The swarm's base parameters with the covariance of the problem.
+    /// Puts these base values, those of a stored model say, in the place of those found: unused motions are then held
+    /// against them.
+    pub fn examine(&mut self, values: &[T; B]) {
+        self.given = Some(*values);
+    }
+
+    /// The base values that are judged: the swarm's unless others were given.
+    #[must_use]
+    pub fn values(&self) -> [T; B] {
+        self.given.unwrap_or_else(|| self.search.values())
+    }
+
+    /// The base parameters that are judged, the swarm's unless others were given, with the covariance of the problem.
     #[must_use]
     pub fn estimate(&self) -> Estimate<T, B> {
-        Estimate { values: self.search.values(), ..self.least_squares.clone() }
+        Estimate { values: self.values(), ..self.least_squares.clone() }
     }
 
     /// Cost of the result above that of the plan's least squares, chi-square units of all rows together.
@@ -117,25 +127,70 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         cost(&self.search.values()) - cost(&self.least_squares.values)
     }
 
-    /// Accepted, or refused with all reasons that apply, given records of motions that were not used.
+    /// Torque error of a row above which it is no noise, N m: six standard deviations and a twentieth of the torque.
     #[must_use]
+    pub fn unexpected(&self) -> [T; N] {
+        let values = self.search.values();
+        core::array::from_fn(|joint| {
+            let size = self.record.torque[joint].root_mean_square;
+            let error = self.record.torque_error(joint, &values).unwrap_or(size);
+            T::of(6.0) * error + T::of(0.05) * size
+        })
+    }
+
+    /// Which other lengths and zeros the records of unused motions, looked at by `alignment`, ask for.
+    #[must_use]
+    pub fn misalignments<'a, const PENDING: usize>(
+        &self,
+        model: &RowModel<T, N, B>,
+        unused: impl Iterator<Item = &'a Record<T, N, B>>,
+        alignment: &Alignment<T, N, B, PENDING>,
+    ) -> Misalignments<T> {
+        let problem = Problem::new(&self.record, model);
+        let mut information = Factor::new();
+        for record in unused {
+            for (factor, &sigma) in record.factors.iter().zip(problem.noise()) {
+                information.merge_scaled(factor, T::one() / sigma);
+            }
+        }
+        alignment.misalignments(&information, problem.noise())
+    }
+
+    /// Accepted, or refused with all reasons that apply, given motions that were not used and what they ask for; every
+    /// piece of evidence goes to `hand_on`.
     pub fn judge<'a>(
         &self,
         model: &RowModel<T, N, B>,
         thresholds: &Thresholds<T>,
-        unused: impl Iterator<Item = &'a Record<T, N, B>>,
+        unused: impl Iterator<Item = Unused<'a, T, N, B>>,
+        asked: &Misalignments<T>,
+        hand_on: &mut dyn FnMut(&Evidence<T>),
     ) -> Verdict {
+        let docket = &mut Docket::new(hand_on);
+        let problem = Problem::new(&self.record, model);
+        thresholds.judge_input(model, &self.record, docket);
+        thresholds.judge_excitation(model, &problem.whole(), self.least_squares.rank(), docket);
+        let done = if self.search.state() == SearchState::Done { T::one() } else { T::zero() };
+        docket.at_least(Reason::Input, Test::Search, None, done, T::one());
+        let found = self.search.values();
         let estimate = self.estimate();
-        let input = match self.search.state() {
-            SearchState::Done => Verdict::ACCEPTED,
-            SearchState::Running | SearchState::Failed(_) => Verdict::refused(super::Reason::Input),
-        };
-        self.before_search
-            .and(input)
-            .and(thresholds.judge_physics(model, &self.record, &self.least_squares))
-            .and(thresholds.judge_physics(model, &self.record, &estimate))
-            .and(thresholds.judge_box(self.excess(model), model.base.rank()))
-            .and(thresholds.judge_residual(&self.record, &estimate.values))
-            .and(thresholds.judge_validation(&self.record, unused, &estimate.values))
+        if !docket.verdict().has(Reason::Unexcited) {
+            // Of parameters that the motion did not show nothing can be said.
+            thresholds.judge_physics(model, &self.record, &self.least_squares, docket);
+            thresholds.judge_physics(model, &self.record, &estimate, docket);
+            thresholds.judge_box(self.excess(model), model.base.rank(), docket);
+        }
+        thresholds.judge_measurement(model, &self.record, &found, docket);
+        thresholds.judge_residual(&self.record, &found, docket);
+        let noise_is_known = self.record.noise.iter().all(|&noise| noise > T::zero());
+        for (motion, unused) in unused.enumerate() {
+            thresholds.judge_validation(&self.record, motion, unused.record, &estimate, docket);
+            thresholds.judge_colour(motion, &unused, docket);
+            thresholds.judge_contact(motion, &unused, docket);
+        }
+        for found in asked.iter().flatten() {
+            thresholds.judge_alignment(found, noise_is_known, docket);
+        }
+        docket.verdict()
     }
 }

@@ -5,7 +5,8 @@ use super::configuration::{LegConfiguration, LegError};
 use super::control::LoggedSample;
 use super::model::IdentifiedModel;
 use crate::ident::{
-    Ends, LinkPrior, Plan, Reason, Record, Recorder, RowModel, SearchState, Solver, Thresholds, Verdict,
+    Ends, Evidence, HeldOut, LinkPrior, Misalignments, Plan, Reason, Record, Recorder, Residual, RowModel,
+    SearchState, Solver, Thresholds, Unused, Verdict,
 };
 
 /// What identification tells control.
@@ -45,6 +46,8 @@ pub struct Identification<const N: usize, const B: usize, const TAPS: usize, con
     work: Work,
     solver: Option<Solver<f32, N, B>>,
     validation: [Option<Record<f32, N, B>>; VALIDATION_MOTIONS],
+    held_out: HeldOut<f32, N, B, PENDING>,
+    residuals: [Residual<f32, N>; VALIDATION_MOTIONS],
     verdict: Option<Verdict>,
     report_due: bool,
 }
@@ -57,13 +60,16 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     /// # Errors
     /// [`LegError::Kernel`] when the filter does not fit.
     pub fn new(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
+        let recorder = Recorder::new(configuration.bandwidth_hz)?;
         Ok(Self {
+            held_out: HeldOut::new(recorder.reach()),
+            residuals: [Residual::new(); VALIDATION_MOTIONS],
+            recorder,
             model: configuration.model.clone(),
             prior: configuration.prior,
             plan: configuration.plan,
             swarm_seed: configuration.swarm_seed,
             thresholds: configuration.thresholds,
-            recorder: Recorder::new(configuration.bandwidth_hz)?,
             work: Work::Idle,
             solver: None,
             validation: [const { None }; VALIDATION_MOTIONS],
@@ -87,7 +93,14 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             }
         }
         if logged.segment.is_some() {
-            self.recorder.push(&self.model, &logged.sample.position_rad, &logged.sample.torque_nm);
+            let sample = &logged.sample;
+            let progress = self.recorder.push(&self.model, &sample.position_rad, &sample.torque_nm);
+            match (logged.segment, progress) {
+                (Some(Segment::Validation(_)), Some(progress)) => self.held_out.take(&self.model, &progress),
+                // A sample that was not finite: the windows start anew.
+                (Some(Segment::Validation(_)), None) => self.held_out.break_off(),
+                _ => {}
+            }
         }
     }
 
@@ -99,8 +112,11 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         self.work = Work::Recording(segment);
         if segment == Segment::Training {
             self.solver = None;
+            self.held_out.clear();
             self.validation = [const { None }; VALIDATION_MOTIONS];
             self.verdict = None;
+        } else if let Some(solver) = &self.solver {
+            self.held_out.begin(&solver.values(), &solver.unexpected());
         }
     }
 
@@ -108,15 +124,18 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         let record = self.recorder.finish();
         match segment {
             Segment::Training => {
-                let seed = self.swarm_seed;
                 let solver =
-                    Solver::new(&self.model, record, self.plan, self.prior.as_ref(), seed, &self.thresholds);
+                    Solver::new(&self.model, record, self.plan, self.prior.as_ref(), self.swarm_seed);
                 self.solver = Some(solver);
                 self.work = Work::Solving;
             }
             Segment::Validation(motion) => {
-                if let Some(slot) = self.validation.get_mut(usize::from(motion)) {
+                let motion = usize::from(motion);
+                if let (Some(slot), Some(residual)) =
+                    (self.validation.get_mut(motion), self.residuals.get_mut(motion))
+                {
                     *slot = Some(record);
+                    *residual = *self.held_out.residual();
                 }
                 self.work = Work::Idle;
                 self.report_due = self.validation.iter().all(Option::is_some);
@@ -148,14 +167,44 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     }
 
     fn judge(&mut self) -> Finding<N> {
-        let verdict = self.solver.as_ref().map_or(Verdict::refused(Reason::Input), |solver| {
-            let records = self.validation.each_ref().map(Option::as_ref);
-            solver.judge(&self.model, &self.thresholds, records.into_iter().flatten())
-        });
+        let verdict = self.judge_with(&mut |_| {});
         self.verdict = Some(verdict);
         let values = self.solver.as_ref().map(|solver| solver.estimate().values);
         let model = values.filter(|_| verdict.is_accepted());
         Finding::Judged { verdict, model: model.map(|values| IdentifiedModel::new(&self.model, &values)) }
+    }
+
+    /// The verdict on what was recorded so far; every piece of evidence goes to `hand_on`.
+    pub fn judge_with(&self, hand_on: &mut dyn FnMut(&Evidence<f32>)) -> Verdict {
+        self.solver.as_ref().map_or(Verdict::refused(Reason::Input), |solver| {
+            let recorded = self.validation.iter().zip(&self.residuals);
+            let unused = recorded
+                .filter_map(|(record, residual)| record.as_ref().map(|record| Unused { record, residual }));
+            solver.judge(&self.model, &self.thresholds, unused, &self.misalignments(), hand_on)
+        })
+    }
+
+    /// Which other lengths and zeros the motions that were predicted ask for.
+    #[must_use]
+    pub fn misalignments(&self) -> Misalignments<f32> {
+        self.solver.as_ref().map_or([None; _], |solver| {
+            let records = self.validation.iter().flatten();
+            solver.misalignments(&self.model, records, self.held_out.alignment())
+        })
+    }
+
+    /// What the motions that were predicted left unexplained, in order of time.
+    #[must_use]
+    pub fn residuals(&self) -> &[Residual<f32, N>; VALIDATION_MOTIONS] {
+        &self.residuals
+    }
+
+    /// Puts these base values in the place of those found, once the search is done: the motions that follow are held
+    /// against them. So a stored model is checked before it is used again.
+    pub fn examine(&mut self, values: &[f32; B]) {
+        if let Some(solver) = self.solver.as_mut().filter(|_| self.work != Work::Solving) {
+            solver.examine(values);
+        }
     }
 
     /// Stops everything; what was found before stays.

@@ -73,6 +73,11 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         output
     }
 
+    /// Has these base values validated in the place of those found; see [`Identification::examine`].
+    pub fn examine(&mut self, values: &[f32; B]) {
+        self.identification.examine(values);
+    }
+
     /// The half that moves.
     #[must_use]
     pub fn control(&self) -> &Control<N> {

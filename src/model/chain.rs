@@ -108,6 +108,22 @@ impl<T: Real, const N: usize> Chain<T, N> {
             .map(|placement| sqrt(placement.a * placement.a + placement.d * placement.d))
     }
 
+    /// Whether the common normal before `joint` has a length at all.
+    #[must_use]
+    pub fn has_length(&self, joint: usize) -> bool {
+        self.placements.get(joint).is_some_and(|placement| placement.a != T::zero())
+    }
+
+    /// The same chain with the length before `joint` multiplied by `factor`.
+    #[must_use]
+    pub fn with_length(&self, joint: usize, factor: T) -> Self {
+        let mut changed = *self;
+        if let Some(placement) = changed.placements.get_mut(joint) {
+            placement.a *= factor;
+        }
+        changed
+    }
+
     /// Numbers of each joint: sine and cosine of alpha, a, d.
     pub(super) fn numbers(&self) -> [(T, T, T, T); N] {
         self.placements.map(|placement| (placement.sin_alpha, placement.cos_alpha, placement.a, placement.d))

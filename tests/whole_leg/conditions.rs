@@ -75,8 +75,10 @@ fn a_wearer_who_pushes_hard_is_refused_with_every_number_known() {
 
 #[test]
 fn a_wearer_who_overpowers_the_drive_ends_in_a_fault_that_is_told() {
-    let error = pushed(200.0, 400.0).expect_err("400 N m against 85");
-    assert!(error.contains("the drive stopped during identification with fault 0x8400: joint "), "{error}");
+    let report = pushed(200.0, 400.0).expect("it ends");
+    assert_eq!(report.reasons, ["input"]);
+    let words = &report.findings.first().expect("the stop is told").words;
+    assert!(words.contains("the drive stopped during identification with fault 0x8400: joint "), "{words}");
 }
 
 #[test]

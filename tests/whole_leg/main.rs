@@ -7,6 +7,7 @@ mod conditions;
 mod failures;
 mod identification;
 mod memory;
+mod perturbations;
 mod scale;
 mod servo;
 
@@ -41,6 +42,7 @@ fn options(seed: u64) -> SimulationOptions {
         prior: PriorChoice::Default,
         payload: None,
         load: None,
+        perturbations: Vec::new(),
         with_series: false,
     }
 }

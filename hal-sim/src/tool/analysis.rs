@@ -9,6 +9,7 @@ use scarab::ident::{
 };
 use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter};
 
+use super::findings::FindingReport;
 use super::report::{
     BaseReport, FitReport, LeastSquaresReport, Number, ParameterReport, RunReport, SCHEMA, SwarmReport,
     TrackingReport,
@@ -63,6 +64,8 @@ pub struct Circumstances<const B: usize> {
     pub cramer_rao: Option<[f64; B]>,
     /// First iteration with an excess of at most a half.
     pub iterations_to_half_chi2: Option<u32>,
+    /// Every test of the verdict.
+    pub findings: Vec<FindingReport>,
     /// What the model is worth to the servo.
     pub tracking: Vec<TrackingReport>,
     /// Simulated or recorded time, s.
@@ -137,6 +140,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             plan: plan_name(solver.plan()),
             verdict: if verdict.is_accepted() { "accepted" } else { "refused" },
             reasons: verdict.reasons().map(scarab::ident::Reason::name).collect(),
+            findings: circumstances.findings.clone(),
             rank: solver.least_squares().rank(),
             columns: self.columns,
             condition: solver.condition().into(),

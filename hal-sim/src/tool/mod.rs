@@ -9,6 +9,8 @@
 //! | [`recording`], [`resample`], [`replay`] | identification on recordings |
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
 //! | [`series`], [`figures`], [`html`] | a run as curves, drawn, and on one page |
+//! | [`findings`] | what the verdict saw, in words |
+//! | [`perturb`] | what can be made wrong on purpose |
 //! | [`placed_mass`], [`scale`] | known masses: torque constants and loads |
 //! | [`regressor`] | torques and regressor of given states |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
@@ -24,11 +26,13 @@ pub mod anthropometry;
 pub mod cli;
 pub mod error;
 pub mod figures;
+pub mod findings;
 pub mod html;
 pub mod identify;
 pub mod leg_file;
 pub mod motions;
 pub mod pair;
+pub mod perturb;
 pub mod placed_mass;
 pub mod posture;
 pub mod recording;

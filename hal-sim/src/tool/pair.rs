@@ -49,7 +49,7 @@ pub struct Context<const N: usize, const B: usize> {
 }
 
 impl<const N: usize, const B: usize> Context<N, B> {
-    /// What a run of this leg is made from.
+    /// What a run of this leg, as the firmware believes it to be, is made from.
     pub fn new(leg: &LegFile, options: &SimulationOptions) -> Result<Self, ToolError> {
         let background = background::<N, B>(leg, options.prior, options.seed)?;
         let (configuration, motions) = configuration(leg, &background, options.plan, options.swarm_seed)?;
@@ -103,6 +103,8 @@ pub struct Pair<const N: usize, const B: usize> {
     pub ticks: u64,
     /// Evaluations of the search at each tick.
     pub evaluations: u32,
+    /// Which joint of the plant hangs on each joint's connectors.
+    wiring: [usize; N],
 }
 
 impl<const N: usize, const B: usize> Pair<N, B> {
@@ -120,13 +122,31 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         let device = DeviceLeg::new(&context.configuration)
             .map_err(|error| SetupError::new(leg, leg_error(leg, error)))?;
         let sample = world.sample();
-        Ok(Self { leg: Box::new(device), world, sample, ticks: 0, evaluations: EVALUATIONS_PER_TICK })
+        Ok(Self {
+            leg: Box::new(device),
+            world,
+            sample,
+            ticks: 0,
+            evaluations: EVALUATIONS_PER_TICK,
+            wiring: core::array::from_fn(|joint| joint),
+        })
+    }
+
+    /// Exchanges the connectors of two joints, motor and encoder together, before the drive is enabled.
+    pub fn exchange(&mut self, one: usize, other: usize) {
+        self.wiring.swap(one, other);
+        self.sample.joints.swap(one, other);
     }
 
     /// One servo tick of both.
     pub fn tick(&mut self, request: Option<ControlRequest<N>>, gravity: [f32; 3]) -> ControlOutput<N> {
         let output = self.leg.tick(&self.sample, request, gravity, self.evaluations);
-        self.sample = self.world.tick(output.servo.drive());
+        let mut command = *output.servo.drive();
+        for (joint, &wired) in self.wiring.iter().enumerate() {
+            command.currents[wired] = output.servo.drive().currents[joint];
+        }
+        let sample = self.world.tick(&command);
+        self.sample.joints = self.wiring.map(|wired| sample.joints[wired]);
         self.ticks += 1;
         output
     }

@@ -4,11 +4,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use scarab::ident::{Ends, KernelError, Plan, Recorder, SearchState, Smoothed, Solver, Thresholds};
+use scarab::ident::{
+    Ends, HeldOut, KernelError, Plan, Progress, Recorder, SearchState, Solver, Thresholds, Unused,
+};
 use scarab::model::AnatomicalJoint;
 
 use super::analysis::{Background, Circumstances, Motion};
 use super::error::ToolError;
+use super::findings::FindingReport;
 use super::leg_file::LegFile;
 use super::recording::{Recording, RecordingError};
 use super::report::RunReport;
@@ -20,6 +23,8 @@ use super::setup::{PriorChoice, anatomy, background};
 const TAPS: usize = 2048;
 /// Open outputs that go with them.
 const PENDING: usize = 205;
+/// From one sample of the firmware to the next.
+const GRID_S: f64 = 0.002;
 /// Evaluations between two looks at the search.
 const SLICE: u32 = 20;
 /// A recording may go this far beyond the leg's range before that is worth a warning.
@@ -83,6 +88,8 @@ struct Samples<const N: usize> {
     file: PathBuf,
     rate_hz: f64,
     start_s: f64,
+    /// Sampled at the firmware's instants, so that its scatter is the sensor's own.
+    native: bool,
     position: Vec<[f32; N]>,
     torque: Vec<[f32; N]>,
 }
@@ -100,6 +107,7 @@ impl<const N: usize> Samples<N> {
             file: recording.file.clone(),
             rate_hz: grid.native_rate_hz,
             start_s: grid.start_s,
+            native: recording.time_s.windows(2).all(|pair| (pair[1] - pair[0] - GRID_S).abs() < 1e-6),
             position: position
                 .map(|q| core::array::from_fn(|joint| anatomy[joint].angle_to_chain(q[joint]) as f32))
                 .collect(),
@@ -120,6 +128,12 @@ pub fn replay<const N: usize, const B: usize>(
     options: &ReplayOptions,
 ) -> Result<Replayed, ToolError> {
     let started = Instant::now();
+    if let Some(twice) = options.validate.iter().find(|file| options.files.contains(file)) {
+        return Err(ToolError::input(format!(
+            "--validate {}: the file is identified from, it cannot be held out as well (--split holds out a part)",
+            twice.display()
+        )));
+    }
     let background = background::<N, B>(leg, options.prior, options.swarm_seed)?;
     let anatomy = anatomy::<N>(leg)?;
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
@@ -131,16 +145,13 @@ pub fn replay<const N: usize, const B: usize>(
 
     let mut sources = feed(&mut recorder, &background, &training, "training", |_, _, _| {});
     let thresholds = Thresholds::default();
-    let record = recorder.finish();
+    let mut record = recorder.finish();
+    if !training.iter().all(|samples| samples.native) {
+        record.noise = [0.0; N];
+    }
     let prior = background.prior.map(|prior| prior.map(|link| link.convert()));
-    let mut solver = Solver::new(
-        &background.device,
-        record.clone(),
-        options.plan,
-        prior.as_ref(),
-        options.swarm_seed,
-        &thresholds,
-    );
+    let mut solver =
+        Solver::new(&background.device, record.clone(), options.plan, prior.as_ref(), options.swarm_seed);
     let optimum = background.costs(&solver);
     let (mut to_half, mut progress) = (None, Vec::<(u32, f64)>::new());
     loop {
@@ -160,8 +171,17 @@ pub fn replay<const N: usize, const B: usize>(
 
     recorder.clear(Ends::Whole);
     let mut predictions = Vec::new();
-    let values = solver.estimate().values;
-    sources.extend(feed(&mut recorder, &background, &held_out, "validation", |file, time_s, instant| {
+    let values = solver.values();
+    let mut looked_at = Box::new(HeldOut::<f32, N, B, PENDING>::new(recorder.reach()));
+    looked_at.begin(&values, &solver.unexpected());
+    let mut current = 0;
+    sources.extend(feed(&mut recorder, &background, &held_out, "validation", |file, time_s, progress| {
+        if file != current {
+            looked_at.break_off();
+            current = file;
+        }
+        looked_at.take(&background.device, progress);
+        let instant = &progress.instant;
         let rows = background.device.rows(instant);
         predictions.push(Prediction {
             file,
@@ -172,15 +192,27 @@ pub fn replay<const N: usize, const B: usize>(
             }),
         });
     }));
-    let unused = recorder.finish();
+    let mut unused = recorder.finish();
+    if !held_out.iter().all(|samples| samples.native) {
+        unused.noise = [0.0; N];
+    }
     let validated = !held_out.is_empty();
-    let verdict = solver.judge(&background.device, &thresholds, validated.then_some(&unused).into_iter());
+    let mut findings = Vec::new();
+    let records = Unused { record: &unused, residual: looked_at.residual() };
+    let verdict = solver.judge(
+        &background.device,
+        &thresholds,
+        validated.then_some(records).into_iter(),
+        &solver.misalignments(&background.device, [&unused].into_iter(), looked_at.alignment()),
+        &mut |piece| findings.push(FindingReport::new(piece, &["recording"])),
+    );
     if let Some(path) = &options.csv {
         write_predictions(path, &predictions, &anatomy)
             .map_err(|error| ToolError::cannot_write(path, &error))?;
     }
     let motion = |record| Motion { name: "recording".into(), record, truth: None };
     let circumstances = Circumstances {
+        findings,
         iterations_to_half_chi2: to_half,
         simulated_s: training.iter().chain(&held_out).map(Samples::duration_s).sum(),
         wall: started.elapsed(),
@@ -297,7 +329,7 @@ fn feed<const N: usize, const B: usize>(
     background: &Background<N, B>,
     files: &[Samples<N>],
     role: &'static str,
-    mut seen: impl FnMut(usize, f64, &Smoothed<f32, N>),
+    mut seen: impl FnMut(usize, f64, &Progress<f32, N, B>),
 ) -> Vec<Source> {
     let mut sources = Vec::with_capacity(files.len());
     let reach = recorder.delay();
@@ -306,7 +338,7 @@ fn feed<const N: usize, const B: usize>(
         for (index, (position, torque)) in samples.position.iter().zip(&samples.torque).enumerate() {
             if let Some(progress) = recorder.push(&background.device, position, torque) {
                 let time_s = samples.start_s + (index - reach) as f64 / 500.0;
-                seen(number + 1, time_s, &progress.instant);
+                seen(number + 1, time_s, &progress);
                 rows += u32::from(progress.rows.is_some());
             }
         }

@@ -2,6 +2,7 @@
 //!
 //! The names of the fields are an interface. A number that is not known is `null`, never NaN.
 
+use super::findings::FindingReport;
 use super::scale::ScaleReport;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -168,6 +169,8 @@ pub struct RunReport {
     pub verdict: &'static str,
     /// From the closed list.
     pub reasons: Vec<&'static str>,
+    /// Every test of the verdict.
+    pub findings: Vec<FindingReport>,
     /// Base parameters that the data determine.
     pub rank: usize,
     /// Parameters estimated.

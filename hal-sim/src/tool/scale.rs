@@ -12,11 +12,16 @@ mod report;
 
 pub use report::{MassReport, ScaleReport, TorqueConstantReport, lines, summary};
 
-use scarab::ident::{ConstantRatio, Record, SearchState, Solver, Thresholds, Verdict, torque_constant_ratio};
+use scarab::ident::{
+    ConstantRatio, Record, Residual, SearchState, Solver, Thresholds, Unused as HeldOutMotion, Verdict,
+    torque_constant_ratio,
+};
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase, VALIDATION_MOTIONS};
 use scarab::model::Payload;
 
 use super::error::ToolError;
+use super::findings::FindingReport;
+use super::motions::VALIDATION_NAMES;
 use super::pair::{Context, Pair};
 use crate::world::TICK_S;
 
@@ -50,6 +55,8 @@ pub struct Corrected<const N: usize, const B: usize> {
     pub solver: Box<Solver<f32, N, B>>,
     /// Of the corrected result on the corrected records.
     pub verdict: Verdict,
+    /// What it saw.
+    pub findings: Vec<FindingReport>,
     /// Corrected.
     pub unused: Unused<N, B>,
     /// First iteration with an excess of at most a half.
@@ -114,7 +121,7 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         let prior = context.configuration.prior.as_ref();
         let solve = |ratios: &[f32; N]| {
             let record = solver.record().corrected(ratios, &self.load_base);
-            Solver::new(model, record, solver.plan(), prior, solver.search().seed(), &thresholds)
+            Solver::new(model, record, solver.plan(), prior, solver.search().seed())
         };
         let mut again = Box::new(solve(&ratios));
         for joint in 0..N {
@@ -126,8 +133,15 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         let unused = unused
             .each_ref()
             .map(|record| record.as_ref().map(|record| record.corrected(&ratios, &self.load_base)));
-        let verdict = again.judge(model, &thresholds, unused.iter().flatten());
-        Some(Corrected { solver: again, verdict, unused, iterations_to_half_chi2 })
+        // What was seen of the order in time and of the geometry was seen with the torques as they were: it is not asked
+        // of torques put right.
+        let residual = Residual::new();
+        let held_out = unused.iter().flatten().map(|record| HeldOutMotion { record, residual: &residual });
+        let mut findings = Vec::new();
+        let verdict = again.judge(model, &thresholds, held_out, &Default::default(), &mut |piece| {
+            findings.push(FindingReport::new(piece, &VALIDATION_NAMES));
+        });
+        Some(Corrected { solver: again, verdict, findings, unused, iterations_to_half_chi2 })
     }
 }
 

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use scarab::ident::Plan;
-use scarab::leg::{Activity, ControlRequest, LoggedSample, Step};
+use scarab::leg::{Activity, ControlRequest, IdentifyPhase, LoggedSample, Step};
 use scarab::model::Payload;
 use scarab::motion::Periodic;
 use scarab::real::sqrt;
@@ -11,6 +11,7 @@ use scarab::real::sqrt;
 use super::error::ToolError;
 use super::leg_file::LegFile;
 use super::pair::{Context, Pair};
+use super::perturb::{self, Perturbation};
 use super::report::{RunReport, TrackingReport};
 use super::scale::Scale;
 use super::series::Series;
@@ -39,6 +40,8 @@ pub struct SimulationOptions {
     pub payload: Option<Payload<f64>>,
     /// A known mass that the leg carries all the time.
     pub load: Option<Payload<f64>>,
+    /// What is made wrong on purpose.
+    pub perturbations: Vec<Perturbation>,
     /// Whether to keep the run's curves.
     pub with_series: bool,
 }
@@ -60,28 +63,50 @@ pub fn simulate<const N: usize, const B: usize>(
     options: &SimulationOptions,
 ) -> Result<SimulatedRun<N>, ToolError> {
     let started = Instant::now();
-    let context = Context::<N, B>::new(leg, options)?;
-    let mut pair = Pair::new(leg, &context, options.seed)?;
+    let wrong = options.perturbations.as_slice();
+    let simulated = perturb::simulated(leg, wrong)?;
+    let mut context = Context::<N, B>::new(&perturb::believed(leg, wrong)?, options)?;
+    perturb::configure(&mut context, wrong)?;
+    let mut pair = Pair::new(&simulated, &context, options.seed)?;
     if let Some(load) = &options.load {
         pair.world.attach(load.joint, load.mass, load.place.into());
     }
-    if !pair.enable(context.gravity) {
-        return Err(SetupError::new(leg, "the drive refused to be enabled at the start").into());
-    }
+    perturb::at_start(leg, &mut pair, wrong)?;
     let mut run = Watch::new(&context);
+    if !pair.enable(context.gravity) {
+        let words = "the drive refused to be enabled at the start: the leg is not where it may be";
+        return run.report(&pair, options, Vec::new(), Some(words.into()), started);
+    }
     let mut request = Some(ControlRequest::Identify);
     let largest = (LONGEST_RUN_S / TICK_S) as u64;
+    let mut before = Activity::Idle;
     loop {
         // What the sensors of this tick saw, without noise.
         let (torque, sticking) = (pair.world.motor_torque(), pair.world.sticking());
         let output = pair.tick(request.take(), context.gravity);
         run.see(&pair, &torque, &sticking, output.logged.as_ref());
-        match pair.leg.control().activity() {
+        let activity = pair.leg.control().activity();
+        if activity != before {
+            match activity {
+                Activity::Identify(IdentifyPhase::Excite) => {
+                    perturb::at_excitation(&simulated, &context, &mut pair, wrong);
+                }
+                Activity::Identify(IdentifyPhase::Settle) => {
+                    perturb::after_excitation(&simulated, &mut pair, wrong);
+                }
+                Activity::Identify(IdentifyPhase::Validate { motion: 0, step: Step::Approach }) => {
+                    perturb::before_validation(&context, &mut pair, wrong);
+                }
+                _ => {}
+            }
+            before = activity;
+        }
+        match activity {
             Activity::Identify(_) => {}
             _ if pair.leg.control().verdict().is_some() => break,
             _ => {
-                let state = pair.leg.control().state();
-                return Err(SetupError::new(leg, drive_stop(leg, state)).into());
+                let words = drive_stop(leg, pair.leg.control().state());
+                return run.report(&pair, options, Vec::new(), Some(words), started);
             }
         }
         if pair.ticks > largest {
@@ -90,7 +115,7 @@ pub fn simulate<const N: usize, const B: usize>(
     }
     let tracking = track(&context, &pair);
     run.scale = Some(Scale::find(&context, &pair, options.payload.as_ref(), options.load.as_ref())?);
-    run.report(&pair, options, tracking, started)
+    run.report(&pair, options, tracking, None, started)
 }
 
 /// Position error on the 3 s gait, feedback alone and with the model, from the same instant.

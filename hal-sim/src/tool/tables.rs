@@ -221,7 +221,8 @@ fn run_text(run: &RunReport) -> String {
     lines.extend(super::scale::lines(run));
     lines.push(String::new());
     lines.push(verdict_line(run));
-    lines.extend(run.reasons.iter().map(|reason| format!("  {reason}: {}", explanation(reason))));
+    let failed = run.findings.iter().filter(|finding| !finding.passed);
+    lines.extend(failed.map(|finding| format!("  {}: {}", finding.reason, finding.words)));
     if run.validation.is_empty() && run.seed.is_none() {
         lines.push("  not validated: no motion was held out (--validate, --split)".into());
     }

@@ -2,12 +2,16 @@
 
 use std::time::Instant;
 
-use scarab::ident::{Ends, Factor, FilteredRows, LARGEST_STILL_SHARE, RowFilter, Smoothed, Smoother, Solver};
+use scarab::ident::{
+    Ends, Factor, FilteredRows, LARGEST_STILL_SHARE, Reason, Recorder, RowFilter, Smoothed, Smoother, Solver,
+    Verdict,
+};
 use scarab::leg::{LoggedSample, Segment};
 use scarab::real::sqrt;
 
 use super::analysis::{Circumstances, Costs, Motion as RecordedMotion, TruthFit};
 use super::error::ToolError;
+use super::findings::FindingReport;
 use super::motions::VALIDATION_NAMES;
 use super::pair::{Context, PENDING, Pair, TAPS};
 use super::report::TrackingReport;
@@ -249,26 +253,48 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         })
     }
 
-    /// What was seen, once the verdict is there.
+    /// What stands in the report of a run in which nothing was recorded.
+    fn nothing_found(&self, options: &SimulationOptions) -> Result<Solver<f32, N, B>, ToolError> {
+        let configuration = &self.context.configuration;
+        let mut recorder = Box::new(
+            Recorder::<f32, N, B, TAPS, PENDING>::new(configuration.bandwidth_hz)
+                .map_err(|_| ToolError::input("the filter does not fit the device"))?,
+        );
+        let prior = configuration.prior.as_ref();
+        Ok(Solver::new(&configuration.model, recorder.finish(), options.plan, prior, options.swarm_seed))
+    }
+
+    /// What was seen, once the verdict is there, or the drive `stopped` before: then the result is refused as input.
     pub fn report(
         mut self,
         pair: &Pair<N, B>,
         options: &SimulationOptions,
         tracking: Vec<TrackingReport>,
+        stopped: Option<String>,
         started: Instant,
     ) -> Result<SimulatedRun<N>, ToolError> {
         let rows = self.chain.start();
         self.keep(rows);
         let identification = pair.leg.identification();
-        let (Some(solver), Some(verdict)) = (identification.solver(), pair.leg.control().verdict()) else {
-            return Err(ToolError::input("the identification ended without a result"));
+        let nothing = self.nothing_found(options)?;
+        let solver = identification.solver().unwrap_or(&nothing);
+        let mut findings = Vec::new();
+        let verdict = if let Some(words) = stopped {
+            findings.push(FindingReport::stopped(words));
+            Verdict::refused(Reason::Input)
+        } else {
+            identification
+                .judge_with(&mut |evidence| findings.push(FindingReport::new(evidence, &VALIDATION_NAMES)))
         };
         let scale = self.scale.take();
         let corrected = scale
             .as_ref()
             .and_then(|scale| scale.corrected(self.context, solver, identification.validation()));
         let (found, verdict, unused) = match &corrected {
-            Some(run) => (&*run.solver, run.verdict, &run.unused),
+            Some(run) => {
+                findings.clone_from(&run.findings);
+                (&*run.solver, run.verdict, &run.unused)
+            }
             None => (solver, verdict, identification.validation()),
         };
         // The plant's torque is that of the leg with what it carries.
@@ -298,6 +324,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
                 Some(run) => run.iterations_to_half_chi2,
                 None => self.excess.iter().find(|(_, excess)| *excess <= 0.5).map(|(seen, _)| *seen),
             },
+            findings,
             tracking,
             simulated_s: pair.ticks as f64 * TICK_S,
             wall: started.elapsed(),

@@ -86,7 +86,7 @@ fn record<T: Real>(
 }
 
 fn record_of<T: Real>(factors: [Factor<T, BASE>; 2], torque: [TorqueSize<T>; 2]) -> Record<T, 2, BASE> {
-    Record { factors, torque, rows: [500; 2], rejected: 0, row_information: T::one() }
+    Record { factors, torque, rows: [500; 2], rejected: 0, row_information: T::one(), noise: [T::zero(); 2] }
 }
 
 const RATIOS: [f64; 2] = [1.0 / 1.2, 1.1];

@@ -8,6 +8,7 @@ use scarab::model::Payload;
 use super::common::{Common, draw, finish, write_json};
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::identify::{identify_many, identify_one, print_runs};
+use crate::tool::perturb::Perturbation;
 use crate::tool::placed_mass::PlacedMass;
 use crate::tool::report::RunReport;
 use crate::tool::setup::DEFAULT_SEED;
@@ -34,6 +35,9 @@ pub struct IdentifyArguments {
     /// The leg carries a known mass all the time, stated likewise; the parameters are those of the leg without it.
     #[arg(long)]
     load: Option<PlacedMass>,
+    /// Make something wrong on purpose, to see the verdict: NAME or NAME=VALUE, repeatable.
+    #[arg(long, value_name = "NAME[=VALUE]")]
+    perturb: Vec<Perturbation>,
     /// Write the training motion here, in the format that replay reads.
     #[arg(long)]
     log: Option<PathBuf>,
@@ -75,6 +79,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
         payload,
         load,
         with_series: arguments.common.is_drawn(),
+        perturbations: arguments.perturb.clone(),
     };
     let Some((first, last)) = arguments.seeds else {
         let options = &options(arguments.seed.unwrap_or(DEFAULT_SEED));

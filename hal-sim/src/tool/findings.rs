@@ -1,0 +1,143 @@
+//! What the verdict saw: every test with its number and limit, and each refusal as a sentence.
+
+use scarab::ident::{Evidence, Reason, Test};
+use serde::Serialize;
+
+use super::report::Number;
+
+/// One test of the verdict, passed or not.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FindingReport {
+    /// Why the result is refused if it failed: a word of the closed list.
+    pub reason: &'static str,
+    /// Which test.
+    pub test: &'static str,
+    /// Counted from 1; `null` where the test is not about one joint.
+    pub joint: Option<usize>,
+    /// Name of the unused motion; `null` for the motion identified from, or for all.
+    pub motion: Option<String>,
+    /// What was seen.
+    pub value: Number,
+    /// What is allowed.
+    pub limit: Number,
+    /// Within it.
+    pub passed: bool,
+    /// What a failed test means, in a sentence with its numbers; empty where it passed.
+    pub words: String,
+}
+
+impl FindingReport {
+    /// The report of one piece of evidence; `motions` are the names of the unused ones.
+    #[must_use]
+    pub fn new(evidence: &Evidence<f32>, motions: &[&str]) -> Self {
+        let motion = evidence.motion.map(|index| {
+            motions.get(index).map_or_else(|| format!("motion {}", index + 1), |name| (*name).to_owned())
+        });
+        let words =
+            if evidence.passed { String::new() } else { sentence(evidence, motion.as_deref().unwrap_or("")) };
+        Self {
+            reason: evidence.reason.name(),
+            test: evidence.test.name(),
+            joint: evidence.joint.map(|joint| joint + 1),
+            motion,
+            value: evidence.value.into(),
+            limit: evidence.limit.into(),
+            passed: evidence.passed,
+            words,
+        }
+    }
+
+    /// A drive that stopped before the identification was done, told by `words`.
+    #[must_use]
+    pub fn stopped(words: String) -> Self {
+        Self {
+            reason: Reason::Input.name(),
+            test: Test::Drive.name(),
+            joint: None,
+            motion: None,
+            value: 0.0.into(),
+            limit: 1.0.into(),
+            passed: false,
+            words,
+        }
+    }
+}
+
+/// What a failed test means.
+fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
+    let joint = evidence.joint.map_or(0, |joint| joint + 1);
+    let (value, limit) = (f64::from(evidence.value), f64::from(evidence.limit));
+    let known = value.abs() < 1e30;
+    let on = if motion.is_empty() { String::new() } else { format!(" on {motion}") };
+    match evidence.test {
+        Test::Rows => {
+            format!("joint {joint} moved in {value:.0} of the filtered rows, at least {limit:.0} are needed")
+        }
+        Test::NotFinite => format!("{value:.0} samples or rows{on} were not finite, none may be"),
+        Test::Torque => format!("the torque of joint {joint} is always zero"),
+        Test::Search => "the search did not come to its end".into(),
+        Test::Drive => "the drive stopped during the identification".into(),
+        Test::Speed => {
+            format!("joint {joint} hardly moved: {value:.4} rad/s rms, at least {limit:.3} are needed")
+        }
+        Test::Determined => format!("the motion determines {value:.0} of {limit:.0} base parameters"),
+        Test::Condition if known => format!(
+            "the motion hardly tells the parameters apart: condition {value:.0}, at most {limit:.0} is allowed"
+        ),
+        Test::Condition => "the motion does not tell the parameters apart".into(),
+        Test::PredictedUncertainty => format!(
+            "the excitation leaves the torque of joint {joint}{on} uncertain by {:.1} % of its rms, at most {:.1} % \
+             is allowed",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::Finite => format!("a parameter of joint {joint} is not a number"),
+        Test::NegativeParameter => format!(
+            "a parameter of joint {joint} that no body has below zero is {value:.1} sigma below it, {limit:.0} may be \
+             noise"
+        ),
+        Test::NegativeEnergy => format!(
+            "kinetic energy would be negative in some posture, by {value:.1} sigma where {limit:.0} may be noise"
+        ),
+        Test::PriorBox => format!(
+            "every leg that the prior allows misses the data: {value:.0} chi-square units above least squares, at most \
+             {limit:.0} may be noise"
+        ),
+        Test::DynamicShare => format!(
+            "inertia and friction make {:.2} % of the torque of joint {joint}, at least {:.0} % are in any measured \
+             one: it was computed from the angle",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::TrainingError if known => format!(
+            "joint {joint} is off by {value:.3} N m rms on the motion identified from, at most {limit:.3} are explained"
+        ),
+        Test::TrainingError => format!("no torque of joint {joint} could be compared with the model"),
+        Test::ValidationError if known => {
+            format!(
+                "the torque of joint {joint}{on} is off by {value:.3} N m rms, at most {limit:.3} are explained"
+            )
+        }
+        Test::ValidationError => format!("no torque of joint {joint}{on} could be compared with the model"),
+        Test::SlowResidual => format!(
+            "what is left of the torque of joint {joint}{on} is no noise: {value:.3} N m last longer than half a \
+             second, at most {limit:.3} may"
+        ),
+        Test::LinkLength => format!(
+            "the torque asks for a link before joint {joint} that is {:+.1} % longer than believed, within {:.1} % it \
+             may be",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::EncoderZero => format!(
+            "the torque asks for a zero of joint {joint} that is {:+.1} degrees off, within {:.1} it may be",
+            value.to_degrees(),
+            limit.to_degrees()
+        ),
+        Test::CommonDisturbance => {
+            format!(
+                "something held the leg{on}: all joints missed together for {value:.2} s, at most {limit:.2} s may"
+            )
+        }
+    }
+}

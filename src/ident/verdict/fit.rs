@@ -1,0 +1,138 @@
+//! Whether the torque is explained: on the motion identified from, and on motions that were not used.
+//!
+//! ```text
+//! expected^2 = v S + tr(R Cov R') / n         noise through the filter, and the parameters' uncertainty
+//! error^2   <= expected^2 q(n m S) + (harmless share * rms torque)^2
+//! ```
+//!
+//! v is the variance of a 500 Hz sample's noise, from its own scatter (`noise`), S the sum of h^2, n rows worth m S
+//! independent ones each, q the quantile of chi-square over its degrees of freedom. Neither side knows the training's
+//! residual, so a bad training loosens nothing.
+
+use super::{Docket, Evidence, Reason, Test, Thresholds};
+use crate::ident::estimate::Estimate;
+use crate::ident::record::{Record, RowModel};
+use crate::ident::residual::Residual;
+use crate::model::Parameter;
+use crate::real::{self, Real};
+
+/// A motion that was predicted.
+#[derive(Clone, Copy, Debug)]
+pub struct Unused<'a, T, const N: usize, const B: usize> {
+    /// Its rows.
+    pub record: &'a Record<T, N, B>,
+    /// What they left unexplained, in order of time.
+    pub residual: &'a Residual<T, N>,
+}
+
+impl<T: Real> Thresholds<T> {
+    /// Whether the motion identified from is explained by what was found on it.
+    pub fn judge_residual<const N: usize, const B: usize>(
+        &self,
+        training: &Record<T, N, B>,
+        values: &[T; B],
+        docket: &mut Docket<'_, T>,
+    ) {
+        for (joint, size) in training.torque.iter().enumerate() {
+            let Some(error) = training.torque_error(joint, values) else { continue }; // it never moved: unexcited
+            let mut limit = self.largest_error_share * size.root_mean_square;
+            if let Some(noise) = training.filtered_noise(joint) {
+                let allowed = self.allowed(training, joint, noise * noise, self.largest_misfit_share);
+                limit = real::min(limit, allowed);
+            }
+            docket.at_most(Reason::Residual, Test::TrainingError, Some(joint), None, error, limit);
+        }
+    }
+
+    /// Largest error of a joint's filtered torque where `expected` is its variance by noise and uncertainty.
+    fn allowed<const N: usize, const B: usize>(
+        &self,
+        record: &Record<T, N, B>,
+        joint: usize,
+        expected: T,
+        harmless: T,
+    ) -> T {
+        let freedom = T::of(f64::from(record.rows[joint])) * real::min(record.row_information, T::one());
+        let systematic = harmless * record.torque[joint].root_mean_square;
+        real::sqrt(expected * self.variance_ratio(freedom) + systematic * systematic)
+    }
+
+    /// Whether an unused motion is predicted as well as noise and the parameters' uncertainty let expect.
+    pub fn judge_validation<const N: usize, const B: usize>(
+        &self,
+        training: &Record<T, N, B>,
+        motion: usize,
+        record: &Record<T, N, B>,
+        estimate: &Estimate<T, B>,
+        docket: &mut Docket<'_, T>,
+    ) {
+        let (values, at) = (&estimate.values, Some(motion));
+        docket.at_most(
+            Reason::Input,
+            Test::NotFinite,
+            None,
+            at,
+            T::of(f64::from(record.rejected)),
+            T::zero(),
+        );
+        for joint in 0..N {
+            if training.rows[joint] == 0 {
+                continue; // unexcited
+            }
+            let size = record.torque[joint].root_mean_square;
+            let uncertain = record.uncertainty(joint, estimate);
+            let share = if size > T::zero() { uncertain / size } else { T::zero() };
+            let limit = self.largest_uncertainty_share;
+            docket.at_most(Reason::Unexcited, Test::PredictedUncertainty, Some(joint), at, share, limit);
+            let error = record.torque_error(joint, values).unwrap_or(T::LARGEST);
+            let limit = match record.filtered_noise(joint) {
+                Some(noise) => {
+                    let expected = noise * noise + uncertain * uncertain;
+                    self.allowed(record, joint, expected, self.harmless_error_share)
+                }
+                None => training.torque_error(joint, values).map_or(T::zero(), |expected| {
+                    self.largest_error_ratio * expected + self.harmless_error_share * size
+                }),
+            };
+            let limit = real::min(limit, self.largest_error_share * size);
+            docket.at_most(Reason::Validation, Test::ValidationError, Some(joint), at, error, limit);
+        }
+    }
+
+    /// Whether the torque holds a trace of what cannot be computed from the angle alone: inertia and friction. A torque
+    /// that does not is a command that was recorded, or the joint carries nothing that moves.
+    pub fn judge_measurement<const N: usize, const B: usize>(
+        &self,
+        model: &RowModel<T, N, B>,
+        training: &Record<T, N, B>,
+        values: &[T; B],
+        docket: &mut Docket<'_, T>,
+    ) {
+        let mut dynamic = *values;
+        for (base, value) in dynamic.iter_mut().enumerate() {
+            if let Some((_, Parameter::HX | Parameter::HY | Parameter::HZ | Parameter::M | Parameter::OFF)) =
+                model.base.independent(base)
+            {
+                *value = T::zero();
+            }
+        }
+        for (joint, size) in training.torque.iter().enumerate() {
+            let rows = T::of(f64::from(training.rows[joint].max(1)));
+            let part = real::sqrt(training.factors[joint].without_right().excess(&dynamic) / rows);
+            let value =
+                if size.root_mean_square > T::zero() { part / size.root_mean_square } else { T::zero() };
+            let limit = self.smallest_dynamic_share;
+            // A joint that did not move has been named already, with the right reason.
+            let moved = size.speed >= self.smallest_speed && training.rows[joint] > 0;
+            docket.note(Evidence {
+                reason: Reason::NotAMeasurement,
+                test: Test::DynamicShare,
+                joint: Some(joint),
+                motion: None,
+                value,
+                limit,
+                passed: !moved || value >= limit,
+            });
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Whether a motion can be identified from at all, and whether it told the parameters apart.
+
+use super::{Docket, Reason, Test, Thresholds};
+use crate::ident::estimate::Stage;
+use crate::ident::record::{Record, RowModel};
+use crate::real::Real;
+
+impl<T: Real> Thresholds<T> {
+    /// Enough rows, finite samples, a torque that differs from zero, joints that move.
+    pub fn judge_input<const N: usize, const B: usize>(
+        &self,
+        model: &RowModel<T, N, B>,
+        record: &Record<T, N, B>,
+        docket: &mut Docket<'_, T>,
+    ) {
+        let needed = (model.base.rank() as u32).saturating_mul(self.rows_per_parameter);
+        let count = |rows: u32| T::of(f64::from(rows));
+        // Without samples nothing has a speed.
+        let seen = record.rows.iter().any(|&rows| rows > 0)
+            || record.torque.iter().any(|size| size.speed > T::zero());
+        for (joint, (size, &rows)) in record.torque.iter().zip(&record.rows).enumerate() {
+            let at = Some(joint);
+            // Rows that a joint has not because it stood still speak against the motion, not against the data.
+            let still = seen && !(size.speed >= self.smallest_speed);
+            let reason = if still { Reason::Unexcited } else { Reason::Input };
+            docket.at_least(reason, Test::Rows, at, count(rows), count(needed));
+            if rows > 0 {
+                docket.at_least(Reason::Input, Test::Torque, at, size.root_mean_square, T::of(1e-9));
+            }
+            if seen {
+                docket.at_least(Reason::Unexcited, Test::Speed, at, size.speed, self.smallest_speed);
+            }
+        }
+        docket.at_most(Reason::Input, Test::NotFinite, None, None, count(record.rejected), T::zero());
+    }
+
+    /// Whether a motion told all base parameters apart, in all rows together (`stage`) and in the plan that was followed,
+    /// which found `determined` of them.
+    pub fn judge_excitation<const N: usize, const B: usize>(
+        &self,
+        model: &RowModel<T, N, B>,
+        stage: &Stage<T, B>,
+        determined: usize,
+        docket: &mut Docket<'_, T>,
+    ) {
+        let rank = T::of(model.base.rank() as f64);
+        let told = T::of(stage.columns().len().min(determined) as f64);
+        docket.at_least(Reason::Unexcited, Test::Determined, None, told, rank);
+        let condition = stage.condition().unwrap_or(T::LARGEST);
+        docket.at_most(Reason::Unexcited, Test::Condition, None, None, condition, self.largest_condition);
+    }
+}

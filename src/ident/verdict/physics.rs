@@ -1,0 +1,143 @@
+//! Whether a body with these parameters can exist, as far as base parameters tell.
+
+use nalgebra::{SMatrix, Vector3};
+
+use super::{Docket, Reason, Test, Thresholds};
+use crate::ident::completion::is_weak;
+use crate::ident::estimate::Estimate;
+use crate::ident::record::{Record, RowModel};
+use crate::model::{JointState, PARAMETERS_PER_JOINT, Parameter, mass_matrix, regressor};
+use crate::real::{self, Real};
+
+impl<T: Real> Thresholds<T> {
+    /// No negative friction, rotor inertia, mass or kinetic energy beyond noise; every value finite.
+    pub fn judge_physics<const N: usize, const B: usize>(
+        &self,
+        model: &RowModel<T, N, B>,
+        record: &Record<T, N, B>,
+        estimate: &Estimate<T, B>,
+        docket: &mut Docket<'_, T>,
+    ) {
+        let mut worst = [T::zero(); N];
+        for base in 0..model.base.rank() {
+            let Some((joint, parameter)) = model.base.independent(base) else { continue };
+            let (value, sigma) = (estimate.values[base], estimate.sigma(base).unwrap_or(T::zero()));
+            if !real::is_finite(value) {
+                docket.at_most(Reason::Unphysical, Test::Finite, Some(joint), None, value, T::LARGEST);
+            }
+            if parameter.is_never_negative()
+                && !is_weak(record, estimate, base)
+                && sigma > T::zero()
+                && let Some(worst) = worst.get_mut(joint)
+            {
+                *worst = real::max(*worst, -value / sigma);
+            }
+        }
+        let limit = self.largest_negative_sigmas;
+        for (joint, &sigmas) in worst.iter().enumerate() {
+            docket.at_most(Reason::Unphysical, Test::NegativeParameter, Some(joint), None, sigmas, limit);
+        }
+        let energy = self.negative_energy(model, estimate);
+        docket.at_most(
+            Reason::Unphysical,
+            Test::NegativeEnergy,
+            None,
+            None,
+            energy,
+            self.largest_negative_sigmas,
+        );
+    }
+
+    /// Whether what was found in the box explains the data as well as least squares does, up to what noise makes of
+    /// `rank` parameters: if not, the data contradict every leg that the prior allows.
+    pub fn judge_box(&self, excess: T, rank: usize, docket: &mut Docket<'_, T>) {
+        let rank = T::of(rank as f64);
+        let spread = real::sqrt(rank + rank); // of chi-square with `rank` degrees of freedom
+        let limit = rank + self.largest_excess_spreads * spread;
+        docket.at_most(Reason::Unphysical, Test::PriorBox, None, None, excess, limit);
+    }
+
+    /// Standard deviations by which the kinetic energy `v' M(q) v / 2` is negative in some direction, at worst, at
+    /// postures all over the circle; zero where it never is.
+    fn negative_energy<const N: usize, const B: usize>(
+        &self,
+        model: &RowModel<T, N, B>,
+        estimate: &Estimate<T, B>,
+    ) -> T {
+        let parameters = model.base.complete(&estimate.values, &[[T::zero(); PARAMETERS_PER_JOINT]; N]);
+        (0..POSTURES).fold(T::zero(), |worst, index| {
+            let q = posture(index);
+            let mass = mass_matrix(&model.chain, &parameters, &q);
+            let Some((direction, energy)) = negative_direction(&mass) else { return worst };
+            let sigma = estimate.sigma_of(&energy_weights(model, q, &direction));
+            real::max(worst, -energy / real::max(sigma, T::EPSILON))
+        })
+    }
+}
+
+const POSTURES: usize = 16;
+
+/// A direction `v` in which `v' M v` is negative, and that number; `None` for a positive matrix.
+///
+/// With `M = L D L'` and a negative pivot `D_k`, `v = L^-T e_k` gives `v' M v = D_k`.
+fn negative_direction<T: Real, const N: usize>(matrix: &SMatrix<T, N, N>) -> Option<([T; N], T)> {
+    let mut lower = [[T::zero(); N]; N];
+    let mut pivots = [T::zero(); N];
+    for column in 0..N {
+        let mut pivot = matrix[(column, column)];
+        for inner in 0..column {
+            pivot -= lower[column][inner] * lower[column][inner] * pivots[inner];
+        }
+        if !(pivot > T::zero()) {
+            let mut direction = [T::zero(); N];
+            direction[column] = T::one();
+            for row in (0..column).rev() {
+                for inner in row + 1..=column {
+                    direction[row] -= lower[inner][row] * direction[inner];
+                }
+            }
+            return Some((direction, pivot));
+        }
+        pivots[column] = pivot;
+        for row in column + 1..N {
+            let mut element = matrix[(row, column)];
+            for inner in 0..column {
+                element -= lower[row][inner] * lower[column][inner] * pivots[inner];
+            }
+            lower[row][column] = element / pivot;
+        }
+    }
+    None
+}
+
+/// Low-discrepancy postures over the whole circle of every joint.
+fn posture<T: Real, const N: usize>(index: usize) -> [T; N] {
+    core::array::from_fn(|joint| {
+        // Multiples of the golden ratio's powers (Kronecker sequence).
+        let step = [0.618_033_988_749_895, 0.381_966_011_250_105, 0.236_067_977_499_790][joint % 3];
+        let turn = (index + 1) as f64 * step;
+        T::of((turn - (turn as u32) as f64 - 0.5) * 2.0 * core::f64::consts::PI)
+    })
+}
+
+/// Twice the kinetic energy of unit base parameters at speed `direction`: its weights.
+fn energy_weights<T: Real, const N: usize, const B: usize>(
+    model: &RowModel<T, N, B>,
+    q: [T; N],
+    direction: &[T; N],
+) -> [T; B] {
+    let moving = JointState { q, qd: [T::zero(); N], qdd: *direction };
+    let rows = regressor(&model.chain, &moving, &Vector3::zeros());
+    let mut weights = [T::zero(); B];
+    for (row, &share) in rows.iter().zip(direction) {
+        let mut selected = [T::zero(); B];
+        model.base.select(row, &mut selected);
+        for (base, (weight, &element)) in weights.iter_mut().zip(&selected).enumerate() {
+            let at_rest = !matches!(model.base.independent(base), Some((_, Parameter::OFF)));
+            if at_rest {
+                *weight += share * element;
+            }
+        }
+    }
+    weights
+}

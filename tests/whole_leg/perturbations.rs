@@ -1,0 +1,97 @@
+//! Things made wrong on purpose: each is refused for its reason, and honest runs are accepted.
+
+use hal_sim::tool::perturb::Perturbation;
+use hal_sim::tool::report::RunReport;
+use hal_sim::tool::simulate::simulate;
+
+use super::*;
+
+fn perturbed(perturbation: &str, seed: u64) -> RunReport {
+    let perturbations = vec![perturbation.parse::<Perturbation>().expect("known")];
+    let options = SimulationOptions { perturbations, ..options(seed) };
+    simulate::<JOINTS, BASE>(&default_leg(), &options).expect("it ends in a verdict").report
+}
+
+/// Refused for exactly these reasons, each told in a sentence.
+fn refused(perturbation: &str, reasons: &[&str]) {
+    for seed in [1, 2] {
+        let report = perturbed(perturbation, seed);
+        assert_eq!(report.reasons, reasons, "{perturbation}, seed {seed}");
+        for finding in &report.findings {
+            assert_eq!(finding.passed, finding.words.is_empty(), "{perturbation}: {finding:?}");
+            assert!(finding.passed || reasons.contains(&finding.reason), "{perturbation}: {finding:?}");
+        }
+    }
+}
+
+/// Refused, with one of these reasons among others.
+fn refused_with_one_of(perturbation: &str, reasons: &[&str]) {
+    let report = perturbed(perturbation, 1);
+    println!("{perturbation}: {:?}", report.reasons);
+    assert!(report.reasons.iter().any(|reason| reasons.contains(reason)), "{perturbation}");
+}
+
+#[test]
+fn tampered_inertia_and_centre_of_mass_and_an_added_mass_are_refused_by_validation_alone() {
+    for perturbation in ["inertia=0.7", "com=0.8", "added-mass=2"] {
+        refused(perturbation, &["validation"]);
+    }
+}
+
+#[test]
+fn a_wrong_length_or_zero_is_refused_as_residual_alone() {
+    // Both are predicted within 2.1 % of the torque: only what they ask for gives them away.
+    for perturbation in ["length=1.1", "length=0.9", "zero=5", "zero=-5"] {
+        refused(perturbation, &["residual"]);
+    }
+}
+
+#[test]
+fn a_blocked_joint_is_refused_as_unexcited_alone_and_a_small_motion_with_it() {
+    for perturbation in ["stuck=hip", "stuck=2"] {
+        refused(perturbation, &["unexcited"]);
+    }
+    refused_with_one_of("small-motion", &["unexcited"]);
+}
+
+#[test]
+fn exchanged_connectors_and_wrong_directions_are_refused() {
+    for perturbation in ["swap", "sign=hip", "sign=knee"] {
+        refused_with_one_of(perturbation, &["residual", "validation", "unphysical"]);
+    }
+}
+
+#[test]
+fn what_torque_cannot_see_is_accepted() {
+    // A wrong torque constant scales everything, the last joint's zero turns that link's own frame.
+    for perturbation in ["torque-constant=1.2", "zero=5@knee"] {
+        let report = perturbed(perturbation, 1);
+        assert!(report.accepted(), "{perturbation}: {:?}", report.reasons);
+    }
+    let scaled = perturbed("torque-constant=1.2", 1);
+    for base in scaled.base_parameters.iter().filter(|base| base.name.starts_with("HX")) {
+        let ratio = base.value.known().expect("determined") / base.truth.known().expect("simulated");
+        // First moments are known to half a per cent: three sigma, and what the servo does otherwise.
+        assert!((ratio * 1.2 - 1.0).abs() < 0.02, "{}: {ratio}", base.name);
+    }
+}
+
+#[test]
+fn honest_runs_are_accepted_far_within_the_limits() {
+    for seed in 1..=5 {
+        let report = simulate::<JOINTS, BASE>(&default_leg(), &options(seed)).expect("it runs").report;
+        assert!(report.accepted(), "seed {seed}: {:?}", report.reasons);
+        let near = |test: &str| {
+            let of = report.findings.iter().filter(|finding| finding.test == test);
+            let shares = of.map(|finding| {
+                finding.value.known().expect("seen").abs() / finding.limit.known().expect("set")
+            });
+            shares.fold(0.0, f64::max)
+        };
+        for test in ["training_error", "validation_error", "slow_residual", "link_length", "encoder_zero"] {
+            let share = near(test);
+            println!("seed {seed}, {test}: {share:.2} of the limit");
+            assert!(share > 0.0 && share < 0.8, "seed {seed}, {test}: {share}");
+        }
+    }
+}
