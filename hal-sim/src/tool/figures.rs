@@ -108,7 +108,7 @@ pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figu
     let title = "Cost of the beetle swarm above the optimum".into();
     add(Group::Search, "search.svg".into(), title, 330, &|area| search::whole(area, series))?;
     let rows = run.base_parameters.len() as u32;
-    let title = "Errors of the base parameters".into();
+    let title = format!("Base parameters: {}", parameters::what(run));
     add(Group::BaseParameters, "base-parameters.svg".into(), title, 90 + 24 * rows, &|area| {
         parameters::whole(area, run)
     })?;

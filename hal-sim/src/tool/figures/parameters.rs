@@ -19,8 +19,7 @@ const THREE_SIGMA: RGBColor = RGBColor(228, 235, 244);
 
 /// With values, standard deviations and truths.
 pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
-    let what = if truth_is_known(run) { WITH_TRUTH } else { WITHOUT_TRUTH };
-    text(area, (12, 14), 13, HPos::Left, format!("{}: {what}", run.leg))?;
+    text(area, (12, 14), 13, HPos::Left, format!("{}: {}", run.leg, what(run)))?;
     let (_, area) = area.split_vertically(px(30));
     dots(&area, run, (90, 260), &|base| {
         let (value, sigma) = (number(base.value), number(base.sigma));
@@ -32,14 +31,15 @@ pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
 
 /// With values alone.
 pub fn small(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
-    let what = if truth_is_known(run) { WITH_TRUTH } else { WITHOUT_TRUTH };
-    text(area, (12, 14), 13, HPos::Left, format!("Base parameters: {what}"))?;
+    text(area, (12, 14), 13, HPos::Left, format!("Base parameters: {}", what(run)))?;
     let (_, area) = area.split_vertically(px(30));
     dots(&area, run, (56, 136), &|base| format!("{} {}", number(base.value), base.unit))
 }
 
-const WITH_TRUTH: &str = "errors, bands of one and three sigma";
-const WITHOUT_TRUTH: &str = "sigma in percent of the value";
+/// What is drawn, which depends on whether a truth is known.
+pub fn what(run: &RunReport) -> &'static str {
+    if truth_is_known(run) { "errors, bands of one and three sigma" } else { "sigma in percent of the value" }
+}
 
 fn truth_is_known(run: &RunReport) -> bool {
     run.base_parameters.iter().any(|base| base.truth.known().is_some())
@@ -48,7 +48,7 @@ fn truth_is_known(run: &RunReport) -> bool {
 /// Standard deviation in percent of the value.
 fn uncertainty(base: &BaseReport) -> Option<f64> {
     let (value, sigma) = (base.value.known()?, base.sigma.known().filter(|sigma| *sigma > 0.0)?);
-    Some(100.0 * sigma / value.abs()).filter(|percent| percent.is_finite())
+    Some(100.0 * sigma / value.abs())
 }
 
 fn error(base: &BaseReport) -> Option<f64> {

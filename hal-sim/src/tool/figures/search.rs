@@ -6,44 +6,48 @@ use plotters::element::PathElement;
 use plotters::series::LineSeries;
 use plotters::style::text_anchor::HPos;
 
-use super::super::report::Number;
 use super::super::series::Series;
 use super::super::tables::number;
 use super::canvas::{Area, DARK, DrawingError, GRID, Key, VERMILION, font, legend, line, px, text};
 
 /// Excesses below are drawn here, chi-square units: single precision of the cost hides what is smaller.
 const FLOOR: f64 = 1e-7;
+/// J_C - J_LS below this is rounding, chi-square units.
+const SMALLEST_FLOOR: f64 = 1e-6;
 /// Excess that moves no parameter by more than a fraction of its standard deviation.
 const GOAL: f64 = 0.5;
 
 /// Cost above the optimum after each iteration.
 pub fn whole(area: &Area<'_>, series: &Series) -> Result<(), DrawingError> {
-    text(
-        area,
-        (12, 14),
-        13,
-        HPos::Left,
-        "Beetle swarm: cost J of its best above the optimum J_C of its box",
-    )?;
+    let floor = match series.floor_chi2 {
+        Some(above) if above > SMALLEST_FLOOR => {
+            format!(" (J_C lies {} chi-square units above least squares)", number(above.into()))
+        }
+        Some(_) => " (which is that of least squares here)".into(),
+        None => String::new(),
+    };
+    let title = format!("Beetle swarm: cost J of its best above the optimum J_C of its box{floor}");
+    text(area, (12, 14), 13, HPos::Left, title)?;
     let entries = [
         ("swarm, cold start", Key::Curve(line(DARK, 6))),
         ("half a chi-square unit", Key::Curve(line(VERMILION, 10))),
     ];
     legend(area, (66, 36), &entries)?;
-    if series.excess.is_empty() {
+    let known = series.excess.iter().filter(|(_, excess)| excess.is_finite());
+    let points: Vec<(f64, f64)> =
+        known.map(|(iteration, excess)| (f64::from(*iteration), excess.max(FLOOR))).collect();
+    if points.is_empty() {
         return text(area, (66, 90), 12, HPos::Left, "There was no search to draw.");
     }
     let (_, area) = area.split_vertically(px(48));
-    let points: Vec<(f64, f64)> =
-        series.excess.iter().map(|(iteration, excess)| (f64::from(*iteration), excess.max(FLOOR))).collect();
     let last = points.last().map_or(1.0, |(iteration, _)| iteration.max(1.0));
-    let largest =
-        points.iter().map(|(_, excess)| *excess).filter(|excess| excess.is_finite()).fold(10.0, f64::max);
+    let largest = points.iter().map(|(_, excess)| *excess).fold(10.0, f64::max);
     let mut chart = ChartBuilder::on(&area)
+        .margin_left(px(8))
         .margin_right(px(12))
         .margin_top(px(6))
         .x_label_area_size(px(36))
-        .y_label_area_size(px(66))
+        .y_label_area_size(px(58))
         .build_cartesian_2d(0.0..last, (FLOOR..largest * 3.0).log_scale())?;
     chart
         .configure_mesh()
@@ -54,10 +58,7 @@ pub fn whole(area: &Area<'_>, series: &Series) -> Result<(), DrawingError> {
         .y_labels(8)
         .label_style(font(12))
         .axis_desc_style(font(12))
-        .x_desc(format!(
-            "iterations (J_C lies {} chi-square units above least squares; the lower edge is J_C to single precision)",
-            number(Number(series.floor_chi2))
-        ))
+        .x_desc("iterations")
         .y_desc("J \u{2212} J_C, chi-square units")
         .x_label_formatter(&|value| format!("{value:.0}"))
         .y_label_formatter(&|value| format!("1e{:.0}", value.log10()).replace('-', "\u{2212}"))

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::super::report::{FitReport, RunReport};
 use super::super::tables;
-use super::{Circumstances, count, generic, number, signed};
+use super::{Circumstances, generic, number, signed};
 
 /// Name of the leg and date.
 pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
@@ -34,7 +34,7 @@ pub fn verdict(run: &RunReport, findings: Option<&Value>) -> Markup {
                 }
             } @else {
                 p.word { "Refused" }
-                p { "Do not use this model, because " (list_of(&run.reasons)) ":" }
+                p { "Do not use this model. It was refused because of:" }
                 ul { @for reason in &run.reasons {
                     li { strong { (reason.replace('_', " ")) } ": " (tables::explanation(reason)) "." (evidence(reason, run)) }
                 } }
@@ -42,10 +42,6 @@ pub fn verdict(run: &RunReport, findings: Option<&Value>) -> Markup {
         }
         @if let Some(findings) = findings { section { h2 { "Tests of the verdict" } (generic::content(findings, 0)) } }
     }
-}
-
-fn list_of(reasons: &[&str]) -> String {
-    format!("of {}", count(reasons.len(), "reason"))
 }
 
 /// What the report holds that shows a reason.
@@ -89,10 +85,12 @@ pub fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
         ("Gravity in the base frame", format!("{} m/s\u{b2}", gravity.join(", "))),
         (
             "Scale",
-            format!(
-                "{} torque constants",
-                if run.scale.scale == "absolute" { "absolute: identified" } else { "relative to the" }
-            ),
+            match (run.scale.scale, run.seed) {
+                ("absolute", _) => "absolute: identified torque constants",
+                (_, Some(_)) => "relative to the torque constants",
+                (_, None) => "that of the recorded torque",
+            }
+            .into(),
         ),
         ("Noise seed", run.seed.map_or("\u{2013} (recorded)".into(), |seed| seed.to_string())),
         ("Swarm seed", run.swarm_seed.to_string()),

@@ -55,7 +55,8 @@ fn terms(terms: &std::collections::BTreeMap<String, f64>) -> String {
         if !sum.is_empty() || *factor < 0.0 {
             sum += &format!(" {sign} ");
         }
-        if factor.abs() != 1.0 {
+        // A factor of one that was computed is one to rounding.
+        if (factor.abs() - 1.0).abs() > 1e-9 {
             sum += &format!("{}\u{a0}", number(factor.abs().into()));
         }
         sum += name;
