@@ -258,6 +258,19 @@ impl<const N: usize> Control<N> {
         }
     }
 
+    /// Takes a restored model into use instead of the one that was there, from the next tick on; refused (`false`)
+    /// while the leg is doing anything or a model is still in the feedforward, where it would be a step of torque.
+    #[must_use]
+    pub fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
+        let free = self.activity == Activity::Idle && (self.model.is_none() || !(self.model_share > 0.0));
+        if free {
+            self.with_model = false;
+            self.model_share = 0.0;
+            self.model = Some(model);
+        }
+        free
+    }
+
     fn approach(&mut self, activity: Activity, motion: Periodic<N>) {
         let start = Motion::Periodic(motion).start_rad();
         let here = self.motion.state_at(self.motion_tick).position_rad;

@@ -23,12 +23,14 @@ mod configuration;
 mod control;
 mod identification;
 mod model;
+mod stored;
 
 pub use activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
 pub use configuration::{LegConfiguration, LegError, ProvedMotion};
 pub use control::{Control, ControlOutput, ControlRequest, LoggedSample};
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
+pub use stored::{RestoreError, StoredModel};
 
 use crate::hal::Sample;
 
@@ -76,6 +78,12 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
     /// Has these base values validated in the place of those found; see [`Identification::examine`].
     pub fn examine(&mut self, values: &[f32; B]) {
         self.identification.examine(values);
+    }
+
+    /// Takes a model that was kept into use, see [`Control::adopt`].
+    #[must_use]
+    pub fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
+        self.control.adopt(model)
     }
 
     /// The half that moves.

@@ -32,6 +32,11 @@ impl<const N: usize> IdentifiedModel<N> {
         loaded
     }
 
+    /// The model with these equivalent parameters; whoever calls has checked that they are this chain's.
+    pub(super) fn of_parameters(chain: Chain<f32, N>, parameters: LegParameters<f32, N>) -> Self {
+        Self { chain, parameters }
+    }
+
     /// Parameters with the same torque as the leg's; not those of its links.
     #[must_use]
     pub fn equivalent_parameters(&self) -> &LegParameters<f32, N> {

@@ -18,6 +18,7 @@
 pub mod anatomy;
 pub mod base;
 pub mod chain;
+pub mod fingerprint;
 pub mod friction;
 pub mod inertia;
 mod kinematics;
@@ -33,6 +34,7 @@ mod testing;
 pub use anatomy::AnatomicalJoint;
 pub use base::{BaseError, BaseParameters, ColumnMask, Standing, regroup};
 pub use chain::{Chain, ChainError, DenavitHartenberg};
+pub use fingerprint::Fingerprint;
 pub use inertia::{INERTIAL_PARAMETERS, InertialParameters, RigidBody};
 pub use log_cholesky::{LogCholesky, is_physically_consistent};
 pub use mass_matrix::mass_matrix;

@@ -10,6 +10,7 @@ mod memory;
 mod perturbations;
 mod scale;
 mod servo;
+mod stored;
 
 use std::sync::OnceLock;
 

@@ -1,0 +1,84 @@
+//! A model that was kept and is offered to a leg again.
+
+use scarab::leg::{RestoreError, StoredModel};
+use scarab::units::{NewtonMetrePerAmpere, Radian};
+
+use super::*;
+
+/// Of the leg that was identified.
+fn kept() -> StoredModel<JOINTS> {
+    let pair = identified();
+    context().configuration.keep(pair.leg.control().model().expect("accepted"))
+}
+
+#[test]
+fn a_kept_model_comes_back_as_it_was_and_serves_the_next_start() {
+    let first = identified();
+    let found = first.leg.control().model().expect("accepted");
+    let restored = context().configuration.restore(&kept()).expect("the same leg");
+    assert_eq!(&restored, found);
+
+    // The next start knows nothing until the model is adopted.
+    let mut pair = enabled(&default_leg(), 2);
+    assert_eq!(pair.leg.control().model(), None);
+    assert!(pair.leg.adopt(restored));
+    assert_eq!(pair.leg.control().model(), Some(&restored));
+}
+
+#[test]
+fn a_model_of_another_leg_length_or_torque_constant_is_refused() {
+    let stored = kept();
+    let own = context().configuration.fingerprint();
+    let refused = |leg: &LegFile, what: &str| {
+        let other = Context::new(leg, &options(1)).expect(what);
+        let expected = RestoreError::AnotherLeg { stored: own, own: other.configuration.fingerprint() };
+        assert_eq!(other.configuration.restore(&stored), Err(expected), "{what}");
+    };
+    for joint in 0..JOINTS {
+        let mut leg = default_leg();
+        leg.joints[joint].torque_per_ampere *= 1.01;
+        refused(&leg, "torque constant");
+        let mut leg = default_leg();
+        leg.joints[joint].zero_offset_deg += 0.1;
+        refused(&leg, "zero");
+    }
+    let mut leg = default_leg();
+    leg.joints[1].dh.a += 0.001;
+    refused(&leg, "length");
+    let mut configuration = context().configuration.clone();
+    configuration.joints.swap(0, 1);
+    assert!(matches!(configuration.restore(&stored), Err(RestoreError::AnotherLeg { .. })), "joints' order");
+
+    // What does not change what the parameters mean does not refuse them.
+    let mut configuration = context().configuration.clone();
+    configuration.joints[0].low = Radian(0.1);
+    configuration.joints[0].scale.radian_per_count = Radian(1e-5);
+    configuration.swarm_seed += 1;
+    assert!(configuration.restore(&stored).is_ok());
+    configuration.joints[0].scale.torque_per_ampere = NewtonMetrePerAmpere(1.6);
+    assert!(configuration.restore(&stored).is_err());
+}
+
+#[test]
+fn a_model_with_a_number_that_is_none_is_refused_by_joint() {
+    for (joint, value) in [(0, f32::NAN), (1, f32::INFINITY)] {
+        let mut stored = kept();
+        stored.parameters[joint][7] = value;
+        assert_eq!(context().configuration.restore(&stored), Err(RestoreError::NotFinite { joint }));
+    }
+}
+
+#[test]
+fn a_model_is_not_exchanged_while_the_leg_moves_or_uses_one() {
+    let restored = context().configuration.restore(&kept()).expect("the same leg");
+    let mut pair = during_excitation();
+    assert!(!pair.leg.adopt(restored));
+
+    let mut pair = identified();
+    let motion = context().configuration.prove(context().motions.validation[1]).expect("proved before");
+    tick(&mut pair, Some(ControlRequest::Track { motion, with_model: true }));
+    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
+    assert!(!pair.leg.adopt(restored), "tracking");
+    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Idle));
+    assert!(!pair.leg.adopt(restored), "at rest, the model still holds the leg");
+}
