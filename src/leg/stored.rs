@@ -51,7 +51,10 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
         Fingerprint::of(
             &self.model.chain,
             &self.joints.map(|joint| joint.scale.anatomy),
-            &self.joints.map(|joint| joint.scale.torque_per_ampere.0),
+            &self.joints.map(|joint| {
+                let constant = joint.scale.torque_per_ampere.0;
+                if joint.scale.mirrored { -constant } else { constant }
+            }),
         )
     }
 

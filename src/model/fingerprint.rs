@@ -5,13 +5,14 @@
 //!
 //! ```text
 //! fingerprint = CRC-64/XZ of  version, N, then per joint from the base:
-//!               sin alpha, cos alpha in steps of 2^-16;  a, d, direction, zero offset, torque per ampere as f32 bits
+//!               sin alpha, cos alpha in steps of 2^-16;  a, d, direction, zero offset, torque per ampere as f32 bits, the
+//!               last negative where the drive is mounted mirrored, as on a left leg
 //! ```
 //!
 //! | covered | not covered |
 //! | --- | --- |
 //! | number and order of the joints, their axes and lengths | gravity: an argument of every torque, it turns with the trunk |
-//! | sense and zero of each joint's angle | encoder counts and gear ratio: they scale the angle, not the model |
+//! | sense and zero of each joint's angle, side of the body | encoder counts and gear ratio: they scale the angle, not the model |
 //! | torque constants: all parameters are in their units | limits, gains, prior, names, what is being estimated |
 //!
 //! Sines are in steps because a board may compute them in `f32` and the host in `f64`; everything else is rounded to
@@ -39,7 +40,7 @@ const STEPS: f32 = (1_u32 << 16) as f32;
 pub struct Fingerprint(pub u64);
 
 impl Fingerprint {
-    /// Of a leg with these torque constants (N m/A at the joint, positive).
+    /// Of a leg with these torque constants (N m/A at the joint), negative where the drive is mounted mirrored.
     #[must_use]
     pub fn of<const N: usize>(
         chain: &Chain<f32, N>,

@@ -49,6 +49,10 @@ fn a_model_of_another_leg_length_or_torque_constant_is_refused() {
     configuration.joints.swap(0, 1);
     assert!(matches!(configuration.restore(&stored), Err(RestoreError::AnotherLeg { .. })), "joints' order");
 
+    let mut configuration = context().configuration.clone();
+    configuration.joints.iter_mut().for_each(|joint| joint.scale.mirrored = true);
+    assert!(matches!(configuration.restore(&stored), Err(RestoreError::AnotherLeg { .. })), "the other side");
+
     // What does not change what the parameters mean does not refuse them.
     let mut configuration = context().configuration.clone();
     configuration.joints[0].low = Radian(0.1);

@@ -166,6 +166,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
             scale: ScaleReport::default(),
             simulated_s: circumstances.simulated_s,
             wall_s: circumstances.wall.as_secs_f64(),
+            detail: self.detail(&estimate),
+            compared: None,
         }
     }
 

@@ -1,8 +1,11 @@
 //! The command line: one file for each command.
 
 mod common;
+mod export;
 mod identify;
 mod leg_options;
+mod model;
+mod predict;
 mod regressor;
 mod replay;
 
@@ -10,7 +13,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use super::error::EXIT_INPUT;
+use super::error::EXIT_REFUSED;
 
 /// Identifies legs, simulated or recorded. Exit codes: 0 accepted, 3 refused, 2 bad input.
 #[derive(Parser, Debug)]
@@ -26,6 +29,10 @@ enum Command {
     Identify(identify::IdentifyArguments),
     /// Identify a leg from recordings.
     Replay(replay::ReplayArguments),
+    /// Predict the torque of given states with a model that was kept: CSV.
+    Predict(predict::PredictArguments),
+    /// Write a model that was kept as a robot description.
+    Export(export::ExportArguments),
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     Regressor(regressor::RegressorArguments),
 }
@@ -47,14 +54,17 @@ pub fn main() -> ExitCode {
     }
     let outcome = match Cli::parse_from(words).command {
         Command::Replay(arguments) => replay::run(&arguments),
+        Command::Predict(arguments) => predict::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
         Command::Regressor(arguments) => regressor::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
     };
     match outcome {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(EXIT_INPUT)
+            let kind = if error.exit_code() == EXIT_REFUSED { "refused" } else { "error" };
+            eprintln!("{kind}: {error}");
+            ExitCode::from(error.exit_code())
         }
     }
 }

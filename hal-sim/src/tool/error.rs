@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::leg_file::LegFileError;
+use super::model_file::ModelFileError;
 use super::recording::RecordingError;
 use super::setup::SetupError;
 
@@ -13,12 +14,18 @@ pub const EXIT_REFUSED: u8 = 3;
 /// Bad input.
 pub const EXIT_INPUT: u8 = 2;
 
-/// Bad input, in words that name file, line and reason.
+/// Why there is no result, in words that name file, line and reason.
 #[derive(Debug, thiserror::Error)]
 pub enum ToolError {
     /// A leg file.
     #[error(transparent)]
     LegFile(#[from] LegFileError),
+    /// A model file.
+    #[error(transparent)]
+    ModelFile(#[from] ModelFileError),
+    /// Readable and well-formed, but not to be used: exit code [`EXIT_REFUSED`], not [`EXIT_INPUT`].
+    #[error("{0}")]
+    Refused(String),
     /// A recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -35,6 +42,12 @@ impl ToolError {
     #[must_use]
     pub fn input(reason: impl Into<String>) -> Self {
         Self::Input(reason.into())
+    }
+
+    /// What it becomes of the process.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        if matches!(self, Self::Refused(_)) { EXIT_REFUSED } else { EXIT_INPUT }
     }
 
     /// A file that cannot be written.

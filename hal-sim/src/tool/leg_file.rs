@@ -316,6 +316,21 @@ impl JointFile {
 }
 
 impl LegFile {
+    /// A leg of these joints with the defaults of every other key.
+    #[must_use]
+    pub fn plain(name: &str, gravity: [f64; 3], joints: Vec<JointFile>) -> Self {
+        Self {
+            name: name.to_owned(),
+            gravity,
+            torque_noise_percent: 0.0,
+            bandwidth_hz: default_bandwidth(),
+            pushes: None,
+            side: BodySide::default(),
+            segments: None,
+            joints,
+        }
+    }
+
     /// A shipped leg by name, or the file at a path.
     pub fn load(name_or_path: &str) -> Result<Self, LegFileError> {
         if let Some((name, text)) = SHIPPED_LEGS.iter().find(|(name, _)| *name == name_or_path) {

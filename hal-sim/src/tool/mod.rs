@@ -12,6 +12,7 @@
 //! | [`findings`] | what the verdict saw, in words |
 //! | [`perturb`] | what can be made wrong on purpose |
 //! | [`placed_mass`], [`scale`] | known masses: torque constants and loads |
+//! | [`model_file`], [`predict`], [`urdf`] | what was found, kept; its torque; the same for other programs |
 //! | [`regressor`] | torques and regressor of given states |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
 //! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
@@ -30,11 +31,13 @@ pub mod findings;
 pub mod html;
 pub mod identify;
 pub mod leg_file;
+pub mod model_file;
 pub mod motions;
 pub mod pair;
 pub mod perturb;
 pub mod placed_mass;
 pub mod posture;
+pub mod predict;
 pub mod recording;
 pub mod regressor;
 pub mod replay;
@@ -46,6 +49,7 @@ pub mod setup;
 pub mod simulate;
 pub mod size;
 pub mod tables;
+pub mod urdf;
 pub mod watch;
 pub mod words;
 pub mod x2;

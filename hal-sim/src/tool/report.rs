@@ -139,6 +139,51 @@ pub struct SwarmReport {
     pub iterations_to_half_chi2: Option<u32>,
 }
 
+/// A result against a model that was kept.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ComparisonReport {
+    /// The kept model's file.
+    pub model: String,
+    /// When it was found, RFC 3339.
+    pub created: String,
+    /// `same` or `changed`.
+    pub verdict: &'static str,
+    /// In words.
+    pub line: String,
+    /// Squared distance of the two base sets under both covariances.
+    pub chi2: f64,
+    /// What two identifications of one leg stay below in 999 of 1000 cases.
+    pub chi2_limit: f64,
+    /// Base parameters compared, the furthest apart first.
+    pub differences: Vec<DifferenceReport>,
+    /// Base parameters of one of the two only.
+    pub not_compared: Vec<String>,
+}
+
+/// One base parameter in two identifications.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DifferenceReport {
+    /// As reports name it.
+    pub name: String,
+    /// Kept.
+    pub stored: f64,
+    /// Found now.
+    pub found: f64,
+    /// Found less kept, in standard deviations of the difference.
+    pub sigmas: f64,
+}
+
+/// What a model file keeps beyond the report.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ModelDetail {
+    /// Of the base parameters, in their order.
+    pub covariance: Vec<Vec<f64>>,
+    /// The parameter in whose column each base parameter's value stands.
+    pub carriers: Vec<String>,
+    /// Parameters that were left out of the estimate, as if they were zero.
+    pub not_estimated: Vec<String>,
+}
+
 /// Position error on gait.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackingReport {
@@ -198,6 +243,12 @@ pub struct RunReport {
     pub simulated_s: f64,
     /// Time it took, s.
     pub wall_s: f64,
+    /// Against a model that was kept, where one was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub compared: Option<ComparisonReport>,
+    /// For the model file; not in the JSON.
+    #[serde(skip)]
+    pub detail: ModelDetail,
 }
 
 impl RunReport {

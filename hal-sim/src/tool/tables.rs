@@ -226,6 +226,15 @@ fn run_text(run: &RunReport) -> String {
     if run.validation.is_empty() && run.seed.is_none() {
         lines.push("  not validated: no motion was held out (--validate, --split)".into());
     }
+    lines.extend(run.compared.as_ref().map(|compared| {
+        format!(
+            "compared with {}: {} (chi-square {} of at most {})",
+            compared.model,
+            compared.line,
+            number(compared.chi2.into()),
+            number(compared.chi2_limit.into())
+        )
+    }));
     lines.join("\n") + "\n"
 }
 

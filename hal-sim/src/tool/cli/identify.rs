@@ -6,6 +6,7 @@ use clap::Args;
 use scarab::model::Payload;
 
 use super::common::{Common, draw, finish, write_json};
+use super::model::ModelArguments;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::identify::{identify_many, identify_one, print_runs};
 use crate::tool::perturb::Perturbation;
@@ -20,11 +21,13 @@ use crate::with_leg_size;
 pub struct IdentifyArguments {
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    model: ModelArguments,
     /// Of noise, pushes and a wrong prior.
     #[arg(long, conflicts_with = "seeds")]
     seed: Option<u64>,
     /// A run for each seed, A..B with both ends.
-    #[arg(long, value_parser = parse_seeds, conflicts_with = "log")]
+    #[arg(long, value_parser = parse_seeds, conflicts_with_all = ["log", "save_model", "compare_model"])]
     seeds: Option<(u64, u64)>,
     /// Noise of the logged torque in percent of each joint's mean absolute torque; the leg file's unless given.
     #[arg(long)]
@@ -84,9 +87,12 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
     let Some((first, last)) = arguments.seeds else {
         let options = &options(arguments.seed.unwrap_or(DEFAULT_SEED));
         let log = arguments.log.as_deref();
-        let (run, series) = with_leg_size!(leg, identify_one(leg, options, log))?;
+        let kept = arguments.model.kept(leg)?;
+        let (mut run, series) = with_leg_size!(leg, identify_one(leg, options, log))?;
+        arguments.model.compare(kept.as_ref(), &mut run);
         let code = finish(&run, &arguments.common, "")?;
         draw(leg, &arguments.common, &run, &series, &[])?;
+        arguments.model.save(leg, &run, leg.bandwidth_hz)?;
         return Ok(code);
     };
     if arguments.common.is_drawn() {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::common::{Common, draw, finish};
+use super::model::ModelArguments;
 use crate::tool::error::ToolError;
 use crate::tool::replay::{ReplayOptions, replay};
 use crate::tool::setup::DEFAULT_SEED;
@@ -19,6 +20,8 @@ pub struct ReplayArguments {
     files: Vec<PathBuf>,
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    model: ModelArguments,
     /// Held-out recordings.
     #[arg(long, num_args = 1.., conflicts_with = "split")]
     validate: Vec<PathBuf>,
@@ -49,8 +52,11 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         swarm_seed: arguments.common.swarm_seed.unwrap_or(DEFAULT_SEED),
         csv: arguments.csv.clone(),
     };
-    let replayed = with_leg_size!(leg, replay(leg, options))?;
+    let kept = arguments.model.kept(leg)?;
+    let mut replayed = with_leg_size!(leg, replay(leg, options))?;
+    arguments.model.compare(kept.as_ref(), &mut replayed.run);
     let code = finish(&replayed.run, &arguments.common, &tables::sources(&replayed.sources))?;
     draw(leg, &arguments.common, &replayed.run, &replayed.series, &replayed.sources)?;
+    arguments.model.save(leg, &replayed.run, options.bandwidth_hz)?;
     Ok(code)
 }

@@ -1,0 +1,40 @@
+//! `export`: a kept model for other rigid-body software.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::leg_options::LegOptions;
+use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::model_file::{ModelFile, refuse_another_leg};
+use crate::tool::tables;
+use crate::tool::urdf;
+
+/// Which model and where to.
+#[derive(Args, Debug)]
+pub struct ExportArguments {
+    /// Written by --save-model.
+    #[arg(long)]
+    model: PathBuf,
+    /// Write a robot description (URDF) here.
+    #[arg(long)]
+    urdf: PathBuf,
+    /// With any of these a model that is not this leg's is refused.
+    #[command(flatten)]
+    leg: Option<LegOptions>,
+}
+
+/// Writes the file; the exit code.
+pub fn run(arguments: &ExportArguments) -> Result<u8, ToolError> {
+    let file = arguments.model.display().to_string();
+    let leg = arguments.leg.as_ref().map(LegOptions::load).transpose()?;
+    let model = ModelFile::load(&arguments.model)?;
+    if let Some(leg) = &leg {
+        refuse_another_leg(&model, &file, leg)?;
+    }
+    let text = urdf::text(&model, &file)?;
+    let path = &arguments.urdf;
+    std::fs::write(path, text).map_err(|error| ToolError::cannot_write(path, &error))?;
+    tables::print(&format!("robot description: {}\n", path.display()))?;
+    Ok(EXIT_ACCEPTED)
+}

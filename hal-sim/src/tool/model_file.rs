@@ -1,0 +1,312 @@
+//! Model files: what an accepted identification found, kept for later use.
+//!
+//! Why a file of its own: a result is worth keeping only together with what it was found on (leg, lengths, torque
+//! constants, gravity) and how sure it is (covariance). With both, torque can be predicted with a band, two
+//! identifications can be compared, and a model of another leg can be refused. Keys are an interface, see
+//! `docs/model-file.md`; unknown ones are errors.
+//!
+//! ```text
+//! identify, replay --save-model--> file --predict, export, --compare-model-->
+//! ```
+//!
+//! Numbers are written with the digits that restore the f64 exactly. The checksum covers every key and value but
+//! itself, so that an edited file is noticed: the numbers belong together.
+
+mod check;
+mod checksum;
+pub mod comparison;
+mod error;
+mod matching;
+mod save;
+mod text;
+
+pub use error::ModelFileError;
+pub use matching::{differences, fingerprint, refuse_another_leg};
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use nalgebra::SMatrix;
+use scarab::model::Parameter;
+use serde::{Deserialize, Serialize};
+
+use super::error::ToolError;
+use super::leg_file::{BodySide, DhFile, JointFile, LegFile};
+use error::Step;
+
+/// Version of the keys.
+pub const MODEL_SCHEMA: i64 = 1;
+/// Base parameters there is room for: those of three joints.
+pub(super) const LARGEST_BASE_SET: usize = 28;
+/// Larger files are something else.
+const LARGEST_FILE_BYTES: u64 = 1 << 20;
+
+/// A checked model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelFile {
+    /// [`MODEL_SCHEMA`].
+    pub schema: i64,
+    /// Of everything else.
+    pub checksum: String,
+    /// Of geometry, anatomy and torque constants, as the board computes it.
+    pub fingerprint: String,
+    /// RFC 3339, UTC.
+    pub created: String,
+    /// Version of the program that wrote it.
+    pub scarab: String,
+    /// What it was found on.
+    pub leg: StoredLeg,
+    /// How it was found.
+    pub conditions: Conditions,
+    /// What torque determined.
+    pub base_set: BaseSet,
+    /// All fourteen parameters of every joint.
+    pub full_set: FullSet,
+}
+
+/// The leg, as far as the parameters' meaning depends on it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredLeg {
+    /// In the leg file.
+    pub name: String,
+    /// Of the body.
+    pub side: BodySide,
+    /// Base frame, m/s^2; of a trunk that leaned, as it was.
+    pub gravity: [f64; 3],
+    /// Proximal first.
+    pub joints: Vec<StoredJoint>,
+}
+
+/// One joint; the keys are the leg file's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredJoint {
+    /// What the joint is called.
+    pub name: String,
+    /// Modified Denavit-Hartenberg, rad and m.
+    pub dh: DhFile,
+    /// Joint angle = direction * anatomical angle + zero offset.
+    pub direction: i64,
+    /// Joint angle at the anatomical zero, degrees.
+    pub zero_offset_deg: f64,
+    /// Anatomical range, degrees.
+    pub range_deg: [f64; 2],
+    /// Degrees per second.
+    pub speed_limit_deg_s: f64,
+    /// N m at the joint.
+    pub torque_limit_nm: f64,
+    /// In whose units the parameters are, N m/A at the joint: the one that was used, or the one a known mass told.
+    pub torque_per_ampere: f64,
+}
+
+/// How a model was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Conditions {
+    /// `simulation` or `recording`.
+    pub source: String,
+    /// Always `accepted`.
+    pub verdict: String,
+    /// `relative` to the torque constants that were used, or `absolute`: a known mass told them.
+    pub scale: String,
+    /// `none`, `file` or `wrong:P`.
+    pub prior: String,
+    /// `one-time` or `sequential`.
+    pub plan: String,
+    /// Where the low-pass was 3 dB down, Hz.
+    pub bandwidth_hz: f64,
+    /// Of all motions, used and held out, s.
+    pub motion_s: f64,
+    /// Of simulated noise; text, since a seed may need all 64 bits.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<String>,
+    /// Of the swarm.
+    pub swarm_seed: String,
+    /// Of the scaled weighted problem.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<f64>,
+    /// Parameters left out of the estimate, as if they were zero.
+    pub not_estimated: Vec<String>,
+    /// Torque errors on the motion identified from and on those held out.
+    pub fits: Vec<StoredFit>,
+}
+
+/// Torque error of one joint on one motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredFit {
+    /// Counted from 1.
+    pub joint: usize,
+    /// Its name.
+    pub motion: String,
+    /// `training` or `validation`.
+    pub role: String,
+    /// N m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rms_nm: Option<f64>,
+    /// Of the mean absolute torque.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub percent_of_mean_abs: Option<f64>,
+}
+
+/// What torque determined.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BaseSet {
+    /// In the order of the covariance.
+    pub parameters: Vec<StoredBase>,
+    /// Row by row.
+    pub covariance: Vec<Vec<f64>>,
+}
+
+/// One combination of parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredBase {
+    /// As reports name it.
+    pub name: String,
+    /// The parameter in whose column the value gives the torque.
+    pub carrier: String,
+    /// SI.
+    pub value: f64,
+    /// Standard deviation, the root of the covariance's diagonal.
+    pub sigma: f64,
+    /// SI.
+    pub unit: String,
+    /// Whose weighted sum it is.
+    pub terms: BTreeMap<String, f64>,
+}
+
+/// All fourteen parameters of every joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FullSet {
+    /// In the order that never changes, proximal joint first.
+    pub parameters: Vec<StoredParameter>,
+}
+
+/// One parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredParameter {
+    /// Symbol and joint.
+    pub name: String,
+    /// Absent where neither torque nor a prior tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// Standard deviation; absent unless measured alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<f64>,
+    /// SI.
+    pub unit: String,
+    /// `identified`, `grouped`, `weak` or `prior`.
+    pub status: String,
+}
+
+impl ModelFile {
+    /// The checked model in a file.
+    ///
+    /// # Errors
+    /// [`ModelFileError`] for what is no model; [`ToolError::Refused`] for one that was edited or was never accepted.
+    pub fn load(path: &Path) -> Result<Self, ToolError> {
+        let file = path.display().to_string();
+        let unreadable =
+            |fault: std::io::Error| ModelFileError::of_file(&file, format!("cannot be read ({fault})"));
+        let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
+        if bytes > LARGEST_FILE_BYTES {
+            return Err(ModelFileError::of_file(&file, format!("{bytes} bytes are no model file")).into());
+        }
+        let text = std::fs::read_to_string(path).map_err(unreadable)?;
+        Self::parse(&text, &file)
+    }
+
+    /// The checked model in a text; `file` is what faults are reported under.
+    ///
+    /// # Errors
+    /// As [`ModelFile::load`].
+    pub fn parse(text: &str, file: &str) -> Result<Self, ToolError> {
+        let of_text = |fault| ModelFileError::of_text(file, text, &fault);
+        let of_value = |steps: &[Step], reason| ModelFileError::of_value(file, text, steps, reason);
+        let raw: toml::Table = toml::from_str(text).map_err(of_text)?;
+        match raw.get("schema").map(toml::Value::as_integer) {
+            Some(Some(MODEL_SCHEMA)) => {}
+            None if raw.is_empty() => return Err(ModelFileError::of_file(file, "is empty".into()).into()),
+            None => return Err(ModelFileError::of_file(file, "has no `schema`: no model file".into()).into()),
+            _ => {
+                let reason = format!("this schema is unknown; this program reads {MODEL_SCHEMA}");
+                return Err(of_value(&[Step::Key("schema")], reason).into());
+            }
+        }
+        let model: Self = toml::from_str(text).map_err(of_text)?;
+        check::model(&model).map_err(|fault| of_value(&fault.steps, fault.reason))?;
+        let found = checksum::of(&raw);
+        if model.checksum != found {
+            return Err(ToolError::Refused(format!(
+                "{file}: the file was edited or damaged: its checksum is {}, its content has {found}",
+                model.checksum
+            )));
+        }
+        if model.conditions.verdict != "accepted" {
+            return Err(ToolError::Refused(format!("{file}: this model was never accepted")));
+        }
+        Ok(model)
+    }
+
+    /// Joint and parameter of a name like `ZZ1`.
+    #[must_use]
+    pub fn parameter(&self, name: &str) -> Option<(usize, Parameter)> {
+        parameter_of(name, self.leg.joints.len())
+    }
+
+    /// Values of the fourteen parameters of a joint; `None` where one is unknown.
+    #[must_use]
+    pub fn joint_parameters(&self, joint: usize) -> Option<[f64; scarab::model::PARAMETERS_PER_JOINT]> {
+        const COUNT: usize = scarab::model::PARAMETERS_PER_JOINT;
+        let own = self.full_set.parameters.get(joint * COUNT..(joint + 1) * COUNT)?;
+        let values: Option<Vec<f64>> = own.iter().map(|parameter| parameter.value).collect();
+        values?.try_into().ok()
+    }
+}
+
+impl StoredLeg {
+    /// As a leg file without truth, prior and drive.
+    #[must_use]
+    pub fn to_leg_file(&self) -> LegFile {
+        let joints = self.joints.iter().map(|stored| {
+            let mut joint = JointFile::new(&stored.name, stored.dh);
+            joint.direction = stored.direction;
+            joint.zero_offset_deg = stored.zero_offset_deg;
+            joint.range_deg = stored.range_deg;
+            joint.speed_limit_deg_s = stored.speed_limit_deg_s;
+            joint.torque_limit_nm = stored.torque_limit_nm;
+            joint.torque_per_ampere = stored.torque_per_ampere;
+            joint
+        });
+        LegFile { side: self.side, ..LegFile::plain(&self.name, self.gravity, joints.collect()) }
+    }
+}
+
+/// A symmetric matrix of `count` rows with ones on the rest of the diagonal: linear algebra without a heap.
+fn padded(
+    count: usize,
+    element: impl Fn(usize, usize) -> f64,
+) -> SMatrix<f64, LARGEST_BASE_SET, LARGEST_BASE_SET> {
+    let mut matrix = SMatrix::identity();
+    for row in 0..count.min(LARGEST_BASE_SET) {
+        for column in 0..count.min(LARGEST_BASE_SET) {
+            matrix[(row, column)] = element(row, column);
+        }
+    }
+    matrix
+}
+
+/// Joint and parameter of a name like `ZZ1` in a leg of so many joints.
+fn parameter_of(name: &str, joints: usize) -> Option<(usize, Parameter)> {
+    let split = name.find(|letter: char| letter.is_ascii_digit())?;
+    let (symbol, joint) = name.split_at(split);
+    let joint = joint.parse::<usize>().ok().filter(|joint| (1..=joints).contains(joint))?;
+    let parameter = Parameter::ALL.into_iter().find(|parameter| parameter.symbol() == symbol)?;
+    Some((joint - 1, parameter)).filter(|_| name.len() == symbol.len() + 1)
+}

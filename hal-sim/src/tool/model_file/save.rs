@@ -1,0 +1,141 @@
+//! From the report of a run to a model file.
+
+use std::path::Path;
+
+use scarab::ident::Estimate;
+use scarab::model::Standing;
+
+use super::{
+    BaseSet, Conditions, FullSet, MODEL_SCHEMA, ModelFile, StoredBase, StoredFit, StoredJoint, StoredLeg,
+    StoredParameter, fingerprint,
+};
+use crate::tool::analysis::{Background, parameter_name};
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::LegFile;
+use crate::tool::report::{FitReport, ModelDetail, RunReport};
+
+impl<const N: usize, const B: usize> Background<N, B> {
+    /// What a model file keeps beyond the report. The covariance is symmetric up to rounding and is made exactly so.
+    #[must_use]
+    pub fn detail(&self, estimate: &Estimate<f32, B>) -> ModelDetail {
+        let base = &self.model.base;
+        let rank = base.rank();
+        let element = |row: usize, column: usize| {
+            0.5 * (f64::from(estimate.covariance[row][column]) + f64::from(estimate.covariance[column][row]))
+        };
+        let carriers = (0..rank).filter_map(|index| base.independent(index));
+        let parameters =
+            (0..N).flat_map(|joint| scarab::model::Parameter::ALL.map(|parameter| (joint, parameter)));
+        ModelDetail {
+            covariance: (0..rank).map(|row| (0..rank).map(|column| element(row, column)).collect()).collect(),
+            carriers: carriers.map(|(joint, parameter)| parameter_name(joint, parameter)).collect(),
+            not_estimated: parameters
+                .filter(|&(joint, parameter)| base.standing(joint, parameter) == Standing::Off)
+                .map(|(joint, parameter)| parameter_name(joint, parameter))
+                .collect(),
+        }
+    }
+}
+
+impl ModelFile {
+    /// What an accepted run found, with the bandwidth (Hz) it was found with, as of now. `None` where the run was
+    /// refused: a wrong model is not kept.
+    #[must_use]
+    pub fn of(leg: &LegFile, run: &RunReport, bandwidth_hz: f64) -> Option<Self> {
+        let leg = &with_identified_constants(leg, run);
+        let parameters = run.base_parameters.iter().zip(&run.detail.carriers).map(|(base, carrier)| {
+            Some(StoredBase {
+                name: base.name.clone(),
+                carrier: carrier.clone(),
+                value: base.value.known()?,
+                sigma: base.sigma.known()?,
+                unit: base.unit.to_owned(),
+                terms: base.terms.clone(),
+            })
+        });
+        let parameters = parameters.collect::<Option<Vec<_>>>().filter(|_| run.accepted())?;
+        let joints = leg.joints.iter().map(|joint| StoredJoint {
+            name: joint.name.clone(),
+            dh: joint.dh,
+            direction: joint.direction,
+            zero_offset_deg: joint.zero_offset_deg,
+            range_deg: joint.range_deg,
+            speed_limit_deg_s: joint.speed_limit_deg_s,
+            torque_limit_nm: joint.torque_limit_nm,
+            torque_per_ampere: joint.torque_per_ampere,
+        });
+        let full = run.parameters.iter().map(|parameter| StoredParameter {
+            name: parameter.name.clone(),
+            value: parameter.value.known(),
+            sigma: parameter.sigma.known(),
+            unit: parameter.unit.to_owned(),
+            status: parameter.status.to_owned(),
+        });
+        let now = jiff::Timestamp::from_second(jiff::Timestamp::now().as_second()).ok()?;
+        let model = Self {
+            schema: MODEL_SCHEMA,
+            checksum: String::new(),
+            fingerprint: fingerprint(leg).ok()?,
+            created: now.to_string(),
+            scarab: env!("CARGO_PKG_VERSION").to_owned(),
+            leg: StoredLeg {
+                name: leg.name.clone(),
+                side: leg.side,
+                gravity: leg.gravity,
+                joints: joints.collect(),
+            },
+            conditions: conditions(run, bandwidth_hz),
+            base_set: BaseSet { parameters, covariance: run.detail.covariance.clone() },
+            full_set: FullSet { parameters: full.collect() },
+        };
+        Some(model.sealed())
+    }
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), ToolError> {
+        std::fs::write(path, self.to_toml()).map_err(|error| ToolError::cannot_write(path, &error))
+    }
+}
+
+/// The leg whose torques are true: with the torque constants that a known mass told, where it told all.
+fn with_identified_constants(leg: &LegFile, run: &RunReport) -> LegFile {
+    let mut leg = leg.clone();
+    if run.scale.scale == "absolute" {
+        for (joint, constant) in leg.joints.iter_mut().zip(&run.scale.torque_constant) {
+            joint.torque_per_ampere = constant.identified.known().unwrap_or(joint.torque_per_ampere);
+        }
+    }
+    leg
+}
+
+fn conditions(run: &RunReport, bandwidth_hz: f64) -> Conditions {
+    let training = run.training.iter().map(|fit| stored_fit(fit, "training"));
+    let validation = run.validation.iter().map(|fit| stored_fit(fit, "validation"));
+    Conditions {
+        source: if run.seed.is_some() { "simulation" } else { "recording" }.to_owned(),
+        verdict: run.verdict.to_owned(),
+        scale: run.scale.scale.to_owned(),
+        prior: run.prior.clone(),
+        plan: run.plan.to_owned(),
+        bandwidth_hz,
+        motion_s: run.simulated_s,
+        seed: run.seed.map(|seed| seed.to_string()),
+        swarm_seed: run.swarm_seed.to_string(),
+        condition: run.condition.known(),
+        not_estimated: run.detail.not_estimated.clone(),
+        fits: training.chain(validation).collect(),
+    }
+}
+
+fn stored_fit(fit: &FitReport, role: &str) -> StoredFit {
+    StoredFit {
+        joint: fit.joint,
+        motion: fit.motion.clone(),
+        role: role.to_owned(),
+        rms_nm: fit.rms_nm.known(),
+        percent_of_mean_abs: fit.percent_of_mean_abs.known(),
+    }
+}
