@@ -6,7 +6,7 @@
 //! their texts were escaped by the backend.
 //!
 //! What the page does not know by name, a key that a later report has, it shows as a table all the same
-//! ([`generic`]).
+//! (`html/generic.rs`).
 
 mod generic;
 mod head;
