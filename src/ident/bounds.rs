@@ -167,7 +167,7 @@ pub fn search_box<T: Real, const N: usize, const B: usize>(
 }
 
 /// Distance to the next joint; of the last segment, what its centre of mass suggests.
-fn segment_length<T: Real, const N: usize, const B: usize>(
+pub(super) fn segment_length<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     prior: &[LinkPrior<T>; N],
     joint: usize,
@@ -179,7 +179,7 @@ fn segment_length<T: Real, const N: usize, const B: usize>(
 }
 
 /// What the measured torque could need: columns and torques have a size.
-fn measured_box<T: Real, const N: usize, const B: usize>(
+pub(super) fn measured_box<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     record: &Record<T, N, B>,
 ) -> ParameterBox<T, B> {

@@ -114,7 +114,7 @@ pub fn complete<T: Real, const N: usize, const B: usize>(
     Some(parameters)
 }
 
-fn prior_variances<T: Real, const N: usize>(prior: &LegParameters<T, N>) -> LegParameters<T, N> {
+pub(super) fn prior_variances<T: Real, const N: usize>(prior: &LegParameters<T, N>) -> LegParameters<T, N> {
     let kind = |index: usize| match index {
         0..=5 | 10 => 0, // inertias, the rotor's included
         6..=8 => 1,

@@ -13,9 +13,9 @@ pub const BEETLES: usize = 20;
 /// A stage ends after this many iterations at the latest.
 pub const LARGEST_ITERATIONS: u32 = 300;
 /// A stage ends when the best cost fell by less than [`SMALLEST_GAIN`] in this many iterations.
-const PATIENCE: u32 = 15;
+pub(super) const PATIENCE: u32 = 15;
 /// Chi-square units; a tenth of a standard deviation of one parameter is 0.01.
-const SMALLEST_GAIN: f64 = 1e-3;
+pub(super) const SMALLEST_GAIN: f64 = 1e-3;
 
 /// One stage's cost in its box.
 struct StageCost<'a, T, const B: usize> {

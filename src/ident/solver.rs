@@ -1,11 +1,13 @@
 //! One identification from a training record to a verdict: closed form, swarm, judgement.
 //!
 //! The leg advances it in slices at the lowest priority; the host's replay of recordings runs the same value to
-//! its end. The result is the swarm's, in the box the prior allows; the covariance is that of the least-squares
-//! problem, whose optimum the swarm is measured against.
+//! its end. The swarm searches the base values in the box the prior allows; they are then completed to a leg that can
+//! exist ([`super::consistent`]), whose base values are the result. The covariance is that of the least-squares problem,
+//! whose optimum the swarm is measured against.
 
 use super::alignment::{Alignment, Misalignments};
 use super::bounds::{LinkPrior, search_box};
+use super::consistent::{Completion, Effort};
 use super::constrained::ParameterBox;
 use super::estimate::{Estimate, Plan, Problem};
 use super::factor::Factor;
@@ -13,8 +15,21 @@ use super::record::{Record, RowModel};
 use super::scale::widen;
 use super::search::{SearchState, SwarmSearch};
 use super::verdict::{Docket, Evidence, Reason, Test, Thresholds, Unused, Verdict};
+use crate::model::LegParameters;
 use crate::real::Real;
 use crate::swarm::BsoSettings;
+
+/// Evaluations of the search that take about as long as one step of the completion.
+const EVALUATIONS_PER_STEP: u32 = 32;
+
+/// How much worse than least squares a leg that can exist explains the data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Consistency<T> {
+    /// Cost of the data alone above least squares, chi-square units; the prior's pull is not in it.
+    pub excess: T,
+    /// Base parameters: the most that chi-square can have, as if every one of them were held by a constraint.
+    pub degrees_of_freedom: usize,
+}
 
 /// Least squares and swarm on one record.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +40,9 @@ pub struct Solver<T: Real, const N: usize, const B: usize> {
     condition: Option<T>,
     search: SwarmSearch<T, B>,
     bounds: ParameterBox<T, B>,
+    completion: Completion<T, N>,
+    /// Base values of the completed leg and what they cost, once it is there.
+    completed: Option<([T; B], Consistency<T>)>,
     /// Values to be judged instead of those found.
     given: Option<[T; B]>,
 }
@@ -45,13 +63,66 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         let bounds = search_box(model, &record, prior);
         let search = SwarmSearch::new(&problem, plan, bounds, BsoSettings::default(), swarm_seed);
         let condition = whole.condition();
-        Self { record, plan, least_squares, condition, search, bounds, given: None }
+        let completion = Completion::new(model, &record, prior, Effort::device(prior.is_some()));
+        let completed = None;
+        Self { record, plan, least_squares, condition, search, bounds, completion, completed, given: None }
     }
 
-    /// Spends up to `evaluations` of the cost on the search; any slicing gives the same result.
+    /// Spends up to `evaluations` of the cost on the search, then steps of the completion for as many; any slicing
+    /// gives the same result.
     pub fn advance(&mut self, model: &RowModel<T, N, B>, evaluations: u32) -> SearchState {
         let problem = Problem::new(&self.record, model);
-        self.search.advance(&problem, evaluations)
+        let before = self.search.evaluations();
+        let state = self.search.advance(&problem, evaluations);
+        if state != SearchState::Done || self.completed.is_some() {
+            return state;
+        }
+        if self.completion.is_waiting() {
+            self.completion.start(model, &problem.whole(), &self.search.values(), &self.centre());
+        }
+        let mut left = evaluations.saturating_sub(self.search.evaluations().saturating_sub(before));
+        while left > 0 && !self.completion.step() {
+            left = left.saturating_sub(EVALUATIONS_PER_STEP);
+        }
+        if !self.completion.is_done() {
+            return SearchState::Running;
+        }
+        self.close(model);
+        state
+    }
+
+    /// Base values from which the cost of giving way is counted: the swarm's, unless its box held them. The box is wider
+    /// than what is allowed, so its edges say nothing; then least squares itself.
+    fn centre(&self) -> [T; B] {
+        let (low, high) = (&self.bounds.low, &self.bounds.high);
+        let mut free =
+            self.least_squares.values.iter().zip(low).zip(high).zip(&self.least_squares.determined);
+        let inside =
+            free.all(|(((value, low), high), determined)| !determined || (low..=high).contains(&value));
+        if inside { self.search.values() } else { self.least_squares.values }
+    }
+
+    #[inline(never)]
+    fn close(&mut self, model: &RowModel<T, N, B>) {
+        let projected = model.base.project(&self.completion.parameters());
+        let mut values = self.search.values();
+        for ((value, projected), &determined) in
+            values.iter_mut().zip(projected).zip(&self.least_squares.determined)
+        {
+            if determined {
+                *value = projected;
+            }
+        }
+        let whole = Problem::new(&self.record, model).whole();
+        let cost = |values: &[T; B]| {
+            let mut compact = [T::zero(); B];
+            for (slot, &column) in compact.iter_mut().zip(whole.columns()) {
+                *slot = values[column];
+            }
+            whole.factor().excess(&compact)
+        };
+        let excess = cost(&values) - cost(&self.least_squares.values);
+        self.completed = Some((values, Consistency { excess, degrees_of_freedom: whole.columns().len() }));
     }
 
     /// The motion identified from.
@@ -102,35 +173,46 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         self.given = Some(*values);
     }
 
-    /// The base values that are judged: the swarm's unless others were given.
+    /// Base values of the leg that was found; until it is there, of the swarm.
     #[must_use]
-    pub fn values(&self) -> [T; B] {
-        self.given.unwrap_or_else(|| self.search.values())
+    pub fn found(&self) -> [T; B] {
+        self.completed.as_ref().map_or_else(|| self.search.values(), |(values, _)| *values)
     }
 
-    /// The base parameters that are judged, the swarm's unless others were given, with the covariance of the problem.
+    /// The base values that are judged: those found unless others were given.
+    #[must_use]
+    pub fn values(&self) -> [T; B] {
+        self.given.unwrap_or_else(|| self.found())
+    }
+
+    /// The base parameters that are judged, those found unless others were given, with the covariance of the problem.
     #[must_use]
     pub fn estimate(&self) -> Estimate<T, B> {
         Estimate { values: self.values(), ..self.least_squares.clone() }
     }
 
-    /// Cost of the result above that of the plan's least squares, chi-square units of all rows together.
-    fn excess(&self, model: &RowModel<T, N, B>) -> T {
-        let whole = Problem::new(&self.record, model).whole();
-        let cost = |values: &[T; B]| {
-            let mut compact = [T::zero(); B];
-            for (slot, &column) in compact.iter_mut().zip(whole.columns()) {
-                *slot = values[column];
-            }
-            whole.factor().excess(&compact)
-        };
-        cost(&self.search.values()) - cost(&self.least_squares.values)
+    /// From base values to a leg that can exist.
+    #[must_use]
+    pub fn completion(&self) -> &Completion<T, N> {
+        &self.completion
+    }
+
+    /// All parameters of a leg that can exist; `None` until the search and its completion have ended.
+    #[must_use]
+    pub fn parameters(&self) -> Option<LegParameters<T, N>> {
+        self.completed.is_some().then(|| self.completion.parameters())
+    }
+
+    /// How much worse than the plan's least squares the leg that was found explains all rows; `None` until it is there.
+    #[must_use]
+    pub fn consistency(&self) -> Option<Consistency<T>> {
+        self.completed.as_ref().map(|(_, consistency)| *consistency)
     }
 
     /// Torque error of a row above which it is no noise, N m: six standard deviations and a twentieth of the torque.
     #[must_use]
     pub fn unexpected(&self) -> [T; N] {
-        let values = self.search.values();
+        let values = self.found();
         core::array::from_fn(|joint| {
             let size = self.record.torque[joint].root_mean_square;
             let error = self.record.torque_error(joint, &values).unwrap_or(size);
@@ -170,15 +252,17 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         let problem = Problem::new(&self.record, model);
         thresholds.judge_input(model, &self.record, docket);
         thresholds.judge_excitation(model, &problem.whole(), self.least_squares.rank(), docket);
-        let done = if self.search.state() == SearchState::Done { T::one() } else { T::zero() };
+        let done = if self.completed.is_some() { T::one() } else { T::zero() };
         docket.at_least(Reason::Input, Test::Search, None, done, T::one());
-        let found = self.search.values();
+        let found = self.found();
         let estimate = self.estimate();
         if !docket.verdict().has(Reason::Unexcited) {
             // Of parameters that the motion did not show nothing can be said.
             thresholds.judge_physics(model, &self.record, &self.least_squares, docket);
             thresholds.judge_physics(model, &self.record, &estimate, docket);
-            thresholds.judge_box(self.excess(model), model.base.rank(), docket);
+            if let Some(consistency) = self.consistency() {
+                thresholds.judge_consistency(&consistency, docket);
+            }
         }
         thresholds.judge_measurement(model, &self.record, &found, docket);
         thresholds.judge_residual(&self.record, &found, docket);

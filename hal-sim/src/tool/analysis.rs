@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use scarab::ident::{
     Estimate, Factor, LinkPrior, Plan, Problem, Record, RowModel, SearchState, Solver, Status, Verdict,
-    complete, least_squares_in_box, prior_parameters, status,
+    least_squares_in_box, prior_parameters, status,
 };
 use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter};
 
+use super::consistent;
 use super::findings::FindingReport;
 use super::report::{
     BaseReport, FitReport, LeastSquaresReport, Number, ParameterReport, RunReport, SCHEMA, SwarmReport,
@@ -129,7 +130,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
     ) -> RunReport {
         let estimate = solver.estimate();
         let costs = self.costs(solver);
-        let cost = costs.factor.excess(&estimate.values.map(f64::from));
+        let cost = costs.factor.excess(&solver.search().values().map(f64::from));
         let searched = solver.search().state() == SearchState::Done;
         RunReport {
             schema: SCHEMA,
@@ -144,7 +145,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             rank: solver.least_squares().rank(),
             columns: self.columns,
             condition: solver.condition().into(),
-            parameters: self.parameters(solver.record(), &estimate),
+            parameters: self.parameters(solver, &estimate),
             base_parameters: self.base_parameters(&estimate, circumstances.cramer_rao.as_ref()),
             training: fits(training, &estimate.values),
             validation: fits(validation, &estimate.values),
@@ -162,6 +163,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 excess_chi2: searched.then_some(cost - costs.above).into(),
                 iterations_to_half_chi2: circumstances.iterations_to_half_chi2.filter(|_| searched),
             },
+            consistent: consistent::compare(self, solver, circumstances.iterations_to_half_chi2),
             tracking: circumstances.tracking.clone(),
             scale: ScaleReport::default(),
             simulated_s: circumstances.simulated_s,
@@ -189,19 +191,11 @@ impl<const N: usize, const B: usize> Background<N, B> {
             .collect()
     }
 
-    /// Base values completed by the prior; `None` without one.
-    fn completed(&self, estimate: &Estimate<f32, B>) -> Option<LegParameters<f64, N>> {
-        let prior = prior_parameters(self.prior.as_ref()?);
-        let expected = self.model.base.project(&prior);
-        let values = core::array::from_fn(|base| {
-            if estimate.determined[base] { f64::from(estimate.values[base]) } else { expected[base] }
-        });
-        complete(&self.model, &values, &prior)
-    }
-
-    fn parameters(&self, record: &Record<f32, N, B>, estimate: &Estimate<f32, B>) -> Vec<ParameterReport> {
-        let completed = self.completed(estimate);
+    fn parameters(&self, solver: &Solver<f32, N, B>, estimate: &Estimate<f32, B>) -> Vec<ParameterReport> {
+        let record = solver.record();
         let prior = self.prior.as_ref().map(prior_parameters);
+        // Without a prior the values that torque does not tell would be made up.
+        let completed = prior.and_then(|_| solver.parameters());
         let mut reports = Vec::with_capacity(N * PARAMETERS_PER_JOINT);
         for joint in 0..N {
             for parameter in Parameter::ALL {

@@ -7,6 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::consistent_runs;
 use super::error::ToolError;
 use super::leg_file::LegFile;
 use super::recording::{JointSeries, Recording};
@@ -201,6 +202,7 @@ pub fn print_runs(report: &RunsReport) -> Result<(), ToolError> {
         quantile(&mut iterations, 0.5),
         quantile(&mut iterations, 0.95),
     );
+    consistent_runs::print(runs)?;
     for joint in 0..first.tracking.len() {
         let of = |value: &dyn Fn(&super::report::TrackingReport) -> Option<f64>| -> f64 {
             let mut values: Vec<f64> =

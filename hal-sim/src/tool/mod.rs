@@ -14,6 +14,7 @@
 //! | [`placed_mass`], [`scale`] | known masses: torque constants and loads |
 //! | [`model_file`], [`predict`], [`urdf`] | what was found, kept; its torque; the same for other programs |
 //! | [`regressor`] | torques and regressor of given states |
+//! | [`consistent`], [`consistent_runs`] | legs that can exist: both searches and their optimum |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
 //! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
 
@@ -25,6 +26,8 @@
 pub mod analysis;
 pub mod anthropometry;
 pub mod cli;
+pub mod consistent;
+pub mod consistent_runs;
 pub mod error;
 pub mod figures;
 pub mod findings;

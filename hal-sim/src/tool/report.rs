@@ -184,6 +184,42 @@ pub struct ModelDetail {
     pub not_estimated: Vec<String>,
 }
 
+/// One search for a leg that can exist.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ConsistentSearchReport {
+    /// Of the swarm.
+    pub iterations: u32,
+    /// Of the swarm.
+    pub evaluations: u32,
+    /// Newton steps of the completion; none where the closed form is a possible leg.
+    pub steps: u32,
+    /// Cost of the data above the least that any allowed leg has, that found in double precision.
+    pub excess_chi2: Number,
+    /// Iterations until the excess was at most a half; unknown where it never was.
+    pub iterations_to_half_chi2: Option<u32>,
+    /// The leg that was found (of the search over whole legs: the best of every iteration) is a possible one.
+    pub consistent: bool,
+    /// Its parameters by name; empty without a prior.
+    pub parameters: BTreeMap<String, Number>,
+}
+
+/// Both searches for a leg that can exist.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ConsistentReport {
+    /// Which of the two is the run's result.
+    pub chosen: &'static str,
+    /// J_C - J_LS: what physical consistency within the prior's limits costs, found in double precision.
+    pub optimum_over_least_squares: Number,
+    /// The same of the run's result, as the verdict sees it.
+    pub result_over_least_squares: Number,
+    /// Most degrees of freedom of that chi-square.
+    pub degrees_of_freedom: Option<usize>,
+    /// Log-Cholesky coordinates of every link.
+    pub full: ConsistentSearchReport,
+    /// Base values, completed.
+    pub base: ConsistentSearchReport,
+}
+
 /// Position error on gait.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackingReport {
@@ -234,6 +270,8 @@ pub struct RunReport {
     pub least_squares: LeastSquaresReport,
     /// The search.
     pub bso: SwarmReport,
+    /// Searches for a leg that can exist.
+    pub consistent: ConsistentReport,
     /// What the model is worth to the servo; empty in a replay.
     pub tracking: Vec<TrackingReport>,
     /// What the parameters are measured in, and what the leg carried.

@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, Table, presets};
 
 use super::error::ToolError;
 use super::replay::Source;
-use super::report::{FitReport, Number, RunReport};
+use super::report::{ConsistentSearchReport, FitReport, Number, RunReport};
 
 /// Writes to standard output; a reader that has seen enough and closed the pipe is no fault.
 pub fn print(text: &str) -> Result<(), ToolError> {
@@ -210,6 +210,7 @@ fn run_text(run: &RunReport) -> String {
             number(run.bso.excess_chi2),
         ),
     ];
+    lines.push(consistent_line(run));
     lines.extend(run.tracking.iter().map(|tracking| {
         format!(
             "tracking on gait, joint {}: {} deg rms without the model, {} with it",
@@ -236,6 +237,27 @@ fn run_text(run: &RunReport) -> String {
         )
     }));
     lines.join("\n") + "\n"
+}
+
+/// What physical consistency costs, and both searches for it.
+fn consistent_line(run: &RunReport) -> String {
+    let found = &run.consistent;
+    let search = |search: &ConsistentSearchReport| {
+        format!(
+            "{} iterations, {} evaluations, {} steps, {} above",
+            search.iterations,
+            search.evaluations,
+            search.steps,
+            number(search.excess_chi2)
+        )
+    };
+    format!(
+        "legs that can exist: the best of them costs {} chi-square units more than least squares. base values, completed \
+         (the result): {}. whole legs: {}",
+        number(found.optimum_over_least_squares),
+        search(&found.base),
+        search(&found.full)
+    )
 }
 
 /// A reason of the closed list in words.

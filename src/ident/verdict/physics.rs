@@ -2,6 +2,7 @@
 
 use nalgebra::{SMatrix, Vector3};
 
+use super::super::solver::Consistency;
 use super::{Docket, Reason, Test, Thresholds};
 use crate::ident::completion::is_weak;
 use crate::ident::estimate::Estimate;
@@ -48,13 +49,13 @@ impl<T: Real> Thresholds<T> {
         );
     }
 
-    /// Whether what was found in the box explains the data as well as least squares does, up to what noise makes of
-    /// `rank` parameters: if not, the data contradict every leg that the prior allows.
-    pub fn judge_box(&self, excess: T, rank: usize, docket: &mut Docket<'_, T>) {
-        let rank = T::of(rank as f64);
-        let spread = real::sqrt(rank + rank); // of chi-square with `rank` degrees of freedom
-        let limit = rank + self.largest_excess_spreads * spread;
-        docket.at_most(Reason::Unphysical, Test::PriorBox, None, None, excess, limit);
+    /// Whether a leg that can exist explains the data as well as least squares does, up to what noise makes of so many
+    /// degrees of freedom: if not, the data contradict every leg that the prior allows.
+    pub fn judge_consistency(&self, consistency: &Consistency<T>, docket: &mut Docket<'_, T>) {
+        let freedom = T::of(consistency.degrees_of_freedom as f64);
+        let spread = real::sqrt(freedom + freedom); // of chi-square with that many degrees of freedom
+        let limit = freedom + self.largest_excess_spreads * spread;
+        docket.at_most(Reason::Unphysical, Test::PriorBox, None, None, consistency.excess, limit);
     }
 
     /// Standard deviations by which the kinetic energy `v' M(q) v / 2` is negative in some direction, at worst, at

@@ -15,7 +15,7 @@ pub struct Thresholds<T> {
     pub largest_condition: T,
     /// Standard deviations by which a quantity that cannot be negative may be so.
     pub largest_negative_sigmas: T,
-    /// Spreads of chi-square by which the result in the prior's box may be worse than least squares: five are not noise.
+    /// Spreads of chi-square by which a leg that can exist may be worse than least squares: five are not noise.
     pub largest_excess_spreads: T,
     /// Quantile of the standard normal distribution at which noise is no longer believed: 5.2 is passed once in ten
     /// million, and some fifty such tests are made of a run, so that noise refuses less than one run in a hundred
