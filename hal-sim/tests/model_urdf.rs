@@ -176,6 +176,28 @@ fn bodies_of_a_chain_with_crossed_axes_come_back_and_move_as_torque_told() {
 }
 
 #[test]
+fn the_default_leg_as_shipped_is_exported_and_moves_as_torque_told() {
+    let folder = Folder::new();
+    let path = folder.path("model.toml");
+    scarab("identify --save-model", &[&path]).ends_with(0);
+    let urdf = folder.path("leg.urdf");
+    scarab("export --model", &[&path, "--urdf".as_ref(), &urdf]).ends_with(0);
+    let robot = urdf_rs::read_file(&urdf).expect("another reader takes it");
+    let model = ModelFile::load(&path).expect("just written");
+    let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
+    let mechanism = Mechanism::new(&described::<2>(&robot, &leg));
+    let predictor = Predictor::<2>::new(&model).expect("two joints");
+    let state = JointState { q: [0.3, -0.9], qd: [0.7, -1.1], qdd: [4.0, -6.0] };
+    let torque = mechanism.inverse_dynamics(&state.q, &state.qd, &state.qdd);
+    for (joint, predicted) in predictor.torques(&state).iter().enumerate() {
+        let rotor = model.joint_parameters(joint).expect("with a prior")[Parameter::IA.index()];
+        // The completion meets the measured sums to the rounding of single precision.
+        let whole = torque[joint] + rotor * state.qdd[joint];
+        assert!((whole - predicted.rigid).abs() < 1e-4, "joint {joint}: {whole} against {predicted:?}");
+    }
+}
+
+#[test]
 fn the_description_is_well_formed_and_says_what_torque_never_saw() {
     let folder = Folder::new();
     let (model, text) = exported(&folder, "x2-wearer-75kg");
