@@ -40,6 +40,12 @@ impl Wearer {
         wearer
     }
 
+    /// Other habits from this time (s) on; a push that is under way ends.
+    pub fn change_habits(&mut self, habits: Option<PushDescription>, now: f64, joints: usize) {
+        (self.habits, self.next) = (habits, None);
+        self.plan(now, joints);
+    }
+
     /// Torque on each joint, N m, at a time in s that never decreases from call to call.
     pub fn torque<const N: usize>(&mut self, time: f64) -> [f64; N] {
         let mut torque = [0.0; N];

@@ -9,7 +9,7 @@
 //! which does the last two and reads. All public angles and torques are anatomical.
 
 use crate::conventions::{Anatomy, links_at_reference};
-use crate::description::LegDescription;
+use crate::description::{LegDescription, PushDescription};
 use crate::drive::Drive;
 use crate::floor::Floor;
 use crate::leg::{Leg, LegState};
@@ -126,6 +126,24 @@ impl<const N: usize> World<N> {
         }
         let foot = links_at_reference(&joints).last().map(|link| link.to_centre);
         self.floor = foot.map(|foot| Floor::new(foot, self.tick as f64 * TICK_S + delay, duration));
+    }
+
+    /// Multiplies the Coulomb level (that at rest too) and the viscous coefficient of every joint from this instant on.
+    pub fn scale_friction(&mut self, factor: f64) {
+        for joint in &mut self.description.joints {
+            joint.friction.coulomb *= factor;
+            joint.friction.viscous *= factor;
+            if let Some(stribeck) = &mut joint.friction.stribeck {
+                stribeck.static_level *= factor;
+            }
+        }
+        self.leg = Leg::new(&self.description).with_blocked(self.blocked);
+    }
+
+    /// Gives the wearer other habits from this instant on; none for a wearer who holds still.
+    pub fn set_pushes(&mut self, pushes: Option<PushDescription>) {
+        self.description.pushes = pushes;
+        self.wearer.change_habits(pushes, self.tick as f64 * TICK_S, N);
     }
 
     /// Sets each joint's current noise: standard deviation per logged 500 Hz sample, A.
