@@ -8,11 +8,13 @@
 //! held-out motions -> residual, alignment (held_out): its order in time, and what it asks for
 //!        -> verdict: accepted, or refused with reasons
 //! scale: torque constants from two records, without and with a known mass
+//! accepted -> baseline -> monitor of the residual while the leg moves -> update: what changed, from gait alone
 //! ```
 //!
 //! Everything is generic over the scalar: the board runs it in `f32`, tests check it in `f64`.
 
 pub mod alignment;
+pub mod baseline;
 pub mod bounds;
 pub mod completion;
 pub mod consistent;
@@ -21,6 +23,7 @@ pub mod estimate;
 pub mod factor;
 pub mod held_out;
 pub mod kernel;
+pub mod monitor;
 pub mod noise;
 pub mod record;
 pub mod residual;
@@ -29,9 +32,11 @@ pub mod scale;
 pub mod search;
 pub mod smoothing;
 pub mod solver;
+pub mod update;
 pub mod verdict;
 
 pub use alignment::{Alignment, Direction, Misalignment, Misalignments};
+pub use baseline::Baseline;
 pub use bounds::{LinkPrior, prior_parameters, search_box};
 pub use completion::{Status, complete, status};
 pub use consistent::{Completion, Effort, FullObjective, FullSearch, LegCost, Limits};
@@ -40,6 +45,7 @@ pub use estimate::{Estimate, Plan, Problem, Stage, noise};
 pub use factor::{Factor, Pyramid};
 pub use held_out::HeldOut;
 pub use kernel::{Kernel, KernelError, LowPass};
+pub use monitor::{Change, Monitor, MonitorSettings, ROWS_PER_BLOCK};
 pub use record::{
     LARGEST_STILL_SHARE, Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS,
     TorqueSize,
@@ -50,4 +56,6 @@ pub use scale::{ConstantRatio, torque_constant_ratio, widen};
 pub use search::{SearchState, SwarmSearch};
 pub use smoothing::{Smoothed, Smoother};
 pub use solver::{Consistency, Solver};
+pub use update::hypothesis::{DIRECTIONS, Hypothesis};
+pub use update::{Cause, PAYLOAD_PARAMETERS, Update};
 pub use verdict::{Docket, Evidence, Reason, Test, Thresholds, Unused, Verdict};

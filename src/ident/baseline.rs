@@ -1,0 +1,72 @@
+//! What an accepted identification leaves behind for judging later motion by it: values, covariance, noise of a row.
+//!
+//! Why not the model alone: whether a residual is too large can only be said beside the noise that was there when the
+//! model was accepted, and beside what the model itself does not know.
+//!
+//! ```text
+//! r = tau_f - y_f beta                                     residual of one filtered row
+//! e^2 = r^2 / (sigma_i^2 + y_f Cov y_f')                   its expectation is 1 while nothing has changed
+//! sigma_i^2 = largest mean square residual of joint i among the motion identified from and those predicted
+//! ```
+//!
+//! The largest, because a model is accepted with some misfit beyond noise (friction that depends on more than speed), and
+//! that misfit is no change. Of the motion identified from it is the unbiased variance, see [`super::estimate`].
+//! Cost of a row: `B^2 + 2 B` multiplications. Memory: `B^2 + B + N + 1` numbers and `B` flags.
+
+use super::estimate::{Estimate, noise};
+use super::record::Record;
+use super::rows::FilteredRows;
+use crate::real::{self, Real};
+
+/// An accepted model as the reference of what comes after.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Baseline<T, const N: usize, const B: usize> {
+    /// Base values and their covariance.
+    pub estimate: Estimate<T, B>,
+    /// Variance of one filtered row of each joint, (N m)^2.
+    pub row_variance: [T; N],
+    /// Information of one row in units of independent ones.
+    pub row_information: T,
+}
+
+impl<T: Real, const N: usize, const B: usize> Baseline<T, N, B> {
+    /// From the estimate, the record it was made from and those it was tried on.
+    #[must_use]
+    pub fn new<'a>(
+        estimate: Estimate<T, B>,
+        training: &Record<T, N, B>,
+        others: impl Iterator<Item = &'a Record<T, N, B>>,
+    ) -> Self {
+        let row_information = training.row_information;
+        let mut row_variance = noise(training).map(|sigma| sigma * sigma * row_information);
+        for record in others {
+            for (joint, variance) in row_variance.iter_mut().enumerate() {
+                let error = record.torque_error(joint, &estimate.values).unwrap_or(T::zero());
+                *variance = real::max(*variance, error * error);
+            }
+        }
+        Self { estimate, row_variance, row_information }
+    }
+
+    /// Standard deviation of one independent row of a joint, N m, as a [`super::Problem`] weighs it.
+    #[must_use]
+    pub fn noise(&self, joint: usize) -> T {
+        let variance = self.row_variance.get(joint).copied().unwrap_or(T::one());
+        real::sqrt(variance / real::max(self.row_information, T::of(1e-3)))
+    }
+
+    /// Normalised square `e^2` of one joint's residual.
+    #[must_use]
+    pub fn normalised_square(&self, rows: &FilteredRows<T, N, B>, joint: usize) -> T {
+        let (Some(row), Some(&torque), Some(&variance)) =
+            (rows.regressor.get(joint), rows.torque.get(joint), self.row_variance.get(joint))
+        else {
+            return T::zero();
+        };
+        let predicted =
+            row.iter().zip(&self.estimate.values).fold(T::zero(), |sum, (&left, &right)| sum + left * right);
+        let residual = torque - predicted;
+        let unknown = self.estimate.sigma_of(row);
+        residual * residual / (variance + unknown * unknown)
+    }
+}
