@@ -53,6 +53,8 @@ pub enum Segment {
     Training,
     /// Predicted; counted from 0.
     Validation(u8),
+    /// A motion that is followed: the accepted model is watched.
+    Tracking,
 }
 
 impl Activity {
@@ -64,6 +66,7 @@ impl Activity {
             Self::Identify(IdentifyPhase::Validate { motion, step: Step::Run }) => {
                 Some(Segment::Validation(motion))
             }
+            Self::Track(Step::Run) => Some(Segment::Tracking),
             _ => None,
         }
     }

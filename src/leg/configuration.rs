@@ -1,7 +1,7 @@
 //! What does not change about a leg while it runs.
 
 use super::activity::VALIDATION_MOTIONS;
-use crate::ident::{KernelError, LinkPrior, Plan, RowModel, Thresholds};
+use crate::ident::{KernelError, LinkPrior, MonitorSettings, Plan, RowModel, Thresholds};
 use crate::motion::{JointEnvelope, LimitViolation, Motion, MotionError, Periodic};
 use crate::servo::{JointConfiguration, ServoError};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
@@ -26,6 +26,8 @@ pub struct LegConfiguration<const N: usize, const B: usize> {
     pub swarm_seed: u64,
     /// What a result must keep.
     pub thresholds: Thresholds<f32>,
+    /// When a tracked motion says that the model no longer fits.
+    pub monitor: MonitorSettings<f32>,
     /// Where the low-pass of the identification is 3 dB down, Hz.
     pub bandwidth_hz: f32,
     /// The motion identified from.

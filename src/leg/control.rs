@@ -4,20 +4,16 @@ use super::activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS
 use super::configuration::{LegConfiguration, LegError, ProvedMotion};
 use super::identification::Finding;
 use super::model::IdentifiedModel;
+use super::succession::Succession;
 use crate::hal::Sample;
-use crate::ident::Verdict;
+use crate::ident::{Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
-use crate::real::clamp;
 use crate::safety::{DriveState, PowerRequest};
-use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput, TorqueModel};
+use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
 /// At rest this long after a motion before the next step: half a second.
 const SETTLE_TICKS: u32 = SERVO_RATE_HZ / 2;
-
-/// The model fades into and out of the feedforward over half a second, while the controller's integral makes room: no
-/// step of torque when a model is taken into use.
-const FADE_PER_TICK: f32 = 1.0 / (SERVO_RATE_HZ / 2) as f32;
 
 /// What an operator asks of a leg, at one tick. `Identify` and `Track` are refused unless the drive is enabled and the
 /// commanded motion is at rest; a leg in motion is stopped by a quick stop, or by waiting for the motion's end.
@@ -34,6 +30,9 @@ pub enum ControlRequest<const N: usize> {
         /// Whether the model is used, if there is one.
         with_model: bool,
     },
+    /// Take the update that was offered after a change into use, in motion or at rest: its torque fades over from the old
+    /// model's in half a second. Refused where none is offered.
+    TakeUpdate,
 }
 
 /// A 500 Hz sample and what it is for.
@@ -56,6 +55,8 @@ pub struct ControlOutput<const N: usize> {
     pub logged: Option<LoggedSample<N>>,
     /// The request of this tick was refused.
     pub refused: bool,
+    /// The update offered was taken into use at this tick.
+    pub took_update: bool,
 }
 
 /// Activity, servo and log of one leg.
@@ -74,23 +75,9 @@ pub struct Control<const N: usize> {
     validation: [Periodic<N>; VALIDATION_MOTIONS],
     approach_speed: [RadianPerSecond; N],
     approach_acceleration: [RadianPerSecondSquared; N],
-    model: Option<IdentifiedModel<N>>,
-    with_model: bool,
-    /// Share of the model in the feedforward, 0..1.
-    model_share: f32,
+    models: Succession<N>,
+    change: Option<Change<f32, N>>,
     verdict: Option<Verdict>,
-}
-
-/// A model at a share of its torque.
-struct Faded<'a, const N: usize> {
-    model: &'a IdentifiedModel<N>,
-    share: f32,
-}
-
-impl<const N: usize> TorqueModel<N> for Faded<'_, N> {
-    fn torques(&self, q: &[f32; N], qd: &[f32; N], qdd: &[f32; N], gravity: [f32; 3]) -> [f32; N] {
-        self.model.torques(q, qd, qdd, gravity).map(|torque| self.share * torque)
-    }
 }
 
 impl<const N: usize> Control<N> {
@@ -117,9 +104,8 @@ impl<const N: usize> Control<N> {
             validation: configuration.validation,
             approach_speed,
             approach_acceleration,
-            model: None,
-            with_model: false,
-            model_share: 0.0,
+            models: Succession::EMPTY,
+            change: None,
             verdict: None,
         })
     }
@@ -133,12 +119,12 @@ impl<const N: usize> Control<N> {
     ) -> ControlOutput<N> {
         self.tick = self.tick.wrapping_add(1);
         let refused = request.as_ref().is_some_and(|request| !self.may_begin(request));
+        let took_update = !refused && request == Some(ControlRequest::TakeUpdate);
         let power = self.accept(request.filter(|_| !refused));
         let motion = self.motion.state_at(self.motion_tick);
-        let wanted = if self.with_model { FADE_PER_TICK } else { -FADE_PER_TICK };
-        self.model_share = clamp(self.model_share + wanted, 0.0, 1.0);
-        let faded = self.model.as_ref().map(|model| Faded { model, share: self.model_share });
-        let feedforward = faded.as_ref().filter(|faded| faded.share > 0.0);
+        let mixed = self.models.advance();
+        let feedforward = self.models.faded(mixed.as_ref());
+        let feedforward = feedforward.as_ref();
         let servo = self.servo.tick(sample, &ServoCommand { motion, feedforward, power }, gravity);
         self.motion_tick = self.motion_tick.saturating_add(1);
         if servo.decision.state != DriveState::OperationEnabled {
@@ -159,7 +145,7 @@ impl<const N: usize> Control<N> {
             self.segment = self.activity.segment();
             LoggedSample { sample, segment }
         });
-        ControlOutput { servo, motion, logged, refused }
+        ControlOutput { servo, motion, logged, refused, took_update }
     }
 
     /// Power requests always; a new activity only from rest, since the way to it starts at rest.
@@ -167,7 +153,17 @@ impl<const N: usize> Control<N> {
         let still =
             self.motion.state_at(self.motion_tick).velocity_rad_per_s.iter().all(|&speed| speed == 0.0);
         let enabled = self.servo.state() == DriveState::OperationEnabled;
-        matches!(request, ControlRequest::Power(_)) || (enabled && still)
+        match request {
+            ControlRequest::Power(_) => true,
+            ControlRequest::TakeUpdate => self.is_update_offered(),
+            ControlRequest::Identify | ControlRequest::Track { .. } => enabled && still,
+        }
+    }
+
+    /// A new activity: what an earlier motion told no longer counts. A model that is fading does so to its end.
+    fn forget_change(&mut self) {
+        self.change = None;
+        self.models.withdraw();
     }
 
     fn accept(&mut self, request: Option<ControlRequest<N>>) -> Option<PowerRequest> {
@@ -175,13 +171,19 @@ impl<const N: usize> Control<N> {
             ControlRequest::Power(power) => return Some(power),
             ControlRequest::Identify => {
                 self.verdict = None;
-                self.with_model = false;
+                self.models.want(false);
+                self.forget_change();
                 self.approach(Activity::Identify(IdentifyPhase::Approach), self.excitation);
             }
             ControlRequest::Track { motion, with_model } => {
+                self.forget_change();
                 self.tracked = Some(*motion.motion());
-                self.with_model = with_model;
+                self.models.want(with_model);
                 self.approach(Activity::Track(Step::Approach), *motion.motion());
+            }
+            ControlRequest::TakeUpdate => {
+                self.models.take();
+                self.change = None;
             }
         }
         None
@@ -206,7 +208,7 @@ impl<const N: usize> Control<N> {
             }
             Activity::Identify(IdentifyPhase::Validate { motion, step }) => self.validate_after(motion, step),
             // The model is wholly in use, or wholly out of it, before the motion begins.
-            Activity::Track(Step::Approach) if self.is_fading() => {}
+            Activity::Track(Step::Approach) if self.models.is_fading() => {}
             Activity::Track(Step::Approach) => match self.tracked {
                 Some(motion) => self.run(Activity::Track(Step::Run), motion),
                 None => self.rest(Activity::Idle),
@@ -214,10 +216,6 @@ impl<const N: usize> Control<N> {
             Activity::Track(Step::Run) => self.rest(Activity::Idle),
             Activity::Idle | Activity::Identify(IdentifyPhase::Solve | IdentifyPhase::Judge) => {}
         }
-    }
-
-    fn is_fading(&self) -> bool {
-        self.model.is_some() && self.model_share != if self.with_model { 1.0 } else { 0.0 }
     }
 
     fn validate_after(&mut self, motion: u8, step: Step) {
@@ -251,10 +249,15 @@ impl<const N: usize> Control<N> {
                 if let Activity::Identify(Settle | Solve | Judge) = self.activity {
                     self.verdict = Some(verdict);
                     // A refused result leaves the model that was there before.
-                    self.model = model.or(self.model);
+                    if let Some(model) = model {
+                        self.models.accept(model);
+                    }
                     self.rest(Activity::Idle);
                 }
             }
+            Finding::Changed(change) => self.change = Some(change),
+            Finding::Updated { model: Some(model), .. } => self.models.offer(model),
+            Finding::Updated { model: None, .. } => {}
         }
     }
 
@@ -262,13 +265,7 @@ impl<const N: usize> Control<N> {
     /// while the leg is doing anything or a model is still in the feedforward, where it would be a step of torque.
     #[must_use]
     pub fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
-        let free = self.activity == Activity::Idle && (self.model.is_none() || !(self.model_share > 0.0));
-        if free {
-            self.with_model = false;
-            self.model_share = 0.0;
-            self.model = Some(model);
-        }
-        free
+        self.activity == Activity::Idle && self.models.adopt(model)
     }
 
     fn approach(&mut self, activity: Activity, motion: Periodic<N>) {
@@ -322,9 +319,21 @@ impl<const N: usize> Control<N> {
         self.verdict
     }
 
+    /// The alarm that the model no longer fits; gone with a new activity or once an update is taken.
+    #[must_use]
+    pub fn change(&self) -> Option<&Change<f32, N>> {
+        self.change.as_ref()
+    }
+
+    /// Whether there is an update to take.
+    #[must_use]
+    pub fn is_update_offered(&self) -> bool {
+        self.models.is_offered()
+    }
+
     /// The accepted model.
     #[must_use]
     pub fn model(&self) -> Option<&IdentifiedModel<N>> {
-        self.model.as_ref()
+        self.models.model()
     }
 }

@@ -4,9 +4,11 @@ use super::activity::{Segment, VALIDATION_MOTIONS};
 use super::configuration::{LegConfiguration, LegError};
 use super::control::LoggedSample;
 use super::model::IdentifiedModel;
+use super::upkeep::Upkeep;
 use crate::ident::{
-    Ends, Evidence, HeldOut, LinkPrior, Misalignments, Plan, Reason, Record, Recorder, Residual, RowModel,
-    SearchState, Solver, Thresholds, Unused, Verdict,
+    Baseline, Cause, Change, Ends, Evidence, HeldOut, LinkPrior, LowPass, Misalignments, Plan, Progress,
+    Reason, Record, Recorder, Residual, RowModel, SAMPLE_RATE_HZ, SearchState, Solver, Thresholds, Unused,
+    Verdict,
 };
 
 /// What identification tells control.
@@ -19,6 +21,17 @@ pub enum Finding<const N: usize> {
         /// Accepted or not, and why.
         verdict: Verdict,
         /// Only with an accepting verdict.
+        model: Option<IdentifiedModel<N>>,
+    },
+    /// The accepted model no longer fits the motion that is tracked.
+    Changed(Change<f32, N>),
+    /// What changed was looked for.
+    Updated {
+        /// What it was.
+        cause: Cause,
+        /// Accepted or not, and why.
+        verdict: Verdict,
+        /// Offered with an accepting verdict; the operator takes it into use.
         model: Option<IdentifiedModel<N>>,
     },
 }
@@ -50,6 +63,8 @@ pub struct Identification<const N: usize, const B: usize, const TAPS: usize, con
     residuals: [Residual<f32, N>; VALIDATION_MOTIONS],
     verdict: Option<Verdict>,
     report_due: bool,
+    upkeep: Upkeep<N, B>,
+    change_due: bool,
 }
 
 impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
@@ -61,6 +76,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     /// [`LegError::Kernel`] when the filter does not fit.
     pub fn new(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
         let recorder = Recorder::new(configuration.bandwidth_hz)?;
+        let low_pass = LowPass::<f32, TAPS>::new(configuration.bandwidth_hz, SAMPLE_RATE_HZ as f32)?;
         Ok(Self {
             held_out: HeldOut::new(recorder.reach()),
             residuals: [Residual::new(); VALIDATION_MOTIONS],
@@ -75,6 +91,8 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             validation: [const { None }; VALIDATION_MOTIONS],
             verdict: None,
             report_due: false,
+            upkeep: Upkeep::new(&low_pass, configuration.monitor),
+            change_due: false,
         })
     }
 
@@ -92,23 +110,34 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
                 self.open(begun);
             }
         }
-        if logged.segment.is_some() {
-            let sample = &logged.sample;
-            let progress = self.recorder.push(&self.model, &sample.position_rad, &sample.torque_nm);
-            match (logged.segment, progress) {
-                (Some(Segment::Validation(_)), Some(progress)) => self.held_out.take(&self.model, &progress),
-                // A sample that was not finite: the windows start anew.
-                (Some(Segment::Validation(_)), None) => self.held_out.break_off(),
-                _ => {}
+        if logged.segment.is_none() {
+            return;
+        }
+        let sample = &logged.sample;
+        let progress = self.recorder.push(&self.model, &sample.position_rad, &sample.torque_nm);
+        match (logged.segment, progress) {
+            (Some(Segment::Validation(_)), Some(progress)) => self.held_out.take(&self.model, &progress),
+            // A sample that was not finite: the windows start anew.
+            (Some(Segment::Validation(_)), None) => self.held_out.break_off(),
+            (Some(Segment::Tracking), Some(Progress { rows: Some(rows), .. }))
+                if self.upkeep.watch(&rows).is_some() =>
+            {
+                self.recorder.clear(Ends::Whole);
+                self.change_due = true;
             }
+            _ => {}
         }
     }
 
     fn open(&mut self, segment: Segment) {
         self.recorder.clear(match segment {
             Segment::Training => Ends::Cut,
-            Segment::Validation(_) => Ends::Whole,
+            Segment::Validation(_) | Segment::Tracking => Ends::Whole,
         });
+        if segment == Segment::Tracking {
+            self.upkeep.begin();
+            self.change_due = false;
+        }
         self.work = Work::Recording(segment);
         if segment == Segment::Training {
             self.solver = None;
@@ -121,6 +150,10 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     }
 
     fn close(&mut self, segment: Segment) {
+        if segment == Segment::Tracking {
+            self.work = Work::Idle;
+            return;
+        }
         let record = self.recorder.finish();
         match segment {
             Segment::Training => {
@@ -140,6 +173,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
                 self.work = Work::Idle;
                 self.report_due = self.validation.iter().all(Option::is_some);
             }
+            Segment::Tracking => {}
         }
     }
 
@@ -148,6 +182,9 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         if self.report_due {
             self.report_due = false;
             return Some(self.judge());
+        }
+        if self.work == Work::Recording(Segment::Tracking) {
+            return self.keep_up();
         }
         if self.work != Work::Solving {
             return None;
@@ -166,12 +203,46 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         }
     }
 
+    /// The alarm, and later what was found since.
+    fn keep_up(&mut self) -> Option<Finding<N>> {
+        if self.change_due {
+            self.change_due = false;
+            return self.upkeep.change().map(|change| Finding::Changed(*change));
+        }
+        if !self.upkeep.is_ready(&self.recorder.rows()) {
+            return None;
+        }
+        let record = self.recorder.finish();
+        self.recorder.clear(Ends::Whole);
+        let update = self.upkeep.solve(&self.model, &record, &self.thresholds)?;
+        let model = update.verdict.is_accepted();
+        Some(Finding::Updated {
+            cause: update.cause,
+            verdict: update.verdict,
+            model: model.then(|| IdentifiedModel::new(&self.model, &update.estimate.values)),
+        })
+    }
+
+    /// The model in use is another one, of which nothing is known here.
+    pub fn forget_model(&mut self) {
+        self.upkeep.forget();
+    }
+
+    /// The operator takes the update that was offered into use.
+    pub fn take_update(&mut self) {
+        self.upkeep.take();
+    }
+
     fn judge(&mut self) -> Finding<N> {
         let verdict = self.judge_with(&mut |_| {});
         self.verdict = Some(verdict);
-        let values = self.solver.as_ref().map(|solver| solver.estimate().values);
-        let model = values.filter(|_| verdict.is_accepted());
-        Finding::Judged { verdict, model: model.map(|values| IdentifiedModel::new(&self.model, &values)) }
+        let estimate = self.solver.as_ref().map(Solver::estimate).filter(|_| verdict.is_accepted());
+        let model = estimate.as_ref().map(|estimate| IdentifiedModel::new(&self.model, &estimate.values));
+        if let (Some(estimate), Some(solver)) = (estimate, &self.solver) {
+            let others = self.validation.iter().flatten();
+            self.upkeep.accept(Baseline::new(estimate, solver.record(), others));
+        }
+        Finding::Judged { verdict, model }
     }
 
     /// The verdict on what was recorded so far; every piece of evidence goes to `hand_on`.
@@ -207,10 +278,10 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         }
     }
 
-    /// Stops everything; what was found before stays.
+    /// Stops an identification; what was found before stays, and a motion that is tracked goes on.
     pub fn cancel(&mut self) {
         self.report_due = false;
-        if self.work != Work::Idle {
+        if self.work != Work::Recording(Segment::Tracking) {
             self.work = Work::Idle;
         }
     }
@@ -231,6 +302,12 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     #[must_use]
     pub fn verdict(&self) -> Option<Verdict> {
         self.verdict
+    }
+
+    /// What becomes of the accepted model.
+    #[must_use]
+    pub fn upkeep(&self) -> &Upkeep<N, B> {
+        &self.upkeep
     }
 
     /// What the rows are made with.

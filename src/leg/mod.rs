@@ -4,7 +4,8 @@
 //!   control (ticked at 4 kHz)                              identification (advanced when there is time)
 //!   motion -> servo -> drive command                       recorder -> solver -> verdict
 //!      |  LoggedSample, 500 Hz: angle, torque, segment  ----->
-//!      <-----  Finding: solved | judged, with the model if it was accepted
+//!      <-----  Finding: solved | judged, with the model if it was accepted | changed | updated, with the model offered
+//!      |  took_update: the operator takes what was offered into use  ----->
 //! ```
 //!
 //! The board runs control in an interrupt and identification at the lowest priority and carries the values from one
@@ -24,6 +25,8 @@ mod control;
 mod identification;
 mod model;
 mod stored;
+mod succession;
+mod upkeep;
 
 pub use activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
 pub use configuration::{LegConfiguration, LegError, ProvedMotion};
@@ -31,6 +34,7 @@ pub use control::{Control, ControlOutput, ControlRequest, LoggedSample};
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
 pub use stored::{RestoreError, StoredModel};
+pub use upkeep::{UPDATE_ROWS, Upkeep};
 
 use crate::hal::Sample;
 
@@ -69,6 +73,9 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         if !matches!(self.control.activity(), Activity::Identify(_)) {
             self.identification.cancel();
         }
+        if output.took_update {
+            self.identification.take_update();
+        }
         if let Some(finding) = self.identification.advance(evaluations) {
             self.control.receive(finding);
         }
@@ -80,10 +87,14 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         self.identification.examine(values);
     }
 
-    /// Takes a model that was kept into use, see [`Control::adopt`].
+    /// Takes a model that was kept into use, see [`Control::adopt`]. It comes without its uncertainty and is not watched.
     #[must_use]
     pub fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
-        self.control.adopt(model)
+        let adopted = self.control.adopt(model);
+        if adopted {
+            self.identification.forget_model();
+        }
+        adopted
     }
 
     /// The half that moves.

@@ -37,6 +37,17 @@ impl<const N: usize> IdentifiedModel<N> {
         Self { chain, parameters }
     }
 
+    /// The model that gives `share` (0..1) of the other's torque and the rest of this one's: torque is linear in the
+    /// parameters. Both are models of one leg.
+    #[must_use]
+    pub fn towards(&self, other: &Self, share: f32) -> Self {
+        let mut mixed = *self;
+        for (from, to) in mixed.parameters.iter_mut().flatten().zip(other.parameters.iter().flatten()) {
+            *from += share * (*to - *from);
+        }
+        mixed
+    }
+
     /// Parameters with the same torque as the leg's; not those of its links.
     #[must_use]
     pub fn equivalent_parameters(&self) -> &LegParameters<f32, N> {

@@ -7,6 +7,7 @@ mod conditions;
 mod failures;
 mod identification;
 mod memory;
+mod monitor;
 mod perturbations;
 mod scale;
 mod servo;

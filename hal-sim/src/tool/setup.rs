@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use scarab::ident::{LinkPrior, Plan, RowModel, Thresholds, prior_parameters};
+use scarab::ident::{LinkPrior, MonitorSettings, Plan, RowModel, Thresholds, prior_parameters};
 use scarab::leg::LegConfiguration;
 use scarab::model::{
     AnatomicalJoint, BaseError, BaseParameters, Chain, ColumnMask, DenavitHartenberg, LegParameters,
@@ -329,6 +329,7 @@ pub fn configuration<const N: usize, const B: usize>(
         plan,
         swarm_seed,
         thresholds: Thresholds::default(),
+        monitor: MonitorSettings::default(),
         bandwidth_hz: leg.bandwidth_hz as f32,
         excitation: motions.excitation,
         validation: motions.validation,

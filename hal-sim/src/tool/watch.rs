@@ -182,7 +182,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
                     *slot = rows;
                 }
             }
-            None => {}
+            Some(Segment::Tracking) | None => {}
         }
     }
 
@@ -225,6 +225,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
                 Segment::Validation(index) => {
                     (Role::Validation, self.context.motions.validation.get(usize::from(index)))
                 }
+                Segment::Tracking => (Role::Validation, None),
             };
             let samples = self.log.iter().filter(|logged| logged.segment == Some(segment));
             let samples = samples.map(|logged| {
