@@ -5,6 +5,7 @@ mod export;
 mod identify;
 mod leg_options;
 mod model;
+mod monitor;
 mod predict;
 mod regressor;
 mod replay;
@@ -33,6 +34,8 @@ enum Command {
     Predict(predict::PredictArguments),
     /// Write a model that was kept as a robot description.
     Export(export::ExportArguments),
+    /// Change the load or the friction of a leg that walks: time to notice, what was found, false alarms.
+    Monitor(monitor::MonitorArguments),
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     Regressor(regressor::RegressorArguments),
 }
@@ -56,6 +59,7 @@ pub fn main() -> ExitCode {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
+        Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Regressor(arguments) => regressor::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
     };

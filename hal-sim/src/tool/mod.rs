@@ -8,6 +8,7 @@
 //! | [`setup`] | from a leg file to what the firmware is built from |
 //! | [`recording`], [`resample`], [`replay`] | identification on recordings |
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
+//! | [`monitor`] | an accepted model watched while the leg walks and something changes |
 //! | [`series`], [`figures`], [`html`] | a run as curves, drawn, and on one page |
 //! | [`findings`] | what the verdict saw, in words |
 //! | [`perturb`] | what can be made wrong on purpose |
@@ -35,6 +36,7 @@ pub mod html;
 pub mod identify;
 pub mod leg_file;
 pub mod model_file;
+pub mod monitor;
 pub mod motions;
 pub mod pair;
 pub mod perturb;

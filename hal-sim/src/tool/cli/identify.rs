@@ -46,7 +46,7 @@ pub struct IdentifyArguments {
     log: Option<PathBuf>,
 }
 
-fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
+pub(super) fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
     let ends = text
         .split_once("..")
         .map(|(first, last)| (first.parse::<u64>(), last.trim_start_matches('=').parse::<u64>()));

@@ -1,0 +1,345 @@
+//! `monitor`: a leg is identified and walks; load or friction change meanwhile; what the firmware notices and makes of it.
+//!
+//! The leg walks the paper's gait with a 3 s cycle, which hardly excites it: what can be told is what a wearer's own day
+//! shows. The operator of this simulation takes every update that is offered.
+
+mod print;
+mod report;
+
+pub use print::print_runs;
+pub use report::{AlarmReport, HypothesisReport, MonitorRun, MonitorRuns, UpdateReport, ValueReport};
+
+use scarab::ident::{Cause, Plan};
+use scarab::leg::{Activity, ControlRequest, ProvedMotion, Step};
+use scarab::model::Payload;
+use scarab::motion::Periodic;
+use scarab::safety::PowerRequest;
+use scarab::servo::SERVO_RATE_HZ;
+use scarab::units::Second;
+
+use super::error::ToolError;
+use super::leg_file::{LegFile, PushesFile};
+use super::pair::{Context, Pair};
+use super::setup::{PriorChoice, SetupError};
+use super::simulate::SimulationOptions;
+use super::words::drive_stop;
+use crate::description::PushDescription;
+use crate::world::TICK_S;
+use report::update_report;
+
+/// A change that is not noticed within so long is not noticed.
+const LONGEST_WAIT_S: f64 = 600.0;
+/// The quick pass is tried again for so long.
+const LONGEST_UPDATE_S: f64 = 120.0;
+/// Walked with the update in use.
+const AFTER_S: f64 = 60.0;
+/// Identification takes 53 s.
+const LONGEST_IDENTIFICATION_S: f64 = 300.0;
+/// After a false alarm: damping and coming to rest.
+const REST_S: f64 = 4.0;
+/// Friction that changes slowly does so in steps of a second.
+const FRICTION_STEP_S: f64 = 1.0;
+
+/// What happens to a leg while it walks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Disturbance {
+    /// A point mass fixed to a link, or taken off.
+    Payload(Payload<f64>),
+    /// Coulomb and viscous friction of all joints.
+    Friction {
+        /// Times what it was.
+        factor: f64,
+        /// In the course of so many seconds.
+        over_s: f64,
+    },
+}
+
+/// What to simulate.
+#[derive(Clone, Debug)]
+pub struct MonitorOptions {
+    /// Of noise and pushes.
+    pub seed: u64,
+    /// What changes.
+    pub disturbances: Vec<Disturbance>,
+    /// Seconds of walking before that.
+    pub at_s: f64,
+    /// Hours of walking in which nothing changes.
+    pub hours: f64,
+    /// The wearer's pushes while walking.
+    pub pushes: Option<PushesFile>,
+}
+
+fn ticks(seconds: f64) -> u64 {
+    (seconds / TICK_S) as u64
+}
+
+/// The 3 s gait for so long.
+fn gait<const N: usize, const B: usize>(
+    leg: &LegFile,
+    context: &Context<N, B>,
+    seconds: f64,
+) -> Result<ProvedMotion<N>, ToolError> {
+    let unfit = || SetupError::new(leg, "no gait of this length fits the limits");
+    let curve = *context.motions.validation[1].curve();
+    let cycles = (seconds / f64::from(curve.period().0)).ceil() as u32 + 1;
+    let motion = Periodic::new(curve, Second(1.0), cycles, SERVO_RATE_HZ).map_err(|_| unfit())?;
+    Ok(context.configuration.prove(motion).map_err(|_| unfit())?)
+}
+
+/// Identified, at rest; `Err` holds the words of the refusal.
+fn identified<const N: usize, const B: usize>(
+    leg: &LegFile,
+    context: &Context<N, B>,
+    seed: u64,
+) -> Result<Result<Pair<N, B>, Vec<&'static str>>, ToolError> {
+    let mut pair = Pair::new(leg, context, seed)?;
+    if !pair.enable(context.gravity) {
+        return Err(SetupError::new(leg, "the drive refused to be enabled at the start").into());
+    }
+    let mut request = Some(ControlRequest::Identify);
+    while pair.leg.control().verdict().is_none() {
+        pair.tick(request.take(), context.gravity);
+        let identifying = matches!(pair.leg.control().activity(), Activity::Identify(_));
+        if (!identifying && pair.leg.control().verdict().is_none())
+            || pair.ticks > ticks(LONGEST_IDENTIFICATION_S)
+        {
+            return Err(SetupError::new(leg, drive_stop(leg, pair.leg.control().state())).into());
+        }
+    }
+    let reasons = pair.leg.control().verdict().into_iter().flat_map(|verdict| verdict.reasons());
+    let reasons: Vec<_> = reasons.map(scarab::ident::Reason::name).collect();
+    Ok(if pair.leg.control().model().is_some() { Ok(pair) } else { Err(reasons) })
+}
+
+/// A pair that walks, and how well.
+struct Walk<'a, const N: usize, const B: usize> {
+    leg: &'a LegFile,
+    context: &'a Context<N, B>,
+    pair: Pair<N, B>,
+    /// What changes, and since which tick.
+    changing: Option<(&'a [Disturbance], u64)>,
+    squared: f64,
+    count: u64,
+}
+
+impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
+    /// From rest into the gait.
+    fn begin(
+        leg: &'a LegFile,
+        context: &'a Context<N, B>,
+        pair: Pair<N, B>,
+        seconds: f64,
+        pushes: Option<PushesFile>,
+    ) -> Result<Self, ToolError> {
+        let motion = gait(leg, context, seconds)?;
+        let mut walk = Self { leg, context, pair, changing: None, squared: 0.0, count: 0 };
+        walk.pair.world.set_pushes(pushes.map(|pushes| PushDescription {
+            rate: pushes.per_minute / 60.0,
+            torque: pushes.torque_nm,
+            duration: pushes.duration_s,
+        }));
+        walk.tick(Some(ControlRequest::Track { motion, with_model: true }))?;
+        while walk.activity() != Activity::Track(Step::Run) {
+            walk.tick(None)?;
+        }
+        walk.error_deg();
+        Ok(walk)
+    }
+
+    fn activity(&self) -> Activity {
+        self.pair.leg.control().activity()
+    }
+
+    fn tick(&mut self, request: Option<ControlRequest<N>>) -> Result<(), ToolError> {
+        if let Some((disturbances, since)) = self.changing {
+            let tick = self.pair.ticks - since;
+            disturb(&mut self.pair, disturbances, tick);
+        }
+        let output = self.pair.tick(request, self.context.gravity);
+        self.squared +=
+            output.servo.tracking_error.iter().map(|error| f64::from(error.0).powi(2)).sum::<f64>();
+        self.count += 1;
+        if matches!(self.activity(), Activity::Track(_)) {
+            return Ok(());
+        }
+        Err(SetupError::new(self.leg, drive_stop(self.leg, self.pair.leg.control().state())).into())
+    }
+
+    /// Root mean square position error of all joints since the last call, degrees.
+    fn error_deg(&mut self) -> f64 {
+        let mean = self.squared / (N as f64 * self.count.max(1) as f64);
+        (self.squared, self.count) = (0.0, 0);
+        mean.sqrt().to_degrees()
+    }
+
+    /// Walks on until there is an alarm, at most so long. Seconds it took.
+    fn until_alarm(&mut self, longest_s: f64) -> Result<Option<f64>, ToolError> {
+        for tick in 0..ticks(longest_s) {
+            self.tick(None)?;
+            if self.pair.leg.control().change().is_some() {
+                return Ok(Some((tick + 1) as f64 * TICK_S));
+            }
+        }
+        Ok(None)
+    }
+
+    fn run(&mut self, seconds: f64) -> Result<(), ToolError> {
+        for _ in 0..ticks(seconds) {
+            self.tick(None)?;
+        }
+        Ok(())
+    }
+
+    /// Stands still, damped, and is enabled again.
+    fn rest(mut self) -> Result<Pair<N, B>, ToolError> {
+        self.pair.tick(Some(ControlRequest::Power(PowerRequest::QuickStop)), self.context.gravity);
+        for _ in 0..ticks(REST_S) {
+            self.pair.tick(None, self.context.gravity);
+        }
+        if self.pair.enable(self.context.gravity) {
+            return Ok(self.pair);
+        }
+        Err(SetupError::new(self.leg, "the drive refused to be enabled after a false alarm").into())
+    }
+}
+
+/// One seed: identification, false alarms, change.
+pub fn watch<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &MonitorOptions,
+) -> Result<MonitorRun, ToolError> {
+    let simulation = SimulationOptions {
+        seed: options.seed,
+        swarm_seed: options.seed,
+        torque_noise_percent: None,
+        plan: Plan::OneTime,
+        prior: PriorChoice::Default,
+        with_series: false,
+        payload: None,
+        load: None,
+        perturbations: Vec::new(),
+    };
+    let context = Context::<N, B>::new(leg, &simulation)?;
+    let pair = match identified(leg, &context, options.seed)? {
+        Ok(pair) => pair,
+        Err(reasons) => return Ok(MonitorRun::refused(options.seed, reasons)),
+    };
+    let upkeep = pair.leg.identification().upkeep();
+    let baseline =
+        upkeep.baseline().ok_or_else(|| SetupError::new(leg, "an accepted model is not watched"))?;
+    let mut run = MonitorRun {
+        row_sigma_nm: baseline
+            .row_variance
+            .iter()
+            .map(|variance| f64::from(variance.sqrt()).into())
+            .collect(),
+        limit: f64::from(upkeep.monitor().limit()).into(),
+        hours: options.hours,
+        ..MonitorRun::new(options.seed)
+    };
+    if options.hours > 0.0 {
+        run.false_alarms_at_s = false_alarms(leg, &context, pair.clone(), options)?;
+    }
+    if !options.disturbances.is_empty() {
+        change(leg, &context, pair, options, &mut run)?;
+    }
+    Ok(run)
+}
+
+fn false_alarms<const N: usize, const B: usize>(
+    leg: &LegFile,
+    context: &Context<N, B>,
+    mut pair: Pair<N, B>,
+    options: &MonitorOptions,
+) -> Result<Vec<f64>, ToolError> {
+    let (mut alarms, mut walked) = (Vec::new(), 0.0);
+    let whole = options.hours * 3600.0;
+    while walked < whole {
+        let mut walk = Walk::begin(leg, context, pair, whole - walked, options.pushes)?;
+        match walk.until_alarm(whole - walked)? {
+            Some(after) => {
+                walked += after;
+                alarms.push(walked);
+            }
+            None => break,
+        }
+        pair = walk.rest()?;
+    }
+    Ok(alarms)
+}
+
+fn change<const N: usize, const B: usize>(
+    leg: &LegFile,
+    context: &Context<N, B>,
+    pair: Pair<N, B>,
+    options: &MonitorOptions,
+    run: &mut MonitorRun,
+) -> Result<(), ToolError> {
+    run.changed = true;
+    let longest = options.at_s + 2.0 * LONGEST_WAIT_S + AFTER_S;
+    let mut walk = Walk::begin(leg, context, pair, longest, options.pushes)?;
+    if let Some(early) = walk.until_alarm(options.at_s)? {
+        run.false_alarms_at_s.push(early);
+        return Ok(());
+    }
+    run.error_deg_before = walk.error_deg().into();
+    walk.changing = Some((&options.disturbances, walk.pair.ticks));
+    let noticed = walk.until_alarm(LONGEST_WAIT_S)?;
+    let (Some(after_s), Some(alarm)) = (noticed, walk.pair.leg.control().change().copied()) else {
+        return Ok(());
+    };
+    run.alarm = Some(AlarmReport {
+        after_s,
+        since_s: alarm.since_s.into(),
+        joints: (0..N)
+            .filter(|joint| alarm.joints[*joint])
+            .map(|joint| leg.joints[joint].name.clone())
+            .collect(),
+        statistic: alarm.statistic.iter().map(|sum| f64::from(*sum).into()).collect(),
+    });
+    let mut waited = 0;
+    while !walk.pair.leg.control().is_update_offered() && waited < ticks(LONGEST_UPDATE_S) {
+        walk.tick(None)?;
+        waited += 1;
+    }
+    run.error_deg_changed = walk.error_deg().into();
+    let Some(update) = walk.pair.leg.identification().upkeep().update() else { return Ok(()) };
+    run.still_changing = options
+        .disturbances
+        .iter()
+        .any(|disturbance| matches!(disturbance, Disturbance::Friction { over_s, .. } if *over_s > after_s));
+    // A truth that moves is none.
+    let known: &[_] = if run.still_changing { &[] } else { &options.disturbances };
+    let thresholds = &context.configuration.thresholds;
+    let waited_s = waited as f64 * TICK_S;
+    run.update = Some(update_report(leg, update, thresholds, &options.disturbances, known, waited_s));
+    if update.cause == Cause::Unexplained {
+        return Ok(());
+    }
+    walk.tick(Some(ControlRequest::TakeUpdate))?;
+    walk.run(2.0)?;
+    walk.error_deg();
+    run.alarm_after_update = walk.until_alarm(AFTER_S)?.is_some();
+    run.error_deg_updated = walk.error_deg().into();
+    Ok(())
+}
+
+/// What happens at this tick after the change began.
+fn disturb<const N: usize, const B: usize>(pair: &mut Pair<N, B>, disturbances: &[Disturbance], tick: u64) {
+    for disturbance in disturbances {
+        match *disturbance {
+            Disturbance::Payload(payload) if tick == 0 => {
+                pair.world.attach(payload.joint, payload.mass, payload.place.into());
+            }
+            Disturbance::Payload(_) => {}
+            Disturbance::Friction { factor, over_s } => {
+                let steps = (over_s / FRICTION_STEP_S).floor().max(1.0);
+                let reached = |step: f64| 1.0 + (factor - 1.0) * step / steps;
+                let step = tick / ticks(FRICTION_STEP_S);
+                if tick.is_multiple_of(ticks(FRICTION_STEP_S)) && (step as f64) < steps {
+                    pair.world.scale_friction(reached(step as f64 + 1.0) / reached(step as f64));
+                }
+            }
+        }
+    }
+}
