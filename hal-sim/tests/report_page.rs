@@ -54,6 +54,7 @@ fn a_page_shows_the_whole_run_and_fetches_nothing() {
         run.printed
     );
     assert_eq!(page.one(".verdict .word"), "Accepted");
+    assert!(page.all("tr.failed").is_empty() && page.all("table.tests tbody tr").len() > 10);
     let names = page.all("tbody th");
     let parameters = report["parameters"].as_array().expect("a list");
     let bases = report["base_parameters"].as_array().expect("a list");
@@ -126,7 +127,7 @@ fn a_refused_run_says_so_first_and_gives_every_reason() {
     assert_eq!(page.one(".verdict.refused .word"), "Refused");
     assert!(page.one("head title").contains("refused"));
     let report = folder.json("run.json");
-    let given = page.all(".verdict li");
+    let given = page.all(".verdict > ul > li");
     let reasons = command::reasons(&report);
     assert!(reasons.contains(&"residual"), "{reasons:?}");
     assert_eq!(given.len(), reasons.len());
@@ -135,13 +136,24 @@ fn a_refused_run_says_so_first_and_gives_every_reason() {
         assert!(words.len() > reason.len() + 20, "no sentence: {words}");
     }
     let residual = given.iter().find(|words| words.starts_with("residual")).expect("a reason");
-    assert!(residual.contains("joint") && residual.contains("% of the motion's rms torque"), "{residual}");
+    assert!(residual.contains("joint 1 is off by") && residual.contains("at most"), "{residual}");
+    // Nothing that failed is left out, and the table marks it.
+    for finding in report["findings"].as_array().expect("a list") {
+        let words = finding["words"].as_str().expect("a sentence");
+        assert!(finding["passed"] == true || page.one(".verdict").contains(words), "{words}");
+    }
+    assert!(page.all("tr.failed").iter().any(|row| row.starts_with("residual")));
 }
 
 #[test]
-fn a_recording_without_truth_prior_or_held_out_part_leaves_dashes() {
-    let (folder, _, page) = reported(&format!("replay {MUJOCO} --leg mujoco-leg --prior none"), 0);
-    assert!(page.one(".verdict").contains("Not validated"));
+fn what_a_recording_without_a_prior_does_not_tell_is_a_dash() {
+    let folder = Folder::new();
+    let (page, json) = (folder.path("report.html"), folder.path("run.json"));
+    let arguments =
+        format!("replay {MUJOCO} --leg mujoco-leg --prior none --json {} --report", json.display());
+    // Whether it is accepted is not this test's matter.
+    scarab(&arguments, &[&page]);
+    let page = Page::read(&folder);
     let report = folder.json("run.json");
     let unknown = report["parameters"].as_array().expect("a list").iter();
     let unknown: Vec<_> = unknown.filter(|parameter| parameter["value"].is_null()).collect();
@@ -167,4 +179,12 @@ fn one_page_is_one_run_and_one_path_that_can_be_written() {
     let nowhere = folder.path("no/such/folder/report.html");
     let run = scarab("identify --report", &[&nowhere]).ends_with(2);
     assert!(run.errors.contains("report.html: cannot be written"), "{}", run.errors);
+}
+
+#[test]
+fn an_accepted_recording_of_which_nothing_was_held_out_is_not_called_validated() {
+    let (_, _, page) = reported(&format!("replay {MUJOCO} --leg mujoco-leg"), 0);
+    assert!(page.one(".verdict.accepted").contains("Not validated"));
+    let (_, _, page) = reported(&format!("replay {MUJOCO} --leg mujoco-leg --split 0.7"), 0);
+    assert!(!page.one(".verdict.accepted").contains("Not validated"));
 }

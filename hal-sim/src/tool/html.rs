@@ -13,6 +13,7 @@ mod head;
 mod limits;
 mod parameters;
 mod results;
+mod verdict;
 
 use jiff::{Timestamp, Unit};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -89,7 +90,7 @@ pub fn page(
             body {
                 main {
                     (head::title(circumstances, run))
-                    (head::verdict(run, rest.findings.as_ref()))
+                    (verdict::banner(run))
                     (head::facts(circumstances, run))
                     section { h2 { "At a glance" } (head::numbers(run)) (group(Group::Summary)) }
                     @if !sources.is_empty() { (results::sources(sources)) }
@@ -103,9 +104,11 @@ pub fn page(
                     section { h2 { "Torque" } (results::torque_words(run)) (group(Group::Torque)) (results::fits(run)) }
                     section { h2 { "Residuals" } (results::residual_words()) (group(Group::Residuals)) }
                     section { h2 { "Search" } (results::search(run)) (group(Group::Search)) }
+                    (results::consistent(run))
                     @if !run.tracking.is_empty() { (results::tracking(run)) }
                     (results::scale(run))
-                    @for (name, value) in &rest.others { (generic::section(name, value)) }
+                    @for (name, value) in &rest { (generic::section(name, value)) }
+                    (verdict::tests(run))
                     (limits::section(run))
                     (head::colophon(run))
                 }

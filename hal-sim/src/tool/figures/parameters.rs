@@ -22,6 +22,9 @@ pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, format!("{}: {}", run.leg, what(run)))?;
     let (_, area) = area.split_vertically(px(30));
     dots(&area, run, (90, 260), &|base| {
+        if base.value.known().is_none() {
+            return NOT_DETERMINED.into();
+        }
         let (value, sigma) = (number(base.value), number(base.sigma));
         let truth =
             base.truth.known().map_or(String::new(), |truth| format!(", truth {}", number(truth.into())));
@@ -33,8 +36,14 @@ pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
 pub fn small(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, format!("Base parameters: {}", what(run)))?;
     let (_, area) = area.split_vertically(px(30));
-    dots(&area, run, (56, 136), &|base| format!("{} {}", number(base.value), base.unit))
+    dots(&area, run, (56, 136), &|base| match base.value.known() {
+        Some(_) => format!("{} {}", number(base.value), base.unit),
+        None => NOT_DETERMINED.into(),
+    })
 }
+
+/// In the place of a value.
+const NOT_DETERMINED: &str = "not determined";
 
 /// What is drawn, which depends on whether a truth is known.
 pub fn what(run: &RunReport) -> &'static str {

@@ -10,7 +10,7 @@ use super::super::report::{Number, RunReport};
 use super::number;
 
 /// Keys that the page shows in sections of their own.
-const KNOWN: [&str; 25] = [
+const KNOWN: [&str; 26] = [
     "schema",
     "leg",
     "seed",
@@ -36,28 +36,20 @@ const KNOWN: [&str; 25] = [
     "simulated_s",
     "wall_s",
     "findings",
+    "consistent",
 ];
 /// Nothing is nested deeper than this on the page.
 const DEEPEST: usize = 3;
 
-/// What the typed part of the page leaves over.
-pub struct Rest {
-    /// The verdict's tests, where the report has them.
-    pub findings: Option<Value>,
-    /// All other keys in their order.
-    pub others: Map<String, Value>,
-}
-
-/// The keys of a report that no section shows; those without content are left out.
-pub fn unknown_keys(run: &RunReport) -> Result<Rest, ToolError> {
+/// The keys of a report that no section shows, in their order; those without content are left out.
+pub fn unknown_keys(run: &RunReport) -> Result<Map<String, Value>, ToolError> {
     let value = serde_json::to_value(run)
         .map_err(|error| ToolError::input(format!("the report cannot be shown: {error}")))?;
     let Value::Object(mut keys) = value else {
-        return Ok(Rest { findings: None, others: Map::new() });
+        return Ok(Map::new());
     };
-    let findings = keys.remove("findings").filter(|value| !is_empty(value));
     keys.retain(|key, value| !KNOWN.contains(&key.as_str()) && !is_empty(value));
-    Ok(Rest { findings, others: keys })
+    Ok(keys)
 }
 
 fn is_empty(value: &Value) -> bool {

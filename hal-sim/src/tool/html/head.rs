@@ -1,11 +1,9 @@
-//! What is read first: the verdict in words, what was run, the few numbers that matter.
+//! Title, what was run, the few numbers that matter.
 
 use maud::{Markup, html};
-use serde_json::Value;
 
 use super::super::report::{FitReport, RunReport};
-use super::super::tables;
-use super::{Circumstances, generic, number, signed};
+use super::{Circumstances, number, signed};
 
 /// Name of the leg and date.
 pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
@@ -17,62 +15,6 @@ pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
             p.when { (circumstances.time_utc) " (UTC)" }
         }
     }
-}
-
-/// The verdict, large and in words, with each reason and what it was measured against.
-pub fn verdict(run: &RunReport, findings: Option<&Value>) -> Markup {
-    let validated = !run.validation.is_empty();
-    html! {
-        section.verdict.accepted[run.accepted()].refused[!run.accepted()] {
-            @if run.accepted() {
-                p.word { "Accepted" }
-                p { "The model explains the motion it was identified from" @if validated {
-                    ", and predicts the motions that were not used"
-                } ". Nothing of what was tested speaks against it." }
-                @if !validated {
-                    p { strong { "Not validated: " } "no motion was held out, so nothing is known of its predictions." }
-                }
-            } @else {
-                p.word { "Refused" }
-                p { "Do not use this model. It was refused because of:" }
-                ul { @for reason in &run.reasons {
-                    li { strong { (reason.replace('_', " ")) } ": " (tables::explanation(reason)) "." (evidence(reason, run)) }
-                } }
-            }
-        }
-        @if let Some(findings) = findings { section { h2 { "Tests of the verdict" } (generic::content(findings, 0)) } }
-    }
-}
-
-/// What the report holds that shows a reason.
-fn evidence(reason: &str, run: &RunReport) -> Markup {
-    let worst = |fits: &[FitReport]| -> Option<(String, f64)> {
-        fits.iter()
-            .filter_map(|fit| {
-                let share = fit.percent_of_rms.known()?;
-                let words = format!(
-                    "{}, joint {}: {} N m rms, {} % of the motion's rms torque",
-                    fit.motion,
-                    fit.joint,
-                    number(fit.rms_nm),
-                    number(fit.percent_of_rms)
-                );
-                Some((words, share))
-            })
-            .max_by(|one, other| one.1.total_cmp(&other.1))
-    };
-    let words = match reason {
-        "validation" => worst(&run.validation).map(|(words, _)| format!("Worst is {words}.")),
-        "residual" => worst(&run.training).map(|(words, _)| format!("Worst is {words}.")),
-        "unexcited" => Some(format!(
-            "{} of {} base parameters are determined, condition {}.",
-            run.rank,
-            run.base_parameters.len(),
-            number(run.condition)
-        )),
-        _ => None,
-    };
-    html! { @if let Some(words) = words { " " (words) } }
 }
 
 /// What was run.

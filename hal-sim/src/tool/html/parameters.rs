@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::super::leg_file::LegFile;
-use super::super::report::{ParameterReport, RunReport};
+use super::super::report::{Number, ParameterReport, RunReport};
 use super::{number, signed, unit};
 
 /// Width and height of a bar, pixels.
@@ -37,7 +37,7 @@ pub fn base(run: &RunReport) -> Markup {
                             None => { "\u{2013}" },
                         } }
                     }
-                    @if bounded { td.n { (number(base.cramer_rao)) } }
+                    @if bounded { td.n { (number(Number(base.cramer_rao.known().filter(|bound| *bound > 0.0)))) } }
                     td.terms { (terms(&base.terms)) }
                 }
             } }
@@ -107,7 +107,8 @@ fn half_range(parameter: &ParameterReport, value: f64) -> f64 {
     let prior = parameter.prior.known().map_or(0.0, |prior| 1.2 * (prior - value).abs());
     // Without a sigma nothing would be lost by a wide range; with one it must stay visible.
     let half = if sigma > 0.0 { sigma.max(truth) } else { truth.max(prior) };
-    if half > 0.0 { half } else { value.abs().max(1e-9) }
+    // Below that lies the rounding of a zero.
+    if half > 1e-9 { half } else { value.abs().max(1e-9) }
 }
 
 /// Value, sigma, truth and prior on one line.

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::super::replay::Source;
-use super::super::report::{FitReport, Number, RunReport};
+use super::super::report::{ConsistentSearchReport, FitReport, Number, RunReport};
 use super::super::scale;
 use super::number;
 
@@ -115,6 +115,39 @@ pub fn scale(run: &RunReport) -> Markup {
 fn capital(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Searches for a leg that can exist.
+pub fn consistent(run: &RunReport) -> Markup {
+    let found = &run.consistent;
+    let row = |words: &str, name: &str, search: &ConsistentSearchReport| {
+        html! { tr {
+            td { (words) @if found.chosen == name { " (the result)" } } td.n { (search.iterations) } td.n { (search.evaluations) }
+            td.n { (search.steps) } td.n { (number(search.excess_chi2)) }
+            td.n { @match search.iterations_to_half_chi2 { Some(half) => { (half) }, None => { "\u{2013}" } } }
+            td { (if search.consistent { "yes" } else { "no" }) }
+        } }
+    };
+    html! {
+        section {
+            h2 { "Legs that can exist" }
+            p { "Of all legs whose every link has a mass above zero and an inertia that some body has, within the prior's \
+                limits, the best costs " (number(found.optimum_over_least_squares)) " chi-square units more than least squares, \
+                the result " (number(found.result_over_least_squares)) "."
+                @if let Some(freedom) = found.degrees_of_freedom { " Of noise alone that is a chi-square of at most " (freedom) " degrees of freedom." } }
+            div.wide { table {
+                thead { tr {
+                    th scope="col" { "search" } th.n scope="col" { "iterations" } th.n scope="col" { "evaluations" }
+                    th.n scope="col" { "completion steps" } th.n scope="col" { "excess, chi-square units" }
+                    th.n scope="col" { "iterations to half a unit" } th scope="col" { "can exist" }
+                } }
+                tbody {
+                    (row("base values, completed by the prior", "base", &found.base))
+                    (row("whole legs", "full", &found.full))
+                }
+            } }
+        }
+    }
 }
 
 /// What the model is worth to the servo.

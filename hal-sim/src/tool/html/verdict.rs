@@ -1,0 +1,178 @@
+//! The verdict: one word, the sentences of what failed, and how near every test came to its limit.
+
+use maud::{Markup, html};
+
+use super::super::findings::FindingReport;
+use super::super::report::{Number, RunReport};
+use super::super::tables;
+use super::number;
+
+/// The verdict, large and in words, with each reason and what it was measured against.
+pub fn banner(run: &RunReport) -> Markup {
+    let validated = !run.validation.is_empty();
+    html! {
+        section.verdict.accepted[run.accepted()].refused[!run.accepted()] {
+            @if run.accepted() {
+                p.word { "Accepted" }
+                p { "The model explains the motion it was identified from" @if validated {
+                    ", and predicts the motions that were not used"
+                } ". " (passed(run)) }
+                @if !validated {
+                    p { strong { "Not validated: " } "no motion was held out, so nothing is known of its predictions." }
+                }
+            } @else {
+                p.word { "Refused" }
+                p { "Do not use this model. It was refused because of:" }
+                ul { @for reason in &run.reasons { li { (sentences(reason, run)) } } }
+            }
+        }
+    }
+}
+
+fn passed(run: &RunReport) -> String {
+    match run.findings.len() {
+        0 => String::new(),
+        all => format!("All {all} tests of the verdict were passed."),
+    }
+}
+
+/// What failed for a reason: its sentences, or what the reason means in general.
+fn sentences(reason: &str, run: &RunReport) -> Markup {
+    let failed = run.findings.iter().filter(|finding| finding.reason == reason && !finding.passed);
+    let words: Vec<&str> =
+        failed.map(|finding| finding.words.as_str()).filter(|words| !words.is_empty()).collect();
+    let name = html! { strong { (reason.replace('_', " ")) } ": " };
+    match words.as_slice() {
+        [] => html! { (name) (tables::explanation(reason)) "." },
+        [only] => html! { (name) (only) "." },
+        many => {
+            html! { (name) (tables::explanation(reason)) "." ul { @for words in many { li { (words) "." } } } }
+        }
+    }
+}
+
+/// Whether a limit is a least and not a most, and what a test looks at.
+fn meaning(test: &str) -> (bool, &str) {
+    match test {
+        "rows" => (true, "filtered rows in which the joint moves"),
+        "not_finite" => (false, "samples and rows that are not finite"),
+        "torque" => (true, "rms torque, N m"),
+        "search" => (true, "the search came to its end"),
+        "drive" => (true, "the drive stayed enabled"),
+        "speed" => (true, "rms speed, rad/s"),
+        "determined" => (true, "base parameters that are determined"),
+        "condition" => (false, "condition of the scaled problem"),
+        "predicted_uncertainty" => (false, "uncertainty of the predicted torque over its rms"),
+        "finite" => (false, "parameters that are not numbers"),
+        "negative_parameter" => (false, "sigma by which a parameter is below what a body can have"),
+        "negative_energy" => (false, "sigma by which kinetic energy is negative"),
+        "prior_box" => (false, "chi-square that the prior's limits cost"),
+        "dynamic_share" => (true, "share of the torque that inertia and friction make"),
+        "training_error" => (false, "rms error on the motion identified from, N m"),
+        "validation_error" => (false, "rms error on an unused motion, N m"),
+        "slow_residual" => (false, "residual that lasts, N m"),
+        "link_length" => (false, "share by which the link before seems longer"),
+        "encoder_zero" => (false, "angle by which the zero seems off, rad"),
+        "common_disturbance" => (false, "time for which all joints missed together, s"),
+        _ => (false, ""),
+    }
+}
+
+/// How near a test came to its limit: 1 at it.
+fn nearness(finding: &FindingReport) -> f64 {
+    let (value, limit) =
+        (finding.value.known().unwrap_or(f64::INFINITY).abs(), finding.limit.known().unwrap_or(0.0));
+    let (least, _) = meaning(finding.test);
+    let share = if least { limit / value } else { value / limit };
+    if share.is_nan() { 0.0 } else { share }
+}
+
+/// Every kind of test, with the case that came nearest to its limit.
+pub fn tests(run: &RunReport) -> Markup {
+    let mut kinds: Vec<(&str, &str)> = Vec::new();
+    for finding in &run.findings {
+        if !kinds.contains(&(finding.reason, finding.test)) {
+            kinds.push((finding.reason, finding.test));
+        }
+    }
+    kinds.sort_by_key(|(reason, _)| run.findings.iter().position(|finding| finding.reason == *reason));
+    html! { @if !kinds.is_empty() {
+        section {
+            h2 { "Tests of the verdict" }
+            p { "Each kind of test, with the case that came nearest to its limit, or went farthest beyond it." }
+            div.wide { table.tests {
+                thead { tr {
+                    th scope="col" { "against" } th scope="col" { "what is tested" } th.n scope="col" { "value" }
+                    th.n scope="col" { "limit" } th scope="col" { "where" } th.n scope="col" { "passed" }
+                } }
+                tbody { @for kind in kinds { (row(run, kind)) } }
+            } }
+        }
+    } }
+}
+
+fn row(run: &RunReport, (reason, test): (&str, &str)) -> Markup {
+    let of_kind = || run.findings.iter().filter(|finding| (finding.reason, finding.test) == (reason, test));
+    let (all, passed) = (of_kind().count(), of_kind().filter(|finding| finding.passed).count());
+    let nearest = of_kind().max_by(|one, other| {
+        let rank = |finding: &FindingReport| (!finding.passed, nearness(finding));
+        let (one, other) = (rank(one), rank(other));
+        one.0.cmp(&other.0).then(one.1.total_cmp(&other.1))
+    });
+    let (least, words) = meaning(test);
+    let words = if words.is_empty() { test.replace('_', " ") } else { words.to_owned() };
+    html! { @if let Some(nearest) = nearest {
+        tr.failed[passed < all] {
+            td { (reason.replace('_', " ")) } td.what { (words) }
+            td.n { (whole(nearest.value)) } td.n { (if least { "\u{2265}\u{a0}" } else { "\u{2264}\u{a0}" }) (whole(nearest.limit)) }
+            td { (place(nearest)) }
+            td.n { (passed) " of " (all) }
+        }
+    } }
+}
+
+/// Counts without decimals.
+fn whole(value: Number) -> String {
+    match value.known() {
+        Some(known) if known.abs() < 1e6 && known == known.round() => {
+            format!("{known:.0}").replace('-', "\u{2212}")
+        }
+        Some(known) if known.abs() >= 1e30 => "\u{2013}".into(),
+        _ => number(value),
+    }
+}
+
+fn place(finding: &FindingReport) -> String {
+    let joint = finding.joint.map(|joint| format!("joint {joint}"));
+    let parts: Vec<String> = joint.into_iter().chain(finding.motion.clone()).collect();
+    parts.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn finding(test: &'static str, value: f64, limit: f64) -> FindingReport {
+        FindingReport {
+            reason: "input",
+            test,
+            joint: None,
+            motion: None,
+            value: value.into(),
+            limit: limit.into(),
+            passed: true,
+            words: String::new(),
+        }
+    }
+
+    #[test]
+    fn a_least_is_neared_from_above_and_a_most_from_below() {
+        assert!(nearness(&finding("speed", 0.06, 0.05)) > nearness(&finding("speed", 0.6, 0.05)));
+        assert!(
+            nearness(&finding("condition", 900.0, 1000.0)) > nearness(&finding("condition", 9.0, 1000.0))
+        );
+        // A zero that may not be exceeded and is not, and an offset of either sign.
+        assert_eq!(nearness(&finding("not_finite", 0.0, 0.0)), 0.0);
+        assert_eq!(nearness(&finding("encoder_zero", -0.5, 1.0)), 0.5);
+    }
+}
