@@ -28,7 +28,7 @@ fn chain(length_m: f64) -> Chain<f64, 2> {
 fn believed(length_m: f64) -> RowModel<f32, 2, BASE> {
     let (chain, gravity) = (chain(length_m).convert(), GRAVITY.map(|element| element as f32));
     let base = BaseParameters::analyse(&chain, &gravity, &[[true; 14]; 2]).expect("thirteen base parameters");
-    RowModel { chain, gravity, base }
+    RowModel::new(chain, gravity, base)
 }
 
 /// Three harmonics on each joint, faster by `speed`, from `start` on.

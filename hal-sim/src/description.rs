@@ -145,6 +145,17 @@ pub struct CurrentSensorDescription {
     pub offset: f64,
     /// Width of a conversion step, A; 0 for none.
     pub step: f64,
+    /// Isolated wild readings; none by default.
+    pub outliers: Option<OutlierDescription>,
+}
+
+/// Wild readings of a current sensor: each lasts for the eight ticks of one logged 500 Hz sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OutlierDescription {
+    /// Share of the logged samples, 0..1.
+    pub share: f64,
+    /// Largest error, A; errors are uniform in minus this to this.
+    pub current: f64,
 }
 
 /// Pushes by the wearer: half-sine torque pulses on random joints at random instants.

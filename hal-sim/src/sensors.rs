@@ -3,6 +3,7 @@
 //! ```text
 //! counts  = nearest whole number of  angle / 2 pi * counts per turn * turns per joint turn, 32 bits, wrapping
 //! current = nearest step of (true current + offset + sigma * standard normal)
+//!           + wild error, uniform in -size..=size, in a share of the logged samples, the same for their eight ticks
 //! sigma   = sqrt(8) * noise    noise is stated for the mean of eight 4 kHz samples, as logged at 500 Hz
 //! ```
 //!
@@ -10,11 +11,11 @@
 //! eccentricity, no saturation of the converter; other modules inject faults. Cost: one draw per joint and
 //! tick while noise is on.
 
-use crate::description::{CurrentSensorDescription, EncoderDescription, EncoderSide};
+use crate::description::{CurrentSensorDescription, EncoderDescription, EncoderSide, OutlierDescription};
 use crate::gear::Gear;
 use crate::maths::nearest;
 use core::f64::consts::{SQRT_2, TAU};
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// sqrt(8): eight samples make a logged one.
@@ -54,13 +55,21 @@ pub struct CurrentSensor {
     sigma: f64,
     offset: f64,
     step: f64,
+    outliers: Option<OutlierDescription>,
+    wild: f64,
 }
 
 impl CurrentSensor {
     /// As described.
     #[must_use]
     pub fn new(description: &CurrentSensorDescription) -> Self {
-        let mut sensor = Self { sigma: 0.0, offset: description.offset, step: description.step };
+        let mut sensor = Self {
+            sigma: 0.0,
+            offset: description.offset,
+            step: description.step,
+            outliers: description.outliers,
+            wild: 0.0,
+        };
         sensor.set_noise(description.noise);
         sensor
     }
@@ -70,9 +79,16 @@ impl CurrentSensor {
         self.sigma = noise * SAMPLES_PER_LOGGED_ROOT;
     }
 
+    /// A logged sample begins: is it a wild one?
+    pub fn begin_logged(&mut self, generator: &mut Xoshiro256PlusPlus) {
+        let Some(outliers) = self.outliers else { return };
+        let [chance, size]: [f64; 2] = core::array::from_fn(|_| StandardUniform.sample(generator));
+        self.wild = if chance < outliers.share { outliers.current * (2.0 * size - 1.0) } else { 0.0 };
+    }
+
     /// Reading of a current in A.
     pub fn read(&self, current: f64, generator: &mut Xoshiro256PlusPlus) -> f64 {
-        let mut reading = current + self.offset;
+        let mut reading = current + self.offset + self.wild;
         if self.sigma > 0.0 {
             let normal: f64 = StandardNormal.sample(generator);
             reading += self.sigma * normal;

@@ -25,6 +25,9 @@ pub const TICK_RATE_HZ: f64 = 4000.0;
 /// Duration of a servo tick, s.
 pub const TICK_S: f64 = 1.0 / TICK_RATE_HZ;
 
+/// Servo ticks that are logged as one sample.
+const TICKS_PER_LOGGED: u64 = 8;
+
 /// What really happens in a world, without noise, at the present instant; anatomical, proximal joint first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth<const N: usize> {
@@ -58,6 +61,7 @@ pub struct World<const N: usize> {
     blocked: [bool; N],
     floor: Option<Floor>,
     sensor_noise: Xoshiro256PlusPlus,
+    sensor_faults: Xoshiro256PlusPlus,
     tick: u64,
     newest: Sample<N>,
 }
@@ -70,6 +74,8 @@ impl<const N: usize> World<N> {
         let sensor_noise = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut pushes = sensor_noise.clone();
         pushes.jump();
+        let mut sensor_faults = pushes.clone();
+        sensor_faults.jump();
         let mut world = Self {
             description: *description,
             leg: Leg::new(description),
@@ -83,6 +89,7 @@ impl<const N: usize> World<N> {
             blocked: [false; N],
             floor: None,
             sensor_noise,
+            sensor_faults,
             tick: 0,
             newest: Sample { joints: [JointSample::default(); N] },
         };
@@ -186,6 +193,11 @@ impl<const N: usize> World<N> {
     }
 
     fn read_sensors(&mut self) {
+        if self.tick.is_multiple_of(TICKS_PER_LOGGED) {
+            for sensor in &mut self.current_sensors {
+                sensor.begin_logged(&mut self.sensor_faults);
+            }
+        }
         for joint in 0..N {
             let angle = self.anatomy[joint].to_anatomical_angle(self.state.angles[joint]);
             let current =

@@ -24,6 +24,7 @@ fn identified() -> (RunReport, Series) {
         prior: PriorChoice::Default,
         payload: None,
         load: None,
+        estimator: scarab::ident::Estimator::Robust,
         with_series: true,
         perturbations: Vec::new(),
     };

@@ -95,7 +95,10 @@ fn legs_that_do_not_exist_or_cannot_be_are_refused() {
     let refused = |leg: &Path| scarab("replay --leg", &[leg, &recording]).refusal();
     let message = refused(Path::new("nobody"));
     assert!(message.starts_with("error: nobody: cannot be read"), "{message}");
-    assert!(message.contains("no shipped leg is called so (x2-wearer-75kg, mujoco-leg,"), "{message}");
+    assert!(
+        message.contains("no shipped leg is called so (x2-wearer-75kg, x2-rough, mujoco-leg,"),
+        "{message}"
+    );
     let message = refused(&folder.write("leg.toml", &leg("colour = \"red\"\n")));
     assert!(message.contains("leg.toml:7: unknown field `colour`"), "{message}");
     let message = refused(&folder.write("leg.toml", &leg("").replace("gravity", "# gravity")));

@@ -6,8 +6,8 @@
 //!
 //! Each row is rotated into `R` by Givens rotations (Golub and Van Loan, Matrix Computations, 5.1.8); the cost of
 //! any parameter vector is then exact and independent of the number of rows. Feeding one factor for hours in
-//! single precision loses it (a diagonal of 1e3 swallows rows of 1): a [`Pyramid`] fills small factors and merges
-//! full ones upward, so that only numbers of like size ever meet.
+//! single precision loses it (a diagonal of 1e3 swallows rows of 1): a motion is recorded in small factors that are merged
+//! with their like (`window`), so that only numbers of like size ever meet.
 //!
 //! Cost of one row: about `2 B^2` multiplications and `B` square roots. Memory: `B (B + 1) + 2` numbers a factor.
 
@@ -34,6 +34,21 @@ impl<T: Real, const B: usize> Factor<T, B> {
     pub fn insert(&mut self, row: &[T; B], right: T) {
         self.rotate(*row, right);
         self.rows = self.rows.saturating_add(1);
+    }
+
+    /// Takes one row of a factor that was made elsewhere: it is none of the rows counted.
+    pub(super) fn absorb(&mut self, row: &[T; B], right: T) {
+        self.rotate(*row, right);
+    }
+
+    /// Sum of squares that came with such rows.
+    pub(super) fn add_residual(&mut self, residual: T) {
+        self.residual += residual;
+    }
+
+    /// How many rows it stands for.
+    pub(super) fn set_rows(&mut self, rows: u32) {
+        self.rows = rows;
     }
 
     /// Takes all rows of another factor.
@@ -231,68 +246,6 @@ impl<T: Real, const B: usize> Factor<T, B> {
 }
 
 impl<T: Real, const B: usize> Default for Factor<T, B> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// Levels of a [`Pyramid`]; 128^4 rows, two months at 50 Hz, fill the three lower ones once.
-pub const PYRAMID_LEVELS: usize = 4;
-/// Rows, or merged factors, that fill a level.
-pub const PYRAMID_FILL: u32 = 128;
-
-/// Factors of increasing age: rows enter the first, full factors merge into the next.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Pyramid<T, const B: usize> {
-    levels: [Factor<T, B>; PYRAMID_LEVELS],
-    entries: [u32; PYRAMID_LEVELS],
-}
-
-impl<T: Real, const B: usize> Pyramid<T, B> {
-    /// A pyramid that has seen no row.
-    #[must_use]
-    pub fn new() -> Self {
-        Self { levels: core::array::from_fn(|_| Factor::new()), entries: [0; PYRAMID_LEVELS] }
-    }
-
-    /// Forgets all rows.
-    pub fn clear(&mut self) {
-        for level in &mut self.levels {
-            *level = Factor::new();
-        }
-        self.entries = [0; PYRAMID_LEVELS];
-    }
-
-    /// Takes one row.
-    pub fn insert(&mut self, row: &[T; B], right: T) {
-        self.levels[0].insert(row, right);
-        self.entries[0] += 1;
-        for lower in 0..PYRAMID_LEVELS - 1 {
-            if self.entries[lower] < PYRAMID_FILL {
-                return;
-            }
-            let (below, above) = self.levels.split_at_mut(lower + 1);
-            if let (Some(full), Some(next)) = (below.last_mut(), above.first_mut()) {
-                next.merge(full);
-                *full = Factor::new();
-            }
-            self.entries[lower] = 0;
-            self.entries[lower + 1] = self.entries[lower + 1].saturating_add(1);
-        }
-    }
-
-    /// All rows in one factor.
-    #[must_use]
-    pub fn collapse(&self) -> Factor<T, B> {
-        let mut all = Factor::new();
-        for level in &self.levels {
-            all.merge(level);
-        }
-        all
-    }
-}
-
-impl<T: Real, const B: usize> Default for Pyramid<T, B> {
     fn default() -> Self {
         Self::new()
     }

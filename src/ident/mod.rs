@@ -14,48 +14,62 @@
 //! Everything is generic over the scalar: the board runs it in `f32`, tests check it in `f64`.
 
 pub mod alignment;
+mod assembly;
 pub mod baseline;
 pub mod bounds;
+pub mod choice;
 pub mod completion;
 pub mod consistent;
 pub mod constrained;
 pub mod estimate;
 pub mod factor;
+pub mod hampel;
 pub mod held_out;
 pub mod kernel;
 pub mod monitor;
 pub mod noise;
+pub mod outliers;
+pub mod packed;
 pub mod record;
 pub mod residual;
+pub mod reweighting;
+pub mod row_model;
 pub mod rows;
 pub mod scale;
 pub mod search;
 pub mod smoothing;
 pub mod solver;
+pub mod stribeck;
+mod sum;
 pub mod update;
 pub mod verdict;
+pub mod window;
 
 pub use alignment::{Alignment, Direction, Misalignment, Misalignments};
 pub use baseline::Baseline;
 pub use bounds::{LinkPrior, prior_parameters, search_box};
+pub use choice::{Choice, Estimator};
 pub use completion::{Status, complete, status};
 pub use consistent::{Completion, Effort, FullObjective, FullSearch, LegCost, Limits};
 pub use constrained::{ParameterBox, least_squares_in_box};
 pub use estimate::{Estimate, Plan, Problem, Stage, noise};
-pub use factor::{Factor, Pyramid};
+pub use factor::Factor;
 pub use held_out::HeldOut;
 pub use kernel::{Kernel, KernelError, LowPass};
 pub use monitor::{Change, Monitor, MonitorSettings, ROWS_PER_BLOCK};
+pub use outliers::Outliers;
 pub use record::{
     LARGEST_STILL_SHARE, Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS,
     TorqueSize,
 };
 pub use residual::{JointResidual, Residual};
+pub use row_model::no_stribeck;
 pub use rows::{DECIMATION, Ends, FilteredRows, RowFilter};
 pub use scale::{ConstantRatio, torque_constant_ratio, widen};
 pub use search::{SearchState, SwarmSearch};
 pub use smoothing::{Smoothed, Smoother};
 pub use solver::{Consistency, Solver};
+pub use stribeck::StribeckFit;
 pub use update::hypothesis::{DIRECTIONS, Hypothesis};
 pub use update::{Cause, PAYLOAD_PARAMETERS, Update};
 pub use verdict::{Docket, Evidence, Reason, Test, Thresholds, Unused, Verdict};

@@ -1,22 +1,28 @@
 //! From logged samples to a record of one motion, in constant memory whatever its duration.
 //!
 //! ```text
-//! angle, torque 500 Hz -> Smoother -> regressor of the smoothed motion -> RowFilter 50 Hz -> Pyramid (each joint)
+//! angle, torque 500 Hz -> Hampel -> Smoother -> regressor of the smoothed motion -> RowFilter 50 Hz -> Window
+//! end of the motion: Window -> weights, Stribeck friction -> one factor per joint (assembly)
 //! ```
 //!
 //! A [`Record`] holds one information factor for each joint, so that noise weights can be chosen afterwards, and
 //! the size of the filtered torque. The fit of *any* parameters to the motion follows from it without the samples:
 //! training and validation use the same type.
 
-use nalgebra::Vector3;
-
+use super::assembly::{Choices, assemble};
+use super::choice::Estimator;
 use super::estimate::Estimate;
-use super::factor::{Factor, Pyramid};
+use super::factor::Factor;
+use super::hampel::{self, Hampel, Quantity};
 use super::kernel::{Kernel, KernelError, LowPass};
 use super::noise::NoiseLevel;
+use super::outliers::Outliers;
+pub use super::row_model::RowModel;
 use super::rows::{DECIMATION, Ends, FilteredRows, RowFilter};
 use super::smoothing::{Smoothed, Smoother};
-use crate::model::{BaseParameters, Chain, JointState, regressor};
+use super::stribeck::StribeckFit;
+use super::sum::Sum;
+use super::window::{self, Window};
 use crate::real::{self, Real};
 
 /// Bandwidth of the smoothing over that of the rows: the motion is undisturbed where the rows are sensitive, so that
@@ -34,62 +40,6 @@ pub const STILL_SPEED: f64 = 0.03;
 /// rows in costs 14 % of Coulomb friction and twelve times the torque error; on the simulated default leg a share of
 /// 0.3 biases the knee's rotor inertia by 2.5 standard deviations, 0.05 by 0.1.
 pub const LARGEST_STILL_SHARE: f64 = 0.05;
-
-/// What turns a motion into regressor rows: geometry, gravity, and which columns are estimated.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RowModel<T: Real, const N: usize, const B: usize> {
-    /// Geometry of the leg.
-    pub chain: Chain<T, N>,
-    /// Acceleration of gravity in the base frame, m/s^2.
-    pub gravity: Vector3<T>,
-    /// The columns that torque can tell apart.
-    pub base: BaseParameters<T, N, B>,
-}
-
-impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
-    /// Base columns of every joint for one instant, and its torque.
-    #[must_use]
-    pub fn rows(&self, instant: &Smoothed<T, N>) -> FilteredRows<T, N, B> {
-        let state = JointState { q: instant.position, qd: instant.velocity, qdd: instant.acceleration };
-        let full = regressor(&self.chain, &state, &self.gravity);
-        let mut rows = FilteredRows {
-            regressor: [[T::zero(); B]; N],
-            torque: instant.torque,
-            still: instant
-                .velocity
-                .map(|velocity| if real::abs(velocity) < T::of(STILL_SPEED) { T::one() } else { T::zero() }),
-        };
-        for (row, selected) in full.iter().zip(rows.regressor.iter_mut()) {
-            self.base.select(row, selected);
-        }
-        rows
-    }
-}
-
-/// A sum that keeps its digits over millions of terms (Neumaier 1974).
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Sum<T> {
-    total: T,
-    lost: T,
-}
-
-impl<T: Real> Sum<T> {
-    fn zero() -> Self {
-        Self { total: T::zero(), lost: T::zero() }
-    }
-    fn add(&mut self, term: T) {
-        let total = self.total + term;
-        self.lost += if real::abs(self.total) >= real::abs(term) {
-            (self.total - total) + term
-        } else {
-            (term - total) + self.total
-        };
-        self.total = total;
-    }
-    fn value(&self) -> T {
-        self.total + self.lost
-    }
-}
 
 /// What one joint's part of a motion looked like.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,6 +67,10 @@ pub struct Record<T, const N: usize, const B: usize> {
     pub row_information: T,
     /// Standard deviation of the torque noise of one 500 Hz sample, from its own scatter, N m; zero where not known.
     pub noise: [T; N],
+    /// What was set aside.
+    pub outliers: Outliers<T, N>,
+    /// Stribeck friction of each joint that shows it; its parameters are eliminated from the factor.
+    pub stribeck: [Option<StribeckFit<T, B>>; N],
 }
 
 impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
@@ -135,6 +89,8 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
             rejected: self.rejected,
             row_information: convert(self.row_information),
             noise: self.noise.map(convert),
+            outliers: self.outliers.convert(),
+            stribeck: core::array::from_fn(|joint| self.stribeck[joint].as_ref().map(StribeckFit::convert)),
         }
     }
 
@@ -184,10 +140,15 @@ pub struct Recorder<T, const N: usize, const B: usize, const TAPS: usize, const 
     low_pass: LowPass<T, TAPS>,
     smoother: Smoother<T, N, TAPS>,
     filter: RowFilter<T, N, B, PENDING>,
-    pyramids: [Pyramid<T, B>; N],
+    estimator: Estimator,
+    ends: Ends,
+    /// Angle and torque of each joint.
+    hampel: [[Hampel<T>; 2]; N],
+    window: Window<T, N, B, { window::ROOM }>,
+    choices: Option<Choices<N>>,
+    samples: u32,
+    replaced: [u32; N],
     noise: [NoiseLevel<T>; N],
-    absolute: [Sum<T>; N],
-    squared: [Sum<T>; N],
     speed: [Sum<T>; N],
     instants: u32,
     rows: [u32; N],
@@ -222,10 +183,14 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             low_pass,
             smoother: Smoother::new(),
             filter: RowFilter::new(Ends::Cut),
-            pyramids: core::array::from_fn(|_| Pyramid::new()),
+            estimator: Estimator::Robust,
+            ends: Ends::Cut,
+            hampel: core::array::from_fn(|_| [Hampel::new(Quantity::Angle), Hampel::new(Quantity::Torque)]),
+            window: Window::new(),
+            choices: None,
+            samples: 0,
+            replaced: [0; N],
             noise: [NoiseLevel::new(); N],
-            absolute: [Sum::zero(); N],
-            squared: [Sum::zero(); N],
             speed: [Sum::zero(); N],
             instants: 0,
             rows: [0; N],
@@ -237,6 +202,15 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     #[must_use]
     pub fn delay(&self) -> usize {
         self.smoothing.reach()
+            + match self.estimator {
+                Estimator::Robust => hampel::REACH,
+                Estimator::Plain => 0,
+            }
+    }
+
+    /// How disturbances are met; robust unless said otherwise.
+    pub fn set_estimator(&mut self, estimator: Estimator) {
+        self.estimator = estimator;
     }
 
     /// Taps of the low-pass to each side of a row's centre.
@@ -248,13 +222,32 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     /// Forgets everything: a new motion begins.
     pub fn clear(&mut self, ends: Ends) {
         self.smoother.clear();
+        self.hampel.iter_mut().flatten().for_each(Hampel::restart);
         self.filter = RowFilter::new(ends);
-        self.pyramids.iter_mut().for_each(Pyramid::clear);
+        self.window.clear();
+        self.choices = None;
+        self.ends = ends;
         self.noise = [NoiseLevel::new(); N];
-        self.absolute = [Sum::zero(); N];
-        self.squared = [Sum::zero(); N];
         self.speed = [Sum::zero(); N];
+        (self.samples, self.replaced) = (0, [0; N]);
         (self.instants, self.rows, self.rejected) = (0, [0; N], 0);
+    }
+
+    /// The samples held back for want of neighbours, once no more will come: one at a call, then `None`. To be called before
+    /// [`Self::break_off`] or [`Self::finish`], which drop what is held back.
+    pub fn flush(&mut self, model: &RowModel<T, N, B>) -> Option<Option<Progress<T, N, B>>> {
+        if self.estimator == Estimator::Plain {
+            return None;
+        }
+        let (mut position, mut torque) = ([T::zero(); N], [T::zero(); N]);
+        for joint in 0..N {
+            let [angle, effort] = &mut self.hampel[joint];
+            let (angle, effort) = (angle.finish()?, effort.finish()?);
+            (position[joint], torque[joint]) = (angle.value, effort.value);
+            let wild = u32::from(angle.wild) + u32::from(effort.wild);
+            self.replaced[joint] = self.replaced[joint].saturating_add(wild);
+        }
+        Some(self.advance(model, &position, &torque))
     }
 
     /// The samples that follow do not continue those before: windows start anew, rows already taken stay. Returns how
@@ -262,11 +255,13 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     pub fn break_off(&mut self) -> u32 {
         self.smoother.clear();
         self.noise.iter_mut().for_each(NoiseLevel::break_off);
+        self.hampel.iter_mut().flatten().for_each(Hampel::restart);
         let mut finished = 0;
         while let Some(rows) = self.filter.finish(&self.low_pass) {
             self.take(&rows);
             finished += 1;
         }
+        self.window.close();
         finished
     }
 
@@ -275,15 +270,33 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             self.rejected = self.rejected.saturating_add(1);
             return;
         }
-        for joint in 0..N {
-            if rows.still[joint] > T::of(LARGEST_STILL_SHARE) {
-                continue;
-            }
-            self.rows[joint] = self.rows[joint].saturating_add(1);
-            self.pyramids[joint].insert(&rows.regressor[joint], rows.torque[joint]);
-            self.absolute[joint].add(real::abs(rows.torque[joint]));
-            self.squared[joint].add(rows.torque[joint] * rows.torque[joint]);
+        let taken = rows.still.map(|still| !(still > T::of(LARGEST_STILL_SHARE)));
+        if !self.window.insert(rows, &taken) {
+            self.rejected = self.rejected.saturating_add(1);
+            return;
         }
+        for (count, taken) in self.rows.iter_mut().zip(taken) {
+            *count = count.saturating_add(u32::from(taken));
+        }
+    }
+
+    /// The sample of a few samples ago, wild values replaced.
+    fn clean(&mut self, position: &[T; N], torque: &[T; N]) -> Option<([T; N], [T; N])> {
+        if self.estimator == Estimator::Plain {
+            return Some((*position, *torque));
+        }
+        let (mut angles, mut torques, mut complete) = ([T::zero(); N], [T::zero(); N], true);
+        for (joint, [angle, effort]) in self.hampel.iter_mut().enumerate() {
+            let cleaned = (angle.push(position[joint]), effort.push(torque[joint]));
+            let (Some(angle), Some(effort)) = cleaned else {
+                complete = false;
+                continue;
+            };
+            (angles[joint], torques[joint]) = (angle.value, effort.value);
+            let wild = u32::from(angle.wild) + u32::from(effort.wild);
+            self.replaced[joint] = self.replaced[joint].saturating_add(wild);
+        }
+        complete.then_some((angles, torques))
     }
 
     /// Takes one 500 Hz sample: D-H angles in rad, D-H torques in N m.
@@ -301,6 +314,23 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         for (noise, &torque) in self.noise.iter_mut().zip(torque) {
             noise.push(torque);
         }
+        if self.choices.is_none() {
+            let choices = Choices::of(model);
+            self.choices = Some(if self.ends == Ends::Cut { choices } else { choices.without_stribeck() });
+            self.window.lay_out(model);
+        }
+        self.samples = self.samples.saturating_add(1);
+        let (position, torque) = self.clean(position, torque)?;
+        self.advance(model, &position, &torque)
+    }
+
+    /// The filter chain behind the first step.
+    fn advance(
+        &mut self,
+        model: &RowModel<T, N, B>,
+        position: &[T; N],
+        torque: &[T; N],
+    ) -> Option<Progress<T, N, B>> {
         let instant = self.smoother.push(&self.smoothing, position, torque)?;
         self.instants = self.instants.saturating_add(1);
         for (sum, &velocity) in self.speed.iter_mut().zip(&instant.velocity) {
@@ -326,18 +356,22 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     }
 
     fn record(&self) -> Record<T, N, B> {
-        let rows = self.rows.map(|rows| T::of(f64::from(rows.max(1))));
+        let information = T::of(DECIMATION as f64) * self.low_pass.energy();
+        // What is held out is measured as it is.
+        let estimator = if self.ends == Ends::Cut { self.estimator } else { Estimator::Plain };
+        let assembly = assemble(&self.window, self.choices.as_ref(), estimator, information);
         let instants = T::of(f64::from(self.instants.max(1)));
         Record {
-            factors: core::array::from_fn(|joint| self.pyramids[joint].collapse()),
+            factors: assembly.factors,
             torque: core::array::from_fn(|joint| TorqueSize {
-                mean_absolute: self.absolute[joint].value() / rows[joint],
-                root_mean_square: real::sqrt(self.squared[joint].value() / rows[joint]),
                 speed: real::sqrt(self.speed[joint].value() / instants),
+                ..assembly.torque[joint]
             }),
-            rows: self.rows,
+            rows: assembly.rows,
             rejected: self.rejected,
-            row_information: T::of(DECIMATION as f64) * self.low_pass.energy(),
+            row_information: information,
+            outliers: Outliers { samples: self.samples, replaced: self.replaced, ..assembly.outliers },
+            stribeck: assembly.stribeck,
             noise: self.noise.map(|noise| noise.sigma()),
         }
     }

@@ -14,9 +14,10 @@
 //! has a sharp edge and lets through what the low-pass keeps out, so errors are measured on whole windows
 //! ([`Ends::Whole`]).
 //!
-//! Cost of one sample: `PENDING (N (B + 2) + 1)` multiplications. Memory: as many numbers.
+//! Cost of one sample: `PENDING (N (B + 5) + 1)` multiplications. Memory: as many numbers.
 
 use super::kernel::LowPass;
+use super::stribeck::BANK;
 use crate::real::{self, Real};
 
 /// Samples from one output to the next: 500 Hz to 50 Hz.
@@ -27,6 +28,8 @@ pub const DECIMATION: usize = 10;
 pub struct FilteredRows<T, const N: usize, const B: usize> {
     /// `regressor[joint]` times base parameters is the torque.
     pub regressor: [[T; B]; N],
+    /// Stribeck columns of each joint's own torque; zero where none is looked for.
+    pub stribeck: [[T; BANK]; N],
     /// N m, D-H sign.
     pub torque: [T; N],
     /// Share of the window, weighted by the filter's magnitude, in which the joint stood still: 0..1.
@@ -35,13 +38,22 @@ pub struct FilteredRows<T, const N: usize, const B: usize> {
 
 impl<T: Real, const N: usize, const B: usize> FilteredRows<T, N, B> {
     fn empty() -> Self {
-        Self { regressor: [[T::zero(); B]; N], torque: [T::zero(); N], still: [T::zero(); N] }
+        Self {
+            regressor: [[T::zero(); B]; N],
+            stribeck: [[T::zero(); BANK]; N],
+            torque: [T::zero(); N],
+            still: [T::zero(); N],
+        }
     }
 
     /// No NaN, no infinity.
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.torque.iter().chain(self.regressor.iter().flatten()).all(|&value| real::is_finite(value))
+        self.torque
+            .iter()
+            .chain(self.regressor.iter().flatten())
+            .chain(self.stribeck.iter().flatten())
+            .all(|&value| real::is_finite(value))
     }
 }
 
@@ -170,6 +182,9 @@ fn add_scaled<T: Real, const N: usize, const B: usize>(
         for (sum, &element) in output.regressor[joint].iter_mut().zip(&rows.regressor[joint]) {
             *sum += weight * element;
         }
+        for (sum, &element) in output.stribeck[joint].iter_mut().zip(&rows.stribeck[joint]) {
+            *sum += weight * element;
+        }
         output.torque[joint] += weight * rows.torque[joint];
         output.still[joint] += share * rows.still[joint];
     }
@@ -190,7 +205,12 @@ mod tests {
         let mut outputs = Vec::new();
         for index in 0..1500 {
             let (left, right) = signal(index);
-            let rows = FilteredRows { regressor: [[left, 1.0]], torque: [right], still: [0.0] };
+            let rows = FilteredRows {
+                regressor: [[left, 1.0]],
+                stribeck: [[0.0; 3]],
+                torque: [right],
+                still: [0.0],
+            };
             outputs.extend(filter.push(&low_pass, &rows));
         }
         while let Some(output) = filter.finish(&low_pass) {

@@ -175,6 +175,9 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
             }
             size.root_mean_square = root_mean_square;
             record.noise[joint] /= ratio;
+            if let Some(fit) = &mut record.stribeck[joint] {
+                fit.correct(ratio, load);
+            }
         }
         record
     }

@@ -12,11 +12,13 @@ use super::constrained::ParameterBox;
 use super::estimate::{Estimate, Plan, Problem};
 use super::factor::Factor;
 use super::record::{Record, RowModel};
+use super::row_model::no_stribeck;
 use super::scale::widen;
 use super::search::{SearchState, SwarmSearch};
 use super::verdict::{Docket, Evidence, Reason, Test, Thresholds, Unused, Verdict};
-use crate::model::LegParameters;
-use crate::real::Real;
+use crate::model::friction::Stribeck;
+use crate::model::{LegParameters, Parameter};
+use crate::real::{self, Real};
 use crate::swarm::BsoSettings;
 
 /// Evaluations of the search that take about as long as one step of the completion.
@@ -189,6 +191,24 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     #[must_use]
     pub fn estimate(&self) -> Estimate<T, B> {
         Estimate { values: self.values(), ..self.least_squares.clone() }
+    }
+
+    /// Stribeck friction of each joint that goes with the base values that are judged, as a factor on its Coulomb friction.
+    #[must_use]
+    pub fn stribeck(&self, model: &RowModel<T, N, B>) -> [Stribeck<T>; N] {
+        let values = self.values();
+        let mut found = no_stribeck();
+        for (joint, (slot, fit)) in found.iter_mut().zip(&self.record.stribeck).enumerate() {
+            let coulomb = model.drive(joint, Parameter::FC).map_or(T::zero(), |base| values[base]);
+            // Without Coulomb friction there is nothing to be a factor of; the verdict calls that unphysical.
+            if let Some(fit) = fit
+                && coulomb > T::zero()
+            {
+                let excess = real::max(fit.surplus(&values) / coulomb, T::zero());
+                *slot = Stribeck { excess, velocity: fit.speed };
+            }
+        }
+        found
     }
 
     /// From base values to a leg that can exist.

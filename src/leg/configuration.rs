@@ -1,7 +1,7 @@
 //! What does not change about a leg while it runs.
 
 use super::activity::VALIDATION_MOTIONS;
-use crate::ident::{KernelError, LinkPrior, MonitorSettings, Plan, RowModel, Thresholds};
+use crate::ident::{Estimator, KernelError, LinkPrior, MonitorSettings, Plan, RowModel, Thresholds};
 use crate::motion::{JointEnvelope, LimitViolation, Motion, MotionError, Periodic};
 use crate::servo::{JointConfiguration, ServoError};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
@@ -28,6 +28,8 @@ pub struct LegConfiguration<const N: usize, const B: usize> {
     pub thresholds: Thresholds<f32>,
     /// When a tracked motion says that the model no longer fits.
     pub monitor: MonitorSettings<f32>,
+    /// How disturbances of the motion identified from are met.
+    pub estimator: Estimator,
     /// Where the low-pass of the identification is 3 dB down, Hz.
     pub bandwidth_hz: f32,
     /// The motion identified from.

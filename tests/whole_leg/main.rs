@@ -44,6 +44,7 @@ fn options(seed: u64) -> SimulationOptions {
         prior: PriorChoice::Default,
         payload: None,
         load: None,
+        estimator: scarab::ident::Estimator::Robust,
         perturbations: Vec::new(),
         with_series: false,
     }

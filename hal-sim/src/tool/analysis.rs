@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use scarab::ident::{
-    Estimate, Factor, LinkPrior, Plan, Problem, Record, RowModel, SearchState, Solver, Status, Verdict,
-    least_squares_in_box, prior_parameters, status,
+    Choice, Estimate, Estimator, Factor, LinkPrior, Plan, Problem, Record, RowModel, SearchState, Solver,
+    Status, Verdict, least_squares_in_box, prior_parameters, status,
 };
 use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter};
 
 use super::consistent;
+use super::disturbances::{OutliersReport, StribeckReport};
 use super::findings::FindingReport;
+use super::information::StribeckTruth;
 use super::report::{
     BaseReport, FitReport, LeastSquaresReport, Number, ParameterReport, RunReport, SCHEMA, SwarmReport,
     TrackingReport,
@@ -34,6 +36,8 @@ pub struct Background<const N: usize, const B: usize> {
     pub prior_name: String,
     /// What the simulated leg has.
     pub truth: Option<LegParameters<f64, N>>,
+    /// Its friction curves.
+    pub stribeck_truth: [Option<StribeckTruth>; N],
 }
 
 /// A motion that was recorded, and how its noise-free torque compares, where that is known.
@@ -63,6 +67,10 @@ pub struct Circumstances<const B: usize> {
     pub seed: Option<u64>,
     /// Cramer-Rao bound of the base parameters.
     pub cramer_rao: Option<[f64; B]>,
+    /// The same of each joint's Stribeck surplus.
+    pub surplus_cramer_rao: Vec<Option<f64>>,
+    /// Robust or plain.
+    pub estimator: Estimator,
     /// First iteration with an excess of at most a half.
     pub iterations_to_half_chi2: Option<u32>,
     /// Every test of the verdict.
@@ -88,6 +96,17 @@ impl<const N: usize, const B: usize> Background<N, B> {
         let Some((joint, parameter)) = self.model.base.independent(base) else { return String::new() };
         let others = self.terms(base).count() > 1;
         format!("{}{}", parameter_name(joint, parameter), if others { "R" } else { "" })
+    }
+
+    /// Plain least squares looks for nothing that was not asked for.
+    pub fn use_estimator(&mut self, estimator: Estimator) {
+        let unasked = |choice: &mut Choice| {
+            if *choice == Choice::Auto && estimator == Estimator::Plain {
+                *choice = Choice::Off;
+            }
+        };
+        self.model.stribeck_choice.iter_mut().for_each(unasked);
+        self.device.stribeck_choice.iter_mut().for_each(unasked);
     }
 
     fn terms(&self, base: usize) -> impl Iterator<Item = (usize, Parameter, f64)> + '_ {
@@ -146,12 +165,23 @@ impl<const N: usize, const B: usize> Background<N, B> {
             columns: self.columns,
             condition: solver.condition().into(),
             parameters: self.parameters(solver, &estimate),
-            base_parameters: self.base_parameters(&estimate, circumstances.cramer_rao.as_ref()),
+            base_parameters: self
+                .base_parameters(&estimate, circumstances.cramer_rao.as_ref())
+                .into_iter()
+                .chain(self.surpluses(solver, &estimate.values, circumstances))
+                .collect(),
+            stribeck: self.stribeck(solver, &estimate.values),
+            outliers: OutliersReport::of(solver.record(), estimator_name(circumstances.estimator)),
             training: fits(training, &estimate.values),
             validation: fits(validation, &estimate.values),
             least_squares: LeastSquaresReport {
                 base_parameters: (0..self.model.base.rank())
                     .map(|base| (self.base_name(base), solver.least_squares().values[base].into()))
+                    .chain(
+                        self.stribeck(solver, &solver.least_squares().values)
+                            .into_iter()
+                            .map(|found| (surplus_name(found.joint - 1), found.surplus_nm)),
+                    )
                     .collect(),
                 cost: costs.least_squares.into(),
             },
@@ -171,6 +201,38 @@ impl<const N: usize, const B: usize> Background<N, B> {
             detail: self.detail(&estimate),
             compared: None,
         }
+    }
+
+    fn stribeck(&self, solver: &Solver<f32, N, B>, values: &[f32; B]) -> Vec<StribeckReport> {
+        let found = solver.record().stribeck.iter().enumerate();
+        found.filter_map(|(joint, fit)| Some(StribeckReport::of(joint, fit.as_ref()?, values))).collect()
+    }
+
+    /// Surplus of static over Coulomb friction, of joints that have one or for which one was found.
+    fn surpluses(
+        &self,
+        solver: &Solver<f32, N, B>,
+        values: &[f32; B],
+        circumstances: &Circumstances<B>,
+    ) -> Vec<BaseReport> {
+        let found = self.stribeck(solver, values);
+        let of = |joint: usize| {
+            let found = found.iter().find(|found| found.joint == joint + 1);
+            let truth = self.stribeck_truth[joint];
+            (found.is_some() || truth.is_some()).then(|| BaseReport {
+                name: surplus_name(joint),
+                terms: [(surplus_name(joint), 1.0), (parameter_name(joint, Parameter::FC), -1.0)].into(),
+                value: found.map_or(Number::UNKNOWN, |found| found.surplus_nm),
+                unit: "N m",
+                sigma: found.map_or(Number::UNKNOWN, |found| found.surplus_sigma_nm),
+                truth: match self.truth {
+                    Some(_) => truth.map_or(0.0, |truth| truth.surplus).into(),
+                    None => Number::UNKNOWN,
+                },
+                cramer_rao: circumstances.surplus_cramer_rao.get(joint).copied().flatten().into(),
+            })
+        };
+        (0..N).filter_map(of).collect()
     }
 
     fn base_parameters(&self, estimate: &Estimate<f32, B>, cramer_rao: Option<&[f64; B]>) -> Vec<BaseReport> {
@@ -242,6 +304,20 @@ pub struct Costs<const B: usize> {
     pub above: f64,
     /// J(p) - J_LS for any parameters.
     pub factor: Factor<f64, B>,
+}
+
+/// Name of static friction.
+fn surplus_name(joint: usize) -> String {
+    format!("FS{}", joint + 1)
+}
+
+/// The word for an estimator.
+#[must_use]
+pub const fn estimator_name(estimator: Estimator) -> &'static str {
+    match estimator {
+        Estimator::Robust => "robust",
+        Estimator::Plain => "plain",
+    }
 }
 
 /// The word for a plan.

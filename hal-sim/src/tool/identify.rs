@@ -116,16 +116,25 @@ fn spread_table(report: &RunsReport) -> Table {
         "ls rmse / CRB",
         "bso bias / CRB",
     ]);
-    let Some(first) = report.runs.first() else { return table };
-    for (index, base) in first.base_parameters.iter().enumerate() {
+    let names = report.runs.iter().flat_map(|run| &run.base_parameters).map(|base| &base.name);
+    let mut seen = Vec::new();
+    names.for_each(|name| {
+        if !seen.contains(&name) {
+            seen.push(name);
+        }
+    });
+    let named =
+        |run: &RunReport, name: &str| run.base_parameters.iter().find(|base| base.name == name).cloned();
+    let first = |name: &&String| report.runs.iter().find_map(|run| named(run, name));
+    for base in seen.iter().filter_map(first) {
         let (Some(truth), Some(bound)) = (base.truth.known(), base.cramer_rao.known()) else { continue };
         let of = |value: &dyn Fn(&RunReport) -> Option<f64>| -> Vec<f64> {
             report.runs.iter().filter_map(value).collect()
         };
-        let swarm = of(&|run| run.base_parameters.get(index)?.value.known());
+        let swarm = of(&|run| named(run, &base.name)?.value.known());
         let squares = of(&|run| run.least_squares.base_parameters.get(&base.name)?.known());
-        let sigma = of(&|run| run.base_parameters.get(index)?.sigma.known());
-        let bounds = rms(of(&|run| run.base_parameters.get(index)?.cramer_rao.known()).into_iter());
+        let sigma = of(&|run| named(run, &base.name)?.sigma.known());
+        let bounds = rms(of(&|run| named(run, &base.name)?.cramer_rao.known()).into_iter());
         let bound = if bounds > 0.0 { bounds } else { bound };
         let bias = swarm.iter().map(|value| value - truth).sum::<f64>() / swarm.len().max(1) as f64;
         table.add_row(vec![

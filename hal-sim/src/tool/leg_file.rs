@@ -23,7 +23,9 @@
 //! | `encoder` | `{ side = "motor" or "joint", counts, ratio }` | motor, 8192, 50 |
 //! | `current_noise_a` | standard deviation per logged 500 Hz sample, besides `torque_noise_percent` | 0 |
 //! | `current_offset_a`, `current_step_a` | error and conversion step of the current sensor | 0, 0 (none) |
+//! | `outliers` | `{ percent, torque_nm }`: share of logged 500 Hz samples with a wild current, its largest error | none |
 //! | `offset`, `rotor` | `"on"` or `"off"`: whether a torque offset, a rotor inertia is estimated | on, on |
+//! | `stribeck_model` | `"auto"`, `"on"` or `"off"`: whether Stribeck friction is estimated | auto |
 //! | `stribeck` | `{ static_nm, speed_rad_s }`: simulated friction at rest and where it has fallen | none |
 //! | `truth`, `prior` | `{ mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset }`, the last four 0 unless given | none |
 //! | `[joint.motor]` | reserved | |
@@ -46,8 +48,9 @@ use serde::{Deserialize, Serialize};
 pub const DEFAULT_LEG: &str = "x2-wearer-75kg";
 
 /// Shipped legs by name, with their text.
-pub const SHIPPED_LEGS: [(&str, &str); 5] = [
+pub const SHIPPED_LEGS: [(&str, &str); 6] = [
     (DEFAULT_LEG, include_str!("../../legs/x2-wearer-75kg.toml")),
+    ("x2-rough", include_str!("../../legs/x2-rough.toml")),
     ("mujoco-leg", include_str!("../../legs/mujoco-leg.toml")),
     ("dp-a0", include_str!("../../legs/dp-a0.toml")),
     ("sp", include_str!("../../legs/sp.toml")),
@@ -141,12 +144,18 @@ pub struct JointFile {
     /// Conversion step of the current sensor, A; 0 for none.
     #[serde(default)]
     pub current_step_a: f64,
+    /// Wild readings of the current, simulated only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outliers: Option<OutliersFile>,
     /// Whether a torque offset is estimated.
     #[serde(default)]
     pub offset: Switch,
     /// Whether a rotor inertia is estimated.
     #[serde(default)]
     pub rotor: Switch,
+    /// Whether Stribeck friction is estimated.
+    #[serde(default = "auto")]
+    pub stribeck_model: Switch,
     /// Friction at rest above Coulomb's, simulated only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stribeck: Option<StribeckFile>,
@@ -203,6 +212,8 @@ pub enum Switch {
     On,
     /// It is not.
     Off,
+    /// If the data tell it.
+    Auto,
 }
 
 /// Stribeck friction.
@@ -213,6 +224,16 @@ pub struct StribeckFile {
     pub static_nm: f64,
     /// Speed at which the surplus has fallen to 1/e, rad/s.
     pub speed_rad_s: f64,
+}
+
+/// Isolated wild readings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutliersFile {
+    /// Of the logged 500 Hz samples.
+    pub percent: f64,
+    /// Largest error, either sign, N m at the joint.
+    pub torque_nm: f64,
 }
 
 /// A link with rotor and friction, in the joint's D-H frame.
@@ -281,6 +302,10 @@ fn default_lag() -> f64 {
     5e-4
 }
 
+fn auto() -> Switch {
+    Switch::Auto
+}
+
 fn default_encoder() -> EncoderFile {
     EncoderFile { side: Side::Motor, counts: 8192, ratio: 50.0 }
 }
@@ -305,8 +330,10 @@ impl JointFile {
             current_noise_a: 0.0,
             current_offset_a: 0.0,
             current_step_a: 0.0,
+            outliers: None,
             offset: Switch::On,
             rotor: Switch::On,
+            stribeck_model: auto(),
             stribeck: None,
             truth: None,
             prior: None,

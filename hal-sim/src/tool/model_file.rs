@@ -159,6 +159,21 @@ pub struct BaseSet {
     pub parameters: Vec<StoredBase>,
     /// Row by row.
     pub covariance: Vec<Vec<f64>>,
+    /// Stribeck friction, of joints that show it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stribeck: Vec<StoredStribeck>,
+}
+
+/// Stribeck friction of one joint: surplus * exp(-(speed / its speed)^2) on top of Coulomb friction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredStribeck {
+    /// Counted from 1.
+    pub joint: usize,
+    /// N m.
+    pub surplus_nm: f64,
+    /// rad/s.
+    pub speed_rad_s: f64,
 }
 
 /// One combination of parameters.

@@ -51,8 +51,10 @@ pub struct Context<const N: usize, const B: usize> {
 impl<const N: usize, const B: usize> Context<N, B> {
     /// What a run of this leg, as the firmware believes it to be, is made from.
     pub fn new(leg: &LegFile, options: &SimulationOptions) -> Result<Self, ToolError> {
-        let background = background::<N, B>(leg, options.prior, options.seed)?;
-        let (configuration, motions) = configuration(leg, &background, options.plan, options.swarm_seed)?;
+        let mut background = background::<N, B>(leg, options.prior, options.seed)?;
+        background.use_estimator(options.estimator);
+        let (mut configuration, motions) = configuration(leg, &background, options.plan, options.swarm_seed)?;
+        configuration.estimator = options.estimator;
         let unfit = |_| SetupError::new(leg, "the filter does not fit the device");
         let (bandwidth, rate) = (configuration.bandwidth_hz, SAMPLE_RATE_HZ as f32);
         let smoothing = Kernel::new(SMOOTHING_BANDWIDTHS as f32 * bandwidth, rate).map_err(unfit)?;

@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 use csv::StringRecord;
 use nalgebra::Vector3;
 use scarab::model::{AnatomicalJoint, Chain, JointState, Parameter, regressor};
+use scarab::real::sign;
 
 use super::error::ToolError;
 use super::model_file::ModelFile;
@@ -42,7 +43,7 @@ pub struct PredictOptions {
 pub struct Prediction {
     /// Bodies, gravity and rotor.
     pub rigid: f64,
-    /// Coulomb and viscous.
+    /// Coulomb, viscous and Stribeck; the band leaves the Stribeck surplus' own uncertainty out.
     pub friction: f64,
     /// Constant.
     pub offset: f64,
@@ -86,7 +87,7 @@ impl<'a, const N: usize> Predictor<'a, N> {
     #[must_use]
     pub fn torques(&self, state: &JointState<f64, N>) -> [Prediction; N] {
         let set = &self.model.base_set;
-        regressor(&self.chain, state, &self.gravity).map(|row| {
+        let mut torques = regressor(&self.chain, state, &self.gravity).map(|row| {
             let columns: Vec<f64> =
                 self.carriers.iter().map(|(joint, parameter)| row[*joint][parameter.index()]).collect();
             let mut torque = Prediction::default();
@@ -108,7 +109,13 @@ impl<'a, const N: usize> Predictor<'a, N> {
                 .sum();
             torque.sigma = variance.max(0.0).sqrt();
             torque
-        })
+        });
+        for found in &set.stribeck {
+            let Some(joint) = found.joint.checked_sub(1).filter(|joint| *joint < N) else { continue };
+            let ratio = state.qd[joint] / found.speed_rad_s;
+            torques[joint].friction += found.surplus_nm * sign(state.qd[joint]) * (-ratio * ratio).exp();
+        }
+        torques
     }
 
     fn to_chain(&self, [q, qd, qdd]: [[f64; N]; 3]) -> JointState<f64, N> {

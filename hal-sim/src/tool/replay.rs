@@ -1,11 +1,14 @@
 //! `replay`: the firmware's identification on recordings.
 
-use std::io::Write;
+mod predictions;
+
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use predictions::{Prediction, write_predictions};
+
 use scarab::ident::{
-    Ends, HeldOut, KernelError, Plan, Progress, Recorder, SearchState, Solver, Thresholds, Unused,
+    Ends, Estimator, HeldOut, KernelError, Plan, Progress, Recorder, SearchState, Solver, Thresholds, Unused,
 };
 use scarab::model::AnatomicalJoint;
 
@@ -45,6 +48,8 @@ pub struct ReplayOptions {
     pub plan: Plan,
     /// Prior for the search box.
     pub prior: PriorChoice,
+    /// Whether disturbances are met, and Stribeck friction looked for unasked.
+    pub estimator: Estimator,
     /// Of the swarm.
     pub swarm_seed: u64,
     /// Predicted torque of the validation part.
@@ -134,9 +139,11 @@ pub fn replay<const N: usize, const B: usize>(
             twice.display()
         )));
     }
-    let background = background::<N, B>(leg, options.prior, options.swarm_seed)?;
+    let mut background = background::<N, B>(leg, options.prior, options.swarm_seed)?;
     let anatomy = anatomy::<N>(leg)?;
+    background.use_estimator(options.estimator);
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
+    recorder.set_estimator(options.estimator);
     let (training, held_out) = read_all(options, leg)?;
     let on_grid = |recordings: &[Recording]| -> Vec<Samples<N>> {
         recordings.iter().map(|recording| Samples::of(recording, &anatomy, options.bandwidth_hz)).collect()
@@ -169,6 +176,7 @@ pub fn replay<const N: usize, const B: usize>(
         }
     }
 
+    background.device.stribeck = solver.stribeck(&background.device);
     recorder.clear(Ends::Whole);
     let mut predictions = Vec::new();
     let values = solver.values();
@@ -213,6 +221,7 @@ pub fn replay<const N: usize, const B: usize>(
     let motion = |record| Motion { name: "recording".into(), record, truth: None };
     let circumstances = Circumstances {
         findings,
+        estimator: options.estimator,
         iterations_to_half_chi2: to_half,
         simulated_s: training.iter().chain(&held_out).map(Samples::duration_s).sum(),
         wall: started.elapsed(),
@@ -335,12 +344,19 @@ fn feed<const N: usize, const B: usize>(
     let reach = recorder.delay();
     for (number, samples) in files.iter().enumerate() {
         let (mut rows, before) = (0, recorder.rows());
+        let mut take = |index: usize, progress: Option<Progress<f32, N, B>>| {
+            let Some(progress) = progress else { return };
+            let time_s = samples.start_s + (index - reach) as f64 / 500.0;
+            seen(number + 1, time_s, &progress);
+            rows += u32::from(progress.rows.is_some());
+        };
         for (index, (position, torque)) in samples.position.iter().zip(&samples.torque).enumerate() {
-            if let Some(progress) = recorder.push(&background.device, position, torque) {
-                let time_s = samples.start_s + (index - reach) as f64 / 500.0;
-                seen(number + 1, time_s, &progress);
-                rows += u32::from(progress.rows.is_some());
-            }
+            take(index, recorder.push(&background.device, position, torque));
+        }
+        let mut index = samples.position.len();
+        while let Some(progress) = recorder.flush(&background.device) {
+            take(index, progress);
+            index += 1;
         }
         rows += recorder.break_off();
         let used = recorder.rows().iter().zip(before).map(|(after, before)| after - before).collect();
@@ -355,35 +371,4 @@ fn feed<const N: usize, const B: usize>(
         });
     }
     sources
-}
-
-struct Prediction<const N: usize> {
-    file: usize,
-    time_s: f64,
-    measured: [f32; N],
-    predicted: [f32; N],
-}
-
-fn write_predictions<const N: usize>(
-    path: &Path,
-    predictions: &[Prediction<N>],
-    anatomy: &[AnatomicalJoint<f64>; N],
-) -> std::io::Result<()> {
-    let mut out = std::io::BufWriter::new(std::fs::File::create(path)?);
-    write!(out, "t_s")?;
-    for joint in 1..=N {
-        write!(out, ",tau{joint}_measured_Nm,tau{joint}_predicted_Nm")?;
-    }
-    writeln!(out, ",file")?;
-    for prediction in predictions {
-        write!(out, "{:.6}", prediction.time_s)?;
-        for joint in 0..N {
-            let anatomical = |torque: f32| anatomy[joint].from_chain(f64::from(torque));
-            let (measured, predicted) =
-                (anatomical(prediction.measured[joint]), anatomical(prediction.predicted[joint]));
-            write!(out, ",{measured:.7},{predicted:.7}")?;
-        }
-        writeln!(out, ",{}", prediction.file)?;
-    }
-    out.flush()
 }

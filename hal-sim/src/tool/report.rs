@@ -7,6 +7,8 @@ use super::scale::ScaleReport;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
+use super::disturbances::{OutliersReport, StribeckReport};
+
 /// Version of the JSON.
 pub const SCHEMA: u32 = 1;
 
@@ -262,6 +264,10 @@ pub struct RunReport {
     pub parameters: Vec<ParameterReport>,
     /// What torque determines.
     pub base_parameters: Vec<BaseReport>,
+    /// Of joints that show it.
+    pub stribeck: Vec<StribeckReport>,
+    /// What was set aside of the motion identified from.
+    pub outliers: OutliersReport,
     /// The motion identified from.
     pub training: Vec<FitReport>,
     /// Motions not used.

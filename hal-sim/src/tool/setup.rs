@@ -3,7 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use scarab::ident::{LinkPrior, MonitorSettings, Plan, RowModel, Thresholds, prior_parameters};
+use scarab::ident::{
+    Choice, Estimator, LinkPrior, MonitorSettings, Plan, RowModel, Thresholds, prior_parameters,
+};
 use scarab::leg::LegConfiguration;
 use scarab::model::{
     AnatomicalJoint, BaseError, BaseParameters, Chain, ColumnMask, DenavitHartenberg, LegParameters,
@@ -18,6 +20,7 @@ use scarab::units::{
 };
 
 use super::analysis::Background;
+use super::information::StribeckTruth;
 use super::leg_file::{BodySide, JointFile, LegFile, LinkParameters, Switch};
 use super::motions::{Motions, motions};
 
@@ -115,10 +118,19 @@ pub fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
     core::array::from_fn(|joint| {
         let mut columns = [true; PARAMETERS_PER_JOINT];
         if let Some(joint) = leg.joints.get(joint) {
-            columns[Parameter::OFF.index()] = joint.offset == Switch::On;
-            columns[Parameter::IA.index()] = joint.rotor == Switch::On;
+            columns[Parameter::OFF.index()] = joint.offset != Switch::Off;
+            columns[Parameter::IA.index()] = joint.rotor != Switch::Off;
         }
         columns
+    })
+}
+
+/// Which joints' Stribeck friction a leg file asks to look for.
+fn stribeck_choice<const N: usize>(leg: &LegFile) -> [Choice; N] {
+    core::array::from_fn(|joint| match leg.joints.get(joint).map(|joint| joint.stribeck_model) {
+        Some(Switch::On) => Choice::On,
+        Some(Switch::Auto) => Choice::Auto,
+        Some(Switch::Off) | None => Choice::Off,
     })
 }
 
@@ -133,7 +145,7 @@ pub fn row_model<const N: usize, const B: usize>(leg: &LegFile) -> Result<RowMod
         };
         SetupError::new(leg, reason)
     })?;
-    Ok(RowModel { chain, gravity, base })
+    Ok(RowModel { stribeck_choice: stribeck_choice(leg), ..RowModel::new(chain, gravity, base) })
 }
 
 /// The same in the device's precision, analysed there.
@@ -147,7 +159,7 @@ pub fn device_model<const N: usize, const B: usize>(
     if (0..B).any(|index| base.independent(index) != reference.base.independent(index)) {
         return Err(SetupError::new(leg, "base parameters differ between single and double precision"));
     }
-    Ok(RowModel { chain, gravity, base })
+    Ok(RowModel { stribeck_choice: stribeck_choice(leg), ..RowModel::new(chain, gravity, base) })
 }
 
 /// Anatomical to D-H angles of every joint.
@@ -259,7 +271,14 @@ pub fn background<const N: usize, const B: usize>(
         prior,
         prior_name,
         truth: truth.map(|truth| prior_parameters(&truth)),
+        stribeck_truth: core::array::from_fn(|joint| stribeck_truth(leg.joints.get(joint)?)),
     })
+}
+
+/// Friction curve of a simulated joint.
+fn stribeck_truth(joint: &JointFile) -> Option<StribeckTruth> {
+    let (truth, curve) = (joint.truth?, joint.stribeck?);
+    Some(StribeckTruth { surplus: curve.static_nm - truth.coulomb, speed: curve.speed_rad_s })
 }
 
 /// Largest inertia each joint moves, kg m2, over postures of the whole circle.
@@ -330,6 +349,7 @@ pub fn configuration<const N: usize, const B: usize>(
         swarm_seed,
         thresholds: Thresholds::default(),
         monitor: MonitorSettings::default(),
+        estimator: Estimator::default(),
         bandwidth_hz: leg.bandwidth_hz as f32,
         excitation: motions.excitation,
         validation: motions.validation,

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use scarab::ident::Plan;
+use scarab::ident::{Estimator, Plan};
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase, LoggedSample, Step};
 use scarab::model::Payload;
 use scarab::motion::Periodic;
@@ -42,6 +42,8 @@ pub struct SimulationOptions {
     pub load: Option<Payload<f64>>,
     /// What is made wrong on purpose.
     pub perturbations: Vec<Perturbation>,
+    /// Whether disturbances are met, and Stribeck friction looked for unasked.
+    pub estimator: Estimator,
     /// Whether to keep the run's curves.
     pub with_series: bool,
 }

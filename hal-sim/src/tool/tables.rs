@@ -4,6 +4,7 @@ use std::io::{ErrorKind, Write};
 
 use comfy_table::{CellAlignment, ColumnConstraint, Table, presets};
 
+use super::disturbances::StribeckReport;
 use super::error::ToolError;
 use super::replay::Source;
 use super::report::{ConsistentSearchReport, FitReport, Number, RunReport};
@@ -211,6 +212,8 @@ fn run_text(run: &RunReport) -> String {
         ),
     ];
     lines.push(consistent_line(run));
+    lines.extend(run.stribeck.iter().map(StribeckReport::line));
+    lines.extend(run.outliers.line());
     lines.extend(run.tracking.iter().map(|tracking| {
         format!(
             "tracking on gait, joint {}: {} deg rms without the model, {} with it",

@@ -2,16 +2,19 @@
 
 use std::time::Instant;
 
+use scarab::ident::stribeck::combination;
 use scarab::ident::{
-    Ends, Factor, FilteredRows, LARGEST_STILL_SHARE, Reason, Recorder, RowFilter, Smoothed, Smoother, Solver,
-    Verdict,
+    Ends, FilteredRows, LARGEST_STILL_SHARE, Reason, Recorder, RowFilter, RowModel, Smoothed, Smoother,
+    Solver, Verdict,
 };
 use scarab::leg::{LoggedSample, Segment};
+use scarab::model::Parameter;
 use scarab::real::sqrt;
 
 use super::analysis::{Circumstances, Costs, Motion as RecordedMotion, TruthFit};
 use super::error::ToolError;
 use super::findings::FindingReport;
+use super::information::Information;
 use super::motions::VALIDATION_NAMES;
 use super::pair::{Context, PENDING, Pair, TAPS};
 use super::report::TrackingReport;
@@ -62,13 +65,27 @@ impl<const N: usize, const B: usize> TruthChain<N, B> {
 /// Comparison of base values with the noise-free torque of one motion.
 fn truth_fit<const N: usize, const B: usize>(
     rows: &[FilteredRows<f32, N, B>],
+    model: &RowModel<f32, N, B>,
     values: &[f32; B],
 ) -> [TruthFit; N] {
     core::array::from_fn(|joint| {
+        // The rows were made before the friction curve was known: its part is made of other columns.
+        let curve = model.stribeck[joint];
+        let places = [Parameter::FC, Parameter::FV].map(|parameter| model.drive(joint, parameter));
+        let surplus = curve.excess * places[0].map_or(0.0, |base| values[base]);
+        let made = combination(curve.velocity);
+        let bank = made.bank.map(|weight| weight * surplus);
+        let mut values = *values;
+        for (place, weight) in places.into_iter().zip(made.friction) {
+            if let Some(base) = place {
+                values[base] += weight * surplus;
+            }
+        }
         let (mut squared, mut absolute, mut used) = (0.0, 0.0, 0_usize);
         for row in rows.iter().filter(|row| f64::from(row.still[joint]) <= LARGEST_STILL_SHARE) {
-            let predicted: f32 =
-                row.regressor[joint].iter().zip(values).map(|(element, value)| element * value).sum();
+            let known = row.regressor[joint].iter().zip(&values);
+            let curve = row.stribeck[joint].iter().zip(&bank);
+            let predicted: f32 = known.chain(curve).map(|(element, value)| element * value).sum();
             let error = f64::from(predicted - row.torque[joint]);
             squared += error * error;
             absolute += f64::from(row.torque[joint].abs());
@@ -92,7 +109,7 @@ pub struct Watch<'a, const N: usize, const B: usize> {
     training_rows: Vec<FilteredRows<f32, N, B>>,
     validation_rows: [Vec<FilteredRows<f32, N, B>>; VALIDATION_NAMES.len()],
     log: Vec<LoggedSample<N>>,
-    information: Factor<f64, B>,
+    information: Information<N>,
     costs: Option<Costs<B>>,
     excess: Vec<(u32, f64)>,
     /// What a known mass and a known load said, once they were asked.
@@ -111,7 +128,10 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             training_rows: Vec::new(),
             validation_rows: Default::default(),
             log: Vec::new(),
-            information: Factor::new(),
+            information: Information::new(
+                context.background.model.base.rank(),
+                context.background.stribeck_truth,
+            ),
             costs: None,
             excess: Vec::new(),
             scale: None,
@@ -168,8 +188,8 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         });
         for joint in 0..N {
             if !truth.sticking[joint] {
-                let weight = 1.0 / self.context.noise[joint].max(1e-12);
-                self.information.insert(&rows.regressor[joint].map(|element| element * weight), 0.0);
+                let (regressor, velocity) = (&rows.regressor[joint], sign(joint) * truth.velocity[joint]);
+                self.information.insert(joint, regressor, velocity, self.context.noise[joint]);
             }
         }
     }
@@ -201,6 +221,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
     /// with what it carries, the torque is put right where a known mass told the constants.
     fn series(
         &self,
+        model: &RowModel<f32, N, B>,
         solver: &Solver<f32, N, B>,
         scale: Option<&Scale<N, B>>,
         values: &[f32; B],
@@ -211,8 +232,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             direction: scales.map(|scale| f64::from(scale.anatomy.direction())),
             zero_rad: scales.map(|scale| f64::from(scale.anatomy.zero_offset())),
         };
-        let (model, bandwidth_hz) =
-            (&self.context.background.device, self.context.configuration.bandwidth_hz);
+        let bandwidth_hz = self.context.configuration.bandwidth_hz;
         let mut reader = Reader::<N, B, TAPS, PENDING>::new(model, anatomy, *values, bandwidth_hz)
             .map_err(|error| ToolError::input(format!("the filter does not fit the device: {error:?}")))?;
         let unused = (0..VALIDATION_NAMES.len()).map(|index| {
@@ -233,9 +253,12 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
                 (logged.sample.position_rad, torque)
             });
             let mut motion = reader.motion(name, role, 0.0, samples);
+            let points = motion.time_s.len();
             for (joint, curves) in motion.joints.iter_mut().enumerate() {
-                let noise_free =
-                    truth.iter().map(|row| anatomy.direction[joint] * f64::from(row.torque[joint]));
+                let noise_free = truth
+                    .iter()
+                    .take(points)
+                    .map(|row| anatomy.direction[joint] * f64::from(row.torque[joint]));
                 curves.noise_free_nm = noise_free.collect();
                 let angle = |time_s: &f64| {
                     let tick = (time_s / TICK_S + MIDDLE_OF_A_SAMPLE_TICKS).round() as u32;
@@ -298,12 +321,13 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             }
             None => (solver, verdict, identification.validation()),
         };
+        let model = identification.model();
         // The plant's torque is that of the leg with what it carries.
         let carrying = loaded(scale.as_ref(), &found.estimate().values);
         let training = RecordedMotion {
             name: "fourier".into(),
             record: found.record().clone(),
-            truth: Some(truth_fit(&self.training_rows, &carrying)),
+            truth: Some(truth_fit(&self.training_rows, model, &carrying)),
         };
         let validation: Vec<_> = VALIDATION_NAMES
             .iter()
@@ -311,16 +335,16 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             .zip(&self.validation_rows)
             .filter_map(|((name, record), rows)| {
                 let record = record.clone()?;
-                Some(RecordedMotion { name: (*name).into(), record, truth: Some(truth_fit(rows, &carrying)) })
+                let truth = Some(truth_fit(rows, model, &carrying));
+                Some(RecordedMotion { name: (*name).into(), record, truth })
             })
             .collect();
-        let rank = self.context.background.model.base.rank();
-        let inverse = self.information.inverse(rank);
-        let cramer_rao =
-            core::array::from_fn(|base| sqrt(inverse[base].iter().map(|element| element * element).sum()));
+        let (cramer_rao, surplus_cramer_rao) = self.information.bounds();
         let circumstances = Circumstances {
             seed: Some(options.seed),
             cramer_rao: Some(cramer_rao),
+            surplus_cramer_rao: surplus_cramer_rao.to_vec(),
+            estimator: options.estimator,
             iterations_to_half_chi2: match &corrected {
                 Some(run) => run.iterations_to_half_chi2,
                 None => self.excess.iter().find(|(_, excess)| *excess <= 0.5).map(|(seen, _)| *seen),
@@ -331,7 +355,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             wall: started.elapsed(),
         };
         let series = if options.with_series {
-            self.series(found, scale.as_ref(), &carrying)?
+            self.series(model, found, scale.as_ref(), &carrying)?
         } else {
             Series::default()
         };

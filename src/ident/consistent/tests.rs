@@ -68,7 +68,7 @@ fn model<T: Real, const N: usize>(mask: &ColumnMask<N>) -> RowModel<T, N, B> {
     let geometry = core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
     let chain = Chain::<f64, N>::new(&geometry).unwrap().convert();
     let gravity = Vector3::new(T::of(9.81), T::zero(), T::zero());
-    RowModel { base: BaseParameters::analyse(&chain, &gravity, mask).unwrap(), chain, gravity }
+    RowModel::new(chain, gravity, BaseParameters::analyse(&chain, &gravity, mask).unwrap())
 }
 
 const ALL: ColumnMask<2> = [[true; 14]; 2];

@@ -17,7 +17,7 @@ fn model<T: Real>() -> RowModel<T, 2, BASE> {
     let chain = Chain::new(&[link(0.0), link(0.39)]).expect("finite");
     let gravity = Vector3::new(T::of(9.81), T::zero(), T::zero());
     let base = BaseParameters::analyse(&chain, &gravity, &[[true; 14]; 2]).expect("thirteen");
-    RowModel { chain, gravity, base }
+    RowModel::new(chain, gravity, base)
 }
 
 /// XX XY XZ YY YZ ZZ HX HY HZ M IA FC FV OFF of hip and knee.
@@ -86,7 +86,16 @@ fn record<T: Real>(
 }
 
 fn record_of<T: Real>(factors: [Factor<T, BASE>; 2], torque: [TorqueSize<T>; 2]) -> Record<T, 2, BASE> {
-    Record { factors, torque, rows: [500; 2], rejected: 0, row_information: T::one(), noise: [T::zero(); 2] }
+    Record {
+        factors,
+        torque,
+        rows: [500; 2],
+        rejected: 0,
+        row_information: T::one(),
+        noise: [T::zero(); 2],
+        outliers: crate::ident::Outliers::none(),
+        stribeck: [None; 2],
+    }
 }
 
 const RATIOS: [f64; 2] = [1.0 / 1.2, 1.1];

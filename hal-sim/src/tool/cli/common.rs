@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use scarab::ident::Plan;
+use scarab::ident::{Estimator, Plan};
 
 use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
@@ -32,6 +32,24 @@ impl From<PlanArgument> for Plan {
     }
 }
 
+/// How disturbances are met.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum EstimatorArgument {
+    /// Wild samples are replaced, disturbed stretches count for less, Stribeck friction is looked for.
+    Robust,
+    /// Every sample counts alike.
+    Plain,
+}
+
+impl From<EstimatorArgument> for Estimator {
+    fn from(estimator: EstimatorArgument) -> Self {
+        match estimator {
+            EstimatorArgument::Robust => Self::Robust,
+            EstimatorArgument::Plain => Self::Plain,
+        }
+    }
+}
+
 /// What identification and replay have in common.
 #[derive(Args, Debug)]
 pub struct Common {
@@ -43,6 +61,9 @@ pub struct Common {
     /// One-time or sequential.
     #[arg(long, value_enum, default_value = "one-time")]
     pub plan: PlanArgument,
+    /// How outliers and disturbances are met.
+    #[arg(long, value_enum, default_value = "robust")]
+    pub estimator: EstimatorArgument,
     /// none, file, or wrong:PERCENT; the leg file's unless given.
     #[arg(long)]
     pub prior: Option<PriorChoice>,

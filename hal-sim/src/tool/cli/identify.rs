@@ -81,6 +81,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
         prior: arguments.common.prior.unwrap_or_default(),
         payload,
         load,
+        estimator: arguments.common.estimator.into(),
         with_series: arguments.common.is_drawn(),
         perturbations: arguments.perturb.clone(),
     };

@@ -49,6 +49,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         bandwidth_hz: arguments.bandwidth.unwrap_or(leg.bandwidth_hz),
         plan: arguments.common.plan.into(),
         prior: arguments.common.prior.unwrap_or_default(),
+        estimator: arguments.common.estimator.into(),
         swarm_seed: arguments.common.swarm_seed.unwrap_or(DEFAULT_SEED),
         csv: arguments.csv.clone(),
     };

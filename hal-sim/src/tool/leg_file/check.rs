@@ -129,6 +129,11 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
     place.within("current_noise_a", joint.current_noise_a, 0.0, 1000.0)?;
     place.within("current_offset_a", joint.current_offset_a, -1000.0, 1000.0)?;
     place.within("current_step_a", joint.current_step_a, 0.0, 100.0)?;
+    if let Some(outliers) = &joint.outliers {
+        let place = inside("outliers");
+        place.within("percent", outliers.percent, 0.0, 100.0)?;
+        place.positive("torque_nm", outliers.torque_nm, 1000.0)?;
+    }
     for (table, parameters) in [("truth", &joint.truth), ("prior", &joint.prior)] {
         if let Some(parameters) = parameters {
             link(&inside(table), parameters)?;

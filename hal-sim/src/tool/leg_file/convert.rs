@@ -3,7 +3,8 @@
 use super::{BodySide, JointFile, LegFile, LegFileError, LinkParameters, PushesFile, Side};
 use crate::description::{
     BodyDescription, CurrentSensorDescription, DenavitHartenberg, DriveDescription, EncoderDescription,
-    EncoderSide, FrictionDescription, JointDescription, LegDescription, PushDescription, Stribeck,
+    EncoderSide, FrictionDescription, JointDescription, LegDescription, OutlierDescription, PushDescription,
+    Stribeck,
 };
 
 impl LegFile {
@@ -70,6 +71,10 @@ impl JointFile {
                 noise: self.current_noise_a,
                 offset: self.current_offset_a,
                 step: self.current_step_a,
+                outliers: self.outliers.map(|outliers| OutlierDescription {
+                    share: outliers.percent / 100.0,
+                    current: outliers.torque_nm / self.torque_per_ampere,
+                }),
             },
         }
     }

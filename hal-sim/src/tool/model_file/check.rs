@@ -102,6 +102,15 @@ fn base_set(model: &ModelFile) -> Checked {
             return Err(fault(&steps, format!("`sigma` is {}; it must be above 0", base.sigma)));
         }
     }
+    for (number, found) in set.stribeck.iter().enumerate() {
+        let steps = [Step::Key("base_set"), Step::Key("stribeck"), Step::Entry(number)];
+        if !(1..=model.leg.joints.len()).contains(&found.joint) {
+            return Err(fault(&steps, format!("there is no joint {}", found.joint)));
+        }
+        if !(found.surplus_nm.is_finite() && found.speed_rad_s > 0.0 && found.speed_rad_s.is_finite()) {
+            return Err(fault(&steps, "a surplus must be a number, a speed one above 0"));
+        }
+    }
     covariance(set)
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use scarab::ident::Estimate;
 use scarab::model::Standing;
 
+use super::StoredStribeck;
 use super::{
     BaseSet, Conditions, FullSet, MODEL_SCHEMA, ModelFile, StoredBase, StoredFit, StoredJoint, StoredLeg,
     StoredParameter, fingerprint,
@@ -71,6 +72,14 @@ impl ModelFile {
             unit: parameter.unit.to_owned(),
             status: parameter.status.to_owned(),
         });
+        let stribeck = run.stribeck.iter().map(|found| {
+            Some(StoredStribeck {
+                joint: found.joint,
+                surplus_nm: found.surplus_nm.known()?,
+                speed_rad_s: found.speed_rad_s.known()?,
+            })
+        });
+        let stribeck = stribeck.collect::<Option<Vec<_>>>()?;
         let now = jiff::Timestamp::from_second(jiff::Timestamp::now().as_second()).ok()?;
         let model = Self {
             schema: MODEL_SCHEMA,
@@ -85,7 +94,7 @@ impl ModelFile {
                 joints: joints.collect(),
             },
             conditions: conditions(run, bandwidth_hz),
-            base_set: BaseSet { parameters, covariance: run.detail.covariance.clone() },
+            base_set: BaseSet { parameters, covariance: run.detail.covariance.clone(), stribeck },
             full_set: FullSet { parameters: full.collect() },
         };
         Some(model.sealed())

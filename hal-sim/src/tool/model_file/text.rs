@@ -44,6 +44,9 @@ impl ModelFile {
         out += "\n[base_set]\n";
         lines(&mut out, "parameters", &self.base_set.parameters);
         lines(&mut out, "covariance", &self.base_set.covariance);
+        if !self.base_set.stribeck.is_empty() {
+            lines(&mut out, "stribeck", &self.base_set.stribeck);
+        }
         out += "\n[full_set]\n";
         lines(&mut out, "parameters", &self.full_set.parameters);
         out

@@ -1,0 +1,85 @@
+//! The Cramer-Rao bound of a simulated motion: the noise-free rows of every logged sample, Stribeck friction included.
+//!
+//! ```text
+//! bound^2 = diagonal of (sum of y' y / noise^2)^-1,   y = base columns | for each joint with Stribeck friction:
+//!           sign(v) g(v / vs),   d/d ln vs = S sign(v) g(v / vs) 2 (v / vs)^2
+//! ```
+//!
+//! No unbiased estimator of the same parameters has a smaller variance. Rows of a joint that sticks are left out.
+
+use scarab::ident::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE, Row};
+use scarab::real::{exp, sign, sqrt};
+
+/// Friction curve of a simulated joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StribeckTruth {
+    /// Static friction less Coulomb's, N m.
+    pub surplus: f64,
+    /// rad/s.
+    pub speed: f64,
+}
+
+/// Information of a motion.
+#[derive(Clone, Debug)]
+pub struct Information<const N: usize> {
+    factor: [f64; LARGEST_SIZE],
+    rank: usize,
+    curves: [Option<StribeckTruth>; N],
+    columns: usize,
+}
+
+impl<const N: usize> Information<N> {
+    /// Of `rank` base parameters and the joints' curves; curves for which there is no room are left out.
+    #[must_use]
+    pub fn new(rank: usize, curves: [Option<StribeckTruth>; N]) -> Self {
+        let columns = rank + 2 * curves.iter().flatten().count();
+        let (curves, columns) = if columns <= LARGEST_COLUMNS {
+            (curves, columns)
+        } else {
+            ([None; N], rank.min(LARGEST_COLUMNS))
+        };
+        Self { factor: [0.0; LARGEST_SIZE], rank, curves, columns }
+    }
+
+    /// Column of a joint's surplus.
+    fn place(&self, joint: usize) -> Option<usize> {
+        self.curves[joint].map(|_| self.rank + 2 * self.curves[..joint].iter().flatten().count())
+    }
+
+    /// Takes one sample of a joint's torque with this noise, N m; `velocity` is the joint's.
+    pub fn insert(&mut self, joint: usize, regressor: &[f64], velocity: f64, noise: f64) {
+        let mut row: Row<f64> = [0.0; LARGEST_COLUMNS + 1];
+        let weight = 1.0 / noise.max(1e-12);
+        for (slot, element) in row.iter_mut().zip(regressor).take(self.rank) {
+            *slot = element * weight;
+        }
+        if let (Some(place), Some(curve)) = (self.place(joint), self.curves[joint]) {
+            let ratio = velocity / curve.speed;
+            let column = weight * sign(velocity) * exp(-ratio * ratio);
+            row[place] = column;
+            row[place + 1] = column * curve.surplus * 2.0 * ratio * ratio;
+        }
+        packed::rotate(&mut self.factor, self.columns, &mut row);
+    }
+
+    /// Bounds of the base parameters, and of each joint's surplus.
+    #[must_use]
+    pub fn bounds<const B: usize>(&self) -> ([f64; B], [Option<f64>; N]) {
+        let mut variance = [0.0; LARGEST_COLUMNS];
+        for unit in 0..self.columns {
+            // R x = unit: one column of the inverse.
+            let mut factor = self.factor;
+            let mut end = 0;
+            for column in 0..self.columns {
+                end += self.columns - column + 1;
+                factor[end - 1] = f64::from(u8::from(column == unit));
+            }
+            let inverse = packed::solve(&factor, self.columns, 0.0);
+            for (sum, element) in variance.iter_mut().zip(inverse) {
+                *sum += element * element;
+            }
+        }
+        let base = core::array::from_fn(|base| if base < self.rank { sqrt(variance[base]) } else { 0.0 });
+        (base, core::array::from_fn(|joint| self.place(joint).map(|place| sqrt(variance[place]))))
+    }
+}

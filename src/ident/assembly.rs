@@ -1,0 +1,179 @@
+//! From the window of blocks to the record of a motion: weights, Stribeck friction, one factor per joint.
+//!
+//! ```text
+//! blocks -> weights of each joint (reweighting) -> one packed factor per joint -> Stribeck found, eliminated -> Record
+//! ```
+//!
+//! What follows sees ordinary rows: each joint's factor over the base parameters, as many rows as the weights add up to,
+//! and the torque's size by the same weights.
+
+use super::choice::{Choice, Estimator};
+use super::factor::Factor;
+use super::outliers::Outliers;
+use super::packed::{self, LARGEST_SIZE};
+use super::record::TorqueSize;
+use super::reweighting::{Weights, weigh, weighted};
+use super::row_model::RowModel;
+use super::stribeck::{
+    JointRows, SMALLEST_GAIN, SMALLEST_SURPLUS_SHARE, StribeckFit, bank_eliminated, find, without_bank,
+};
+use super::window::{LARGEST_BLOCKS, Window};
+use crate::real::{self, Real};
+
+/// Rows a second.
+const ROW_RATE_HZ: f64 = 50.0;
+/// A block that got less than this of its weight counts as disturbed.
+const DISTURBED_BELOW: f64 = 0.5;
+/// Below this share of the torque's root mean square single precision and not the data decides.
+const SMALLEST_NOISE_SHARE: f64 = 1e-5;
+
+/// What the blocks of a motion add up to.
+pub(super) struct Assembly<T, const N: usize, const B: usize> {
+    pub factors: [Factor<T, B>; N],
+    pub torque: [TorqueSize<T>; N],
+    pub rows: [u32; N],
+    pub outliers: Outliers<T, N>,
+    pub stribeck: [Option<StribeckFit<T, B>>; N],
+}
+
+/// Adds up a window. `information` is `m sum h^2`; without a model nothing was recorded.
+#[inline(never)]
+pub(super) fn assemble<T: Real, const N: usize, const B: usize, const ROOM: usize>(
+    window: &Window<T, N, B, ROOM>,
+    model: Option<&Choices<N>>,
+    estimator: Estimator,
+    information: T,
+) -> Assembly<T, N, B> {
+    let mut assembly = Assembly {
+        factors: core::array::from_fn(|_| Factor::new()),
+        torque: [TorqueSize { mean_absolute: T::zero(), root_mean_square: T::zero(), speed: T::zero() }; N],
+        rows: [0; N],
+        outliers: Outliers::none(),
+        stribeck: [const { None }; N],
+    };
+    let mut weights = [[T::one(); LARGEST_BLOCKS]; N];
+    let mut joints = [[T::zero(); LARGEST_SIZE]; N];
+    let mut noise = [T::one(); N];
+    for joint in 0..N {
+        if estimator == Estimator::Robust {
+            weights[joint] = weigh(window, joint, information);
+        }
+        joints[joint] = weighted(window, joint, &weights[joint]);
+        let (rows, absolute) = sums(window, joint, &weights[joint]);
+        let columns = window.columns()[joint].all();
+        let power = packed::cost(&joints[joint], columns, &[]);
+        let divisor = real::max(rows, T::one());
+        assembly.torque[joint].mean_absolute = absolute / divisor;
+        assembly.torque[joint].root_mean_square = real::sqrt(power / divisor);
+        assembly.rows[joint] = (rows + T::of(0.5)).to_double() as u32;
+        let free = rows - T::of(columns as f64) / real::max(information, T::of(1e-3));
+        let variance = packed::residual(&joints[joint], columns)
+            / real::max(free, T::one())
+            / real::max(information, T::of(1e-3));
+        let floor = T::of(SMALLEST_NOISE_SHARE) * assembly.torque[joint].root_mean_square;
+        noise[joint] = real::max(real::sqrt(variance), real::max(floor, T::of(1e-9)));
+    }
+    disturbed(window, &weights, &mut assembly.outliers);
+
+    let choices = model.map_or([Choice::Off; N], |choices| choices.stribeck);
+    for joint in 0..N {
+        let own =
+            JointRows { factor: &joints[joint], columns: &window.columns()[joint], noise: noise[joint] };
+        assembly.factors[joint] =
+            if choices[joint].is_possible() { bank_eliminated(&own) } else { without_bank(&own) };
+    }
+    for joint in (0..N).rev().filter(|&joint| choices[joint].is_possible()) {
+        let own =
+            JointRows { factor: &joints[joint], columns: &window.columns()[joint], noise: noise[joint] };
+        let mut others = Factor::new();
+        for other in (0..N).filter(|&other| other != joint) {
+            others.merge_scaled(&assembly.factors[other], T::one() / noise[other]);
+        }
+        let wanted = match choices[joint] {
+            Choice::Auto => {
+                let share = T::of(SMALLEST_SURPLUS_SHARE);
+                (T::of(SMALLEST_GAIN), share * assembly.torque[joint].root_mean_square)
+            }
+            Choice::On | Choice::Off => (T::zero(), T::zero()),
+        };
+        let rank = model.map_or(0, |choices| choices.rank);
+        match find(&own, &others, rank, wanted) {
+            Some((fit, factor)) => {
+                assembly.stribeck[joint] = Some(fit);
+                assembly.factors[joint] = factor;
+            }
+            None => assembly.factors[joint] = without_bank(&own),
+        }
+    }
+    for (factor, &rows) in assembly.factors.iter_mut().zip(&assembly.rows) {
+        factor.set_rows(rows);
+    }
+    assembly
+}
+
+/// What of the row model the assembly needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Choices<const N: usize> {
+    rank: usize,
+    stribeck: [Choice; N],
+}
+
+impl<const N: usize> Choices<N> {
+    /// Of a model; where a curve is known already, nothing is looked for.
+    pub(super) fn of<T: Real, const B: usize>(model: &RowModel<T, N, B>) -> Self {
+        Self { rank: model.base.rank(), stribeck: model.stribeck_choice }
+    }
+
+    /// The same without Stribeck friction.
+    pub(super) fn without_stribeck(self) -> Self {
+        Self { stribeck: [Choice::Off; N], ..self }
+    }
+}
+
+/// Weighted rows and absolute torques of one joint.
+fn sums<T: Real, const N: usize, const B: usize, const ROOM: usize>(
+    window: &Window<T, N, B, ROOM>,
+    joint: usize,
+    weights: &Weights<T>,
+) -> (T, T) {
+    let (mut rows, mut absolute) = (T::zero(), T::zero());
+    for (block, &weight) in weights.iter().enumerate().take(window.blocks()) {
+        if let Some(part) = window.part(block, joint) {
+            rows += weight * part.rows;
+            absolute += weight * part.absolute_torque;
+        }
+    }
+    (rows, absolute)
+}
+
+/// Shares and longest stretches of what was disturbed. A block in which a joint only stood still is as the one before.
+fn disturbed<T: Real, const N: usize, const B: usize, const ROOM: usize>(
+    window: &Window<T, N, B, ROOM>,
+    weights: &[Weights<T>; N],
+    outliers: &mut Outliers<T, N>,
+) {
+    let (mut all, mut hit) = ([T::zero(); N], [T::zero(); N]);
+    let (mut state, mut stretch, mut common) = ([false; N], [T::zero(); N], T::zero());
+    for block in 0..window.blocks() {
+        let seconds = T::of(f64::from(window.outputs(block)) / ROW_RATE_HZ);
+        for joint in 0..N {
+            let rows = window.part(block, joint).map_or(T::zero(), |part| part.rows);
+            all[joint] += rows;
+            if rows > T::zero() {
+                state[joint] = weights[joint][block] < T::of(DISTURBED_BELOW);
+            }
+            if state[joint] {
+                hit[joint] += rows;
+                stretch[joint] += seconds;
+                outliers.longest_s[joint] = real::max(outliers.longest_s[joint], stretch[joint]);
+            } else {
+                stretch[joint] = T::zero();
+            }
+        }
+        common = if state.iter().all(|&state| state) { common + seconds } else { T::zero() };
+        outliers.longest_common_s = real::max(outliers.longest_common_s, common);
+    }
+    for joint in 0..N {
+        outliers.disturbed_share[joint] = hit[joint] / real::max(all[joint], T::one());
+    }
+}

@@ -1,0 +1,31 @@
+//! A long sum that keeps its digits.
+
+use crate::real::{self, Real};
+
+/// A sum that keeps its digits over millions of terms (Neumaier 1974).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Sum<T> {
+    total: T,
+    lost: T,
+}
+
+impl<T: Real> Sum<T> {
+    /// No term yet.
+    pub(super) fn zero() -> Self {
+        Self { total: T::zero(), lost: T::zero() }
+    }
+    /// Takes a term.
+    pub(super) fn add(&mut self, term: T) {
+        let total = self.total + term;
+        self.lost += if real::abs(self.total) >= real::abs(term) {
+            (self.total - total) + term
+        } else {
+            (term - total) + self.total
+        };
+        self.total = total;
+    }
+    /// The sum.
+    pub(super) fn value(&self) -> T {
+        self.total + self.lost
+    }
+}

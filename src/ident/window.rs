@@ -1,0 +1,298 @@
+//! A motion as a window of blocks: what reweighting needs, in memory that does not grow with the duration.
+//!
+//! One factor for a whole motion cannot be reweighted: a push that has entered it cannot be taken out. So the motion is
+//! cut into blocks of [`BLOCK_ROWS`] filtered rows, and each block keeps for each joint a small factor over the columns
+//! that this joint's torque can see. When the room is full two neighbours become one block: of the adjacent pairs of
+//! equal level (doublings) the lowest and oldest. Blocks are then of two neighbouring levels and the youngest ones
+//! finer, whatever the duration; and only factors of like size ever meet, which single precision needs.
+//!
+//! ```text
+//! joint i sees   link columns of joints >= i, drive columns of joint i, its Stribeck columns
+//! numbers of a block   sum over joints of  n_i (n_i + 3) / 2 + 1  and two more: sum of |torque|, rows
+//! ```
+//!
+//! Memory: `ROOM` numbers and about 1 kB. For the default leg (9 + 3 and 7 + 3 columns) a block takes 161 numbers, so
+//! 8192 numbers hold 50 blocks: 22 s of motion in pieces of 0.32 and 0.64 s.
+//! Cost: a row is rotated into a factor of its joint's columns; every eighth output two blocks are merged.
+//! Limits: with three joints and 28 columns there is room for 10 blocks only; a chain whose joint sees more than
+//! 32 columns is not held.
+
+use super::packed::{self, LARGEST_COLUMNS, Row};
+use super::record::RowModel;
+use super::rows::FilteredRows;
+use super::stribeck::BANK;
+use crate::model::Parameter;
+use crate::real::{self, Real};
+
+/// Outputs of the row filter, 50 a second, that make a block.
+pub const BLOCK_ROWS: u32 = 8;
+/// Numbers in the window of the device: 32 KB in single precision.
+pub const ROOM: usize = 8192;
+/// Blocks that are kept track of.
+pub const LARGEST_BLOCKS: usize = 64;
+/// What a block holds of a joint besides its factor: sum of the absolute torque, and rows.
+const BESIDE: usize = 2;
+
+/// Which columns one joint's torque sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Columns<const B: usize> {
+    base: [usize; B],
+    count: usize,
+    /// Which of them are the joint's Coulomb and viscous friction.
+    pub friction: [Option<usize>; 2],
+    /// Stribeck columns behind them.
+    pub bank: usize,
+    /// Where the joint's numbers begin in a block.
+    start: usize,
+}
+
+impl<const B: usize> Columns<B> {
+    /// The base parameters, in the order of the factor's columns.
+    #[must_use]
+    pub fn base(&self) -> &[usize] {
+        self.base.get(..self.count).unwrap_or(&[])
+    }
+
+    /// All columns, the Stribeck ones last.
+    #[must_use]
+    pub fn all(&self) -> usize {
+        self.count + self.bank
+    }
+}
+
+/// One joint's part of a block.
+#[derive(Clone, Copy, Debug)]
+pub struct Part<'a, T> {
+    /// Packed.
+    pub factor: &'a [T],
+    /// N m.
+    pub absolute_torque: T,
+    /// Rows taken.
+    pub rows: T,
+}
+
+/// The blocks of one motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Window<T, const N: usize, const B: usize, const ROOM: usize> {
+    columns: [Columns<B>; N],
+    stride: usize,
+    capacity: usize,
+    /// Slots of the closed blocks, oldest first, and behind them those that are free.
+    order: [u8; LARGEST_BLOCKS],
+    level: [u8; LARGEST_BLOCKS],
+    /// Filter outputs in each slot, those of joints that stood still included.
+    outputs: [u32; LARGEST_BLOCKS],
+    closed: usize,
+    room: [T; ROOM],
+}
+
+impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B, ROOM> {
+    /// Empty, without any columns yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            columns: [Columns { base: [0; B], count: 0, friction: [None; 2], bank: 0, start: 0 }; N],
+            stride: 0,
+            capacity: 0,
+            order: core::array::from_fn(|slot| slot as u8),
+            level: [0; LARGEST_BLOCKS],
+            outputs: [0; LARGEST_BLOCKS],
+            closed: 0,
+            room: [T::zero(); ROOM],
+        }
+    }
+
+    /// Forgets all rows.
+    pub fn clear(&mut self) {
+        (self.stride, self.capacity, self.closed) = (0, 0, 0);
+    }
+
+    /// Columns of each joint.
+    #[must_use]
+    pub fn columns(&self) -> &[Columns<B>; N] {
+        &self.columns
+    }
+
+    /// Makes room for the columns of a model; all blocks are forgotten.
+    pub fn lay_out(&mut self, model: &RowModel<T, N, B>) {
+        let mut all = self.columns;
+        for (joint, columns) in all.iter_mut().enumerate() {
+            let (mut base, mut count) = ([0; B], 0);
+            for index in 0..model.base.rank() {
+                let seen = model.base.independent(index).is_some_and(|(carrier, parameter)| {
+                    carrier == joint || (carrier > joint && is_of_the_link(parameter))
+                });
+                if seen {
+                    base[count] = index;
+                    count += 1;
+                }
+            }
+            let place = |parameter| {
+                let seen = base.iter().take(count);
+                seen.copied().position(|index| model.base.independent(index) == Some((joint, parameter)))
+            };
+            let friction = [place(Parameter::FC), place(Parameter::FV)];
+            let bank = if model.stribeck_choice[joint].is_possible() { BANK } else { 0 };
+            *columns = Columns { base, count, friction, bank, start: 0 };
+        }
+        self.arrange(all);
+    }
+
+    fn arrange(&mut self, columns: [Columns<B>; N]) {
+        self.columns = columns;
+        let mut start = 0;
+        for columns in &mut self.columns {
+            columns.start = start;
+            start += packed::size(columns.all()) + BESIDE;
+        }
+        self.stride = start;
+        let fits = self.columns.iter().all(|columns| columns.all() <= LARGEST_COLUMNS);
+        self.capacity = if fits { (ROOM / start.max(1)).min(LARGEST_BLOCKS) } else { 0 };
+        self.order = core::array::from_fn(|slot| slot as u8);
+        self.closed = 0;
+        if self.capacity > 0 {
+            self.empty(0);
+        }
+    }
+
+    /// Makes a slot an open block.
+    fn empty(&mut self, slot: usize) {
+        if let Some(numbers) = self.room.get_mut(slot * self.stride..(slot + 1) * self.stride) {
+            numbers.fill(T::zero());
+        }
+        (self.level[slot], self.outputs[slot]) = (0, 0);
+    }
+
+    fn slot(&self, place: usize) -> usize {
+        usize::from(self.order[place.min(LARGEST_BLOCKS - 1)])
+    }
+
+    /// Takes one output of the row filter; `taken` tells of which joints the row counts. False where there is no room.
+    pub fn insert(&mut self, rows: &FilteredRows<T, N, B>, taken: &[bool; N]) -> bool {
+        if self.capacity < 2 {
+            return false;
+        }
+        let slot = self.slot(self.closed);
+        for joint in (0..N).filter(|&joint| taken[joint]) {
+            let columns = self.columns[joint];
+            let mut row: Row<T> = [T::zero(); LARGEST_COLUMNS + 1];
+            let elements = columns.base().iter().map(|&base| rows.regressor[joint][base]);
+            let bank = rows.stribeck[joint].iter().copied().take(columns.bank);
+            for (place, element) in
+                row.iter_mut().zip(elements.chain(bank).chain(core::iter::once(rows.torque[joint])))
+            {
+                *place = element;
+            }
+            let Some(part) = self.part_mut(slot, joint) else { return false };
+            packed::rotate(part, columns.all(), &mut row);
+            if let [.., absolute, count] = part {
+                *absolute += real::abs(rows.torque[joint]);
+                *count += T::one();
+            }
+        }
+        self.outputs[slot] += 1;
+        if self.outputs[slot] >= BLOCK_ROWS {
+            self.close();
+        }
+        true
+    }
+
+    /// Ends the open block: what follows does not continue it.
+    pub fn close(&mut self) {
+        if self.capacity < 2 || self.outputs[self.slot(self.closed)] == 0 {
+            return;
+        }
+        self.closed += 1;
+        if self.closed >= self.capacity {
+            self.make_room();
+        }
+        let next = self.slot(self.closed);
+        self.empty(next);
+    }
+
+    /// Joins the pair of neighbours that [`Window`] speaks of; where levels differ everywhere, the shortest pair.
+    fn make_room(&mut self) {
+        let pair = |place: &usize| (self.slot(*place), self.slot(*place + 1));
+        let equal = (0..self.closed - 1)
+            .filter(|place| self.level[pair(place).0] == self.level[pair(place).1])
+            .min_by_key(|place| self.level[pair(place).0]);
+        let place = equal.or_else(|| {
+            (0..self.closed - 1)
+                .min_by_key(|place| self.outputs[pair(place).0].saturating_add(self.outputs[pair(place).1]))
+        });
+        let Some(place) = place else { return };
+        let (kept, freed) = pair(&place);
+        for joint in 0..N {
+            self.merge(kept, freed, joint);
+        }
+        self.level[kept] = self.level[kept].max(self.level[freed]).saturating_add(1);
+        self.outputs[kept] = self.outputs[kept].saturating_add(self.outputs[freed]);
+        // The freed slot goes behind the closed ones.
+        if let Some(younger) = self.order.get_mut(place + 1..self.closed) {
+            younger.rotate_left(1);
+        }
+        self.closed -= 1;
+    }
+
+    fn merge(&mut self, kept: usize, freed: usize, joint: usize) {
+        let columns = self.columns[joint];
+        let size = packed::size(columns.all()) + BESIDE;
+        let (first, second) = (kept.min(freed) * self.stride, kept.max(freed) * self.stride);
+        let Some((low, high)) = self.room.split_at_mut_checked(second) else { return };
+        let low = low.get_mut(first + columns.start..first + columns.start + size);
+        let high = high.get_mut(columns.start..columns.start + size);
+        let (Some(low), Some(high)) = (low, high) else { return };
+        let (into, from) = if kept < freed { (low, high) } else { (high, low) };
+        packed::merge(into, from, columns.all(), T::one());
+        if let ([.., absolute, rows], [.., other_absolute, other_rows]) = (into, from) {
+            *absolute += *other_absolute;
+            *rows += *other_rows;
+        }
+    }
+
+    fn part_mut(&mut self, slot: usize, joint: usize) -> Option<&mut [T]> {
+        let columns = self.columns.get(joint)?;
+        let start = slot * self.stride + columns.start;
+        self.room.get_mut(start..start + packed::size(columns.all()) + BESIDE)
+    }
+
+    /// Number of blocks with rows, the open one included.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        let open = self.capacity > 1 && self.outputs[self.slot(self.closed)] > 0;
+        self.closed + usize::from(open)
+    }
+
+    /// Filter outputs in a block: its length at 50 Hz.
+    #[must_use]
+    pub fn outputs(&self, block: usize) -> u32 {
+        self.outputs[self.slot(block)]
+    }
+
+    /// One joint's part of a block, oldest block first.
+    #[must_use]
+    pub fn part(&self, block: usize, joint: usize) -> Option<Part<'_, T>> {
+        let columns = self.columns.get(joint)?;
+        let start = self.slot(block) * self.stride + columns.start;
+        let all = self.room.get(start..start + packed::size(columns.all()) + BESIDE)?;
+        match all {
+            [factor @ .., absolute_torque, rows] => {
+                Some(Part { factor, absolute_torque: *absolute_torque, rows: *rows })
+            }
+            _ => None,
+        }
+    }
+}
+
+impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Default for Window<T, N, B, ROOM> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn is_of_the_link(parameter: Parameter) -> bool {
+    !matches!(parameter, Parameter::IA | Parameter::FC | Parameter::FV | Parameter::OFF)
+}
+
+#[cfg(test)]
+mod tests;
