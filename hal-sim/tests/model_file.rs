@@ -233,7 +233,7 @@ fn an_edited_number_is_noticed_and_an_added_comment_is_not() {
     predict(&folder, &format!("# seen by a person\n\n{}", good.replace(" = ", "=")), "").ends_with(0);
     for (old, new) in [
         ("prior = \"file\"", "prior = \"none\""),
-        ("motion_s = 55.5", "motion_s = 55.6"),
+        ("motion_s = 55.", "motion_s = 65."),
         ("status = \"grouped\"", "status = \"identified\""),
         ("verdict = \"accepted\"", "verdict = \"refused\""),
     ] {

@@ -214,6 +214,7 @@ pub fn watch<const N: usize, const B: usize>(
         torque_noise_percent: None,
         plan: Plan::OneTime,
         prior: PriorChoice::Default,
+        estimator: scarab::ident::Estimator::Robust,
         with_series: false,
         payload: None,
         load: None,

@@ -22,7 +22,7 @@ fn model<T: Real>() -> RowModel<T, 2, BASE> {
     let chain = Chain::<f64, 2>::new(&[link(0.0), link(0.45)]).expect("finite").convert();
     let gravity = Vector3::new(9.81, 0.0, 0.0).map(T::of);
     let base = BaseParameters::analyse(&chain, &gravity, &[[true; 14]; 2]).expect("thirteen base parameters");
-    RowModel { chain, gravity, base }
+    RowModel::new(chain, gravity, base)
 }
 
 /// Uniform in +-`half`, and a normal variable.
@@ -70,6 +70,8 @@ fn record<T: Real>(
         rejected: 0,
         row_information: T::one(),
         noise: [T::of(SIGMA); 2],
+        outliers: crate::ident::Outliers::none(),
+        stribeck: [None; 2],
     }
 }
 
