@@ -284,7 +284,8 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
                 thresholds.judge_consistency(&consistency, docket);
             }
         }
-        thresholds.judge_measurement(model, &self.record, &found, docket);
+        // What the data said before it was made a leg: a computed torque asks for none.
+        thresholds.judge_measurement(model, &self.record, &self.search.values(), docket);
         thresholds.judge_residual(&self.record, &found, docket);
         let noise_is_known = self.record.noise.iter().all(|&noise| noise > T::zero());
         for (motion, unused) in unused.enumerate() {
