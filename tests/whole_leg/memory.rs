@@ -35,7 +35,6 @@ fn a_leg_fits_the_memory_set_aside_for_it() {
         assert!(bytes <= largest, "{name}: {bytes} bytes");
     }
     assert!(sizes[0].1 <= STATIC_BYTES + WINDOW_BYTES);
-    println!("Record: {} bytes", size_of::<Record<f32, JOINTS, BASE>>());
     println!("RowFilter: {} bytes", size_of::<RowFilter<f32, JOINTS, BASE, PENDING>>());
     println!("Estimate: {} bytes", size_of::<Estimate<f32, BASE>>());
     println!("Window: {WINDOW_BYTES} bytes");
