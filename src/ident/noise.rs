@@ -56,30 +56,35 @@ impl<T: Real> Median<T> {
 
     /// Moves a marker by one place where it lags its quarter by a place or more.
     fn adjust(&mut self, marker: usize) {
-        let wanted = T::of(f64::from(self.seen - 1) * marker as f64 / 4.0);
-        let place = |index: usize| T::of(f64::from(self.positions[index]));
-        let lag = wanted - place(marker);
-        let forward = lag >= T::one() && self.positions[marker + 1] > self.positions[marker] + 1;
-        let backward = lag <= -T::one() && self.positions[marker] > self.positions[marker - 1] + 1;
+        // In whole quarters: exact however long the stream, and no double precision on the device.
+        let wanted = u64::from(self.seen - 1) * marker as u64;
+        let place = u64::from(self.positions[marker]) * 4;
+        let (before, after) = (self.gap(marker - 1), self.gap(marker));
+        let forward = wanted >= place + 4 && after > 1;
+        let backward = wanted + 4 <= place && before > 1;
         if !forward && !backward {
             return;
         }
         let step = if forward { T::one() } else { -T::one() };
-        let (before, here, after) = (place(marker - 1), place(marker), place(marker + 1));
+        let (before, after) = (T::of(f64::from(before)), T::of(f64::from(after)));
         let (low, height, high) = (self.heights[marker - 1], self.heights[marker], self.heights[marker + 1]);
         let parabola = height
-            + step / (after - before)
-                * ((here - before + step) * (high - height) / (after - here)
-                    + (after - here - step) * (height - low) / (here - before));
+            + step / (before + after)
+                * ((before + step) * (high - height) / after + (after - step) * (height - low) / before);
         self.heights[marker] = if parabola > low && parabola < high {
             parabola
         } else if forward {
-            height + (high - height) / (after - here)
+            height + (high - height) / after
         } else {
-            height + (height - low) / (here - before)
+            height + (low - height) / before
         };
         self.positions[marker] =
             if forward { self.positions[marker] + 1 } else { self.positions[marker].saturating_sub(1) };
+    }
+
+    /// Places from a marker to the next one.
+    fn gap(&self, marker: usize) -> u32 {
+        self.positions[marker + 1].saturating_sub(self.positions[marker])
     }
 
     /// `None` before the fifth value.
@@ -178,6 +183,15 @@ mod tests {
             let clean = level(|_, normal| 1.5 * normal, 10_000, seed);
             assert!((clean / 1.5 - 1.0).abs() < 0.06, "{clean}");
         }
+    }
+
+    #[test]
+    fn a_marker_that_goes_back_beside_a_steep_tail_comes_down_towards_its_neighbour() {
+        // The parabola through 0, 1 and 100 leads below 0, so the line to the neighbour two places before counts.
+        let mut median =
+            Median::<f64> { heights: [0.0, 0.0, 1.0, 100.0, 200.0], positions: [0, 1, 3, 4, 8], seen: 5 };
+        median.adjust(2);
+        assert_eq!((median.heights[2], median.positions[2]), (0.5, 2));
     }
 
     #[test]
