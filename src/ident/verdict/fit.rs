@@ -7,7 +7,8 @@
 //!
 //! v is the variance of a 500 Hz sample's noise, from its own scatter (`noise`), S the sum of h^2, n rows worth m S
 //! independent ones each, q the quantile of chi-square over its degrees of freedom. Neither side knows the training's
-//! residual, so a bad training loosens nothing.
+//! residual, so a bad training loosens nothing. Only where v is not known (samples put on another grid) the training's
+//! residual takes its place, times `largest_error_ratio`.
 
 use super::{Docket, Evidence, Reason, Test, Thresholds};
 use crate::ident::estimate::Estimate;

@@ -24,7 +24,14 @@ impl<T: Real> Thresholds<T> {
             let Some((joint, parameter)) = model.base.independent(base) else { continue };
             let (value, sigma) = (estimate.values[base], estimate.sigma(base).unwrap_or(T::zero()));
             if !real::is_finite(value) {
-                docket.at_most(Reason::Unphysical, Test::Finite, Some(joint), None, value, T::LARGEST);
+                docket.at_most(
+                    Reason::Unphysical,
+                    Test::Finite,
+                    Some(joint),
+                    None,
+                    real::abs(value),
+                    T::LARGEST,
+                );
             }
             if parameter.is_never_negative()
                 && !is_weak(record, estimate, base)
