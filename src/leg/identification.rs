@@ -121,7 +121,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     fn look_at(&mut self, segment: Option<Segment>, progress: Option<Progress<f32, N, B>>) {
         match (segment, progress) {
             (Some(Segment::Validation(_)), Some(progress)) => self.held_out.take(&self.model, &progress),
-            // A sample that was not finite: the windows start anew.
+            // The first samples, or one that was not finite: the windows start anew.
             (Some(Segment::Validation(_)), None) => self.held_out.break_off(),
             (Some(Segment::Tracking), Some(Progress { rows: Some(rows), .. }))
                 if self.upkeep.watch(&rows).is_some() =>
@@ -287,7 +287,8 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         }
     }
 
-    /// Stops an identification; what was found before stays, and a motion that is tracked goes on.
+    /// Stops an identification, also where another one is begun: a verdict that control no longer waits for must not change
+    /// what is watched. What was found before stays, and a motion that is tracked goes on.
     pub fn cancel(&mut self) {
         self.report_due = false;
         if self.work != Work::Recording(Segment::Tracking) {

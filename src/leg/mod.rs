@@ -70,7 +70,8 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         if let Some(logged) = &output.logged {
             self.identification.push(logged);
         }
-        if !matches!(self.control.activity(), Activity::Identify(_)) {
+        let begun = request == Some(ControlRequest::Identify) && !output.refused;
+        if begun || !matches!(self.control.activity(), Activity::Identify(_)) {
             self.identification.cancel();
         }
         if output.took_update {
