@@ -130,6 +130,7 @@ impl<const N: usize> Control<N> {
         if servo.decision.state != DriveState::OperationEnabled {
             // A leg that is not held is where it is: enabling must not pull it anywhere.
             self.activity = Activity::Idle;
+            self.models.interrupt();
             self.hold(servo.position.map(|angle| angle.0));
         } else {
             self.proceed();
@@ -255,6 +256,9 @@ impl<const N: usize> Control<N> {
                     self.rest(Activity::Idle);
                 }
             }
+            // About a motion before the identification, and the model that this one may replace.
+            Finding::Changed(_) | Finding::Updated { .. }
+                if matches!(self.activity, Activity::Identify(_)) => {}
             Finding::Changed(change) => self.change = Some(change),
             Finding::Updated { model: Some(model), .. } => self.models.offer(model),
             Finding::Updated { model: None, .. } => {}

@@ -84,9 +84,14 @@ impl<const N: usize> Succession<N> {
         self.model.is_some() && self.share != if self.wanted { 1.0 } else { 0.0 }
     }
 
-    /// A model that was accepted.
+    /// A model that was accepted; an update of the one before is none of this one.
     pub fn accept(&mut self, model: IdentifiedModel<N>) {
-        self.model = Some(model);
+        (self.model, self.next) = (Some(model), Next::Nothing);
+    }
+
+    /// The drive gives no torque: once it does again, the model comes into use from nothing.
+    pub fn interrupt(&mut self) {
+        self.share = 0.0;
     }
 
     /// Another model in place of the one that was there; refused (`false`) while that one feeds forward, where it would
