@@ -10,6 +10,7 @@ use crate::ident::{
     Reason, Record, Recorder, Residual, RowModel, SAMPLE_RATE_HZ, SearchState, Solver, Thresholds, Unused,
     Verdict, no_stribeck,
 };
+use crate::model::friction::Stribeck;
 
 /// What identification tells control.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,6 +65,8 @@ pub struct Identification<const N: usize, const B: usize, const TAPS: usize, con
     verdict: Option<Verdict>,
     report_due: bool,
     upkeep: Upkeep<N, B>,
+    /// Of the accepted model: what is watched has its curves, not those of an identification that was refused since.
+    accepted_stribeck: [Stribeck<f32>; N],
     change_due: bool,
 }
 
@@ -93,6 +96,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             verdict: None,
             report_due: false,
             upkeep: Upkeep::new(&low_pass, configuration.monitor),
+            accepted_stribeck: no_stribeck(),
             change_due: false,
         })
     }
@@ -139,6 +143,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             Segment::Validation(_) | Segment::Tracking => Ends::Whole,
         });
         if segment == Segment::Tracking {
+            self.model.stribeck = self.accepted_stribeck;
             self.upkeep.begin();
             self.change_due = false;
         }
@@ -250,6 +255,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         if let (Some(estimate), Some(solver)) = (estimate, &self.solver) {
             let others = self.validation.iter().flatten();
             self.upkeep.accept(Baseline::new(estimate, solver.record(), others));
+            self.accepted_stribeck = self.model.stribeck;
         }
         Finding::Judged { verdict, model }
     }

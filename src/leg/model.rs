@@ -50,7 +50,7 @@ impl<const N: usize> IdentifiedModel<N> {
     }
 
     /// The model that gives `share` (0..1) of the other's torque and the rest of this one's: torque is linear in the
-    /// parameters. Both are models of one leg.
+    /// parameters. Both are models of one leg with the same Stribeck curves, as a model and its update are.
     #[must_use]
     pub fn towards(&self, other: &Self, share: f32) -> Self {
         let mut mixed = *self;
