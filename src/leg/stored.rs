@@ -45,6 +45,11 @@ pub enum RestoreError {
         /// Counted from 0.
         joint: usize,
     },
+    /// The Stribeck curve of this joint has a negative excess, no speed, or a number that is not finite.
+    Stribeck {
+        /// Counted from 0.
+        joint: usize,
+    },
 }
 
 impl<const N: usize, const B: usize> LegConfiguration<N, B> {
@@ -81,10 +86,17 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
             return Err(RestoreError::AnotherLeg { stored: stored.fingerprint, own });
         }
         let broken = |joint: &[f32]| joint.iter().any(|value| !is_finite(*value));
-        let curves = stored.stribeck.iter().map(|curve| [curve.excess, curve.velocity]);
-        let pairs = stored.parameters.iter().zip(curves);
-        match pairs.into_iter().position(|(joint, curve)| broken(joint) || broken(&curve)) {
-            Some(joint) => Err(RestoreError::NotFinite { joint }),
+        if let Some(joint) = stored.parameters.iter().position(|joint| broken(joint)) {
+            return Err(RestoreError::NotFinite { joint });
+        }
+        let is_curve = |curve: &Stribeck<f32>| {
+            is_finite(curve.excess)
+                && curve.excess >= 0.0
+                && is_finite(curve.velocity)
+                && curve.velocity > 0.0
+        };
+        match stored.stribeck.iter().position(|curve| !is_curve(curve)) {
+            Some(joint) => Err(RestoreError::Stribeck { joint }),
             None => Ok(IdentifiedModel::of_parameters(self.model.chain, stored.parameters, stored.stribeck)),
         }
     }

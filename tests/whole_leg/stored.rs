@@ -73,6 +73,18 @@ fn a_model_with_a_number_that_is_none_is_refused_by_joint() {
 }
 
 #[test]
+fn a_stribeck_curve_that_is_none_is_refused_by_joint() {
+    // A speed of 0 makes the torque of a joint at rest NaN.
+    for (joint, excess, velocity) in
+        [(0, 0.0, 0.0), (1, -0.1, 0.1), (0, f32::NAN, 0.1), (1, 0.4, f32::INFINITY)]
+    {
+        let mut stored = kept();
+        (stored.stribeck[joint].excess, stored.stribeck[joint].velocity) = (excess, velocity);
+        assert_eq!(context().configuration.restore(&stored), Err(RestoreError::Stribeck { joint }));
+    }
+}
+
+#[test]
 fn a_model_is_not_exchanged_while_the_leg_moves_or_uses_one() {
     let restored = context().configuration.restore(&kept()).expect("the same leg");
     let mut pair = during_excitation();
