@@ -284,6 +284,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
                 thresholds.judge_consistency(&consistency, docket);
             }
         }
+        thresholds.judge_disturbance(&self.record.outliers, docket);
         // What the data said before it was made a leg: a computed torque asks for none.
         thresholds.judge_measurement(model, &self.record, &self.search.values(), docket);
         thresholds.judge_residual(&self.record, &found, docket);
@@ -293,8 +294,11 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
             thresholds.judge_colour(motion, &unused, docket);
             thresholds.judge_contact(motion, &unused, docket);
         }
-        for found in asked.iter().flatten() {
-            thresholds.judge_alignment(found, noise_is_known, docket);
+        if !docket.verdict().has(Reason::Validation) {
+            // What pushes and a wrong mass ask for is no geometry.
+            for found in asked.iter().flatten() {
+                thresholds.judge_alignment(found, noise_is_known, docket);
+            }
         }
         docket.verdict()
     }

@@ -1,7 +1,8 @@
 //! Things made wrong on purpose: each is refused for its reason, and honest runs are accepted.
 
+use hal_sim::tool::leg_file::PushesFile;
 use hal_sim::tool::perturb::Perturbation;
-use hal_sim::tool::report::RunReport;
+use hal_sim::tool::report::{Number, RunReport};
 use hal_sim::tool::simulate::simulate;
 
 use super::*;
@@ -35,6 +36,28 @@ fn refused_with_one_of(perturbation: &str, reasons: &[&str]) {
 fn tampered_inertia_and_centre_of_mass_and_an_added_mass_are_refused_by_validation_alone() {
     for perturbation in ["inertia=0.7", "com=0.8", "added-mass=2"] {
         refused(perturbation, &["validation"]);
+    }
+}
+
+#[test]
+fn a_foot_on_the_floor_is_refused_as_contact_alone_and_a_touch_of_half_a_second_is_not() {
+    refused("contact=2", &["contact"]);
+    let report = perturbed("contact=0.5", 1);
+    assert!(report.accepted(), "{:?}", report.reasons);
+}
+
+#[test]
+fn a_wearer_who_pushes_now_and_then_is_never_accepted_with_wrong_parameters() {
+    let pushes = PushesFile { per_minute: 30.0, torque_nm: 10.0, duration_s: 0.3 };
+    let leg = LegFile { pushes: Some(pushes), ..default_leg() };
+    for seed in 1..=5 {
+        let report = simulate::<JOINTS, BASE>(&leg, &options(seed)).expect("it ends").report;
+        println!("seed {seed}: {:?}", report.reasons);
+        for base in report.base_parameters.iter().filter(|_| report.accepted()) {
+            let known = |number: Number| number.known().expect("known");
+            let error = (known(base.value) - known(base.truth)) / known(base.sigma);
+            assert!(error.abs() < 5.0, "seed {seed}, {}: {error:.1} sigma", base.name);
+        }
     }
 }
 

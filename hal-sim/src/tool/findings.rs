@@ -135,9 +135,20 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
             limit.to_degrees()
         ),
         Test::CommonDisturbance => {
+            let on = if motion.is_empty() { " on the motion identified from" } else { on.as_str() };
             format!(
                 "something held the leg{on}: all joints missed together for {value:.2} s, at most {limit:.2} s may"
             )
         }
+        Test::ReplacedShare => format!(
+            "{:.1} % of the samples of joint {joint} were wild, at most {:.0} % may be",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::DisturbedShare => format!(
+            "{:.0} % of the rows of joint {joint} were disturbed, at most {:.0} % may be",
+            100.0 * value,
+            100.0 * limit
+        ),
     }
 }

@@ -46,6 +46,10 @@ pub enum Test {
     EncoderZero,
     /// Time for which all joints missed together, s.
     CommonDisturbance,
+    /// Share of a joint's samples that were wild and replaced.
+    ReplacedShare,
+    /// Share of a joint's rows that lost more than half of their weight.
+    DisturbedShare,
 }
 
 impl Test {
@@ -73,6 +77,8 @@ impl Test {
             Self::LinkLength => "link_length",
             Self::EncoderZero => "encoder_zero",
             Self::CommonDisturbance => "common_disturbance",
+            Self::ReplacedShare => "replaced_share",
+            Self::DisturbedShare => "disturbed_share",
         }
     }
 }

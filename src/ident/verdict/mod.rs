@@ -8,13 +8,14 @@
 //! | `residual` | the motion identified from is not explained, or held-out motions ask for other lengths and zeros | `fit`, `held_out` |
 //! | `validation` | torque on an unused motion is predicted worse than noise and the parameters' uncertainty let expect, or what is left of it is large and slow | `fit`, `held_out` |
 //! | `not_a_measurement` | the torque holds no trace of inertia and friction | `fit` |
-//! | `contact` | all joints miss together for a second or more | `held_out` |
-//! | `outliers` | reserved; nothing raises it yet | |
+//! | `contact` | all joints miss together for a second or more | `disturbance`, `held_out` |
+//! | `outliers` | too many samples were wild, too many rows disturbed | `disturbance` |
 //!
 //! Every test leaves an [`Evidence`], passed or not: what was seen, where, and the limit. Every limit is a field of
 //! [`Thresholds`] with the reason for its default; where noise decides, it follows from degrees of freedom and one
 //! false-alarm rate.
 
+mod disturbance;
 mod evidence;
 mod fit;
 mod held_out;

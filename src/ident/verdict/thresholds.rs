@@ -44,6 +44,10 @@ pub struct Thresholds<T> {
     pub largest_zero_error: T,
     /// Time for which all joints may miss together, s: a push lasts half a second, a step on the floor longer.
     pub longest_disturbance_s: T,
+    /// Share of samples that may be wild: a sensor that is wrong more often is to be mended.
+    pub largest_replaced_share: T,
+    /// Share of rows that may be set aside: with a third of them gone nobody knows what the rest was chosen for.
+    pub largest_disturbed_share: T,
 }
 
 impl<T: Real> Default for Thresholds<T> {
@@ -64,6 +68,8 @@ impl<T: Real> Default for Thresholds<T> {
             largest_length_error: T::of(0.03),
             largest_zero_error: T::of(0.026),
             longest_disturbance_s: T::of(1.0),
+            largest_replaced_share: T::of(0.1),
+            largest_disturbed_share: T::of(1.0 / 3.0),
         }
     }
 }

@@ -1,0 +1,33 @@
+//! Whether the motion identified from was disturbed: for long and in all joints at once, or too often.
+//!
+//! What robust identification set aside ([`Outliers`]) does not spoil the result; but data of which much had to be set
+//! aside are not trusted, and a leg that stood on the floor was no open chain.
+
+use super::{Docket, Evidence, Reason, Test, Thresholds};
+use crate::ident::outliers::Outliers;
+use crate::real::{self, Real};
+
+impl<T: Real> Thresholds<T> {
+    /// Contact is a single long stretch in which all joints missed together. Where more than half of the rows missed the
+    /// model is wrong, not the leg held: other tests say so.
+    pub fn judge_disturbance<const N: usize>(&self, outliers: &Outliers<T, N>, docket: &mut Docket<'_, T>) {
+        let mostly = outliers.disturbed_share.iter().any(|&share| share > T::of(0.5));
+        docket.note(Evidence {
+            reason: Reason::Contact,
+            test: Test::CommonDisturbance,
+            joint: None,
+            motion: None,
+            value: outliers.longest_common_s,
+            limit: self.longest_disturbance_s,
+            passed: outliers.longest_common_s <= self.longest_disturbance_s || mostly,
+        });
+        let samples = real::max(T::of(f64::from(outliers.samples)), T::one());
+        for joint in 0..N {
+            let replaced = T::of(f64::from(outliers.replaced[joint])) / samples;
+            let limit = self.largest_replaced_share;
+            docket.at_most(Reason::Outliers, Test::ReplacedShare, Some(joint), None, replaced, limit);
+            let (share, limit) = (outliers.disturbed_share[joint], self.largest_disturbed_share);
+            docket.at_most(Reason::Outliers, Test::DisturbedShare, Some(joint), None, share, limit);
+        }
+    }
+}
