@@ -18,7 +18,9 @@
 //!
 //! and it can exist: nothing negative that cannot be, and for the payload `M ZZ >= HX^2 + HY^2` within three standard
 //! deviations, which holds of every body put on, and with both signs turned of every body taken off. Of several that
-//! explain it the one with the smaller `chi2 + 2 k` (Akaike 1974) is meant. Neither: a full identification is needed.
+//! explain it the one with the smaller `chi2 + 2 k` (Akaike 1974) is meant. Where the model as it was explains the rows by the
+//! same two tests, and no change explains them better by more than `k + 5 sqrt(2 k)`, nothing changed: the alarm was false, or
+//! what caused it has passed. None of them: a full identification is needed.
 //!
 //! Cost: some `2 B^3 + 20 B^2` multiplications, once after an alarm. Memory: N + 1 hypotheses and an estimate.
 //! Limits: payloads on two links, or one together with other friction, are not among the hypotheses and are refused. Of a
@@ -59,7 +61,9 @@ pub enum Cause {
     },
     /// Friction of the joints.
     Friction,
-    /// Neither: a full identification is needed.
+    /// The model as it was explains the rows: the alarm was false, or what caused it has passed.
+    Nothing,
+    /// None of these: a full identification is needed.
     Unexplained,
 }
 
@@ -68,7 +72,7 @@ pub enum Cause {
 pub struct Update<T, const N: usize, const B: usize> {
     /// What is meant.
     pub cause: Cause,
-    /// Accepted where something explains the change.
+    /// Accepted where something explains the rows.
     pub verdict: Verdict,
     /// chi-square and degrees of freedom of the model as it was.
     pub unchanged: (T, T),
@@ -80,7 +84,7 @@ pub struct Update<T, const N: usize, const B: usize> {
     pub energy_before: [T; N],
     /// The same with the values of `estimate`.
     pub energy_after: [T; N],
-    /// Base values after the change, the accepted ones where nothing explains it.
+    /// Base values after the change; the accepted ones where there was none or nothing explains it.
     pub estimate: Estimate<T, B>,
 }
 
@@ -110,6 +114,7 @@ impl<T: Real, const N: usize, const B: usize> Update<T, N, B> {
             estimate: baseline.estimate.clone(),
         };
         let mut best = None;
+        let (mut gain, mut freed) = (T::zero(), T::zero());
         for candidate in 0..=N {
             let explanation = if candidate < N {
                 comparison.explain(model, &PAYLOAD_PARAMETERS.map(|parameter| (candidate, parameter)))
@@ -134,17 +139,32 @@ impl<T: Real, const N: usize, const B: usize> Update<T, N, B> {
                 hypothesis.explains(thresholds) && energy.iter().all(|&energy| energy <= silent_energy);
             if possible && explained && best.is_none_or(|least| hypothesis.score() < least) {
                 best = Some(hypothesis.score());
+                gain = update.unchanged.0 - hypothesis.chi_square;
+                freed = update.unchanged.1 - hypothesis.freedom;
                 (update.cause, update.verdict) = (cause, Verdict::ACCEPTED);
                 (update.energy_after, update.estimate) = (energy, explanation.estimate);
             }
         }
+        let (chi_square, freedom) = update.unchanged;
+        let unchanged = chi_square <= thresholds.chance(freedom)
+            && update.energy_before.iter().all(|&energy| energy <= silent_energy);
+        if unchanged && gain <= thresholds.chance(freed) {
+            (update.cause, update.verdict) = (Cause::Nothing, Verdict::ACCEPTED);
+            (update.energy_after, update.estimate) = (update.energy_before, baseline.estimate.clone());
+        }
         update
     }
 
-    /// The model with its uncertainty, if something explains the change; its noise is the old one's.
+    /// Whether another model than before is to be used.
+    #[must_use]
+    pub fn is_change(&self) -> bool {
+        self.verdict.is_accepted() && self.cause != Cause::Nothing
+    }
+
+    /// The model with its uncertainty, if a change explains the rows; its noise is the old one's.
     #[must_use]
     pub fn baseline(&self, before: &Baseline<T, N, B>) -> Option<Baseline<T, N, B>> {
-        self.verdict.is_accepted().then(|| Baseline { estimate: self.estimate.clone(), ..before.clone() })
+        self.is_change().then(|| Baseline { estimate: self.estimate.clone(), ..before.clone() })
     }
 }
 

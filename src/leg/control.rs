@@ -6,7 +6,7 @@ use super::identification::Finding;
 use super::model::IdentifiedModel;
 use super::succession::Succession;
 use crate::hal::Sample;
-use crate::ident::{Change, Verdict};
+use crate::ident::{Cause, Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
 use crate::safety::{DriveState, PowerRequest};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
@@ -77,6 +77,8 @@ pub struct Control<const N: usize> {
     approach_acceleration: [RadianPerSecondSquared; N],
     models: Succession<N>,
     change: Option<Change<f32, N>>,
+    /// What the rows since the alarm were last explained by.
+    cause: Option<Cause>,
     verdict: Option<Verdict>,
 }
 
@@ -106,6 +108,7 @@ impl<const N: usize> Control<N> {
             approach_acceleration,
             models: Succession::EMPTY,
             change: None,
+            cause: None,
             verdict: None,
         })
     }
@@ -163,7 +166,7 @@ impl<const N: usize> Control<N> {
 
     /// A new activity: what an earlier motion told no longer counts. A model that is fading does so to its end.
     fn forget_change(&mut self) {
-        self.change = None;
+        (self.change, self.cause) = (None, None);
         self.models.withdraw();
     }
 
@@ -184,7 +187,7 @@ impl<const N: usize> Control<N> {
             }
             ControlRequest::TakeUpdate => {
                 self.models.take();
-                self.change = None;
+                (self.change, self.cause) = (None, None);
             }
         }
         None
@@ -259,9 +262,17 @@ impl<const N: usize> Control<N> {
             // About a motion before the identification, and the model that this one may replace.
             Finding::Changed(_) | Finding::Updated { .. }
                 if matches!(self.activity, Activity::Identify(_)) => {}
-            Finding::Changed(change) => self.change = Some(change),
-            Finding::Updated { model: Some(model), .. } => self.models.offer(model),
-            Finding::Updated { model: None, .. } => {}
+            Finding::Changed(change) => (self.change, self.cause) = (Some(change), None),
+            Finding::Updated { cause, model, .. } => {
+                match model {
+                    Some(model) => self.models.offer(model),
+                    None => self.models.withdraw(),
+                }
+                if cause == Cause::Nothing {
+                    self.change = None;
+                }
+                self.cause = Some(cause);
+            }
         }
     }
 
@@ -327,6 +338,12 @@ impl<const N: usize> Control<N> {
     #[must_use]
     pub fn change(&self) -> Option<&Change<f32, N>> {
         self.change.as_ref()
+    }
+
+    /// What the quick pass made of the alarm; [`Cause::Unexplained`] asks for a full identification.
+    #[must_use]
+    pub fn cause(&self) -> Option<Cause> {
+        self.cause
     }
 
     /// Whether there is an update to take.

@@ -32,7 +32,7 @@ pub enum Finding<const N: usize> {
         cause: Cause,
         /// Accepted or not, and why.
         verdict: Verdict,
-        /// Offered with an accepting verdict; the operator takes it into use.
+        /// Offered with an accepted change; the operator takes it into use. An earlier offer no longer stands.
         model: Option<IdentifiedModel<N>>,
     },
 }
@@ -229,7 +229,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         let record = self.recorder.finish();
         self.recorder.clear(Ends::Whole);
         let update = self.upkeep.solve(&self.model, &record, &self.thresholds)?;
-        let model = update.verdict.is_accepted();
+        let model = update.is_change();
         Some(Finding::Updated {
             cause: update.cause,
             verdict: update.verdict,

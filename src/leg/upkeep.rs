@@ -1,19 +1,22 @@
 //! What becomes of an accepted model while the leg moves: watched, and brought up to date after a change.
 //!
 //! ```text
-//!   Watching --alarm--> Collecting --enough rows--> Solving --explained--> Offered
-//!      ^                    ^                          |                      |
-//!      |                    +------- unexplained ------+                      |
-//!      +---------------------- the operator takes the update ----------------+
+//!   Watching --alarm--> Collecting --enough rows--> Solving --a change--> Offered --enough rows--> Solving
+//!      ^                    ^                          |  |                  |
+//!      |                    +------- unexplained ------+  |                  |
+//!      +--------------- nothing changed ------------------+                  |
+//!      +---------------------- the operator takes the update ---------------+
 //! ```
 //!
 //! Only a motion that is tracked is watched, and only a model that was accepted. Rows from before the alarm are not used
 //! for the update: some are from before the change. Nothing here touches the servo: an update is offered, and taken into
 //! use by a request of the operator. Where nothing explains the rows, a push may have been among them: the next ones are
-//! tried, as long as the motion lasts.
+//! tried, as long as the motion lasts. An offer is made anew from every further 600 rows, and withdrawn where they no longer
+//! show the change: a bag may be taken off again.
 
 use crate::ident::{
-    Baseline, Change, FilteredRows, LowPass, Monitor, MonitorSettings, Record, RowModel, Thresholds, Update,
+    Baseline, Cause, Change, FilteredRows, LowPass, Monitor, MonitorSettings, Record, RowModel, Thresholds,
+    Update,
 };
 
 /// Moving rows of every joint that an update is made from: 12 s at 50 Hz, some 15 s of gait with a 3 s cycle. A payload
@@ -87,7 +90,9 @@ impl<const N: usize, const B: usize> Upkeep<N, B> {
 
     /// Whether these many rows of each joint, recorded since the alarm, are enough for the update.
     pub fn is_ready(&mut self, rows: &[u32; N]) -> bool {
-        if self.phase == Phase::Collecting && rows.iter().all(|&rows| rows >= UPDATE_ROWS) {
+        if matches!(self.phase, Phase::Collecting | Phase::Offered)
+            && rows.iter().all(|&rows| rows >= UPDATE_ROWS)
+        {
             self.phase = Phase::Solving;
         }
         self.phase == Phase::Solving
@@ -103,8 +108,15 @@ impl<const N: usize, const B: usize> Upkeep<N, B> {
         let baseline = self.baseline.as_ref()?;
         let silent = self.settings.silent_energy();
         let update = Update::new(model, baseline, record, thresholds, silent);
-        let explained = update.verdict.is_accepted();
-        self.phase = if explained { Phase::Offered } else { Phase::Collecting };
+        self.phase = match update.cause {
+            Cause::Payload { .. } | Cause::Friction => Phase::Offered,
+            Cause::Unexplained => Phase::Collecting,
+            Cause::Nothing => {
+                self.monitor.clear();
+                self.change = None;
+                Phase::Watching
+            }
+        };
         self.update = Some(update);
         self.update.as_ref()
     }

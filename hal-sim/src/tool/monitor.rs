@@ -9,7 +9,7 @@ mod report;
 pub use print::print_runs;
 pub use report::{AlarmReport, HypothesisReport, MonitorRun, MonitorRuns, UpdateReport, ValueReport};
 
-use scarab::ident::{Cause, Plan};
+use scarab::ident::Plan;
 use scarab::leg::{Activity, ControlRequest, ProvedMotion, Step};
 use scarab::model::Payload;
 use scarab::motion::Periodic;
@@ -314,7 +314,7 @@ fn change<const N: usize, const B: usize>(
     let thresholds = &context.configuration.thresholds;
     let waited_s = waited as f64 * TICK_S;
     run.update = Some(update_report(leg, update, thresholds, &options.disturbances, known, waited_s));
-    if update.cause == Cause::Unexplained {
+    if !update.is_change() {
         return Ok(());
     }
     walk.tick(Some(ControlRequest::TakeUpdate))?;

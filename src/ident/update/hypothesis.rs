@@ -81,8 +81,7 @@ impl<T: Real> Hypothesis<T> {
     /// What is left over is noise.
     #[must_use]
     pub fn explains(&self, thresholds: &Thresholds<T>) -> bool {
-        let spread = real::sqrt(self.freedom + self.freedom);
-        self.chi_square <= self.freedom + thresholds.largest_excess_spreads * spread
+        self.chi_square <= thresholds.chance(self.freedom)
     }
 
     /// Akaike's criterion: smaller is better.

@@ -113,6 +113,16 @@ fn what_changed_is_told_from_what_did_not() {
 }
 
 #[test]
+fn rows_of_an_unchanged_leg_offer_no_change() {
+    for seed in 0..40 {
+        let update = updated::<f32>(&TRUTH, WALKING, 900 + seed);
+        assert_eq!(update.cause, Cause::Nothing, "seed {seed}");
+        assert!(!update.is_change());
+        assert_eq!(update.energy_before, update.energy_after);
+    }
+}
+
+#[test]
 fn what_no_hypothesis_explains_is_refused_and_leaves_the_values() {
     let mut both = loaded(1, 3.0, [0.2, 0.0, 0.0]);
     both[1][Parameter::FC.index()] += 2.0;

@@ -59,9 +59,7 @@ impl<T: Real> Thresholds<T> {
     /// Whether a leg that can exist explains the data as well as least squares does, up to what noise makes of so many
     /// degrees of freedom: if not, the data contradict every leg that the prior allows.
     pub fn judge_consistency(&self, consistency: &Consistency<T>, docket: &mut Docket<'_, T>) {
-        let freedom = T::of(consistency.degrees_of_freedom as f64);
-        let spread = real::sqrt(freedom + freedom); // of chi-square with that many degrees of freedom
-        let limit = freedom + self.largest_excess_spreads * spread;
+        let limit = self.chance(T::of(consistency.degrees_of_freedom as f64));
         docket.at_most(Reason::Unphysical, Test::PriorBox, None, None, consistency.excess, limit);
     }
 

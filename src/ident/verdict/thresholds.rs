@@ -75,6 +75,12 @@ impl<T: Real> Default for Thresholds<T> {
 }
 
 impl<T: Real> Thresholds<T> {
+    /// What chi-square of `freedom` degrees of freedom does not exceed by chance: so many of its spreads above its mean.
+    #[must_use]
+    pub fn chance(&self, freedom: T) -> T {
+        freedom + self.largest_excess_spreads * crate::real::sqrt(freedom + freedom)
+    }
+
     /// Quantile of chi-square over its `freedom` degrees of freedom, at [`Self::noise_quantile`]: what the ratio of a
     /// measured to an expected variance does not exceed by chance (Wilson and Hilferty 1931).
     #[must_use]

@@ -113,7 +113,7 @@ pub fn print_runs(report: &MonitorRuns) -> Result<(), ToolError> {
         number(at(1.0).into())
     );
     let updates: Vec<_> = changed.iter().filter_map(|run| run.update.as_ref()).collect();
-    for cause in ["payload", "friction", "unexplained"] {
+    for cause in ["payload", "friction", "nothing", "unexplained"] {
         let count = updates.iter().filter(|update| update.cause == cause).count();
         if count > 0 {
             say!("explained as {cause}: {count}");

@@ -72,7 +72,7 @@ pub struct AlarmReport {
 /// What the quick pass found.
 #[derive(Clone, Debug, Serialize)]
 pub struct UpdateReport {
-    /// `payload`, `friction` or `unexplained`.
+    /// `payload`, `friction`, `nothing` or `unexplained`.
     pub cause: &'static str,
     /// The link that carries the payload.
     pub link: Option<String>,
@@ -199,6 +199,7 @@ pub(super) fn update_report<const N: usize, const B: usize>(
                 (0..N).flat_map(|joint| [(joint, Parameter::FC), (joint, Parameter::FV)]).collect();
             ("friction", None, values(leg, &update.friction, &parameters, known, right))
         }
+        Cause::Nothing => ("nothing", None, Vec::new()),
         Cause::Unexplained => ("unexplained", None, Vec::new()),
     };
     UpdateReport {
