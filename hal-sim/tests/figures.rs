@@ -27,6 +27,7 @@ fn identified() -> (RunReport, Series) {
         estimator: scarab::ident::Estimator::Robust,
         with_series: true,
         perturbations: Vec::new(),
+        excitation: None,
     };
     identify_one::<2, 13>(&leg, &options, None).expect("it runs")
 }

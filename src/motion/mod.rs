@@ -11,6 +11,7 @@
 //! | [`Ramp`] | from a pose to a pose, at rest at both ends |
 //! | [`Periodic`] | whole cycles of a curve, entered and left at rest by ramping the speed of its phase |
 //! | [`Motion`] | one of them, or a pose held |
+//! | [`ExcitationTable`] | a periodic motion as plain numbers, for a constant in an image |
 //! | [`JointEnvelope`], [`Proof`] | bounds of a motion, and the witness that they lie within limits |
 //!
 //! Time is counted in servo ticks from the start of the motion and never kept as seconds in `f32`: after an hour a
@@ -23,12 +24,14 @@ pub mod gait;
 pub mod periodic;
 pub mod plan;
 pub mod ramp;
+pub mod table;
 
 pub use bounds::{JointEnvelope, LimitViolation, Proof, Quantity};
 pub use fourier::{Fourier, HARMONICS};
 pub use periodic::{Periodic, Phase};
 pub use plan::Motion;
 pub use ramp::Ramp;
+pub use table::ExcitationTable;
 
 use crate::units::Second;
 use core::num::NonZeroU32;

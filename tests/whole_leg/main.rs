@@ -47,6 +47,7 @@ fn options(seed: u64) -> SimulationOptions {
         estimator: scarab::ident::Estimator::Robust,
         perturbations: Vec::new(),
         with_series: false,
+        excitation: None,
     }
 }
 

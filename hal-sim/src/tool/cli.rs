@@ -1,6 +1,7 @@
 //! The command line: one file for each command.
 
 mod common;
+mod excite;
 mod export;
 mod identify;
 mod leg_options;
@@ -28,6 +29,8 @@ struct Cli {
 enum Command {
     /// Identify a simulated leg: drive it, log it, solve, validate, track.
     Identify(identify::IdentifyArguments),
+    /// Design an exciting motion and say what it will tell, before anything moves.
+    Excite(excite::ExciteArguments),
     /// Identify a leg from recordings.
     Replay(replay::ReplayArguments),
     /// Predict the torque of given states with a model that was kept: CSV.
@@ -56,6 +59,7 @@ pub fn main() -> ExitCode {
         Some(_) => {}
     }
     let outcome = match Cli::parse_from(words).command {
+        Command::Excite(arguments) => excite::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),

@@ -8,6 +8,7 @@
 //! | [`setup`] | from a leg file to what the firmware is built from |
 //! | [`recording`], [`resample`], [`replay`] | identification on recordings |
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
+//! | [`excite`] | an exciting motion designed, and what it will tell |
 //! | [`monitor`] | an accepted model watched while the leg walks and something changes |
 //! | [`series`], [`figures`], [`html`] | a run as curves, drawn, and on one page |
 //! | [`findings`] | what the verdict saw, in words |
@@ -31,6 +32,7 @@ pub mod consistent;
 pub mod consistent_runs;
 pub mod disturbances;
 pub mod error;
+pub mod excite;
 pub mod figures;
 pub mod findings;
 pub mod html;

@@ -219,6 +219,7 @@ pub fn watch<const N: usize, const B: usize>(
         payload: None,
         load: None,
         perturbations: Vec::new(),
+        excitation: None,
     };
     let context = Context::<N, B>::new(leg, &simulation)?;
     let pair = match identified(leg, &context, options.seed)? {

@@ -19,7 +19,8 @@ use super::setup::SetupError;
 pub const VALIDATION_NAMES: [&str; VALIDATION_MOTIONS] = ["gait-6.5", "gait-3", "fourier"];
 
 const EXCITATION_PERIOD: Second = Second(10.0);
-const EXCITATION_CYCLES: u32 = 2;
+/// Cycles of the default exciting motion.
+pub const EXCITATION_CYCLES: u32 = 2;
 const UNUSED_PERIOD: Second = Second(8.0);
 const BLEND: Second = Second(1.0);
 /// Harmonics of the exciting motion; the curve has room for one more.
@@ -48,14 +49,24 @@ pub fn motions<const N: usize, const B: usize>(
     limits: &[JointEnvelope; N],
 ) -> Result<Motions<N>, SetupError> {
     let refuse = |motion: &str| SetupError::new(leg, format!("no {motion} motion fits the limits"));
-    let excitation =
-        most_informative(model, limits, EXCITATION_PERIOD, EXCITATION_CYCLES, EXCITATION_SEED, CANDIDATES)
-            .ok_or_else(|| refuse("exciting"))?;
+    let excitation = random_excitation(model, limits, EXCITATION_PERIOD, EXCITATION_CYCLES)
+        .ok_or_else(|| refuse("exciting"))?;
     let unused = most_informative(model, limits, UNUSED_PERIOD, 1, UNUSED_SEED, 20)
         .ok_or_else(|| refuse("Fourier"))?;
     let slow = walk(leg, limits, Second(6.5), 1).ok_or_else(|| refuse("gait"))?;
     let fast = walk(leg, limits, Second(3.0), 3).ok_or_else(|| refuse("gait"))?;
     Ok(Motions { excitation, validation: [slow, fast, unused] })
+}
+
+/// The default way to an exciting motion: the most informative of 300 random ones.
+#[must_use]
+pub fn random_excitation<const N: usize, const B: usize>(
+    model: &RowModel<f64, N, B>,
+    limits: &[JointEnvelope; N],
+    period: Second,
+    cycles: u32,
+) -> Option<Periodic<N>> {
+    most_informative(model, limits, period, cycles, EXCITATION_SEED, CANDIDATES)
 }
 
 fn most_informative<const N: usize, const B: usize>(

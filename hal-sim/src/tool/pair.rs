@@ -53,8 +53,13 @@ impl<const N: usize, const B: usize> Context<N, B> {
     pub fn new(leg: &LegFile, options: &SimulationOptions) -> Result<Self, ToolError> {
         let mut background = background::<N, B>(leg, options.prior, options.seed)?;
         background.use_estimator(options.estimator);
-        let (mut configuration, motions) = configuration(leg, &background, options.plan, options.swarm_seed)?;
+        let (mut configuration, mut motions) =
+            configuration(leg, &background, options.plan, options.swarm_seed)?;
         configuration.estimator = options.estimator;
+        if let Some(excitation) = &options.excitation {
+            motions.excitation = excitation.motion()?;
+            configuration.excitation = motions.excitation;
+        }
         let unfit = |_| SetupError::new(leg, "the filter does not fit the device");
         let (bandwidth, rate) = (configuration.bandwidth_hz, SAMPLE_RATE_HZ as f32);
         let smoothing = Kernel::new(SMOOTHING_BANDWIDTHS as f32 * bandwidth, rate).map_err(unfit)?;

@@ -9,6 +9,7 @@ use scarab::motion::Periodic;
 use scarab::real::sqrt;
 
 use super::error::ToolError;
+use super::excite::file::Excitation;
 use super::leg_file::LegFile;
 use super::pair::{Context, Pair};
 use super::perturb::{self, Perturbation};
@@ -46,6 +47,8 @@ pub struct SimulationOptions {
     pub estimator: Estimator,
     /// Whether to keep the run's curves.
     pub with_series: bool,
+    /// Identified from instead of the default motion; see [`super::excite::run::check`].
+    pub excitation: Option<Excitation>,
 }
 
 /// A run with what it left behind.

@@ -8,6 +8,8 @@ use scarab::model::Payload;
 use super::common::{Common, draw, finish, write_json};
 use super::model::ModelArguments;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::excite::file::Excitation;
+use crate::tool::excite::run::check;
 use crate::tool::identify::{identify_many, identify_one, print_runs};
 use crate::tool::perturb::Perturbation;
 use crate::tool::placed_mass::PlacedMass;
@@ -41,6 +43,9 @@ pub struct IdentifyArguments {
     /// Make something wrong on purpose, to see the verdict: NAME or NAME=VALUE, repeatable.
     #[arg(long, value_name = "NAME[=VALUE]")]
     perturb: Vec<Perturbation>,
+    /// Excite with this motion (from `excite`) instead of the default one.
+    #[arg(long)]
+    excitation: Option<PathBuf>,
     /// Write the training motion here, in the format that replay reads.
     #[arg(long)]
     log: Option<PathBuf>,
@@ -73,6 +78,10 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
     };
     let payload = on_leg(&arguments.payload, "--payload")?;
     let load = on_leg(&arguments.load, "--load")?;
+    let excitation = arguments.excitation.as_deref().map(Excitation::load).transpose()?;
+    if let (Some(motion), Some(file)) = (&excitation, &arguments.excitation) {
+        with_leg_size!(leg, check(leg, file, motion))?;
+    }
     let options = |seed: u64| SimulationOptions {
         seed,
         swarm_seed: arguments.common.swarm_seed.unwrap_or(seed),
@@ -84,6 +93,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
         estimator: arguments.common.estimator.into(),
         with_series: arguments.common.is_drawn(),
         perturbations: arguments.perturb.clone(),
+        excitation: excitation.clone(),
     };
     let Some((first, last)) = arguments.seeds else {
         let options = &options(arguments.seed.unwrap_or(DEFAULT_SEED));

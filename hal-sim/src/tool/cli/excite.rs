@@ -1,0 +1,100 @@
+//! `excite`: designs an exciting motion and says what it will tell, before anything moves.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::common::write_json;
+use super::leg_options::LegOptions;
+use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::excite::assumption::Assumption;
+use crate::tool::excite::bench::ExciteOptions;
+use crate::tool::excite::constant;
+use crate::tool::excite::design::DesignOptions;
+use crate::tool::excite::file::{Excitation, LONGEST_S};
+use crate::tool::excite::run::excite;
+use crate::tool::excite::text;
+use crate::tool::setup::DEFAULT_SEED;
+use crate::tool::tables;
+use crate::with_leg_size;
+
+/// Which leg is to be excited, and what to keep of the design.
+#[derive(Args, Debug)]
+pub struct ExciteArguments {
+    #[command(flatten)]
+    leg: LegOptions,
+    /// Write the motion here, as TOML that identify takes.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Write the motion here, as Rust source with a constant for an image.
+    #[arg(long = "const")]
+    constant: Option<PathBuf>,
+    /// Seconds of motion, blends included.
+    #[arg(long, default_value_t = 22.0, allow_negative_numbers = true)]
+    duration: f64,
+    /// Noise of the logged torque in percent of each joint's mean absolute torque; the leg file's unless given.
+    #[arg(long, allow_negative_numbers = true)]
+    torque_noise: Option<f64>,
+    /// Percent by which each base parameter may be off when the torque is bounded.
+    #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
+    torque_margin: f64,
+    /// Reckon with the truth of the leg file, not with its prior.
+    #[arg(long)]
+    assume_truth: bool,
+    /// Look at this motion instead of designing one.
+    #[arg(long)]
+    excitation: Option<PathBuf>,
+    /// Of the swarm's random numbers.
+    #[arg(long, default_value_t = DEFAULT_SEED)]
+    seed: u64,
+    /// Curves the swarm may look at.
+    #[arg(long, default_value_t = EVALUATIONS, value_parser = clap::value_parser!(u32).range(600..=10_000_000))]
+    evaluations: u32,
+    /// Write the report here.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+/// Some five seconds of one core for two joints.
+const EVALUATIONS: u32 = 48_000;
+
+/// Designs, reports and writes; the exit code.
+pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
+    let leg = &arguments.leg.load()?;
+    let percentage = |option: &str, value: f64, most: f64| {
+        let fits = (0.0..=most).contains(&value);
+        if fits { Ok(()) } else { Err(ToolError::input(format!("{option}: a percentage from 0 to {most}"))) }
+    };
+    percentage("--torque-noise", arguments.torque_noise.unwrap_or(0.0), 1000.0)?;
+    percentage("--torque-margin", arguments.torque_margin, 200.0)?;
+    if !(arguments.duration > 0.0 && arguments.duration <= LONGEST_S) {
+        return Err(ToolError::input(format!("--duration: above 0 and at most {LONGEST_S} s")));
+    }
+    let given = match &arguments.excitation {
+        Some(file) => Some((file.clone(), Excitation::load(file)?)),
+        None => None,
+    };
+    let options = &ExciteOptions {
+        design: DesignOptions {
+            duration_s: arguments.duration,
+            seed: arguments.seed,
+            evaluations: arguments.evaluations,
+        },
+        given,
+        torque_noise_percent: arguments.torque_noise,
+        margin_percent: arguments.torque_margin,
+        assumption: if arguments.assume_truth { Assumption::Truth } else { Assumption::Best },
+    };
+    let excited = with_leg_size!(leg, excite(leg, options))?;
+    let write = |path: &Option<PathBuf>, text: &dyn Fn() -> String| match path {
+        Some(path) => std::fs::write(path, text()).map_err(|error| ToolError::cannot_write(path, &error)),
+        None => Ok(()),
+    };
+    write(&arguments.out, &|| excited.motion.to_toml())?;
+    write(&arguments.constant, &|| constant::source(&excited.motion))?;
+    if let Some(path) = &arguments.json {
+        write_json(path, &excited.report)?;
+    }
+    tables::print(&text::report(&excited.report))?;
+    Ok(EXIT_ACCEPTED)
+}

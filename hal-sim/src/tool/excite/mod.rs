@@ -1,0 +1,27 @@
+//! Designs an exciting motion, says beforehand what it will tell, and keeps it as a file.
+//!
+//! | part | what it does |
+//! | --- | --- |
+//! | [`assumption`] | what is taken for the leg before it has moved |
+//! | [`bench`] | the assumed leg with all that its motions are reckoned with |
+//! | [`candidate`] | coordinates in a box to a curve within angle, speed and acceleration |
+//! | [`score`] | information and torque of a curve, cheaply |
+//! | [`demand`] | torque of every tick, blends and the way there included |
+//! | [`design`] | the swarm over the curves |
+//! | [`expectation`] | sigma and status of every parameter, through the firmware's own chain |
+//! | [`file`], [`constant`] | the motion as TOML, and as a constant for an image |
+//! | [`run`] | a designed or given motion with its report |
+//! | [`report`], [`text`] | what is known of it, as data and in words |
+
+pub mod assumption;
+pub mod bench;
+pub mod candidate;
+pub mod constant;
+pub mod demand;
+pub mod design;
+pub mod expectation;
+pub mod file;
+pub mod report;
+pub mod run;
+pub mod score;
+pub mod text;

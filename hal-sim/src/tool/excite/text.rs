@@ -1,0 +1,207 @@
+//! What is known of a motion before it moves, in words and tables.
+
+use comfy_table::{CellAlignment, Table};
+use scarab::servo::SERVO_RATE_HZ;
+
+use super::report::{ComparedBase, ExciteReport, ExpectedParameter, JointReport};
+use crate::tool::leg_file::LegFile;
+use crate::tool::tables::{headed, number};
+
+/// A systematic error above this many sigma is worth a warning.
+const SYSTEMATIC_SIGMAS: f64 = 1.0;
+/// More rows lost than this is worth a warning.
+const LOST_SHARE: f64 = 0.4;
+
+/// What to know before it moves.
+#[must_use]
+pub fn warnings(
+    leg: &LegFile,
+    joints: &[JointReport],
+    base: &[ComparedBase],
+    parameters: &[ExpectedParameter],
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for ComparedBase { expected, .. } in base {
+        let (Some(sigma), Some(systematic)) = (expected.sigma, expected.systematic) else {
+            warnings.push(format!("{}: this motion does not determine it", expected.name));
+            continue;
+        };
+        if systematic.abs() > SYSTEMATIC_SIGMAS * sigma {
+            warnings.push(format!(
+                "{}: off by {:.1} sigma without any noise (encoder steps, friction at reversals): its sigma says too little",
+                expected.name,
+                systematic.abs() / sigma
+            ));
+        }
+    }
+    for parameter in parameters.iter().filter(|parameter| parameter.status == "weak") {
+        let sigma = number(parameter.sigma);
+        warnings.push(format!(
+            "{}: weak, hardly told from others in this range (sigma {sigma} {})",
+            parameter.name, parameter.unit
+        ));
+    }
+    for joint in joints {
+        if joint.lost_share > LOST_SHARE {
+            let percent = 100.0 * joint.lost_share;
+            warnings.push(format!("{}: {percent:.0} % of its rows are lost to stillness", joint.name));
+        }
+        if joint.torque_with_margin_nm > joint.torque_limit_nm {
+            warnings.push(format!(
+                "{}: {:.1} N m with the margin, the limit is {:.1}",
+                joint.name, joint.torque_with_margin_nm, joint.torque_limit_nm
+            ));
+        }
+        if joint.simulated.limited_ticks > 0 {
+            let seconds = f64::from(joint.simulated.limited_ticks) / f64::from(SERVO_RATE_HZ);
+            warnings.push(format!(
+                "{}: the monitor takes torque from it for {seconds:.3} s: the motion is not the one that was designed",
+                joint.name
+            ));
+        }
+        if joint.torque_noise_nm == 0.0 {
+            warnings.push(format!("{}: the leg file states no torque noise; sigma counts none", joint.name));
+        }
+    }
+    if leg.pushes.is_some() {
+        warnings.push("the wearer's pushes are not in these figures".into());
+    }
+    warnings
+}
+
+/// The report on standard output.
+#[must_use]
+pub fn report(report: &ExciteReport) -> String {
+    let mut lines = vec![
+        format!(
+            "{}: {:.1} s: {} cycles of {} s between blends of {} s",
+            report.leg,
+            report.duration_s,
+            report.cycles,
+            number(report.period_s.into()),
+            number(report.blend_s.into())
+        ),
+        format!(
+            "assumed: the leg file's {}, torque noise {} % of the mean absolute torque; each base parameter may be {} % \
+             off in the torque's bound",
+            report.assumed,
+            number(report.torque_noise_percent.into()),
+            number(report.margin_percent.into()),
+        ),
+        String::new(),
+        joints(report),
+        base_parameters(report),
+        parameters(report),
+        information(report),
+    ];
+    lines.extend(report.warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines.join("\n") + "\n"
+}
+
+fn joints(report: &ExciteReport) -> String {
+    let mut rows = headed(&[
+        "joint",
+        "angle deg",
+        "of",
+        "deg/s",
+        "of",
+        "deg/s2",
+        "of",
+        "torque N m",
+        "with margin",
+        "of",
+        "noise N m",
+        "rows lost %",
+    ]);
+    let range = |[low, high]: [f64; 2]| format!("{low:.1}..{high:.1}");
+    for joint in &report.joints {
+        rows.add_row(vec![
+            joint.name.clone(),
+            range(joint.angle_deg),
+            range(joint.range_deg),
+            format!("{:.0}", joint.speed_deg_s),
+            format!("{:.0}", joint.speed_limit_deg_s),
+            format!("{:.0}", joint.acceleration_deg_s2),
+            format!("{:.0}", joint.acceleration_limit_deg_s2),
+            range(joint.torque_nm),
+            format!("{:.1}", joint.torque_with_margin_nm),
+            format!("{:.1}", joint.torque_limit_nm),
+            number(joint.torque_noise_nm.into()),
+            format!("{:.1}", 100.0 * joint.lost_share),
+        ]);
+    }
+    finished(rows, 1..12)
+}
+
+fn base_parameters(report: &ExciteReport) -> String {
+    let mut rows = headed(&[
+        "base parameter",
+        "assumed",
+        "expected sigma",
+        "unit",
+        "systematic",
+        "over a random motion's",
+    ]);
+    for base in &report.base_parameters {
+        let expected = &base.expected;
+        rows.add_row(vec![
+            expected.name.clone(),
+            number(expected.assumed.into()),
+            number(expected.sigma.into()),
+            expected.unit.clone(),
+            number(expected.systematic.into()),
+            base.ratio_to_random.known().map_or_else(|| "-".into(), |ratio| format!("{ratio:.2}")),
+        ]);
+    }
+    finished(rows, [1, 2, 4, 5])
+}
+
+fn parameters(report: &ExciteReport) -> String {
+    let mut rows = headed(&["parameter", "status", "expected sigma", "unit", "grouped with"]);
+    for parameter in &report.parameters {
+        rows.add_row(vec![
+            parameter.name.clone(),
+            parameter.status.into(),
+            number(parameter.sigma),
+            parameter.unit.into(),
+            parameter.grouped_with.join(" "),
+        ]);
+    }
+    finished(rows, [2])
+}
+
+fn information(report: &ExciteReport) -> String {
+    let count = report.base_parameters.len().max(1) as f64;
+    let mut text = format!(
+        "information: ln det {}, condition {}",
+        number(report.log_determinant),
+        number(report.condition)
+    );
+    for (random, what) in [
+        (report.random, "the best of 300 random motions of two cycles"),
+        (report.random_same_pace, "the best of 300 of as many cycles"),
+    ] {
+        let limits = if random.keeps_torque_limits {
+            ""
+        } else {
+            " (that one takes too much torque, or is too fast near the ends)"
+        };
+        if let Some((own, other)) = report.log_determinant.known().zip(random.log_determinant.known()) {
+            let sigma = ((other - own) / (2.0 * count)).exp();
+            text += &format!(
+                "\n  {:+.2} over {what}: a mean sigma {sigma:.2} times as large{limits}",
+                own - other
+            );
+        }
+    }
+    text
+}
+
+fn finished(mut rows: Table, numbers: impl IntoIterator<Item = usize>) -> String {
+    for index in numbers {
+        if let Some(column) = rows.column_mut(index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    rows.trim_fmt() + "\n"
+}
