@@ -154,8 +154,8 @@ pub struct JointFile {
     #[serde(default)]
     pub rotor: Switch,
     /// Whether Stribeck friction is estimated.
-    #[serde(default = "auto")]
-    pub stribeck_model: Switch,
+    #[serde(default)]
+    pub stribeck_model: StribeckModel,
     /// Friction at rest above Coulomb's, simulated only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stribeck: Option<StribeckFile>,
@@ -212,8 +212,19 @@ pub enum Switch {
     On,
     /// It is not.
     Off,
+}
+
+/// Whether Stribeck friction is estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StribeckModel {
     /// If the data tell it.
+    #[default]
     Auto,
+    /// It is.
+    On,
+    /// It is not.
+    Off,
 }
 
 /// Stribeck friction.
@@ -302,10 +313,6 @@ fn default_lag() -> f64 {
     5e-4
 }
 
-fn auto() -> Switch {
-    Switch::Auto
-}
-
 fn default_encoder() -> EncoderFile {
     EncoderFile { side: Side::Motor, counts: 8192, ratio: 50.0 }
 }
@@ -333,7 +340,7 @@ impl JointFile {
             outliers: None,
             offset: Switch::On,
             rotor: Switch::On,
-            stribeck_model: auto(),
+            stribeck_model: StribeckModel::Auto,
             stribeck: None,
             truth: None,
             prior: None,

@@ -21,7 +21,7 @@ use scarab::units::{
 
 use super::analysis::Background;
 use super::information::StribeckTruth;
-use super::leg_file::{BodySide, JointFile, LegFile, LinkParameters, Switch};
+use super::leg_file::{BodySide, JointFile, LegFile, LinkParameters, StribeckModel, Switch};
 use super::motions::{Motions, motions};
 
 /// Bandwidth of the position loop.
@@ -128,9 +128,9 @@ pub fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
 /// Which joints' Stribeck friction a leg file asks to look for.
 fn stribeck_choice<const N: usize>(leg: &LegFile) -> [Choice; N] {
     core::array::from_fn(|joint| match leg.joints.get(joint).map(|joint| joint.stribeck_model) {
-        Some(Switch::On) => Choice::On,
-        Some(Switch::Auto) => Choice::Auto,
-        Some(Switch::Off) | None => Choice::Off,
+        Some(StribeckModel::On) => Choice::On,
+        Some(StribeckModel::Auto) => Choice::Auto,
+        Some(StribeckModel::Off) | None => Choice::Off,
     })
 }
 
