@@ -86,7 +86,20 @@ pub fn complete<T: Real, const N: usize, const B: usize>(
     base_values: &[T; B],
     prior: &LegParameters<T, N>,
 ) -> Option<LegParameters<T, N>> {
-    let variances = prior_variances(prior);
+    complete_within(model, base_values, prior, &prior_deviations(prior))
+}
+
+/// The same, with the prior's standard deviations given.
+pub(super) fn complete_within<T: Real, const N: usize, const B: usize>(
+    model: &RowModel<T, N, B>,
+    base_values: &[T; B],
+    prior: &LegParameters<T, N>,
+    deviations: &LegParameters<T, N>,
+) -> Option<LegParameters<T, N>> {
+    let mut variances = *deviations;
+    for variance in variances.as_flattened_mut() {
+        *variance *= *variance;
+    }
     let expected = model.base.project(prior);
     let rank = model.base.rank();
     // As many equations as multipliers: the factor solves them exactly.
@@ -114,7 +127,8 @@ pub fn complete<T: Real, const N: usize, const B: usize>(
     Some(parameters)
 }
 
-pub(super) fn prior_variances<T: Real, const N: usize>(prior: &LegParameters<T, N>) -> LegParameters<T, N> {
+/// How far a prior is believed to be off: half of each value, and a hundredth of the largest of its kind.
+pub(super) fn prior_deviations<T: Real, const N: usize>(prior: &LegParameters<T, N>) -> LegParameters<T, N> {
     let kind = |index: usize| match index {
         0..=5 | 10 => 0, // inertias, the rotor's included
         6..=8 => 1,
@@ -127,14 +141,13 @@ pub(super) fn prior_variances<T: Real, const N: usize>(prior: &LegParameters<T, 
             largest[kind(index)] = real::max(largest[kind(index)], real::abs(value));
         }
     }
-    let mut variances = *prior;
-    for parameters in &mut variances {
+    let mut deviations = *prior;
+    for parameters in &mut deviations {
         for (index, value) in parameters.iter_mut().enumerate() {
-            let deviation = real::max(T::of(0.5) * real::abs(*value), T::of(0.01) * largest[kind(index)]);
-            *value = deviation * deviation;
+            *value = real::max(T::of(0.5) * real::abs(*value), T::of(0.01) * largest[kind(index)]);
         }
     }
-    variances
+    deviations
 }
 
 fn weighted_product<T: Real, const N: usize>(

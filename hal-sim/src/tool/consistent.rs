@@ -78,7 +78,7 @@ fn full<const N: usize, const B: usize>(
 ) -> ConsistentSearchReport {
     let problem = Problem::new(solver.record(), &background.device);
     let limits = solver.completion().limits();
-    let mut cost = LegCost::new(limits.origin());
+    let mut cost = LegCost::new(limits);
     let values = problem.least_squares(Plan::OneTime).values;
     cost.fill(&background.device, &problem.whole(), &values, Effort::device(background.prior.is_some()).pull);
 

@@ -7,12 +7,12 @@
 //!
 //! Every place visited is strictly inside the allowed set, so that whatever is read at any time is a possible leg.
 //!
-//! Cost: 30 to 60 steps ([`super::interior`]) where the closed form is no leg. Memory, two joints: 3.9 kB.
+//! Cost: 30 to 60 steps ([`super::interior`]) where the closed form is no leg. Memory, two joints: 4.0 kB.
 //! Limits: at most [`LARGEST_STEPS`]. Where the data contradict every leg the prior's pull on hidden directions is
 //! heard: that chi-square then comes out up to twice as large as its least value, which changes no verdict.
 
 use super::super::bounds::LinkPrior;
-use super::super::completion::complete;
+use super::super::completion::complete_within;
 use super::super::estimate::Stage;
 use super::super::record::{Record, RowModel};
 use super::cost::LegCost;
@@ -74,6 +74,7 @@ pub struct Completion<T: Real, const N: usize> {
     steps: u32,
     steps_here: u32,
     phase: Phase,
+    converged: bool,
 }
 
 impl<T: Real, const N: usize> Completion<T, N> {
@@ -86,10 +87,20 @@ impl<T: Real, const N: usize> Completion<T, N> {
         effort: Effort<T>,
     ) -> Self {
         let limits = Limits::new(model, record, prior);
-        let cost = LegCost::new(limits.origin());
+        let cost = LegCost::new(&limits);
         let place = cost.place(&limits.inside());
         let barrier = effort.last_barrier;
-        Self { limits, cost, effort, place, barrier, steps: 0, steps_here: 0, phase: Phase::Waiting }
+        Self {
+            limits,
+            cost,
+            effort,
+            place,
+            barrier,
+            steps: 0,
+            steps_here: 0,
+            phase: Phase::Waiting,
+            converged: false,
+        }
     }
 
     /// Begins with base values that were found on `stage`; if no leg has them, the cost of others is counted from
@@ -102,19 +113,19 @@ impl<T: Real, const N: usize> Completion<T, N> {
         centre: &[T; B],
     ) {
         self.cost.fill(model, stage, centre, self.effort.pull);
-        (self.steps, self.steps_here) = (0, 0);
+        (self.steps, self.steps_here, self.converged) = (0, 0, false);
         let mut wanted = model.base.project(self.limits.origin());
         for &base in stage.columns() {
             if let (Some(slot), Some(&value)) = (wanted.get_mut(base), values.get(base)) {
                 *slot = value;
             }
         }
-        let closed = complete(model, &wanted, self.limits.origin());
+        let closed = complete_within(model, &wanted, self.limits.origin(), self.limits.deviations());
         if let Some(closed) = closed.filter(|closed| self.limits.allow(closed)) {
             self.place = self.cost.place(&closed);
             // Rounding of the scaling must not lead outside.
             if Limits::consistent(&self.parameters()) {
-                self.phase = Phase::Done;
+                (self.phase, self.converged) = (Phase::Done, true);
                 return;
             }
         }
@@ -134,6 +145,7 @@ impl<T: Real, const N: usize> Completion<T, N> {
         self.steps_here += 1;
         if step.settled || self.steps_here >= STEPS_PER_BARRIER {
             if self.barrier <= self.effort.last_barrier {
+                self.converged = step.settled && step.inside;
                 self.phase = Phase::Done;
             }
             self.steps_here = 0;
@@ -149,6 +161,12 @@ impl<T: Real, const N: usize> Completion<T, N> {
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.phase == Phase::Done
+    }
+
+    /// It ended at the minimum, not because steps ran out or numbers overflowed.
+    #[must_use]
+    pub fn converged(&self) -> bool {
+        self.converged
     }
 
     /// Whether base values were given.

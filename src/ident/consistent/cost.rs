@@ -12,9 +12,9 @@
 //! Cost: `28 + rank` rows into a factor of 28 columns (two joints), about 70,000 multiplications once; an
 //! evaluation 400. Memory: `14 N (14 N + 3)` scalars.
 
-use super::super::completion::prior_variances;
 use super::super::estimate::Stage;
 use super::super::record::RowModel;
+use super::limits::Limits;
 use crate::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter, Standing, row_torque};
 use crate::real::{self, Real};
 
@@ -34,15 +34,16 @@ pub struct LegCost<T: Real, const N: usize> {
 }
 
 impl<T: Real, const N: usize> LegCost<T, N> {
-    /// No rows yet; `origin` is the prior.
+    /// No rows yet; prior and its standard deviations are those of `limits`.
     #[must_use]
-    pub fn new(origin: &LegParameters<T, N>) -> Self {
-        let mut scale = prior_variances(origin);
-        for width in scale.as_flattened_mut() {
-            *width = real::sqrt(*width);
-        }
+    pub fn new(limits: &Limits<T, N>) -> Self {
         let zero = zeros(T::zero());
-        Self { origin: *origin, scale, triangle: [[zero; PARAMETERS_PER_JOINT]; N], right: zero }
+        Self {
+            origin: *limits.origin(),
+            scale: *limits.deviations(),
+            triangle: [[zero; PARAMETERS_PER_JOINT]; N],
+            right: zero,
+        }
     }
 
     /// Takes the data's rows (`stage`, about the base values `centre`) and the prior's, the latter weighted by `pull`.

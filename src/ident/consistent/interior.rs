@@ -52,6 +52,8 @@ pub(super) fn merit<T: Real, const N: usize>(
 pub(super) struct Step {
     /// The place is where `G` is least, as far as it matters or can be resolved.
     pub settled: bool,
+    /// There is a merit to go down from; else it lies outside or numbers overflow, and nothing is settled.
+    pub inside: bool,
 }
 
 /// Decrement, in units of the barrier, from which on a place counts as the minimum: the cost is then within a twentieth of
@@ -71,7 +73,9 @@ pub(super) fn step<T: Real, const N: usize>(
     insert_barriers(&mut newton, limits, place, barrier);
     let direction = newton.solve();
     let decrement = newton.right_squared() / barrier;
-    let Some(before) = merit(cost, limits, place, barrier) else { return Step { settled: true } };
+    let Some(before) = merit(cost, limits, place, barrier) else {
+        return Step { settled: true, inside: false };
+    };
     let largest = before + T::of(8.0) * T::EPSILON * real::abs(before);
     let mut share = T::one();
     for _ in 0..HALVINGS {
@@ -79,12 +83,12 @@ pub(super) fn step<T: Real, const N: usize>(
         add_scaled(&mut tried, &direction, share);
         if merit(cost, limits, &tried, barrier).is_some_and(|after| after <= largest) {
             *place = tried;
-            return Step { settled: decrement < T::of(SETTLED) };
+            return Step { settled: decrement < T::of(SETTLED), inside: true };
         }
         share *= T::of(0.5);
     }
     // Nothing lower can be told from rounding.
-    Step { settled: true }
+    Step { settled: true, inside: true }
 }
 
 fn insert_barriers<T: Real, const N: usize>(

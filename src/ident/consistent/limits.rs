@@ -13,9 +13,12 @@
 //!
 //! Without a prior the geometry and the torque speak: centre of mass within a segment's length of the joint (the
 //! last segment as long as the longest known one, 1 m where none is), masses up to what ten times the measured
-//! torque could need; rotor, friction and offset as in the box of the base set ([`super::super::bounds`]).
+//! torque could need; rotor, friction and offset as in the box of the base set ([`super::super::bounds`]). A neutral
+//! leg stands in for the prior: a twentieth of all that, centres of mass at the joints. It is believed only to within
+//! its own size ([`Limits::deviations`]): a zero of it says nothing.
 
 use super::super::bounds::{LinkPrior, measured_box, segment_length};
+use super::super::completion::prior_deviations;
 use super::super::record::{Record, RowModel};
 use crate::model::{
     INERTIAL_PARAMETERS, JointParameters, LegParameters, LogCholesky, PARAMETERS_PER_JOINT, Parameter,
@@ -56,6 +59,7 @@ pub(super) struct LinkLimits<T> {
 pub struct Limits<T: Real, const N: usize> {
     pub(super) links: [LinkLimits<T>; N],
     origin: LegParameters<T, N>,
+    deviations: LegParameters<T, N>,
 }
 
 impl<T: Real, const N: usize> Limits<T, N> {
@@ -109,13 +113,24 @@ impl<T: Real, const N: usize> Limits<T, N> {
                 }),
             }
         });
-        Self { links, origin: super::super::bounds::prior_parameters(believed) }
+        let origin = super::super::bounds::prior_parameters(believed);
+        let deviations = match prior {
+            Some(_) => prior_deviations(&origin),
+            None => core::array::from_fn(|joint| sizes(&neutral[joint], known_length(model, joint))),
+        };
+        Self { links, origin, deviations }
     }
 
     /// What is believed beforehand: the prior, or a neutral leg.
     #[must_use]
     pub fn origin(&self) -> &LegParameters<T, N> {
         &self.origin
+    }
+
+    /// Standard deviations of that belief.
+    #[must_use]
+    pub fn deviations(&self) -> &LegParameters<T, N> {
+        &self.deviations
     }
 
     /// A leg well inside: round bodies with the prior's masses, centres of mass and sizes.
@@ -269,6 +284,19 @@ fn neutral<T: Real, const N: usize, const B: usize>(
             offset: T::zero(),
         }
     })
+}
+
+/// How large the parameters of a neutral link are, its zeros included: first moments and inertias of its mass at a
+/// segment's length, the offset of its Coulomb friction.
+fn sizes<T: Real>(link: &LinkPrior<T>, length: T) -> JointParameters<T> {
+    let moment = link.body.mass * length;
+    let mut body = [moment * length; INERTIAL_PARAMETERS];
+    for parameter in [Parameter::HX, Parameter::HY, Parameter::HZ] {
+        body[parameter.index()] = moment;
+    }
+    body[Parameter::M.index()] = link.body.mass;
+    let friction = link.coulomb_friction;
+    crate::model::inertia::joint(&body, &[link.rotor_inertia, friction, link.viscous_friction, friction])
 }
 
 /// The most that measured torque could need of a drive parameter.
