@@ -142,6 +142,8 @@ pub struct Recorder<T, const N: usize, const B: usize, const TAPS: usize, const 
     filter: RowFilter<T, N, B, PENDING>,
     estimator: Estimator,
     ends: Ends,
+    /// Parameters are found from it: disturbances are reweighted. What is held out is measured as it is.
+    is_fitted: bool,
     /// Angle and torque of each joint.
     hampel: [[Hampel<T>; 2]; N],
     window: Window<T, N, B, { window::ROOM }>,
@@ -185,6 +187,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             filter: RowFilter::new(Ends::Cut),
             estimator: Estimator::Robust,
             ends: Ends::Cut,
+            is_fitted: true,
             hampel: core::array::from_fn(|_| [Hampel::new(Quantity::Angle), Hampel::new(Quantity::Torque)]),
             window: Window::new(),
             choices: None,
@@ -219,6 +222,13 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         self.low_pass.reach()
     }
 
+    /// Forgets everything in the middle of a motion: a change is looked for in what follows, over whole windows and with the
+    /// model's own Stribeck curves, disturbances reweighted.
+    pub fn clear_for_update(&mut self) {
+        self.clear(Ends::Whole);
+        self.is_fitted = true;
+    }
+
     /// Forgets everything: a new motion begins.
     pub fn clear(&mut self, ends: Ends) {
         self.smoother.clear();
@@ -227,6 +237,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         self.window.clear();
         self.choices = None;
         self.ends = ends;
+        self.is_fitted = ends == Ends::Cut;
         self.noise = [NoiseLevel::new(); N];
         self.speed = [Sum::zero(); N];
         (self.samples, self.replaced) = (0, [0; N]);
@@ -357,8 +368,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
 
     fn record(&self) -> Record<T, N, B> {
         let information = T::of(DECIMATION as f64) * self.low_pass.energy();
-        // What is held out is measured as it is.
-        let estimator = if self.ends == Ends::Cut { self.estimator } else { Estimator::Plain };
+        let estimator = if self.is_fitted { self.estimator } else { Estimator::Plain };
         let assembly = assemble(&self.window, self.choices.as_ref(), estimator, information);
         let instants = T::of(f64::from(self.instants.max(1)));
         Record {

@@ -130,7 +130,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             (Some(Segment::Tracking), Some(Progress { rows: Some(rows), .. }))
                 if self.upkeep.watch(&rows).is_some() =>
             {
-                self.recorder.clear(Ends::Whole);
+                self.recorder.clear_for_update();
                 self.change_due = true;
             }
             _ => {}
@@ -227,7 +227,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             return None;
         }
         let record = self.recorder.finish();
-        self.recorder.clear(Ends::Whole);
+        self.recorder.clear_for_update();
         let update = self.upkeep.solve(&self.model, &record, &self.thresholds)?;
         let model = update.is_change();
         Some(Finding::Updated {

@@ -10,8 +10,8 @@
 //!
 //! Only a motion that is tracked is watched, and only a model that was accepted. Rows from before the alarm are not used
 //! for the update: some are from before the change. Nothing here touches the servo: an update is offered, and taken into
-//! use by a request of the operator. Where nothing explains the rows, a push may have been among them: the next ones are
-//! tried, as long as the motion lasts. An offer is made anew from every further 600 rows, and withdrawn where they no longer
+//! use by a request of the operator. Where nothing explains the rows, something may have happened meanwhile: the next ones
+//! are tried, as long as the motion lasts. An offer is made anew from every further 600 rows, and withdrawn where they no longer
 //! show the change: a bag may be taken off again.
 
 use crate::ident::{
