@@ -3,13 +3,13 @@
 //! | part | what it does |
 //! | --- | --- |
 //! | [`assumption`] | what is taken for the leg before it has moved |
-//! | [`bench`] | the assumed leg with all that its motions are reckoned with |
+//! | [`mod@bench`] | the assumed leg with all that its motions are reckoned with |
 //! | [`candidate`] | coordinates in a box to a curve within angle, speed and acceleration |
 //! | [`score`] | information and torque of a curve, cheaply |
 //! | [`demand`] | torque of every tick, blends and the way there included |
 //! | [`design`] | the swarm over the curves |
 //! | [`expectation`] | sigma and status of every parameter, through the firmware's own chain |
-//! | [`file`], [`constant`] | the motion as TOML, and as a constant for an image |
+//! | [`mod@file`], [`constant`] | the motion as TOML, and as a constant for an image |
 //! | [`run`] | a designed or given motion with its report |
 //! | [`report`], [`text`] | what is known of it, as data and in words |
 
