@@ -3,8 +3,43 @@
 //! A leg of `N` joints is sampled once per servo tick and answered once per servo tick. Angles arrive as encoder
 //! counts, torques leave as motor currents, both with the anatomical sign (flexion positive) of the joint they
 //! belong to; the firmware converts to the model's angles in one place (`servo::scale`).
+//!
+//! Below that lies one axis: a motor with its bridge, sampled and answered once per PWM period
+//! ([`CURRENT_RATE_HZ`]), raw as converter and counter give it. What is commanded after a sample acts from the beginning of the
+//! next period on.
 
 use crate::units::Ampere;
+
+/// PWM periods per second, and so samples and commands of one axis.
+pub const CURRENT_RATE_HZ: u32 = 24_000;
+
+/// What one axis' converter and counter say in one PWM period, taken at the same instant: the middle of the zero vector in
+/// which all low sides conduct.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AxisSample {
+    /// Codes of the shunt amplifiers of the phases B and C, 12 bits; half of the range is no current.
+    pub shunt_codes: [u16; 2],
+    /// Code of the bus voltage's divider, 12 bits.
+    pub bus_code: u16,
+    /// Quadrature counter of the motor's encoder, wrapping.
+    pub encoder_count: u16,
+    /// The counter when the index pulse came, if it came since the last sample.
+    pub index_count: Option<u16>,
+}
+
+/// What one axis' bridge is told for the next PWM period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisCommand {
+    /// The bridge switches; `false` releases it and the duties mean nothing.
+    pub enabled: bool,
+    /// Share of the period for which the high sides of A, B and C conduct, 0..=1, dead time not subtracted.
+    pub duty: [f32; 3],
+}
+
+impl AxisCommand {
+    /// Bridge released.
+    pub const RELEASED: Self = Self { enabled: false, duty: [0.5; 3] };
+}
 
 /// What one joint's sensors say at a servo tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
