@@ -3,6 +3,7 @@
 //! Leg and plant are one value that can be cloned at any tick: tests that begin in the middle of an identification
 //! share the way there.
 
+mod aftermath;
 mod conditions;
 mod failures;
 mod identification;

@@ -1,0 +1,95 @@
+//! What an identification that was refused, broken off or outrun leaves behind: nothing.
+
+use hal_sim::tool::leg_file::StribeckFile;
+use scarab::safety::PowerRequest;
+
+use super::*;
+
+/// Damping lasts 300 ms.
+const DAMPING: u64 = 1200;
+
+#[test]
+fn after_a_stop_the_model_comes_back_into_use_without_a_step_of_torque() {
+    let mut pair = identified();
+    let gait = context().configuration.prove(context().motions.validation[1]).expect("proved at the start");
+    tick(&mut pair, Some(ControlRequest::Track { motion: gait, with_model: true }));
+    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
+    for _ in 0..SECOND {
+        tick(&mut pair, None);
+    }
+    let in_motion = tick(&mut pair, None).servo.wanted_torque.map(|torque| torque.0.abs());
+    tick(&mut pair, Some(ControlRequest::Power(PowerRequest::QuickStop)));
+    // Until the released leg hangs still: what its speed asks of the damping is not the model's.
+    for _ in 0..DAMPING + 5 * SECOND {
+        tick(&mut pair, None);
+    }
+    assert!(pair.enable(context().gravity));
+    let mut before = [0.0; JOINTS];
+    for ticks in 0..SECOND {
+        let torque = tick(&mut pair, None).servo.decision.torque.map(|torque| torque.0);
+        for joint in 0..JOINTS {
+            // The whole torque of the model, gravity first of all, fades in over 2000 ticks: 0.02 N m in each; a count of
+            // the encoder adds what the feedback makes of it.
+            let step = (torque[joint] - before[joint]).abs();
+            assert!(step < 0.6, "joint {joint}, tick {ticks}: {step} N m, {in_motion:?} in motion");
+        }
+        before = torque;
+    }
+    // The model does hold the leg in the end.
+    assert!(before[0].abs() > 1.0 || before[1].abs() > 1.0, "{before:?}");
+}
+
+#[test]
+fn an_identification_begun_while_the_verdict_is_due_leaves_both_halves_of_one_mind() {
+    let mut pair = identified();
+    tick(&mut pair, Some(ControlRequest::Identify));
+    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(IdentifyPhase::Judge)));
+    let model = pair.leg.control().model().copied();
+    let watched = pair.leg.identification().upkeep().clone();
+    let output = tick(&mut pair, Some(ControlRequest::Identify));
+    assert!(!output.refused);
+    assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Approach));
+    // The verdict was due within eight ticks.
+    for _ in 0..100 {
+        tick(&mut pair, None);
+    }
+    assert_eq!(pair.leg.control().verdict(), None);
+    assert_eq!(pair.leg.control().model().copied(), model);
+    assert_eq!(*pair.leg.identification().upkeep(), watched, "it watches what is not in use");
+}
+
+#[test]
+fn a_refused_result_leaves_no_friction_curve_in_what_is_watched() {
+    let mut leg = default_leg();
+    for joint in &mut leg.joints {
+        joint.stribeck = Some(StribeckFile { static_nm: 6.5, speed_rad_s: 0.1 });
+    }
+    let context = Context::new(&leg, &options(1)).expect("the default leg with another friction");
+    let mut pair = Pair::new(&leg, &context, 1).expect("the firmware takes it");
+    assert!(pair.enable(context.gravity));
+    assert!(identify(&mut pair).is_some_and(Verdict::is_accepted));
+    let accepted = pair.leg.identification().model().stribeck;
+    assert!(accepted.iter().all(|curve| curve.excess > 0.1), "{accepted:?}");
+
+    // Again, with a current sensor that shows twice the current of the slow passages.
+    tick(&mut pair, Some(ControlRequest::Identify));
+    while matches!(activity(&pair), Activity::Identify(_)) {
+        if activity(&pair) == Activity::Identify(IdentifyPhase::Excite) {
+            for joint in &mut pair.sample.joints {
+                joint.current = joint.current * 2.0;
+            }
+        }
+        tick(&mut pair, None);
+    }
+    let verdict = pair.leg.control().verdict().expect("it ran to its end");
+    assert!(!verdict.is_accepted());
+    assert_ne!(pair.leg.identification().model().stribeck, accepted, "the refused result has its own");
+
+    let gait = context.configuration.prove(context.motions.validation[1]).expect("proved at the start");
+    tick(&mut pair, Some(ControlRequest::Track { motion: gait, with_model: true }));
+    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Track(Step::Run)));
+    for _ in 0..SECOND {
+        tick(&mut pair, None);
+    }
+    assert_eq!(pair.leg.identification().model().stribeck, accepted);
+}
