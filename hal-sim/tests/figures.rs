@@ -10,25 +10,11 @@ use hal_sim::tool::identify::identify_one;
 use hal_sim::tool::leg_file::LegFile;
 use hal_sim::tool::report::RunReport;
 use hal_sim::tool::series::{Role, Series};
-use hal_sim::tool::setup::PriorChoice;
 use hal_sim::tool::simulate::SimulationOptions;
-use scarab::ident::Plan;
 
 fn identified() -> (RunReport, Series) {
     let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
-    let options = SimulationOptions {
-        seed: 1,
-        swarm_seed: 1,
-        torque_noise_percent: None,
-        plan: Plan::OneTime,
-        prior: PriorChoice::Default,
-        payload: None,
-        load: None,
-        estimator: scarab::ident::Estimator::Robust,
-        with_series: true,
-        perturbations: Vec::new(),
-        excitation: None,
-    };
+    let options = SimulationOptions { with_series: true, ..SimulationOptions::of_seed(1) };
     identify_one::<2, 13>(&leg, &options, None).expect("it runs")
 }
 

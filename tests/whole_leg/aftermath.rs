@@ -64,7 +64,8 @@ fn a_refused_result_leaves_no_friction_curve_in_what_is_watched() {
     for joint in &mut leg.joints {
         joint.stribeck = Some(StribeckFile { static_nm: 6.5, speed_rad_s: 0.1 });
     }
-    let context = Context::new(&leg, &options(1)).expect("the default leg with another friction");
+    let context =
+        Context::new(&leg, &SimulationOptions::of_seed(1)).expect("the default leg with another friction");
     let mut pair = Pair::new(&leg, &context, 1).expect("the firmware takes it");
     assert!(pair.enable(context.gravity));
     assert!(identify(&mut pair).is_some_and(Verdict::is_accepted));

@@ -51,7 +51,9 @@ fn a_joint_that_moves_a_third_less_than_its_current_tells_is_refused() {
 fn pushed(per_minute: f64, torque_nm: f64) -> Result<RunReport, String> {
     let leg =
         LegFile { pushes: Some(PushesFile { per_minute, torque_nm, duration_s: 0.5 }), ..default_leg() };
-    simulate::<JOINTS, BASE>(&leg, &options(1)).map(|run| run.report).map_err(|error| error.to_string())
+    simulate::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(1))
+        .map(|run| run.report)
+        .map_err(|error| error.to_string())
 }
 
 #[test]
@@ -86,8 +88,10 @@ fn a_leg_that_no_prior_allows_is_refused_and_not_pinned_at_the_edge_of_the_box()
     let mut leg = default_leg();
     // The box reaches 5 times the prior's Coulomb friction of 4 N m.
     leg.joints[1].truth.as_mut().expect("simulated").offset = 25.0;
-    let report = simulate::<JOINTS, BASE>(&leg, &options(1)).expect("it runs").report;
+    let report = simulate::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(1)).expect("it runs").report;
     assert_eq!(report.reasons, ["unphysical"]);
     leg.joints[1].truth.as_mut().expect("simulated").offset = 9.0;
-    assert!(simulate::<JOINTS, BASE>(&leg, &options(1)).expect("it runs").report.accepted());
+    assert!(
+        simulate::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(1)).expect("it runs").report.accepted()
+    );
 }

@@ -8,10 +8,13 @@ use hal_sim::tool::replay::{ReplayOptions, replay};
 use hal_sim::tool::report::RunReport;
 use hal_sim::tool::simulate::{SimulationOptions, simulate};
 
+use hal_sim::tool::setup::PriorChoice;
+use scarab::ident::Plan;
+
 use super::*;
 
 fn run(seed: u64) -> RunReport {
-    simulate::<JOINTS, BASE>(&default_leg(), &options(seed)).expect("it runs").report
+    simulate::<JOINTS, BASE>(&default_leg(), &SimulationOptions::of_seed(seed)).expect("it runs").report
 }
 
 /// Errors of the base parameters in reported standard deviations.
@@ -59,7 +62,7 @@ fn the_same_seed_gives_the_same_report_bit_for_bit_and_another_seed_another() {
     let first = text(run(7));
     assert_eq!(first, text(run(7)));
     assert_ne!(first, text(run(8)));
-    let other_swarm = SimulationOptions { swarm_seed: 8, ..options(7) };
+    let other_swarm = SimulationOptions { swarm_seed: 8, ..SimulationOptions::of_seed(7) };
     let other_swarm = simulate::<JOINTS, BASE>(&default_leg(), &other_swarm).expect("it runs").report;
     let same_swarm = run(7);
     // The data are the same, the way of the search is not.
@@ -110,7 +113,7 @@ fn any_slicing_of_the_search_gives_the_same_base_values() {
 
 #[test]
 fn noise_free_torque_leaves_a_bias_below_a_seventh_of_the_sigma_of_noisy_torque() {
-    let quiet = SimulationOptions { torque_noise_percent: Some(0.0), ..options(1) };
+    let quiet = SimulationOptions { torque_noise_percent: Some(0.0), ..SimulationOptions::of_seed(1) };
     let quiet = simulate::<JOINTS, BASE>(&default_leg(), &quiet).expect("it runs").report;
     let noisy = run(1);
     assert!(quiet.accepted(), "{:?}", quiet.reasons);
@@ -127,7 +130,8 @@ fn noise_free_torque_leaves_a_bias_below_a_seventh_of_the_sigma_of_noisy_torque(
 fn a_logged_run_replays_to_the_same_base_parameters() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("whole_leg_log.csv");
     let leg = default_leg();
-    let (report, _) = identify_one::<JOINTS, BASE>(&leg, &options(3), Some(&path)).expect("it runs");
+    let (report, _) =
+        identify_one::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(3), Some(&path)).expect("it runs");
     let options = ReplayOptions {
         files: vec![path],
         validate: Vec::new(),
@@ -157,7 +161,7 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
 #[test]
 fn the_papers_chain_of_three_joints_is_identified() {
     let leg = LegFile::load("paper-chain").expect("shipped");
-    let report = simulate::<3, 28>(&leg, &options(1)).expect("it runs").report;
+    let report = simulate::<3, 28>(&leg, &SimulationOptions::of_seed(1)).expect("it runs").report;
     assert!(report.accepted(), "{:?}", report.reasons);
     for (name, error) in errors_in_sigma(&report) {
         assert!(error.abs() < 4.0, "{name}: {error:.1} sigma");
@@ -167,7 +171,7 @@ fn the_papers_chain_of_three_joints_is_identified() {
 #[test]
 fn the_mujoco_leg_is_identified() {
     let leg = LegFile::load("mujoco-leg").expect("shipped");
-    let report = simulate::<2, 13>(&leg, &options(1)).expect("it runs").report;
+    let report = simulate::<2, 13>(&leg, &SimulationOptions::of_seed(1)).expect("it runs").report;
     assert!(report.accepted(), "{:?}", report.reasons);
     for (name, error) in errors_in_sigma(&report) {
         assert!(error.abs() < 4.0, "{name}: {error:.1} sigma");

@@ -18,9 +18,8 @@ use std::sync::OnceLock;
 
 use hal_sim::tool::leg_file::{DEFAULT_LEG, LegFile};
 use hal_sim::tool::pair;
-use hal_sim::tool::setup::PriorChoice;
 use hal_sim::tool::simulate::SimulationOptions;
-use scarab::ident::{Plan, Verdict};
+use scarab::ident::Verdict;
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase, Step};
 use scarab::safety::DriveState;
 
@@ -36,30 +35,16 @@ const SECOND: u64 = 4000;
 /// An identification takes 53 s.
 const LONGEST_IDENTIFICATION: u64 = 100 * SECOND;
 
-fn options(seed: u64) -> SimulationOptions {
-    SimulationOptions {
-        seed,
-        swarm_seed: seed,
-        torque_noise_percent: None,
-        plan: Plan::OneTime,
-        prior: PriorChoice::Default,
-        payload: None,
-        load: None,
-        estimator: scarab::ident::Estimator::Robust,
-        perturbations: Vec::new(),
-        with_series: false,
-        excitation: None,
-    }
-}
-
 fn default_leg() -> LegFile {
     LegFile::load(DEFAULT_LEG).expect("shipped")
 }
 
 fn context() -> &'static Context {
     static CONTEXT: OnceLock<Context> = OnceLock::new();
-    CONTEXT
-        .get_or_init(|| Context::new(&default_leg(), &options(1)).expect("the default leg can be simulated"))
+    CONTEXT.get_or_init(|| {
+        Context::new(&default_leg(), &SimulationOptions::of_seed(1))
+            .expect("the default leg can be simulated")
+    })
 }
 
 /// Enabled, at rest, in a world with this seed.

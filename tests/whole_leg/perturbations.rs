@@ -9,7 +9,7 @@ use super::*;
 
 fn perturbed(perturbation: &str, seed: u64) -> RunReport {
     let perturbations = vec![perturbation.parse::<Perturbation>().expect("known")];
-    let options = SimulationOptions { perturbations, ..options(seed) };
+    let options = SimulationOptions { perturbations, ..SimulationOptions::of_seed(seed) };
     simulate::<JOINTS, BASE>(&default_leg(), &options).expect("it ends in a verdict").report
 }
 
@@ -51,7 +51,8 @@ fn a_wearer_who_pushes_now_and_then_is_never_accepted_with_wrong_parameters() {
     let pushes = PushesFile { per_minute: 30.0, torque_nm: 10.0, duration_s: 0.3 };
     let leg = LegFile { pushes: Some(pushes), ..default_leg() };
     for seed in 1..=5 {
-        let report = simulate::<JOINTS, BASE>(&leg, &options(seed)).expect("it ends").report;
+        let report =
+            simulate::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(seed)).expect("it ends").report;
         println!("seed {seed}: {:?}", report.reasons);
         for base in report.base_parameters.iter().filter(|_| report.accepted()) {
             let known = |number: Number| number.known().expect("known");
@@ -102,7 +103,9 @@ fn what_torque_cannot_see_is_accepted() {
 #[test]
 fn honest_runs_are_accepted_far_within_the_limits() {
     for seed in 1..=5 {
-        let report = simulate::<JOINTS, BASE>(&default_leg(), &options(seed)).expect("it runs").report;
+        let report = simulate::<JOINTS, BASE>(&default_leg(), &SimulationOptions::of_seed(seed))
+            .expect("it runs")
+            .report;
         assert!(report.accepted(), "seed {seed}: {:?}", report.reasons);
         let near = |test: &str| {
             let of = report.findings.iter().filter(|finding| finding.test == test);

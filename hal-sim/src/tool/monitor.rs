@@ -9,7 +9,6 @@ mod report;
 pub use print::print_runs;
 pub use report::{AlarmReport, HypothesisReport, MonitorRun, MonitorRuns, UpdateReport, ValueReport};
 
-use scarab::ident::Plan;
 use scarab::leg::{Activity, ControlRequest, ProvedMotion, Step};
 use scarab::model::Payload;
 use scarab::motion::Periodic;
@@ -20,7 +19,7 @@ use scarab::units::Second;
 use super::error::ToolError;
 use super::leg_file::{LegFile, PushesFile};
 use super::pair::{Context, Pair};
-use super::setup::{PriorChoice, SetupError};
+use super::setup::SetupError;
 use super::simulate::SimulationOptions;
 use super::words::drive_stop;
 use crate::description::PushDescription;
@@ -208,19 +207,7 @@ pub fn watch<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &MonitorOptions,
 ) -> Result<MonitorRun, ToolError> {
-    let simulation = SimulationOptions {
-        seed: options.seed,
-        swarm_seed: options.seed,
-        torque_noise_percent: None,
-        plan: Plan::OneTime,
-        prior: PriorChoice::Default,
-        estimator: scarab::ident::Estimator::Robust,
-        with_series: false,
-        payload: None,
-        load: None,
-        perturbations: Vec::new(),
-        excitation: None,
-    };
+    let simulation = SimulationOptions::of_seed(options.seed);
     let context = Context::<N, B>::new(leg, &simulation)?;
     let pair = match identified(leg, &context, options.seed)? {
         Ok(pair) => pair,

@@ -51,6 +51,26 @@ pub struct SimulationOptions {
     pub excitation: Option<Excitation>,
 }
 
+impl SimulationOptions {
+    /// The leg as its file says, with both seeds the same, and nothing asked for beside.
+    #[must_use]
+    pub fn of_seed(seed: u64) -> Self {
+        Self {
+            seed,
+            swarm_seed: seed,
+            torque_noise_percent: None,
+            plan: Plan::OneTime,
+            prior: PriorChoice::Default,
+            payload: None,
+            load: None,
+            perturbations: Vec::new(),
+            estimator: Estimator::Robust,
+            with_series: false,
+            excitation: None,
+        }
+    }
+}
+
 /// A run with what it left behind.
 #[derive(Clone, Debug)]
 pub struct SimulatedRun<const N: usize> {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use scarab::ident::{Estimator, Plan};
+use scarab::ident::Estimator;
 use scarab::motion::{ExcitationTable, Periodic};
 use scarab::safety::Barrier;
 use scarab::servo::SERVO_RATE_HZ;
@@ -18,7 +18,6 @@ use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 use crate::tool::motions::random_excitation;
 use crate::tool::pair::{Context, Pair};
-use crate::tool::setup::PriorChoice;
 use crate::tool::simulate::SimulationOptions;
 use crate::tool::words::leg_error;
 
@@ -62,17 +61,9 @@ impl<const N: usize, const B: usize> Bench<N, B> {
     pub fn new(leg: &LegFile, options: &ExciteOptions) -> Result<Self, ToolError> {
         let (leg, word) = assumed(leg, options.assumption)?;
         let simulation = SimulationOptions {
-            seed: 1,
-            swarm_seed: 1,
             torque_noise_percent: options.torque_noise_percent,
-            plan: Plan::OneTime,
-            prior: PriorChoice::Default,
-            payload: None,
-            load: None,
-            perturbations: Vec::new(),
             estimator: Estimator::Plain,
-            with_series: false,
-            excitation: None,
+            ..SimulationOptions::of_seed(1)
         };
         let context = Context::<N, B>::new(&leg, &simulation)?;
         // A leg that the firmware does not take is refused before anything is searched.

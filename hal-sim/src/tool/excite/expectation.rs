@@ -27,7 +27,7 @@ use super::report::Seen;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 use crate::tool::pair::{Context, Pair};
-use crate::tool::setup::{PriorChoice, SetupError};
+use crate::tool::setup::SetupError;
 use crate::tool::simulate::SimulationOptions;
 use crate::tool::words::drive_stop;
 use crate::world::TICK_S;
@@ -74,17 +74,10 @@ pub fn rehearse<const N: usize, const B: usize>(
     torque_noise_percent: Option<f64>,
 ) -> Result<Rehearsal<N, B>, ToolError> {
     let options = SimulationOptions {
-        seed: 1,
-        swarm_seed: 1,
         torque_noise_percent,
-        plan: Plan::OneTime,
-        prior: PriorChoice::Default,
-        payload: None,
-        load: None,
-        perturbations: Vec::new(),
         estimator: Estimator::Plain,
-        with_series: false,
         excitation: Some(super::file::Excitation::of(assumed, table)),
+        ..SimulationOptions::of_seed(1)
     };
     let context = Context::<N, B>::new(assumed, &options)?;
     let motion = context.motions.excitation;
