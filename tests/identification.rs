@@ -140,7 +140,7 @@ fn judge(recorder: &mut LegRecorder) -> Verdict {
     let mut unheard = |_: &Evidence<f32>| {};
     let mut docket = Docket::new(&mut unheard);
     thresholds.judge_input(&model, &record, &mut docket);
-    thresholds.judge_excitation(&model, &problem.whole(), found.rank(), &mut docket);
+    thresholds.judge_excitation(&problem.whole(), found.rank(), &mut docket);
     thresholds.judge_physics(&model, &record, &found, &mut docket);
     docket.verdict()
 }

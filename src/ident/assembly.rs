@@ -15,7 +15,8 @@ use super::record::TorqueSize;
 use super::reweighting::{Weights, weigh, weighted};
 use super::row_model::RowModel;
 use super::stribeck::{
-    JointRows, SMALLEST_GAIN, SMALLEST_SURPLUS_SHARE, StribeckFit, bank_eliminated, find, without_bank,
+    JointRows, SMALLEST_GAIN, SMALLEST_SURPLUS_SHARE, StribeckFit, bank_eliminated, eliminate, strongest,
+    without_bank,
 };
 use super::window::{LARGEST_BLOCKS, Window};
 use crate::real::{self, Real};
@@ -34,6 +35,8 @@ pub(super) struct Assembly<T, const N: usize, const B: usize> {
     pub rows: [u32; N],
     pub outliers: Outliers<T, N>,
     pub stribeck: [Option<StribeckFit<T, B>>; N],
+    /// Gain and surplus of the best curve of each joint that was looked for.
+    pub tried: [Option<(T, T)>; N],
 }
 
 /// Adds up a window. `information` is `m sum h^2`; without a model nothing was recorded.
@@ -50,6 +53,7 @@ pub(super) fn assemble<T: Real, const N: usize, const B: usize, const ROOM: usiz
         rows: [0; N],
         outliers: Outliers::none(),
         stribeck: [const { None }; N],
+        tried: [None; N],
     };
     let mut weights = [[T::one(); LARGEST_BLOCKS]; N];
     let mut joints = [[T::zero(); LARGEST_SIZE]; N];
@@ -97,7 +101,9 @@ pub(super) fn assemble<T: Real, const N: usize, const B: usize, const ROOM: usiz
             Choice::On | Choice::Off => (T::zero(), T::zero()),
         };
         let rank = model.map_or(0, |choices| choices.rank);
-        match find(&own, &others, rank, wanted) {
+        let found = strongest(&own, &others, rank);
+        assembly.tried[joint] = Some((found.gain, found.surplus));
+        match eliminate(&own, &found, wanted) {
             Some((fit, factor)) => {
                 assembly.stribeck[joint] = Some(fit);
                 assembly.factors[joint] = factor;

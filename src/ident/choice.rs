@@ -20,6 +20,34 @@ impl Choice {
     }
 }
 
+/// What the constant part of a joint's torque is taken for. While a joint moves the two are one column: with friction
+/// FC+ one way and FC- the other, torque = (FC+ + FC-)/2 sign(v) + (FC+ - FC-)/2. Only what is known of the drive tells
+/// them apart, and at rest they differ: friction is undetermined there, an offset is not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Constant {
+    /// An offset of the torque or of its measurement.
+    #[default]
+    Offset,
+    /// Half of what Coulomb friction differs by between the two directions; the measurement is known to have no offset.
+    Asymmetry,
+}
+
+/// Of one joint's drive: what is estimated, and what of it may be dropped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriveChoice {
+    /// Rotor inertia.
+    pub rotor: Choice,
+    /// The constant part of the torque.
+    pub constant: Choice,
+    /// What that part is taken for.
+    pub meaning: Constant,
+}
+
+impl DriveChoice {
+    /// Everything, as an offset.
+    pub const ALL: Self = Self { rotor: Choice::On, constant: Choice::On, meaning: Constant::Offset };
+}
+
 /// How disturbances of a motion are met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Estimator {

@@ -25,7 +25,7 @@ pub enum Status {
     Grouped,
     /// Measured, but the data hardly tell it from others.
     Weak,
-    /// Not seen by the torque at all, or not estimated.
+    /// Not seen by the torque at all; or not estimated, then it is zero.
     Prior,
 }
 
@@ -70,6 +70,7 @@ pub fn status<T: Real, const N: usize, const B: usize>(
     parameter: Parameter,
 ) -> Status {
     match model.base.standing(joint, parameter) {
+        Standing::Alone(base) if record.selection.dropped[base] => Status::Prior,
         Standing::Alone(base) if is_weak(record, estimate, base) => Status::Weak,
         Standing::Alone(_) => Status::Identified,
         Standing::Grouped(..) => Status::Grouped,

@@ -59,6 +59,7 @@ pub fn noise<T: Real, const N: usize, const B: usize>(record: &Record<T, N, B>) 
 pub struct Stage<T, const B: usize> {
     columns: [usize; B],
     count: usize,
+    asked: usize,
     factor: Factor<T, B>,
 }
 
@@ -84,13 +85,19 @@ impl<T: Real, const B: usize> Stage<T, B> {
         } else {
             source.restricted(columns.get(..kept).unwrap_or(&[]), held, weight)
         };
-        Self { columns, count: kept, factor }
+        Self { columns, count: kept, asked: count, factor }
     }
 
     /// The base parameters this stage determines.
     #[must_use]
     pub fn columns(&self) -> &[usize] {
         self.columns.get(..self.count).unwrap_or(&[])
+    }
+
+    /// How many base parameters it was to determine.
+    #[must_use]
+    pub fn asked(&self) -> usize {
+        self.asked
     }
 
     /// Cost in chi-square units, column `i` being base parameter `columns()[i]`.
@@ -209,6 +216,8 @@ pub struct Problem<'a, T: Real, const N: usize, const B: usize> {
     record: &'a Record<T, N, B>,
     noise: [T; N],
     owner: [usize; B],
+    /// Base parameters that are not held at zero.
+    free: [bool; B],
     rank: usize,
 }
 
@@ -220,7 +229,9 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
         for (base, slot) in owner.iter_mut().enumerate() {
             *slot = model.base.independent(base).map_or(0, |(joint, _)| joint);
         }
-        Self { record, noise: noise(record), owner, rank: model.base.rank() }
+        let rank = model.base.rank();
+        let free = core::array::from_fn(|base| base < rank && !record.selection.dropped[base]);
+        Self { record, noise: noise(record), owner, free, rank }
     }
 
     /// Standard deviation of one independent row of each joint, N m.
@@ -229,12 +240,15 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
         &self.noise
     }
 
-    /// All joints' rows, weighted: chi-square units.
+    /// All joints' rows, weighted: chi-square units. Columns held at zero are empty.
     #[must_use]
     pub fn weighted(&self) -> Factor<T, B> {
         let mut all = Factor::new();
         for (factor, &sigma) in self.record.factors.iter().zip(&self.noise) {
             all.merge_scaled(factor, T::one() / sigma);
+        }
+        if self.record.selection.dropped_count() > 0 {
+            all = all.without(&self.record.selection.dropped);
         }
         all
     }
@@ -242,12 +256,7 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
     /// The same as a stage over all base parameters.
     #[must_use]
     pub fn whole(&self) -> Stage<T, B> {
-        Stage::new(
-            &self.weighted(),
-            T::one(),
-            &core::array::from_fn(|base| base < self.rank),
-            &[T::zero(); B],
-        )
+        Stage::new(&self.weighted(), T::one(), &self.free, &[T::zero(); B])
     }
 
     /// Number of stages of a plan.
@@ -276,7 +285,7 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
     }
 
     fn open(&self, joint: usize, determined: &[bool; B]) -> [bool; B] {
-        core::array::from_fn(|base| base < self.rank && self.owner[base] >= joint && !determined[base])
+        core::array::from_fn(|base| self.free[base] && self.owner[base] >= joint && !determined[base])
     }
 
     /// The least-squares estimate of a plan, in closed form.

@@ -186,6 +186,25 @@ impl<T: Real, const B: usize> Factor<T, B> {
         result
     }
 
+    /// The same problem with these columns held at zero: they are left out, the others stay where they are.
+    #[must_use]
+    #[inline(never)]
+    pub fn without(&self, columns: &[bool; B]) -> Self {
+        let mut result = Self::new();
+        for (row, &right) in self.r.iter().zip(&self.z) {
+            let mut rest = *row;
+            for (element, &left_out) in rest.iter_mut().zip(columns) {
+                if left_out {
+                    *element = T::zero();
+                }
+            }
+            result.rotate(rest, right);
+        }
+        result.residual += self.residual;
+        result.rows = self.rows;
+        result
+    }
+
     /// The same rows with zero on the right.
     #[must_use]
     pub fn without_right(&self) -> Self {

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! q, tau 500 Hz -> smoothing: g, g', g'' -> regressor; regressor and tau -> rows: one h, 50 Hz -> factor   (record)
-//! factor -> estimate: noise weights, least squares, covariance
+//! factor -> selection: columns that the data do not tell, where that may be asked
+//!        -> estimate: noise weights, least squares, covariance
 //!        -> search: beetle swarm in the prior's box (bounds), against the constrained optimum (constrained)
 //!        -> completion: fourteen parameters of every joint, each with its status
 //! held-out motions -> residual, alignment (held_out): its order in time, and what it asks for
@@ -37,6 +38,7 @@ pub mod row_model;
 pub mod rows;
 pub mod scale;
 pub mod search;
+pub mod selection;
 pub mod smoothing;
 pub mod solver;
 pub mod stribeck;
@@ -48,7 +50,7 @@ pub mod window;
 pub use alignment::{Alignment, Direction, Misalignment, Misalignments};
 pub use baseline::Baseline;
 pub use bounds::{LinkPrior, prior_parameters, search_box};
-pub use choice::{Choice, Estimator};
+pub use choice::{Choice, Constant, DriveChoice, Estimator};
 pub use completion::{Status, complete, status};
 pub use consistent::{Completion, Effort, FullObjective, FullSearch, LegCost, Limits};
 pub use constrained::{ParameterBox, least_squares_in_box};
@@ -67,6 +69,7 @@ pub use row_model::no_stribeck;
 pub use rows::{DECIMATION, Ends, FilteredRows, RowFilter};
 pub use scale::{ConstantRatio, torque_constant_ratio, widen};
 pub use search::{SearchState, SwarmSearch};
+pub use selection::Selection;
 pub use smoothing::{Smoothed, Smoother};
 pub use solver::{Consistency, Solver};
 pub use stribeck::StribeckFit;

@@ -19,6 +19,7 @@ use super::noise::NoiseLevel;
 use super::outliers::Outliers;
 pub use super::row_model::RowModel;
 use super::rows::{DECIMATION, Ends, FilteredRows, RowFilter};
+use super::selection::Selection;
 use super::smoothing::{Smoothed, Smoother};
 use super::stribeck::StribeckFit;
 use super::sum::Sum;
@@ -71,6 +72,8 @@ pub struct Record<T, const N: usize, const B: usize> {
     pub outliers: Outliers<T, N>,
     /// Stribeck friction of each joint that shows it; its parameters are eliminated from the factor.
     pub stribeck: [Option<StribeckFit<T, B>>; N],
+    /// Which columns are held at zero; those of motions held out all are there.
+    pub selection: Selection<T, N, B>,
 }
 
 impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
@@ -91,6 +94,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
             noise: self.noise.map(convert),
             outliers: self.outliers.convert(),
             stribeck: core::array::from_fn(|joint| self.stribeck[joint].as_ref().map(StribeckFit::convert)),
+            selection: self.selection.convert(),
         }
     }
 
@@ -382,6 +386,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             row_information: information,
             outliers: Outliers { samples: self.samples, replaced: self.replaced, ..assembly.outliers },
             stribeck: assembly.stribeck,
+            selection: Selection { stribeck: assembly.tried, ..Selection::all() },
             noise: self.noise.map(|noise| noise.sigma()),
         }
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::choice::Choice;
+use super::choice::{Choice, Constant, DriveChoice};
 use super::record::STILL_SPEED;
 use super::rows::FilteredRows;
 use super::smoothing::Smoothed;
@@ -21,6 +21,8 @@ pub struct RowModel<T: Real, const N: usize, const B: usize> {
     pub base: BaseParameters<T, N, B>,
     /// Whether Stribeck friction of each joint is looked for.
     pub stribeck_choice: [Choice; N],
+    /// What of each joint's drive the base parameters hold, and what of it may be dropped.
+    pub drive_choice: [DriveChoice; N],
     /// Stribeck friction found before: a factor on the Coulomb column. Without excess until something is found.
     pub stribeck: [Stribeck<T>; N],
 }
@@ -35,7 +37,14 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
     /// Without Stribeck friction.
     #[must_use]
     pub fn new(chain: Chain<T, N>, gravity: Vector3<T>, base: BaseParameters<T, N, B>) -> Self {
-        Self { chain, gravity, base, stribeck_choice: [Choice::Off; N], stribeck: no_stribeck() }
+        Self {
+            chain,
+            gravity,
+            base,
+            stribeck_choice: [Choice::Off; N],
+            drive_choice: [DriveChoice::ALL; N],
+            stribeck: no_stribeck(),
+        }
     }
 
     /// Base columns of every joint for one instant, and its torque.
@@ -55,6 +64,9 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
             let speed = instant.velocity[joint];
             if self.stribeck[joint].excess > T::zero() {
                 full[joint][joint][Parameter::FC.index()] *= self.stribeck[joint].factor(speed);
+            }
+            if self.drive_choice[joint].meaning == Constant::Asymmetry {
+                full[joint][joint][Parameter::OFF.index()] = real::abs(real::sign(speed));
             }
             if self.stribeck_choice[joint].is_possible() {
                 rows.stribeck[joint] = bank_columns(speed);

@@ -15,6 +15,7 @@ use super::record::{Record, RowModel};
 use super::row_model::no_stribeck;
 use super::scale::widen;
 use super::search::{SearchState, SwarmSearch};
+use super::selection;
 use super::verdict::{Docket, Evidence, Reason, Test, Thresholds, Unused, Verdict};
 use crate::model::friction::Stribeck;
 use crate::model::{LegParameters, Parameter};
@@ -23,6 +24,8 @@ use crate::swarm::BsoSettings;
 
 /// Evaluations of the search that take about as long as one step of the completion.
 const EVALUATIONS_PER_STEP: u32 = 32;
+/// Evaluations that take about as long as one step of the selection.
+const EVALUATIONS_PER_CHOICE: u32 = 12;
 
 /// How much worse than least squares a leg that can exist explains the data.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,15 +53,17 @@ pub struct Solver<T: Real, const N: usize, const B: usize> {
 }
 
 impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
-    /// Solves in closed form and puts the swarm at its start.
+    /// Solves in closed form and puts the swarm at its start. Where columns may be dropped that is done again once
+    /// [`Self::advance`] has decided which.
     #[must_use]
     pub fn new(
         model: &RowModel<T, N, B>,
-        record: Record<T, N, B>,
+        mut record: Record<T, N, B>,
         plan: Plan,
         prior: Option<&[LinkPrior<T>; N]>,
         swarm_seed: u64,
     ) -> Self {
+        record.selection.is_made |= selection::candidates(model).next().is_none();
         let problem = Problem::new(&record, model);
         let whole = problem.whole();
         let least_squares = problem.least_squares(plan);
@@ -70,9 +75,37 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         Self { record, plan, least_squares, condition, search, bounds, completion, completed, given: None }
     }
 
-    /// Spends up to `evaluations` of the cost on the search, then steps of the completion for as many; any slicing
+    /// Whether it is decided which columns are there; always where none may be dropped.
+    #[must_use]
+    pub fn is_selected(&self) -> bool {
+        self.record.selection.is_made
+    }
+
+    /// Solves again without the columns that were dropped.
+    #[inline(never)]
+    fn restart(&mut self, model: &RowModel<T, N, B>) {
+        self.completion.hold(model, &self.record.selection);
+        let problem = Problem::new(&self.record, model);
+        self.least_squares = problem.least_squares(self.plan);
+        self.condition = problem.whole().condition();
+        let seed = self.search.seed();
+        self.search = SwarmSearch::new(&problem, self.plan, self.bounds, BsoSettings::default(), seed);
+    }
+
+    /// Spends up to `evaluations` of the cost on the choice of columns, then on the search, then steps of the completion for as many; any slicing
     /// gives the same result.
     pub fn advance(&mut self, model: &RowModel<T, N, B>, evaluations: u32) -> SearchState {
+        let mut evaluations = evaluations;
+        while !self.record.selection.is_made {
+            if evaluations == 0 {
+                return SearchState::Running;
+            }
+            evaluations = evaluations.saturating_sub(EVALUATIONS_PER_CHOICE);
+            if selection::step(model, &mut self.record) && self.record.selection.dropped_count() > 0 {
+                self.restart(model);
+                return SearchState::Running;
+            }
+        }
         let problem = Problem::new(&self.record, model);
         let before = self.search.evaluations();
         let state = self.search.advance(&problem, evaluations);
@@ -255,6 +288,9 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
                 information.merge_scaled(factor, T::one() / sigma);
             }
         }
+        if self.record.selection.dropped_count() > 0 {
+            information = information.without(&self.record.selection.dropped);
+        }
         alignment.misalignments(&information, problem.noise())
     }
 
@@ -271,7 +307,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         let docket = &mut Docket::new(hand_on);
         let problem = Problem::new(&self.record, model);
         thresholds.judge_input(model, &self.record, docket);
-        thresholds.judge_excitation(model, &problem.whole(), self.least_squares.rank(), docket);
+        thresholds.judge_excitation(&problem.whole(), self.least_squares.rank(), docket);
         let done = if self.completed.is_some() { T::one() } else { T::zero() };
         docket.at_least(Reason::Input, Test::Search, None, done, T::one());
         let found = self.found();

@@ -28,6 +28,12 @@
 //! Cost: one exponential per joint and sample; the search about 50 small solutions per joint, once per motion.
 //! Limits: speeds below 0.03 rad/s are not in the rows (stillness rule), so a vs below 0.05 rad/s is reported as 0.05.
 
+mod curve;
+
+pub use curve::{Combination, bank_columns, combination};
+
+use curve::slope;
+
 use super::factor::Factor;
 use super::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE, Row};
 use super::window::Columns;
@@ -37,8 +43,6 @@ use crate::real::{self, Real};
 pub const BANK: usize = 3;
 /// The slowest of them, rad/s; each is twice the one before.
 pub const SLOWEST_RAD_S: f64 = 0.06;
-/// Up to here curves are fitted to one another, rad/s.
-const FASTEST_RAD_S: f64 = 1.5;
 /// Speeds looked at, rad/s.
 pub const SPEEDS_RAD_S: (f64, f64) = (0.05, 0.3);
 /// Chi-square that a surplus must explain to be believed when nobody asked for it. With no surplus the gain stays below
@@ -51,72 +55,6 @@ pub const SMALLEST_SURPLUS_SHARE: f64 = 0.02;
 /// What is believed of ln vs beforehand: keeps a speed that the data do not tell from spoiling what they tell.
 const LOG_SPEED_SIGMA: f64 = 0.5;
 const GRID: usize = 25;
-
-/// The bank's columns at a speed, rad/s.
-#[must_use]
-pub fn bank_columns<T: Real>(speed: T) -> [T; BANK] {
-    let ratio = speed / T::of(4.0 * SLOWEST_RAD_S);
-    let fastest = real::exp(-(ratio * ratio));
-    let fourth = |value: T| (value * value) * (value * value);
-    let middle = fourth(fastest);
-    let sign = real::sign(speed);
-    [sign * fourth(middle), sign * middle, sign * fastest]
-}
-
-/// (S2): a curve made of the bank and of the columns of Coulomb and viscous friction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Combination<T> {
-    /// Of the bank's columns.
-    pub bank: [T; BANK],
-    /// Of the columns of Coulomb and viscous friction.
-    pub friction: [T; 2],
-}
-
-impl<T: Real> Combination<T> {
-    fn scaled(&self, factor: T) -> Self {
-        Self {
-            bank: self.bank.map(|weight| weight * factor),
-            friction: self.friction.map(|weight| weight * factor),
-        }
-    }
-}
-
-/// (S2): what makes the column of `speed` (rad/s).
-#[must_use]
-pub fn combination<T: Real>(speed: T) -> Combination<T> {
-    const COLUMNS: usize = BANK + 2;
-    let half_root_pi = T::of(0.886_226_925_452_758);
-    let bank: [T; BANK] = core::array::from_fn(|index| T::of(SLOWEST_RAD_S * f64::from(1_u32 << index)));
-    let product = |one: T, other: T| half_root_pi * one * other / real::sqrt(one * one + other * other);
-    // Of a curve of the family with the bank, a constant and a line.
-    let row = |speed: T| {
-        let [one, two, three] = bank.map(|other| product(speed, other));
-        [one, two, three, half_root_pi * speed, T::of(0.5) * speed * speed]
-    };
-    let end = T::of(FASTEST_RAD_S);
-    let mut equations = Factor::<T, COLUMNS>::new();
-    let right = row(speed);
-    for (index, curve) in bank.iter().enumerate() {
-        equations.insert(&row(*curve), right[index]);
-    }
-    let [constant, line] = [BANK, BANK + 1].map(|place| bank.map(|curve| row(curve)[place]));
-    let (square, cube) = (T::of(0.5) * end * end, end * end * end / T::of(3.0));
-    equations.insert(&[constant[0], constant[1], constant[2], end, square], right[BANK]);
-    equations.insert(&[line[0], line[1], line[2], square, cube], right[BANK + 1]);
-    let [one, two, three, coulomb, viscous] = equations.solve(COLUMNS);
-    Combination { bank: [one, two, three], friction: [coulomb, viscous] }
-}
-
-/// Change of [`combination`] with ln speed.
-fn slope<T: Real>(speed: T) -> Combination<T> {
-    let step = T::of(0.02);
-    let (up, down) = (combination(speed * real::exp(step)), combination(speed * real::exp(-step)));
-    let difference = |up: T, down: T| (up - down) / (step + step);
-    Combination {
-        bank: core::array::from_fn(|index| difference(up.bank[index], down.bank[index])),
-        friction: core::array::from_fn(|index| difference(up.friction[index], down.friction[index])),
-    }
-}
 
 /// What was found of one joint's Stribeck friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -328,19 +266,40 @@ fn dot<T: Real>(one: &[T; BANK], other: &[T; BANK]) -> T {
     one.iter().zip(other).fold(T::zero(), |sum, (&left, &right)| sum + left * right)
 }
 
+/// The Stribeck curve that explains most of one joint's rows.
+pub struct Strongest<T> {
+    reduced: Reduced<T>,
+    speed: T,
+    /// Chi-square explained.
+    pub gain: T,
+    /// N m.
+    pub surplus: T,
+}
+
 /// Looks for Stribeck friction of one joint. `others` holds the rows of the other joints, weighted to chi-square units,
-/// `rank` counts the base parameters; smaller gains and surpluses than `least` are nothing. With the fit comes the joint's factor with surplus and speed eliminated; `None`
-/// where nothing at all is explained.
+/// `rank` counts the base parameters.
 #[must_use]
-pub fn find<T: Real, const B: usize>(
+pub fn strongest<T: Real, const B: usize>(
     joint: &JointRows<'_, T, B>,
     others: &Factor<T, B>,
     rank: usize,
-    least: (T, T),
-) -> Option<(StribeckFit<T, B>, Factor<T, B>)> {
+) -> Strongest<T> {
     let reduced = Reduced::of(joint, others, rank);
     let speed = reduced.best_speed();
     let (gain, surplus) = reduced.gain(speed);
+    Strongest { reduced, speed, gain, surplus }
+}
+
+/// The fit, and the joint's factor with surplus and speed eliminated; gains and surpluses that are not above `least` are
+/// nothing, and `None` where nothing at all is explained.
+#[must_use]
+pub fn eliminate<T: Real, const B: usize>(
+    joint: &JointRows<'_, T, B>,
+    found: &Strongest<T>,
+    least: (T, T),
+) -> Option<(StribeckFit<T, B>, Factor<T, B>)> {
+    let Strongest { reduced, speed, gain, surplus } = found;
+    let (speed, gain, surplus) = (*speed, *gain, *surplus);
     if !(gain > least.0 && surplus > least.1 && real::is_finite(gain)) {
         return None;
     }

@@ -2,11 +2,12 @@
 
 use nalgebra::Vector3;
 
-use crate::ident::RowModel;
+use crate::ident::{Constant, RowModel};
 use crate::model::friction::Stribeck;
 use crate::model::{
     Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, Parameter, Payload, rigid_body_torques,
 };
+use crate::real::abs;
 use crate::servo::{TorqueModel, smoothed_sign};
 use crate::units::RadianPerSecond;
 
@@ -16,6 +17,7 @@ pub struct IdentifiedModel<const N: usize> {
     chain: Chain<f32, N>,
     parameters: LegParameters<f32, N>,
     stribeck: [Stribeck<f32>; N],
+    constant: [Constant; N],
 }
 
 impl<const N: usize> IdentifiedModel<N> {
@@ -23,7 +25,8 @@ impl<const N: usize> IdentifiedModel<N> {
     #[must_use]
     pub fn new<const B: usize>(model: &RowModel<f32, N, B>, base_values: &[f32; B]) -> Self {
         let parameters = model.base.complete(base_values, &[[0.0; PARAMETERS_PER_JOINT]; N]);
-        Self { chain: model.chain, parameters, stribeck: model.stribeck }
+        let constant = model.drive_choice.map(|choice| choice.meaning);
+        Self { chain: model.chain, parameters, stribeck: model.stribeck, constant }
     }
 
     /// The model of the same leg carrying a known load; a negative mass takes one off. The load need not be identified.
@@ -39,8 +42,9 @@ impl<const N: usize> IdentifiedModel<N> {
         chain: Chain<f32, N>,
         parameters: LegParameters<f32, N>,
         stribeck: [Stribeck<f32>; N],
+        constant: [Constant; N],
     ) -> Self {
-        Self { chain, parameters, stribeck }
+        Self { chain, parameters, stribeck, constant }
     }
 
     /// Stribeck friction, a factor on the Coulomb friction of each joint.
@@ -49,8 +53,14 @@ impl<const N: usize> IdentifiedModel<N> {
         &self.stribeck
     }
 
+    /// What the constant part of each joint's torque is taken for.
+    #[must_use]
+    pub fn constant(&self) -> &[Constant; N] {
+        &self.constant
+    }
+
     /// The model that gives `share` (0..1) of the other's torque and the rest of this one's: torque is linear in the
-    /// parameters. Both are models of one leg with the same Stribeck curves, as a model and its update are.
+    /// parameters. Both are models of one leg with the same curves and constants, as a model and its update are.
     #[must_use]
     pub fn towards(&self, other: &Self, share: f32) -> Self {
         let mut mixed = *self;
@@ -73,12 +83,16 @@ impl<const N: usize> TorqueModel<N> for IdentifiedModel<N> {
         let mut torque = rigid_body_torques(&self.chain, &self.parameters, &state, &Vector3::from(gravity));
         for joint in 0..N {
             let of = |parameter: Parameter| self.parameters[joint][parameter.index()];
+            let sign = smoothed_sign(RadianPerSecond(qd[joint]));
+            // Friction is there where the joint moves, an offset always.
+            let constant = match self.constant[joint] {
+                Constant::Offset => 1.0,
+                Constant::Asymmetry => abs(sign),
+            };
             torque[joint] += of(Parameter::IA) * qdd[joint]
-                + of(Parameter::FC)
-                    * smoothed_sign(RadianPerSecond(qd[joint]))
-                    * self.stribeck[joint].factor(qd[joint])
+                + of(Parameter::FC) * sign * self.stribeck[joint].factor(qd[joint])
                 + of(Parameter::FV) * qd[joint]
-                + of(Parameter::OFF);
+                + of(Parameter::OFF) * constant;
         }
         torque
     }

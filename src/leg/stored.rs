@@ -15,6 +15,7 @@
 
 use super::configuration::LegConfiguration;
 use super::model::IdentifiedModel;
+use crate::ident::Constant;
 use crate::model::friction::Stribeck;
 use crate::model::{Fingerprint, LegParameters};
 use crate::real::is_finite;
@@ -28,6 +29,8 @@ pub struct StoredModel<const N: usize> {
     pub parameters: LegParameters<f32, N>,
     /// See [`IdentifiedModel::stribeck`].
     pub stribeck: [Stribeck<f32>; N],
+    /// See [`IdentifiedModel::constant`].
+    pub constant: [Constant; N],
 }
 
 /// Why a stored model is not taken.
@@ -73,6 +76,7 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
             fingerprint: self.fingerprint(),
             parameters: *model.equivalent_parameters(),
             stribeck: *model.stribeck(),
+            constant: *model.constant(),
         }
     }
 
@@ -97,7 +101,12 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
         };
         match stored.stribeck.iter().position(|curve| !is_curve(curve)) {
             Some(joint) => Err(RestoreError::Stribeck { joint }),
-            None => Ok(IdentifiedModel::of_parameters(self.model.chain, stored.parameters, stored.stribeck)),
+            None => Ok(IdentifiedModel::of_parameters(
+                self.model.chain,
+                stored.parameters,
+                stored.stribeck,
+                stored.constant,
+            )),
         }
     }
 }

@@ -15,6 +15,7 @@ use super::super::bounds::LinkPrior;
 use super::super::completion::complete_within;
 use super::super::estimate::Stage;
 use super::super::record::{Record, RowModel};
+use super::super::selection::Selection;
 use super::cost::LegCost;
 use super::interior;
 use super::limits::Limits;
@@ -101,6 +102,13 @@ impl<T: Real, const N: usize> Completion<T, N> {
             phase: Phase::Waiting,
             converged: false,
         }
+    }
+
+    /// Holds what `selection` drops at zero, before it begins.
+    pub fn hold<const B: usize>(&mut self, model: &RowModel<T, N, B>, selection: &Selection<T, N, B>) {
+        self.limits.hold(model, selection);
+        self.cost = LegCost::new(&self.limits);
+        self.place = self.cost.place(&self.limits.inside());
     }
 
     /// Begins with base values that were found on `stage`; if no leg has them, the cost of others is counted from

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! With the projector `N` instead of the identity the prior has no say in what is measured: the minimum of `F` is
-//! `p0 + W K' (K W K')^-1 (beta - K p0)` for any `pull`. Columns that are not estimated are held at `p0`.
+//! `p0 + W K' (K W K')^-1 (beta - K p0)` for any `pull`. Columns that are not estimated are held at `p0`, which is 0.
 //!
 //! Cost: `28 + rank` rows into a factor of 28 columns (two joints), about 70,000 multiplications once; an
 //! evaluation 400. Memory: `14 N (14 N + 3)` scalars.
@@ -15,7 +15,7 @@
 use super::super::estimate::Stage;
 use super::super::record::RowModel;
 use super::limits::Limits;
-use crate::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter, Standing, row_torque};
+use crate::model::{INERTIAL_PARAMETERS, LegParameters, PARAMETERS_PER_JOINT, Parameter, row_torque};
 use crate::real::{self, Real};
 
 /// Parameters of a leg without any value.
@@ -31,6 +31,8 @@ pub struct LegCost<T: Real, const N: usize> {
     /// Upper triangular, rows in the order of the parameters.
     triangle: [[LegParameters<T, N>; PARAMETERS_PER_JOINT]; N],
     right: LegParameters<T, N>,
+    /// Drive parameters that are estimated.
+    estimated: [[bool; 4]; N],
 }
 
 impl<T: Real, const N: usize> LegCost<T, N> {
@@ -43,6 +45,7 @@ impl<T: Real, const N: usize> LegCost<T, N> {
             scale: *limits.deviations(),
             triangle: [[zero; PARAMETERS_PER_JOINT]; N],
             right: zero,
+            estimated: limits.links.map(|link| link.estimated),
         }
     }
 
@@ -97,7 +100,8 @@ impl<T: Real, const N: usize> LegCost<T, N> {
             for parameter in Parameter::ALL {
                 let mut row = zeros(T::zero());
                 let place = (joint, parameter.index());
-                if model.base.standing(joint, parameter) == Standing::Off {
+                let drive = parameter.index().checked_sub(INERTIAL_PARAMETERS);
+                if drive.is_some_and(|drive| !self.estimated[joint][drive]) {
                     row[place.0][place.1] = T::one();
                 } else {
                     row[place.0][place.1] = weight;

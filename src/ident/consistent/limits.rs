@@ -20,6 +20,7 @@
 use super::super::bounds::{LinkPrior, measured_box, segment_length};
 use super::super::completion::prior_deviations;
 use super::super::record::{Record, RowModel};
+use super::super::selection::Selection;
 use crate::model::{
     INERTIAL_PARAMETERS, JointParameters, LegParameters, LogCholesky, PARAMETERS_PER_JOINT, Parameter,
     RigidBody, Standing, is_physically_consistent,
@@ -110,10 +111,12 @@ impl<T: Real, const N: usize> Limits<T, N> {
                 estimated: core::array::from_fn(|index| {
                     let parameter = Parameter::ALL[INERTIAL_PARAMETERS + index];
                     model.base.standing(joint, parameter) != Standing::Off
+                        && !record.selection.drops(model, joint, parameter)
                 }),
             }
         });
-        let origin = super::super::bounds::prior_parameters(believed);
+        let mut origin = super::super::bounds::prior_parameters(believed);
+        hold_at_zero(&links, &mut origin);
         let deviations = match prior {
             Some(_) => prior_deviations(&origin),
             None => core::array::from_fn(|joint| sizes(&neutral[joint], known_length(model, joint))),
@@ -121,7 +124,17 @@ impl<T: Real, const N: usize> Limits<T, N> {
         Self { links, origin, deviations }
     }
 
-    /// What is believed beforehand: the prior, or a neutral leg.
+    /// Holds what `selection` drops at zero.
+    pub(super) fn hold<const B: usize>(&mut self, model: &RowModel<T, N, B>, selection: &Selection<T, N, B>) {
+        for (joint, link) in self.links.iter_mut().enumerate() {
+            for (index, estimated) in link.estimated.iter_mut().enumerate() {
+                *estimated &= !selection.drops(model, joint, Parameter::ALL[INERTIAL_PARAMETERS + index]);
+            }
+        }
+        hold_at_zero(&self.links, &mut self.origin);
+    }
+
+    /// What is believed beforehand, a neutral leg without a prior; zero what is not estimated.
     #[must_use]
     pub fn origin(&self) -> &LegParameters<T, N> {
         &self.origin
@@ -174,6 +187,17 @@ impl<T: Real, const N: usize> Limits<T, N> {
                     link.condition(index).is_none_or(|condition| condition.slack(joint) >= T::zero())
                 })
             })
+    }
+}
+
+/// What is not estimated is zero in the model of the torque, whatever the prior says: so is the leg's.
+fn hold_at_zero<T: Real, const N: usize>(links: &[LinkLimits<T>; N], origin: &mut LegParameters<T, N>) {
+    for (link, joint) in links.iter().zip(origin) {
+        for (slot, estimated) in joint.iter_mut().skip(INERTIAL_PARAMETERS).zip(link.estimated) {
+            if !estimated {
+                *slot = T::zero();
+            }
+        }
     }
 }
 

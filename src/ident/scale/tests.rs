@@ -95,6 +95,7 @@ fn record_of<T: Real>(factors: [Factor<T, BASE>; 2], torque: [TorqueSize<T>; 2])
         noise: [T::zero(); 2],
         outliers: crate::ident::Outliers::none(),
         stribeck: [None; 2],
+        selection: crate::ident::Selection::all(),
     }
 }
 

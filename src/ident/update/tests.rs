@@ -72,6 +72,7 @@ fn record<T: Real>(
         noise: [T::of(SIGMA); 2],
         outliers: crate::ident::Outliers::none(),
         stribeck: [None; 2],
+        selection: crate::ident::Selection::all(),
     }
 }
 

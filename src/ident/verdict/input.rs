@@ -34,16 +34,15 @@ impl<T: Real> Thresholds<T> {
         docket.at_most(Reason::Input, Test::NotFinite, None, None, count(record.rejected), T::zero());
     }
 
-    /// Whether a motion told all base parameters apart, in all rows together (`stage`) and in the plan that was followed,
+    /// Whether a motion told all base parameters apart that are not held at zero, in all rows together (`stage`) and in the plan that was followed,
     /// which found `determined` of them.
-    pub fn judge_excitation<const N: usize, const B: usize>(
+    pub fn judge_excitation<const B: usize>(
         &self,
-        model: &RowModel<T, N, B>,
         stage: &Stage<T, B>,
         determined: usize,
         docket: &mut Docket<'_, T>,
     ) {
-        let rank = T::of(model.base.rank() as f64);
+        let rank = T::of(stage.asked() as f64);
         let told = T::of(stage.columns().len().min(determined) as f64);
         docket.at_least(Reason::Unexcited, Test::Determined, None, told, rank);
         let condition = stage.condition().unwrap_or(T::LARGEST);

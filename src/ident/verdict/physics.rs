@@ -4,6 +4,7 @@ use nalgebra::{SMatrix, Vector3};
 
 use super::super::solver::Consistency;
 use super::{Docket, Reason, Test, Thresholds};
+use crate::ident::choice::Constant;
 use crate::ident::completion::is_weak;
 use crate::ident::estimate::Estimate;
 use crate::ident::record::{Record, RowModel};
@@ -40,6 +41,9 @@ impl<T: Real> Thresholds<T> {
             {
                 *worst = real::max(*worst, -value / sigma);
             }
+        }
+        for (joint, worst) in worst.iter_mut().enumerate() {
+            *worst = real::max(*worst, negative_direction_of_friction(model, estimate, joint));
         }
         let limit = self.largest_negative_sigmas;
         for (joint, &sigmas) in worst.iter().enumerate() {
@@ -79,6 +83,25 @@ impl<T: Real> Thresholds<T> {
             real::max(worst, -energy / real::max(sigma, T::EPSILON))
         })
     }
+}
+
+/// Standard deviations by which Coulomb friction with a level for each direction is negative in one of them.
+fn negative_direction_of_friction<T: Real, const N: usize, const B: usize>(
+    model: &RowModel<T, N, B>,
+    estimate: &Estimate<T, B>,
+    joint: usize,
+) -> T {
+    let is_asymmetric = model.drive_choice[joint].meaning == Constant::Asymmetry;
+    let (Some(level), Some(half), true) =
+        (model.drive(joint, Parameter::FC), model.drive(joint, Parameter::OFF), is_asymmetric)
+    else {
+        return T::zero();
+    };
+    let mut weights = [T::zero(); B];
+    (weights[level], weights[half]) = (T::one(), -real::sign(estimate.values[half]));
+    let lower = estimate.values[level] - real::abs(estimate.values[half]);
+    let sigma = estimate.sigma_of(&weights);
+    if sigma > T::zero() { -lower / sigma } else { T::zero() }
 }
 
 const POSTURES: usize = 16;
