@@ -1,5 +1,6 @@
 //! Models that are kept: what is in them, and what is refused.
 #![cfg(feature = "tool")]
+#![expect(clippy::disallowed_methods, reason = "runs on the host only and may use std's mathematics")]
 
 mod command;
 mod kept;

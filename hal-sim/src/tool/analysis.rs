@@ -7,12 +7,13 @@ use scarab::ident::{
     Choice, Estimate, Estimator, Factor, LinkPrior, Plan, Problem, Record, RowModel, SearchState, Solver,
     Status, Verdict, least_squares_in_box, prior_parameters, status,
 };
-use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter};
+use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter, Standing};
 
 use super::consistent;
 use super::disturbances::{OutliersReport, StribeckReport};
 use super::findings::FindingReport;
 use super::information::StribeckTruth;
+use super::model_choice::Asked;
 use super::report::{
     BaseReport, FitReport, LeastSquaresReport, Number, ParameterReport, RunReport, SCHEMA, SwarmReport,
     TrackingReport,
@@ -36,6 +37,10 @@ pub struct Background<const N: usize, const B: usize> {
     pub prior_name: String,
     /// What the simulated leg has.
     pub truth: Option<LegParameters<f64, N>>,
+    /// What the leg file asks of each joint's model.
+    pub asked: Vec<Asked>,
+    /// Of the drives, degrees Celsius, if it is known.
+    pub temperature_c: Option<f64>,
     /// Its friction curves.
     pub stribeck_truth: [Option<StribeckTruth>; N],
 }
@@ -95,7 +100,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
     pub fn base_name(&self, base: usize) -> String {
         let Some((joint, parameter)) = self.model.base.independent(base) else { return String::new() };
         let others = self.terms(base).count() > 1;
-        format!("{}{}", parameter_name(joint, parameter), if others { "R" } else { "" })
+        format!("{}{}", self.name(joint, parameter), if others { "R" } else { "" })
     }
 
     /// Plain least squares looks for nothing that was not asked for.
@@ -117,6 +122,12 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 .map(move |parameter| (joint, parameter, terms[joint][parameter.index()]))
                 .filter(|(_, _, factor)| *factor != 0.0)
         })
+    }
+
+    /// Not estimated, and so zero in the model.
+    pub fn is_zero(&self, solver: &Solver<f32, N, B>, joint: usize, parameter: Parameter) -> bool {
+        self.model.base.standing(joint, parameter) == Standing::Off
+            || solver.record().selection.drops(&self.device, joint, parameter)
     }
 
     fn unit(&self, base: usize) -> &'static str {
@@ -162,20 +173,24 @@ impl<const N: usize, const B: usize> Background<N, B> {
             reasons: verdict.reasons().map(scarab::ident::Reason::name).collect(),
             findings: circumstances.findings.clone(),
             rank: solver.least_squares().rank(),
-            columns: self.columns,
+            columns: self.columns - solver.record().selection.dropped_count(),
             condition: solver.condition().into(),
             parameters: self.parameters(solver, &estimate),
             base_parameters: self
-                .base_parameters(&estimate, circumstances.cramer_rao.as_ref())
+                .base_parameters(solver, &estimate, circumstances.cramer_rao.as_ref())
                 .into_iter()
                 .chain(self.surpluses(solver, &estimate.values, circumstances))
                 .collect(),
             stribeck: self.stribeck(solver, &estimate.values),
+            model_choice: self.model_choice(solver),
+            asymmetric_coulomb: self.directions(solver, &estimate),
+            temperature_c: self.temperature_c.into(),
             outliers: OutliersReport::of(solver.record(), estimator_name(circumstances.estimator)),
             training: fits(training, &estimate.values),
             validation: fits(validation, &estimate.values),
             least_squares: LeastSquaresReport {
-                base_parameters: (0..self.model.base.rank())
+                base_parameters: self
+                    .kept(solver)
                     .map(|base| (self.base_name(base), solver.least_squares().values[base].into()))
                     .chain(
                         self.stribeck(solver, &solver.least_squares().values)
@@ -198,7 +213,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             scale: ScaleReport::default(),
             simulated_s: circumstances.simulated_s,
             wall_s: circumstances.wall.as_secs_f64(),
-            detail: self.detail(&estimate),
+            detail: self.detail(solver, &estimate),
             compared: None,
         }
     }
@@ -235,14 +250,24 @@ impl<const N: usize, const B: usize> Background<N, B> {
         (0..N).filter_map(of).collect()
     }
 
-    fn base_parameters(&self, estimate: &Estimate<f32, B>, cramer_rao: Option<&[f64; B]>) -> Vec<BaseReport> {
+    /// Base parameters that are not held at zero.
+    pub fn kept<'a>(&self, solver: &'a Solver<f32, N, B>) -> impl Iterator<Item = usize> + 'a {
+        (0..self.model.base.rank()).filter(|&base| !solver.record().selection.dropped[base])
+    }
+
+    fn base_parameters(
+        &self,
+        solver: &Solver<f32, N, B>,
+        estimate: &Estimate<f32, B>,
+        cramer_rao: Option<&[f64; B]>,
+    ) -> Vec<BaseReport> {
         let truth = self.truth.as_ref().map(|truth| self.model.base.project(truth));
-        (0..self.model.base.rank())
+        self.kept(solver)
             .map(|base| BaseReport {
                 name: self.base_name(base),
                 terms: self
                     .terms(base)
-                    .map(|(joint, parameter, factor)| (parameter_name(joint, parameter), factor))
+                    .map(|(joint, parameter, factor)| (self.name(joint, parameter), factor))
                     .collect::<BTreeMap<_, _>>(),
                 value: estimate.determined[base].then_some(estimate.values[base]).into(),
                 unit: self.unit(base),
@@ -270,14 +295,15 @@ impl<const N: usize, const B: usize> Background<N, B> {
                     .iter()
                     .flat_map(|&base| self.terms(base))
                     .filter(|&(other, symbol, _)| (other, symbol) != (joint, parameter))
-                    .map(|(other, symbol, _)| parameter_name(other, symbol))
+                    .map(|(other, symbol, _)| self.name(other, symbol))
                     .collect();
                 grouped_with.sort();
                 grouped_with.dedup();
                 reports.push(ParameterReport {
-                    name: parameter_name(joint, parameter),
+                    name: self.name(joint, parameter),
                     joint: joint + 1,
                     value: match (base, &completed) {
+                        _ if self.is_zero(solver, joint, parameter) => 0.0.into(),
                         (Some(base), _) => estimate.values[base].into(),
                         (None, Some(parameters)) => parameters[joint][parameter.index()].into(),
                         (None, None) => Number::UNKNOWN,

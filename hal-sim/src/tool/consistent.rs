@@ -12,7 +12,7 @@ use scarab::ident::{
 use scarab::model::{LegParameters, Parameter};
 use scarab::swarm::BsoSettings;
 
-use super::analysis::{Background, parameter_name};
+use super::analysis::Background;
 use super::report::{ConsistentReport, ConsistentSearchReport, Number};
 
 /// Room for the coordinates of three joints.
@@ -125,7 +125,7 @@ fn named<const N: usize, const B: usize>(
 ) -> BTreeMap<String, Number> {
     let Some(parameters) = parameters.filter(|_| background.prior.is_some()) else { return BTreeMap::new() };
     let value = |joint: usize, parameter: Parameter| {
-        (parameter_name(joint, parameter), parameters[joint][parameter.index()].into())
+        (background.name(joint, parameter), parameters[joint][parameter.index()].into())
     };
     (0..N).flat_map(|joint| Parameter::ALL.map(|parameter| value(joint, parameter))).collect()
 }

@@ -62,6 +62,20 @@ impl<const N: usize> Information<N> {
         packed::rotate(&mut self.factor, self.columns, &mut row);
     }
 
+    /// Of the same motion with these base parameters known to be zero.
+    #[must_use]
+    pub fn without(&self, dropped: &[bool]) -> Self {
+        let mut factor = [0.0; LARGEST_SIZE];
+        for (column, kept) in packed::rows(&self.factor, self.columns) {
+            let mut row: Row<f64> = [0.0; LARGEST_COLUMNS + 1];
+            for (place, &element) in (column..).zip(kept) {
+                row[place] = if dropped.get(place) == Some(&true) { 0.0 } else { element };
+            }
+            packed::rotate(&mut factor, self.columns, &mut row);
+        }
+        Self { factor, ..self.clone() }
+    }
+
     /// Bounds of the base parameters, and of each joint's surplus.
     #[must_use]
     pub fn bounds<const B: usize>(&self) -> ([f64; B], [Option<f64>; N]) {

@@ -11,6 +11,7 @@
 //! | `torque_noise_percent` | white, per logged 500 Hz sample, of each joint's mean absolute torque, on the logged current only | 0 |
 //! | `bandwidth_hz` | where the low-pass of the identification is 3 dB down | 8 |
 //! | `pushes` | `{ per_minute, torque_nm, duration_s }`: the wearer pushes at random | none |
+//! | `temperature_c` | of the drives, degrees Celsius, if it is known | none |
 //! | `side` | `"right"` or `"left"`: on the left the drives are mounted mirrored | right |
 //! | `segments` | `{ shank_m, foot_m, wearer_kg, prior_wearer_kg }`: the last two links are a thigh and a shank, and whose | none |
 //! | `joint.name`, `joint.dh` | `dh = { alpha, a, d }`, modified D-H, rad and m | required |
@@ -24,10 +25,10 @@
 //! | `current_noise_a` | standard deviation per logged 500 Hz sample, besides `torque_noise_percent` | 0 |
 //! | `current_offset_a`, `current_step_a` | error and conversion step of the current sensor | 0, 0 (none) |
 //! | `outliers` | `{ percent, torque_nm }`: share of logged 500 Hz samples with a wild current, its largest error | none |
-//! | `offset`, `rotor` | `"on"` or `"off"`: whether a torque offset, a rotor inertia is estimated | on, on |
-//! | `stribeck_model` | `"auto"`, `"on"` or `"off"`: whether Stribeck friction is estimated | auto |
+//! | `offset`, `rotor` | `"auto"`, `"on"`, `"off"`: whether a torque offset, a rotor inertia is estimated | on, on |
+//! | `stribeck_model`, `asymmetric_coulomb` | the same of Stribeck friction, of Coulomb friction with a level for each direction | auto, off |
 //! | `stribeck` | `{ static_nm, speed_rad_s }`: simulated friction at rest and where it has fallen | none |
-//! | `truth`, `prior` | `{ mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset }`, the last four 0 unless given | none |
+//! | `truth`, `prior` | `{ mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset, asymmetry }`, the last five 0 unless given | none |
 //! | `[joint.motor]` | reserved | |
 //!
 //! `inertia_com` holds the tensor elements XX XY XZ YY YZ ZZ about the centre of mass. Everything in `truth`
@@ -37,9 +38,11 @@ mod check;
 mod convert;
 mod error;
 mod segments;
+mod switch;
 
 pub use error::LegFileError;
 pub use segments::{BodySide, SegmentsFile};
+pub use switch::Switch;
 
 use serde::de::{Deserializer, Error as _};
 use serde::{Deserialize, Serialize};
@@ -74,6 +77,9 @@ pub struct LegFile {
     /// The wearer's pushes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pushes: Option<PushesFile>,
+    /// Of the drives, degrees Celsius, if it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
     /// Side of the body.
     #[serde(default, skip_serializing_if = "BodySide::is_default")]
     pub side: BodySide,
@@ -148,14 +154,17 @@ pub struct JointFile {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outliers: Option<OutliersFile>,
     /// Whether a torque offset is estimated.
-    #[serde(default)]
+    #[serde(default = "Switch::on")]
     pub offset: Switch,
     /// Whether a rotor inertia is estimated.
-    #[serde(default)]
+    #[serde(default = "Switch::on")]
     pub rotor: Switch,
     /// Whether Stribeck friction is estimated.
-    #[serde(default)]
-    pub stribeck_model: StribeckModel,
+    #[serde(default = "Switch::auto")]
+    pub stribeck_model: Switch,
+    /// Whether Coulomb friction has a level for each direction.
+    #[serde(default = "Switch::off", skip_serializing_if = "Switch::is_off")]
+    pub asymmetric_coulomb: Switch,
     /// Friction at rest above Coulomb's, simulated only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stribeck: Option<StribeckFile>,
@@ -203,30 +212,6 @@ pub enum Side {
     Joint,
 }
 
-/// Whether something is estimated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Switch {
-    /// It is.
-    #[default]
-    On,
-    /// It is not.
-    Off,
-}
-
-/// Whether Stribeck friction is estimated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum StribeckModel {
-    /// If the data tell it.
-    #[default]
-    Auto,
-    /// It is.
-    On,
-    /// It is not.
-    Off,
-}
-
 /// Stribeck friction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -269,6 +254,9 @@ pub struct LinkParameters {
     /// N m.
     #[serde(default)]
     pub offset: f64,
+    /// Half of what Coulomb friction is larger by with a growing D-H angle than against it, N m.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub asymmetry: f64,
 }
 
 /// A key that must not be used yet.
@@ -283,6 +271,10 @@ impl<'de> Deserialize<'de> for Reserved {
 
 fn default_bandwidth() -> f64 {
     8.0
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 fn one() -> i64 {
@@ -340,7 +332,8 @@ impl JointFile {
             outliers: None,
             offset: Switch::On,
             rotor: Switch::On,
-            stribeck_model: StribeckModel::Auto,
+            stribeck_model: Switch::Auto,
+            asymmetric_coulomb: Switch::Off,
             stribeck: None,
             truth: None,
             prior: None,
@@ -359,6 +352,7 @@ impl LegFile {
             torque_noise_percent: 0.0,
             bandwidth_hz: default_bandwidth(),
             pushes: None,
+            temperature_c: None,
             side: BodySide::default(),
             segments: None,
             joints,

@@ -11,6 +11,7 @@
 //! | [`excite`] | an exciting motion designed, and what it will tell |
 //! | [`monitor`] | an accepted model watched while the leg walks and something changes |
 //! | [`series`], [`figures`], [`html`] | a run as curves, drawn, and on one page |
+//! | [`model_choice`], [`temperature`] | what of the model was left to the data; when a model is another day's |
 //! | [`findings`] | what the verdict saw, in words |
 //! | [`perturb`] | what can be made wrong on purpose |
 //! | [`placed_mass`], [`scale`] | known masses: torque constants and loads |
@@ -39,6 +40,7 @@ pub mod html;
 pub mod identify;
 pub mod information;
 pub mod leg_file;
+pub mod model_choice;
 pub mod model_file;
 pub mod monitor;
 pub mod motions;
@@ -58,6 +60,7 @@ pub mod setup;
 pub mod simulate;
 pub mod size;
 pub mod tables;
+pub mod temperature;
 pub mod urdf;
 pub mod watch;
 pub mod words;

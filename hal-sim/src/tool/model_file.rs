@@ -38,6 +38,8 @@ use error::Step;
 pub const MODEL_SCHEMA: i64 = 1;
 /// Base parameters there is room for: those of three joints.
 pub(super) const LARGEST_BASE_SET: usize = 28;
+/// The constant column of a joint whose Coulomb friction differs between the directions.
+const ASYMMETRY: &str = "FCA";
 /// Larger files are something else.
 const LARGEST_FILE_BYTES: u64 = 1 << 20;
 
@@ -127,6 +129,9 @@ pub struct Conditions {
     /// Of the scaled weighted problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition: Option<f64>,
+    /// Of the drives, degrees Celsius; absent where it was not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
     /// Parameters left out of the estimate, as if they were zero.
     pub not_estimated: Vec<String>,
     /// Torque errors on the motion identified from and on those held out.
@@ -275,6 +280,12 @@ impl ModelFile {
         parameter_of(name, self.leg.joints.len())
     }
 
+    /// Whether a parameter of this name acts only while its joint moves: a difference of friction between the directions.
+    #[must_use]
+    pub fn is_asymmetry(name: &str) -> bool {
+        name.starts_with(ASYMMETRY)
+    }
+
     /// Values of the fourteen parameters of a joint; `None` where one is unknown.
     #[must_use]
     pub fn joint_parameters(&self, joint: usize) -> Option<[f64; scarab::model::PARAMETERS_PER_JOINT]> {
@@ -322,6 +333,9 @@ fn parameter_of(name: &str, joints: usize) -> Option<(usize, Parameter)> {
     let split = name.find(|letter: char| letter.is_ascii_digit())?;
     let (symbol, joint) = name.split_at(split);
     let joint = joint.parse::<usize>().ok().filter(|joint| (1..=joints).contains(joint))?;
-    let parameter = Parameter::ALL.into_iter().find(|parameter| parameter.symbol() == symbol)?;
+    let parameter = match symbol {
+        ASYMMETRY => Parameter::OFF,
+        _ => Parameter::ALL.into_iter().find(|parameter| parameter.symbol() == symbol)?,
+    };
     Some((joint - 1, parameter)).filter(|_| name.len() == symbol.len() + 1)
 }

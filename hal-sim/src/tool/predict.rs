@@ -13,6 +13,7 @@
 //! | in, found by name, others ignored | `q1..` (or `q1_rad`) rad, `qd1..` (`qd1_radps`) rad/s, `qdd1..` (`qdd1_radps2`) rad/s2: D-H angles, as `regressor` takes them, or anatomical ones; `t_s` if there |
 //! | out | `t_s` if there, else `k` from 0; per joint `tau1_Nm`, `tau1_sigma_Nm`, and the parts whose sum it is: `tau1_rigid_Nm` (bodies, gravity, rotor), `tau1_friction_Nm`, `tau1_offset_Nm` |
 //!
+//! A difference of Coulomb friction between the directions (`FCA1`) is friction, an offset is not.
 //! Torques have the sign of the angles that were given. At a speed of exactly 0 Coulomb friction is undetermined and
 //! counts as 0. All states are read and computed before anything is written.
 
@@ -67,6 +68,8 @@ pub struct Predictor<'a, const N: usize> {
     anatomy: [AnatomicalJoint<f64>; N],
     gravity: Vector3<f64>,
     carriers: Vec<(usize, Parameter)>,
+    /// Of each carrier: it acts only while its joint moves.
+    moving_only: Vec<bool>,
 }
 
 impl<'a, const N: usize> Predictor<'a, N> {
@@ -80,6 +83,9 @@ impl<'a, const N: usize> Predictor<'a, N> {
             anatomy: anatomy(&leg)?,
             gravity: Vector3::from(leg.gravity),
             carriers: carriers.collect(),
+            moving_only: (model.base_set.parameters.iter())
+                .map(|base| ModelFile::is_asymmetry(&base.carrier))
+                .collect(),
         })
     }
 
@@ -88,12 +94,21 @@ impl<'a, const N: usize> Predictor<'a, N> {
     pub fn torques(&self, state: &JointState<f64, N>) -> [Prediction; N] {
         let set = &self.model.base_set;
         let mut torques = regressor(&self.chain, state, &self.gravity).map(|row| {
-            let columns: Vec<f64> =
-                self.carriers.iter().map(|(joint, parameter)| row[*joint][parameter.index()]).collect();
+            let columns = self.carriers.iter().zip(&self.moving_only);
+            let columns: Vec<f64> = columns
+                .map(|((joint, parameter), &moving_only)| {
+                    let moves = if moving_only { sign(state.qd[*joint]).abs() } else { 1.0 };
+                    moves * row[*joint][parameter.index()]
+                })
+                .collect();
             let mut torque = Prediction::default();
-            for ((element, base), (_, parameter)) in columns.iter().zip(&set.parameters).zip(&self.carriers) {
+            let kinds = self.carriers.iter().zip(&self.moving_only);
+            for ((element, base), ((_, parameter), moving_only)) in
+                columns.iter().zip(&set.parameters).zip(kinds)
+            {
                 let part = match parameter {
                     Parameter::FC | Parameter::FV => &mut torque.friction,
+                    Parameter::OFF if *moving_only => &mut torque.friction,
                     Parameter::OFF => &mut torque.offset,
                     _ => &mut torque.rigid,
                 };

@@ -158,7 +158,10 @@ pub fn replay<const N: usize, const B: usize>(
     }
     let prior = background.prior.map(|prior| prior.map(|link| link.convert()));
     let mut solver =
-        Solver::new(&background.device, record.clone(), options.plan, prior.as_ref(), options.swarm_seed);
+        Solver::new(&background.device, record, options.plan, prior.as_ref(), options.swarm_seed);
+    while !solver.is_selected() {
+        solver.advance(&background.device, 1);
+    }
     let optimum = background.costs(&solver);
     let (mut to_half, mut progress) = (None, Vec::<(u32, f64)>::new());
     loop {
@@ -228,7 +231,8 @@ pub fn replay<const N: usize, const B: usize>(
         ..Circumstances::default()
     };
     let validation = if validated { vec![motion(unused)] } else { Vec::new() };
-    let run = background.report(&solver, verdict, &[motion(record)], &validation, &circumstances);
+    let run =
+        background.report(&solver, verdict, &[motion(solver.record().clone())], &validation, &circumstances);
     let series = Series {
         excess: progress,
         floor_chi2: Some(optimum.above),

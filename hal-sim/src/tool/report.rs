@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
 use super::disturbances::{OutliersReport, StribeckReport};
+use super::model_choice::{DirectionsReport, ModelChoiceReport};
 
 /// Version of the JSON.
 pub const SCHEMA: u32 = 1;
@@ -160,6 +161,9 @@ pub struct ComparisonReport {
     pub differences: Vec<DifferenceReport>,
     /// Base parameters of one of the two only.
     pub not_compared: Vec<String>,
+    /// Both temperatures are known, and they differ by more than hardly.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub warning: Option<String>,
 }
 
 /// One base parameter in two identifications.
@@ -266,6 +270,12 @@ pub struct RunReport {
     pub base_parameters: Vec<BaseReport>,
     /// Of joints that show it.
     pub stribeck: Vec<StribeckReport>,
+    /// What was asked of each joint's model, used, and why.
+    pub model_choice: Vec<ModelChoiceReport>,
+    /// Of joints whose Coulomb friction was found to differ between the directions.
+    pub asymmetric_coulomb: Vec<DirectionsReport>,
+    /// Of the drives, degrees Celsius; unknown unless stated.
+    pub temperature_c: Number,
     /// What was set aside of the motion identified from.
     pub outliers: OutliersReport,
     /// The motion identified from.

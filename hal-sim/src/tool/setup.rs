@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::ident::{
-    Choice, Estimator, LinkPrior, MonitorSettings, Plan, RowModel, Thresholds, prior_parameters,
+    Choice, DriveChoice, Estimator, LinkPrior, MonitorSettings, Plan, RowModel, Thresholds, prior_parameters,
 };
 use scarab::leg::LegConfiguration;
 use scarab::model::{
@@ -13,6 +13,7 @@ use scarab::model::{
 };
 
 use scarab::motion::JointEnvelope;
+use scarab::real::Real;
 use scarab::servo::{JointConfiguration, JointScale};
 use scarab::units::{
     Ampere, Hertz, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
@@ -21,7 +22,8 @@ use scarab::units::{
 
 use super::analysis::Background;
 use super::information::StribeckTruth;
-use super::leg_file::{BodySide, JointFile, LegFile, LinkParameters, StribeckModel, Switch};
+use super::leg_file::{BodySide, JointFile, LegFile, LinkParameters};
+use super::model_choice::{Asked, drive_choice, stribeck_choice};
 use super::motions::{Motions, motions};
 
 /// Bandwidth of the position loop.
@@ -118,20 +120,25 @@ pub fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
     core::array::from_fn(|joint| {
         let mut columns = [true; PARAMETERS_PER_JOINT];
         if let Some(joint) = leg.joints.get(joint) {
-            columns[Parameter::OFF.index()] = joint.offset != Switch::Off;
-            columns[Parameter::IA.index()] = joint.rotor != Switch::Off;
+            columns[Parameter::OFF.index()] = drive_choice(joint).constant.is_possible();
+            columns[Parameter::IA.index()] = drive_choice(joint).rotor.is_possible();
         }
         columns
     })
 }
 
-/// Which joints' Stribeck friction a leg file asks to look for.
-fn stribeck_choice<const N: usize>(leg: &LegFile) -> [Choice; N] {
-    core::array::from_fn(|joint| match leg.joints.get(joint).map(|joint| joint.stribeck_model) {
-        Some(StribeckModel::On) => Choice::On,
-        Some(StribeckModel::Auto) => Choice::Auto,
-        Some(StribeckModel::Off) | None => Choice::Off,
-    })
+/// With what a leg file leaves to the data.
+fn chosen<T: Real, const N: usize, const B: usize>(
+    leg: &LegFile,
+    model: RowModel<T, N, B>,
+) -> RowModel<T, N, B> {
+    let drive = |joint: usize| leg.joints.get(joint).map_or(DriveChoice::ALL, drive_choice);
+    let stribeck = |joint: usize| leg.joints.get(joint).map_or(Choice::Off, stribeck_choice);
+    RowModel {
+        stribeck_choice: core::array::from_fn(stribeck),
+        drive_choice: core::array::from_fn(drive),
+        ..model
+    }
 }
 
 /// Geometry, gravity and base parameters of a leg.
@@ -145,7 +152,7 @@ pub fn row_model<const N: usize, const B: usize>(leg: &LegFile) -> Result<RowMod
         };
         SetupError::new(leg, reason)
     })?;
-    Ok(RowModel { stribeck_choice: stribeck_choice(leg), ..RowModel::new(chain, gravity, base) })
+    Ok(chosen(leg, RowModel::new(chain, gravity, base)))
 }
 
 /// The same in the device's precision, analysed there.
@@ -159,7 +166,7 @@ pub fn device_model<const N: usize, const B: usize>(
     if (0..B).any(|index| base.independent(index) != reference.base.independent(index)) {
         return Err(SetupError::new(leg, "base parameters differ between single and double precision"));
     }
-    Ok(RowModel { stribeck_choice: stribeck_choice(leg), ..RowModel::new(chain, gravity, base) })
+    Ok(chosen(leg, RowModel::new(chain, gravity, base)))
 }
 
 /// Anatomical to D-H angles of every joint.
@@ -184,7 +191,7 @@ fn link_prior(link: &LinkParameters) -> LinkPrior<f64> {
         rotor_inertia: link.rotor_inertia,
         coulomb_friction: link.coulomb,
         viscous_friction: link.viscous,
-        offset: link.offset,
+        offset: link.offset + link.asymmetry,
     }
 }
 
@@ -271,6 +278,8 @@ pub fn background<const N: usize, const B: usize>(
         prior,
         prior_name,
         truth: truth.map(|truth| prior_parameters(&truth)),
+        temperature_c: leg.temperature_c,
+        asked: leg.joints.iter().map(Asked::of).collect(),
         stribeck_truth: core::array::from_fn(|joint| stribeck_truth(leg.joints.get(joint)?)),
     })
 }

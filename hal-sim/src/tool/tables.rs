@@ -213,6 +213,7 @@ fn run_text(run: &RunReport) -> String {
     ];
     lines.push(consistent_line(run));
     lines.extend(run.stribeck.iter().map(StribeckReport::line));
+    lines.extend(super::model_choice::lines(&run.model_choice, &run.asymmetric_coulomb));
     lines.extend(run.outliers.line());
     lines.extend(run.tracking.iter().map(|tracking| {
         format!(
@@ -239,6 +240,12 @@ fn run_text(run: &RunReport) -> String {
             number(compared.chi2_limit.into())
         )
     }));
+    lines.extend(
+        run.compared
+            .as_ref()
+            .and_then(|compared| compared.warning.as_ref())
+            .map(|words| format!("warning: {words}")),
+    );
     lines.join("\n") + "\n"
 }
 

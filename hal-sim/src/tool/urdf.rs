@@ -57,6 +57,8 @@ struct Link<'a> {
     joint: &'a StoredJoint,
     parameters: JointParameters<f64>,
     body: RigidBody<f64>,
+    /// The constant column is a difference of friction between the directions.
+    is_asymmetric: bool,
     /// Names of parameters by what is known of them.
     standing: String,
 }
@@ -97,7 +99,25 @@ impl<'a> Link<'a> {
             of(&["grouped"]),
             of(&["prior"])
         );
-        Ok(Self { joint, parameters, body, standing })
+        let is_asymmetric = model.full_set.parameters.iter().any(|parameter| {
+            ModelFile::is_asymmetry(&parameter.name)
+                && model.parameter(&parameter.name).is_some_and(|(own, _)| own == number)
+        });
+        Ok(Self { joint, parameters, body, is_asymmetric, standing })
+    }
+
+    /// What the constant column says, in words.
+    fn constant(&self) -> String {
+        let (level, half) = (self.parameter(Parameter::FC), self.parameter(Parameter::OFF));
+        if self.is_asymmetric {
+            let (forward, backward) = (level + half, level - half);
+            format!(
+                "Coulomb friction that differs between the directions: {forward} N m while the D-H angle grows, {backward} N m \
+                 while it falls; friction is their mean"
+            )
+        } else {
+            format!("the torque offset along the D-H angle, {half} N m")
+        }
     }
 
     fn parameter(&self, parameter: Parameter) -> f64 {
@@ -179,9 +199,9 @@ fn joint(xml: &mut Xml, link: &Link<'_>, parent: &str, child: &str) -> io::Resul
         xml,
         &format!(
             "no place in this format for the rotor inertia at the joint, {} kg m2 (MuJoCo, Pinocchio: armature), and for \
-             the torque offset along the D-H angle, {} N m",
+             {}",
             link.parameter(Parameter::IA),
-            link.parameter(Parameter::OFF)
+            link.constant()
         ),
     )?;
     inside(xml, "joint", &[("name", stored.name.as_str().into()), ("type", "revolute".into())], |xml| {

@@ -207,7 +207,9 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
     }
 
     fn watch_search(&mut self, pair: &Pair<N, B>) {
-        let Some(solver) = pair.leg.identification().solver() else { return };
+        // Until it is decided which columns are there, costs are those of another problem.
+        let solver = pair.leg.identification().solver().filter(|solver| solver.is_selected());
+        let Some(solver) = solver else { return };
         let iterations = solver.search().iterations();
         if self.excess.last().is_some_and(|(seen, _)| *seen == iterations) {
             return;
@@ -339,7 +341,8 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
                 Some(RecordedMotion { name: (*name).into(), record, truth })
             })
             .collect();
-        let (cramer_rao, surplus_cramer_rao) = self.information.bounds();
+        let (cramer_rao, surplus_cramer_rao) =
+            self.information.without(&found.record().selection.dropped).bounds();
         let circumstances = Circumstances {
             seed: Some(options.seed),
             cramer_rao: Some(cramer_rao),

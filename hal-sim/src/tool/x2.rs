@@ -77,6 +77,7 @@ fn link(segments: &[Segment], [rotor_inertia, coulomb, viscous]: Drive) -> LinkP
         coulomb,
         viscous,
         offset: 0.0,
+        asymmetry: 0.0,
     }
 }
 
@@ -127,6 +128,7 @@ pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
         gravity: [9.81, 0.0, 0.0],
         torque_noise_percent: 7.0,
         bandwidth_hz: 16.0,
+        temperature_c: None,
         pushes: None,
         side: BodySide::Right,
         segments: Some(SegmentsFile {

@@ -12,7 +12,7 @@ use crate::tool::replay::Source;
 use crate::tool::report::RunReport;
 use crate::tool::series::Series;
 use crate::tool::setup::PriorChoice;
-use crate::tool::{figures, html, tables};
+use crate::tool::{figures, html, tables, temperature};
 
 /// How parameters are found from the joints' rows.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -67,6 +67,9 @@ pub struct Common {
     /// none, file, or wrong:PERCENT; the leg file's unless given.
     #[arg(long)]
     pub prior: Option<PriorChoice>,
+    /// Temperature of the drives, degrees Celsius (-40 to 125), kept with the result; the leg file's unless given.
+    #[arg(long, value_name = "C", allow_negative_numbers = true, value_parser = temperature::parse)]
+    temperature: Option<f64>,
     /// Write the report here, for exit codes 0 and 3.
     #[arg(long)]
     pub json: Option<PathBuf>,
@@ -82,6 +85,12 @@ pub struct Common {
 }
 
 impl Common {
+    /// The leg as it is set, at the temperature that is stated.
+    pub fn leg(&self) -> Result<LegFile, ToolError> {
+        let leg = self.leg.load()?;
+        Ok(LegFile { temperature_c: self.temperature.or(leg.temperature_c), ..leg })
+    }
+
     /// Whether curves are wanted.
     pub fn is_drawn(&self) -> bool {
         self.figures.is_some() || self.report.is_some()

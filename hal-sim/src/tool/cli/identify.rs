@@ -69,7 +69,7 @@ const LARGEST_SEED_COUNT: u64 = 100_000;
 
 /// Identifies and reports; the exit code.
 pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
-    let leg = &arguments.common.leg.load()?;
+    let leg = &arguments.common.leg()?;
     if arguments.torque_noise.is_some_and(|percent| !(0.0..=1000.0).contains(&percent)) {
         return Err(ToolError::input("--torque-noise: a percentage from 0 to 1000"));
     }

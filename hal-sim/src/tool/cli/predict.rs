@@ -8,7 +8,7 @@ use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, ToolError};
 use crate::tool::model_file::{ModelFile, refuse_another_leg};
 use crate::tool::predict::{self, PredictOptions};
-use crate::tool::tables;
+use crate::tool::{tables, temperature};
 
 /// Which model and which states.
 #[derive(Args, Debug)]
@@ -36,6 +36,9 @@ pub fn run(arguments: &PredictArguments) -> Result<u8, ToolError> {
     let model = ModelFile::load(&arguments.model)?;
     if let Some(leg) = &leg {
         refuse_another_leg(&model, &arguments.model.display().to_string(), leg)?;
+        if let Some(words) = temperature::warning(model.conditions.temperature_c, leg.temperature_c) {
+            eprintln!("warning: {}: {words}", arguments.model.display());
+        }
     }
     let options = PredictOptions { states: arguments.states.clone(), anatomical: arguments.anatomical };
     let table = predict::table(&model, &options)?;

@@ -38,7 +38,7 @@ pub struct ReplayArguments {
 
 /// Identifies and reports; the exit code.
 pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
-    let leg = &arguments.common.leg.load()?;
+    let leg = &arguments.common.leg()?;
     if arguments.split.is_some_and(|fraction| !(fraction > 0.0 && fraction < 1.0)) {
         return Err(ToolError::input("--split: a fraction above 0 and below 1"));
     }

@@ -18,7 +18,7 @@
 //! steps, sticking and the drive's lag make in this motion (`systematic`). It is one sample of an error that depends on the
 //! motion, not a standard deviation, and no average over runs removes it.
 
-use scarab::ident::{DECIMATION, Estimate, Estimator, Plan, Problem, Record, RowModel};
+use scarab::ident::{DECIMATION, Estimate, Estimator, Plan, Problem, Record, RowModel, Selection};
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase};
 use scarab::motion::ExcitationTable;
 use scarab::servo::TICKS_PER_LOG;
@@ -110,7 +110,8 @@ pub fn rehearse<const N: usize, const B: usize>(
     let Some(solver) = pair.leg.identification().solver() else {
         return Err(SetupError::new(assumed, "the excitation ended without a record").into());
     };
-    let record = solver.record().convert::<f64>();
+    // What data will leave out is not known beforehand: every column counts.
+    let record = Record { selection: Selection::all(), ..solver.record().convert::<f64>() };
     let model = context.background.model.clone();
     let assumed = context.background.truth.map_or([0.0; B], |truth| model.base.project(&truth));
     let samples = motion.duration_ticks() as usize / TICKS_PER_LOG as usize;

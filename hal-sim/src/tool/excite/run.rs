@@ -15,7 +15,7 @@ use super::file::{Excitation, Expected, Proved, geometry};
 use super::report::{
     ComparedBase, ExciteReport, ExpectedBase, ExpectedParameter, JointReport, RandomMotion, SCHEMA,
 };
-use crate::tool::analysis::{Background, parameter_name};
+use crate::tool::analysis::Background;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 use crate::tool::motions::EXCITATION_CYCLES;
@@ -260,7 +260,7 @@ fn parameters<const N: usize, const B: usize>(
             for terms in carriers.iter().map(|&carrier| model.base.terms(carrier)) {
                 for (other, symbol) in (0..N).flat_map(|other| Parameter::ALL.map(|symbol| (other, symbol))) {
                     if terms[other][symbol.index()] != 0.0 && (other, symbol) != (joint, parameter) {
-                        grouped_with.push(parameter_name(other, symbol));
+                        grouped_with.push(background.name(other, symbol));
                     }
                 }
             }
@@ -268,7 +268,7 @@ fn parameters<const N: usize, const B: usize>(
             grouped_with.dedup();
             let alone = matches!(status.name(), "identified" | "weak").then(|| carriers.first()).flatten();
             all.push(ExpectedParameter {
-                name: parameter_name(joint, parameter),
+                name: background.name(joint, parameter),
                 joint: joint + 1,
                 unit: parameter.unit(),
                 assumed: background.truth.map(|truth| truth[joint][parameter.index()]).into(),

@@ -10,13 +10,14 @@ use super::super::report::{Number, RunReport};
 use super::number;
 
 /// Keys that the page shows in sections of their own.
-const KNOWN: [&str; 26] = [
+const KNOWN: [&str; 27] = [
     "schema",
     "leg",
     "seed",
     "swarm_seed",
     "prior",
     "plan",
+    "temperature_c",
     "verdict",
     "reasons",
     "rank",

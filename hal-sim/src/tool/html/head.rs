@@ -39,6 +39,10 @@ pub fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
         ("Prior", prior(&run.prior)),
         ("Plan", run.plan.into()),
         (
+            "Temperature",
+            run.temperature_c.known().map_or("unknown".into(), |celsius| format!("{celsius} \u{b0}C")),
+        ),
+        (
             if run.seed.is_some() { "Simulated time" } else { "Recorded time" },
             format!("{:.1} s", run.simulated_s),
         ),

@@ -4,7 +4,7 @@
 //! not what is unusual. A body is possible if its mass is positive, its inertia about the centre of mass
 //! positive definite and no principal moment as large as the sum of the two others.
 
-use super::{JointFile, LegFile, LinkParameters};
+use super::{JointFile, LegFile, LinkParameters, Switch};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
 
@@ -67,6 +67,10 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
     top.within("torque_noise_percent", leg.torque_noise_percent, 0.0, 100.0)?;
     // Above 25 Hz the rows at 50 Hz would be independent, and noise would alias into them.
     top.within("bandwidth_hz", leg.bandwidth_hz, 1.0, 25.0)?;
+    if let Some(celsius) = leg.temperature_c {
+        let (low, high) = crate::tool::temperature::RANGE_C;
+        top.within("temperature_c", celsius, low, high)?;
+    }
     if let Some(pushes) = &leg.pushes {
         let place = Place { joint: None, table: Some("pushes") };
         place.positive("per_minute", pushes.per_minute, 600.0)?;
@@ -134,6 +138,11 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
         place.within("percent", outliers.percent, 0.0, 100.0)?;
         place.positive("torque_nm", outliers.torque_nm, 1000.0)?;
     }
+    if (joint.offset, joint.asymmetric_coulomb) == (Switch::On, Switch::On) {
+        let complaint = "is on and so is `offset`: while the joint moves a torque offset and a difference of Coulomb \
+                         friction between the directions are the same column; one of them must be off";
+        return Err(place.fault("asymmetric_coulomb", complaint));
+    }
     for (table, parameters) in [("truth", &joint.truth), ("prior", &joint.prior)] {
         if let Some(parameters) = parameters {
             link(&inside(table), parameters)?;
@@ -175,5 +184,7 @@ fn link(place: &Place<'_>, link: &LinkParameters) -> Result<(), Fault> {
     place.within("rotor_inertia", link.rotor_inertia, 0.0, 100.0)?;
     place.within("coulomb", link.coulomb, 0.0, 1000.0)?;
     place.within("viscous", link.viscous, 0.0, 1000.0)?;
-    place.within("offset", link.offset, -1000.0, 1000.0)
+    place.within("offset", link.offset, -1000.0, 1000.0)?;
+    // Friction feeds nothing in either direction.
+    place.within("asymmetry", link.asymmetry, -link.coulomb, link.coulomb)
 }

@@ -48,7 +48,9 @@ impl JointFile {
             friction: FrictionDescription {
                 coulomb: truth.coulomb,
                 viscous: truth.viscous,
-                offset: truth.offset,
+                // Friction of coulomb + asymmetry one way and coulomb - asymmetry the other is, moving and at rest alike,
+                // friction of coulomb both ways and a constant torque.
+                offset: truth.offset + truth.asymmetry,
                 stribeck: self.stribeck.map(|stribeck| Stribeck {
                     static_level: stribeck.static_nm,
                     speed: stribeck.speed_rad_s,

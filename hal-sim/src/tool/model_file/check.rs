@@ -11,6 +11,8 @@ use super::{
 };
 use crate::tool::analysis::parameter_name;
 use crate::tool::leg_file::LegFile;
+use crate::tool::model_choice::asymmetry_name;
+use crate::tool::temperature::RANGE_C;
 
 /// Smallest eigenvalue of the correlations.
 const SMALLEST_EIGENVALUE: f64 = -1e-5;
@@ -36,6 +38,11 @@ pub(super) fn model(model: &ModelFile) -> Checked {
         if !(value > 0.0 && value.is_finite()) {
             return Err(fault(&conditions(key), format!("`{key}` is {value}; it must be above 0")));
         }
+    }
+    let (low, high) = RANGE_C;
+    if let Some(celsius) = model.conditions.temperature_c.filter(|celsius| !(low..=high).contains(celsius)) {
+        let reason = format!("`temperature_c` is {celsius}, outside {low}..{high}");
+        return Err(fault(&conditions("temperature_c"), reason));
     }
     if !["relative", "absolute"].contains(&model.conditions.scale.as_str()) {
         let reason = format!("`scale` is `{}`, neither relative nor absolute", model.conditions.scale);
@@ -82,8 +89,8 @@ fn base_set(model: &ModelFile) -> Checked {
     }
     for (number, base) in set.parameters.iter().enumerate() {
         let steps = place(number);
-        known(model, &base.carrier, &steps)?;
-        if set.parameters[..number].iter().any(|other| other.carrier == base.carrier) {
+        let carrier = known(model, &base.carrier, &steps)?;
+        if set.parameters[..number].iter().any(|other| model.parameter(&other.carrier) == Some(carrier)) {
             return Err(fault(&steps, format!("`{}` carries two base parameters", base.carrier)));
         }
         for (name, factor) in &base.terms {
@@ -171,8 +178,10 @@ fn full_set(model: &ModelFile) -> Checked {
     }
     for (number, parameter) in parameters.iter().enumerate() {
         let (joint, symbol) = (number / PARAMETERS_PER_JOINT, Parameter::ALL[number % PARAMETERS_PER_JOINT]);
-        one_parameter(parameter, &parameter_name(joint, symbol), symbol)
-            .map_err(|reason| fault(&place(number), reason))?;
+        let plain = parameter_name(joint, symbol);
+        let other = (symbol == Parameter::OFF).then(|| asymmetry_name(joint));
+        let name = other.filter(|other| *other == parameter.name).unwrap_or(plain);
+        one_parameter(parameter, &name, symbol).map_err(|reason| fault(&place(number), reason))?;
     }
     Ok(())
 }

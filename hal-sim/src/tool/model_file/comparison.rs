@@ -17,6 +17,7 @@ use nalgebra::SVector;
 
 use super::{LARGEST_BASE_SET, ModelFile, padded};
 use crate::tool::report::{ComparisonReport, DifferenceReport, RunReport};
+use crate::tool::temperature;
 
 /// 999 of 1000 of a normal distribution lie below so many standard deviations.
 const NORMAL_QUANTILE: f64 = 3.090_232;
@@ -92,6 +93,7 @@ pub fn compare(model: &ModelFile, file: &str, run: &RunReport) -> Option<Compari
         chi2_limit,
         differences,
         not_compared,
+        warning: temperature::warning(model.conditions.temperature_c, run.temperature_c.known()),
     })
 }
 

@@ -2,15 +2,14 @@
 
 use std::path::Path;
 
-use scarab::ident::Estimate;
-use scarab::model::Standing;
+use scarab::ident::{Estimate, Solver};
 
 use super::StoredStribeck;
 use super::{
     BaseSet, Conditions, FullSet, MODEL_SCHEMA, ModelFile, StoredBase, StoredFit, StoredJoint, StoredLeg,
     StoredParameter, fingerprint,
 };
-use crate::tool::analysis::{Background, parameter_name};
+use crate::tool::analysis::Background;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 use crate::tool::report::{FitReport, ModelDetail, RunReport};
@@ -18,21 +17,24 @@ use crate::tool::report::{FitReport, ModelDetail, RunReport};
 impl<const N: usize, const B: usize> Background<N, B> {
     /// What a model file keeps beyond the report. The covariance is symmetric up to rounding and is made exactly so.
     #[must_use]
-    pub fn detail(&self, estimate: &Estimate<f32, B>) -> ModelDetail {
+    pub fn detail(&self, solver: &Solver<f32, N, B>, estimate: &Estimate<f32, B>) -> ModelDetail {
         let base = &self.model.base;
-        let rank = base.rank();
+        let kept: Vec<usize> = self.kept(solver).collect();
         let element = |row: usize, column: usize| {
             0.5 * (f64::from(estimate.covariance[row][column]) + f64::from(estimate.covariance[column][row]))
         };
-        let carriers = (0..rank).filter_map(|index| base.independent(index));
+        let carriers = kept.iter().filter_map(|&index| base.independent(index));
         let parameters =
             (0..N).flat_map(|joint| scarab::model::Parameter::ALL.map(|parameter| (joint, parameter)));
         ModelDetail {
-            covariance: (0..rank).map(|row| (0..rank).map(|column| element(row, column)).collect()).collect(),
-            carriers: carriers.map(|(joint, parameter)| parameter_name(joint, parameter)).collect(),
+            covariance: kept
+                .iter()
+                .map(|&row| kept.iter().map(|&column| element(row, column)).collect())
+                .collect(),
+            carriers: carriers.map(|(joint, parameter)| self.name(joint, parameter)).collect(),
             not_estimated: parameters
-                .filter(|&(joint, parameter)| base.standing(joint, parameter) == Standing::Off)
-                .map(|(joint, parameter)| parameter_name(joint, parameter))
+                .filter(|&(joint, parameter)| self.is_zero(solver, joint, parameter))
+                .map(|(joint, parameter)| self.name(joint, parameter))
                 .collect(),
         }
     }
@@ -134,6 +136,7 @@ fn conditions(run: &RunReport, bandwidth_hz: f64) -> Conditions {
         seed: run.seed.map(|seed| seed.to_string()),
         swarm_seed: run.swarm_seed.to_string(),
         condition: run.condition.known(),
+        temperature_c: run.temperature_c.known(),
         not_estimated: run.detail.not_estimated.clone(),
         fits: training.chain(validation).collect(),
     }

@@ -1,0 +1,44 @@
+//! What of the model is estimated: asked for, ruled out, or left to the data.
+
+use serde::{Deserialize, Serialize};
+
+/// Whether something is estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Switch {
+    /// If the data tell it.
+    Auto,
+    /// It is.
+    On,
+    /// It is not.
+    Off,
+}
+
+impl Switch {
+    /// The word in leg files and reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::On => "on",
+            Self::Off => "off",
+        }
+    }
+
+    pub(super) const fn on() -> Self {
+        Self::On
+    }
+
+    pub(super) const fn auto() -> Self {
+        Self::Auto
+    }
+
+    pub(super) const fn off() -> Self {
+        Self::Off
+    }
+
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+    pub(super) const fn is_off(&self) -> bool {
+        matches!(self, Self::Off)
+    }
+}

@@ -1,0 +1,295 @@
+//! What of each joint's model was asked for, what was used, and why.
+//!
+//! The firmware decides (`scarab::ident::selection`, `scarab::ident::stribeck`); here leg files become its choices and
+//! its decisions become words.
+//!
+//! | `offset` | `asymmetric_coulomb` | the constant column is |
+//! | --- | --- | --- |
+//! | on, auto | off, auto | the offset, kept or as the data tell; a difference of the directions is not told apart from it |
+//! | off, auto | on | the difference of the directions, kept |
+//! | off | auto | the same as the data tell |
+//! | off | off | not there |
+//! | on | on | refused: they are one column |
+
+use scarab::ident::{Choice, Constant, DriveChoice, Estimate, Solver, selection, stribeck};
+use scarab::model::{Parameter, Standing};
+use serde::Serialize;
+
+use super::analysis::Background;
+use super::leg_file::{JointFile, Switch};
+use super::report::Number;
+use super::tables::number;
+
+/// What a leg file asks of one joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    rotor: Switch,
+    offset: Switch,
+    stribeck: Switch,
+    asymmetric: Switch,
+}
+
+impl Asked {
+    /// Of a joint.
+    #[must_use]
+    pub fn of(joint: &JointFile) -> Self {
+        Self {
+            rotor: joint.rotor,
+            offset: joint.offset,
+            stribeck: joint.stribeck_model,
+            asymmetric: joint.asymmetric_coulomb,
+        }
+    }
+}
+
+fn choice(switch: Switch) -> Choice {
+    match switch {
+        Switch::Auto => Choice::Auto,
+        Switch::On => Choice::On,
+        Switch::Off => Choice::Off,
+    }
+}
+
+/// What the firmware is to do about a joint's rotor and constant column.
+#[must_use]
+pub fn drive_choice(joint: &JointFile) -> DriveChoice {
+    let (constant, meaning) = match (joint.offset, joint.asymmetric_coulomb) {
+        (Switch::Off | Switch::Auto, Switch::On) => (Choice::On, Constant::Asymmetry),
+        (Switch::Off, Switch::Auto) => (Choice::Auto, Constant::Asymmetry),
+        (offset, _) => (choice(offset), Constant::Offset),
+    };
+    DriveChoice { rotor: choice(joint.rotor), constant, meaning }
+}
+
+/// Whether a joint's Stribeck friction is looked for.
+#[must_use]
+pub fn stribeck_choice(joint: &JointFile) -> Choice {
+    choice(joint.stribeck_model)
+}
+
+/// One part of one joint's model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModelChoiceReport {
+    /// Counted from 1.
+    pub joint: usize,
+    /// `rotor`, `offset`, `stribeck` or `asymmetric_coulomb`, as in leg files.
+    pub option: &'static str,
+    /// `auto`, `on` or `off`.
+    pub asked: &'static str,
+    /// `on` or `off`.
+    pub used: &'static str,
+    /// Chi-square that it explains; unknown where nothing was asked of the data.
+    pub gain_chi2: Number,
+    /// Less is dropped.
+    pub limit_chi2: Number,
+    /// In words.
+    pub why: String,
+}
+
+/// Coulomb friction of one joint in both directions.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DirectionsReport {
+    /// Counted from 1.
+    pub joint: usize,
+    /// While the D-H angle grows, N m.
+    pub forward_nm: Number,
+    /// Standard deviation.
+    pub forward_sigma_nm: Number,
+    /// While it falls, N m, not negative for friction.
+    pub backward_nm: Number,
+    /// Standard deviation.
+    pub backward_sigma_nm: Number,
+}
+
+/// What was decided, and the words for it.
+struct Decision {
+    used: bool,
+    gain: Option<f64>,
+    limit: Option<f64>,
+    why: String,
+}
+
+fn decided(used: bool, why: &str) -> Decision {
+    Decision { used, gain: None, limit: None, why: why.into() }
+}
+
+impl<const N: usize, const B: usize> Background<N, B> {
+    /// Name of a parameter in this leg's reports: `FCA1` where the constant column is a difference of the directions.
+    #[must_use]
+    pub fn name(&self, joint: usize, parameter: Parameter) -> String {
+        if parameter == Parameter::OFF && self.meaning(joint) == Constant::Asymmetry {
+            return asymmetry_name(joint);
+        }
+        super::analysis::parameter_name(joint, parameter)
+    }
+
+    fn meaning(&self, joint: usize) -> Constant {
+        self.device.drive_choice.get(joint).map_or(Constant::Offset, |choice| choice.meaning)
+    }
+
+    /// All options of all joints.
+    #[must_use]
+    pub fn model_choice(&self, solver: &Solver<f32, N, B>) -> Vec<ModelChoiceReport> {
+        let of = |(joint, asked): (usize, &Asked)| {
+            let report = |option, asked: Switch, decision: Decision| ModelChoiceReport {
+                joint: joint + 1,
+                option,
+                asked: asked.name(),
+                used: if decision.used { "on" } else { "off" },
+                gain_chi2: decision.gain.into(),
+                limit_chi2: decision.limit.into(),
+                why: decision.why,
+            };
+            [
+                report("rotor", asked.rotor, self.column(solver, joint, Parameter::IA, asked.rotor)),
+                report("offset", asked.offset, self.offset(solver, joint, asked)),
+                report("stribeck", asked.stribeck, self.stribeck_decision(solver, joint, asked.stribeck)),
+                report("asymmetric_coulomb", asked.asymmetric, self.asymmetry(solver, joint, asked)),
+            ]
+        };
+        self.asked.iter().enumerate().flat_map(of).collect()
+    }
+
+    fn column(
+        &self,
+        solver: &Solver<f32, N, B>,
+        joint: usize,
+        parameter: Parameter,
+        asked: Switch,
+    ) -> Decision {
+        match asked {
+            Switch::Off => return decided(false, "ruled out"),
+            Switch::On => return decided(true, "asked for"),
+            Switch::Auto => {}
+        }
+        let base = match self.model.base.standing(joint, parameter) {
+            Standing::Alone(base) => base,
+            Standing::Grouped(base) => {
+                let sum = self.base_name(base);
+                return decided(true, &format!("measured in the sum {sum} only: there is no column to drop"));
+            }
+            Standing::Unseen | Standing::Off => return decided(false, "torque never sees it"),
+        };
+        let found = &solver.record().selection;
+        if !found.is_made {
+            return decided(true, "the identification ended before it was decided");
+        }
+        let (used, gain, limit) =
+            (!found.dropped[base], f64::from(found.gain[base]), selection::SMALLEST_GAIN);
+        let why = if used {
+            format!("explains {} chi-square units, {limit} are asked for", number(gain.into()))
+        } else if gain > 0.0 {
+            format!("explains {} chi-square units, fewer than {limit}: held at zero", number(gain.into()))
+        } else {
+            "not told apart from the others by this motion: held at zero".into()
+        };
+        Decision { used, gain: Some(gain), limit: Some(limit), why }
+    }
+
+    fn offset(&self, solver: &Solver<f32, N, B>, joint: usize, asked: &Asked) -> Decision {
+        if self.meaning(joint) == Constant::Asymmetry {
+            return decided(
+                false,
+                match asked.offset {
+                    Switch::Off => "ruled out",
+                    _ => "not told apart from the asymmetric Coulomb friction that was asked for",
+                },
+            );
+        }
+        self.column(solver, joint, Parameter::OFF, asked.offset)
+    }
+
+    fn asymmetry(&self, solver: &Solver<f32, N, B>, joint: usize, asked: &Asked) -> Decision {
+        match (asked.asymmetric, self.meaning(joint)) {
+            (Switch::Off, _) => decided(false, "ruled out"),
+            (_, Constant::Offset) => decided(false, "not told apart from the offset, which is taken for it"),
+            (asymmetric, Constant::Asymmetry) => self.column(solver, joint, Parameter::OFF, asymmetric),
+        }
+    }
+
+    fn stribeck_decision(&self, solver: &Solver<f32, N, B>, joint: usize, asked: Switch) -> Decision {
+        let used = solver.record().stribeck[joint].is_some();
+        let Some((gain, surplus)) = solver.record().selection.stribeck[joint] else {
+            return decided(
+                used,
+                match asked {
+                    Switch::Off => "ruled out",
+                    _ => "not looked for: plain least squares, or nothing was recorded",
+                },
+            );
+        };
+        let (gain, surplus) = (f64::from(gain), f64::from(surplus));
+        if asked == Switch::On {
+            let why = if used { "asked for" } else { "asked for, but the best curve explains nothing" };
+            return Decision { gain: Some(gain), ..decided(used, why) };
+        }
+        let limit = stribeck::SMALLEST_GAIN;
+        let size = f64::from(solver.record().torque[joint].root_mean_square);
+        let share = 100.0 * surplus / size;
+        let why = format!(
+            "explains {} chi-square units, {limit} are asked for; {} % of the torque's rms, {} are asked for",
+            number(gain.into()),
+            number(share.into()),
+            100.0 * stribeck::SMALLEST_SURPLUS_SHARE
+        );
+        Decision { used, gain: Some(gain), limit: Some(limit), why }
+    }
+
+    /// Coulomb friction of both directions, of joints where they differ by what was measured.
+    #[must_use]
+    pub fn directions(
+        &self,
+        solver: &Solver<f32, N, B>,
+        estimate: &Estimate<f32, B>,
+    ) -> Vec<DirectionsReport> {
+        let of = |joint: usize| {
+            if self.meaning(joint) != Constant::Asymmetry {
+                return None;
+            }
+            let [level, half] =
+                [Parameter::FC, Parameter::OFF].map(|parameter| self.device.drive(joint, parameter));
+            let (level, half) = (level?, half.filter(|&base| !solver.record().selection.dropped[base])?);
+            let direction = |sign: f32| {
+                let mut weights = [0.0; B];
+                (weights[level], weights[half]) = (1.0, sign);
+                let value = estimate.values[level] + sign * estimate.values[half];
+                (Number::from(value), Number::from(estimate.sigma_of(&weights)))
+            };
+            let (forward, backward) = (direction(1.0), direction(-1.0));
+            Some(DirectionsReport {
+                joint: joint + 1,
+                forward_nm: forward.0,
+                forward_sigma_nm: forward.1,
+                backward_nm: backward.0,
+                backward_sigma_nm: backward.1,
+            })
+        };
+        (0..N).filter_map(of).collect()
+    }
+}
+
+/// Name of half the difference of Coulomb friction between the directions.
+#[must_use]
+pub fn asymmetry_name(joint: usize) -> String {
+    format!("FCA{}", joint + 1)
+}
+
+/// What was left to the data, a line each.
+#[must_use]
+pub fn lines(choices: &[ModelChoiceReport], directions: &[DirectionsReport]) -> Vec<String> {
+    let open = choices.iter().filter(|choice| choice.asked == "auto");
+    let open = open.map(|choice| {
+        format!("model, joint {}: {} {} (auto): {}", choice.joint, choice.option, choice.used, choice.why)
+    });
+    let directions = directions.iter().map(|found| {
+        format!(
+            "Coulomb friction of joint {}: {} +- {} N m while the D-H angle grows, {} +- {} N m while it falls",
+            found.joint,
+            number(found.forward_nm),
+            number(found.forward_sigma_nm),
+            number(found.backward_nm),
+            number(found.backward_sigma_nm)
+        )
+    });
+    open.chain(directions).collect()
+}
