@@ -5,30 +5,37 @@
 //!
 //! ```text
 //! z_j = d tau / d ln a_j,   d tau / d q0_j                   at the model's parameters, by a difference quotient
-//! r   = Y nu + z delta + noise                               rows of the held-out motions
-//! L'L = sum R'R / s^2 of these motions,   u = L^-T Y'z,   w = L^-T Y'r
-//! S   = z'z - u'u,      delta = (z'r - u'w) / S,      sigma = 1 / sqrt S
+//! r   = Y nu + z delta + noise                               rows of the held-out motions, over sigma of their joint
+//! R   = triangular factor of (Y, z, r);  u_j, w: what of z_j and r lies below the rows of Y
+//! S   = u'u,      delta = u'w / S,      sigma = 1 / sqrt S
 //! ```
 //!
 //! delta is the share by which a link is longer than believed, or the angle by which a zero is off: of each alone, the
 //! parameters free to follow. It is zero within sigma for a leg as believed (score test, Rao 1948). The motion
 //! identified from cannot take part: while it streams by the parameters are not known, and z with them.
 //!
+//! A push of the wearer asks for nothing, but z'r would take it for geometry: rows within [`HELD`] rows of one that misses by
+//! more than is expected are left out. A wrong length or zero misses by a few per cent of the torque, never by so much.
+//!
 //! What torque cannot tell: the zero of the last joint turns that link's own frame and is absorbed exactly by its first
-//! moments, and the lengths before the first joint move nothing; there S vanishes beside z'z and nothing is said.
+//! moments, and the lengths before the first joint move nothing: neither is looked at.
 //! Derivatives are rigid-body ones, which lie in the filter's passband, so z is taken at the row's centre unfiltered.
-//! Cost: one torque evaluation for each of up to 2 N directions, 50 times a second. Memory: N (2 N (B + 2 N + 1) + B)
-//! numbers and a queue of row centres.
+//! Cost: one torque evaluation for each of 2 (N - 1) directions and one row rotated into B + 4 columns for each joint, 50
+//! times a second. Memory: 561 numbers, N (B + 6) for each of [`HELD`] rows and a queue of row centres.
 
-use super::factor::Factor;
+use super::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE};
 use super::record::{LARGEST_STILL_SHARE, RowModel};
 use super::rows::{DECIMATION, FilteredRows};
 use super::smoothing::Smoothed;
 use crate::model::{Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, rigid_body_torques};
 use crate::real::{self, Real};
 
-/// Directions looked at: the length before each joint, then each joint's zero; room for three joints.
-pub const DIRECTIONS: usize = 6;
+/// Directions looked at: the length before each joint but the first, then the zero of each joint but the last; room for
+/// three joints.
+pub const DIRECTIONS: usize = 4;
+/// Rows held back, and left out beside one that misses by more than is expected: 0.3 s, the longer half of a push with the
+/// filter's reach.
+pub const HELD: usize = 15;
 /// A direction of which the parameters absorb all but this share of its power says nothing: single precision leaves 6e-7
 /// of one that is absorbed wholly; of the first joint's zero, most of which is gravity's, 6e-5 remain.
 const SEEN_SHARE: f64 = 1e-5;
@@ -60,30 +67,36 @@ pub struct Misalignment<T> {
 /// Of every direction that is seen.
 pub type Misalignments<T> = [Option<Misalignment<T>>; DIRECTIONS];
 
-/// Sums over the rows of one joint.
-#[derive(Clone, Debug, PartialEq)]
-struct Sums<T, const B: usize> {
-    /// z'z of each direction alone.
-    power: [T; DIRECTIONS],
-    /// z'r.
-    with_residual: [T; DIRECTIONS],
-    /// Y'z.
-    with_columns: [[T; B]; DIRECTIONS],
-    /// Y'r.
-    residual: [T; B],
+/// One row of each joint, held back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct HeldRow<T, const N: usize, const B: usize> {
+    used: [bool; N],
+    columns: [[T; B]; N],
+    directions: [[T; N]; DIRECTIONS],
+    residual: [T; N],
 }
 
-/// The directions' sums over all held-out motions of one identification.
+/// The directions' factor over all held-out motions of one identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment<T, const N: usize, const B: usize, const PENDING: usize> {
-    sums: [Sums<T, B>; N],
+    /// Packed: base columns, directions, residual.
+    factor: [T; LARGEST_SIZE],
+    wild: [T; N],
+    weight: [T; N],
+    /// Columns that are not estimated.
+    dropped: [bool; B],
+    held: [HeldRow<T, N, B>; HELD],
+    /// Rows since the motion began, and of them those that left [`Self::held`].
+    rows: usize,
+    left: usize,
+    /// The last row of each joint that missed by more than is expected.
+    last_wild: [Option<usize>; N],
     /// Directions at the centres of rows that are not finished yet.
     queue: [[[T; N]; DIRECTIONS]; PENDING],
     next: usize,
     waiting: usize,
     /// Smoothed instants since the motion began.
     instants: usize,
-    rows: u32,
 }
 
 impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T, N, B, PENDING> {
@@ -91,35 +104,47 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
     #[must_use]
     pub fn new() -> Self {
         let zero = T::zero();
+        let row = HeldRow {
+            used: [false; N],
+            columns: [[zero; B]; N],
+            directions: [[zero; N]; DIRECTIONS],
+            residual: [zero; N],
+        };
         Self {
-            sums: core::array::from_fn(|_| Sums {
-                power: [zero; DIRECTIONS],
-                with_residual: [zero; DIRECTIONS],
-                with_columns: [[zero; B]; DIRECTIONS],
-                residual: [zero; B],
-            }),
+            factor: [zero; LARGEST_SIZE],
+            wild: [T::LARGEST; N],
+            weight: [zero; N],
+            dropped: [false; B],
+            held: [row; HELD],
+            rows: 0,
+            left: 0,
+            last_wild: [None; N],
             queue: [[[zero; N]; DIRECTIONS]; PENDING],
             next: 0,
             waiting: 0,
             instants: 0,
-            rows: 0,
         }
     }
 
     /// Forgets all motions.
     pub fn clear(&mut self) {
-        for sums in &mut self.sums {
-            sums.power = [T::zero(); DIRECTIONS];
-            sums.with_residual = [T::zero(); DIRECTIONS];
-            sums.with_columns = [[T::zero(); B]; DIRECTIONS];
-            sums.residual = [T::zero(); B];
-        }
-        self.rows = 0;
         self.break_off();
+        self.factor.fill(T::zero());
     }
 
-    /// Another motion begins, or the samples that follow do not continue those before.
+    /// Another motion begins: a row that misses by more than `wild` N m is disturbed, `noise` is the standard deviation of an
+    /// independent row of each joint, N m. Columns that were `dropped` are not free to follow.
+    pub fn begin(&mut self, wild: &[T; N], noise: &[T; N], dropped: &[bool; B]) {
+        self.break_off();
+        (self.wild, self.weight, self.dropped) = (*wild, noise.map(|noise| T::one() / noise), *dropped);
+    }
+
+    /// The samples that follow do not continue those before: what was held back is taken.
     pub fn break_off(&mut self) {
+        while self.left < self.rows {
+            self.release();
+        }
+        (self.rows, self.left, self.last_wild) = (0, 0, [None; N]);
         (self.next, self.waiting, self.instants) = (0, 0, 0);
     }
 
@@ -151,68 +176,86 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
             self.next = (self.next + 1) % PENDING.max(1);
             self.waiting -= 1;
             if let Some(centre) = centre.filter(|_| rows.is_finite()) {
-                self.add(values, rows, &centre);
+                self.hold(values, rows, centre);
             }
         }
     }
 
-    fn add(&mut self, values: &[T; B], rows: &FilteredRows<T, N, B>, centre: &[[T; N]; DIRECTIONS]) {
-        self.rows = self.rows.saturating_add(1);
-        for (joint, sums) in self.sums.iter_mut().enumerate() {
-            if rows.still[joint] > T::of(LARGEST_STILL_SHARE) {
+    fn hold(&mut self, values: &[T; B], rows: &FilteredRows<T, N, B>, directions: [[T; N]; DIRECTIONS]) {
+        let used = rows.still.map(|still| !(still > T::of(LARGEST_STILL_SHARE)));
+        let mut residual = rows.torque;
+        for joint in 0..N {
+            let row = rows.regressor[joint].iter().zip(values);
+            residual[joint] -= row.fold(T::zero(), |sum, (&y, &p)| sum + y * p);
+            if used[joint] && real::abs(residual[joint]) > self.wild[joint] {
+                self.last_wild[joint] = Some(self.rows);
+            }
+        }
+        if let Some(slot) = self.held.get_mut(self.rows % HELD) {
+            *slot = HeldRow { used, columns: rows.regressor, directions, residual };
+        }
+        self.rows += 1;
+        if self.rows - self.left >= HELD {
+            self.release();
+        }
+    }
+
+    /// The oldest row that is held leaves: into the factor, unless it is too near to a disturbance.
+    fn release(&mut self) {
+        let row = self.left;
+        self.left += 1;
+        let Some(held) = self.held.get(row % HELD).copied() else { return };
+        for joint in (0..N).filter(|&joint| held.used[joint]) {
+            if self.last_wild[joint].is_some_and(|wild| wild + HELD >= row) {
                 continue;
             }
-            let row = &rows.regressor[joint];
-            let fitted = row.iter().zip(values).fold(T::zero(), |sum, (&y, &p)| sum + y * p);
-            let residual = rows.torque[joint] - fitted;
-            for (sum, &element) in sums.residual.iter_mut().zip(row) {
-                *sum += element * residual;
+            let mut entering = [T::zero(); LARGEST_COLUMNS + 1];
+            let directions = held.directions.iter().map(|torque| torque[joint]);
+            let columns = held.columns[joint].iter().zip(&self.dropped);
+            let columns = columns.map(|(&element, &dropped)| if dropped { T::zero() } else { element });
+            let elements = columns.chain(directions);
+            let elements = elements.chain(core::iter::once(held.residual[joint]));
+            for (slot, element) in entering.iter_mut().zip(elements) {
+                *slot = element * self.weight[joint];
             }
-            for (direction, z) in centre.iter().enumerate() {
-                let z = z[joint];
-                sums.power[direction] += z * z;
-                sums.with_residual[direction] += z * residual;
-                for (sum, &element) in sums.with_columns[direction].iter_mut().zip(row) {
-                    *sum += element * z;
+            packed::rotate(&mut self.factor, Self::COLUMNS, &mut entering);
+        }
+    }
+
+    /// Base columns and directions; all shipped sizes have room for both.
+    const COLUMNS: usize = {
+        assert!(B + DIRECTIONS <= LARGEST_COLUMNS, "no room for the directions");
+        B + DIRECTIONS
+    };
+
+    /// What the motions say, once [`Self::break_off`] has ended the last one. `None` for directions that are not there or that
+    /// parameters absorb.
+    #[must_use]
+    pub fn misalignments(&self) -> Misalignments<T> {
+        let (mut power, mut seen, mut along) =
+            ([T::zero(); DIRECTIONS], [T::zero(); DIRECTIONS], [T::zero(); DIRECTIONS]);
+        for (column, row) in packed::rows(&self.factor, Self::COLUMNS) {
+            let right = row.last().copied().unwrap_or(T::zero());
+            for direction in 0..DIRECTIONS {
+                let element = (B + direction).checked_sub(column).and_then(|place| row.get(place));
+                let element = element.copied().unwrap_or(T::zero());
+                power[direction] += element * element;
+                if column >= B {
+                    seen[direction] += element * element;
+                    along[direction] += element * right;
                 }
             }
         }
-    }
-
-    /// What the motions say, given their rows' information on the parameters, weighted, and each joint's standard
-    /// deviation of an independent row. `None` for directions that parameters absorb.
-    #[must_use]
-    pub fn misalignments(&self, information: &Factor<T, B>, noise: &[T; N]) -> Misalignments<T> {
-        let mut total = Sums {
-            power: [T::zero(); DIRECTIONS],
-            with_residual: [T::zero(); DIRECTIONS],
-            with_columns: [[T::zero(); B]; DIRECTIONS],
-            residual: [T::zero(); B],
-        };
-        for (sums, &sigma) in self.sums.iter().zip(noise) {
-            let weight = T::one() / (sigma * sigma);
-            add_scaled(&mut total.power, &sums.power, weight);
-            add_scaled(&mut total.with_residual, &sums.with_residual, weight);
-            add_scaled(&mut total.residual, &sums.residual, weight);
-            for (to, from) in total.with_columns.iter_mut().zip(&sums.with_columns) {
-                add_scaled(to, from, weight);
-            }
-        }
-        let residual = whitened(information, &total.residual);
         core::array::from_fn(|index| {
-            let columns = whitened(information, &total.with_columns[index]);
-            let power = total.power[index];
-            let seen = power - dot(&columns, &columns);
-            if !(power > T::zero() && seen > T::of(SEEN_SHARE) * power) {
+            let (direction, joint) = subject::<N>(index)?;
+            if !(power[index] > T::zero() && seen[index] > T::of(SEEN_SHARE) * power[index]) {
                 return None;
             }
-            let (direction, joint) =
-                if index < N { (Direction::Length, index) } else { (Direction::Zero, index - N) };
             Some(Misalignment {
                 direction,
                 joint,
-                delta: (total.with_residual[index] - dot(&columns, &residual)) / seen,
-                sigma: T::one() / real::sqrt(seen),
+                delta: along[index] / seen[index],
+                sigma: T::one() / real::sqrt(seen[index]),
             })
         })
     }
@@ -224,28 +267,14 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Default for 
     }
 }
 
-fn add_scaled<T: Real, const K: usize>(sum: &mut [T; K], terms: &[T; K], weight: T) {
-    for (sum, &term) in sum.iter_mut().zip(terms) {
-        *sum += weight * term;
+/// What a direction is about: the lengths before joints 1.., then the zeros of joints ..N-1.
+fn subject<const N: usize>(index: usize) -> Option<(Direction, usize)> {
+    let others = N.checked_sub(1)?;
+    match index.checked_sub(others) {
+        None => Some((Direction::Length, index + 1)),
+        Some(joint) if joint < others => Some((Direction::Zero, joint)),
+        Some(_) => None,
     }
-}
-
-fn dot<T: Real, const K: usize>(one: &[T; K], other: &[T; K]) -> T {
-    one.iter().zip(other).fold(T::zero(), |sum, (&left, &right)| sum + left * right)
-}
-
-/// `R^-T vector`: forward substitution; zero in a column without information.
-fn whitened<T: Real, const B: usize>(factor: &Factor<T, B>, vector: &[T; B]) -> [T; B] {
-    let mut solved = [T::zero(); B];
-    for column in 0..B {
-        let mut rest = vector[column];
-        for (row, &value) in factor.triangle().iter().zip(&solved).take(column) {
-            rest -= row[column] * value;
-        }
-        let diagonal = factor.triangle()[column][column];
-        solved[column] = if diagonal == T::zero() { T::zero() } else { rest / diagonal };
-    }
-    solved
 }
 
 /// Change of the torques with each direction at one instant; zero where there is no such direction.
@@ -264,14 +293,16 @@ fn directions<T: Real, const N: usize, const B: usize>(
     let here = torques(&model.chain, &state);
     let slope = |there: [T; N]| core::array::from_fn(|joint| (there[joint] - here[joint]) / T::of(STEP));
     for (index, slot) in slots.iter_mut().enumerate() {
-        *slot = if let Some(joint) = index.checked_sub(N).filter(|&joint| joint < N) {
-            let mut turned = state;
-            turned.q[joint] += T::of(STEP);
-            slope(torques(&model.chain, &turned))
-        } else if index < N && model.chain.has_length(index) {
-            slope(torques(&model.chain.with_length(index, T::of(1.0 + STEP)), &state))
-        } else {
-            [T::zero(); N]
+        *slot = match subject::<N>(index) {
+            Some((Direction::Zero, joint)) => {
+                let mut turned = state;
+                turned.q[joint] += T::of(STEP);
+                slope(torques(&model.chain, &turned))
+            }
+            Some((Direction::Length, joint)) if model.chain.has_length(joint) => {
+                slope(torques(&model.chain.with_length(joint, T::of(1.0 + STEP)), &state))
+            }
+            _ => [T::zero(); N],
         };
     }
 }

@@ -36,11 +36,12 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> HeldOut<T, N
         self.alignment.clear();
     }
 
-    /// The next motion begins: held against base `values`; a row that misses by more than `wild` N m is unexpected.
-    pub fn begin(&mut self, values: &[T; B], wild: &[T; N]) {
+    /// The next motion begins: held against base `values`; a row that misses by more than `wild` N m is unexpected. `noise` is
+    /// the standard deviation of an independent row of each joint, N m; columns that were `dropped` are not estimated.
+    pub fn begin(&mut self, values: &[T; B], wild: &[T; N], noise: &[T; N], dropped: &[bool; B]) {
         (self.values, self.wild) = (*values, *wild);
         self.residual = Residual::new();
-        self.alignment.break_off();
+        self.alignment.begin(wild, noise, dropped);
     }
 
     /// The samples that follow do not continue those before.

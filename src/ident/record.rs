@@ -146,8 +146,8 @@ pub struct Recorder<T, const N: usize, const B: usize, const TAPS: usize, const 
     filter: RowFilter<T, N, B, PENDING>,
     estimator: Estimator,
     ends: Ends,
-    /// Parameters are found from it: disturbances are reweighted. What is held out is measured as it is.
-    is_fitted: bool,
+    /// Disturbed stretches of this motion count for less.
+    reweights: bool,
     /// Angle and torque of each joint.
     hampel: [[Hampel<T>; 2]; N],
     window: Window<T, N, B, { window::ROOM }>,
@@ -191,7 +191,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             filter: RowFilter::new(Ends::Cut),
             estimator: Estimator::Robust,
             ends: Ends::Cut,
-            is_fitted: true,
+            reweights: true,
             hampel: core::array::from_fn(|_| [Hampel::new(Quantity::Angle), Hampel::new(Quantity::Torque)]),
             window: Window::new(),
             choices: None,
@@ -226,14 +226,13 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         self.low_pass.reach()
     }
 
-    /// Forgets everything in the middle of a motion: a change is looked for in what follows, over whole windows and with the
-    /// model's own Stribeck curves, disturbances reweighted.
-    pub fn clear_for_update(&mut self) {
-        self.clear(Ends::Whole);
-        self.is_fitted = true;
+    /// All of the motion that began last counts alike: where the noise is not known nothing tells a disturbance from it.
+    pub fn count_disturbances(&mut self) {
+        self.reweights = false;
     }
 
-    /// Forgets everything: a new motion begins.
+    /// Forgets everything: a new motion begins, or what follows in the middle of one is looked at by itself. Over whole
+    /// windows Stribeck friction is the model's own.
     pub fn clear(&mut self, ends: Ends) {
         self.smoother.clear();
         self.hampel.iter_mut().flatten().for_each(Hampel::restart);
@@ -241,7 +240,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         self.window.clear();
         self.choices = None;
         self.ends = ends;
-        self.is_fitted = ends == Ends::Cut;
+        self.reweights = true;
         self.noise = [NoiseLevel::new(); N];
         self.speed = [Sum::zero(); N];
         (self.samples, self.replaced) = (0, [0; N]);
@@ -372,7 +371,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
 
     fn record(&self) -> Record<T, N, B> {
         let information = T::of(DECIMATION as f64) * self.low_pass.energy();
-        let estimator = if self.is_fitted { self.estimator } else { Estimator::Plain };
+        let estimator = if self.reweights { self.estimator } else { Estimator::Plain };
         let assembly = assemble(&self.window, self.choices.as_ref(), estimator, information);
         let instants = T::of(f64::from(self.instants.max(1)));
         Record {

@@ -7,14 +7,15 @@
 //! ```text
 //! r_k    = tau_k - y_k p                            filtered rows at 50 Hz, those of a joint at rest left out
 //! b_j    = mean of r over half a second             one block of 25 rows, at least 12 of them used
-//! slow^2 = sum b_j b_(j+1) / pairs                  power of what lasts longer than a block
+//! slow^2 = sum b_j b_(j+1) / pairs                  power of what lasts longer than a block; where disturbances are
+//!                                                   forgiven, of pairs without a row that misses wildly
 //! chance = q var b / sqrt(pairs)                    what slow^2 does not exceed for noise, q standard normal
 //! ```
 //!
 //! Neighbouring blocks share no noise but what the filter's reach carries across (0.12 s at 16 Hz), so the mean product
 //! of neighbours is free of noise: it needs no noise level. Source: lag-one autocovariance of block means; its
 //! spread after Bartlett (1946).
-//! Cost: B multiplications for each joint and row. Memory: 12 numbers for each joint. Known limits: a
+//! Cost: B multiplications for each joint and row. Memory: 13 numbers for each joint. Known limits: a
 //! rest that changes its sign within half a second, as friction's does at fast reversals, does not show.
 
 use super::record::LARGEST_STILL_SHARE;
@@ -25,62 +26,102 @@ use crate::real::{self, Real};
 pub const BLOCK_ROWS: u32 = 25;
 /// A block of which fewer rows were used says nothing.
 const LEAST_FILLED: u32 = 12;
+/// Wild rows are a minority up to one in so many.
+const LARGEST_WILD_PART: u64 = 3;
+
+/// Products of neighbouring blocks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Neighbours<T> {
+    pairs: u32,
+    products: T,
+    squares: T,
+    before: Option<T>,
+}
+
+impl<T: Real> Neighbours<T> {
+    fn new() -> Self {
+        Self { pairs: 0, products: T::zero(), squares: T::zero(), before: None }
+    }
+
+    fn take(&mut self, mean: Option<T>) {
+        if let (Some(before), Some(mean)) = (self.before, mean) {
+            self.products += before * mean;
+            self.squares += T::of(0.5) * (before * before + mean * mean);
+            self.pairs = self.pairs.saturating_add(1);
+        }
+        self.before = mean;
+    }
+}
 
 /// One joint's residual on one motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointResidual<T> {
     /// Rows looked at.
     pub rows: u32,
-    /// Pairs of neighbouring blocks.
-    pub pairs: u32,
     /// Rows that missed by more than the limit.
     pub wild: u32,
-    products: T,
-    squares: T,
+    all: Neighbours<T>,
+    /// Of blocks without a row that missed by more than the limit.
+    undisturbed: Neighbours<T>,
     block: T,
     age: u32,
     filled: u32,
-    before: Option<T>,
+    is_disturbed: bool,
 }
 
 impl<T: Real> JointResidual<T> {
     fn new() -> Self {
         Self {
             rows: 0,
-            pairs: 0,
             wild: 0,
-            products: T::zero(),
-            squares: T::zero(),
+            all: Neighbours::new(),
+            undisturbed: Neighbours::new(),
             block: T::zero(),
             age: 0,
             filled: 0,
-            before: None,
+            is_disturbed: false,
         }
+    }
+
+    /// What is judged: disturbed blocks are left out where they are `forgiven` and wild rows are a minority. An error that
+    /// is everywhere is no disturbance.
+    fn judged(&self, forgiven: bool) -> &Neighbours<T> {
+        let minority = u64::from(self.wild) * LARGEST_WILD_PART <= u64::from(self.rows);
+        if forgiven && minority { &self.undisturbed } else { &self.all }
+    }
+
+    /// Pairs of neighbouring blocks.
+    #[must_use]
+    pub fn pairs(&self, forgiven: bool) -> u32 {
+        self.judged(forgiven).pairs
     }
 
     /// Root mean square of what lasts longer than half a second, N m; zero where neighbours do not agree.
     #[must_use]
-    pub fn slow(&self) -> T {
-        let mean = self.products / T::of(f64::from(self.pairs.max(1)));
+    pub fn slow(&self, forgiven: bool) -> T {
+        let judged = self.judged(forgiven);
+        let mean = judged.products / T::of(f64::from(judged.pairs.max(1)));
         real::sqrt(real::max(mean, T::zero()))
     }
 
     /// What [`Self::slow`] does not exceed for noise alone, at a quantile of the standard normal distribution. `noise` is
-    /// the standard deviation of a 500 Hz sample; where it is not known the blocks' own scatter takes its place, and
-    /// with fewer than `quantile^2` pairs nothing can be said.
+    /// the standard deviation of a 500 Hz sample; where it is not known nothing is forgiven, the blocks' own scatter takes
+    /// its place, and with fewer than `quantile^2` pairs nothing can be said.
     #[must_use]
     pub fn slow_by_chance(&self, quantile: T, noise: Option<T>) -> T {
-        let pairs = T::of(f64::from(self.pairs.max(1)));
+        let judged = self.judged(noise.is_some());
+        let pairs = T::of(f64::from(judged.pairs.max(1)));
         let variance = match noise {
             Some(noise) => noise * noise / T::of(f64::from(LEAST_FILLED) * DECIMATION as f64),
-            None => self.squares / pairs,
+            None => judged.squares / pairs,
         };
         real::sqrt(quantile * variance / real::sqrt(pairs))
     }
 
     /// Neighbours end here.
     fn break_off(&mut self) {
-        (self.block, self.age, self.filled, self.before) = (T::zero(), 0, 0, None);
+        (self.block, self.age, self.filled, self.is_disturbed) = (T::zero(), 0, 0, false);
+        (self.all.before, self.undisturbed.before) = (None, None);
     }
 
     /// A row that is left out: the block goes on without it.
@@ -90,8 +131,10 @@ impl<T: Real> JointResidual<T> {
     }
 
     fn take(&mut self, residual: T, wild: T) {
+        let is_wild = real::abs(residual) > wild;
         self.rows = self.rows.saturating_add(1);
-        self.wild = self.wild.saturating_add(u32::from(real::abs(residual) > wild));
+        self.wild = self.wild.saturating_add(u32::from(is_wild));
+        self.is_disturbed |= is_wild;
         self.block += residual;
         self.filled += 1;
         self.age += 1;
@@ -103,12 +146,9 @@ impl<T: Real> JointResidual<T> {
             return;
         }
         let mean = (self.filled >= LEAST_FILLED).then(|| self.block / T::of(f64::from(self.filled)));
-        if let (Some(before), Some(mean)) = (self.before, mean) {
-            self.products += before * mean;
-            self.squares += T::of(0.5) * (before * before + mean * mean);
-            self.pairs = self.pairs.saturating_add(1);
-        }
-        (self.block, self.age, self.filled, self.before) = (T::zero(), 0, 0, mean);
+        self.all.take(mean);
+        self.undisturbed.take(mean.filter(|_| !self.is_disturbed));
+        (self.block, self.age, self.filled, self.is_disturbed) = (T::zero(), 0, 0, false);
     }
 }
 

@@ -5,12 +5,11 @@
 //! exist ([`super::consistent`]), whose base values are the result. The covariance is that of the least-squares problem,
 //! whose optimum the swarm is measured against.
 
-use super::alignment::{Alignment, Misalignments};
+use super::alignment::Misalignments;
 use super::bounds::{LinkPrior, search_box};
 use super::consistent::{Completion, Effort};
 use super::constrained::ParameterBox;
-use super::estimate::{Estimate, Plan, Problem};
-use super::factor::Factor;
+use super::estimate::{Estimate, Plan, Problem, noise};
 use super::record::{Record, RowModel};
 use super::row_model::no_stribeck;
 use super::scale::widen;
@@ -273,25 +272,10 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         })
     }
 
-    /// Which other lengths and zeros the records of unused motions, looked at by `alignment`, ask for.
+    /// Standard deviation of one independent row of each joint on the motion identified from, N m.
     #[must_use]
-    pub fn misalignments<'a, const PENDING: usize>(
-        &self,
-        model: &RowModel<T, N, B>,
-        unused: impl Iterator<Item = &'a Record<T, N, B>>,
-        alignment: &Alignment<T, N, B, PENDING>,
-    ) -> Misalignments<T> {
-        let problem = Problem::new(&self.record, model);
-        let mut information = Factor::new();
-        for record in unused {
-            for (factor, &sigma) in record.factors.iter().zip(problem.noise()) {
-                information.merge_scaled(factor, T::one() / sigma);
-            }
-        }
-        if self.record.selection.dropped_count() > 0 {
-            information = information.without(&self.record.selection.dropped);
-        }
-        alignment.misalignments(&information, problem.noise())
+    pub fn row_noise(&self) -> [T; N] {
+        noise(&self.record)
     }
 
     /// Accepted, or refused with all reasons that apply, given motions that were not used and what they ask for; every
@@ -326,6 +310,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         thresholds.judge_residual(&self.record, &found, docket);
         let noise_is_known = self.record.noise.iter().all(|&noise| noise > T::zero());
         for (motion, unused) in unused.enumerate() {
+            thresholds.judge_set_aside(&unused.record.outliers, Some(motion), docket);
             thresholds.judge_validation(&self.record, motion, unused.record, &estimate, docket);
             thresholds.judge_colour(motion, &unused, docket);
             thresholds.judge_contact(motion, &unused, docket);

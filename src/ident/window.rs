@@ -138,6 +138,15 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         self.arrange(all);
     }
 
+    /// For tests: every joint sees the first `count` columns, Coulomb and viscous friction among them as said.
+    #[cfg(test)]
+    pub(super) fn of_columns(count: usize, friction: [Option<usize>; 2], bank: usize) -> Self {
+        let mut window = Self::new();
+        let base = core::array::from_fn(|column| column);
+        window.arrange([Columns { base, count, friction, bank, start: 0 }; N]);
+        window
+    }
+
     fn arrange(&mut self, columns: [Columns<B>; N]) {
         self.columns = columns;
         let mut start = 0;

@@ -130,7 +130,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             (Some(Segment::Tracking), Some(Progress { rows: Some(rows), .. }))
                 if self.upkeep.watch(&rows).is_some() =>
             {
-                self.recorder.clear_for_update();
+                self.recorder.clear(Ends::Whole);
                 self.change_due = true;
             }
             _ => {}
@@ -155,7 +155,8 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             self.validation = [const { None }; VALIDATION_MOTIONS];
             self.verdict = None;
         } else if let Some(solver) = &self.solver {
-            self.held_out.begin(&solver.values(), &solver.unexpected());
+            let dropped = &solver.record().selection.dropped;
+            self.held_out.begin(&solver.values(), &solver.unexpected(), &solver.row_noise(), dropped);
         }
     }
 
@@ -167,6 +168,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         while let Some(progress) = self.recorder.flush(&self.model) {
             self.look_at(Some(segment), progress);
         }
+        self.held_out.break_off();
         let record = self.recorder.finish();
         match segment {
             Segment::Training => {
@@ -227,7 +229,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             return None;
         }
         let record = self.recorder.finish();
-        self.recorder.clear_for_update();
+        self.recorder.clear(Ends::Whole);
         let update = self.upkeep.solve(&self.model, &record, &self.thresholds)?;
         let model = update.is_change();
         Some(Finding::Updated {
@@ -273,10 +275,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     /// Which other lengths and zeros the motions that were predicted ask for.
     #[must_use]
     pub fn misalignments(&self) -> Misalignments<f32> {
-        self.solver.as_ref().map_or([None; _], |solver| {
-            let records = self.validation.iter().flatten();
-            solver.misalignments(&self.model, records, self.held_out.alignment())
-        })
+        self.held_out.alignment().misalignments()
     }
 
     /// What the motions that were predicted left unexplained, in order of time.

@@ -371,6 +371,9 @@ fn fits<const N: usize, const B: usize>(motions: &[Motion<N, B>], values: &[f32;
                 percent_of_rms: percent(size.root_mean_square),
                 percent_of_mean_abs_vs_truth: truth.map(|truth| truth.percent_of_mean_abs).into(),
                 sticking_share: truth.map(|truth| truth.sticking_share).into(),
+                disturbed_share: motion.record.outliers.disturbed_share[joint].into(),
+                disturbed_longest_s: motion.record.outliers.longest_s[joint].into(),
+                replaced: motion.record.outliers.replaced[joint],
             });
         }
     }

@@ -141,12 +141,12 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
             )
         }
         Test::ReplacedShare => format!(
-            "{:.1} % of the samples of joint {joint} were wild, at most {:.0} % may be",
+            "{:.1} % of the samples of joint {joint}{on} were wild, at most {:.0} % may be",
             100.0 * value,
             100.0 * limit
         ),
         Test::DisturbedShare => format!(
-            "{:.0} % of the rows of joint {joint} were disturbed, at most {:.0} % may be",
+            "{:.0} % of the rows of joint {joint}{on} were disturbed, at most {:.0} % may be",
             100.0 * value,
             100.0 * limit
         ),

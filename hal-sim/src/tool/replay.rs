@@ -181,10 +181,15 @@ pub fn replay<const N: usize, const B: usize>(
 
     background.device.stribeck = solver.stribeck(&background.device);
     recorder.clear(Ends::Whole);
+    let noise_is_known = held_out.iter().all(|samples| samples.native);
+    if !noise_is_known {
+        recorder.count_disturbances();
+    }
     let mut predictions = Vec::new();
     let values = solver.values();
     let mut looked_at = Box::new(HeldOut::<f32, N, B, PENDING>::new(recorder.reach()));
-    looked_at.begin(&values, &solver.unexpected());
+    let dropped = &solver.record().selection.dropped;
+    looked_at.begin(&values, &solver.unexpected(), &solver.row_noise(), dropped);
     let mut current = 0;
     sources.extend(feed(&mut recorder, &background, &held_out, "validation", |file, time_s, progress| {
         if file != current {
@@ -203,8 +208,9 @@ pub fn replay<const N: usize, const B: usize>(
             }),
         });
     }));
+    looked_at.break_off();
     let mut unused = recorder.finish();
-    if !held_out.iter().all(|samples| samples.native) {
+    if !noise_is_known {
         unused.noise = [0.0; N];
     }
     let validated = !held_out.is_empty();
@@ -214,7 +220,7 @@ pub fn replay<const N: usize, const B: usize>(
         &background.device,
         &thresholds,
         validated.then_some(records).into_iter(),
-        &solver.misalignments(&background.device, [&unused].into_iter(), looked_at.alignment()),
+        &looked_at.alignment().misalignments(),
         &mut |piece| findings.push(FindingReport::new(piece, &["recording"])),
     );
     if let Some(path) = &options.csv {

@@ -104,7 +104,7 @@ pub struct FitReport {
     pub joint: usize,
     /// `fourier`, `gait-6.5`, `gait-3`, `recording`.
     pub motion: String,
-    /// Root mean square of measured minus predicted, both through the same filter.
+    /// Root mean square of measured minus predicted, both through the same filter; without what was set aside.
     pub rms_nm: Number,
     /// Of the mean absolute filtered torque.
     pub percent_of_mean_abs: Number,
@@ -114,6 +114,12 @@ pub struct FitReport {
     pub percent_of_mean_abs_vs_truth: Number,
     /// Share of rows left out there.
     pub sticking_share: Number,
+    /// Share of the motion's rows that was set aside as disturbed (less than half of their weight), 0..1.
+    pub disturbed_share: Number,
+    /// Longest stretch of such rows, s.
+    pub disturbed_longest_s: Number,
+    /// Wild angles and torques that were replaced before the filter.
+    pub replaced: u32,
 }
 
 /// The closed-form solution.

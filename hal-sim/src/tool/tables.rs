@@ -131,6 +131,7 @@ pub fn fits(run: &RunReport) -> String {
         "rms N m",
         "% of mean abs",
         "% of rms",
+        "set aside %",
         "% of mean abs, noise-free",
         "sticking %",
     ]);
@@ -142,16 +143,17 @@ pub fn fits(run: &RunReport) -> String {
             number(fit.rms_nm),
             number(fit.percent_of_mean_abs),
             number(fit.percent_of_rms),
+            number(Number(fit.disturbed_share.known().map(|share| 100.0 * share))),
             number(fit.percent_of_mean_abs_vs_truth),
             number(Number(fit.sticking_share.known().map(|share| 100.0 * share))),
         ]);
     };
     run.training.iter().for_each(|fit| add(fit, "training"));
     run.validation.iter().for_each(|fit| add(fit, "validation"));
-    align_numbers(&mut rows, 3..8);
+    align_numbers(&mut rows, 3..9);
     let mut all = run.training.iter().chain(&run.validation);
     let known = all.any(|fit| fit.percent_of_mean_abs_vs_truth.known().is_some());
-    text(rows, if known { &[] } else { &[6, 7] })
+    text(rows, if known { &[] } else { &[7, 8] })
 }
 
 /// Which files trained and validated, and how many of their rows each joint could use.

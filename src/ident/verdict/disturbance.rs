@@ -21,13 +21,23 @@ impl<T: Real> Thresholds<T> {
             limit: self.longest_disturbance_s,
             passed: outliers.longest_common_s <= self.longest_disturbance_s || mostly,
         });
+        self.judge_set_aside(outliers, None, docket);
+    }
+
+    /// Whether too many samples were replaced or rows set aside, on the motion identified from or an unused one.
+    pub fn judge_set_aside<const N: usize>(
+        &self,
+        outliers: &Outliers<T, N>,
+        motion: Option<usize>,
+        docket: &mut Docket<'_, T>,
+    ) {
         let samples = real::max(T::of(f64::from(outliers.samples)), T::one());
         for joint in 0..N {
             let replaced = T::of(f64::from(outliers.replaced[joint])) / samples;
             let limit = self.largest_replaced_share;
-            docket.at_most(Reason::Outliers, Test::ReplacedShare, Some(joint), None, replaced, limit);
+            docket.at_most(Reason::Outliers, Test::ReplacedShare, Some(joint), motion, replaced, limit);
             let (share, limit) = (outliers.disturbed_share[joint], self.largest_disturbed_share);
-            docket.at_most(Reason::Outliers, Test::DisturbedShare, Some(joint), None, share, limit);
+            docket.at_most(Reason::Outliers, Test::DisturbedShare, Some(joint), motion, share, limit);
         }
     }
 }

@@ -19,7 +19,14 @@ impl<T: Real> Thresholds<T> {
             let harmless = share * unused.record.torque[joint].root_mean_square;
             let limit = real::max(harmless, residual.slow_by_chance(self.noise_quantile, noise));
             let at = (Some(joint), Some(motion));
-            docket.at_most(Reason::Validation, Test::SlowResidual, at.0, at.1, residual.slow(), limit);
+            docket.at_most(
+                Reason::Validation,
+                Test::SlowResidual,
+                at.0,
+                at.1,
+                residual.slow(noise.is_some()),
+                limit,
+            );
         }
     }
 

@@ -10,10 +10,7 @@ const COLUMNS: usize = 6;
 type Blocks = Window<f32, 1, COLUMNS, 1500>;
 
 fn blocks() -> Blocks {
-    let mut window = Blocks::new();
-    let base = core::array::from_fn(|column| column);
-    window.arrange([Columns { base, count: COLUMNS, friction: [None; 2], bank: 0, start: 0 }]);
-    window
+    Blocks::of_columns(COLUMNS, [None; 2], 0)
 }
 
 fn row(index: u32) -> FilteredRows<f64, 1, COLUMNS> {

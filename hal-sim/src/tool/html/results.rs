@@ -68,6 +68,7 @@ pub fn fits(run: &RunReport) -> Markup {
         html! { tr {
             td { (fit.motion) } td { (role) } td.n { (fit.joint) }
             td.n { (number(fit.rms_nm)) } td.n { (number(fit.percent_of_mean_abs)) } td.n { (number(fit.percent_of_rms)) }
+            td.n { (number(Number(fit.disturbed_share.known().map(|share| 100.0 * share)))) }
             @if truth {
                 td.n { (number(fit.percent_of_mean_abs_vs_truth)) }
                 td.n { (number(Number(fit.sticking_share.known().map(|share| 100.0 * share)))) }
@@ -80,6 +81,7 @@ pub fn fits(run: &RunReport) -> Markup {
             thead { tr {
                 th scope="col" { "motion" } th scope="col" { "use" } th.n scope="col" { "joint" }
                 th.n scope="col" { "rms, N\u{a0}m" } th.n scope="col" { "% of mean abs" } th.n scope="col" { "% of rms" }
+                th.n scope="col" { "set aside, %" }
                 @if truth { th.n scope="col" { "% of mean abs, noise-free" } th.n scope="col" { "sticking, %" } }
             } }
             tbody {

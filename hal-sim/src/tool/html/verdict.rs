@@ -74,6 +74,8 @@ fn meaning(test: &str) -> (bool, &str) {
         "link_length" => (false, "share by which the link before seems longer"),
         "encoder_zero" => (false, "angle by which the zero seems off, rad"),
         "common_disturbance" => (false, "time for which all joints missed together, s"),
+        "replaced_share" => (false, "share of samples that were wild and replaced"),
+        "disturbed_share" => (false, "share of rows that was set aside as disturbed"),
         _ => (false, ""),
     }
 }
