@@ -5,12 +5,13 @@
 //!
 //! | room | what lives there |
 //! | --- | --- |
-//! | [`real`], [`units`] | the only door to `libm`; unit newtypes |
+//! | [`real`], [`units`] | the only door to `libm` and `micromath`; unit newtypes |
 //! | [`hal`] | the ports a board provides |
 //! | [`model`] | serial chain, Newton-Euler, regressor, friction, base parameters |
 //! | [`motion`] | Fourier excitation, gait, ramps, and the proof that they stay within limits |
 //! | [`swarm`] | beetle antennae search, particle swarm, beetle swarm |
 //! | [`ident`] | filter chain, information factor, least squares, statistics, verdict |
+//! | [`motor`] | field-oriented current control of one axis, 24 kHz, and its calibration |
 //! | [`safety`], [`servo`] | monitor and drive states; the 4 kHz tick |
 //! | [`leg`] | one leg: the activity machine, a control half and an identification half |
 #![no_std]
@@ -20,6 +21,7 @@ pub mod ident;
 pub mod leg;
 pub mod model;
 pub mod motion;
+pub mod motor;
 pub mod real;
 pub mod safety;
 pub mod servo;

@@ -47,7 +47,7 @@ unit! {
     RadianPerSecondSquared,
     /// Torque at the joint, N m.
     NewtonMetre,
-    /// Motor (quadrature) current, A.
+    /// Current, A; of a motor without further words its quadrature current.
     Ampere,
     /// Time, s.
     Second,
@@ -57,4 +57,12 @@ unit! {
     KilogramMetreSquared,
     /// Frequency, Hz.
     Hertz,
+    /// Voltage, V.
+    Volt,
+    /// Resistance of one phase against the star point, ohm.
+    Ohm,
+    /// Inductance of one phase as a rotating axis sees it, H.
+    Henry,
+    /// Flux linkage of the magnets with one phase, peak, V s.
+    Weber,
 }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use tokens::{Token, tokens};
 
 /// Each room and the rooms it may use beside itself and the open ones.
-const HOUSE: [(&str, &[&str]); 10] = [
+const HOUSE: [(&str, &[&str]); 11] = [
     ("units", &[]),
     ("real", &[]),
     ("hal", &[]),
@@ -20,9 +20,10 @@ const HOUSE: [(&str, &[&str]); 10] = [
     ("motion", &["model"]),
     ("swarm", &[]),
     ("ident", &["model", "motion", "swarm"]),
+    ("motor", &["hal"]),
     ("safety", &["hal"]),
-    ("servo", &["hal", "model", "motion", "safety"]),
-    ("leg", &["hal", "model", "motion", "swarm", "ident", "safety", "servo"]),
+    ("servo", &["hal", "model", "motion", "motor", "safety"]),
+    ("leg", &["hal", "model", "motion", "swarm", "ident", "motor", "safety", "servo"]),
 ];
 
 /// Rooms every other room may use.

@@ -1,0 +1,260 @@
+//! One axis: what the 24 kHz interrupt calls.
+//!
+//! ```text
+//! count -> turn -> electrical angle -> speed ----------------------------------+
+//! shunt codes -> currents -> Park(angle) -> current loop -> Park back (angle + 1.5 T w) -> duties
+//! bus code -> voltage limit, duties per volt --^                                  ^
+//! ```
+//!
+//! An [`Axis`] exists only with a [`Calibration`], and a calibration only where every check of the wiring was passed: there is
+//! no way to torque around it. The configuration and what follows from it never change; what a tick changes is [`Axis`]'s
+//! few state words.
+//!
+//! **Borders.** A target that is not a number, a voltage that is none, a current beyond the bound release the bridge in the
+//! same tick. A saturated amplifier, a bus voltage out of range and an encoder step that no motor makes have one tick of
+//! patience, in which the duties of the tick before are kept; the second in a row releases. Released stays released until
+//! [`Axis::clear_fault`].
+//!
+//! **Signs.** Inside, positive current makes torque towards growing electrical angle. Outside, counts and current both grow
+//! with the joint's flexion: [`AxisConfiguration::flexion`] says which way the counter runs then.
+//!
+//! Cost: see docs/motor.md, "instructions".
+
+use super::configuration::{AxisConfiguration, AxisError, Constants};
+use super::current_loop::DELAY_PERIODS;
+use super::{Calibration, CurrentLoop, Rotating, SpeedTracker};
+use crate::hal::{AxisCommand, AxisSample, JointSample};
+use crate::real::{clamp, is_finite};
+use crate::units::{Ampere, RadianPerSecond};
+
+/// What an axis is asked for in one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisRequest {
+    /// The bridge switches.
+    pub enabled: bool,
+    /// Quadrature current in the joint's sense, limited to the configuration's.
+    pub current: Ampere,
+}
+
+impl AxisRequest {
+    /// Bridge released.
+    pub const RELEASED: Self = Self { enabled: false, current: Ampere::ZERO };
+}
+
+/// Why an axis released its bridge by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisFault {
+    /// A shunt amplifier at its rail, two ticks in a row.
+    CurrentSense,
+    /// The current vector is longer than the bound.
+    Overcurrent,
+    /// Bus voltage out of its range, two ticks in a row.
+    BusVoltage,
+    /// Two encoder steps in a row that no motor makes. The place is lost: only a new calibration helps.
+    Encoder,
+    /// Target or voltage not a number.
+    NotANumber,
+}
+
+/// One axis; see the module.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    constants: Constants,
+    current_loop: CurrentLoop,
+    speed: SpeedTracker,
+    /// Counter at the last plausible sample.
+    counter: u16,
+    /// Within one turn, in the electrical sense.
+    place: i32,
+    /// Unwrapped, in the joint's sense.
+    counts: i32,
+    measured: Rotating<Ampere>,
+    window: Window,
+    last: AxisCommand,
+    doubtful: bool,
+    fault: Option<AxisFault>,
+}
+
+impl Axis {
+    /// An axis at rest with its bridge released; counts begin at zero. `sample` is the newest there is: since the calibration
+    /// the counter may not have moved by more than half of its range.
+    ///
+    /// # Errors
+    /// The part of the configuration that makes no sense.
+    pub fn new(
+        configuration: &AxisConfiguration,
+        calibration: &Calibration,
+        sample: &AxisSample,
+    ) -> Result<Self, AxisError> {
+        let constants = Constants::new(configuration, calibration)?;
+        let place = calibration.place_of(&constants.scale, configuration.counter, sample.encoder_count);
+        Ok(Self {
+            constants,
+            current_loop: CurrentLoop::default(),
+            speed: SpeedTracker::at(constants.scale.angle(place).plus(constants.offset)),
+            counter: sample.encoder_count,
+            place,
+            counts: 0,
+            measured: Rotating::default(),
+            window: Window::EMPTY,
+            last: AxisCommand::RELEASED,
+            doubtful: false,
+            fault: None,
+        })
+    }
+
+    /// States that the joint now stands at `counts`.
+    pub fn set_counts(&mut self, counts: i32) {
+        self.counts = counts;
+        self.window = Window::EMPTY;
+    }
+
+    /// One PWM period: what the bridge does in the next one.
+    pub fn tick(&mut self, sample: &AxisSample, request: AxisRequest) -> AxisCommand {
+        self.last = self.step(sample, request).unwrap_or_else(|fault| {
+            self.fault = Some(fault);
+            self.current_loop.reset();
+            AxisCommand::RELEASED
+        });
+        self.last
+    }
+
+    fn step(&mut self, sample: &AxisSample, request: AxisRequest) -> Result<AxisCommand, AxisFault> {
+        let constants = &self.constants;
+        let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
+        let plausible = step.abs() <= constants.greatest_step;
+        if plausible {
+            self.counter = sample.encoder_count;
+            self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
+            self.place = constants.scale.moved(self.place, constants.counter_sign * step);
+        }
+        let angle = constants.scale.angle(self.place).plus(constants.offset);
+        self.speed.track(angle);
+        let currents = constants.sense.currents(sample.shunt_codes, constants.zeros);
+        if let Some(currents) = currents {
+            self.measured = currents.to_rotating(angle.rotation(constants.sine));
+        }
+        self.window.push(self.counts, self.measured.q.0 * constants.current_sign);
+
+        let switching = request.enabled && self.fault.is_none();
+        let [low, high] = constants.bus_codes;
+        let doubt = if !plausible {
+            Some(AxisFault::Encoder)
+        } else if switching && currents.is_none() {
+            Some(AxisFault::CurrentSense)
+        } else if switching && !(low..=high).contains(&sample.bus_code) {
+            Some(AxisFault::BusVoltage)
+        } else {
+            None
+        };
+        if let Some(fault) = doubt {
+            if self.doubtful {
+                return Err(fault);
+            }
+            self.doubtful = true;
+            return Ok(if switching { self.last } else { AxisCommand::RELEASED });
+        }
+        self.doubtful = false;
+        if !switching {
+            self.current_loop.reset();
+            return Ok(AxisCommand::RELEASED);
+        }
+        if !is_finite(request.current.0) {
+            return Err(AxisFault::NotANumber);
+        }
+        let (d, q) = (self.measured.d.0, self.measured.q.0);
+        if d * d + q * q > constants.overcurrent_square {
+            return Err(AxisFault::Overcurrent);
+        }
+        let bus = constants.sense.bus(sample.bus_code);
+        let limit = constants.current_limit;
+        let target = Ampere(clamp(request.current.0 * constants.current_sign, -limit, limit));
+        let voltage = self.current_loop.voltage(
+            &constants.gains,
+            target,
+            self.measured,
+            self.speed.rad_per_s(),
+            constants.modulator.voltage_limit(bus),
+        );
+        if !is_finite(voltage.d.0 + voltage.q.0) {
+            return Err(AxisFault::NotANumber);
+        }
+        let acting = self.speed.ahead(angle, DELAY_PERIODS).rotation(constants.sine);
+        let target = Rotating { d: Ampere::ZERO, q: target }.to_stationary(acting);
+        let duty = constants.modulator.duties(voltage.to_stationary(acting), 1.0 / bus.0, target);
+        Ok(AxisCommand { enabled: true, duty })
+    }
+
+    /// Means of count and current since the last call, in the joint's sense; both of the same ticks, so that they belong to one
+    /// instant, 2.5 ticks (104 us) before the last of six. Without a tick since then the newest values.
+    pub fn joint_sample(&mut self) -> JointSample {
+        let sample = self.window.mean().unwrap_or(JointSample {
+            encoder_counts: self.counts,
+            current: self.measured.q * self.constants.current_sign,
+        });
+        self.window = Window::EMPTY;
+        sample
+    }
+
+    /// Currents of the last tick, in the electrical sense.
+    #[must_use]
+    pub fn measured(&self) -> Rotating<Ampere> {
+        self.measured
+    }
+
+    /// Electrical speed, rad/s.
+    #[must_use]
+    pub fn electrical_speed(&self) -> RadianPerSecond {
+        RadianPerSecond(self.speed.rad_per_s())
+    }
+
+    /// Why the bridge is released, if the axis did it.
+    #[must_use]
+    pub fn fault(&self) -> Option<AxisFault> {
+        self.fault
+    }
+
+    /// Forgets a fault, so that a request may enable again; `false` where the place was lost.
+    pub fn clear_fault(&mut self) -> bool {
+        let lost = self.fault == Some(AxisFault::Encoder);
+        if !lost {
+            self.fault = None;
+        }
+        !lost
+    }
+}
+
+/// Sums since the last joint sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Window {
+    first: i32,
+    /// Of counts minus `first`.
+    counts: i32,
+    current_a: f32,
+    ticks: i32,
+}
+
+impl Window {
+    const EMPTY: Self = Self { first: 0, counts: 0, current_a: 0.0, ticks: 0 };
+    /// Of a joint sample that nobody fetches the window starts over.
+    const MOST: i32 = 48;
+
+    fn push(&mut self, counts: i32, current_a: f32) {
+        if self.ticks == 0 || self.ticks == Self::MOST {
+            *self = Self { first: counts, ..Self::EMPTY };
+        }
+        self.counts += counts.wrapping_sub(self.first);
+        self.current_a += current_a;
+        self.ticks += 1;
+    }
+
+    fn mean(&self) -> Option<JointSample> {
+        (self.ticks > 0).then(|| JointSample {
+            encoder_counts: self.first.wrapping_add(self.counts.div_euclid(self.ticks)),
+            current: Ampere(self.current_a / self.ticks as f32),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,226 @@
+use super::*;
+use crate::motor::calibration::tests::calibrate;
+use crate::motor::testing::{CONFIGURATION, TestMotor};
+use crate::motor::{AxisConfiguration, Direction, Sine};
+use crate::units::{Volt, Weber};
+
+const fn ask(current: f32) -> AxisRequest {
+    AxisRequest { enabled: true, current: Ampere(current) }
+}
+
+/// A motor that turns at a given mechanical speed, its axis, and the newest sample.
+struct Bench {
+    motor: TestMotor,
+    axis: Axis,
+    sample: AxisSample,
+}
+
+impl Bench {
+    fn at(speed: f64, configuration: &AxisConfiguration) -> Self {
+        let mut motor = TestMotor::default();
+        let calibration = calibrate(&mut motor, configuration).expect("sound");
+        (motor.driven, motor.speed) = (true, speed);
+        let sample = motor.sample();
+        let axis = Axis::new(configuration, &calibration, &sample).expect("usual");
+        let mut bench = Self { motor, axis, sample };
+        // The speed is tracked before anything switches.
+        bench.run(AxisRequest::RELEASED, 480);
+        bench
+    }
+
+    fn tick(&mut self, request: AxisRequest) -> AxisCommand {
+        let command = self.axis.tick(&self.sample, request);
+        self.sample = self.motor.period(command);
+        command
+    }
+
+    fn run(&mut self, request: AxisRequest, ticks: usize) -> AxisCommand {
+        (0..ticks).fold(AxisCommand::RELEASED, |_, _| self.tick(request))
+    }
+
+    /// Mean and spread (peak to peak) of both true currents over one electrical turn and more.
+    fn watch(&mut self, request: AxisRequest, ticks: usize) -> [(f64, f64); 2] {
+        let (mut sum, mut least, mut most) = ([0.0; 2], [f64::MAX; 2], [f64::MIN; 2]);
+        for _ in 0..ticks {
+            self.tick(request);
+            for axis in 0..2 {
+                let current = self.motor.current[axis];
+                sum[axis] += current;
+                least[axis] = least[axis].min(current);
+                most[axis] = most[axis].max(current);
+            }
+        }
+        [0, 1].map(|axis| (sum[axis] / ticks as f64, most[axis] - least[axis]))
+    }
+}
+
+#[test]
+fn the_torque_current_follows_and_the_field_stays_zero_at_every_speed_and_sign() {
+    for speed in [0.0, 50.0, -120.0, 225.0] {
+        let mut bench = Bench::at(speed, &CONFIGURATION);
+        for current in [15.0, -15.0] {
+            bench.run(ask(current), 1200);
+            let [(d, _), (q, _)] = bench.watch(ask(current), 2400);
+            // Shunt zeros to 0.3 codes, a degree of offset error.
+            assert!((q - f64::from(current)).abs() < 0.1 && d.abs() < 0.3, "{speed} rad/s: {d} {q} A");
+        }
+        assert_eq!(bench.axis.fault(), None);
+        // One count per tick is 18 rad/s of the motor; tracked to a fiftieth.
+        let electrical = f64::from(bench.axis.electrical_speed().0);
+        assert!((electrical - 7.0 * speed).abs() < 4.0, "{electrical} rad/s");
+    }
+}
+
+#[test]
+fn turning_the_voltage_by_the_delay_is_what_keeps_the_axes_apart_at_speed() {
+    // Without the angle ahead 1,575 rad/s times 62.5 us are 5.6 degrees: the voltage would be turned by them.
+    let mut bench = Bench::at(225.0, &AxisConfiguration { feedforward: true, ..CONFIGURATION });
+    let mut worst = 0.0_f64;
+    bench.run(ask(0.0), 480);
+    for _ in 0..240 {
+        bench.tick(ask(10.0));
+        worst = worst.max(bench.motor.current[0].abs());
+    }
+    assert!(worst < 1.0, "{worst} A");
+}
+
+#[test]
+fn the_fast_sine_costs_less_than_two_thousandths_of_ripple() {
+    let ripple = |sine| {
+        let mut bench = Bench::at(60.0, &AxisConfiguration { sine, ..CONFIGURATION });
+        bench.motor.noise_codes = 0.0;
+        bench.motor.dead = 0.0;
+        bench.run(ask(30.0), 1200);
+        let [_, (_, spread)] = bench.watch(ask(30.0), 1200);
+        spread
+    };
+    let (fast, exact) = (ripple(Sine::Fast), ripple(Sine::Exact));
+    // Peak to peak of 30 A; quantisation of angle and current is in both.
+    assert!(fast - exact < 0.004 * 30.0, "{fast} A against {exact} A");
+}
+
+#[test]
+fn dead_time_given_back_leaves_less_of_the_sixth_harmonic() {
+    use crate::motor::DeadTime;
+    let ripple = |dead_time| {
+        let mut bench = Bench::at(60.0, &AxisConfiguration { dead_time, ..CONFIGURATION });
+        bench.motor.noise_codes = 0.0;
+        bench.run(ask(10.0), 1200);
+        let [_, (_, spread)] = bench.watch(ask(10.0), 1200);
+        spread
+    };
+    let with = ripple(DeadTime::Compensated { band: Ampere(0.3) });
+    let without = ripple(DeadTime::Uncompensated);
+    assert!(with < 0.7 * without, "{with} A with, {without} A without");
+}
+
+#[test]
+fn the_joint_sample_belongs_to_the_middle_of_its_ticks_and_starts_over() {
+    let mut bench = Bench::at(200.0, &CONFIGURATION);
+    bench.run(ask(5.0), 600);
+    let first = bench.axis.joint_sample();
+    assert!((first.current.0 - 5.0).abs() < 0.2, "{first:?}");
+    bench.run(ask(5.0), 6);
+    let second = bench.axis.joint_sample();
+    bench.run(ask(5.0), 6);
+    let third = bench.axis.joint_sample();
+    // 200 rad/s are 10.865 counts per tick, six of them 65.2.
+    assert!((64..=67).contains(&(third.encoder_counts - second.encoder_counts)), "{second:?} {third:?}");
+    // Without a tick in between the newest count: two and a half ticks later.
+    let newest = bench.axis.joint_sample();
+    assert!((25..=30).contains(&(newest.encoder_counts - third.encoder_counts)), "{newest:?}");
+    bench.axis.set_counts(-1_000_000);
+    assert_eq!(bench.axis.joint_sample().encoder_counts, -1_000_000);
+}
+
+#[test]
+fn counts_stay_exact_through_many_wraps_of_the_counter() {
+    let mut bench = Bench::at(-400.0, &AxisConfiguration { flexion: Direction::Down, ..CONFIGURATION });
+    let _ = bench.axis.joint_sample();
+    bench.axis.set_counts(0);
+    let begin = bench.motor.angle;
+    bench.run(AxisRequest::RELEASED, 24_000);
+    // The newest sample is not yet ticked.
+    bench.tick(AxisRequest::RELEASED);
+    bench.tick(AxisRequest::RELEASED);
+    let turned = -(bench.motor.angle - begin) / core::f64::consts::TAU * 8192.0;
+    let _ = bench.axis.joint_sample();
+    let counts = f64::from(bench.axis.joint_sample().encoder_counts);
+    // 521,000 counts, eight wraps; two ticks of 21.7 counts between sample and motor.
+    assert!(turned > 500_000.0 && (turned - counts).abs() < 70.0, "{turned} {counts}");
+}
+
+#[test]
+fn every_border_releases_and_stays_released_until_it_is_cleared() {
+    type Spoil = fn(&mut AxisSample);
+    let spoils: [(Spoil, AxisFault, usize); 4] = [
+        (|sample| sample.shunt_codes[1] = 4000, AxisFault::CurrentSense, 2),
+        (|sample| sample.bus_code = 3950, AxisFault::BusVoltage, 2),
+        (|sample| sample.bus_code = 0, AxisFault::BusVoltage, 2),
+        (|sample| sample.shunt_codes = [3700, 2048], AxisFault::Overcurrent, 1),
+    ];
+    for (spoil, fault, patience) in spoils {
+        let mut bench = Bench::at(50.0, &CONFIGURATION);
+        bench.run(ask(5.0), 100);
+        for tick in 1..=patience {
+            assert_eq!(bench.axis.fault(), None);
+            spoil(&mut bench.sample);
+            assert_eq!(bench.tick(ask(5.0)).enabled, tick < patience, "{fault:?}");
+        }
+        assert_eq!(bench.axis.fault(), Some(fault));
+        assert_eq!(bench.run(ask(5.0), 10), AxisCommand::RELEASED);
+        assert!(bench.axis.clear_fault());
+        assert!(bench.run(ask(5.0), 10).enabled);
+    }
+}
+
+#[test]
+fn one_bad_sample_alone_is_survived_and_a_lost_place_is_not_cleared() {
+    let mut bench = Bench::at(50.0, &CONFIGURATION);
+    bench.run(ask(5.0), 100);
+    for _ in 0..10 {
+        bench.sample.encoder_count ^= 0x4000;
+        assert!(bench.tick(ask(5.0)).enabled);
+        bench.run(ask(5.0), 2);
+    }
+    assert_eq!(bench.axis.fault(), None);
+    for _ in 0..2 {
+        bench.sample.encoder_count ^= 0x4000;
+        bench.tick(ask(5.0));
+    }
+    assert_eq!(bench.axis.fault(), Some(AxisFault::Encoder));
+    assert!(!bench.axis.clear_fault() && !bench.run(ask(5.0), 10).enabled);
+}
+
+#[test]
+fn nothing_that_is_not_finite_reaches_the_bridge() {
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut bench = Bench::at(0.0, &CONFIGURATION);
+        bench.run(ask(5.0), 100);
+        assert_eq!(bench.tick(ask(bad)), AxisCommand::RELEASED);
+        assert_eq!(bench.axis.fault(), Some(AxisFault::NotANumber));
+        assert!(bench.axis.clear_fault());
+        bench.run(ask(5.0), 600);
+        let [_, (q, _)] = bench.watch(ask(5.0), 600);
+        assert!((q - 5.0).abs() < 0.1, "{q} A");
+    }
+}
+
+#[test]
+fn an_axis_of_absurd_numbers_is_refused_by_part() {
+    let refused = |change: fn(&mut AxisConfiguration)| {
+        let mut configuration = CONFIGURATION;
+        change(&mut configuration);
+        configuration.check().expect_err("absurd")
+    };
+    assert_eq!(refused(|c| c.pole_pairs = 0), AxisError::Encoder);
+    assert_eq!(refused(|c| c.sense.volt_per_code = Volt(f32::NAN)), AxisError::Sense);
+    assert_eq!(refused(|c| c.timing.settling.0 = 1.0), AxisError::Timing);
+    assert_eq!(refused(|c| c.greatest_speed.0 = 1e5), AxisError::Speed);
+    assert_eq!(refused(|c| c.flux = Weber(0.0)), AxisError::Motor);
+    assert_eq!(refused(|c| c.bandwidth.0 = 1e4), AxisError::Motor);
+    assert_eq!(refused(|c| c.current_limit.0 = 56.0), AxisError::Current);
+    assert_eq!(refused(|c| c.overcurrent.0 = 70.0), AxisError::Current);
+    assert_eq!(refused(|c| c.bus = [Volt(30.0), Volt(20.0)]), AxisError::Bus);
+    assert_eq!(CONFIGURATION.check(), Ok(()));
+}

@@ -1,0 +1,295 @@
+//! From an unknown motor on an unknown wiring to a [`Calibration`], or to the reason why there is none.
+//!
+//! ```text
+//! zeros (bridge off) -> resistance at C, B, A: wiring of phases and shunts -> inductances at A
+//!    -> scan: the field turns forwards and back, slowly: counts, direction, pole pairs, offset, index -> Calibration
+//! ```
+//!
+//! Why here and nowhere else: an [`super::Axis`] cannot be made without a [`Calibration`], and a [`Calibration`] has
+//! no constructor but the end of a [`Calibrator`]. Until then the motor sees voltages along angles that the machine chooses,
+//! never a quadrature current: a free rotor follows the field and stops with it, whatever the encoder says.
+//! Limits hold in every tick: current vector, voltage, bus, rails, time of every stage.
+//!
+//! | wrong | seen as | reason |
+//! | --- | --- | --- |
+//! | a phase open, or its shunt silent | no current along its axis, or none in it | [`Refusal::PhaseOpen`] |
+//! | a shunt inverted, both, the two exchanged | signs of the phase currents | [`Refusal::ShuntInverted`], [`Refusal::ShuntsInverted`], [`Refusal::ShuntsSwapped`] |
+//! | two motor leads exchanged, or A and B of the encoder | counter runs against the field | [`Refusal::Direction`] |
+//! | encoder without counts, rotor blocked | travel | [`Refusal::NoCounts`] |
+//! | pole pairs, counts per turn | counts per electrical turn | [`Refusal::PolePairs`], [`Refusal::CountsPerTurn`] |
+//! | index missing, or not at one place per turn | index | [`Refusal::NoIndex`], [`Refusal::IndexMoved`] |
+//!
+//! Nothing is corrected in silence. Exchanged motor leads and an exchanged encoder look the same from here (the counter runs
+//! against the field), but the second also reverses the joint's angle: so the direction is part of the commissioned
+//! configuration, and the other one is refused. All three leads moved on by one are the same motor with another offset, which
+//! is found. Counts per electrical turn tell pole pairs and counts per turn apart only where the first come out whole.
+//!
+//! Known limits: gain errors of shunts and of the bus divider scale R and L; a constant torque (gravity)
+//! shifts the offset by asin(torque / holding torque), friction does not; calibrate with the leg hanging or unloaded.
+
+mod found;
+mod hold;
+mod inductance;
+mod refusal;
+mod resistance;
+mod scan;
+mod zeros;
+
+use super::configuration::{AxisConfiguration, AxisError, Direction};
+use super::{
+    CountScale, CurrentGains, ElectricalAngle, Modulator, MotorConstants, Rotating, SenseScale, Sine,
+    Stationary,
+};
+use crate::hal::{AxisCommand, AxisSample};
+use crate::units::{Ampere, Hertz, Ohm, Volt, Weber};
+pub use found::{Calibration, StoredCalibration};
+use hold::Hold;
+use inductance::{InductanceStage, Inductances};
+pub use refusal::{Phase, Refusal};
+use resistance::ResistanceStage;
+use scan::{Scan, ScanResult};
+use zeros::Zeros;
+
+/// What a calibration may do to a motor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CalibrationSettings {
+    /// Current that holds and turns the rotor; has to overcome friction and cogging several times.
+    pub current: Ampere,
+    /// Longest voltage vector while the motor's constants are unknown.
+    pub voltage: Volt,
+    /// Electrical turns per second of the scan, 0.5..=20.
+    pub turns_per_s: f32,
+}
+
+/// What a tick of a calibration answers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CalibrationStep {
+    /// Goes on; what the bridge does next.
+    Running(AxisCommand),
+    /// Passed; the bridge is to be released.
+    Done(Calibration),
+    /// Refused; the bridge is to be released.
+    Refused(Refusal),
+}
+
+/// What all stages read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Bench {
+    settings: CalibrationSettings,
+    sense: SenseScale,
+    scale: CountScale,
+    modulator: Modulator,
+    pole_pairs: u8,
+    direction: Direction,
+    index: bool,
+    bus_codes: [u16; 2],
+    overcurrent_square: f32,
+    sine: Sine,
+}
+
+/// What a stage sees of one tick.
+#[derive(Clone, Copy)]
+struct Reading<'a> {
+    bench: &'a Bench,
+    sample: &'a AxisSample,
+    current: Stationary<Ampere>,
+    bus: Volt,
+}
+
+impl Reading<'_> {
+    fn command(&self, voltage: Stationary<Volt>) -> AxisCommand {
+        let duty = self.bench.modulator.duties(voltage, 1.0 / self.bus.0, Stationary::default());
+        AxisCommand { enabled: true, duty }
+    }
+}
+
+/// What a stage answers.
+enum Outcome<R> {
+    Running(Stationary<Volt>),
+    Passed(R),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Zeros(Zeros),
+    Resistance(ResistanceStage),
+    Inductance(InductanceStage),
+    Scan(Scan),
+    Finished(Result<Calibration, Refusal>),
+}
+
+/// The machine; one tick per PWM period, and every tick is answered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Calibrator {
+    bench: Bench,
+    stored: Option<StoredCalibration>,
+    zeros: [f32; 2],
+    resistance: Ohm,
+    inductances: Inductances,
+    stage: Stage,
+}
+
+impl Calibrator {
+    /// Measures everything.
+    ///
+    /// # Errors
+    /// The part of the configuration or of the settings (as [`AxisError::Current`]) that makes no sense.
+    pub fn new(configuration: &AxisConfiguration, settings: CalibrationSettings) -> Result<Self, AxisError> {
+        configuration.check()?;
+        let sensible = settings.current.0 > 0.0
+            && settings.current.0 * 1.3 < configuration.overcurrent.0
+            && settings.voltage.0 > 0.0
+            && settings.voltage.0 < 0.5 * configuration.bus[0].0
+            && (0.5..=20.0).contains(&settings.turns_per_s);
+        if !sensible {
+            return Err(AxisError::Current);
+        }
+        let bench = Bench {
+            settings,
+            sense: configuration.sense,
+            scale: configuration.scale()?,
+            modulator: configuration.modulator()?,
+            pole_pairs: configuration.pole_pairs,
+            direction: configuration.counter,
+            index: configuration.index,
+            bus_codes: configuration.bus_codes(),
+            overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
+            sine: configuration.sine,
+        };
+        Ok(Self {
+            bench,
+            stored: None,
+            zeros: [0.0; 2],
+            resistance: Ohm::ZERO,
+            inductances: Inductances::default(),
+            stage: Stage::Zeros(Zeros::default()),
+        })
+    }
+
+    /// After a power-up: zeros and wiring again, inductances as stored, and the index instead of the offset.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; also [`AxisError::Encoder`] where there is no index.
+    pub fn from_stored(
+        configuration: &AxisConfiguration,
+        settings: CalibrationSettings,
+        stored: StoredCalibration,
+    ) -> Result<Self, AxisError> {
+        if !configuration.index {
+            return Err(AxisError::Encoder);
+        }
+        Ok(Self { stored: Some(stored), ..Self::new(configuration, settings)? })
+    }
+
+    /// One PWM period.
+    pub fn tick(&mut self, sample: &AxisSample) -> CalibrationStep {
+        match self.advance(sample) {
+            Ok(command) => CalibrationStep::Running(command),
+            Err(end) => {
+                self.stage = Stage::Finished(end);
+                end.map_or_else(CalibrationStep::Refused, CalibrationStep::Done)
+            }
+        }
+    }
+
+    /// The command, or how it ended.
+    fn advance(&mut self, sample: &AxisSample) -> Result<AxisCommand, Result<Calibration, Refusal>> {
+        let [low, high] = self.bench.bus_codes;
+        if !(low..=high).contains(&sample.bus_code) {
+            return Err(Err(Refusal::BusVoltage));
+        }
+        let zeros = self.zeros;
+        let reading = |zeros| {
+            let current =
+                self.bench.sense.currents(sample.shunt_codes, zeros).ok_or(Refusal::CurrentSense)?;
+            let (alpha, beta) = (current.alpha.0, current.beta.0);
+            if alpha * alpha + beta * beta > self.bench.overcurrent_square {
+                return Err(Refusal::Overcurrent);
+            }
+            let bus = self.bench.sense.bus(sample.bus_code);
+            Ok(Reading { bench: &self.bench, sample, current, bus })
+        };
+        match &mut self.stage {
+            Stage::Finished(end) => Err(*end),
+            Stage::Zeros(stage) => {
+                if let Some(found) = stage.tick(sample).map_err(Err)? {
+                    self.zeros = found;
+                    self.stage = Stage::Resistance(ResistanceStage::default());
+                }
+                Ok(AxisCommand::RELEASED)
+            }
+            Stage::Resistance(stage) => {
+                let reading = reading(zeros).map_err(Err)?;
+                match stage.tick(&reading).map_err(Err)? {
+                    Outcome::Running(voltage) => Ok(reading.command(voltage)),
+                    Outcome::Passed((resistance, hold)) => {
+                        let command = reading.command(hold.voltage());
+                        self.resistance = resistance;
+                        self.stage = self.after_resistance(hold).map_err(Err)?;
+                        Ok(command)
+                    }
+                }
+            }
+            Stage::Inductance(stage) => {
+                let reading = reading(zeros).map_err(Err)?;
+                match stage.tick(&reading, self.resistance).map_err(Err)? {
+                    Outcome::Running(voltage) => Ok(reading.command(voltage)),
+                    Outcome::Passed((inductances, hold)) => {
+                        let command = reading.command(hold.voltage());
+                        self.inductances = inductances;
+                        self.stage = self.scan(hold).map_err(Err)?;
+                        Ok(command)
+                    }
+                }
+            }
+            Stage::Scan(stage) => {
+                let reading = reading(zeros).map_err(Err)?;
+                match stage.tick(&reading).map_err(Err)? {
+                    Outcome::Running(voltage) => Ok(reading.command(voltage)),
+                    Outcome::Passed(found) => Err(Ok(self.passed(found, sample))),
+                }
+            }
+        }
+    }
+
+    fn after_resistance(&mut self, hold: Hold) -> Result<Stage, Refusal> {
+        let Some(stored) = self.stored else {
+            return Ok(Stage::Inductance(InductanceStage::new(hold)));
+        };
+        if !((0.6 * stored.resistance.0)..=(1.4 * stored.resistance.0)).contains(&self.resistance.0) {
+            return Err(Refusal::OtherMotor);
+        }
+        self.inductances =
+            Inductances { direct: stored.direct_inductance, quadrature: stored.quadrature_inductance };
+        self.scan(hold)
+    }
+
+    fn scan(&self, hold: Hold) -> Result<Stage, Refusal> {
+        let motor = MotorConstants {
+            resistance: self.resistance,
+            direct_inductance: self.inductances.direct,
+            quadrature_inductance: self.inductances.quadrature,
+            flux: Weber::ZERO,
+        };
+        let gains = CurrentGains::new(&motor, SCAN_BANDWIDTH, false).ok_or(Refusal::MotorConstants)?;
+        Ok(Stage::Scan(Scan::new(gains, hold.volts(), self.stored.map(|stored| stored.offset))))
+    }
+
+    fn passed(&self, found: ScanResult, sample: &AxisSample) -> Calibration {
+        Calibration {
+            zeros: self.zeros,
+            resistance: self.resistance,
+            inductances: self.inductances,
+            offset: found.offset,
+            counter: sample.encoder_count,
+            place: found.place,
+            indexed: self.bench.index,
+        }
+    }
+}
+
+/// The field turns slowly: a loop this fast holds the current and forgives an inductance that is half of what was found.
+const SCAN_BANDWIDTH: Hertz = Hertz(300.0);
+
+#[cfg(test)]
+pub(in crate::motor) mod tests;

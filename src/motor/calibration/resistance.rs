@@ -1,0 +1,173 @@
+//! Phase resistance, and with it the wiring of phases and shunts.
+//!
+//! Current is held along the axes of C, B and A in turn, at half and at full current:
+//!
+//! ```text
+//! R = (v_2 - v_1) / (i_2 - i_1)
+//! ```
+//!
+//! The difference removes what dead time and diodes take, which does not change with the current's size. The voltage is the
+//! modulator's, so the bridge's own resistance counts as the motor's, as it should.
+//! A current that flows must lie within 15 degrees of the voltage; each wrong wiring bends it by 30 or more on one of the
+//! axes, with its own pattern of signs. Where a wrong sign turns the hold's feedback around, a quarter of the current is enough.
+//! 0.3 s to settle (the rotor swings towards the field), 0.1 s of mean, twice per axis.
+
+use super::hold::Hold;
+use super::{ElectricalAngle, Outcome, Phase, Reading, Refusal, Stationary};
+use crate::hal::CURRENT_RATE_HZ;
+use crate::units::{Ampere, Ohm};
+
+const SETTLE_TICKS: u32 = CURRENT_RATE_HZ * 3 / 10;
+const MEAN_TICKS: u32 = CURRENT_RATE_HZ / 10;
+const RELEASE_TICKS: u32 = CURRENT_RATE_HZ / 10;
+/// Share of the held current that is refused at once where it flows backwards: the hold would drive it further.
+const JUDGED_SHARE: f32 = 0.25;
+/// Tangent of 15 degrees.
+const GREATEST_BEND: f32 = 0.268;
+/// Share of the largest phase current that counts as none.
+const NO_CURRENT_SHARE: f32 = 0.15;
+const GREATEST_IMBALANCE: f32 = 0.15;
+
+/// The last one is where the rotor stands for what comes next.
+const AXES: [Phase; 3] = [Phase::C, Phase::B, Phase::A];
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ResistanceStage {
+    axis: usize,
+    ticks: u32,
+    hold: Hold,
+    sums: [Sums; 2],
+    found: [f32; 3],
+}
+
+/// Of one level of current, over the ticks of its mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Sums {
+    volts: f32,
+    current: Stationary<Ampere>,
+}
+
+impl Default for ResistanceStage {
+    fn default() -> Self {
+        Self {
+            axis: 0,
+            ticks: 0,
+            hold: Hold::along(angle_of(AXES[0])),
+            sums: [Sums::default(); 2],
+            found: [0.0; 3],
+        }
+    }
+}
+
+fn angle_of(phase: Phase) -> ElectricalAngle {
+    ElectricalAngle::from_turns(match phase {
+        Phase::A => 0.0,
+        Phase::B => 1.0 / 3.0,
+        Phase::C => 2.0 / 3.0,
+    })
+}
+
+impl ResistanceStage {
+    pub(super) fn tick(&mut self, reading: &Reading<'_>) -> Result<Outcome<(Ohm, Hold)>, Refusal> {
+        const HALF: u32 = SETTLE_TICKS + MEAN_TICKS;
+        let full = reading.bench.settings.current;
+        let phase = AXES.get(self.axis).copied().unwrap_or(Phase::A);
+        let target = match self.ticks {
+            0..HALF => full * 0.5,
+            ticks if ticks < 2 * HALF => full,
+            _ => Ampere::ZERO,
+        };
+        let held = self.hold.tick(reading, target);
+        let backwards = reading.bench.settings.current * -JUDGED_SHARE;
+        if self.hold.along_axis(reading.current) < backwards {
+            return Err(diagnosis(reading.current, phase));
+        }
+        held.map_err(|reason| self.without_current(reading, phase, reason))?;
+        let level = usize::from(self.ticks >= HALF);
+        if self.ticks % HALF >= SETTLE_TICKS
+            && self.ticks < 2 * HALF
+            && let Some(sums) = self.sums.get_mut(level)
+        {
+            sums.volts += self.hold.volts().0;
+            sums.current.alpha += reading.current.alpha;
+            sums.current.beta += reading.current.beta;
+        }
+        self.ticks += 1;
+        if self.ticks == HALF {
+            self.judge_direction(phase)?;
+        }
+        if self.ticks == 2 * HALF {
+            self.take(reading)?;
+            if self.axis + 1 == AXES.len() {
+                return Ok(Outcome::Passed((self.mean()?, self.hold)));
+            }
+        }
+        if self.ticks == 2 * HALF + RELEASE_TICKS {
+            let axis = self.axis + 1;
+            let next = AXES.get(axis).copied().unwrap_or(Phase::A);
+            *self = Self { axis, found: self.found, hold: Hold::along(angle_of(next)), ..Self::default() };
+        }
+        Ok(Outcome::Running(self.hold.voltage()))
+    }
+
+    fn take(&mut self, reading: &Reading<'_>) -> Result<(), Refusal> {
+        let [half, full] = self.sums;
+        let (i1, i2) = (self.hold.along_axis(half.current).0, self.hold.along_axis(full.current).0);
+        let reached = i2 > 0.95 * MEAN_TICKS as f32 * reading.bench.settings.current.0;
+        if !reached || !(i2 > 1.5 * i1) {
+            return Err(Refusal::TimeOut);
+        }
+        if let Some(found) = self.found.get_mut(self.axis) {
+            *found = (full.volts - half.volts) / (i2 - i1);
+        }
+        Ok(())
+    }
+
+    fn mean(&self) -> Result<Ohm, Refusal> {
+        let mean = self.found.iter().sum::<f32>() / 3.0;
+        if !(1e-3..=10.0).contains(&mean) {
+            return Err(Refusal::MotorConstants);
+        }
+        if self.found.iter().any(|found| (found - mean).abs() > GREATEST_IMBALANCE * mean) {
+            return Err(Refusal::PhaseImbalance);
+        }
+        Ok(Ohm(mean))
+    }
+
+    /// The voltage is at its bound: for want of a current, or because the resistance is that large.
+    fn without_current(&self, reading: &Reading<'_>, phase: Phase, reason: Refusal) -> Refusal {
+        let current = self.hold.along_axis(reading.current).abs();
+        if current < reading.bench.settings.current * NO_CURRENT_SHARE {
+            Refusal::PhaseOpen(phase)
+        } else {
+            reason
+        }
+    }
+
+    /// By the mean at half current: a rotor that swings towards the field bends the current as well.
+    fn judge_direction(&self, phase: Phase) -> Result<(), Refusal> {
+        let [half, _] = self.sums;
+        let (along, across) = (self.hold.along_axis(half.current), self.hold.across_axis(half.current));
+        if across.abs() <= along * GREATEST_BEND { Ok(()) } else { Err(diagnosis(half.current, phase)) }
+    }
+}
+
+/// What bends a current that ought to flow along `phase`'s axis: in through it, out through the other two.
+fn diagnosis(current: Stationary<Ampere>, phase: Phase) -> Refusal {
+    let currents = current.to_phases();
+    let phases = [(Phase::A, currents.a.0), (Phase::B, currents.b.0), (Phase::C, currents.c.0)];
+    let largest = phases.iter().fold(0.0_f32, |largest, (_, current)| largest.max(current.abs()));
+    if let Some((open, _)) =
+        phases.iter().find(|(each, current)| *each != phase && current.abs() < NO_CURRENT_SHARE * largest)
+    {
+        return Refusal::PhaseOpen(*open);
+    }
+    let wrong = phases.map(|(each, current)| (current > 0.0) != (each == phase));
+    match wrong {
+        [true, true, true] => Refusal::ShuntsInverted,
+        [false, true, true] => Refusal::ShuntsSwapped,
+        [_, true, false] => Refusal::ShuntInverted(Phase::B),
+        [_, false, true] => Refusal::ShuntInverted(Phase::C),
+        [_, false, false] => Refusal::CurrentDirection,
+    }
+}

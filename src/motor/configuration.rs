@@ -1,0 +1,185 @@
+//! What an axis must be told, the refusal of what makes no sense, and the constants that follow.
+
+use super::{
+    BridgeTiming, Calibration, CountScale, CurrentGains, DeadTime, ElectricalAngle, Modulator,
+    MotorConstants, SenseScale, Sine,
+};
+use crate::hal::CURRENT_RATE_HZ;
+use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
+
+/// Which way something runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Direction {
+    /// It grows.
+    #[default]
+    Up,
+    /// It falls.
+    Down,
+}
+
+impl Direction {
+    /// 1 or -1.
+    #[must_use]
+    pub const fn sign(self) -> i32 {
+        match self {
+            Self::Up => 1,
+            Self::Down => -1,
+        }
+    }
+}
+
+/// One axis: board, motor, encoder, limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisConfiguration {
+    /// Amplifiers and converter.
+    pub sense: SenseScale,
+    /// What a PWM period has to leave room for.
+    pub timing: BridgeTiming,
+    /// Compensation of the bridge's dead time.
+    pub dead_time: DeadTime,
+    /// Of the motor, 1..=64.
+    pub pole_pairs: u8,
+    /// Flux linkage of the magnets: torque per ampere of the motor is 3/2 pole pairs times this.
+    pub flux: Weber,
+    /// Of the encoder at the motor, 16..=65,536, four per line.
+    pub counts_per_turn: u32,
+    /// The encoder has an index pulse.
+    pub index: bool,
+    /// How the counter runs while the field turns from A over B to C, as the axis was commissioned.
+    pub counter: Direction,
+    /// How the counter runs while the joint flexes.
+    pub flexion: Direction,
+    /// Of the current loop, 50..=2000 Hz.
+    pub bandwidth: Hertz,
+    /// Cross-coupling and back-EMF are fed forward.
+    pub feedforward: bool,
+    /// Of the Park angles.
+    pub sine: Sine,
+    /// Largest current that is asked of the motor.
+    pub current_limit: Ampere,
+    /// Length of the current vector at which the bridge is released.
+    pub overcurrent: Ampere,
+    /// Bus voltage within which the bridge may switch.
+    pub bus: [Volt; 2],
+    /// No motor of this axis turns faster.
+    pub greatest_speed: RadianPerSecond,
+}
+
+/// The part of a configuration that makes no sense.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisError {
+    /// Amplifiers, converter or divider.
+    Sense,
+    /// Dead time, settling or conversion leave less than half of the period, or the compensation's band.
+    Timing,
+    /// Counts per turn and pole pairs.
+    Encoder,
+    /// Greatest speed: positive, less than a quarter of an electrical turn and 32,767 counts per tick.
+    Speed,
+    /// Flux, inductances, resistance or bandwidth.
+    Motor,
+    /// Current limit positive, below the overcurrent bound, that within the amplifiers' range.
+    Current,
+    /// Bus voltages: 5 V..=100 V, the first below the second.
+    Bus,
+}
+
+impl AxisConfiguration {
+    /// Everything that can be told without a calibration.
+    ///
+    /// # Errors
+    /// The first part that makes no sense.
+    pub fn check(&self) -> Result<(), AxisError> {
+        let must = |holds: bool, error| if holds { Ok(()) } else { Err(error) };
+        must(self.sense.is_sensible(), AxisError::Sense)?;
+        self.modulator()?;
+        self.scale()?;
+        self.greatest_step()?;
+        must((1e-4..=1.0).contains(&self.flux.0), AxisError::Motor)?;
+        must((50.0..=2000.0).contains(&self.bandwidth.0), AxisError::Motor)?;
+        let currents = self.current_limit.0 > 0.0
+            && self.current_limit < self.overcurrent
+            && self.overcurrent <= self.sense.range(ZERO_SPREAD_CODES);
+        must(currents, AxisError::Current)?;
+        let [low, high] = self.bus;
+        must(low.0 >= 5.0 && low < high && high.0 <= 100.0, AxisError::Bus)
+    }
+
+    pub(super) fn scale(&self) -> Result<CountScale, AxisError> {
+        CountScale::new(self.counts_per_turn, self.pole_pairs).ok_or(AxisError::Encoder)
+    }
+
+    pub(super) fn modulator(&self) -> Result<Modulator, AxisError> {
+        Modulator::new(self.timing, self.dead_time).ok_or(AxisError::Timing)
+    }
+
+    /// Counts per tick that no motor of this axis exceeds, one of rounding included.
+    pub(super) fn greatest_step(&self) -> Result<i32, AxisError> {
+        let turns = self.greatest_speed.0 / (core::f32::consts::TAU * CURRENT_RATE_HZ as f32);
+        let counts = turns * self.counts_per_turn as f32;
+        let sensible = turns > 0.0 && turns * f32::from(self.pole_pairs) < 0.25 && counts < 32_767.0;
+        if sensible { Ok(counts as i32 + 2) } else { Err(AxisError::Speed) }
+    }
+
+    /// The bus voltages as codes.
+    pub(super) fn bus_codes(&self) -> [u16; 2] {
+        self.bus.map(|voltage| (voltage.0 / self.sense.volt_per_code.0) as u16)
+    }
+}
+
+/// How far a shunt's zero may lie from the middle of the converter's range: 6 A on the board's scale.
+pub const ZERO_SPREAD_CODES: u16 = 150;
+
+/// What a tick reads and never writes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Constants {
+    pub sense: SenseScale,
+    pub zeros: [f32; 2],
+    pub bus_codes: [u16; 2],
+    pub scale: CountScale,
+    pub offset: ElectricalAngle,
+    pub counter_sign: i32,
+    pub flexion_sign: i32,
+    /// Joint's sense to the electrical one.
+    pub current_sign: f32,
+    pub greatest_step: i32,
+    pub sine: Sine,
+    pub gains: CurrentGains,
+    pub modulator: Modulator,
+    pub current_limit: f32,
+    pub overcurrent_square: f32,
+}
+
+impl Constants {
+    pub(super) fn new(
+        configuration: &AxisConfiguration,
+        calibration: &Calibration,
+    ) -> Result<Self, AxisError> {
+        configuration.check()?;
+        let motor = MotorConstants {
+            resistance: calibration.resistance(),
+            direct_inductance: calibration.direct_inductance(),
+            quadrature_inductance: calibration.quadrature_inductance(),
+            flux: configuration.flux,
+        };
+        let gains = CurrentGains::new(&motor, configuration.bandwidth, configuration.feedforward)
+            .ok_or(AxisError::Motor)?;
+        let signs = [configuration.counter.sign(), configuration.flexion.sign()];
+        Ok(Self {
+            sense: configuration.sense,
+            zeros: calibration.zeros(),
+            bus_codes: configuration.bus_codes(),
+            scale: configuration.scale()?,
+            offset: calibration.offset(),
+            counter_sign: signs[0],
+            flexion_sign: signs[1],
+            current_sign: (signs[0] * signs[1]) as f32,
+            greatest_step: configuration.greatest_step()?,
+            sine: configuration.sine,
+            gains,
+            modulator: configuration.modulator()?,
+            current_limit: configuration.current_limit.0,
+            overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
+        })
+    }
+}

@@ -1,0 +1,46 @@
+//! Field-oriented current control of one axis, and the calibration without which there is none.
+//!
+//! ```text
+//! AxisSample -> sense -> frames -> current loop -> frames -> modulation -> AxisCommand        24 kHz
+//! Calibrator: zeros -> resistance, wiring -> inductances -> scan of the encoder -> Calibration -> Axis
+//! ```
+//!
+//! | part | what it is |
+//! | --- | --- |
+//! | [`Phases`], [`Stationary`], [`Rotating`] | Clarke and Park as types |
+//! | [`ElectricalAngle`], [`SpeedTracker`] | counts to angle and speed; fast and exact sine |
+//! | [`SenseScale`] | two shunts to a current vector, or an error at the rails |
+//! | [`CurrentLoop`] | PI in d and q, feedforward, voltage limit, anti-windup |
+//! | [`Modulator`] | space vectors, room for the sample, dead time |
+//! | [`Axis`] | all of it in one tick, with the borders that release |
+//! | [`calibration`] | measures and refuses; the only source of a [`Calibration`] |
+//! | [`reference`] | the joint's zero: an end stop or a stated pose |
+//! | [`Transmission`] | current to joint torque and back |
+//!
+//! Equations, the timing within one PWM period and measured figures: docs/motor.md.
+
+pub mod angle;
+pub mod axis;
+pub mod calibration;
+pub mod configuration;
+pub mod current_loop;
+pub mod frames;
+pub mod modulation;
+pub mod reference;
+pub mod sense;
+pub mod transmission;
+
+pub use angle::{CountScale, ElectricalAngle, Rotation, Sine, SpeedTracker};
+pub use axis::{Axis, AxisFault, AxisRequest};
+pub use calibration::{
+    Calibration, CalibrationSettings, CalibrationStep, Calibrator, Phase, Refusal, StoredCalibration,
+};
+pub use configuration::{AxisConfiguration, AxisError, Direction};
+pub use current_loop::{CurrentGains, CurrentLoop, MotorConstants};
+pub use frames::{Phases, Quantity, Rotating, Stationary};
+pub use modulation::{BridgeTiming, DeadTime, Modulator};
+pub use sense::SenseScale;
+pub use transmission::{Transmission, TransmissionConfiguration};
+
+#[cfg(test)]
+mod testing;

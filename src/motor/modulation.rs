@@ -1,0 +1,231 @@
+//! Space-vector modulation: from a voltage to the duties of three half-bridges.
+//!
+//! Why a common shift: only differences between phases reach the motor, so all three may be moved together. Centring the
+//! largest and the smallest about one half gives the waveform of space-vector modulation and 2/sqrt(3) times the voltage of
+//! a sine against the middle.
+//!
+//! ```text
+//! x = phases(v) / V_bus
+//! shift = 1/2 - (max x + min x) / 2,   lowered by what max x + shift exceeds d_max
+//! duty = x + shift + t_d f clamp(i_target / band)                        dead time given back
+//! |v| <= V_bus (d_max - 2 t_d f) / sqrt(3)                               largest circle within that hexagon
+//! ```
+//!
+//! **Minimum zero vector.** The shunts lie below the low sides, and the sample is taken in the middle of the time in which all
+//! three conduct. From the last high side's turning off to that middle the dead time and the amplifier's settling have to
+//! pass, and from there the converter's sampling and conversion:
+//!
+//! ```text
+//! (1 - d_max) / (2 f) >= max(t_d + t_settle, t_adc)
+//! ```
+//!
+//! 119 ns + 1.2 us (DRV8301 at 40 V/V to 1 % of 2 V, SLOS719, table of the shunt amplifiers), 3 + 12 cycles of 21 MHz: 0.71 us;
+//! so at 24 kHz d_max = 0.9367. Centred about one half and not about d_max / 2, because only equal zero vectors make the
+//! sample the mean of the ripple: by the shift the error is v s / (2 L f) at most, s the shift. It arises above
+//! 0.873 of the largest voltage only.
+//!
+//! **Dead time** takes t_d f V_bus from a phase whose current flows out of the bridge and adds it where it flows in: 0.14 V of 48 V
+//! at 119 ns. It is given back by the sign of the *target's* current, smooth within `band`: the measured one would make a
+//! negative resistance of V_d / band out of it, which the loop would have to outweigh.
+//!
+//! The circle leaves up to 1 - sqrt(3)/2 of the hexagon unused at its corners; using it would put a sixth harmonic on
+//! the torque. Source: van der Broeck, Skudelny, Stanke (1988); dead time: Sukegawa et al. (1991).
+
+use super::{Phases, Stationary};
+use crate::hal::CURRENT_RATE_HZ;
+use crate::units::{Ampere, Second, Volt};
+
+const ONE_OVER_SQRT_3: f32 = 0.577_350_26;
+
+/// What the bridge and the converter need of a PWM period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BridgeTiming {
+    /// Both sides off at every edge.
+    pub dead_time: Second,
+    /// From a phase current's change of path to a settled shunt amplifier.
+    pub settling: Second,
+    /// Sampling and conversion after the trigger.
+    pub conversion: Second,
+}
+
+impl BridgeTiming {
+    /// ODrive v3.6: 20 cycles of 168 MHz, DRV8301 at 40 V/V, 15 cycles of 21 MHz.
+    pub const ODRIVE_3_6: Self =
+        Self { dead_time: Second(119e-9), settling: Second(1.2e-6), conversion: Second(0.714e-6) };
+}
+
+/// How dead time is treated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DeadTime {
+    /// Left to the current controllers.
+    Uncompensated,
+    /// Given back by the sign of the target's phase currents, smooth within a band.
+    Compensated {
+        /// Half the width of the transition, positive.
+        band: Ampere,
+    },
+}
+
+/// The modulator's constants; see the module's equations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Modulator {
+    greatest_duty: f32,
+    circle_per_bus: f32,
+    /// Duty that the dead time takes; 0 where it is not given back.
+    dead_duty: f32,
+    per_band: f32,
+}
+
+impl Modulator {
+    /// `None` unless at least half of the period is left to conduct and the band is positive.
+    #[must_use]
+    pub fn new(timing: BridgeTiming, dead_time: DeadTime) -> Option<Self> {
+        let rate = CURRENT_RATE_HZ as f32;
+        let before = timing.dead_time.0 + timing.settling.0;
+        let greatest_duty = 1.0 - 2.0 * rate * before.max(timing.conversion.0);
+        let (dead_duty, per_band) = match dead_time {
+            DeadTime::Uncompensated => (0.0, 0.0),
+            DeadTime::Compensated { band } => (timing.dead_time.0 * rate, 1.0 / band.0),
+        };
+        let times = [timing.dead_time, timing.settling, timing.conversion];
+        let sensible = times.iter().all(|time| (0.0..1.0).contains(&time.0))
+            && greatest_duty >= 0.5
+            && (0.0..=100.0).contains(&per_band)
+            && dead_duty < 0.1;
+        let circle_per_bus = (greatest_duty - 2.0 * dead_duty) * ONE_OVER_SQRT_3;
+        sensible.then_some(Self { greatest_duty, circle_per_bus, dead_duty, per_band })
+    }
+
+    /// Largest duty at which the shunts can still be read.
+    #[must_use]
+    pub const fn greatest_duty(&self) -> f32 {
+        self.greatest_duty
+    }
+
+    /// Longest voltage vector in any direction.
+    #[must_use]
+    pub fn voltage_limit(&self, bus: Volt) -> Volt {
+        bus * self.circle_per_bus
+    }
+
+    /// Duties of A, B and C for a voltage; `per_bus` is one over the bus voltage, `target` the current that is wanted while
+    /// they act.
+    #[must_use]
+    pub fn duties(&self, voltage: Stationary<Volt>, per_bus: f32, target: Stationary<Ampere>) -> [f32; 3] {
+        let Phases { a, b, c } =
+            Stationary { alpha: voltage.alpha.0 * per_bus, beta: voltage.beta.0 * per_bus }.to_phases();
+        let (low, high) = if a < b { (a, b) } else { (b, a) };
+        let low = if c < low { c } else { low };
+        let high = if c > high { c } else { high };
+        let mut shift = 0.5 - 0.5 * (low + high);
+        let room = self.greatest_duty - self.dead_duty - high;
+        if shift > room {
+            shift = room;
+        }
+        let current =
+            Stationary { alpha: target.alpha.0 * self.per_band, beta: target.beta.0 * self.per_band };
+        let current = current.to_phases();
+        [self.duty(a + shift, current.a), self.duty(b + shift, current.b), self.duty(c + shift, current.c)]
+    }
+
+    fn duty(&self, wanted: f32, current_in_bands: f32) -> f32 {
+        let duty = wanted + self.dead_duty * clamp(current_in_bands, -1.0, 1.0);
+        clamp(duty, 0.0, self.greatest_duty)
+    }
+}
+
+/// Two comparisons; what is not a number becomes `low`.
+fn clamp(value: f32, low: f32, high: f32) -> f32 {
+    let value = if value > low { value } else { low };
+    if value < high { value } else { high }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::real::{sin_cos, sqrt};
+
+    const PLAIN: DeadTime = DeadTime::Uncompensated;
+    const NO_CURRENT: Stationary<Ampere> = Stationary { alpha: Ampere::ZERO, beta: Ampere::ZERO };
+
+    fn at(length: f32, degrees: usize) -> Stationary<Volt> {
+        let (sine, cosine) = sin_cos((degrees as f32).to_radians());
+        Stationary { alpha: Volt(length * cosine), beta: Volt(length * sine) }
+    }
+
+    #[test]
+    fn duties_give_the_voltage_that_was_asked_for_up_to_the_limit() {
+        let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, PLAIN).expect("usual");
+        let limit = modulator.voltage_limit(Volt(48.0)).0;
+        for share in [0.0, 0.1, 0.5, 0.87, 0.999] {
+            for degrees in 0..360 {
+                let wanted = at(share * limit, degrees);
+                let [a, b, c] =
+                    modulator.duties(wanted, 1.0 / 48.0, NO_CURRENT).map(|duty| Volt(duty * 48.0));
+                let given = Phases { a, b, c }.to_stationary();
+                let error = (given.alpha - wanted.alpha).abs().0.max((given.beta - wanted.beta).abs().0);
+                assert!(error < 1e-5 * 48.0, "{share} at {degrees}: {error} V");
+            }
+        }
+    }
+
+    #[test]
+    fn the_low_sides_always_conduct_long_enough_to_be_read_and_no_duty_leaves_its_range() {
+        for dead_time in [PLAIN, DeadTime::Compensated { band: Ampere(0.5) }] {
+            let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, dead_time).expect("usual");
+            // 2 * (0.119 + 1.2) us of 41.667 us.
+            assert!((modulator.greatest_duty() - 0.9367).abs() < 1e-4, "{}", modulator.greatest_duty());
+            for length in [5.0, 25.0, 1000.0, f32::INFINITY, f32::NAN] {
+                for degrees in 0..360 {
+                    let target = Stationary { alpha: Ampere(60.0), beta: Ampere(-20.0) };
+                    for duty in modulator.duties(at(length, degrees), 1.0 / 48.0, target) {
+                        assert!((0.0..=modulator.greatest_duty()).contains(&duty), "{duty}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn zero_vectors_are_equal_as_long_as_the_sample_leaves_room() {
+        let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, PLAIN).expect("usual");
+        let limit = modulator.voltage_limit(Volt(48.0)).0;
+        for degrees in 0..360 {
+            let duties = modulator.duties(at(0.87 * limit, degrees), 1.0 / 48.0, NO_CURRENT);
+            let (low, high) = duties.iter().fold((1.0_f32, 0.0_f32), |(l, h), &d| (l.min(d), h.max(d)));
+            assert!((low + high - 1.0).abs() < 1e-6, "{degrees}: {low} {high}");
+        }
+    }
+
+    #[test]
+    fn dead_time_is_given_back_with_the_sign_of_each_phase_and_smoothly_through_zero() {
+        let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, DeadTime::Compensated { band: Ampere(0.5) })
+            .expect("usual");
+        let duties = |current| modulator.duties(at(0.0, 0), 1.0 / 48.0, current);
+        // 119 ns of 41.667 us.
+        let full = 119e-9 * 24_000.0;
+        let [a, b, c] = duties(Stationary { alpha: Ampere(10.0), beta: Ampere::ZERO });
+        assert!((a - 0.5 - full).abs() < 1e-6 && (b - 0.5 + full).abs() < 1e-6 && (c - b).abs() < 1e-7);
+        let [a, ..] = duties(Stationary { alpha: Ampere(-0.25), beta: Ampere::ZERO });
+        assert!((a - 0.5 + 0.5 * full).abs() < 1e-6);
+        assert_eq!(duties(NO_CURRENT), [0.5; 3]);
+    }
+
+    #[test]
+    fn the_circle_touches_the_hexagon() {
+        let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, PLAIN).expect("usual");
+        let limit = modulator.voltage_limit(Volt(48.0)).0;
+        // Least room in the direction between two phases' axes: 30 degrees, where the span is sqrt(3) of the length.
+        let [a, _, c] = modulator.duties(at(limit, 30), 1.0 / 48.0, NO_CURRENT);
+        assert!((a - modulator.greatest_duty()).abs() < 1e-5 && c.abs() < 1e-5, "{a} {c}");
+        assert!((limit * sqrt(3.0) / 48.0 - modulator.greatest_duty()).abs() < 1e-5);
+    }
+
+    #[test]
+    fn timing_that_leaves_no_room_is_refused() {
+        let timing = BridgeTiming::ODRIVE_3_6;
+        assert_eq!(Modulator::new(BridgeTiming { settling: Second(12e-6), ..timing }, PLAIN), None);
+        assert_eq!(Modulator::new(BridgeTiming { dead_time: Second(f32::NAN), ..timing }, PLAIN), None);
+        assert_eq!(Modulator::new(timing, DeadTime::Compensated { band: Ampere(0.0) }), None);
+    }
+}

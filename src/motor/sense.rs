@@ -1,0 +1,103 @@
+//! Codes of the converter to currents and bus voltage.
+//!
+//! Two phases have shunts; what flows in through them flows out through the third. A code near a rail says that the amplifier
+//! is saturated, so the current is unknown: an error, never a number that is too small.
+//!
+//! ```text
+//! i = ampere_per_code * (code - zero)          i_A = -(i_B + i_C)          V_bus = volt_per_code * code
+//! ```
+//!
+//! Currents flow into the motor. `ampere_per_code` is signed, one for each shunt; `zero` is found by calibration.
+//! Source of the board's numbers: ODrive v3.6 firmware (0.5 mOhm, 40 V/V, 3.3 V of 4,096 codes, divider 19).
+//! Cost: 10 operations.
+
+use super::Stationary;
+use crate::units::{Ampere, Volt};
+
+/// The board's amplifiers, divider and converter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SenseScale {
+    /// Current per code of the shunts of B and C.
+    pub ampere_per_code: [Ampere; 2],
+    /// Smallest and largest code that is no saturation.
+    pub rails: [u16; 2],
+    /// Bus voltage per code.
+    pub volt_per_code: Volt,
+}
+
+impl SenseScale {
+    /// ODrive v3.6, 56 V: 0.5 mOhm, 40 V/V, 0.3 V..3.0 V; divider 19. 0.0403 A and 15.3 mV per code.
+    pub const ODRIVE_3_6: Self = Self {
+        ampere_per_code: [Ampere(3.3 / 4096.0 / 40.0 / 0.0005); 2],
+        rails: [372, 3723],
+        volt_per_code: Volt(3.3 * 19.0 / 4096.0),
+    };
+
+    /// Bus voltage of a code.
+    #[must_use]
+    pub fn bus(&self, code: u16) -> Volt {
+        self.volt_per_code * f32::from(code)
+    }
+
+    /// Current vector of the codes of B and C, with their zeros; `None` where one is at a rail.
+    #[must_use]
+    pub fn currents(&self, codes: [u16; 2], zeros: [f32; 2]) -> Option<Stationary<Ampere>> {
+        let [b, c] = codes;
+        let width = self.rails[1].wrapping_sub(self.rails[0]);
+        if b.wrapping_sub(self.rails[0]) > width || c.wrapping_sub(self.rails[0]) > width {
+            return None;
+        }
+        let b = self.ampere_per_code[0] * (f32::from(b) - zeros[0]);
+        let c = self.ampere_per_code[1] * (f32::from(c) - zeros[1]);
+        Some(Stationary::from_two_phases(b, c))
+    }
+
+    /// Largest phase current that both shunts can tell, whatever their zeros within `spread` codes of the middle.
+    #[must_use]
+    pub fn range(&self, spread: u16) -> Ampere {
+        let below = 2048_u16.saturating_sub(self.rails[0]);
+        let above = self.rails[1].saturating_sub(2048);
+        let codes = below.min(above).saturating_sub(spread);
+        let [b, c] = self.ampere_per_code.map(|scale| scale.abs().0);
+        Ampere(f32::from(codes) * b.min(c))
+    }
+
+    /// Rails in order, constants finite and not zero.
+    pub(super) fn is_sensible(&self) -> bool {
+        self.rails[0] < 2048
+            && 2048 < self.rails[1]
+            && self.rails[1] < 4096
+            && self.ampere_per_code.iter().all(|scale| (1e-4..=1.0).contains(&scale.0.abs()))
+            && (1e-4..=1.0).contains(&self.volt_per_code.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::real::sqrt;
+
+    const ZEROS: [f32; 2] = [2050.5, 2040.0];
+
+    #[test]
+    fn two_shunts_tell_three_currents() {
+        let scale = SenseScale::ODRIVE_3_6;
+        let vector = scale.currents([2150, 1990], ZEROS).expect("within the rails");
+        let (b, c) = (0.040_283 * 99.5, -0.040_283 * 50.0);
+        assert!((vector.alpha.0 + b + c).abs() < 1e-3, "{vector:?}");
+        assert!((vector.beta.0 - (b - c) / sqrt(3.0)).abs() < 1e-3, "{vector:?}");
+        // 1675 codes of 40.3 mA on the narrower side, less 100.
+        assert!((scale.range(100).0 - 63.4).abs() < 0.1, "{:?}", scale.range(100));
+        assert!((scale.bus(3000).0 - 45.92).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_saturated_amplifier_gives_no_current() {
+        let scale = SenseScale::ODRIVE_3_6;
+        for code in [0, 371, 3724, 4095, u16::MAX] {
+            assert_eq!(scale.currents([code, 2048], ZEROS), None);
+            assert_eq!(scale.currents([2048, code], ZEROS), None);
+        }
+        assert!(scale.currents([372, 3723], ZEROS).is_some());
+    }
+}

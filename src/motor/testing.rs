@@ -1,0 +1,182 @@
+//! A small motor for unit tests: averaged over the PWM period, in the rotor's frame, double precision.
+//!
+//! The joint tests with the simulated hardware, which resolves every edge and shares nothing with this room, are in
+//! `hal-sim/tests/`.
+
+use super::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale, Sine};
+use crate::hal::{AxisCommand, AxisSample};
+use crate::real::{sin_cos, sqrt};
+use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
+
+pub(super) const CONFIGURATION: AxisConfiguration = AxisConfiguration {
+    sense: SenseScale::ODRIVE_3_6,
+    timing: BridgeTiming::ODRIVE_3_6,
+    dead_time: DeadTime::Compensated { band: Ampere(0.5) },
+    pole_pairs: 7,
+    flux: Weber(2.9e-3),
+    counts_per_turn: 8192,
+    index: true,
+    counter: Direction::Up,
+    flexion: Direction::Up,
+    bandwidth: Hertz(1000.0),
+    feedforward: true,
+    sine: Sine::Fast,
+    current_limit: Ampere(40.0),
+    overcurrent: Ampere(55.0),
+    bus: [Volt(20.0), Volt(58.0)],
+    greatest_speed: RadianPerSecond(600.0),
+};
+
+const SUBSTEPS: usize = 10;
+const STEP_S: f64 = 1.0 / 24_000.0 / SUBSTEPS as f64;
+
+#[derive(Clone, Debug)]
+pub(super) struct TestMotor {
+    pub resistance: f64,
+    pub inductance: [f64; 2],
+    pub flux: f64,
+    pub pole_pairs: f64,
+    pub counts_per_turn: f64,
+    /// kg m^2, N m s, N m.
+    pub inertia: f64,
+    pub viscous: f64,
+    pub coulomb: f64,
+    pub load: f64,
+    pub bus: f64,
+    /// Fraction of a period in which the bridge does what the current wants.
+    pub dead: f64,
+    pub zeros: [f64; 2],
+    pub noise_codes: f64,
+    /// Encoder's zero against the flux, mechanical turns; -1 where it counts backwards.
+    pub encoder_zero: f64,
+    pub encoder_sign: f64,
+    pub encoder_dead: bool,
+    /// What the converter makes of the currents of B and C.
+    pub shunts: fn([f64; 2]) -> [f64; 2],
+    /// d and q, A.
+    pub current: [f64; 2],
+    pub angle: f64,
+    pub speed: f64,
+    /// Held by a machine at its speed.
+    pub driven: bool,
+    pub pending: AxisCommand,
+    pub seed: u64,
+    pub turn: Option<i64>,
+}
+
+impl Default for TestMotor {
+    fn default() -> Self {
+        Self {
+            resistance: 0.05,
+            inductance: [24e-6, 27e-6],
+            flux: 2.9e-3,
+            pole_pairs: 7.0,
+            counts_per_turn: 8192.0,
+            inertia: 2e-4,
+            viscous: 2e-4,
+            coulomb: 0.01,
+            load: 0.0,
+            bus: 48.0,
+            dead: 119e-9 * 24_000.0,
+            zeros: [12.3, -20.6],
+            noise_codes: 1.5,
+            encoder_zero: 0.137,
+            encoder_sign: 1.0,
+            encoder_dead: false,
+            shunts: |currents| currents,
+            current: [0.0; 2],
+            angle: 0.3,
+            speed: 0.0,
+            driven: false,
+            pending: AxisCommand::RELEASED,
+            seed: 1,
+            turn: None,
+        }
+    }
+}
+
+impl TestMotor {
+    pub(super) fn electrical(&self) -> f64 {
+        self.angle * self.pole_pairs
+    }
+
+    fn place(&self) -> f64 {
+        self.encoder_sign * self.angle / core::f64::consts::TAU + self.encoder_zero
+    }
+
+    /// Sum of twelve uniform numbers: a normal one, nearly.
+    fn noise(&mut self) -> f64 {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            self.seed =
+                self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += (self.seed >> 40) as f64 / (1_u64 << 24) as f64;
+        }
+        sum
+    }
+
+    fn phases(&self) -> [f64; 3] {
+        let (sine, cosine) = sin_cos(self.electrical());
+        let alpha = cosine * self.current[0] - sine * self.current[1];
+        let beta = sine * self.current[0] + cosine * self.current[1];
+        let turned = 0.5 * sqrt(3.0) * beta;
+        [alpha, -0.5 * alpha + turned, -0.5 * alpha - turned]
+    }
+
+    /// One PWM period: the command given acts in the next one.
+    pub(super) fn period(&mut self, command: AxisCommand) -> AxisSample {
+        let acting = core::mem::replace(&mut self.pending, command);
+        for _ in 0..SUBSTEPS {
+            self.substep(&acting);
+        }
+        self.sample()
+    }
+
+    pub(super) fn sample(&mut self) -> AxisSample {
+        let [_, b, c] = self.phases();
+        let seen = (self.shunts)([b, c]);
+        let mut shunt_codes = [0; 2];
+        for (shunt, code) in shunt_codes.iter_mut().enumerate() {
+            let exact = 2048.0 + self.zeros[shunt] + seen[shunt] / (3.3 / 4096.0 / 40.0 / 0.0005);
+            *code = (exact + self.noise_codes * self.noise() + 0.5).clamp(0.0, 4095.0) as u16;
+        }
+        let place = if self.encoder_dead { 0.0 } else { self.place() };
+        let counts = (place * self.counts_per_turn).floor() as i64;
+        let turn = place.floor() as i64;
+        let before = self.turn.replace(turn).unwrap_or(turn);
+        let at = (turn.max(before) as f64 * self.counts_per_turn) as i64;
+        let index_count = (before != turn).then_some(at as u16);
+        let bus_code = (self.bus / (3.3 * 19.0 / 4096.0)) as u16;
+        AxisSample { shunt_codes, bus_code, encoder_count: counts as u16, index_count }
+    }
+
+    fn substep(&mut self, command: &AxisCommand) {
+        let electrical_speed = self.speed * self.pole_pairs;
+        let [id, iq] = self.current;
+        if command.enabled {
+            let phases = self.phases();
+            let mut volts = [0.0; 3];
+            for (phase, volt) in volts.iter_mut().enumerate() {
+                let lost = self.dead * (phases[phase] / 0.2).clamp(-1.0, 1.0);
+                *volt = (f64::from(command.duty[phase]) - lost) * self.bus;
+            }
+            let alpha = (2.0 * volts[0] - volts[1] - volts[2]) / 3.0;
+            let beta = (volts[1] - volts[2]) / sqrt(3.0);
+            let (sine, cosine) = sin_cos(self.electrical());
+            let (vd, vq) = (cosine * alpha + sine * beta, cosine * beta - sine * alpha);
+            let [ld, lq] = self.inductance;
+            self.current[0] += STEP_S * (vd - self.resistance * id + electrical_speed * lq * iq) / ld;
+            self.current[1] +=
+                STEP_S * (vq - self.resistance * iq - electrical_speed * (ld * id + self.flux)) / lq;
+        } else {
+            self.current = [0.0; 2];
+        }
+        let torque = 1.5 * self.pole_pairs * self.flux * iq;
+        if !self.driven {
+            let push = torque - self.load - self.viscous * self.speed;
+            let friction = self.coulomb * (self.speed / 0.05).clamp(-1.0, 1.0);
+            self.speed += STEP_S * (push - friction) / self.inertia;
+        }
+        self.angle += STEP_S * self.speed;
+    }
+}
