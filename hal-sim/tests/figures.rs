@@ -8,9 +8,11 @@ use command::{Folder, MUJOCO, scarab};
 use hal_sim::tool::figures;
 use hal_sim::tool::identify::identify_one;
 use hal_sim::tool::leg_file::LegFile;
+use hal_sim::tool::perturb::Perturbation;
 use hal_sim::tool::report::RunReport;
 use hal_sim::tool::series::{Role, Series};
 use hal_sim::tool::simulate::SimulationOptions;
+use scarab::model::Payload;
 
 fn identified() -> (RunReport, Series) {
     let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
@@ -98,6 +100,30 @@ fn curves_of_one_motion_are_of_the_same_instants() {
     }
     assert!(series.excess.first().expect("a search").1 > 10.0, "a cold start is far from the optimum");
     assert!(series.excess.last().expect("a search").1 < 0.5);
+}
+
+#[test]
+fn torques_that_a_known_mass_put_right_are_drawn_put_right() {
+    let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
+    let options = SimulationOptions {
+        with_series: true,
+        perturbations: vec![Perturbation::TorqueConstant(1.2)],
+        payload: Some(Payload { joint: 1, mass: 5.0, place: [0.2, 0.0, 0.0].into() }),
+        ..SimulationOptions::of_seed(1)
+    };
+    let (report, series) = identify_one::<2, 13>(&leg, &options, None).expect("it runs");
+    for motion in &series.motions {
+        let fits = if motion.role == Role::Training { &report.training } else { &report.validation };
+        let name = if motion.role == Role::Training { "fourier" } else { motion.name.as_str() };
+        for (joint, curves) in motion.joints.iter().enumerate() {
+            let residual = root_mean_square(curves.residual_nm().flatten());
+            let fit =
+                fits.iter().find(|fit| fit.motion == name && fit.joint == joint + 1).expect("in the table");
+            // As without a mass, above; a ratio on the wrong side makes 44 % of the torque, 30 times that.
+            let table = fit.rms_nm.known().expect("known");
+            assert!((residual / table - 1.0).abs() < 0.05, "{} {joint}: {residual}, {table}", motion.name);
+        }
+    }
 }
 
 #[test]

@@ -72,3 +72,46 @@ fn masses_that_cannot_be_meant_are_refused_by_option_and_reason() {
         assert!(refusal.contains(reason), "{arguments}: {refusal}");
     }
 }
+
+#[test]
+fn geometry_is_asked_of_corrected_torques_too() {
+    // Without a known mass each of them is refused; a constant that makes up for a wrong length must not excuse it.
+    for options in [
+        "--perturb length=1.1 --payload 5@knee:0.2",
+        "--perturb length=1.05 --payload 5@knee:0.2",
+        "--perturb zero=5 --payload 5@knee:0.2",
+        "--perturb length=1.1 --load 3@knee:0.2",
+        "--perturb zero=5 --load 3@knee:0.2",
+    ] {
+        let folder = Folder::new();
+        scarab(&format!("identify {options} --json"), &[&folder.path("run.json")]).ends_with(3);
+        let json = folder.json("run.json");
+        let reasons = json["reasons"].as_array().expect("reasons");
+        assert!(reasons.iter().any(|reason| reason == "residual"), "{options}: {reasons:?}");
+        assert_eq!(json["scale"], "relative", "{options}");
+        for finding in json["findings"].as_array().expect("findings") {
+            // Of rows that were looked at none is exactly zero.
+            assert!(finding["test"] != "slow_residual" || finding["value"] != 0.0, "{options}");
+        }
+    }
+}
+
+#[test]
+fn a_mass_too_light_to_tell_is_called_that() {
+    let run = scarab("identify --payload 0.001@knee:0.2", &[]).ends_with(0);
+    assert!(
+        run.printed.contains("too light to tell") && !run.printed.contains("contradicted"),
+        "{}",
+        run.printed
+    );
+}
+
+#[test]
+fn values_tampered_with_are_not_replaced_in_silence() {
+    for mass in ["--payload 5@knee:0.2", "--load 3@knee:0.2"] {
+        for tampering in ["inertia=0.7", "com=0.8"] {
+            let refusal = scarab(&format!("identify --perturb {tampering} {mass}"), &[]).refusal();
+            assert!(refusal.contains("one of the two"), "{refusal}");
+        }
+    }
+}

@@ -7,11 +7,13 @@
 //! z_j = d tau / d ln a_j,   d tau / d q0_j                   at the model's parameters, by a difference quotient
 //! r   = Y nu + z delta + noise                               rows of the held-out motions, over sigma of their joint
 //! R   = triangular factor of (Y, z, r);  u_j, w: what of z_j and r lies below the rows of Y
-//! S   = u'u,      delta = u'w / S,      sigma = 1 / sqrt S
+//! S   = u'u,      delta = u'w / S,      sigma = 1 / sqrt S                   each direction alone
+//! U delta = w,    sigma_j^2 = (U'U)^-1_jj                                     all directions together
 //! ```
 //!
 //! delta is the share by which a link is longer than believed, or the angle by which a zero is off: of each alone, the
-//! parameters free to follow. It is zero within sigma for a leg as believed (score test, Rao 1948). The motion
+//! parameters free to follow, and of each beside the others. Alone is the sharper question where one thing is wrong; a
+//! length and a zero that are both off resemble each other enough to cancel in it, and show only beside each other. It is zero within sigma for a leg as believed (score test, Rao 1948). The motion
 //! identified from cannot take part: while it streams by the parameters are not known, and z with them.
 //!
 //! A push of the wearer asks for nothing, but z'r would take it for geometry: rows within [`HELD`] rows of one that misses by
@@ -58,10 +60,12 @@ pub struct Misalignment<T> {
     pub direction: Direction,
     /// Of this joint.
     pub joint: usize,
-    /// See [`Direction`].
+    /// See [`Direction`]; of this direction alone.
     pub delta: T,
     /// Its standard deviation.
     pub sigma: T,
+    /// The same beside all other directions, and its standard deviation; `None` where they leave nothing of it.
+    pub beside: Option<(T, T)>,
 }
 
 /// Of every direction that is seen.
@@ -246,6 +250,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
                 }
             }
         }
+        let beside = self.beside(&power);
         core::array::from_fn(|index| {
             let (direction, joint) = subject::<N>(index)?;
             if !(power[index] > T::zero() && seen[index] > T::of(SEEN_SHARE) * power[index]) {
@@ -256,7 +261,47 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
                 joint,
                 delta: along[index] / seen[index],
                 sigma: T::one() / real::sqrt(seen[index]),
+                beside: beside[index],
             })
+        })
+    }
+
+    /// All directions together: `U delta = w` from below upwards. A direction that those before it leave nothing of stays 0.
+    fn beside(&self, power: &[T; DIRECTIONS]) -> [Option<(T, T)>; DIRECTIONS] {
+        let mut triangle = [[T::zero(); DIRECTIONS]; DIRECTIONS];
+        // The right-hand side, and the columns of the unit matrix: their solution is U^-1.
+        let mut solved = [[T::zero(); DIRECTIONS + 1]; DIRECTIONS];
+        for (column, row) in packed::rows(&self.factor, Self::COLUMNS) {
+            let Some(direction) = column.checked_sub(B).filter(|&direction| direction < DIRECTIONS) else {
+                continue;
+            };
+            for (slot, &element) in triangle[direction].iter_mut().skip(direction).zip(row) {
+                *slot = element;
+            }
+            solved[direction][direction] = T::one();
+            solved[direction][DIRECTIONS] = row.last().copied().unwrap_or(T::zero());
+        }
+        let mut seen = [false; DIRECTIONS];
+        for direction in (0..DIRECTIONS).rev() {
+            let pivot = triangle[direction][direction];
+            seen[direction] = pivot * pivot > T::of(SEEN_SHARE) * power[direction];
+            let mut rest = solved[direction];
+            for later in direction + 1..DIRECTIONS {
+                for (element, &known) in rest.iter_mut().zip(&solved[later]) {
+                    *element -= triangle[direction][later] * known;
+                }
+            }
+            solved[direction] = if seen[direction] {
+                rest.map(|element| element / pivot)
+            } else {
+                [T::zero(); DIRECTIONS + 1]
+            };
+        }
+        core::array::from_fn(|direction| {
+            let row = &solved[direction];
+            let variance =
+                row.iter().take(DIRECTIONS).fold(T::zero(), |sum, &element| sum + element * element);
+            seen[direction].then(|| (row[DIRECTIONS], real::sqrt(variance)))
         })
     }
 }

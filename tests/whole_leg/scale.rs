@@ -5,7 +5,7 @@ use hal_sim::tool::posture::on_side;
 use hal_sim::tool::scale::{Corrected, Scale};
 use hal_sim::world::World;
 use nalgebra::Vector3;
-use scarab::leg::IdentifiedModel;
+use scarab::leg::{IdentifiedModel, LoggedSample};
 use scarab::model::Payload;
 use scarab::servo::TorqueModel;
 
@@ -23,18 +23,32 @@ fn leg_with_constants(factors: [f64; JOINTS]) -> LegFile {
     leg
 }
 
-/// Identified once; the verdict on that alone.
-fn first_run(factors: [f64; JOINTS], seed: u64) -> (Pair, Option<Verdict>) {
-    let mut pair = enabled(&leg_with_constants(factors), seed);
-    let verdict = identify(&mut pair);
-    (pair, verdict)
+/// A leg that has identified itself once.
+struct FirstRun {
+    pair: Pair,
+    /// On that alone.
+    verdict: Option<Verdict>,
+    log: Vec<LoggedSample<JOINTS>>,
 }
 
-fn corrected(pair: &Pair, stated: &Payload<f64>) -> (Scale<JOINTS, BASE>, Option<Corrected<JOINTS, BASE>>) {
-    let scale = second_run(pair, &ON_THE_KNEE, stated);
-    let identification = pair.leg.identification();
+fn first_run(factors: [f64; JOINTS], seed: u64) -> FirstRun {
+    let mut pair = enabled(&leg_with_constants(factors), seed);
+    let mut log = Vec::new();
+    let mut request = Some(ControlRequest::Identify);
+    while request.is_some() || matches!(activity(&pair), Activity::Identify(_)) {
+        log.extend(tick(&mut pair, request.take()).logged);
+    }
+    FirstRun { verdict: pair.leg.control().verdict(), pair, log }
+}
+
+fn corrected(
+    run: &FirstRun,
+    stated: &Payload<f64>,
+) -> (Scale<JOINTS, BASE>, Option<Corrected<JOINTS, BASE>>) {
+    let scale = second_run(&run.pair, &ON_THE_KNEE, stated);
+    let identification = run.pair.leg.identification();
     let solver = identification.solver().expect("solved");
-    let corrected = scale.corrected(context(), solver, identification.validation());
+    let corrected = scale.corrected(context(), solver, identification.validation(), &run.log);
     (scale, corrected)
 }
 
@@ -61,14 +75,14 @@ fn worst_pull(run: &Corrected<JOINTS, BASE>) -> f64 {
 #[test]
 fn a_wrong_torque_constant_is_not_seen_in_one_run_and_found_with_a_known_mass() {
     for seed in 1..=3 {
-        let (pair, verdict) = first_run([1.2; JOINTS], seed);
-        assert_eq!(verdict, Some(Verdict::ACCEPTED), "nothing in one run tells");
-        let relative = pair.leg.identification().solver().expect("solved").estimate().values;
+        let run = first_run([1.2; JOINTS], seed);
+        assert_eq!(run.verdict, Some(Verdict::ACCEPTED), "nothing in one run tells");
+        let relative = run.pair.leg.identification().solver().expect("solved").estimate().values;
         let rotor = BASE - 1;
         // Everything is too small by the factor; sigma of this rotor's inertia is 0.3 %.
         assert!((f64::from(relative[rotor]) * 1.2 / true_base()[rotor] - 1.0).abs() < 0.02);
 
-        let (scale, corrected) = corrected(&pair, &ON_THE_KNEE);
+        let (scale, corrected) = corrected(&run, &ON_THE_KNEE);
         let ratios = scale.trusted().expect("both joints feel the mass");
         for ratio in ratios {
             let constant = 1.5 / f64::from(ratio.ratio);
@@ -88,8 +102,8 @@ fn a_wrong_torque_constant_is_not_seen_in_one_run_and_found_with_a_known_mass() 
 
 #[test]
 fn constants_that_differ_from_joint_to_joint_are_found_each() {
-    let (pair, _) = first_run([0.8, 1.15], 4);
-    let (scale, corrected) = corrected(&pair, &ON_THE_KNEE);
+    let run = first_run([0.8, 1.15], 4);
+    let (scale, corrected) = corrected(&run, &ON_THE_KNEE);
     let ratios = scale.trusted().expect("both joints feel the mass").map(|ratio| f64::from(ratio.ratio));
     assert!((ratios[0] * 0.8 - 1.0).abs() < 0.01 && (ratios[1] * 1.15 - 1.0).abs() < 0.01, "{ratios:?}");
     let corrected = corrected.expect("to be corrected");
@@ -99,21 +113,21 @@ fn constants_that_differ_from_joint_to_joint_are_found_each() {
 
 #[test]
 fn a_mass_stated_wrongly_scales_the_result_and_a_place_stated_wrongly_is_noticed() {
-    let (pair, _) = first_run([1.0; JOINTS], 5);
-    let (heavy, _) = corrected(&pair, &Payload { mass: 5.5, ..ON_THE_KNEE });
+    let run = first_run([1.0; JOINTS], 5);
+    let (heavy, _) = corrected(&run, &Payload { mass: 5.5, ..ON_THE_KNEE });
     for ratio in heavy.trusted().expect("nothing contradicts") {
         assert!((f64::from(ratio.ratio) * 1.1 - 1.0).abs() < 0.01, "10 % of mass are 10 % of the constant");
     }
     let far = Payload { place: Vector3::new(0.3, 0.0, 0.0), ..ON_THE_KNEE };
-    let (contradicted, corrected) = corrected(&pair, &far);
+    let (contradicted, corrected) = corrected(&run, &far);
     assert!(contradicted.trusted().is_none() && corrected.is_none());
 }
 
 #[test]
 fn a_mass_on_the_thigh_tells_the_hip_alone_and_nothing_is_corrected() {
-    let (pair, _) = first_run([1.2; JOINTS], 6);
+    let run = first_run([1.2; JOINTS], 6);
     let thigh = Payload { joint: 0, mass: 5.0, place: Vector3::new(0.3, 0.0, 0.0) };
-    let scale = second_run(&pair, &thigh, &thigh);
+    let scale = second_run(&run.pair, &thigh, &thigh);
     let hip = scale.ratios[0].expect("felt");
     assert!((f64::from(hip.ratio) * 1.2 - 1.0).abs() < 0.02, "{}", hip.ratio);
     assert!(scale.ratios[1].is_none() && scale.trusted().is_none());

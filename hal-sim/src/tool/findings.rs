@@ -124,13 +124,15 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
              second, at most {limit:.3} may"
         ),
         Test::LinkLength => format!(
-            "the torque asks for a link before joint {joint} that is {:+.1} % longer than believed, within {:.1} % it \
-             may be",
-            100.0 * value,
+            "the torque asks for another geometry: a link before joint {joint} {:.1} % {} than believed, or what resembles \
+             it, a zero that is off or a trunk that leans; {:.1} % may be",
+            100.0 * value.abs(),
+            if value < 0.0 { "shorter" } else { "longer" },
             100.0 * limit
         ),
         Test::EncoderZero => format!(
-            "the torque asks for a zero of joint {joint} that is {:+.1} degrees off, within {:.1} it may be",
+            "the torque asks for another geometry: the zero of joint {joint} {:+.1} degrees from where it is believed, or \
+             what resembles it, another length or a trunk that leans; {:.1} may be",
             value.to_degrees(),
             limit.to_degrees()
         ),

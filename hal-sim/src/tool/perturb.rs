@@ -102,6 +102,14 @@ impl FromStr for Perturbation {
     }
 }
 
+impl Perturbation {
+    /// Whether it changes the values found, before they are validated.
+    #[must_use]
+    pub fn tampers(&self) -> bool {
+        matches!(self, Self::Inertia(_) | Self::CentreOfMass(_))
+    }
+}
+
 /// The place of a joint given by its name or its number from 1.
 fn joint_index(leg: &LegFile, joint: &str) -> Result<usize, ToolError> {
     let by_number = joint.parse::<usize>().ok().and_then(|number| number.checked_sub(1));

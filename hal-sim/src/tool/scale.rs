@@ -13,16 +13,16 @@ mod report;
 pub use report::{MassReport, ScaleReport, TorqueConstantReport, lines, summary};
 
 use scarab::ident::{
-    ConstantRatio, Record, Residual, SearchState, Solver, Thresholds, Unused as HeldOutMotion, Verdict,
-    torque_constant_ratio,
+    ConstantRatio, Ends, HeldOut, Misalignments, Record, Recorder, Residual, SearchState, Solver, Thresholds,
+    Unused as HeldOutMotion, Verdict, torque_constant_ratio,
 };
-use scarab::leg::{Activity, ControlRequest, IdentifyPhase, VALIDATION_MOTIONS};
+use scarab::leg::{Activity, ControlRequest, IdentifyPhase, LoggedSample, Segment, VALIDATION_MOTIONS};
 use scarab::model::Payload;
 
 use super::error::ToolError;
 use super::findings::FindingReport;
 use super::motions::VALIDATION_NAMES;
-use super::pair::{Context, Pair};
+use super::pair::{Context, PENDING, Pair, TAPS};
 use crate::world::TICK_S;
 
 /// The leg hangs so long with the mass before it is moved again, s.
@@ -63,6 +63,12 @@ pub struct Corrected<const N: usize, const B: usize> {
     pub iterations_to_half_chi2: Option<u32>,
 }
 
+/// What unused motions look like with every torque put right.
+struct SeenAgain<const N: usize> {
+    residuals: [Residual<f32, N>; VALIDATION_MOTIONS],
+    asked: Misalignments<f32>,
+}
+
 impl<const N: usize, const B: usize> Scale<N, B> {
     /// What a load says, and a mass for which `pair`, which has identified, is carried through a second run.
     pub fn find(
@@ -96,11 +102,14 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         Ok(Self { payload: Some(*stated), ratios, load: None, load_base: [0.0; B] })
     }
 
-    /// Believed over true constant of all joints; `None` unless the mass told every one of them and nothing contradicts.
+    /// Believed over true constant of all joints; `None` unless the mass told every one of them well and nothing contradicts.
     #[must_use]
     pub fn trusted(&self) -> Option<[ConstantRatio<f32>; N]> {
-        let all: Option<Vec<_>> =
-            self.ratios.iter().map(|ratio| ratio.filter(ConstantRatio::is_consistent)).collect();
+        let all: Option<Vec<_>> = self
+            .ratios
+            .iter()
+            .map(|ratio| ratio.filter(|found| found.is_told() && found.is_consistent()))
+            .collect();
         all?.try_into().ok()
     }
 
@@ -111,6 +120,7 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         context: &Context<N, B>,
         solver: &Solver<f32, N, B>,
         unused: &Unused<N, B>,
+        log: &[LoggedSample<N>],
     ) -> Option<Corrected<N, B>> {
         let found = self.trusted();
         if found.is_none() && self.load.is_none() {
@@ -133,15 +143,60 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         let unused = unused
             .each_ref()
             .map(|record| record.as_ref().map(|record| record.corrected(&ratios, &self.load_base)));
-        // What was seen of the order in time and of the geometry was seen with the torques as they were: it is not asked
-        // of torques put right.
-        let residual = Residual::new();
-        let held_out = unused.iter().flatten().map(|record| HeldOutMotion { record, residual: &residual });
+        let seen = self.look_again(context, &again, &ratios, log)?;
+        let held_out = unused
+            .iter()
+            .zip(&seen.residuals)
+            .filter_map(|(record, residual)| Some(HeldOutMotion { record: record.as_ref()?, residual }));
         let mut findings = Vec::new();
-        let verdict = again.judge(model, &thresholds, held_out, &Default::default(), &mut |piece| {
+        let verdict = again.judge(model, &thresholds, held_out, &seen.asked, &mut |piece| {
             findings.push(FindingReport::new(piece, &VALIDATION_NAMES));
         });
         Some(Corrected { solver: again, verdict, findings, unused, iterations_to_half_chi2 })
+    }
+
+    /// The unused motions once more through the firmware's own recorder, every torque put right, held against the corrected
+    /// leg with what it carries: their order in time, and what they ask for.
+    fn look_again(
+        &self,
+        context: &Context<N, B>,
+        solver: &Solver<f32, N, B>,
+        ratios: &[f32; N],
+        log: &[LoggedSample<N>],
+    ) -> Option<SeenAgain<N>> {
+        let mut recorder =
+            Box::new(Recorder::<f32, N, B, TAPS, PENDING>::new(context.configuration.bandwidth_hz).ok()?);
+        let mut model = context.background.device.clone();
+        model.stribeck = solver.stribeck(&model);
+        let values = loaded(Some(self), &solver.values());
+        let mut held_out = Box::new(HeldOut::<f32, N, B, PENDING>::new(recorder.reach()));
+        let mut residuals = [Residual::new(); VALIDATION_MOTIONS];
+        for (motion, residual) in residuals.iter_mut().enumerate() {
+            let segment = Some(Segment::Validation(motion as u8));
+            recorder.clear(Ends::Whole);
+            held_out.begin(
+                &values,
+                &solver.unexpected(),
+                &solver.row_noise(),
+                &solver.record().selection.dropped,
+            );
+            for logged in log.iter().filter(|logged| logged.segment == segment) {
+                let torque = core::array::from_fn(|joint| logged.sample.torque_nm[joint] / ratios[joint]);
+                match recorder.push(&model, &logged.sample.position_rad, &torque) {
+                    Some(progress) => held_out.take(&model, &progress),
+                    None => held_out.break_off(),
+                }
+            }
+            while let Some(progress) = recorder.flush(&model) {
+                match progress {
+                    Some(progress) => held_out.take(&model, &progress),
+                    None => held_out.break_off(),
+                }
+            }
+            held_out.break_off();
+            *residual = *held_out.residual();
+        }
+        Some(SeenAgain { residuals, asked: held_out.alignment().misalignments() })
     }
 }
 

@@ -251,7 +251,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             };
             let samples = self.log.iter().filter(|logged| logged.segment == Some(segment));
             let samples = samples.map(|logged| {
-                let torque = core::array::from_fn(|joint| ratios[joint] * logged.sample.torque_nm[joint]);
+                let torque = core::array::from_fn(|joint| logged.sample.torque_nm[joint] / ratios[joint]);
                 (logged.sample.position_rad, torque)
             });
             let mut motion = reader.motion(name, role, 0.0, samples);
@@ -315,7 +315,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         let scale = self.scale.take();
         let corrected = scale
             .as_ref()
-            .and_then(|scale| scale.corrected(self.context, solver, identification.validation()));
+            .and_then(|scale| scale.corrected(self.context, solver, identification.validation(), &self.log));
         let (found, verdict, unused) = match &corrected {
             Some(run) => {
                 findings.clone_from(&run.findings);

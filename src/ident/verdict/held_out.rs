@@ -58,7 +58,7 @@ impl<T: Real> Thresholds<T> {
     }
 
     /// Whether the unused motions ask for other lengths or zeros than the model has, significantly and by more than
-    /// lengths and zeros are known.
+    /// lengths and zeros are known; alone or beside each other, whichever says more.
     ///
     /// Where the noise is not known, sigma comes from the model's own errors, which are not white: three times the
     /// tolerance is allowed then.
@@ -68,15 +68,21 @@ impl<T: Real> Thresholds<T> {
             Direction::Zero => (Test::EncoderZero, self.largest_zero_error),
         };
         let tolerance = if noise_is_known { tolerance } else { T::of(3.0) * tolerance };
-        let limit = real::max(tolerance, self.noise_quantile * found.sigma);
+        let limit = |sigma: T| real::max(tolerance, self.noise_quantile * sigma);
+        let (mut value, mut allowed) = (found.delta, limit(found.sigma));
+        if let Some((delta, sigma)) = found.beside
+            && real::abs(delta) * allowed > real::abs(value) * limit(sigma)
+        {
+            (value, allowed) = (delta, limit(sigma));
+        }
         docket.note(Evidence {
             reason: Reason::Residual,
             test,
             joint: Some(found.joint),
             motion: None,
-            value: found.delta,
-            limit,
-            passed: real::abs(found.delta) <= limit,
+            value,
+            limit: allowed,
+            passed: real::abs(value) <= allowed,
         });
     }
 }

@@ -78,6 +78,12 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
     };
     let payload = on_leg(&arguments.payload, "--payload")?;
     let load = on_leg(&arguments.load, "--load")?;
+    if (payload.is_some() || load.is_some()) && arguments.perturb.iter().any(Perturbation::tampers) {
+        return Err(ToolError::input(
+            "--perturb inertia and com tamper with the values that are validated; --payload and --load put others in their \
+             place: one of the two",
+        ));
+    }
     let excitation = arguments.excitation.as_deref().map(Excitation::load).transpose()?;
     if let (Some(motion), Some(file)) = (&excitation, &arguments.excitation) {
         with_leg_size!(leg, check(leg, file, motion))?;

@@ -8,6 +8,9 @@ use super::{JointFile, LegFile, LinkParameters, Switch};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
 
+/// What the firmware's limits take at least.
+const SMALLEST_RANGE_DEG: f64 = 2.0;
+
 /// A refused value and where it stands.
 pub(super) struct Fault {
     pub joint: Option<usize>,
@@ -114,22 +117,38 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
     }
     place.within("zero_offset_deg", joint.zero_offset_deg, -360.0, 360.0)?;
     let [lower, upper] = joint.range_deg;
-    place.within("range_deg", lower, -3600.0, 3600.0)?;
-    place.within("range_deg", upper, -3600.0, 3600.0)?;
+    place.within("range_deg", lower, -360.0, 360.0)?;
+    place.within("range_deg", upper, -360.0, 360.0)?;
     if lower >= upper {
         return Err(place.fault("range_deg", &format!("is inverted or empty: {lower} to {upper}")));
     }
-    place.positive("speed_limit_deg_s", joint.speed_limit_deg_s, 3600.0)?;
+    if upper - lower < SMALLEST_RANGE_DEG {
+        let words = format!("is {} degrees wide; at least {SMALLEST_RANGE_DEG} are needed", upper - lower);
+        return Err(place.fault("range_deg", &words));
+    }
+    for end in joint.range_deg {
+        let angle = if joint.direction < 0 { -end } else { end } + joint.zero_offset_deg;
+        if angle.abs() > 360.0 {
+            let words = format!("ends at the D-H angle {angle} degrees, outside -360..360");
+            return Err(place.fault("range_deg", &words));
+        }
+    }
+    place.positive("speed_limit_deg_s", joint.speed_limit_deg_s, 2800.0)?;
     place.positive("acceleration_limit_deg_s2", joint.acceleration_limit_deg_s2, 1e5)?;
-    place.positive("torque_limit_nm", joint.torque_limit_nm, 5000.0)?;
-    place.positive("torque_per_ampere", joint.torque_per_ampere, 1000.0)?;
+    place.positive("torque_limit_nm", joint.torque_limit_nm, 1000.0)?;
+    place.within("torque_per_ampere", joint.torque_per_ampere, 0.001, 100.0)?;
     if let Some(limit) = joint.current_limit_a {
-        place.positive("current_limit_a", limit, 1e4)?;
+        place.positive("current_limit_a", limit, 300.0)?;
     }
     place.within("drive_lag_s", joint.drive_lag_s, 0.0, 0.1)?;
     let encoder = inside("encoder");
     encoder.positive("counts", f64::from(joint.encoder.counts), f64::from(1 << 24))?;
     encoder.positive("ratio", joint.encoder.ratio, 1000.0)?;
+    let step = core::f64::consts::TAU / (f64::from(joint.encoder.counts) * joint.encoder.ratio);
+    if !(1e-7..=0.1).contains(&step) {
+        let words = format!("times `ratio` make {step:.3e} rad of the joint per count, outside 1e-7..0.1");
+        return Err(encoder.fault("counts", &words));
+    }
     place.within("current_noise_a", joint.current_noise_a, 0.0, 1000.0)?;
     place.within("current_offset_a", joint.current_offset_a, -1000.0, 1000.0)?;
     place.within("current_step_a", joint.current_step_a, 0.0, 100.0)?;

@@ -35,6 +35,9 @@ pub struct TorqueConstantReport {
     pub sigma: Number,
     /// Whether the two runs differ by the stated mass at the stated place, as far as the joint tells.
     pub consistent: Option<bool>,
+    /// Whether the mass is heavy enough for the joint to tell.
+    #[serde(skip)]
+    pub told: bool,
 }
 
 /// A known mass.
@@ -74,6 +77,7 @@ impl ScaleReport {
                 identified: (used / found).into(),
                 sigma: (used * sigma / (found * found)).into(),
                 consistent: ratio.map(|ratio| ratio.is_consistent()),
+                told: ratio.is_some_and(|ratio| ratio.is_told()),
             }
         };
         Self {
@@ -102,9 +106,14 @@ pub fn lines(run: &RunReport) -> Vec<String> {
             .into(),
         (_, Some(_)) if scale.torque_constant.iter().any(|joint| joint.consistent == Some(false)) => {
             "scale: relative to the torque constants used; the two runs do not differ by the stated mass at the stated \
-             place, so what they say is not used"
+             place of a leg with these lengths and zeros, so what they say is not used"
                 .into()
         }
+        (_, Some(mass)) if scale.torque_constant.iter().any(|joint| joint.consistent.is_some() && !joint.told) => format!(
+            "scale: relative to the torque constants used; {} kg at that place are too light to tell, what they say is not \
+             used",
+            mass.mass
+        ),
         (_, Some(mass)) => format!(
             "scale: relative to the torque constants used; a mass on link {} does not load every joint",
             mass.joint
@@ -127,7 +136,11 @@ fn constant(joint: &TorqueConstantReport) -> String {
             joint.joint,
             number(joint.identified),
             number(joint.sigma),
-            if consistent { "" } else { " (contradicted)" }
+            match (consistent, joint.told) {
+                (false, _) => " (contradicted)",
+                (true, false) => " (too light a mass to tell)",
+                (true, true) => "",
+            }
         ),
         _ => format!("joint {} used {used}", joint.joint),
     }
