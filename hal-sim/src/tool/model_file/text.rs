@@ -39,6 +39,7 @@ impl ModelFile {
         conditions.seed.iter().for_each(|seed| line(&mut out, "seed", seed));
         line(&mut out, "swarm_seed", &conditions.swarm_seed);
         conditions.condition.iter().for_each(|condition| line(&mut out, "condition", condition));
+        conditions.temperature_c.iter().for_each(|celsius| line(&mut out, "temperature_c", celsius));
         line(&mut out, "not_estimated", &conditions.not_estimated);
         lines(&mut out, "fits", &conditions.fits);
         out += "\n[base_set]\n";
