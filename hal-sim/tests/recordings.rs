@@ -93,6 +93,36 @@ fn a_header_without_a_needed_column_is_refused() {
 }
 
 #[test]
+fn a_table_of_a_spreadsheet_that_writes_decimal_commas_is_refused_with_a_hint() {
+    let lines: Vec<String> = rows().iter().map(|row| row.replace(',', ";").replace('.', ",")).collect();
+    assert_eq!(
+        refusal(&text(&HEADER.replace(',', ";"), &lines)),
+        "walk.csv:1: the header has no column `t_s`; its columns are: t_s;q1_rad;q2_rad;tau1_Nm;tau2_Nm (columns are \
+         separated by commas, numbers written with points)"
+    );
+    let lines: Vec<String> = rows().iter().map(|row| row.replace('.', ",")).collect();
+    assert_eq!(
+        refusal(&text(HEADER, &lines)),
+        "walk.csv:2: 10 fields, but the header has 5: are these decimal commas?"
+    );
+}
+
+#[test]
+fn a_message_does_not_repeat_the_file() {
+    for garbage in ["\0".repeat(10_000_000), "7v{1k2J".repeat(1_500_000), "c,".repeat(5_000_000)] {
+        let message = refusal(&garbage);
+        assert!(
+            message.starts_with("walk.csv:1: the header has no column `t_s`; its columns are: "),
+            "{message}"
+        );
+        // 200 characters, each escaped with up to six.
+        assert!(message.len() < 1400 && message.lines().count() == 1, "{} characters", message.len());
+    }
+    let message = refusal_with(&format!("1.0,{},-0.2,3,-4", "x".repeat(1_000_000)));
+    assert!(message.starts_with("walk.csv:102: `xxx") && message.len() < 300, "{} characters", message.len());
+}
+
+#[test]
 fn a_field_that_is_no_finite_number_is_refused_with_its_line() {
     assert_eq!(
         refusal_with("1.0,0.1,-0.2,three,-4"),
@@ -111,7 +141,7 @@ fn a_truncated_file_is_refused_with_its_last_line() {
     assert_eq!(refusal(cut), "walk.csv:201: 3 fields, but the header has 5: is the line truncated?");
     assert_eq!(
         refusal_with("1.0,0,1,-0,2,3,-4"),
-        "walk.csv:102: 7 fields, but the header has 5: is the line truncated?"
+        "walk.csv:102: 7 fields, but the header has 5: are these decimal commas?"
     );
 }
 
@@ -166,6 +196,15 @@ fn numbers_in_another_unit_are_refused() {
     assert_eq!(
         refusal_with("1.0,0.1,-0.2,3,-4e5"),
         "walk.csv:102: -400000 in column `tau2_Nm` is beyond 100000: is it in another unit?"
+    );
+    assert_eq!(
+        refusal_with("1.0,1e300,-0.2,3,-4"),
+        "walk.csv:102: 1e300 in column `q1_rad` is beyond 1000: is it in another unit?"
+    );
+    // Milliseconds since 1970.
+    assert_eq!(
+        refusal_with("1.79e12,0.1,-0.2,3,-4"),
+        "walk.csv:102: 1.79e12 in column `t_s` is beyond 1e10: is it in another unit?"
     );
 }
 

@@ -128,6 +128,7 @@ fn swapped_columns_are_refused_with_and_without_prior_and_held_out_motion() {
         "t_s,q2_rad,q1_rad,tau1_Nm,tau2_Nm",
         "t_s,q1_rad,q2_rad,tau2_Nm,tau1_Nm",
         "t_s,q2_rad,q1_rad,tau2_Nm,tau1_Nm",
+        "t_s,tau1_Nm,q2_rad,q1_rad,tau2_Nm",
     ] {
         for arguments in ["", "--split 0.66", "--prior none", "--prior none --split 0.66"] {
             let reasons = reasons_with_header(header, arguments);

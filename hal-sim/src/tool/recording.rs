@@ -8,7 +8,7 @@
 //!
 //! | column | unit | range |
 //! | --- | --- | --- |
-//! | `t_s` | s, strictly increasing | a step of at most 0.1 s or 20 median steps, whichever is longer |
+//! | `t_s` | s, strictly increasing, within +-1e10 s | a step of at most 0.1 s or 20 median steps, whichever is longer |
 //! | `q1_rad`, `q2_rad`, .. | rad, proximal joint first | within +-1000 rad |
 //! | `tau1_Nm`, `tau2_Nm`, .. | N m at the joint | within +-100 kN m |
 //!
@@ -34,6 +34,8 @@ pub const MINIMUM_DURATION_S: f64 = 1.0;
 pub const LARGEST_STEP_S: f64 = 0.1;
 /// A step in time of up to this many median steps is never a gap either.
 pub const LARGEST_STEP_IN_MEDIANS: f64 = 20.0;
+/// A stamp beyond this is in another unit, s: seconds since 1970 are 2e9, and a microsecond can still be told there.
+pub const LARGEST_TIME_S: f64 = 1.0e10;
 /// An angle beyond this is in another unit, rad.
 pub const LARGEST_POSITION_RAD: f64 = 1.0e3;
 /// A torque beyond this is in another unit, N m.
@@ -149,7 +151,7 @@ impl Recording {
     }
 
     fn push(&mut self, columns: &Columns, row: &StringRecord) -> Result<(), Fault> {
-        let time = columns.time.number(row, f64::INFINITY)?;
+        let time = columns.time.number(row, LARGEST_TIME_S)?;
         if let Some(&previous) = self.time_s.last()
             && time <= previous
         {

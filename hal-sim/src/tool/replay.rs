@@ -1,10 +1,12 @@
 //! `replay`: the firmware's identification on recordings.
 
+mod cleaning;
 mod predictions;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use cleaning::cleaned;
 use predictions::{Prediction, write_predictions};
 
 use scarab::ident::{
@@ -91,6 +93,8 @@ pub struct Source {
 /// One file on the firmware's grid, D-H angles and torques.
 struct Samples<const N: usize> {
     file: PathBuf,
+    /// Wild samples replaced before resampling, as many samples of the grid.
+    replaced: [u32; N],
     rate_hz: f64,
     start_s: f64,
     /// Sampled at the firmware's instants, so that its scatter is the sensor's own.
@@ -100,9 +104,17 @@ struct Samples<const N: usize> {
 }
 
 impl<const N: usize> Samples<N> {
-    fn of(recording: &Recording, anatomy: &[AnatomicalJoint<f64>; N], bandwidth_hz: f64) -> Self {
+    fn of(recording: &Recording, anatomy: &[AnatomicalJoint<f64>; N], options: &ReplayOptions) -> Self {
+        let (clean, replaced) = cleaned::<N>(recording);
+        let (recording, replaced) = match options.estimator {
+            Estimator::Robust => (&clean, replaced),
+            Estimator::Plain => (recording, [0; N]),
+        };
         let grid = Resampled::of(recording);
-        if let Some(warning) = grid.bandwidth_warning(bandwidth_hz) {
+        // In samples of the grid, as the recorder counts.
+        let share = grid.len() as f64 / recording.time_s.len() as f64;
+        let replaced = replaced.map(|count| (f64::from(count) * share).round() as u32);
+        if let Some(warning) = grid.bandwidth_warning(options.bandwidth_hz) {
             warn(&recording.file, &warning);
         }
         let points = 0..grid.len();
@@ -110,6 +122,7 @@ impl<const N: usize> Samples<N> {
         let torque = points.filter_map(|point| grid.torque_nm::<N>(point));
         Self {
             file: recording.file.clone(),
+            replaced,
             rate_hz: grid.native_rate_hz,
             start_s: grid.start_s,
             native: recording.time_s.windows(2).all(|pair| (pair[1] - pair[0] - GRID_S).abs() < 1e-6),
@@ -146,13 +159,16 @@ pub fn replay<const N: usize, const B: usize>(
     recorder.set_estimator(options.estimator);
     let (training, held_out) = read_all(options, leg)?;
     let on_grid = |recordings: &[Recording]| -> Vec<Samples<N>> {
-        recordings.iter().map(|recording| Samples::of(recording, &anatomy, options.bandwidth_hz)).collect()
+        recordings.iter().map(|recording| Samples::of(recording, &anatomy, options)).collect()
     };
     let (training, held_out) = (on_grid(&training), on_grid(&held_out));
 
     let mut sources = feed(&mut recorder, &background, &training, "training", |_, _, _| {});
     let thresholds = Thresholds::default();
     let mut record = recorder.finish();
+    for (count, joint) in record.outliers.replaced.iter_mut().zip(0..) {
+        *count += training.iter().map(|samples: &Samples<N>| samples.replaced[joint]).sum::<u32>();
+    }
     if !training.iter().all(|samples| samples.native) {
         record.noise = [0.0; N];
     }

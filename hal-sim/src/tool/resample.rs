@@ -21,8 +21,8 @@
 //! | Catmull-Rom, 500 Hz with +-0.8 ms of jitter | -4e-5 at 3 Hz, with the square of f; single points 5e-4 | about as above |
 //!
 //! where sinc(x) = sin(pi x) / (pi x). The slopes over two steps keep the cubic calm where stamps arrive in
-//! bursts: a slope over a very short step would throw its noise across the next long one. Its support is four
-//! samples, so an outlier stays an outlier and can be removed after.
+//! bursts: a slope over a very short step would throw its noise across the next long one. Wild samples are best
+//! replaced before: each touches the points of four samples (the cubic) or of two bins.
 //!
 //! Limits: beyond 0.2 of the recording's own rate the interpolation loses 6 % and more, see
 //! [`Resampled::bandwidth_warning`]. Source of the cubic: Catmull and Rom, A class of local interpolating splines,

@@ -34,7 +34,7 @@ pub enum Fault {
     #[error("not a CSV file ({0})")]
     NotCsv(csv::Error),
     /// The header lacks a column that the leg needs.
-    #[error("the header has no column `{column}`; its columns are: {present}")]
+    #[error("the header has no column `{column}`; its columns are: {}{}", Excerpt(.present), Separator(.present))]
     MissingColumn {
         /// Name looked for.
         column: String,
@@ -44,16 +44,17 @@ pub enum Fault {
     /// Two columns of one name: nobody can know which is meant.
     #[error("the header has the column `{0}` twice")]
     RepeatedColumn(String),
-    /// A truncated line, or a line of another file.
-    #[error("{found} fields, but the header has {expected}: is the line truncated?")]
+    /// A truncated line, decimal commas, or a line of another file.
+    #[error("{found} fields, but the header has {expected}: {}",
+        if .found < .expected { "is the line truncated?" } else { "are these decimal commas?" })]
     FieldCount {
         /// In this line.
         found: usize,
         /// In the header.
         expected: usize,
     },
-    /// Letters, an empty field, a decimal comma.
-    #[error("`{text}` in column `{column}` is not a number")]
+    /// Letters, an empty field.
+    #[error("`{}` in column `{column}` is not a number", Excerpt(.text))]
     NotANumber {
         /// Column name.
         column: String,
@@ -61,7 +62,7 @@ pub enum Fault {
         text: String,
     },
     /// `NaN` or `inf`.
-    #[error("`{text}` in column `{column}` is not finite")]
+    #[error("`{}` in column `{column}` is not finite", Excerpt(.text))]
     NotFinite {
         /// Column name.
         column: String,
@@ -69,7 +70,7 @@ pub enum Fault {
         text: String,
     },
     /// A number no leg can reach.
-    #[error("{value} in column `{column}` is beyond {limit}: is it in another unit?")]
+    #[error("{} in column `{column}` is beyond {}: is it in another unit?", Short(*.value), Short(*.limit))]
     Absurd {
         /// Column name.
         column: String,
@@ -82,7 +83,8 @@ pub enum Fault {
     #[error("the torque of this state is beyond the range of the numbers computed with")]
     OutOfRange,
     /// Time does not increase.
-    #[error("time {} from {previous} s to {time} s", if *.time < *.previous { "goes back" } else { "stands still" })]
+    #[error("time {} from {} s to {} s",
+        if *.time < *.previous { "goes back" } else { "stands still" }, Short(*.previous), Short(*.time))]
     TimeNotIncreasing {
         /// The stamp before.
         previous: f64,
@@ -115,5 +117,46 @@ struct LineSuffix(Option<usize>);
 impl fmt::Display for LineSuffix {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.map_or(Ok(()), |line| write!(formatter, ":{line}"))
+    }
+}
+
+/// Most characters of a file that a message repeats: it may be any file, of any size.
+const EXCERPT: usize = 200;
+
+/// What stands in a file, on one line and not at length.
+struct Excerpt<'a>(&'a str);
+
+impl fmt::Display for Excerpt<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for character in self.0.chars().take(EXCERPT) {
+            if character.is_control() {
+                write!(formatter, "{}", character.escape_default())?;
+            } else {
+                write!(formatter, "{character}")?;
+            }
+        }
+        if self.0.chars().nth(EXCERPT).is_some() { formatter.write_str(" ..") } else { Ok(()) }
+    }
+}
+
+/// A hint where the header is a single column with another separator in it.
+struct Separator<'a>(&'a str);
+
+impl fmt::Display for Separator<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.0.contains(',') && self.0.contains([';', '\t']) {
+            formatter.write_str(" (columns are separated by commas, numbers written with points)")
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// A number as one reads it, not with three hundred digits.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.abs() < 1e7 { write!(formatter, "{}", self.0) } else { write!(formatter, "{:e}", self.0) }
     }
 }
