@@ -117,6 +117,56 @@ fn the_sigma_that_is_expected_is_the_sigma_that_is_reported_and_the_spread_that_
 }
 
 #[test]
+fn noise_is_the_sensors_own_whichever_leg_is_assumed_and_whatever_it_is_to_be_used_for() {
+    let folder = Folder::new();
+    let json = folder.path("report.json");
+    let report = |arguments: &str| {
+        // The motion was designed for the truth, so no doubt is added to what the prior makes of it.
+        let arguments = format!("excite --torque-margin 0 {arguments} --excitation");
+        scarab(&arguments, &[Path::new(SHIPPED), Path::new("--json"), &json]).ends_with(0);
+        folder.json("report.json")
+    };
+    let noise = |report: &Value| -> Vec<f64> {
+        list(report, "joints").iter().map(|joint| value(joint, "torque_noise_nm")).collect()
+    };
+    let (prior, truth) = (report(""), report("--assume-truth"));
+    assert_eq!(noise(&prior), noise(&truth));
+    assert_eq!((&prior["torque_noise_of"], &prior["assumed"]), (&"truth".into(), &"prior".into()));
+    // Stillness differs a little with the friction that is believed; noise that is a share of the torque believed made 8 %.
+    for (prior, truth) in list(&prior, "base_parameters").iter().zip(list(&truth, "base_parameters")) {
+        let ratio = value(prior, "sigma") / value(truth, "sigma");
+        println!("{}: sigma expected of the prior over that of the truth {ratio:.3}", prior["name"]);
+        assert!((ratio - 1.0).abs() < 0.05, "{}: {ratio}", prior["name"]);
+    }
+    let stated = report("--torque-noise-nm 2,1.5");
+    let [hip, knee] = noise(&stated)[..] else { panic!("two joints") };
+    // Through amperes and back.
+    assert!((hip - 2.0).abs() < 1e-12 && (knee - 1.5).abs() < 1e-12, "{hip} {knee}");
+    let doubled = report("--torque-noise-nm 4,3");
+    for (one, two) in list(&stated, "base_parameters").iter().zip(list(&doubled, "base_parameters")) {
+        // The noise-free residual is counted beside it.
+        assert!((value(two, "sigma") / value(one, "sigma") - 2.0).abs() < 0.05, "{one} {two}");
+    }
+    // The run meets what was stated: its sigma is the one expected.
+    let paths = [Path::new(SHIPPED), Path::new("--json"), &json];
+    scarab("identify --torque-noise-nm 2,1.5 --excitation", &paths).ends_with(0);
+    let run = folder.json("report.json");
+    for (expected, found) in list(&stated, "base_parameters").iter().zip(list(&run, "base_parameters")) {
+        let ratio = value(found, "sigma") / value(expected, "sigma");
+        // One run tells a noise within 3 %; three times that, and what the prior's friction changes of stillness.
+        assert!((ratio - 1.0).abs() < 0.12, "{}: {ratio}", expected["name"]);
+    }
+}
+
+#[test]
+fn a_motion_is_checked_with_the_mass_that_will_be_hung_on() {
+    let message = scarab("identify --payload 30@knee:0.35 --excitation", &[Path::new(SHIPPED)]).refusal();
+    assert!(message.contains("the motion takes") && message.contains("the limit is 85.0"), "{message}");
+    let message = scarab("identify --load 30@knee:0.35 --excitation", &[Path::new(SHIPPED)]).refusal();
+    assert!(message.contains("the motion takes"), "{message}");
+}
+
+#[test]
 fn a_written_motion_is_read_back_unchanged() {
     let (folder, report) = designed();
     let file = folder.path("motion.toml");
@@ -255,6 +305,11 @@ fn options_that_make_no_sense_are_refused_in_words() {
         ("excite --duration 3", "leave no room for a cycle"),
         ("excite --torque-noise -1", "--torque-noise"),
         ("excite --torque-margin inf", "--torque-margin"),
+        ("excite --torque-noise-nm 1,2,3", "3 numbers, the leg `x2-wearer-75kg` has 2 joints"),
+        ("excite --torque-noise-nm -1", "-1 N m; it must be from 0 to 1000"),
+        ("identify --torque-noise-nm nan", "NaN N m; it must be from 0 to 1000"),
+        ("identify --torque-noise-nm 1 --torque-noise 7", "cannot be used with"),
+        ("excite --leg paper-chain --evaluations 600", "no motion can be designed for this leg"),
         ("excite --evaluations 1", "evaluations"),
         ("excite --leg nobody", "nobody"),
     ] {

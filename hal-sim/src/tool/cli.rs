@@ -7,6 +7,7 @@ mod identify;
 mod leg_options;
 mod model;
 mod monitor;
+mod noise;
 mod predict;
 mod regressor;
 mod replay;

@@ -56,6 +56,10 @@ impl<const N: usize, const B: usize> Context<N, B> {
         let (mut configuration, mut motions) =
             configuration(leg, &background, options.plan, options.swarm_seed)?;
         configuration.estimator = options.estimator;
+        let world = World::<N>::new(&leg.description()?, options.seed);
+        let percent = options.torque_noise_percent.unwrap_or(leg.torque_noise_percent);
+        // Of the default motion whichever is asked for: a sensor does not know what it will be used for.
+        let mean = mean_absolute_torque(leg, &world, &motions.excitation);
         if let Some(excitation) = &options.excitation {
             motions.excitation = excitation.motion()?;
             configuration.excitation = motions.excitation;
@@ -64,9 +68,6 @@ impl<const N: usize, const B: usize> Context<N, B> {
         let (bandwidth, rate) = (configuration.bandwidth_hz, SAMPLE_RATE_HZ as f32);
         let smoothing = Kernel::new(SMOOTHING_BANDWIDTHS as f32 * bandwidth, rate).map_err(unfit)?;
         let low_pass = LowPass::new(bandwidth, rate).map_err(unfit)?;
-        let world = World::<N>::new(&leg.description()?, options.seed);
-        let percent = options.torque_noise_percent.unwrap_or(leg.torque_noise_percent);
-        let mean = mean_absolute_torque(leg, &world, &motions.excitation);
         let noise = core::array::from_fn(|joint| {
             let own = leg.joints[joint].current_noise_a * leg.joints[joint].torque_per_ampere;
             (percent / 100.0 * mean[joint]).hypot(own)

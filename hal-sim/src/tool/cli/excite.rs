@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::common::write_json;
 use super::leg_options::LegOptions;
+use super::noise::NoiseOptions;
 use crate::tool::error::{EXIT_ACCEPTED, ToolError};
 use crate::tool::excite::assumption::Assumption;
 use crate::tool::excite::bench::ExciteOptions;
@@ -32,9 +33,8 @@ pub struct ExciteArguments {
     /// Seconds of motion, blends included.
     #[arg(long, default_value_t = 22.0, allow_negative_numbers = true)]
     duration: f64,
-    /// Noise of the logged torque in percent of each joint's mean absolute torque; the leg file's unless given.
-    #[arg(long, allow_negative_numbers = true)]
-    torque_noise: Option<f64>,
+    #[command(flatten)]
+    noise: NoiseOptions,
     /// Percent by which each base parameter may be off when the torque is bounded.
     #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
     torque_margin: f64,
@@ -60,12 +60,12 @@ const EVALUATIONS: u32 = 48_000;
 
 /// Designs, reports and writes; the exit code.
 pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
-    let leg = &arguments.leg.load()?;
+    let leg = &arguments.noise.on(arguments.leg.load()?)?;
+    let torque_noise_percent = arguments.noise.percent()?;
     let percentage = |option: &str, value: f64, most: f64| {
         let fits = (0.0..=most).contains(&value);
         if fits { Ok(()) } else { Err(ToolError::input(format!("{option}: a percentage from 0 to {most}"))) }
     };
-    percentage("--torque-noise", arguments.torque_noise.unwrap_or(0.0), 1000.0)?;
     percentage("--torque-margin", arguments.torque_margin, 200.0)?;
     if !(arguments.duration > 0.0 && arguments.duration <= LONGEST_S) {
         return Err(ToolError::input(format!("--duration: above 0 and at most {LONGEST_S} s")));
@@ -81,7 +81,8 @@ pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
             evaluations: arguments.evaluations,
         },
         given,
-        torque_noise_percent: arguments.torque_noise,
+        carried: Vec::new(),
+        torque_noise_percent,
         margin_percent: arguments.torque_margin,
         assumption: if arguments.assume_truth { Assumption::Truth } else { Assumption::Best },
     };

@@ -7,6 +7,7 @@ use scarab::model::Payload;
 
 use super::common::{Common, draw, finish, write_json};
 use super::model::ModelArguments;
+use super::noise::NoiseOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::excite::file::Excitation;
 use crate::tool::excite::run::check;
@@ -31,9 +32,8 @@ pub struct IdentifyArguments {
     /// A run for each seed, A..B with both ends.
     #[arg(long, value_parser = parse_seeds, conflicts_with_all = ["log", "save_model", "compare_model"])]
     seeds: Option<(u64, u64)>,
-    /// Noise of the logged torque in percent of each joint's mean absolute torque; the leg file's unless given.
-    #[arg(long)]
-    torque_noise: Option<f64>,
+    #[command(flatten)]
+    noise: NoiseOptions,
     /// Identify again with a known mass, KG@JOINT:X_M[:Y_M] (JOINT: name or number; X along the link): tells the torque constants.
     #[arg(long)]
     payload: Option<PlacedMass>,
@@ -69,10 +69,8 @@ const LARGEST_SEED_COUNT: u64 = 100_000;
 
 /// Identifies and reports; the exit code.
 pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
-    let leg = &arguments.common.leg()?;
-    if arguments.torque_noise.is_some_and(|percent| !(0.0..=1000.0).contains(&percent)) {
-        return Err(ToolError::input("--torque-noise: a percentage from 0 to 1000"));
-    }
+    let leg = &arguments.noise.on(arguments.common.leg()?)?;
+    let torque_noise_percent = arguments.noise.percent()?;
     let on_leg = |mass: &Option<PlacedMass>, option: &str| -> Result<Option<Payload<f64>>, ToolError> {
         mass.as_ref().map(|mass| mass.on(leg, option)).transpose()
     };
@@ -86,12 +84,18 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
     }
     let excitation = arguments.excitation.as_deref().map(Excitation::load).transpose()?;
     if let (Some(motion), Some(file)) = (&excitation, &arguments.excitation) {
-        with_leg_size!(leg, check(leg, file, motion))?;
+        // Without and with what is hung on for the second run.
+        let carried: &Vec<_> = &load.into_iter().collect();
+        with_leg_size!(leg, check(leg, file, motion, carried))?;
+        if let Some(payload) = payload {
+            let carried = &load.into_iter().chain([payload]).collect::<Vec<_>>();
+            with_leg_size!(leg, check(leg, file, motion, carried))?;
+        }
     }
     let options = |seed: u64| SimulationOptions {
         seed,
         swarm_seed: arguments.common.swarm_seed.unwrap_or(seed),
-        torque_noise_percent: arguments.torque_noise,
+        torque_noise_percent,
         plan: arguments.common.plan.into(),
         prior: arguments.common.prior.unwrap_or_default(),
         payload,

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use scarab::ident::Estimator;
+use scarab::model::{PARAMETERS_PER_JOINT, Payload};
 use scarab::motion::{ExcitationTable, Periodic};
 use scarab::safety::Barrier;
 use scarab::servo::SERVO_RATE_HZ;
@@ -30,10 +31,21 @@ pub struct ExciteOptions {
     pub given: Option<(PathBuf, Excitation)>,
     /// Instead of the leg file's.
     pub torque_noise_percent: Option<f64>,
+    /// Known masses that the leg carries.
+    pub carried: Vec<Payload<f64>>,
     /// How far off each base parameter may be, percent.
     pub margin_percent: f64,
     /// What is taken for the leg.
     pub assumption: Assumption,
+}
+
+/// What the noise was reckoned from.
+#[derive(Clone, Copy, Debug)]
+pub struct NoiseOrigin {
+    /// Of each joint's mean absolute torque on the default motion; zero where only N m are stated.
+    pub percent: f64,
+    /// Whose torque: `truth` or `prior`.
+    pub of: &'static str,
 }
 
 /// Everything that motions of one leg are reckoned with.
@@ -49,8 +61,8 @@ pub struct Bench<const N: usize, const B: usize> {
     pub scorer: Scorer<N, B>,
     /// Of torque limit and current limit the lower, N m.
     pub torque_limit: [f64; N],
-    /// Instead of the leg file's.
-    pub noise_percent: Option<f64>,
+    /// Where the noise of the torque comes from.
+    pub noise: NoiseOrigin,
 }
 
 impl<const N: usize, const B: usize> Bench<N, B> {
@@ -59,17 +71,32 @@ impl<const N: usize, const B: usize> Bench<N, B> {
     /// # Errors
     /// Where the leg cannot be worked with.
     pub fn new(leg: &LegFile, options: &ExciteOptions) -> Result<Self, ToolError> {
+        let file = leg;
         let (leg, word) = assumed(leg, options.assumption)?;
         let simulation = SimulationOptions {
             torque_noise_percent: options.torque_noise_percent,
             estimator: Estimator::Plain,
             ..SimulationOptions::of_seed(1)
         };
+        // Noise belongs to the sensors, which are there already: whoever will meet it has measured it at rest. So it is the
+        // simulated leg's even where its torque is not believed.
+        let simulated = file.joints.iter().all(|joint| joint.truth.is_some());
+        let noise = if simulated {
+            Context::<N, B>::new(file, &simulation)?.noise
+        } else {
+            Context::<N, B>::new(&leg, &simulation)?.noise
+        };
+        let percent = options.torque_noise_percent.unwrap_or(file.torque_noise_percent);
+        let origin = NoiseOrigin { percent, of: if simulated { "truth" } else { word } };
+        let leg = leg.with_torque_noise(&noise);
+        let simulation = SimulationOptions { torque_noise_percent: None, ..simulation };
         let context = Context::<N, B>::new(&leg, &simulation)?;
         // A leg that the firmware does not take is refused before anything is searched.
         Pair::new(&leg, &context, simulation.seed)?;
         let model = context.background.model.clone();
-        let values = context.background.truth.map_or([0.0; B], |truth| model.base.project(&truth));
+        let mut parameters = context.background.truth.unwrap_or([[0.0; PARAMETERS_PER_JOINT]; N]);
+        options.carried.iter().for_each(|payload| payload.add_to(&mut parameters));
+        let values = model.base.project(&parameters);
         let scorer = Scorer::new(
             model,
             values,
@@ -85,8 +112,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
             let joint = &leg.joints[joint];
             joint.torque_limit_nm.min(joint.current_limit() * joint.torque_per_ampere)
         });
-        let noise_percent = options.torque_noise_percent;
-        Ok(Self { leg, assumed: word, context, scorer, torque_limit, noise_percent })
+        Ok(Self { leg, assumed: word, context, scorer, torque_limit, noise: origin })
     }
 
     /// What a design works within.
@@ -105,7 +131,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
     /// # Errors
     /// Where the drive stops.
     pub fn rehearse(&self, table: &ExcitationTable<N>) -> Result<Rehearsal<N, B>, ToolError> {
-        rehearse(&self.leg, table, self.noise_percent)
+        rehearse(&self.leg, table)
     }
 
     /// A motion from a file: proved by the firmware, its torque without margin within the limits.

@@ -71,10 +71,8 @@ pub struct Expectation<const N: usize, const B: usize> {
 pub fn rehearse<const N: usize, const B: usize>(
     assumed: &LegFile,
     table: &ExcitationTable<N>,
-    torque_noise_percent: Option<f64>,
 ) -> Result<Rehearsal<N, B>, ToolError> {
     let options = SimulationOptions {
-        torque_noise_percent,
         estimator: Estimator::Plain,
         excitation: Some(super::file::Excitation::of(assumed, table)),
         ..SimulationOptions::of_seed(1)

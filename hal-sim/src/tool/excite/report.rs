@@ -145,8 +145,10 @@ pub struct ExciteReport {
     pub assumed: &'static str,
     /// Of the swarm; unknown for a motion from a file.
     pub seed: Option<u64>,
-    /// Torque noise in percent of the mean absolute torque.
+    /// Torque noise in percent of the mean absolute torque on the default motion; zero where only N m are stated.
     pub torque_noise_percent: f64,
+    /// Whose torque that is: `truth` (of the simulated leg) or `prior`.
+    pub torque_noise_of: &'static str,
     /// How far off each base parameter may be in the torque's bound, percent.
     pub margin_percent: f64,
     /// Blends included, s.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use scarab::ident::status;
-use scarab::model::{PARAMETERS_PER_JOINT, Parameter};
+use scarab::model::{PARAMETERS_PER_JOINT, Parameter, Payload};
 use scarab::motion::Motion;
 
 use super::assumption::Assumption;
@@ -30,7 +30,8 @@ pub struct Excited {
     pub report: ExciteReport,
 }
 
-/// Refuses a motion that is not this leg's or leaves its limits of angle, speed, acceleration or torque.
+/// Refuses a motion that is not this leg's or leaves its limits of angle, speed, acceleration or torque; the last with the
+/// masses it carries.
 ///
 /// # Errors
 /// Names the file.
@@ -38,12 +39,14 @@ pub fn check<const N: usize, const B: usize>(
     leg: &LegFile,
     file: &Path,
     motion: &Excitation,
+    carried: &[Payload<f64>],
 ) -> Result<(), ToolError> {
     // Before the leg is asked for more: another leg's motion is the likeliest fault.
     motion.table::<N>(leg).map_err(|reason| about(file, &reason))?;
     let options = ExciteOptions {
         design: DesignOptions { duration_s: 0.0, seed: 0, evaluations: 0 },
         given: None,
+        carried: carried.to_vec(),
         torque_noise_percent: None,
         margin_percent: 0.0,
         assumption: Assumption::Best,
@@ -108,7 +111,11 @@ fn untouched<const N: usize, const B: usize>(
         let Some(next) = smaller(&bench.frame(), &candidate) else { break };
         candidate = next;
     }
-    Err(ToolError::input(format!("{}: the monitor takes torque from every exciting motion", bench.leg.name)))
+    Err(ToolError::input(format!(
+        "{}: no motion can be designed for this leg: however small, near an end of its range the monitor takes torque from it, \
+         for a joint that is slow to follow could not stop there; `identify` has the default motion",
+        bench.leg.name
+    )))
 }
 
 /// How often a motion is made smaller.
@@ -172,7 +179,8 @@ impl<const N: usize, const B: usize> Bench<N, B> {
             geometry: geometry(&self.leg),
             assumed: self.assumed,
             seed: options.given.is_none().then_some(options.design.seed),
-            torque_noise_percent: self.noise_percent.unwrap_or(self.leg.torque_noise_percent),
+            torque_noise_percent: self.noise.percent,
+            torque_noise_of: self.noise.of,
             margin_percent: options.margin_percent,
             duration_s: motion.duration_s(),
             period_s: candidate.table.period_s.into(),
@@ -182,7 +190,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
             random: compared(&random),
             random_same_pace: compared(&quick),
             condition: expectation.condition.into(),
-            warnings: super::text::warnings(&self.leg, &joints, &base, &parameters),
+            warnings: super::text::warnings(&self.leg, self.noise, &joints, &base, &parameters),
             joints,
             base_parameters: base,
             parameters,

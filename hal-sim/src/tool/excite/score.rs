@@ -9,9 +9,9 @@
 //! ```
 //!
 //! `y_i` the base row of joint i (N m per unit), at 50 Hz along one cycle of the commanded curve; `b` the base
-//! parameters of the assumed leg; noise_i of the logged torque, N m, the same for every curve: a leg file states noise in
-//! percent of the mean torque, and a design that believed this to the letter would win by hanging the leg where it takes
-//! no torque (tried: the hip between 5 and 29 degrees). So all curves meet the noise of one reference motion. A row counts unless the joint stands still in too much of its window, the rule of `ident::record`; shares of
+//! parameters of the assumed leg; noise_i of the logged torque, N m, the same for every curve: noise in percent of a
+//! curve's own torque would be beaten by hanging the leg where it takes none (tried: the hip between 5 and 29 degrees).
+//! A row counts unless the joint stands still in too much of its window, the rule of `ident::record`; shares of
 //! stillness come from speeds at 100 Hz, straight in between, and the magnitude of the low-pass. The filters
 //! themselves are left out: a curve's harmonics lie in their flat band ([`super::design`] keeps them there). D-optimality
 //! after J. Swevers et al., "Optimal robot excitation and identification", IEEE Trans. Robotics and Automation 13

@@ -3,6 +3,7 @@
 use comfy_table::{CellAlignment, Table};
 use scarab::servo::SERVO_RATE_HZ;
 
+use super::bench::NoiseOrigin;
 use super::report::{ComparedBase, ExciteReport, ExpectedParameter, JointReport};
 use crate::tool::leg_file::LegFile;
 use crate::tool::tables::{headed, number};
@@ -16,6 +17,7 @@ const LOST_SHARE: f64 = 0.4;
 #[must_use]
 pub fn warnings(
     leg: &LegFile,
+    noise: NoiseOrigin,
     joints: &[JointReport],
     base: &[ComparedBase],
     parameters: &[ExpectedParameter],
@@ -63,6 +65,12 @@ pub fn warnings(
             warnings.push(format!("{}: the leg file states no torque noise; sigma counts none", joint.name));
         }
     }
+    if noise.of == "prior" && noise.percent > 0.0 {
+        warnings.push(
+            "the noise is a share of the assumed leg's torque, as wrong as that is: measure it at rest (--torque-noise-nm)"
+                .into(),
+        );
+    }
     if leg.pushes.is_some() {
         warnings.push("the wearer's pushes are not in these figures".into());
     }
@@ -82,10 +90,9 @@ pub fn report(report: &ExciteReport) -> String {
             number(report.blend_s.into())
         ),
         format!(
-            "assumed: the leg file's {}, torque noise {} % of the mean absolute torque; each base parameter may be {} % \
-             off in the torque's bound",
+            "assumed: the leg file's {}, torque noise {}; each base parameter may be {} % off in the torque's bound",
             report.assumed,
-            number(report.torque_noise_percent.into()),
+            noise(report),
             number(report.margin_percent.into()),
         ),
         String::new(),
@@ -96,6 +103,15 @@ pub fn report(report: &ExciteReport) -> String {
     ];
     lines.extend(report.warnings.iter().map(|warning| format!("warning: {warning}")));
     lines.join("\n") + "\n"
+}
+
+fn noise(report: &ExciteReport) -> String {
+    if report.torque_noise_percent == 0.0 {
+        return "as stated in N m".into();
+    }
+    let whose = if report.torque_noise_of == "truth" { "the simulated leg's" } else { "the assumed leg's" };
+    let percent = number(report.torque_noise_percent.into());
+    format!("{percent} % of {whose} mean absolute torque on the default motion")
 }
 
 fn joints(report: &ExciteReport) -> String {

@@ -31,6 +31,18 @@ impl LegFile {
     }
 }
 
+impl LegFile {
+    /// The same leg with this standard deviation of each joint's logged torque, N m, in the place of its own noise.
+    #[must_use]
+    pub fn with_torque_noise(mut self, noise_nm: &[f64]) -> Self {
+        self.torque_noise_percent = 0.0;
+        for (joint, noise) in self.joints.iter_mut().zip(noise_nm) {
+            joint.current_noise_a = noise / joint.torque_per_ampere;
+        }
+        self
+    }
+}
+
 impl JointFile {
     /// Limit of the drive's current, A.
     #[must_use]
