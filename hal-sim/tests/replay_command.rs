@@ -200,9 +200,11 @@ fn what_was_not_validated_says_so() {
     let folder = folder_with("", &[("a.csv", Motion::default())]);
     let note = "not validated: no motion was held out";
     let (report, run) = replay(&folder, &["a.csv"], "");
-    assert!(run.printed.contains(note));
-    assert_eq!(report["validation"], Value::Array(Vec::new()));
-    assert!(!replay(&folder, &["a.csv"], "--split 0.5").1.printed.contains(note));
+    assert!(run.printed.contains(note) && run.printed.contains("verdict: accepted, not validated"));
+    assert_eq!((&report["validation"], &report["validated"]), (&Value::Array(Vec::new()), &false.into()));
+    let (report, run) = replay(&folder, &["a.csv"], "--split 0.5");
+    assert!(!run.printed.contains("not validated"), "{}", run.printed);
+    assert_eq!(report["validated"], true);
 }
 
 /// Fails unless the object has these keys, each a number or, where it may be, null.

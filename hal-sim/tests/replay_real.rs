@@ -124,3 +124,27 @@ fn recordings_that_are_no_free_motion_are_refused() {
     let (report, _) = replay(&recordings, "@sp/energy.csv --leg sp --split 0.5 --bandwidth 5", 3);
     assert_eq!(reasons(&report), ["validation"]);
 }
+
+#[test]
+fn pushes_that_were_set_aside_do_not_make_a_recording_without_held_out_part_acceptable() {
+    let Some(recordings) = recordings() else { return };
+    let whole = |report: &serde_json::Value| -> f64 {
+        let findings = report["findings"].as_array().expect("a list").iter();
+        let shares = findings.filter(|finding| finding["test"] == "whole_error");
+        shares.map(|finding| finding["value"].as_f64().expect("a number")).fold(0.0, f64::max)
+    };
+    for bandwidth in [3, 5, 8] {
+        let arguments = format!("@sp/energy.csv --leg sp --bandwidth {bandwidth}");
+        let (report, _) = replay(&recordings, &arguments, 3);
+        assert_eq!(reasons(&report), ["residual"], "{bandwidth} Hz");
+        println!("sp/energy at {bandwidth} Hz misses {:.2} of the torque", whole(&report));
+    }
+    let excitation = "@dp_A0/00.csv @dp_A0/01.csv @dp_A0/03.csv @dp_A0/05.csv @dp_A0/13.csv --leg dp-a0";
+    for (arguments, bandwidths) in [("@sp/ddp.csv --leg sp", [3, 5, 8]), (excitation, [4, 5, 8])] {
+        for bandwidth in bandwidths {
+            let (report, _) = replay(&recordings, &format!("{arguments} --bandwidth {bandwidth}"), 0);
+            assert_eq!(report["validated"], false);
+            println!("{arguments} at {bandwidth} Hz misses {:.2} of the torque", whole(&report));
+        }
+    }
+}

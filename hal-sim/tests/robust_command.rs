@@ -3,8 +3,10 @@
 
 mod command;
 
+use hal_sim::tool::leg_file::LegFile;
+
 use command::{Folder, MUJOCO, Table, base, reasons, scarab};
-use scarab::real::sqrt;
+use scarab::real::{exp, sqrt};
 use serde_json::Value;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -179,4 +181,29 @@ fn wild_samples_are_replaced_at_the_rate_of_the_recording_not_after_resampling_s
     // Four other draws: 0.05 to 0.26 sigma, plain 9 to 11; replaced after resampling 1.0 to 3.8 and refused.
     assert!(robust < 0.6, "{robust} sigma");
     assert!(plain > 3.0 * robust, "plain {plain} sigma, robust {robust}");
+}
+
+#[test]
+fn the_band_of_a_prediction_counts_what_is_not_known_of_stribeck_friction() {
+    let folder = Folder::new();
+    // The rough leg on a calm day: nobody pushes, no sample is wild.
+    let mut calm = LegFile::load("x2-rough").expect("shipped");
+    calm.pushes = None;
+    calm.joints.iter_mut().for_each(|joint| joint.outliers = None);
+    let leg = folder.write("calm.toml", &calm.to_toml());
+    let (model, json) = (folder.path("model.toml"), folder.path("run.json"));
+    let arguments = "identify --torque-noise 5 --leg";
+    scarab(arguments, &[&leg, Path::new("--save-model"), &model, Path::new("--json"), &json]).ends_with(0);
+    let run = folder.json("run.json");
+    let hip = &run["stribeck"][0];
+    let of = |key: &str| hip[key].as_f64().expect("a number");
+    let (sigma, speed) = (of("surplus_sigma_nm"), of("speed_rad_s"));
+    let states =
+        folder.write("s.csv", "q1,q2,qd1,qd2,qdd1,qdd2\n0.5,-0.8,0.02,0.5,0,0\n0.5,-0.8,1.5,0.5,0,0\n");
+    let run = scarab("predict --model", &[&model, Path::new("--states"), &states]).ends_with(0);
+    let band = Table::parse(&run.printed).column("tau1_sigma_Nm");
+    println!("surplus +- {sigma:.3} N m: band {:.3} N m at 0.02 rad/s, {:.3} at 1.5", band[0], band[1]);
+    let ratio = 0.02 / speed;
+    assert!(band[0] > sigma * exp(-ratio * ratio), "{band:?} {sigma}");
+    assert!(band[1] < band[0], "{band:?}");
 }

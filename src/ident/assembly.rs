@@ -25,6 +25,8 @@ use crate::real::{self, Real};
 const ROW_RATE_HZ: f64 = 50.0;
 /// A block that got less than this of its weight counts as disturbed.
 const DISTURBED_BELOW: f64 = 0.5;
+/// A column of which less is independent of the others does not help to predict.
+const INDEPENDENT_SHARE: f64 = 1e-4;
 /// Below this share of the torque's root mean square single precision and not the data decides.
 const SMALLEST_NOISE_SHARE: f64 = 1e-5;
 
@@ -70,6 +72,7 @@ pub(super) fn assemble<T: Real, const N: usize, const B: usize, const ROOM: usiz
         assembly.torque[joint].mean_absolute = absolute / divisor;
         assembly.torque[joint].root_mean_square = real::sqrt(power / divisor);
         assembly.rows[joint] = (rows + T::of(0.5)).to_double() as u32;
+        assembly.outliers.whole_error_share[joint] = whole_error_share(window, joint, &joints[joint]);
         let free = rows - T::of(columns as f64) / real::max(information, T::of(1e-3));
         let variance = packed::residual(&joints[joint], columns)
             / real::max(free, T::one())
@@ -150,6 +153,22 @@ fn sums<T: Real, const N: usize, const B: usize, const ROOM: usize>(
         }
     }
     (rows, absolute)
+}
+
+/// Error of all rows of one joint by what its weighted rows say, over the torque of all; zero where nothing is known.
+fn whole_error_share<T: Real, const N: usize, const B: usize, const ROOM: usize>(
+    window: &Window<T, N, B, ROOM>,
+    joint: usize,
+    weighted: &[T; LARGEST_SIZE],
+) -> T {
+    let columns = window.columns()[joint].all();
+    let parameters = packed::solve(weighted, columns, T::of(INDEPENDENT_SHARE));
+    let parts = (0..window.blocks()).filter_map(|block| window.part(block, joint));
+    let (error, power) = parts.fold((T::zero(), T::zero()), |(error, power), part| {
+        let of = |parameters: &[T]| packed::cost(part.factor, columns, parameters);
+        (error + of(&parameters), power + of(&[]))
+    });
+    if power > T::zero() { real::sqrt(error / power) } else { T::zero() }
 }
 
 /// Shares and longest stretches of what was disturbed. A block in which a joint only stood still is as the one before.

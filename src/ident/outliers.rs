@@ -18,6 +18,8 @@ pub struct Outliers<T, const N: usize> {
     pub longest_s: [T; N],
     /// Longest stretch in which all joints' rows were disturbed at once, s.
     pub longest_common_s: T,
+    /// What the rows that counted say of all rows, those set aside included: the error's root mean square over the torque's.
+    pub whole_error_share: [T; N],
 }
 
 impl<T: Real, const N: usize> Outliers<T, N> {
@@ -30,6 +32,7 @@ impl<T: Real, const N: usize> Outliers<T, N> {
             disturbed_share: [T::zero(); N],
             longest_s: [T::zero(); N],
             longest_common_s: T::zero(),
+            whole_error_share: [T::zero(); N],
         }
     }
 
@@ -43,6 +46,7 @@ impl<T: Real, const N: usize> Outliers<T, N> {
             disturbed_share: self.disturbed_share.map(convert),
             longest_s: self.longest_s.map(convert),
             longest_common_s: convert(self.longest_common_s),
+            whole_error_share: self.whole_error_share.map(convert),
         }
     }
 }

@@ -309,11 +309,16 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         thresholds.judge_measurement(model, &self.record, &self.search.values(), docket);
         thresholds.judge_residual(&self.record, &found, docket);
         let noise_is_known = self.record.noise.iter().all(|&noise| noise > T::zero());
+        let mut predicted = false;
         for (motion, unused) in unused.enumerate() {
+            predicted = true;
             thresholds.judge_set_aside(&unused.record.outliers, Some(motion), docket);
             thresholds.judge_validation(&self.record, motion, unused.record, &estimate, docket);
             thresholds.judge_colour(motion, &unused, docket);
             thresholds.judge_contact(motion, &unused, docket);
+        }
+        if !predicted {
+            thresholds.judge_whole(&self.record.outliers, docket);
         }
         if !docket.verdict().has(Reason::Validation) {
             // What pushes and a wrong mass ask for is no geometry.

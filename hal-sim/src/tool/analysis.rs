@@ -170,6 +170,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             prior: self.prior_name.clone(),
             plan: plan_name(solver.plan()),
             verdict: if verdict.is_accepted() { "accepted" } else { "refused" },
+            validated: !validation.is_empty(),
             reasons: verdict.reasons().map(scarab::ident::Reason::name).collect(),
             findings: circumstances.findings.clone(),
             rank: solver.least_squares().rank(),
@@ -273,7 +274,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 unit: self.unit(base),
                 sigma: estimate.sigma(base).into(),
                 truth: truth.map(|truth| truth[base]).into(),
-                cramer_rao: cramer_rao.map(|bound| bound[base]).into(),
+                cramer_rao: cramer_rao.filter(|_| estimate.determined[base]).map(|bound| bound[base]).into(),
             })
             .collect()
     }

@@ -113,6 +113,12 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
             "joint {joint} is off by {value:.3} N m rms on the motion identified from, at most {limit:.3} are explained"
         ),
         Test::TrainingError => format!("no torque of joint {joint} could be compared with the model"),
+        Test::WholeError => format!(
+            "what was found misses the motion identified from, rows set aside included, by {:.0} % of the torque of joint \
+             {joint}, at most {:.0} % may be: hold a motion out",
+            100.0 * value,
+            100.0 * limit
+        ),
         Test::ValidationError if known => {
             format!(
                 "the torque of joint {joint}{on} is off by {value:.3} N m rms, at most {limit:.3} are explained"

@@ -177,8 +177,14 @@ pub struct StoredStribeck {
     pub joint: usize,
     /// N m.
     pub surplus_nm: f64,
+    /// Standard deviation; files from before it was kept have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surplus_sigma_nm: Option<f64>,
     /// rad/s.
     pub speed_rad_s: f64,
+    /// Standard deviation, likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed_sigma_rad_s: Option<f64>,
 }
 
 /// One combination of parameters.

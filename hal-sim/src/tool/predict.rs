@@ -44,7 +44,7 @@ pub struct PredictOptions {
 pub struct Prediction {
     /// Bodies, gravity and rotor.
     pub rigid: f64,
-    /// Coulomb, viscous and Stribeck; the band leaves the Stribeck surplus' own uncertainty out.
+    /// Coulomb, viscous and Stribeck.
     pub friction: f64,
     /// Constant.
     pub offset: f64,
@@ -128,7 +128,15 @@ impl<'a, const N: usize> Predictor<'a, N> {
         for found in &set.stribeck {
             let Some(joint) = found.joint.checked_sub(1).filter(|joint| *joint < N) else { continue };
             let ratio = state.qd[joint] / found.speed_rad_s;
-            torques[joint].friction += found.surplus_nm * sign(state.qd[joint]) * (-ratio * ratio).exp();
+            let fallen = (-ratio * ratio).exp();
+            torques[joint].friction += found.surplus_nm * sign(state.qd[joint]) * fallen;
+            // As if independent of the base parameters, which is on the safe side: surplus and Coulomb friction make up for
+            // each other.
+            let surplus =
+                if state.qd[joint] == 0.0 { 0.0 } else { found.surplus_sigma_nm.unwrap_or(0.0) * fallen };
+            let speed = found.surplus_nm * fallen * 2.0 * ratio * ratio / found.speed_rad_s
+                * found.speed_sigma_rad_s.unwrap_or(0.0);
+            torques[joint].sigma = torques[joint].sigma.hypot(surplus).hypot(speed);
         }
         torques
     }

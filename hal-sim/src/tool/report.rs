@@ -205,6 +205,9 @@ pub struct ConsistentSearchReport {
     pub evaluations: u32,
     /// Newton steps of the completion; none where the closed form is a possible leg.
     pub steps: u32,
+    /// The completion ended at its minimum, not because steps ran out or single precision did; unknown of the search over
+    /// whole legs. The verdict judges what it costs (`prior_box`), not this.
+    pub settled: Option<bool>,
     /// Cost of the data above the least that any allowed leg has, that found in double precision.
     pub excess_chi2: Number,
     /// Iterations until the excess was at most a half; unknown where it never was.
@@ -260,6 +263,8 @@ pub struct RunReport {
     pub plan: &'static str,
     /// `accepted` or `refused`.
     pub verdict: &'static str,
+    /// Whether motions that were not used were predicted; where none was, `accepted` speaks of the motion identified from.
+    pub validated: bool,
     /// From the closed list.
     pub reasons: Vec<&'static str>,
     /// Every test of the verdict.

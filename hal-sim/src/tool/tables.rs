@@ -230,7 +230,7 @@ fn run_text(run: &RunReport) -> String {
     lines.push(verdict_line(run));
     let failed = run.findings.iter().filter(|finding| !finding.passed);
     lines.extend(failed.map(|finding| format!("  {}: {}", finding.reason, finding.words)));
-    if run.validation.is_empty() && run.seed.is_none() {
+    if !run.validated && run.seed.is_none() {
         lines.push("  not validated: no motion was held out (--validate, --split)".into());
     }
     lines.extend(run.compared.as_ref().map(|compared| {
@@ -301,7 +301,8 @@ pub fn verdict_line(run: &RunReport) -> String {
         String::new()
     };
     if run.accepted() {
-        format!("verdict: accepted{seconds}")
+        let validated = if run.validated { "" } else { ", not validated" };
+        format!("verdict: accepted{validated}{seconds}")
     } else {
         format!("verdict: refused, {}{seconds}", run.reasons.join(", "))
     }

@@ -8,6 +8,22 @@ use crate::ident::outliers::Outliers;
 use crate::real::{self, Real};
 
 impl<T: Real> Thresholds<T> {
+    /// Whether what was found on the rows that counted says something of those that were set aside too. Only where no other
+    /// motion is there to ask: a push is set aside rightly, but a machine that was pushed for most of its motion leaves a few
+    /// calm rows, and a model of these that fits nothing else.
+    pub fn judge_whole<const N: usize>(&self, outliers: &Outliers<T, N>, docket: &mut Docket<'_, T>) {
+        for (joint, &share) in outliers.whole_error_share.iter().enumerate() {
+            docket.at_most(
+                Reason::Residual,
+                Test::WholeError,
+                Some(joint),
+                None,
+                share,
+                self.largest_error_share,
+            );
+        }
+    }
+
     /// Contact is a single long stretch in which all joints missed together. Where more than half of the rows missed the
     /// model is wrong, not the leg held: other tests say so.
     pub fn judge_disturbance<const N: usize>(&self, outliers: &Outliers<T, N>, docket: &mut Docket<'_, T>) {

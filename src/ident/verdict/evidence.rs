@@ -36,6 +36,8 @@ pub enum Test {
     DynamicShare,
     /// Error on the motion identified from, N m.
     TrainingError,
+    /// Error of all rows of the motion identified from, those set aside included, over their torque.
+    WholeError,
     /// Error on a held-out motion, N m.
     ValidationError,
     /// Slow part of what is unexplained on a held-out motion, N m.
@@ -72,6 +74,7 @@ impl Test {
             Self::PriorBox => "prior_box",
             Self::DynamicShare => "dynamic_share",
             Self::TrainingError => "training_error",
+            Self::WholeError => "whole_error",
             Self::ValidationError => "validation_error",
             Self::SlowResidual => "slow_residual",
             Self::LinkLength => "link_length",

@@ -13,7 +13,7 @@ pub fn banner(run: &RunReport) -> Markup {
     html! {
         section.verdict.accepted[run.accepted()].refused[!run.accepted()] {
             @if run.accepted() {
-                p.word { "Accepted" }
+                p.word { "Accepted" @if !validated { ", not validated" } }
                 p { "The model explains the motion it was identified from" @if validated {
                     ", and predicts the motions that were not used"
                 } ". " (passed(run)) }
@@ -69,6 +69,7 @@ fn meaning(test: &str) -> (bool, &str) {
         "prior_box" => (false, "chi-square that the prior's limits cost"),
         "dynamic_share" => (true, "share of the torque that inertia and friction make"),
         "training_error" => (false, "rms error on the motion identified from, N m"),
+        "whole_error" => (false, "error of all rows over their torque, those set aside included"),
         "validation_error" => (false, "rms error on an unused motion, N m"),
         "slow_residual" => (false, "residual that lasts, N m"),
         "link_length" => (false, "share by which the link before seems longer"),

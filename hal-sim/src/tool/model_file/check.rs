@@ -117,6 +117,11 @@ fn base_set(model: &ModelFile) -> Checked {
         if !(found.surplus_nm.is_finite() && found.speed_rad_s > 0.0 && found.speed_rad_s.is_finite()) {
             return Err(fault(&steps, "a surplus must be a number, a speed one above 0"));
         }
+        let sigmas = [found.surplus_sigma_nm, found.speed_sigma_rad_s];
+        if let Some(sigma) = sigmas.into_iter().flatten().find(|sigma| !(*sigma >= 0.0 && sigma.is_finite()))
+        {
+            return Err(fault(&steps, format!("a standard deviation is {sigma}; it must be 0 or more")));
+        }
     }
     covariance(set)
 }

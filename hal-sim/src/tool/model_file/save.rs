@@ -78,7 +78,9 @@ impl ModelFile {
             Some(StoredStribeck {
                 joint: found.joint,
                 surplus_nm: found.surplus_nm.known()?,
+                surplus_sigma_nm: found.surplus_sigma_nm.known(),
                 speed_rad_s: found.speed_rad_s.known()?,
+                speed_sigma_rad_s: found.speed_sigma_rad_s.known(),
             })
         });
         let stribeck = stribeck.collect::<Option<Vec<_>>>()?;
