@@ -171,11 +171,39 @@ fn what_a_recording_without_a_prior_does_not_tell_is_a_dash() {
 }
 
 #[test]
-fn one_page_is_one_run_and_one_path_that_can_be_written() {
+fn many_runs_are_a_page_of_how_they_lie_about_truth() {
+    let (folder, _, page) = reported("identify --seeds 1..6", 0);
+    let report = folder.json("run.json");
+    let runs = report["runs"].as_array().expect("a list");
+    assert_eq!((page.one(".verdict .word"), page.all("figure svg").len()), ("6 of 6 accepted".into(), 1));
+    let rows = page.all("table.spread tbody tr");
+    assert_eq!(rows.len(), 13);
+    for (row, base) in rows.iter().zip(runs[0]["base_parameters"].as_array().expect("a list")) {
+        assert!(row.starts_with(base["name"].as_str().expect("a name")) && row.ends_with('6'), "{row}");
+    }
+    // Mean error of the first parameter in the sigma of each run, as the page says it.
+    let errors = runs.iter().map(|run| {
+        let of = |key: &str| run["base_parameters"][0][key].as_f64().expect("a number");
+        (of("value") - of("truth")) / of("sigma")
+    });
+    let mean = format!("{:+.1}", errors.sum::<f64>() / 6.0).replace('-', "\u{2212}");
+    assert!(rows[0].contains(&mean), "{mean} in {}", rows[0]);
+    assert!(page.all("figure svg").iter().all(|figure| figure.contains("mean") && figure.contains("spread")));
+    assert!(!page.text.contains("NaN") && !page.text.contains("<script"));
+    let tests = page.all("table.tests tbody tr");
+    assert!(tests.len() > 10 && tests.iter().any(|row| row.contains("36 of 36")), "{tests:?}");
+}
+
+#[test]
+fn runs_that_were_refused_are_told_with_their_seeds() {
+    let (_, _, page) = reported("identify --seeds 3..4 --perturb stuck=knee", 3);
+    assert_eq!(page.one(".verdict.refused .word"), "0 of 2 accepted");
+    assert!(page.one(".verdict.refused").contains("unexcited: 2 runs, seeds 3, 4"));
+}
+
+#[test]
+fn a_page_that_cannot_be_written_is_said_so() {
     let folder = Folder::new();
-    let refusal = scarab("identify --seeds 1..3 --report", &[&folder.path("report.html")]).refusal();
-    assert!(refusal.contains("--report") && refusal.contains("one run"), "{refusal}");
-    assert!(!folder.path("report.html").exists());
     let nowhere = folder.path("no/such/folder/report.html");
     let run = scarab("identify --report", &[&nowhere]).ends_with(2);
     assert!(run.errors.contains("report.html: cannot be written"), "{}", run.errors);

@@ -9,6 +9,8 @@
 //! | `search.svg` | the swarm's cost above the optimum in its box over its iterations |
 //! | `base-parameters.svg` | errors of the base parameters in reported standard deviations, or those of the value |
 //!
+//! Of many runs (`--seeds`) there is `spread.svg`: every base parameter about its truth.
+//!
 //! More than four motions are continued in `motions-b.svg`, `torque-1-b.svg` and so on.
 //! `docs/figures/identify.svg` is this `identify.svg`: `cargo sim && cp target/sim/identify.svg docs/figures/`.
 //!
@@ -21,6 +23,7 @@ mod curve;
 mod parameters;
 mod residuals;
 mod search;
+mod spread;
 mod torque;
 mod trajectories;
 
@@ -29,6 +32,7 @@ use std::path::Path;
 use super::error::ToolError;
 use super::report::RunReport;
 use super::series::{Role, Series};
+use super::spread::Spread;
 use canvas::{Area, DrawingError, render};
 
 /// Width of every figure, pixels.
@@ -113,6 +117,16 @@ pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figu
         parameters::whole(area, run)
     })?;
     Ok(figures)
+}
+
+/// Base parameters of many runs of one leg about their truth.
+pub fn spread(leg: &str, spreads: &[Spread]) -> Result<Figure, ToolError> {
+    let file = "spread.svg".to_owned();
+    let svg = render(WIDTH, 60 + 26 * spreads.len() as u32, &|area| spread::whole(area, spreads))
+        .map_err(|error| ToolError::input(format!("{file}: cannot be drawn: {error}")))?;
+    let title =
+        format!("Base parameters of {leg} about their truth: runs, their mean and spread, in reported sigma");
+    Ok(Figure { file, group: Group::BaseParameters, title, svg })
 }
 
 type Draw<'d> = &'d dyn Fn(&Area<'_>) -> Result<(), DrawingError>;

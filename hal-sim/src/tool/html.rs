@@ -13,6 +13,7 @@ mod head;
 mod limits;
 mod parameters;
 mod results;
+pub mod seeds;
 mod verdict;
 
 use jiff::{Timestamp, Unit};
@@ -108,7 +109,7 @@ pub fn page(
                     @if !run.tracking.is_empty() { (results::tracking(run)) }
                     (results::scale(run))
                     @for (name, value) in &rest { (generic::section(name, value)) }
-                    (verdict::tests(run))
+                    (verdict::tests(&run.findings))
                     (limits::section(run))
                     (head::colophon(run))
                 }

@@ -60,6 +60,7 @@ pub mod servo_inertia;
 pub mod setup;
 pub mod simulate;
 pub mod size;
+pub mod spread;
 pub mod tables;
 pub mod temperature;
 pub mod urdf;

@@ -12,6 +12,7 @@ use crate::tool::replay::Source;
 use crate::tool::report::RunReport;
 use crate::tool::series::Series;
 use crate::tool::setup::PriorChoice;
+use crate::tool::spread::Spread;
 use crate::tool::{figures, html, tables, temperature};
 
 /// How parameters are found from the joints' rows.
@@ -117,6 +118,25 @@ pub fn draw(
     if let Some(path) = &common.report {
         let circumstances = html::Circumstances::now(leg);
         let page = html::page(&circumstances, run, sources, &drawn)?;
+        std::fs::write(path, page).map_err(|error| ToolError::cannot_write(path, &error))?;
+        tables::print(&format!("report: {}\n", path.display()))?;
+    }
+    Ok(())
+}
+
+/// Draws many runs of one leg where they are asked for, and says where they are.
+pub fn draw_runs(leg: &LegFile, common: &Common, runs: &[RunReport]) -> Result<(), ToolError> {
+    if !common.is_drawn() {
+        return Ok(());
+    }
+    let spreads = Spread::of(runs);
+    let figure = figures::spread(&leg.name, &spreads)?;
+    if let Some(directory) = &common.figures {
+        figures::write(directory, std::slice::from_ref(&figure))?;
+        tables::print(&format!("figures: {}\n", directory.display()))?;
+    }
+    if let Some(path) = &common.report {
+        let page = html::seeds::page(&html::Circumstances::now(leg), runs, &spreads, &figure)?;
         std::fs::write(path, page).map_err(|error| ToolError::cannot_write(path, &error))?;
         tables::print(&format!("report: {}\n", path.display()))?;
     }

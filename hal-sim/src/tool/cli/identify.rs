@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use scarab::model::Payload;
 
-use super::common::{Common, draw, finish, write_json};
+use super::common::{Common, draw, draw_runs, finish, write_json};
 use super::model::ModelArguments;
 use super::noise::NoiseOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
@@ -101,7 +101,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
         payload,
         load,
         estimator: arguments.common.estimator.into(),
-        with_series: arguments.common.is_drawn(),
+        with_series: arguments.common.is_drawn() && arguments.seeds.is_none(),
         perturbations: arguments.perturb.clone(),
         excitation: excitation.clone(),
     };
@@ -116,14 +116,12 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
         arguments.model.save(leg, &run, leg.bandwidth_hz)?;
         return Ok(code);
     };
-    if arguments.common.is_drawn() {
-        return Err(ToolError::input("--figures and --report show one run: give --seed instead of --seeds"));
-    }
     let options: &Vec<_> = &(first..=last).map(options).collect();
     let runs = with_leg_size!(leg, identify_many(leg, options))?;
     if let Some(path) = &arguments.common.json {
         write_json(path, &runs)?;
     }
     print_runs(&runs)?;
+    draw_runs(leg, &arguments.common, &runs.runs)?;
     Ok(if runs.runs.iter().all(RunReport::accepted) { EXIT_ACCEPTED } else { EXIT_REFUSED })
 }

@@ -14,8 +14,8 @@ use super::super::report::{BaseReport, RunReport};
 use super::super::tables::number;
 use super::canvas::{Area, DARK, DrawingError, GRID, font, line, px, text};
 
-const ONE_SIGMA: RGBColor = RGBColor(190, 205, 225);
-const THREE_SIGMA: RGBColor = RGBColor(228, 235, 244);
+pub const ONE_SIGMA: RGBColor = RGBColor(190, 205, 225);
+pub const THREE_SIGMA: RGBColor = RGBColor(228, 235, 244);
 
 /// With values, standard deviations and truths.
 pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
@@ -104,13 +104,15 @@ fn dots(
 /// Of the logarithmic axis.
 const PERCENT: (f64, f64) = (0.01, 1000.0);
 
-fn frame<'a, 'b>(area: &'a Area<'b>, (left, right): (i32, i32)) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
+/// Room for names and values beside the axes.
+pub fn frame<'a, 'b>(area: &'a Area<'b>, (left, right): (i32, i32)) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
     let mut builder = ChartBuilder::on(area);
     builder.margin_left(px(left)).margin_right(px(right)).x_label_area_size(px(36));
     builder
 }
 
-fn mesh<'b, X: Ranged<ValueType = f64> + ValueFormatter<f64>>(
+/// Lines up from one axis of numbers.
+pub fn mesh<'b, X: Ranged<ValueType = f64> + ValueFormatter<f64>>(
     chart: &mut ChartContext<'_, SVGBackend<'b>, Cartesian2d<X, RangedCoordf64>>,
     label: &str,
     numbers: &dyn Fn(&f64) -> String,
@@ -134,12 +136,11 @@ fn rows_of<X: Ranged<ValueType = f64>>(
     area: &Area<'_>,
     chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, RangedCoordf64>>,
     bases: &[BaseReport],
-    (left, right): (i32, i32),
+    margins: (i32, i32),
     place: &dyn Fn(&BaseReport) -> Option<f64>,
     values: &dyn Fn(&BaseReport) -> String,
 ) -> Result<(), DrawingError> {
     let rows = bases.len().max(1) as f64;
-    let (width, _) = area.dim_in_pixel();
     for (row, base) in bases.iter().enumerate() {
         let middle = rows - row as f64 - 0.5;
         let at = place(base);
@@ -147,13 +148,24 @@ fn rows_of<X: Ranged<ValueType = f64>>(
         if let Some(at) = at {
             chart.draw_series([Circle::new((at, middle), px(4), DARK.filled())])?;
         }
-        // From the figure's corner to the area's own.
-        let (_, y0) = area.get_base_pixel();
-        let words = |words: String, x: i32, anchor| {
-            Text::new(words, (x, y - y0), font(12).pos(Pos::new(anchor, VPos::Center)))
-        };
-        area.draw(&words(base.name.clone(), px(left - 8), HPos::Right))?;
-        area.draw(&words(values(base).replace('-', "\u{2212}"), width as i32 - px(right - 8), HPos::Left))?;
+        labels(area, y, margins, (base.name.clone(), values(base)))?;
     }
     Ok(())
+}
+
+/// A name to the left and words to the right of a row at `y`, counted from the figure's corner.
+pub fn labels(
+    area: &Area<'_>,
+    y: i32,
+    (left, right): (i32, i32),
+    (name, words): (String, String),
+) -> Result<(), DrawingError> {
+    let (width, _) = area.dim_in_pixel();
+    // From the figure's corner to the area's own.
+    let (_, y0) = area.get_base_pixel();
+    let text = |words: String, x: i32, anchor| {
+        Text::new(words, (x, y - y0), font(12).pos(Pos::new(anchor, VPos::Center)))
+    };
+    area.draw(&text(name, px(left - 8), HPos::Right))?;
+    area.draw(&text(words.replace('-', "\u{2212}"), width as i32 - px(right - 8), HPos::Left))
 }

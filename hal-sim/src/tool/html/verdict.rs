@@ -91,14 +91,14 @@ fn nearness(finding: &FindingReport) -> f64 {
 }
 
 /// Every kind of test, with the case that came nearest to its limit.
-pub fn tests(run: &RunReport) -> Markup {
+pub fn tests(findings: &[FindingReport]) -> Markup {
     let mut kinds: Vec<(&str, &str)> = Vec::new();
-    for finding in &run.findings {
+    for finding in findings {
         if !kinds.contains(&(finding.reason, finding.test)) {
             kinds.push((finding.reason, finding.test));
         }
     }
-    kinds.sort_by_key(|(reason, _)| run.findings.iter().position(|finding| finding.reason == *reason));
+    kinds.sort_by_key(|(reason, _)| findings.iter().position(|finding| finding.reason == *reason));
     html! { @if !kinds.is_empty() {
         section {
             h2 { "Tests of the verdict" }
@@ -108,14 +108,14 @@ pub fn tests(run: &RunReport) -> Markup {
                     th scope="col" { "against" } th scope="col" { "what is tested" } th.n scope="col" { "value" }
                     th.n scope="col" { "limit" } th scope="col" { "where" } th.n scope="col" { "passed" }
                 } }
-                tbody { @for kind in kinds { (row(run, kind)) } }
+                tbody { @for kind in kinds { (row(findings, kind)) } }
             } }
         }
     } }
 }
 
-fn row(run: &RunReport, (reason, test): (&str, &str)) -> Markup {
-    let of_kind = || run.findings.iter().filter(|finding| (finding.reason, finding.test) == (reason, test));
+fn row(findings: &[FindingReport], (reason, test): (&str, &str)) -> Markup {
+    let of_kind = || findings.iter().filter(|finding| (finding.reason, finding.test) == (reason, test));
     let (all, passed) = (of_kind().count(), of_kind().filter(|finding| finding.passed).count());
     let nearest = of_kind().max_by(|one, other| {
         let rank = |finding: &FindingReport| (!finding.passed, nearness(finding));
