@@ -213,3 +213,6 @@ fn redescend<T: Real>(weights: &mut Weights<T>, blocks: &Residuals<T>, scale: T,
         *weight = kept * kept;
     }
 }
+
+#[cfg(test)]
+mod tests;
