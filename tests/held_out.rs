@@ -120,34 +120,14 @@ fn the_first_joints_zero_is_seen_and_the_last_ones_is_not() {
 }
 
 #[test]
-fn a_length_and_a_zero_that_hide_each_other_show_beside_each_other() {
-    // The zero by which the length's own question is answered with nothing: between these two the answer changes sign.
-    let alone = |zero: f64| {
-        let found = look(0.9 * LENGTH_M, [zero, 0.0], [0.0; 2], 1, |_| 0.0);
-        of(&found, Direction::Length, 1).expect("seen").0
-    };
-    let (mut low, mut high) = (-0.2, 0.2);
-    assert!(alone(low) * alone(high) < 0.0, "{} {}", alone(low), alone(high));
-    for _ in 0..6 {
-        let middle = 0.5 * (low + high);
-        if alone(middle) * alone(low) > 0.0 { low = middle } else { high = middle }
-    }
-    let found = look(0.9 * LENGTH_M, [low, 0.0], NOISE_NM, 1, |_| 0.0);
-    let length = found.misalignments.iter().find(|found| found.direction == Direction::Length).expect("seen");
-    let (delta, sigma) = length.beside.expect("told from the zero");
-    println!("zero {low}: {length:?}");
-    assert!(length.delta.abs() < 0.02 && (delta - 0.1 / 0.9).abs() < 0.03, "{length:?}");
-    assert!(delta > 5.2 * sigma, "{length:?}");
-}
-
-#[test]
 fn a_leg_as_believed_asks_for_nothing() {
     let mut worst = 0.0_f64;
     for seed in 0..20 {
         let found = look(LENGTH_M, [0.0; 2], NOISE_NM, seed, |_| 0.0);
         for found in &found.misalignments {
             worst = worst.max(f64::from((found.delta / found.sigma).abs()));
-            let (delta, sigma) = found.beside.expect("told from the others");
+            // A direction may leave nothing of another.
+            let (delta, sigma) = found.beside.unwrap_or((0.0, 1.0));
             worst = worst.max(f64::from((delta / sigma).abs()));
         }
     }

@@ -101,7 +101,7 @@ fn every_fault_is_told_with_file_line_and_reason() {
         (joint("[joint.motor]\npoles = 7"), Some(7), "`[joint.motor]` is reserved"),
         (joint("direction = 2"), Some(7), "joint `hip`: `direction` is 2; it must be 1 or -1"),
         (joint("\nrange_deg = [50.0, 2.0]"), Some(8), "`range_deg` is inverted or empty: 50 to 2"),
-        (joint("range_deg = [-inf, 2.0]"), Some(7), "`range_deg` is -inf, outside -360..360"),
+        (joint("range_deg = [-inf, 2.0]"), Some(7), "`range_deg` is -inf, outside -3600..3600"),
         (
             joint("speed_limit_deg_s = 0.0"),
             Some(7),

@@ -56,7 +56,6 @@ pub mod report;
 pub mod resample;
 pub mod scale;
 pub mod series;
-pub mod servo_inertia;
 pub mod setup;
 pub mod simulate;
 pub mod size;

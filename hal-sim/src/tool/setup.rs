@@ -8,8 +8,8 @@ use scarab::ident::{
 };
 use scarab::leg::LegConfiguration;
 use scarab::model::{
-    AnatomicalJoint, BaseError, BaseParameters, Chain, ColumnMask, DenavitHartenberg, PARAMETERS_PER_JOINT,
-    Parameter, RigidBody, is_physically_consistent,
+    AnatomicalJoint, BaseError, BaseParameters, Chain, ColumnMask, DenavitHartenberg, LegParameters,
+    PARAMETERS_PER_JOINT, Parameter, RigidBody, is_physically_consistent, mass_matrix,
 };
 
 use scarab::motion::JointEnvelope;
@@ -25,7 +25,6 @@ use super::information::StribeckTruth;
 use super::leg_file::{BodySide, JointFile, LegFile, LinkParameters};
 use super::model_choice::{Asked, drive_choice, stribeck_choice};
 use super::motions::{Motions, motions};
-use super::servo_inertia::servo_inertia;
 
 /// Bandwidth of the position loop.
 const POSITION_BANDWIDTH: Hertz = Hertz(6.0);
@@ -291,6 +290,25 @@ fn stribeck_truth(joint: &JointFile) -> Option<StribeckTruth> {
     Some(StribeckTruth { surplus: curve.static_nm - truth.coulomb, speed: curve.speed_rad_s })
 }
 
+/// Largest inertia each joint moves, kg m2, over postures of the whole circle.
+#[must_use]
+pub fn largest_inertia<const N: usize>(
+    chain: &Chain<f64, N>,
+    parameters: &LegParameters<f64, N>,
+) -> [f64; N] {
+    let mut largest = [0.0_f64; N];
+    for step in 0..64 {
+        let q = core::array::from_fn(|joint| {
+            f64::from(step) * core::f64::consts::TAU / 64.0 * (joint + 1) as f64
+        });
+        let mass = mass_matrix(chain, parameters, &q);
+        for joint in 0..N {
+            largest[joint] = largest[joint].max(mass[(joint, joint)]);
+        }
+    }
+    largest
+}
+
 /// The firmware's configuration of a leg, and its motions.
 pub fn configuration<const N: usize, const B: usize>(
     leg: &LegFile,
@@ -298,7 +316,7 @@ pub fn configuration<const N: usize, const B: usize>(
     plan: Plan,
     swarm_seed: u64,
 ) -> Result<(LegConfiguration<N, B>, Motions<N>), SetupError> {
-    let inertia = servo_inertia(leg, &anatomy::<N>(leg)?, &background.model.chain)?;
+    let inertia = servo_inertia(leg, background)?;
     let anatomy = anatomy::<N>(leg)?;
     let joints: [JointConfiguration; N] = core::array::from_fn(|index| {
         let joint = &leg.joints[index];
@@ -346,4 +364,14 @@ pub fn configuration<const N: usize, const B: usize>(
         validation: motions.validation,
     };
     Ok((configuration, motions))
+}
+
+/// Largest inertia of each joint after the leg file's prior, else its truth: the servo's gains follow it.
+fn servo_inertia<const N: usize, const B: usize>(
+    leg: &LegFile,
+    background: &Background<N, B>,
+) -> Result<[f64; N], SetupError> {
+    let links = links::<N>(leg, |joint| joint.prior.as_ref().or(joint.truth.as_ref()))
+        .ok_or_else(|| SetupError::new(leg, "neither prior nor truth tells how heavy the leg is"))?;
+    Ok(largest_inertia(&background.model.chain, &prior_parameters(&links)))
 }

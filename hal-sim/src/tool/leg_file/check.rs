@@ -117,21 +117,14 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
     }
     place.within("zero_offset_deg", joint.zero_offset_deg, -360.0, 360.0)?;
     let [lower, upper] = joint.range_deg;
-    place.within("range_deg", lower, -360.0, 360.0)?;
-    place.within("range_deg", upper, -360.0, 360.0)?;
+    place.within("range_deg", lower, -3600.0, 3600.0)?;
+    place.within("range_deg", upper, -3600.0, 3600.0)?;
     if lower >= upper {
         return Err(place.fault("range_deg", &format!("is inverted or empty: {lower} to {upper}")));
     }
     if upper - lower < SMALLEST_RANGE_DEG {
         let words = format!("is {} degrees wide; at least {SMALLEST_RANGE_DEG} are needed", upper - lower);
         return Err(place.fault("range_deg", &words));
-    }
-    for end in joint.range_deg {
-        let angle = if joint.direction < 0 { -end } else { end } + joint.zero_offset_deg;
-        if angle.abs() > 360.0 {
-            let words = format!("ends at the D-H angle {angle} degrees, outside -360..360");
-            return Err(place.fault("range_deg", &words));
-        }
     }
     place.positive("speed_limit_deg_s", joint.speed_limit_deg_s, 2800.0)?;
     place.positive("acceleration_limit_deg_s2", joint.acceleration_limit_deg_s2, 1e5)?;
