@@ -18,7 +18,7 @@
 //! **Signs.** Inside, positive current makes torque towards growing electrical angle. Outside, counts and current both grow
 //! with the joint's flexion: [`AxisConfiguration::flexion`] says which way the counter runs then.
 //!
-//! Cost: see docs/motor.md, "instructions".
+//! Cost: `scripts/count-instructions`.
 
 use super::configuration::{AxisConfiguration, AxisError, Constants};
 use super::current_loop::DELAY_PERIODS;

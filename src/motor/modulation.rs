@@ -19,7 +19,7 @@
 //! (1 - d_max) / (2 f) >= max(t_d + t_settle, t_adc)
 //! ```
 //!
-//! 119 ns + 1.2 us (DRV8301 at 40 V/V to 1 % of 2 V, SLOS719, table of the shunt amplifiers), 3 + 12 cycles of 21 MHz: 0.71 us;
+//! 119 ns + 1.2 us (DRV8301 at 40 V/V to 1 % of 2 V, from memory of its data sheet SLOS719: to be checked), 3 + 12 cycles of 21 MHz: 0.71 us;
 //! so at 24 kHz d_max = 0.9367. Centred about one half and not about d_max / 2, because only equal zero vectors make the
 //! sample the mean of the ripple: by the shift the error is v s / (2 L f) at most, s the shift. It arises above
 //! 0.873 of the largest voltage only.
