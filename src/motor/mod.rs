@@ -14,7 +14,7 @@
 //! | [`Modulator`] | space vectors, room for the sample, dead time |
 //! | [`Axis`] | all of it in one tick, with the borders that release |
 //! | [`calibration`] | measures and refuses; the only source of a [`Calibration`] |
-//! | [`reference`] | the joint's zero: an end stop or a stated pose |
+//! | [`mod@reference`] | the joint's zero: an end stop or a stated pose |
 //! | [`Transmission`] | current to joint torque and back |
 //!
 //! Equations, the timing within one PWM period and measured figures: docs/motor.md.
