@@ -131,12 +131,14 @@ impl Axis {
         let angle = constants.scale.angle(self.place).plus(constants.offset);
         self.speed.track(angle);
         let currents = constants.sense.currents(sample.shunt_codes, constants.zeros);
-        if let Some(currents) = currents {
-            self.measured = currents.to_rotating(angle.rotation(constants.sine));
-        }
+        let switching = request.enabled && self.fault.is_none();
+        self.measured = match currents {
+            Some(currents) => currents.to_rotating(angle.rotation(constants.sine)),
+            None if switching => self.measured,
+            None => Rotating::default(),
+        };
         self.window.push(self.counts, self.measured.q.0 * constants.current_sign);
 
-        let switching = request.enabled && self.fault.is_none();
         let [low, high] = constants.bus_codes;
         let doubt = if !plausible {
             Some(AxisFault::Encoder)

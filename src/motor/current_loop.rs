@@ -35,7 +35,7 @@
 
 use super::Rotating;
 use crate::hal::CURRENT_RATE_HZ;
-use crate::real::{exp, sqrt};
+use crate::real::{clamp, exp, sqrt};
 use crate::units::{Ampere, Henry, Hertz, Ohm, Volt, Weber};
 
 /// From a sample to the middle of the period in which its answer acts, in periods.
@@ -150,9 +150,9 @@ fn limited(wanted: Rotating<f32>, limit: f32) -> Rotating<f32> {
         return wanted;
     }
     let most = DIRECT_SHARE * limit;
-    let d = wanted.d.max(-most).min(most);
+    let d = clamp(wanted.d, -most, most);
     let left = sqrt(square - d * d);
-    Rotating { d, q: wanted.q.max(-left).min(left) }
+    Rotating { d, q: clamp(wanted.q, -left, left) }
 }
 
 #[cfg(test)]

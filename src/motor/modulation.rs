@@ -33,6 +33,7 @@
 
 use super::{Phases, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
+use crate::real::clamp;
 use crate::units::{Ampere, Second, Volt};
 
 const ONE_OVER_SQRT_3: f32 = 0.577_350_26;
@@ -132,12 +133,6 @@ impl Modulator {
         let duty = wanted + self.dead_duty * clamp(current_in_bands, -1.0, 1.0);
         clamp(duty, 0.0, self.greatest_duty)
     }
-}
-
-/// Two comparisons; what is not a number becomes `low`.
-fn clamp(value: f32, low: f32, high: f32) -> f32 {
-    let value = if value > low { value } else { low };
-    if value < high { value } else { high }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Why on top of a current: as long as no phase's current changes its sign, dead time adds a constant and nothing else. So `di`
-//! is brought to 0.3 of the holding current by raising u, and the swing across bends the smallest phase current (half the
+//! is brought to 0.3 of the holding current by raising u (or to what the voltage allowed can do, 0.03 at least), and the swing across bends the smallest phase current (half the
 //! holding one) by 0.26 of the full. Across the flux the rotor feels an alternating torque at 6 kHz and stands still.
 //! What is commanded after sample k acts between the samples k+1 and k+2: the maximum is read three samples after the
 //! wave's beginning, the minimum two later. 512 waves each (85 ms): noise of 0.1 A leaves 6 mA of some amperes.
@@ -25,6 +25,8 @@ const MEAN_WAVES: u32 = 512;
 const SETTLE_WAVES: u32 = 64;
 /// What di is raised to, of the holding current.
 const SWING_SHARE: f32 = 0.3;
+/// Less, at the voltage allowed, is too little to be measured.
+const LEAST_SWING_SHARE: f32 = 0.03;
 /// Steps of the amplitude, of the voltage allowed: one per wave.
 const RISE_SHARE: f32 = 1.0 / 1024.0;
 
@@ -108,8 +110,11 @@ impl InductanceStage {
                 self.rising = false;
             } else {
                 self.amplitude += RISE_SHARE * settings.voltage.0;
-                if self.amplitude > settings.voltage.0 {
-                    return Err(Refusal::MotorConstants);
+                if self.amplitude >= settings.voltage.0 {
+                    if !(swing >= LEAST_SWING_SHARE * settings.current.0) {
+                        return Err(Refusal::MotorConstants);
+                    }
+                    self.rising = false;
                 }
             }
             return Ok(());

@@ -10,16 +10,21 @@
 //! modulator's, so the bridge's own resistance counts as the motor's, as it should.
 //! A current that flows must lie within 15 degrees of the voltage; each wrong wiring bends it by 30 or more on one of the
 //! axes, with its own pattern of signs. Where a wrong sign turns the hold's feedback around, a quarter of the current is enough.
-//! 0.3 s to settle (the rotor swings towards the field), 0.1 s of mean, twice per axis.
+//!
+//! The rotor swings towards the field, and while it does its flux takes or gives voltage along it; so means of 0.1 s are
+//! taken until two in a row agree to 0.2 % (at least 0.3 s, at most 4 s), twice per axis.
 
 use super::hold::Hold;
 use super::{ElectricalAngle, Outcome, Phase, Reading, Refusal, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
 use crate::units::{Ampere, Ohm};
 
-const SETTLE_TICKS: u32 = CURRENT_RATE_HZ * 3 / 10;
+const RISE_TICKS: u32 = CURRENT_RATE_HZ / 10;
 const MEAN_TICKS: u32 = CURRENT_RATE_HZ / 10;
 const RELEASE_TICKS: u32 = CURRENT_RATE_HZ / 10;
+const LEVEL_TICKS: u32 = 4 * CURRENT_RATE_HZ;
+/// Share by which two means of a settled rotor may differ.
+const SETTLED_SHARE: f32 = 0.002;
 /// Share of the held current that is refused at once where it flows backwards: the hold would drive it further.
 const JUDGED_SHARE: f32 = 0.25;
 /// Tangent of 15 degrees.
@@ -34,13 +39,25 @@ const AXES: [Phase; 3] = [Phase::C, Phase::B, Phase::A];
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ResistanceStage {
     axis: usize,
+    level: Level,
+    /// Of this level.
     ticks: u32,
     hold: Hold,
-    sums: [Sums; 2],
+    sums: Sums,
+    /// The sums before these.
+    before: Option<Sums>,
+    half: Sums,
     found: [f32; 3],
 }
 
-/// Of one level of current, over the ticks of its mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Level {
+    Half,
+    Full,
+    Release,
+}
+
+/// Over the ticks of one mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sums {
     volts: f32,
@@ -51,9 +68,12 @@ impl Default for ResistanceStage {
     fn default() -> Self {
         Self {
             axis: 0,
+            level: Level::Half,
             ticks: 0,
             hold: Hold::along(angle_of(AXES[0])),
-            sums: [Sums::default(); 2],
+            sums: Sums::default(),
+            before: None,
+            half: Sums::default(),
             found: [0.0; 3],
         }
     }
@@ -69,56 +89,73 @@ fn angle_of(phase: Phase) -> ElectricalAngle {
 
 impl ResistanceStage {
     pub(super) fn tick(&mut self, reading: &Reading<'_>) -> Result<Outcome<(Ohm, Hold)>, Refusal> {
-        const HALF: u32 = SETTLE_TICKS + MEAN_TICKS;
         let full = reading.bench.settings.current;
         let phase = AXES.get(self.axis).copied().unwrap_or(Phase::A);
-        let target = match self.ticks {
-            0..HALF => full * 0.5,
-            ticks if ticks < 2 * HALF => full,
-            _ => Ampere::ZERO,
+        let target = match self.level {
+            Level::Half => full * 0.5,
+            Level::Full => full,
+            Level::Release => Ampere::ZERO,
         };
         let held = self.hold.tick(reading, target);
-        let backwards = reading.bench.settings.current * -JUDGED_SHARE;
-        if self.hold.along_axis(reading.current) < backwards {
+        if self.hold.along_axis(reading.current) < full * -JUDGED_SHARE {
             return Err(diagnosis(reading.current, phase));
         }
         held.map_err(|reason| self.without_current(reading, phase, reason))?;
-        let level = usize::from(self.ticks >= HALF);
-        if self.ticks % HALF >= SETTLE_TICKS
-            && self.ticks < 2 * HALF
-            && let Some(sums) = self.sums.get_mut(level)
-        {
-            sums.volts += self.hold.volts().0;
-            sums.current.alpha += reading.current.alpha;
-            sums.current.beta += reading.current.beta;
-        }
         self.ticks += 1;
-        if self.ticks == HALF {
-            self.judge_direction(phase)?;
-        }
-        if self.ticks == 2 * HALF {
-            self.take(reading)?;
-            if self.axis + 1 == AXES.len() {
-                return Ok(Outcome::Passed((self.mean()?, self.hold)));
+        if self.level == Level::Release {
+            if self.ticks == RELEASE_TICKS {
+                let axis = self.axis + 1;
+                let next = AXES.get(axis).copied().unwrap_or(Phase::A);
+                *self =
+                    Self { axis, found: self.found, hold: Hold::along(angle_of(next)), ..Self::default() };
             }
-        }
-        if self.ticks == 2 * HALF + RELEASE_TICKS {
-            let axis = self.axis + 1;
-            let next = AXES.get(axis).copied().unwrap_or(Phase::A);
-            *self = Self { axis, found: self.found, hold: Hold::along(angle_of(next)), ..Self::default() };
+        } else if let Some(settled) = self.settled(reading)? {
+            match self.level {
+                Level::Half => {
+                    self.judge_direction(settled, phase)?;
+                    self.half = settled;
+                    self.level = Level::Full;
+                }
+                _ => {
+                    self.take(settled, full)?;
+                    if self.axis + 1 == AXES.len() {
+                        return Ok(Outcome::Passed((self.mean()?, self.hold)));
+                    }
+                    self.level = Level::Release;
+                }
+            }
+            (self.ticks, self.before) = (0, None);
         }
         Ok(Outcome::Running(self.hold.voltage()))
     }
 
-    fn take(&mut self, reading: &Reading<'_>) -> Result<(), Refusal> {
-        let [half, full] = self.sums;
-        let (i1, i2) = (self.hold.along_axis(half.current).0, self.hold.along_axis(full.current).0);
-        let reached = i2 > 0.95 * MEAN_TICKS as f32 * reading.bench.settings.current.0;
+    /// The sums of a mean that agrees with the one before.
+    fn settled(&mut self, reading: &Reading<'_>) -> Result<Option<Sums>, Refusal> {
+        if self.ticks > LEVEL_TICKS {
+            return Err(Refusal::TimeOut);
+        }
+        if self.ticks <= RISE_TICKS {
+            return Ok(None);
+        }
+        self.sums.volts += self.hold.volts().0;
+        self.sums.current.alpha += reading.current.alpha;
+        self.sums.current.beta += reading.current.beta;
+        if !(self.ticks - RISE_TICKS).is_multiple_of(MEAN_TICKS) {
+            return Ok(None);
+        }
+        let sums = core::mem::take(&mut self.sums);
+        let agrees = |before: Sums| (sums.volts - before.volts).abs() <= SETTLED_SHARE * sums.volts.abs();
+        Ok(self.before.replace(sums).is_some_and(agrees).then_some(sums))
+    }
+
+    fn take(&mut self, settled: Sums, full: Ampere) -> Result<(), Refusal> {
+        let (i1, i2) = (self.hold.along_axis(self.half.current).0, self.hold.along_axis(settled.current).0);
+        let reached = i2 > 0.95 * MEAN_TICKS as f32 * full.0;
         if !reached || !(i2 > 1.5 * i1) {
             return Err(Refusal::TimeOut);
         }
         if let Some(found) = self.found.get_mut(self.axis) {
-            *found = (full.volts - half.volts) / (i2 - i1);
+            *found = (settled.volts - self.half.volts) / (i2 - i1);
         }
         Ok(())
     }
@@ -145,8 +182,8 @@ impl ResistanceStage {
     }
 
     /// By the mean at half current: a rotor that swings towards the field bends the current as well.
-    fn judge_direction(&self, phase: Phase) -> Result<(), Refusal> {
-        let [half, _] = self.sums;
+    /// By the mean at half current: a rotor that swings towards the field bends the current as well.
+    fn judge_direction(&self, half: Sums, phase: Phase) -> Result<(), Refusal> {
         let (along, across) = (self.hold.along_axis(half.current), self.hold.across_axis(half.current));
         if across.abs() <= along * GREATEST_BEND { Ok(()) } else { Err(diagnosis(half.current, phase)) }
     }
