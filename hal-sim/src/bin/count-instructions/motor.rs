@@ -1,0 +1,126 @@
+//! A motor to count instructions on, in single precision: just enough of one for a calibration to pass and for
+//! currents, speeds and noise to look real. What proves the current loop is the simulated hardware, not this.
+
+use scarab::hal::{AxisCommand, AxisSample};
+use scarab::motor::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale, Sine};
+use scarab::real::sin_cos;
+use scarab::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
+
+pub const CONFIGURATION: AxisConfiguration = AxisConfiguration {
+    sense: SenseScale::ODRIVE_3_6,
+    timing: BridgeTiming::ODRIVE_3_6,
+    dead_time: DeadTime::Compensated { band: Ampere(0.5) },
+    pole_pairs: PAIRS as u8,
+    flux: Weber(FLUX_VS),
+    counts_per_turn: COUNTS as u32,
+    index: true,
+    counter: Direction::Up,
+    flexion: Direction::Up,
+    bandwidth: Hertz(1000.0),
+    feedforward: true,
+    sine: Sine::Fast,
+    current_limit: Ampere(40.0),
+    overcurrent: Ampere(60.0),
+    bus: [Volt(10.0), Volt(58.0)],
+    greatest_speed: RadianPerSecond(900.0),
+};
+
+const PAIRS: f32 = 7.0;
+const COUNTS: f32 = 8192.0;
+/// After so many turns the 16-bit counter is where it was.
+const TURNS: f32 = 65_536.0 / COUNTS;
+const FLUX_VS: f32 = 2.9e-3;
+const RESISTANCE_OHM: f32 = 0.05;
+const INDUCTANCE_H: f32 = 25e-6;
+const INERTIA: f32 = 2e-4;
+const FRICTION_NM: f32 = 0.01;
+const STEPS: usize = 4;
+const STEP_S: f32 = 1.0 / 24_000.0 / STEPS as f32;
+const AMPERE_PER_CODE: f32 = 3.3 / 4096.0 / 40.0 / 0.0005;
+
+pub struct Motor {
+    current: [f32; 2],
+    /// Mechanical turns, `0..TURNS`.
+    turns: f32,
+    pub speed_rad_per_s: f32,
+    /// Turned by something stronger.
+    pub driven: bool,
+    pub bus: f32,
+    pending: AxisCommand,
+    seed: u32,
+}
+
+impl Motor {
+    pub const fn at_rest() -> Self {
+        Self {
+            current: [0.0; 2],
+            turns: 4.03,
+            speed_rad_per_s: 0.0,
+            driven: false,
+            bus: 48.0,
+            pending: AxisCommand::RELEASED,
+            seed: 1,
+        }
+    }
+
+    /// Codes of noise, -2..=2.
+    fn noise(&mut self) -> f32 {
+        self.seed ^= self.seed << 13;
+        self.seed ^= self.seed >> 17;
+        self.seed ^= self.seed << 5;
+        (self.seed % 5) as f32 - 2.0
+    }
+
+    pub fn sample(&mut self, index: bool) -> AxisSample {
+        let (sine, cosine) = sin_cos(self.turns * PAIRS * core::f32::consts::TAU);
+        let [d, q] = self.current;
+        let (alpha, beta) = (d * cosine - q * sine, d * sine + q * cosine);
+        let turned = 0.866_025_4 * beta;
+        let shunt_codes = [turned - 0.5 * alpha, -turned - 0.5 * alpha]
+            .map(|current| (2050.0 + current / AMPERE_PER_CODE + self.noise()) as u16);
+        let bus_code = (self.bus / (3.3 * 19.0 / 4096.0)) as u16;
+        let encoder_count = (self.turns * COUNTS) as u32 as u16;
+        AxisSample { shunt_codes, bus_code, encoder_count, index_count: index.then_some(encoder_count) }
+    }
+
+    /// One PWM period; `command` acts in the next one.
+    pub fn period(&mut self, command: AxisCommand) -> AxisSample {
+        let acting = core::mem::replace(&mut self.pending, command);
+        let before = self.turns;
+        for _ in 0..STEPS {
+            self.step(&acting);
+        }
+        // Place zero of any turn.
+        let index = before as u32 != self.turns as u32;
+        if self.turns >= TURNS {
+            self.turns -= TURNS;
+        } else if self.turns < 0.0 {
+            self.turns += TURNS;
+        }
+        self.sample(index)
+    }
+
+    fn step(&mut self, command: &AxisCommand) {
+        let electrical = self.speed_rad_per_s * PAIRS;
+        let [d, q] = self.current;
+        if command.enabled {
+            let [a, b, c] = command.duty.map(|duty| duty * self.bus);
+            let (alpha, beta) = ((2.0 * a - b - c) / 3.0, (b - c) * 0.577_350_26);
+            let (sine, cosine) = sin_cos(self.turns * PAIRS * core::f32::consts::TAU);
+            let (along, across) = (alpha * cosine + beta * sine, beta * cosine - alpha * sine);
+            let per_henry = STEP_S / INDUCTANCE_H;
+            self.current = [
+                d + per_henry * (along - RESISTANCE_OHM * d + electrical * INDUCTANCE_H * q),
+                q + per_henry * (across - RESISTANCE_OHM * q - electrical * (INDUCTANCE_H * d + FLUX_VS)),
+            ];
+        } else {
+            self.current = [0.0; 2];
+        }
+        if !self.driven {
+            let torque = 1.5 * PAIRS * FLUX_VS * q;
+            let friction = FRICTION_NM * (self.speed_rad_per_s * 20.0).clamp(-1.0, 1.0);
+            self.speed_rad_per_s += STEP_S / INERTIA * (torque - friction);
+        }
+        self.turns += STEP_S / core::f32::consts::TAU * self.speed_rad_per_s;
+    }
+}
