@@ -14,6 +14,7 @@
 //! | [`motor`] | field-oriented current control of one axis, 24 kHz, and its calibration |
 //! | [`safety`], [`servo`] | monitor and drive states; the 4 kHz tick |
 //! | [`leg`] | one leg: the activity machine, a control half and an identification half |
+//! | [`trace`] | what leaves the board: records, one line each |
 #![no_std]
 
 pub mod hal;
@@ -26,4 +27,5 @@ pub mod real;
 pub mod safety;
 pub mod servo;
 pub mod swarm;
+pub mod trace;
 pub mod units;

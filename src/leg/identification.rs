@@ -325,6 +325,12 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
         &self.upkeep
     }
 
+    /// Something was believed before measuring.
+    #[must_use]
+    pub fn has_prior(&self) -> bool {
+        self.prior.is_some()
+    }
+
     /// What the rows are made with.
     #[must_use]
     pub fn model(&self) -> &RowModel<f32, N, B> {

@@ -24,6 +24,7 @@ mod configuration;
 mod control;
 mod identification;
 mod model;
+mod results;
 mod stored;
 mod succession;
 mod upkeep;
@@ -33,8 +34,17 @@ pub use configuration::{LegConfiguration, LegError, ProvedMotion};
 pub use control::{Control, ControlOutput, ControlRequest, LoggedSample};
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
+pub use results::{FoundBase, FoundFit, FoundParameter};
 pub use stored::{RestoreError, StoredModel};
 pub use upkeep::{UPDATE_ROWS, Upkeep};
+
+// What crosses the leg's border: rooms that tell or keep it look no deeper.
+pub use crate::ident::{
+    Cause, Change, Estimate, Evidence, Plan, Reason, SearchState, Status, StribeckFit, Test, Verdict,
+};
+pub use crate::model::Parameter;
+pub use crate::motor::{AxisFault, Calibration, Phase, Refusal as CalibrationRefusal};
+pub use crate::safety::{DriveState, Fault, FaultCode, PowerRequest, RefusalReason};
 
 use crate::hal::Sample;
 

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use tokens::{Token, tokens};
 
 /// Each room and the rooms it may use beside itself and the open ones.
-const HOUSE: [(&str, &[&str]); 11] = [
+const HOUSE: [(&str, &[&str]); 12] = [
     ("units", &[]),
     ("real", &[]),
     ("hal", &[]),
@@ -24,6 +24,7 @@ const HOUSE: [(&str, &[&str]); 11] = [
     ("safety", &["hal"]),
     ("servo", &["hal", "model", "motion", "motor", "safety"]),
     ("leg", &["hal", "model", "motion", "swarm", "ident", "motor", "safety", "servo"]),
+    ("trace", &["hal", "leg"]),
 ];
 
 /// Rooms every other room may use.

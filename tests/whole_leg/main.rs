@@ -13,6 +13,7 @@ mod perturbations;
 mod scale;
 mod servo;
 mod stored;
+mod trace;
 
 use std::sync::OnceLock;
 

@@ -1,0 +1,145 @@
+//! What an identification found, as values to be told: the same numbers for every listener.
+//!
+//! A parameter's value is the best there is: its own where it was measured alone, the completed leg's where a prior says how
+//! a group or an unseen one is to be split, nothing otherwise (such a value would be made up). What is not estimated is zero
+//! in the model, and so here.
+
+use super::identification::Identification;
+use crate::ident::{Estimate, Record, Status, status};
+use crate::model::{Parameter, Standing};
+
+/// One of a joint's fourteen parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundParameter {
+    /// SI; unknown where neither torque nor a prior tells.
+    pub value: Option<f32>,
+    /// Standard deviation; unknown unless it was measured alone.
+    pub sigma: Option<f32>,
+    /// Where the value comes from.
+    pub status: Status,
+}
+
+/// One base parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundBase {
+    /// Joint and parameter in whose column it stands, joint from 0.
+    pub carrier: (usize, Parameter),
+    /// Others are regrouped into it.
+    pub grouped: bool,
+    /// It was held at zero, because the data do not tell it.
+    pub dropped: bool,
+    /// Of the result; unknown where the data do not determine it.
+    pub value: Option<f32>,
+    /// Standard deviation.
+    pub sigma: Option<f32>,
+    /// Of the closed form.
+    pub least_squares: f32,
+}
+
+/// How well one joint's torque on one motion is explained.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundFit {
+    /// Filtered rows in which the joint moved.
+    pub rows: u32,
+    /// Root mean square of measured minus predicted, N m.
+    pub rms_nm: Option<f32>,
+    /// Mean of the absolute torque, N m.
+    pub mean_absolute_nm: f32,
+    /// Root mean square torque, N m.
+    pub torque_rms_nm: f32,
+    /// Root mean square speed, rad/s.
+    pub speed_rms: f32,
+    /// Share of the rows that lost more than half of their weight.
+    pub disturbed_share: f32,
+    /// Longest stretch of them, s.
+    pub disturbed_longest_s: f32,
+    /// Wild samples that were replaced.
+    pub replaced: u32,
+}
+
+impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
+    Identification<N, B, TAPS, PENDING>
+{
+    /// The base parameters that are judged; `None` before there is a solver.
+    #[must_use]
+    pub fn estimate(&self) -> Option<Estimate<f32, B>> {
+        Some(self.solver()?.estimate())
+    }
+
+    /// One parameter of a joint (from 0), given [`Self::estimate`].
+    #[must_use]
+    pub fn parameter(
+        &self,
+        estimate: &Estimate<f32, B>,
+        joint: usize,
+        parameter: Parameter,
+    ) -> Option<FoundParameter> {
+        let solver = self.solver()?;
+        let record = solver.record();
+        let model = self.model();
+        let status = status(model, record, estimate, joint, parameter);
+        let alone = match model.base.standing(joint, parameter) {
+            Standing::Alone(base) if !record.selection.dropped.get(base).copied().unwrap_or(true) => {
+                Some(base)
+            }
+            _ => None,
+        };
+        let base = alone.filter(|&base| estimate.determined.get(base).copied().unwrap_or(false));
+        let is_zero = model.base.standing(joint, parameter) == Standing::Off
+            || record.selection.drops(model, joint, parameter);
+        let value = match base {
+            _ if is_zero => Some(0.0),
+            Some(base) => estimate.values.get(base).copied(),
+            None => solver
+                .parameters()
+                .filter(|_| self.has_prior())
+                .and_then(|leg| leg.get(joint)?.get(parameter.index()).copied()),
+        };
+        Some(FoundParameter { value, sigma: base.and_then(|base| estimate.sigma(base)), status })
+    }
+
+    /// One base parameter, given [`Self::estimate`]; `None` beyond the last.
+    #[must_use]
+    pub fn base_parameter(&self, estimate: &Estimate<f32, B>, base: usize) -> Option<FoundBase> {
+        let solver = self.solver()?;
+        let model = self.model();
+        let carrier = model.base.independent(base)?;
+        let terms = model.base.terms(base).as_flattened().iter().filter(|factor| **factor != 0.0).count();
+        let determined = estimate.determined.get(base).copied().unwrap_or(false);
+        Some(FoundBase {
+            carrier,
+            grouped: terms > 1,
+            dropped: solver.record().selection.dropped.get(base).copied().unwrap_or(false),
+            value: estimate.values.get(base).copied().filter(|_| determined),
+            sigma: estimate.sigma(base),
+            least_squares: solver.least_squares().values.get(base).copied().unwrap_or(0.0),
+        })
+    }
+
+    /// One joint (from 0) on one motion: 0 the one identified from, then those that were predicted. `None` where it was
+    /// not recorded.
+    #[must_use]
+    pub fn fit(&self, estimate: &Estimate<f32, B>, motion: usize, joint: usize) -> Option<FoundFit> {
+        let record = self.motion(motion)?;
+        let size = record.torque.get(joint)?;
+        Some(FoundFit {
+            rows: *record.rows.get(joint)?,
+            rms_nm: record.torque_error(joint, &estimate.values),
+            mean_absolute_nm: size.mean_absolute,
+            torque_rms_nm: size.root_mean_square,
+            speed_rms: size.speed,
+            disturbed_share: *record.outliers.disturbed_share.get(joint)?,
+            disturbed_longest_s: *record.outliers.longest_s.get(joint)?,
+            replaced: *record.outliers.replaced.get(joint)?,
+        })
+    }
+
+    /// The record of a motion, counted as in [`Self::fit`].
+    #[must_use]
+    pub fn motion(&self, motion: usize) -> Option<&Record<f32, N, B>> {
+        match motion.checked_sub(1) {
+            None => Some(self.solver()?.record()),
+            Some(unused) => self.validation().get(unused)?.as_ref(),
+        }
+    }
+}

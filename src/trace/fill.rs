@@ -1,0 +1,81 @@
+//! Writes a record's line: the format's placeholders in order, each with its value.
+//!
+//! The format is `defmt`'s, of which three things are used: `{=type}`, `{=type:#x}` and text. On the device the same
+//! string is compiled into the image and never read; here it is read at run time, so that both write one line.
+
+use core::fmt::{Result, Write};
+
+/// Something that stands behind a key.
+pub trait Value {
+    /// As it is read back.
+    fn put(&self, out: &mut dyn Write) -> Result;
+    /// The same in base 16, with `0x`; what is no whole number as ever.
+    fn put_hex(&self, out: &mut dyn Write) -> Result {
+        self.put(out)
+    }
+}
+
+macro_rules! whole {
+    ($($type:ty),*) => {$(
+        impl Value for $type {
+            fn put(&self, out: &mut dyn Write) -> Result {
+                write!(out, "{self}")
+            }
+            fn put_hex(&self, out: &mut dyn Write) -> Result {
+                write!(out, "{self:#x}")
+            }
+        }
+    )*};
+}
+whole!(u8, u16, u32, u64, i32);
+
+impl Value for f32 {
+    fn put(&self, out: &mut dyn Write) -> Result {
+        write!(out, "{self:?}")
+    }
+}
+
+impl Value for bool {
+    fn put(&self, out: &mut dyn Write) -> Result {
+        write!(out, "{self}")
+    }
+}
+
+impl Value for &str {
+    fn put(&self, out: &mut dyn Write) -> Result {
+        out.write_str(self)
+    }
+}
+
+impl<V: Value, const N: usize> Value for [V; N] {
+    fn put(&self, out: &mut dyn Write) -> Result {
+        out.write_str("[")?;
+        for (place, value) in self.iter().enumerate() {
+            if place > 0 {
+                out.write_str(", ")?;
+            }
+            value.put(out)?;
+        }
+        out.write_str("]")
+    }
+}
+
+/// Writes `format` with `values` in the place of its placeholders; those without a value stay empty.
+pub(super) fn fill(format: &str, values: &[&dyn Value], out: &mut dyn Write) -> Result {
+    let mut values = values.iter();
+    for (place, piece) in format.split('{').enumerate() {
+        let text = match piece.split_once('}') {
+            Some((hint, text)) if place > 0 => {
+                match values.next() {
+                    Some(value) if hint.ends_with(":#x") => value.put_hex(out)?,
+                    Some(value) => value.put(out)?,
+                    None => {}
+                }
+                text
+            }
+            _ => piece,
+        };
+        out.write_str(text)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,276 @@
+//! The result of an identification as a succession of records.
+//!
+//! One record at a time, so that whoever tells it can wait between two until the listener has caught up; nothing is copied but
+//! the tests of the verdict, eight at a time. The order is fixed: solver, parameters, base parameters, covariance, Stribeck
+//! friction, motions with their fits, findings, reasons, verdict, end.
+//!
+//! Cost: one judgement for every eight findings, a copy of the covariance for each record.
+//! Limits: the identification must not be begun anew meanwhile; then the report is to be dropped.
+
+use super::{Record, words};
+use crate::leg::{Estimate, Evidence, Identification, Parameter, Plan, SearchState, VALIDATION_MOTIONS};
+
+/// Parameters of a joint.
+const PARAMETERS: usize = Parameter::ALL.len();
+/// Findings that are kept at a time.
+const CHUNK: usize = 8;
+
+/// Where the report stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Solver,
+    Parameters,
+    Base,
+    Covariance,
+    Stribeck,
+    Motions,
+    Findings,
+    Reasons,
+    Verdict,
+    End,
+    Told,
+}
+
+/// A report that is being told; see the module.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    part: Part,
+    index: usize,
+    records: u32,
+    findings: [Option<Evidence<f32>>; CHUNK],
+}
+
+impl Default for Report {
+    fn default() -> Self {
+        Self { part: Part::Solver, index: 0, records: 0, findings: [None; CHUNK] }
+    }
+}
+
+impl Report {
+    /// The next record; `None` once all is told, or where nothing was identified.
+    pub fn advance<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+        &mut self,
+        identification: &Identification<N, B, TAPS, PENDING>,
+    ) -> Option<Record<N>> {
+        let estimate = identification.estimate()?;
+        while self.part != Part::Told {
+            if let Some(record) = self.record(identification, &estimate) {
+                self.index += 1;
+                if let Some(record) = record {
+                    self.records += 1;
+                    return Some(record);
+                }
+            } else {
+                self.index = 0;
+                self.part = match self.part {
+                    Part::Solver => Part::Parameters,
+                    Part::Parameters => Part::Base,
+                    Part::Base => Part::Covariance,
+                    Part::Covariance => Part::Stribeck,
+                    Part::Stribeck => Part::Motions,
+                    Part::Motions => Part::Findings,
+                    Part::Findings => Part::Reasons,
+                    Part::Reasons => Part::Verdict,
+                    Part::Verdict => Part::End,
+                    Part::End | Part::Told => Part::Told,
+                };
+            }
+        }
+        None
+    }
+
+    /// The record at `index` of this part: `None` where the part ends, `Some(None)` where there is none at this place.
+    fn record<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+        &mut self,
+        identification: &Identification<N, B, TAPS, PENDING>,
+        estimate: &Estimate<f32, B>,
+    ) -> Option<Option<Record<N>>> {
+        let index = self.index;
+        match self.part {
+            Part::Solver => (index == 0).then(|| solver(identification)),
+            Part::Parameters => (index < N * PARAMETERS).then(|| parameter(identification, estimate, index)),
+            Part::Base => base(identification, estimate, index).map(Some),
+            Part::Covariance => (index < B * B).then(|| covariance(estimate, index)),
+            Part::Stribeck => (index < N).then(|| stribeck(identification, estimate, index)),
+            Part::Motions => {
+                (index < (VALIDATION_MOTIONS + 1) * (N + 1)).then(|| motion(identification, estimate, index))
+            }
+            Part::Findings => self.finding(identification).map(Some),
+            Part::Reasons => {
+                let name = identification.verdict()?.reasons().nth(index)?.name();
+                Some(Some(Record::Reason { reason: name }))
+            }
+            Part::Verdict => (index == 0).then(|| {
+                let verdict = identification.verdict()?;
+                let reasons = verdict.reasons().count() as u8;
+                Some(Record::Verdict { verdict: judged(verdict.is_accepted()), reasons })
+            }),
+            Part::End => (index == 0).then_some(Some(Record::End { records: self.records })),
+            Part::Told => None,
+        }
+    }
+
+    fn finding<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+        &mut self,
+        identification: &Identification<N, B, TAPS, PENDING>,
+    ) -> Option<Record<N>> {
+        let place = self.index % CHUNK;
+        if place == 0 {
+            self.findings = [None; CHUNK];
+            let (first, slots, mut seen) = (self.index, &mut self.findings, 0_usize);
+            identification.judge_with(&mut |evidence| {
+                if let Some(slot) = seen.checked_sub(first).and_then(|place| slots.get_mut(place)) {
+                    *slot = Some(*evidence);
+                }
+                seen += 1;
+            });
+        }
+        let evidence = (*self.findings.get(place)?)?;
+        Some(Record::Finding {
+            reason: evidence.reason.name(),
+            test: evidence.test.name(),
+            joint: from_one(evidence.joint),
+            motion: from_one(evidence.motion),
+            value: evidence.value,
+            limit: evidence.limit,
+            passed: evidence.passed,
+        })
+    }
+}
+
+/// The word for a verdict.
+#[must_use]
+pub const fn judged(accepted: bool) -> &'static str {
+    if accepted { "accepted" } else { "refused" }
+}
+
+fn from_one(index: Option<usize>) -> u8 {
+    index.map_or(0, |index| index.saturating_add(1) as u8)
+}
+
+fn known(value: Option<f32>) -> f32 {
+    value.unwrap_or(f32::NAN)
+}
+
+fn solver<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+    identification: &Identification<N, B, TAPS, PENDING>,
+) -> Option<Record<N>> {
+    let solver = identification.solver()?;
+    let search = solver.search();
+    Some(Record::Solver {
+        plan: match solver.plan() {
+            Plan::OneTime => "one-time",
+            Plan::Sequential => "sequential",
+        },
+        swarm_seed: search.seed(),
+        state: match search.state() {
+            SearchState::Running => "running",
+            SearchState::Done => "done",
+            SearchState::Failed(_) => "failed",
+        },
+        iterations: search.iterations(),
+        evaluations: search.evaluations(),
+        steps: solver.completion().steps(),
+        rank: solver.least_squares().rank() as u8,
+        base: identification.model().base.rank() as u8,
+        dropped: solver.record().selection.dropped_count() as u8,
+        condition: known(solver.condition()),
+        consistency_chi2: known(solver.consistency().map(|consistency| consistency.excess)),
+    })
+}
+
+fn parameter<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+    identification: &Identification<N, B, TAPS, PENDING>,
+    estimate: &Estimate<f32, B>,
+    index: usize,
+) -> Option<Record<N>> {
+    let joint = index / PARAMETERS;
+    let parameter = *Parameter::ALL.get(index % PARAMETERS)?;
+    let found = identification.parameter(estimate, joint, parameter)?;
+    Some(Record::Parameter {
+        joint: from_one(Some(joint)),
+        symbol: parameter.symbol(),
+        value: known(found.value),
+        unit: words::unit(parameter),
+        sigma: known(found.sigma),
+        status: found.status.name(),
+    })
+}
+
+fn base<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+    identification: &Identification<N, B, TAPS, PENDING>,
+    estimate: &Estimate<f32, B>,
+    index: usize,
+) -> Option<Record<N>> {
+    let found = identification.base_parameter(estimate, index)?;
+    let (joint, parameter) = found.carrier;
+    Some(Record::Base {
+        index: index as u8,
+        joint: from_one(Some(joint)),
+        symbol: parameter.symbol(),
+        grouped: found.grouped,
+        dropped: found.dropped,
+        value: known(found.value),
+        unit: words::unit(parameter),
+        sigma: known(found.sigma),
+        least_squares: found.least_squares,
+    })
+}
+
+fn covariance<const N: usize, const B: usize>(
+    estimate: &Estimate<f32, B>,
+    index: usize,
+) -> Option<Record<N>> {
+    let (row, column) = (index / B, index % B);
+    let both = *estimate.determined.get(row)? && *estimate.determined.get(column)?;
+    let value = *estimate.covariance.get(row)?.get(column)?;
+    (both && column <= row).then_some(Record::Covariance { row: row as u8, column: column as u8, value })
+}
+
+fn stribeck<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+    identification: &Identification<N, B, TAPS, PENDING>,
+    estimate: &Estimate<f32, B>,
+    joint: usize,
+) -> Option<Record<N>> {
+    let fit = identification.solver()?.record().stribeck.get(joint)?.as_ref()?;
+    Some(Record::Stribeck {
+        joint: from_one(Some(joint)),
+        surplus_nm: fit.surplus(&estimate.values),
+        surplus_sigma_nm: fit.sigma,
+        speed_rad_s: fit.speed,
+        speed_sigma_rad_s: fit.speed_sigma,
+        gain_chi2: fit.gain,
+    })
+}
+
+/// Of each motion its own record, then one for each joint.
+fn motion<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+    identification: &Identification<N, B, TAPS, PENDING>,
+    estimate: &Estimate<f32, B>,
+    index: usize,
+) -> Option<Record<N>> {
+    let (motion, place) = (index / (N + 1), index % (N + 1));
+    let Some(joint) = place.checked_sub(1) else {
+        let record = identification.motion(motion)?;
+        return Some(Record::Motion {
+            motion: motion as u8,
+            samples: record.outliers.samples,
+            rejected: record.rejected,
+            longest_common_s: record.outliers.longest_common_s,
+            row_information: record.row_information,
+        });
+    };
+    let fit = identification.fit(estimate, motion, joint)?;
+    Some(Record::Fit {
+        motion: motion as u8,
+        joint: from_one(Some(joint)),
+        rows: fit.rows,
+        rms_nm: known(fit.rms_nm),
+        mean_abs_nm: fit.mean_absolute_nm,
+        torque_rms_nm: fit.torque_rms_nm,
+        speed_rms_rad_s: fit.speed_rms,
+        disturbed_share: fit.disturbed_share,
+        disturbed_longest_s: fit.disturbed_longest_s,
+        replaced: fit.replaced,
+    })
+}

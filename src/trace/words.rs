@@ -1,0 +1,188 @@
+//! The words of closed lists: one for each state, activity, fault and refusal, the same for ever.
+//!
+//! Every match is without a rest: who adds a state gives it a word.
+
+use crate::leg::{
+    Activity, AxisFault, CalibrationRefusal, Cause, DriveState, FaultCode, IdentifyPhase, Parameter, Phase,
+    RefusalReason, Segment, Step,
+};
+
+/// Where the drive stands.
+#[must_use]
+pub const fn drive(state: DriveState) -> &'static str {
+    match state {
+        DriveState::NotReadyToSwitchOn => "not_ready",
+        DriveState::SwitchOnDisabled => "switch_on_disabled",
+        DriveState::ReadyToSwitchOn => "ready_to_switch_on",
+        DriveState::SwitchedOn => "switched_on",
+        DriveState::OperationEnabled => "operation_enabled",
+        DriveState::QuickStopActive { .. } => "quick_stop_active",
+        DriveState::FaultReactionActive { .. } => "fault_reaction_active",
+        DriveState::Fault { .. } => "fault",
+    }
+}
+
+/// Activity, its phase (`-` for none), and the motion of the validation from 1 (0 for none).
+#[must_use]
+pub const fn activity(activity: Activity) -> (&'static str, &'static str, u8) {
+    match activity {
+        Activity::Idle => ("idle", "-", 0),
+        Activity::Identify(phase) => match phase {
+            IdentifyPhase::Approach => ("identify", "approach", 0),
+            IdentifyPhase::Excite => ("identify", "excite", 0),
+            IdentifyPhase::Settle => ("identify", "settle", 0),
+            IdentifyPhase::Solve => ("identify", "solve", 0),
+            IdentifyPhase::Validate { motion, step: Step::Approach } => {
+                ("identify", "validate_approach", motion.saturating_add(1))
+            }
+            IdentifyPhase::Validate { motion, step: Step::Run } => {
+                ("identify", "validate", motion.saturating_add(1))
+            }
+            IdentifyPhase::Judge => ("identify", "judge", 0),
+        },
+        Activity::Track(Step::Approach) => ("track", "approach", 0),
+        Activity::Track(Step::Run) => ("track", "run", 0),
+    }
+}
+
+/// What a logged sample is for, and the motion of the validation from 1.
+#[must_use]
+pub const fn segment(segment: Option<Segment>) -> (&'static str, u8) {
+    match segment {
+        None => ("-", 0),
+        Some(Segment::Training) => ("training", 0),
+        Some(Segment::Validation(motion)) => ("validation", motion.saturating_add(1)),
+        Some(Segment::Tracking) => ("tracking", 0),
+    }
+}
+
+/// A fault of the leg.
+#[must_use]
+pub const fn fault(code: FaultCode) -> &'static str {
+    match code {
+        FaultCode::EncoderStep => "encoder_step",
+        FaultCode::Overspeed => "overspeed",
+        FaultCode::PositionLimit => "position_limit",
+        FaultCode::NotFinite => "not_finite",
+    }
+}
+
+/// Why the drive was not enabled.
+#[must_use]
+pub const fn refusal(reason: RefusalReason) -> &'static str {
+    match reason {
+        RefusalReason::OutOfRange => "out_of_range",
+        RefusalReason::Moving => "moving",
+        RefusalReason::Encoder => "encoder",
+    }
+}
+
+/// Why an axis released its bridge by itself.
+#[must_use]
+pub const fn axis_fault(fault: AxisFault) -> &'static str {
+    match fault {
+        AxisFault::CurrentSense => "current_sense",
+        AxisFault::Overcurrent => "overcurrent",
+        AxisFault::BusVoltage => "bus_voltage",
+        AxisFault::Encoder => "encoder",
+        AxisFault::NotANumber => "not_a_number",
+    }
+}
+
+/// What changed about a leg, and the link of a load from 1.
+#[must_use]
+pub const fn cause(cause: Cause) -> (&'static str, u8) {
+    match cause {
+        Cause::Payload { link } => ("payload", (link as u8).saturating_add(1)),
+        Cause::Friction => ("friction", 0),
+        Cause::Nothing => ("nothing", 0),
+        Cause::Unexplained => ("unexplained", 0),
+    }
+}
+
+/// A parameter's unit as one word.
+#[must_use]
+pub const fn unit(parameter: Parameter) -> &'static str {
+    match parameter {
+        Parameter::XX
+        | Parameter::XY
+        | Parameter::XZ
+        | Parameter::YY
+        | Parameter::YZ
+        | Parameter::ZZ
+        | Parameter::IA => "kg_m2",
+        Parameter::HX | Parameter::HY | Parameter::HZ => "kg_m",
+        Parameter::M => "kg",
+        Parameter::FC | Parameter::OFF => "N_m",
+        Parameter::FV => "N_m_s/rad",
+    }
+}
+
+/// Why there is no calibration, and the number that goes with it: a phase from 1, pole pairs or counts that would fit.
+#[must_use]
+pub const fn calibration(refusal: CalibrationRefusal) -> (&'static str, u32) {
+    use CalibrationRefusal as Why;
+    match refusal {
+        Why::Overcurrent => ("overcurrent", 0),
+        Why::CurrentSense => ("current_sense", 0),
+        Why::BusVoltage => ("bus_voltage", 0),
+        Why::ShuntZero(phase) => ("shunt_zero", number(phase)),
+        Why::Turning => ("turning", 0),
+        Why::PhaseOpen(phase) => ("phase_open", number(phase)),
+        Why::ShuntInverted(phase) => ("shunt_inverted", number(phase)),
+        Why::ShuntsInverted => ("shunts_inverted", 0),
+        Why::ShuntsSwapped => ("shunts_swapped", 0),
+        Why::CurrentDirection => ("current_direction", 0),
+        Why::PhaseImbalance => ("phase_imbalance", 0),
+        Why::MotorConstants => ("motor_constants", 0),
+        Why::OtherMotor => ("other_motor", 0),
+        Why::TimeOut => ("time_out", 0),
+        Why::NoCounts => ("no_counts", 0),
+        Why::Direction => ("direction", 0),
+        Why::PolePairs(pairs) => ("pole_pairs", pairs as u32),
+        Why::CountsPerTurn(counts) => ("counts_per_turn", counts),
+        Why::Slipped => ("slipped", 0),
+        Why::NoIndex => ("no_index", 0),
+        Why::IndexMoved => ("index_moved", 0),
+        Why::StoredOffset => ("stored_offset", 0),
+    }
+}
+
+const fn number(phase: Phase) -> u32 {
+    match phase {
+        Phase::A => 1,
+        Phase::B => 2,
+        Phase::C => 3,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_is_the_report_s_with_its_spaces_closed() {
+        for parameter in Parameter::ALL {
+            let spaced = parameter.unit().bytes().map(|byte| if byte == b' ' { b'_' } else { byte });
+            assert!(spaced.eq(unit(parameter).bytes()), "{parameter:?}");
+        }
+    }
+
+    #[test]
+    fn every_word_can_stand_behind_a_key() {
+        let words = [
+            drive(DriveState::NotReadyToSwitchOn),
+            activity(Activity::Idle).1,
+            activity(Activity::Identify(IdentifyPhase::Validate { motion: 2, step: Step::Run })).1,
+            segment(Some(Segment::Validation(0))).0,
+            fault(FaultCode::Overspeed),
+            refusal(RefusalReason::Moving),
+            axis_fault(AxisFault::NotANumber),
+            cause(Cause::Payload { link: 1 }).0,
+            calibration(CalibrationRefusal::CountsPerTurn(4000)).0,
+        ];
+        for word in words {
+            assert!(!word.is_empty() && !word.contains([' ', '[']), "{word}");
+        }
+    }
+}
