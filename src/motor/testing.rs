@@ -20,7 +20,7 @@ pub(super) const CONFIGURATION: AxisConfiguration = AxisConfiguration {
     flexion: Direction::Up,
     bandwidth: Hertz(1000.0),
     feedforward: true,
-    sine: Sine::Fast,
+    sine: Sine::Exact,
     current_limit: Ampere(40.0),
     overcurrent: Ampere(55.0),
     bus: [Volt(20.0), Volt(58.0)],

@@ -18,7 +18,7 @@ pub const CONFIGURATION: AxisConfiguration = AxisConfiguration {
     flexion: Direction::Up,
     bandwidth: Hertz(1000.0),
     feedforward: true,
-    sine: Sine::Fast,
+    sine: Sine::Exact,
     current_limit: Ampere(40.0),
     overcurrent: Ampere(60.0),
     bus: [Volt(10.0), Volt(58.0)],
