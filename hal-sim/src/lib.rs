@@ -13,7 +13,8 @@
 //! | [`friction`] | Coulomb that sticks, viscous, Stribeck, offset; which joint sticks and which slides |
 //! | [`leg`] | mechanism and friction moved through time |
 //! | [`floor`] | contact under the foot |
-//! | [`drive`], [`gear`], [`sensors`], [`wearer`] | current with lag; ratio; encoder and current sensor; pushes |
+//! | [`drive`] | ideal: a current with lag; complete: motor, bridge, shunts, counter, supply |
+//! | [`gear`], [`sensors`], [`wearer`] | ratio; encoder and current sensor; pushes |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 //!
 //! The plant needs neither `std` nor a heap; the host tool and its crates are behind the feature `tool`.

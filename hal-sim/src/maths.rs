@@ -27,11 +27,15 @@ pub(crate) fn sqrt(value: f64) -> f64 {
     libm::sqrt(value)
 }
 
+/// Largest whole number that is not above; saturates at the ends of `i64`, 0 for NaN.
+pub(crate) fn floor(value: f64) -> i64 {
+    let truncated = value as i64;
+    if (truncated as f64) > value { truncated.saturating_sub(1) } else { truncated }
+}
+
 /// Nearest whole number, halves upward; saturates at the ends of `i64`, 0 for NaN.
 pub(crate) fn nearest(value: f64) -> i64 {
-    let shifted = value + 0.5;
-    let truncated = shifted as i64;
-    if (truncated as f64) > shifted { truncated.saturating_sub(1) } else { truncated }
+    floor(value + 0.5)
 }
 
 #[cfg(test)]

@@ -6,7 +6,10 @@
 //!
 //! The exchange, once per servo tick of 250 us: read [`LegDrives::sample`] (sensors at this instant), hand
 //! over [`LegDrives::command`] (acts from this instant), [`World::advance`] to the next; or [`World::tick`],
-//! which does the last two and reads. All public angles and torques are anatomical.
+//! which does the last two and reads. With complete drives there is one exchange per PWM period instead,
+//! [`World::period`]. All public angles and torques are anatomical.
+
+pub mod periods;
 
 use crate::conventions::{Anatomy, links_at_reference};
 use crate::description::{LegDescription, PushDescription};
@@ -15,9 +18,10 @@ use crate::floor::Floor;
 use crate::leg::{Leg, LegState};
 use crate::sensors::{CurrentSensor, Encoder};
 use crate::wearer::Wearer;
+use periods::{Electric, PERIODS_PER_TICK};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use scarab::hal::{DriveCommand, JointSample, LegDrives, Sample};
+use scarab::hal::{AxisCommand, DriveCommand, JointSample, LegDrives, Sample};
 use scarab::units::Ampere;
 
 /// Servo rate, Hz.
@@ -53,6 +57,8 @@ pub struct World<const N: usize> {
     state: LegState<N>,
     anatomy: [Anatomy; N],
     drives: [Drive; N],
+    /// Instead of the ideal drives.
+    electric: Option<Electric<N>>,
     encoders: [Encoder; N],
     current_sensors: [CurrentSensor; N],
     /// Sense of motors and encoders in the anatomical one, 1 or -1.
@@ -82,6 +88,7 @@ impl<const N: usize> World<N> {
             state: LegState { angles: joints.map(|joint| joint.zero_offset), rates: [0.0; N] },
             anatomy: joints.map(|joint| Anatomy::of(&joint)),
             drives: joints.map(|joint| Drive::new(&joint.drive, TICK_S)),
+            electric: None,
             encoders: joints.map(|joint| Encoder::new(&joint.encoder)),
             current_sensors: joints.map(|joint| CurrentSensor::new(&joint.current_sensor)),
             mounting: if description.mirrored { -1.0 } else { 1.0 },
@@ -104,6 +111,9 @@ impl<const N: usize> World<N> {
             angles: core::array::from_fn(|joint| anatomy[joint].to_joint_angle(position[joint])),
             rates: [0.0; N],
         };
+        if let Some(electric) = &mut self.electric {
+            electric.place(&position.map(|angle| self.mounting * angle));
+        }
         self.read_sensors();
     }
 
@@ -167,8 +177,14 @@ impl<const N: usize> World<N> {
         self.newest
     }
 
-    /// To the next servo tick.
+    /// To the next servo tick; complete drives coast.
     pub fn advance(&mut self) {
+        if self.electric.is_some() {
+            for _ in 0..PERIODS_PER_TICK {
+                self.period(&[AxisCommand::RELEASED; N], 0.0);
+            }
+            return self.read_sensors();
+        }
         let pushed: [f64; N] = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
         let stood: [f64; N] = match &mut self.floor {
             Some(floor) => floor.torque(self.leg.mechanism(), &self.state, self.tick as f64 * TICK_S),
@@ -192,12 +208,16 @@ impl<const N: usize> World<N> {
         core::array::from_fn(|joint| self.anatomy[joint].flip(motor[joint] + pushed[joint]))
     }
 
-    fn read_sensors(&mut self) {
+    fn begin_reading(&mut self) {
         if self.tick.is_multiple_of(TICKS_PER_LOGGED) {
             for sensor in &mut self.current_sensors {
                 sensor.begin_logged(&mut self.sensor_faults);
             }
         }
+    }
+
+    fn read_sensors(&mut self) {
+        self.begin_reading();
         for joint in 0..N {
             let angle = self.anatomy[joint].to_anatomical_angle(self.state.angles[joint]);
             let current =
@@ -224,10 +244,14 @@ impl<const N: usize> World<N> {
         }
     }
 
-    /// Torque of the motors at the joints now, N m, without noise; what [`Truth`] holds, at no cost.
+    /// Torque of the motors at the joints now, N m, without noise; what [`Truth`] holds, at no cost. Of complete drives the
+    /// mean over the last servo tick.
     #[must_use]
     pub fn motor_torque(&self) -> [f64; N] {
-        core::array::from_fn(|joint| self.mounting * self.drives[joint].torque())
+        core::array::from_fn(|joint| {
+            let ideal = || self.drives[joint].torque();
+            self.mounting * self.electric.as_ref().map_or_else(ideal, |electric| electric.torque()[joint])
+        })
     }
 
     /// Joint angles now, rad, anatomical; what [`Truth`] holds, at no cost.

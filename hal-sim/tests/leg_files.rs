@@ -17,6 +17,13 @@ dh = { alpha = 0.0, a = 0.0, d = 0.0 }
 
 const TRUTH: &str = "truth = { mass = 2.0, com = [0.2, 0.0, 0.0], inertia_com = [0.01, 0.0, 0.0, 0.05, 0.0, 0.05], coulomb = 3.0 }";
 
+const MOTOR: &str = "[joint.motor]
+pole_pairs = 7
+resistance_ohm = 0.039
+inductance_d_uh = 15.0
+inductance_q_uh = 17.0
+";
+
 #[test]
 fn every_shipped_leg_loads_under_its_name_and_survives_a_round_trip() {
     for (name, _) in SHIPPED_LEGS {
@@ -30,6 +37,21 @@ fn every_shipped_leg_loads_under_its_name_and_survives_a_round_trip() {
 #[test]
 fn the_default_leg_as_shipped_is_the_derived_one() {
     assert_eq!(LegFile::load(DEFAULT_LEG), Ok(x2::leg_file(x2::DEFAULT_WEARER_KG)));
+}
+
+#[test]
+fn a_complete_drive_makes_the_torque_of_the_ideal_one_per_ampere() {
+    let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+    let drives = leg.complete_description::<2>().expect("both joints have motors");
+    for (joint, axis) in leg.joints.iter().zip(drives.axes) {
+        let torque = 1.5 * f64::from(axis.motor.pole_pairs) * axis.motor.flux * axis.ratio;
+        assert!((torque / joint.torque_per_ampere - 1.0).abs() < 1e-12, "{torque}");
+        // A D5065 with 270 rpm/V has 8.27/270 N m/A; the leg's round figure is 2 % below.
+        assert!((torque / axis.ratio / (8.27 / 270.0) - 1.0).abs() < 0.03);
+    }
+    let bare = LegFile::parse(&format!("{MINIMAL}{TRUTH}"), "small.toml").expect("without a motor");
+    let fault = bare.complete_description::<1>().expect_err("nothing to simulate").to_string();
+    assert_eq!(fault, "small: joint `hip` has no `[joint.motor]`: its complete drive cannot be simulated");
 }
 
 #[test]
@@ -57,6 +79,10 @@ fn every_fault_is_told_with_file_line_and_reason() {
         joint(&format!(
             "direction = 1\ntruth = {{ mass = {mass}, com = [0.1, 0.0, 0.0], inertia_com = {inertia} }}"
         ))
+    };
+    let motor = |key: &str, value: &str| {
+        let (name, _) = key.split_once(" = ").expect("a key with its value");
+        joint(&MOTOR.replace(key, &format!("{name} = {value}")))
     };
     let body = "[0.01, 0.0, 0.0, 0.05, 0.0, 0.05]";
     let above = |line: &str| MINIMAL.replace("[[joint]]", &format!("{line}\n[[joint]]"));
@@ -98,7 +124,23 @@ fn every_fault_is_told_with_file_line_and_reason() {
             "joint `hip`: `name` is the name of an earlier joint",
         ),
         (joint("colour = \"red\""), Some(7), "unknown field `colour`"),
-        (joint("[joint.motor]\npoles = 7"), Some(7), "`[joint.motor]` is reserved"),
+        (joint("[joint.motor]\npoles = 7"), Some(8), "unknown field `poles`"),
+        (motor("resistance_ohm = 0.039", "39.0"), Some(9), "`motor.resistance_ohm` is 39, outside 0.001..10"),
+        (motor("inductance_d_uh = 15.0", "1.5"), Some(10), "its time constant is below 0.05 ms"),
+        (motor("pole_pairs = 7", "0"), Some(8), "`motor.pole_pairs` is 0, outside 1..64"),
+        (
+            joint(&format!("encoder = {{ side = \"joint\", counts = 8192, ratio = 1.0 }}\n{MOTOR}")),
+            Some(8),
+            "joint `hip`: `motor` needs an encoder at the motor",
+        ),
+        (joint(&format!("torque_per_ampere = 0.01\n{MOTOR}")), Some(8), "has a flux of 0.000019 V s"),
+        (
+            above(
+                "supply = { voltage_v = 480.0, resistance_ohm = 0.05, capacitance_uf = 1500.0, brake_ohm = 2.0 }",
+            ),
+            Some(4),
+            "`supply.voltage_v` is 480, outside 10..60",
+        ),
         (joint("direction = 2"), Some(7), "joint `hip`: `direction` is 2; it must be 1 or -1"),
         (joint("\nrange_deg = [50.0, 2.0]"), Some(8), "`range_deg` is inverted or empty: 50 to 2"),
         (joint("range_deg = [-inf, 2.0]"), Some(7), "`range_deg` is -inf, outside -3600..3600"),

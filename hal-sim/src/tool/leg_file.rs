@@ -29,7 +29,7 @@
 //! | `stribeck_model`, `asymmetric_coulomb` | the same of Stribeck friction, of Coulomb friction with a level for each direction | auto, off |
 //! | `stribeck` | `{ static_nm, speed_rad_s }`: simulated friction at rest and where it has fallen | none |
 //! | `truth`, `prior` | `{ mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset, asymmetry }`, the last five 0 unless given | none |
-//! | `[joint.motor]` | reserved | |
+//! | `[joint.motor]`, `supply` | motor and supply of a complete drive ([`MotorFile`], [`SupplyFile`]) | none, 48 V |
 //!
 //! `inertia_com` holds the tensor elements XX XY XZ YY YZ ZZ about the centre of mass. Everything in `truth`
 //! and `prior` is in the joint's D-H frame with the D-H sign. `truth` is only needed to simulate.
@@ -37,14 +37,15 @@
 mod check;
 mod convert;
 mod error;
+mod motor;
 mod segments;
 mod switch;
 
 pub use error::LegFileError;
+pub use motor::{MotorFile, SupplyFile};
 pub use segments::{BodySide, SegmentsFile};
 pub use switch::Switch;
 
-use serde::de::{Deserializer, Error as _};
 use serde::{Deserialize, Serialize};
 
 /// The leg that is meant when none is named.
@@ -86,6 +87,9 @@ pub struct LegFile {
     /// What thigh and shank are made of.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub segments: Option<SegmentsFile>,
+    /// What feeds complete drives.
+    #[serde(default, skip_serializing_if = "SupplyFile::is_default")]
+    pub supply: SupplyFile,
     /// Proximal first.
     #[serde(rename = "joint")]
     pub joints: Vec<JointFile>,
@@ -174,8 +178,9 @@ pub struct JointFile {
     /// What is believed before measuring.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<LinkParameters>,
-    #[serde(default, rename = "motor", skip_serializing)]
-    reserved: Reserved,
+    /// Motor of a complete drive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motor: Option<MotorFile>,
 }
 
 /// Modified Denavit-Hartenberg parameters, rad and m.
@@ -259,16 +264,6 @@ pub struct LinkParameters {
     pub asymmetry: f64,
 }
 
-/// A key that must not be used yet.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Reserved;
-
-impl<'de> Deserialize<'de> for Reserved {
-    fn deserialize<D: Deserializer<'de>>(_: D) -> Result<Self, D::Error> {
-        Err(D::Error::custom("`[joint.motor]` is reserved for a later description of the motor"))
-    }
-}
-
 fn default_bandwidth() -> f64 {
     8.0
 }
@@ -337,7 +332,7 @@ impl JointFile {
             stribeck: None,
             truth: None,
             prior: None,
-            reserved: Reserved,
+            motor: None,
         }
     }
 }
@@ -355,6 +350,7 @@ impl LegFile {
             temperature_c: None,
             side: BodySide::default(),
             segments: None,
+            supply: SupplyFile::default(),
             joints,
         }
     }

@@ -8,6 +8,7 @@
 //!   there as not yet investigated. "From hip" and "from knee" of the lower parts are read as in the constants
 //!   below.
 //! - Wearer: anthropometry after Winter ([`super::anthropometry`]), segments as long as the exoskeleton's.
+//! - Motors: [`MotorFile::D5065_CLASS`], whose 0.03 N m/A times the gear's 50 are the leg's 1.5 N m/A.
 //! - Only sagittal inertias are given, so each segment is completed as a solid of revolution: about its long axis
 //!   it has mass * radius^2 / 2 with the radii stated below (ours).
 //!
@@ -17,7 +18,8 @@
 
 use super::anthropometry::{Along, Segment, Wearer, joined};
 use super::leg_file::{
-    BodySide, DhFile, EncoderFile, JointFile, LegFile, LinkParameters, SegmentsFile, Side,
+    BodySide, DhFile, EncoderFile, JointFile, LegFile, LinkParameters, MotorFile, SegmentsFile, Side,
+    SupplyFile,
 };
 
 const THIGH_M: f64 = 0.39;
@@ -111,6 +113,7 @@ pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
         joint.torque_limit_nm = 85.0;
         joint.torque_per_ampere = 1.5;
         joint.encoder = EncoderFile { side: Side::Motor, counts: 8192, ratio: 50.0 };
+        joint.motor = Some(MotorFile::D5065_CLASS);
     };
     let mut hip = JointFile::new("hip", DhFile { alpha: 0.0, a: 0.0, d: 0.0 });
     drive(&mut hip);
@@ -137,6 +140,7 @@ pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
             wearer_kg: wearer.mass,
             prior_wearer_kg: prior_mass,
         }),
+        supply: SupplyFile::default(),
         joints: vec![hip, knee],
     }
 }

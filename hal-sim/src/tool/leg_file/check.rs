@@ -19,13 +19,13 @@ pub(super) struct Fault {
 }
 
 /// Where a value stands; makes faults.
-struct Place<'a> {
-    joint: Option<(usize, &'a str)>,
-    table: Option<&'static str>,
+pub(super) struct Place<'a> {
+    pub joint: Option<(usize, &'a str)>,
+    pub table: Option<&'static str>,
 }
 
 impl Place<'_> {
-    fn fault(&self, key: &'static str, complaint: &str) -> Fault {
+    pub(super) fn fault(&self, key: &'static str, complaint: &str) -> Fault {
         let keys: Vec<&'static str> = self.table.into_iter().chain([key]).collect();
         let path = keys.join(".");
         let reason = match self.joint {
@@ -36,7 +36,7 @@ impl Place<'_> {
     }
 
     /// `low..=high`; refuses what is not a number.
-    fn within(&self, key: &'static str, value: f64, low: f64, high: f64) -> Result<(), Fault> {
+    pub(super) fn within(&self, key: &'static str, value: f64, low: f64, high: f64) -> Result<(), Fault> {
         if (low..=high).contains(&value) {
             Ok(())
         } else {
@@ -90,6 +90,7 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
             return Err(top.fault("segments", "needs two joints, a hip and a knee"));
         }
     }
+    leg.supply.check()?;
     if !(1..=3).contains(&leg.joints.len()) {
         return Err(top.fault("joint", &format!("occurs {} times; a leg has 1 to 3", leg.joints.len())));
     }
@@ -154,6 +155,9 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
         let complaint = "is on and so is `offset`: while the joint moves a torque offset and a difference of Coulomb \
                          friction between the directions are the same column; one of them must be off";
         return Err(place.fault("asymmetric_coulomb", complaint));
+    }
+    if let Some(motor) = &joint.motor {
+        motor.check(number, joint)?;
     }
     for (table, parameters) in [("truth", &joint.truth), ("prior", &joint.prior)] {
         if let Some(parameters) = parameters {

@@ -1,0 +1,105 @@
+//! Quadrature counter of the motor's encoder, with its index pulse.
+//!
+//! ```text
+//! counter = start + floor(sense * angle / 2 pi * counts)      16 bits, wrapping
+//! index   : where (angle - index) / 2 pi passes a whole number; the counter is captured there
+//! ```
+//!
+//! Angles of the rotor in rad, over all its turns. Cost: one multiplication and one comparison per sample.
+
+use super::description::{CounterDescription, EncoderWiring};
+use crate::maths::floor;
+use core::f64::consts::TAU;
+
+/// The counter of one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Counter {
+    description: CounterDescription,
+    wiring: EncoderWiring,
+    /// Turns since the index at the last sample.
+    turns: i64,
+}
+
+impl Counter {
+    /// As described, the rotor at `angle`.
+    #[must_use]
+    pub fn new(description: &CounterDescription, wiring: EncoderWiring, angle: f64) -> Self {
+        let mut counter = Self { description: *description, wiring, turns: 0 };
+        counter.turns = counter.index_turns(angle);
+        counter
+    }
+
+    /// The counter at an angle, and what it was when the index came since the last reading.
+    pub fn read(&mut self, angle: f64) -> (u16, Option<u16>) {
+        if self.wiring == EncoderWiring::Missing {
+            return (self.description.start, None);
+        }
+        let turns = self.index_turns(angle);
+        // Upward the last pulse passed is that of the turn that began, downward that of the turn that ended.
+        let pulse = turns.max(turns.saturating_add(1).min(self.turns));
+        let captured = (turns != self.turns).then(|| self.count(self.description.index + TAU * pulse as f64));
+        self.turns = turns;
+        (self.count(angle), captured)
+    }
+
+    fn index_turns(&self, angle: f64) -> i64 {
+        floor((angle - self.description.index) / TAU)
+    }
+
+    fn count(&self, angle: f64) -> u16 {
+        let sense = if self.wiring == EncoderWiring::Reversed { -1.0 } else { 1.0 };
+        let counts = floor(sense * angle / TAU * self.description.counts);
+        // Dropping the upper bits is the wrap of a 16-bit counter.
+        self.description.start.wrapping_add(counts as u16)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNT: f64 = TAU / 8192.0;
+
+    fn counter(wiring: EncoderWiring) -> Counter {
+        let description = CounterDescription { counts: 8192.0, start: 65_530, index: 100.5 * COUNT };
+        Counter::new(&description, wiring, 0.0)
+    }
+
+    #[test]
+    fn the_counter_wraps_at_sixteen_bits_in_both_directions() {
+        let mut forward = counter(EncoderWiring::Forward);
+        assert_eq!(forward.read(0.5 * COUNT).0, 65_530);
+        assert_eq!(forward.read(6.5 * COUNT).0, 0);
+        assert_eq!(forward.read(-65_536.0 * COUNT + 0.5 * COUNT).0, 65_530);
+        let mut reversed = counter(EncoderWiring::Reversed);
+        assert_eq!(reversed.read(-0.5 * COUNT).0, 65_530);
+        assert_eq!(reversed.read(9.5 * COUNT).0, 65_520);
+        let mut missing = counter(EncoderWiring::Missing);
+        assert_eq!(missing.read(3.0 * TAU), (65_530, None));
+    }
+
+    #[test]
+    fn the_index_comes_once_per_turn_at_the_same_place_from_both_sides() {
+        let mut counter = counter(EncoderWiring::Forward);
+        let mut seen = [(0, 0); 7];
+        let mut pulses = 0;
+        for step in (0..20_000_i32).chain((0..20_000).rev()) {
+            if let (_, Some(captured)) = counter.read(f64::from(step) * COUNT) {
+                seen[pulses] = (step, captured);
+                pulses += 1;
+            }
+        }
+        let captured = |turn: i32| 65_530_u16.wrapping_add((100 + 8192 * turn) as u16);
+        assert_eq!(
+            seen[..pulses],
+            [
+                (101, captured(0)),
+                (8293, captured(1)),
+                (16_485, captured(2)),
+                (16_484, captured(2)),
+                (8292, captured(1)),
+                (100, captured(0))
+            ]
+        );
+    }
+}

@@ -1,0 +1,179 @@
+//! What a complete drive is made from, as plain numbers; nothing is checked here.
+//!
+//! Defaults are those of a board of the ODrive v3.6 class (48 V and more): 500 uOhm shunts, amplifiers at 40 V/V, 12 bits
+//! over 3.3 V, bus divider 19, dead time of 20 clocks at 168 MHz, 3,500 timer clocks per half period. Amplifier settling,
+//! rails, noise, diode drop and capacitance are typical values of such parts, not measurements.
+
+/// A permanent-magnet synchronous motor, star connected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorDescription {
+    /// Of one phase at 20 degrees Celsius, ohm.
+    pub resistance: f64,
+    /// Along the magnets' axis, H.
+    pub inductance_d: f64,
+    /// Across it, H.
+    pub inductance_q: f64,
+    /// Peak of the magnets' flux linkage with a phase, V s.
+    pub flux: f64,
+    /// Electrical turns per turn of the rotor.
+    pub pole_pairs: u32,
+    /// Electrical angle where the rotor's angle is 0, rad.
+    pub electrical_zero: f64,
+    /// Peak of the cogging torque at the rotor, N m.
+    pub cogging: f64,
+    /// Periods of the cogging torque per turn of the rotor.
+    pub cogging_periods: u32,
+    /// Winding to surroundings, K/W.
+    pub thermal_resistance: f64,
+    /// Of the winding's warming, s.
+    pub thermal_time: f64,
+}
+
+/// Three half bridges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BridgeDescription {
+    /// Both switches of a leg off at each edge, s.
+    pub dead_time: f64,
+    /// Of a switch that is on, ohm.
+    pub on_resistance: f64,
+    /// Of a diode that conducts, V.
+    pub diode_drop: f64,
+    /// Steps of the duty.
+    pub duty_steps: f64,
+}
+
+impl Default for BridgeDescription {
+    fn default() -> Self {
+        Self { dead_time: 20.0 / 168e6, on_resistance: 0.002, diode_drop: 0.8, duty_steps: 3500.0 }
+    }
+}
+
+/// Shunts of the outputs B and C with amplifiers and converter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShuntDescription {
+    /// Ohm.
+    pub resistance: f64,
+    /// Of the amplifier, V/V.
+    pub gain: f64,
+    /// Of the amplifier's first-order settling, s: 1 % after 1.2 us.
+    pub settling: f64,
+    /// Between which the amplifier's output stays, V.
+    pub rails: [f64; 2],
+    /// Code without current, less half of the range.
+    pub offset_codes: [f64; 2],
+    /// Relative error of shunt and amplifier.
+    pub gain_error: [f64; 2],
+    /// Standard deviation of amplifier and converter, codes.
+    pub noise_codes: f64,
+}
+
+impl Default for ShuntDescription {
+    fn default() -> Self {
+        Self {
+            resistance: 500e-6,
+            gain: 40.0,
+            settling: 0.26e-6,
+            rails: [0.15, 3.15],
+            offset_codes: [12.0, -9.0],
+            gain_error: [0.0; 2],
+            noise_codes: 1.0,
+        }
+    }
+}
+
+/// Quadrature counter of the motor's encoder.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CounterDescription {
+    /// Per turn of the rotor.
+    pub counts: f64,
+    /// The counter where the rotor's angle is 0.
+    pub start: u16,
+    /// Rotor angle at which the index pulse comes, rad.
+    pub index: f64,
+}
+
+/// What is connected to what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wiring {
+    /// The motor's phase (0 to 2) on each of the bridge's outputs A, B and C.
+    pub phases: [usize; 3],
+    /// An output whose wire is broken.
+    pub open: Option<usize>,
+    /// Codes of B and C exchanged.
+    pub shunts_exchanged: bool,
+    /// Shunts whose sign is wrong, B and C.
+    pub shunts_inverted: [bool; 2],
+    /// How the encoder is connected.
+    pub encoder: EncoderWiring,
+}
+
+impl Default for Wiring {
+    fn default() -> Self {
+        Self {
+            phases: [0, 1, 2],
+            open: None,
+            shunts_exchanged: false,
+            shunts_inverted: [false; 2],
+            encoder: EncoderWiring::Forward,
+        }
+    }
+}
+
+/// How an encoder is connected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EncoderWiring {
+    /// Counts up with the rotor's angle.
+    #[default]
+    Forward,
+    /// Counts down.
+    Reversed,
+    /// Counts nothing.
+    Missing,
+}
+
+/// One axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisDescription {
+    /// Motor.
+    pub motor: MotorDescription,
+    /// Bridge.
+    pub bridge: BridgeDescription,
+    /// Current sensing.
+    pub shunts: ShuntDescription,
+    /// Encoder.
+    pub counter: CounterDescription,
+    /// Connectors.
+    pub wiring: Wiring,
+    /// Rotor turns per joint turn.
+    pub ratio: f64,
+}
+
+/// What feeds the bridges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SupplyDescription {
+    /// Without load, V.
+    pub voltage: f64,
+    /// Of source and cable, ohm.
+    pub resistance: f64,
+    /// Of the bus, F.
+    pub capacitance: f64,
+    /// Brake resistor, ohm; infinite for none.
+    pub brake_resistance: f64,
+    /// Bus voltage per voltage at the converter.
+    pub divider: f64,
+}
+
+impl Default for SupplyDescription {
+    fn default() -> Self {
+        Self { voltage: 48.0, resistance: 0.05, capacitance: 1.5e-3, brake_resistance: 2.0, divider: 19.0 }
+    }
+}
+
+/// Complete drives of a leg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CompleteDescription<const N: usize> {
+    /// Proximal first.
+    pub axes: [AxisDescription; N],
+    /// Common to all axes.
+    pub supply: SupplyDescription,
+}

@@ -1,0 +1,30 @@
+//! Joint drives: an ideal one, and a complete one down to switches and converter codes.
+//!
+//! | module | what lives there |
+//! | --- | --- |
+//! | [`ideal`] | a current that follows its target with a lag |
+//! | [`description`] | what a complete drive is made from |
+//! | [`motor`] | three phases by their flux linkages: currents, torque, heat |
+//! | [`bridge`] | which switch conducts when: centred pulses, dead time |
+//! | [`shunts`] | amplifiers and converter: the codes that the firmware reads |
+//! | [`counter`] | encoder counter with its index pulse |
+//! | [`supply`] | bus capacitor, source that takes nothing back, brake resistor |
+//! | [`axis`] | motor, bridge, shunts and counter as one axis, a quarter of a PWM period at a time |
+//! | [`complete`] | all axes on their supply |
+//! | [`stand`] | one axis on a test stand |
+//!
+//! The ideal drive serves identification apart from a current loop; the complete drive serves the firmware's current loop
+//! and its calibration, which see nothing but [`scarab::hal::AxisSample`].
+
+pub mod axis;
+pub mod bridge;
+pub mod complete;
+pub mod counter;
+pub mod description;
+pub mod ideal;
+pub mod motor;
+pub mod shunts;
+pub mod stand;
+pub mod supply;
+
+pub use ideal::Drive;
