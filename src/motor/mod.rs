@@ -14,6 +14,7 @@
 //! | [`Modulator`] | space vectors, room for the sample, dead time |
 //! | [`Axis`] | all of it in one tick, with the borders that release |
 //! | [`calibration`] | measures and refuses; the only source of a [`Calibration`] |
+//! | [`Chopper`] | what the supply does not take back, into the brake resistor |
 //! | [`mod@reference`] | the joint's zero: an end stop or a stated pose |
 //! | [`Transmission`] | current to joint torque and back |
 //!
@@ -22,6 +23,7 @@
 pub mod angle;
 pub mod axis;
 pub mod calibration;
+pub mod chopper;
 pub mod configuration;
 pub mod current_loop;
 pub mod frames;
@@ -35,6 +37,7 @@ pub use axis::{Axis, AxisFault, AxisRequest};
 pub use calibration::{
     Calibration, CalibrationSettings, CalibrationStep, Calibrator, Phase, Refusal, StoredCalibration,
 };
+pub use chopper::{Chopper, GREATEST_BRAKE_DUTY};
 pub use configuration::{AxisConfiguration, AxisError, Direction};
 pub use current_loop::{CurrentGains, CurrentLoop, MotorConstants};
 pub use frames::{Phases, Quantity, Rotating, Stationary};

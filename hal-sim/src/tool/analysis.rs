@@ -82,6 +82,8 @@ pub struct Circumstances<const B: usize> {
     pub findings: Vec<FindingReport>,
     /// What the model is worth to the servo.
     pub tracking: Vec<TrackingReport>,
+    /// Which drives were simulated.
+    pub drive: Option<&'static str>,
     /// Simulated or recorded time, s.
     pub simulated_s: f64,
     /// Time it took.
@@ -212,6 +214,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             consistent: consistent::compare(self, solver, circumstances.iterations_to_half_chi2),
             tracking: circumstances.tracking.clone(),
             scale: ScaleReport::default(),
+            drive: circumstances.drive,
             simulated_s: circumstances.simulated_s,
             wall_s: circumstances.wall.as_secs_f64(),
             detail: self.detail(solver, &estimate),

@@ -7,6 +7,7 @@ mod identify;
 mod leg_options;
 mod model;
 mod monitor;
+mod motor;
 mod noise;
 mod predict;
 mod regressor;
@@ -40,6 +41,8 @@ enum Command {
     Export(export::ExportArguments),
     /// Change the load or the friction of a leg that walks: time to notice, what was found, false alarms.
     Monitor(monitor::MonitorArguments),
+    /// Measure the current loop on a motor's test stand: steps, torque ripple, voltage limit, regeneration.
+    Motor(motor::MotorArguments),
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     Regressor(regressor::RegressorArguments),
 }
@@ -65,6 +68,7 @@ pub fn main() -> ExitCode {
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),
+        Command::Motor(arguments) => motor::run(&arguments),
         Command::Regressor(arguments) => regressor::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
     };

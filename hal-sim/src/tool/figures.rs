@@ -20,6 +20,7 @@
 
 mod canvas;
 mod curve;
+pub mod motor;
 mod parameters;
 mod residuals;
 mod search;

@@ -7,8 +7,10 @@
 //! | [`size`], [`anthropometry`], [`posture`] | a leg file for other lengths, another wearer, side or trunk |
 //! | [`setup`] | from a leg file to what the firmware is built from |
 //! | [`recording`], [`resample`], [`replay`] | identification on recordings |
+//! | [`board`] | the firmware's current loops against complete drives |
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
 //! | [`excite`] | an exciting motion designed, and what it will tell |
+//! | [`motor`] | the current loop measured on a test stand |
 //! | [`monitor`] | an accepted model watched while the leg walks and something changes |
 //! | [`series`], [`figures`], [`html`] | a run as curves, drawn, and on one page |
 //! | [`model_choice`], [`temperature`] | what of the model was left to the data; when a model is another day's |
@@ -28,6 +30,7 @@
 
 pub mod analysis;
 pub mod anthropometry;
+pub mod board;
 pub mod cli;
 pub mod consistent;
 pub mod consistent_runs;
@@ -44,6 +47,7 @@ pub mod model_choice;
 pub mod model_file;
 pub mod monitor;
 pub mod motions;
+pub mod motor;
 pub mod pair;
 pub mod perturb;
 pub mod placed_mass;

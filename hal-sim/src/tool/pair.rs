@@ -10,11 +10,12 @@ use scarab::motion::Periodic;
 use scarab::safety::{DriveState, PowerRequest};
 
 use super::analysis::Background;
+use super::board::Board;
 use super::error::ToolError;
 use super::leg_file::LegFile;
 use super::motions::Motions;
 use super::setup::{SetupError, background, configuration};
-use super::simulate::SimulationOptions;
+use super::simulate::{DriveModel, SimulationOptions};
 use super::words::leg_error;
 use crate::world::World;
 
@@ -46,6 +47,8 @@ pub struct Context<const N: usize, const B: usize> {
     pub gravity: [f32; 3],
     /// Standard deviation of each joint's logged torque, N m.
     pub noise: [f64; N],
+    /// Where drives are complete: the leg that the current loops are configured for.
+    pub complete: Option<Box<LegFile>>,
 }
 
 impl<const N: usize, const B: usize> Context<N, B> {
@@ -73,7 +76,8 @@ impl<const N: usize, const B: usize> Context<N, B> {
             (percent / 100.0 * mean[joint]).hypot(own)
         });
         let gravity = leg.gravity.map(|element| element as f32);
-        Ok(Self { background, configuration, motions, smoothing, low_pass, gravity, noise })
+        let complete = (options.drive == DriveModel::Full).then(|| Box::new(leg.clone()));
+        Ok(Self { background, configuration, motions, smoothing, low_pass, gravity, noise, complete })
     }
 }
 
@@ -105,6 +109,8 @@ pub struct Pair<const N: usize, const B: usize> {
     pub leg: Box<DeviceLeg<N, B>>,
     /// The plant.
     pub world: World<N>,
+    /// The board's current loops, where the plant's drives are complete.
+    pub board: Option<Board<N>>,
     /// What the sensors said last.
     pub sample: Sample<N>,
     /// So far.
@@ -118,7 +124,12 @@ pub struct Pair<const N: usize, const B: usize> {
 impl<const N: usize, const B: usize> Pair<N, B> {
     /// A leg at rest a tenth into its range, drive off.
     pub fn new(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
-        let mut world = World::new(&leg.description()?, seed);
+        let (description, believed) = (leg.description()?, context.complete.as_deref());
+        let drives = believed.map(|_| leg.complete_description::<N>()).transpose()?;
+        let mut world = match &drives {
+            Some(drives) => World::with_complete_drives(&description, drives, seed),
+            None => World::new(&description, seed),
+        };
         world.set_current_noise(&core::array::from_fn(|joint| {
             context.noise[joint] / leg.joints[joint].torque_per_ampere
         }));
@@ -130,9 +141,14 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         let device = DeviceLeg::new(&context.configuration)
             .map_err(|error| SetupError::new(leg, leg_error(leg, error)))?;
         let sample = world.sample();
+        let board = match believed.zip(drives.as_ref()) {
+            Some((believed, drives)) => Some(Board::new(believed, drives, &mut world, seed)?),
+            None => None,
+        };
         Ok(Self {
             leg: Box::new(device),
             world,
+            board,
             sample,
             ticks: 0,
             evaluations: EVALUATIONS_PER_TICK,
@@ -153,7 +169,10 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         for (joint, &wired) in self.wiring.iter().enumerate() {
             command.currents[wired] = output.servo.drive().currents[joint];
         }
-        let sample = self.world.tick(&command);
+        let sample = match &mut self.board {
+            Some(board) => board.tick(&mut self.world, &command),
+            None => self.world.tick(&command),
+        };
         self.sample.joints = self.wiring.map(|wired| sample.joints[wired]);
         self.ticks += 1;
         output

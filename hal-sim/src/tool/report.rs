@@ -304,6 +304,9 @@ pub struct RunReport {
     /// What the parameters are measured in, and what the leg carried.
     #[serde(flatten)]
     pub scale: ScaleReport,
+    /// Which drives were simulated; none in a replay.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive: Option<&'static str>,
     /// Simulated or recorded time, s.
     pub simulated_s: f64,
     /// Time it took, s.

@@ -24,6 +24,27 @@ use crate::world::TICK_S;
 /// No run takes longer, s.
 const LONGEST_RUN_S: f64 = 300.0;
 
+/// Which drives are simulated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DriveModel {
+    /// A current with a lag.
+    #[default]
+    Ideal,
+    /// Motor, bridge, shunts, counter and supply, under the board's current loops.
+    Full,
+}
+
+impl DriveModel {
+    /// As reports and options write it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ideal => "ideal",
+            Self::Full => "full",
+        }
+    }
+}
+
 /// What to simulate.
 #[derive(Clone, Debug)]
 pub struct SimulationOptions {
@@ -33,6 +54,8 @@ pub struct SimulationOptions {
     pub swarm_seed: u64,
     /// Instead of the leg file's.
     pub torque_noise_percent: Option<f64>,
+    /// Ideal or complete drives.
+    pub drive: DriveModel,
     /// One-time or sequential.
     pub plan: Plan,
     /// Prior for the search box.
@@ -59,6 +82,7 @@ impl SimulationOptions {
             seed,
             swarm_seed: seed,
             torque_noise_percent: None,
+            drive: DriveModel::Ideal,
             plan: Plan::OneTime,
             prior: PriorChoice::Default,
             payload: None,

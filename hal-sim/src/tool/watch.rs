@@ -354,6 +354,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             },
             findings,
             tracking,
+            drive: Some(options.drive.name()),
             simulated_s: pair.ticks as f64 * TICK_S,
             wall: started.elapsed(),
         };

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use scarab::model::Payload;
 
 use super::common::{Common, draw, draw_runs, finish, write_json};
@@ -16,7 +16,7 @@ use crate::tool::perturb::Perturbation;
 use crate::tool::placed_mass::PlacedMass;
 use crate::tool::report::RunReport;
 use crate::tool::setup::DEFAULT_SEED;
-use crate::tool::simulate::SimulationOptions;
+use crate::tool::simulate::{DriveModel, SimulationOptions};
 use crate::with_leg_size;
 
 /// What to identify and what to keep of it.
@@ -34,6 +34,10 @@ pub struct IdentifyArguments {
     seeds: Option<(u64, u64)>,
     #[command(flatten)]
     noise: NoiseOptions,
+    /// Ideal currents, or motors, bridges and sensors under the board's current loops.
+    #[arg(long, value_enum, default_value = "ideal")]
+    drive: DriveArgument,
+    #[arg(long)]
     /// Identify again with a known mass, KG@JOINT:X_M[:Y_M] (JOINT: name or number; X along the link): tells the torque constants.
     #[arg(long)]
     payload: Option<PlacedMass>,
@@ -49,6 +53,24 @@ pub struct IdentifyArguments {
     /// Write the training motion here, in the format that replay reads.
     #[arg(long)]
     log: Option<PathBuf>,
+}
+
+/// Which drives are simulated.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DriveArgument {
+    /// A current that follows its target with a lag.
+    Ideal,
+    /// Motor, inverter, current and angle sensors, supply; needs `[joint.motor]` in the leg file.
+    Full,
+}
+
+impl From<DriveArgument> for DriveModel {
+    fn from(drive: DriveArgument) -> Self {
+        match drive {
+            DriveArgument::Ideal => Self::Ideal,
+            DriveArgument::Full => Self::Full,
+        }
+    }
 }
 
 pub(super) fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
@@ -96,6 +118,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
         seed,
         swarm_seed: arguments.common.swarm_seed.unwrap_or(seed),
         torque_noise_percent,
+        drive: arguments.drive.into(),
         plan: arguments.common.plan.into(),
         prior: arguments.common.prior.unwrap_or_default(),
         payload,

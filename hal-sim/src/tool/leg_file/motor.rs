@@ -94,6 +94,18 @@ impl SupplyFile {
         *self == Self::default()
     }
 
+    /// The supply that is simulated.
+    #[must_use]
+    pub fn description(&self) -> SupplyDescription {
+        SupplyDescription {
+            voltage: self.voltage_v,
+            resistance: self.resistance_ohm,
+            capacitance: 1e-6 * self.capacitance_uf,
+            brake_resistance: self.brake_ohm,
+            ..SupplyDescription::default()
+        }
+    }
+
     pub(super) fn check(&self) -> Result<(), Fault> {
         let place = Place { joint: None, table: Some("supply") };
         place.within("voltage_v", self.voltage_v, 10.0, 60.0)?;
@@ -209,13 +221,6 @@ impl LegFile {
         }
         let count = axes.len();
         let axes = axes.try_into().map_err(|_| refused(format!("has {count} joints, not {N}")))?;
-        let supply = SupplyDescription {
-            voltage: self.supply.voltage_v,
-            resistance: self.supply.resistance_ohm,
-            capacitance: 1e-6 * self.supply.capacitance_uf,
-            brake_resistance: self.supply.brake_ohm,
-            ..SupplyDescription::default()
-        };
-        Ok(CompleteDescription { axes, supply })
+        Ok(CompleteDescription { axes, supply: self.supply.description() })
     }
 }

@@ -1,0 +1,162 @@
+//! The firmware's side of a complete drive: the board's current loops, six PWM periods per servo tick.
+//!
+//! Exactly the code of the board runs here: [`Axis`] at 24 kHz for every joint, its calibration before, the brake chopper. What
+//! the plant says in a period is answered in the same period and acts in the next; the servo's sample is the mean of the six
+//! periods since its last tick.
+//!
+//! A run begins with a drive that is ready: every motor was calibrated on a stand, free of its gear and at rest, and the
+//! pose in which the leg stands was stated as the reference.
+
+use scarab::hal::{AxisCommand, DriveCommand, JointSample, LegDrives, Sample};
+use scarab::motor::{
+    Axis, AxisConfiguration, AxisRequest, BridgeTiming, Calibration, CalibrationSettings, CalibrationStep,
+    Calibrator, Chopper, DeadTime, Direction, SenseScale, Sine,
+};
+use scarab::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
+
+use super::error::ToolError;
+use super::leg_file::{JointFile, LegFile, MotorFile};
+use crate::drive::description::{AxisDescription, CompleteDescription, SupplyDescription};
+use crate::drive::stand::{Load, Stand};
+use crate::world::World;
+use crate::world::periods::PERIODS_PER_TICK;
+
+/// Of the current loops.
+pub const BANDWIDTH: Hertz = Hertz(1000.0);
+/// Within it the dead time is given back smoothly.
+const DEAD_TIME_BAND: Ampere = Ampere(2.0);
+/// Shunts are trusted up to here: 3,723 codes less 150 of zero.
+const OVERCURRENT: Ampere = Ampere(61.0);
+/// Within which the bridges may switch.
+const BUS: [Volt; 2] = [Volt(20.0), Volt(58.0)];
+/// Where the brake resistor begins to conduct, and where it does all the time it may.
+pub const CHOPPER: [Volt; 2] = [Volt(50.0), Volt(54.0)];
+/// Faster than the joint's limit by this the counter is not believed.
+const SPEED_MARGIN: f64 = 2.0;
+
+/// How a motor is calibrated on its stand.
+pub const CALIBRATION: CalibrationSettings =
+    CalibrationSettings { current: Ampere(15.0), voltage: Volt(3.0), turns_per_s: 10.0 };
+/// What turns on the stand: the rotor alone, kg m^2; bearings, N m; a little of drag, N m s/rad.
+const ROTOR: Load = Load::Free { inertia: 1e-4, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
+/// A calibration takes some seconds.
+const LONGEST_CALIBRATION: u32 = 24_000 * 60;
+
+/// The configuration of a joint's axis, as a leg file states it.
+pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfiguration {
+    let speed = SPEED_MARGIN * joint.speed_limit_deg_s.to_radians() * joint.encoder.ratio;
+    AxisConfiguration {
+        sense: SenseScale::ODRIVE_3_6,
+        timing: BridgeTiming::ODRIVE_3_6,
+        dead_time: DeadTime::Compensated { band: DEAD_TIME_BAND },
+        pole_pairs: motor.pole_pairs as u8,
+        flux: Weber(motor.flux(joint) as f32),
+        counts_per_turn: joint.encoder.counts,
+        index: true,
+        counter: Direction::Up,
+        // A mirrored drive is the servo's affair (`servo::JointScale`).
+        flexion: Direction::Up,
+        bandwidth: BANDWIDTH,
+        feedforward: true,
+        sine: Sine::Fast,
+        current_limit: Ampere(joint.current_limit() as f32),
+        overcurrent: OVERCURRENT,
+        bus: BUS,
+        greatest_speed: RadianPerSecond(speed as f32),
+    }
+}
+
+/// Calibrates a motor on its stand; `name` is for the message where that fails.
+pub fn commission(
+    name: &str,
+    configuration: &AxisConfiguration,
+    axis: &AxisDescription,
+    supply: &SupplyDescription,
+    seed: u64,
+) -> Result<Calibration, ToolError> {
+    let refused = |reason: String| ToolError::input(format!("axis `{name}`: {reason}"));
+    let mut stand = Stand::new(axis, supply, ROTOR, 0.0, seed);
+    let mut calibrator = Calibrator::new(configuration, CALIBRATION)
+        .map_err(|error| refused(format!("the firmware refuses its configuration: {error:?}")))?;
+    let mut command = AxisCommand::RELEASED;
+    for _ in 0..LONGEST_CALIBRATION {
+        match calibrator.tick(&stand.period(&command, 0.0)) {
+            CalibrationStep::Running(next) => command = next,
+            CalibrationStep::Done(calibration) => return Ok(calibration),
+            CalibrationStep::Refused(reason) => {
+                return Err(refused(format!("the calibration is refused: {reason:?}")));
+            }
+        }
+    }
+    Err(refused("the calibration did not end".into()))
+}
+
+/// The board of a leg: its axes with their last commands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Board<const N: usize> {
+    axes: [Axis; N],
+    commands: [AxisCommand; N],
+    chopper: Chopper,
+    brake: f32,
+}
+
+impl<const N: usize> Board<N> {
+    /// A board that is ready: motors calibrated, counts as those of the pose in which the world's leg stands. `believed` is
+    /// the leg as the firmware has it, `description` what is simulated.
+    pub fn new(
+        believed: &LegFile,
+        description: &CompleteDescription<N>,
+        world: &mut World<N>,
+        seed: u64,
+    ) -> Result<Self, ToolError> {
+        let pose = world.sample();
+        let samples = world.period(&[AxisCommand::RELEASED; N], 0.0);
+        let mut axes = Vec::with_capacity(N);
+        for (index, joint) in believed.joints.iter().enumerate().take(N) {
+            let motor = joint
+                .motor
+                .as_ref()
+                .ok_or_else(|| ToolError::input(format!("joint `{}` has no motor", joint.name)))?;
+            let configuration = axis_configuration(joint, motor);
+            let (name, simulated) = (&joint.name, &description.axes[index]);
+            let calibration = commission(name, &configuration, simulated, &description.supply, seed)?;
+            let mut axis = Axis::new(&configuration, &calibration, &samples[index]).map_err(|error| {
+                ToolError::input(format!("axis `{name}`: the firmware refuses its configuration: {error:?}"))
+            })?;
+            axis.set_counts(pose.joints[index].encoder_counts);
+            axes.push(axis);
+        }
+        let chopper = Chopper::new(CHOPPER[0], CHOPPER[1])
+            .ok_or_else(|| ToolError::input("the firmware refuses the chopper's voltages"))?;
+        let axes = axes.try_into().map_err(|_| ToolError::input("a motor for every joint is needed"))?;
+        // The first period was that of the reference; the rest of its servo tick passes released.
+        for _ in 1..PERIODS_PER_TICK {
+            world.period(&[AxisCommand::RELEASED; N], 0.0);
+        }
+        Ok(Self { axes, commands: [AxisCommand::RELEASED; N], chopper, brake: 0.0 })
+    }
+
+    /// One servo tick of drives and plant; what the servo sees at its end.
+    pub fn tick(&mut self, world: &mut World<N>, command: &DriveCommand<N>) -> Sample<N> {
+        for _ in 0..PERIODS_PER_TICK {
+            let samples = world.period(&self.commands, f64::from(self.brake));
+            for (joint, axis) in self.axes.iter_mut().enumerate() {
+                let request = AxisRequest { enabled: command.enabled, current: command.currents[joint] };
+                self.commands[joint] = axis.tick(&samples[joint], request);
+            }
+            let bus = samples.first().map_or(0, |sample| sample.bus_code);
+            self.brake = self.chopper.duty(SenseScale::ODRIVE_3_6.bus(bus));
+        }
+        let mut joints = [JointSample::default(); N];
+        for (joint, axis) in joints.iter_mut().zip(&mut self.axes) {
+            *joint = axis.joint_sample();
+        }
+        world.observe(&Sample { joints })
+    }
+
+    /// The current loops.
+    #[must_use]
+    pub fn axes(&self) -> &[Axis; N] {
+        &self.axes
+    }
+}

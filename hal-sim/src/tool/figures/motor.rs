@@ -1,0 +1,187 @@
+//! Figures of a current loop: steps, voltage limit, braking.
+
+use std::path::Path;
+
+use plotters::style::text_anchor::HPos;
+use plotters::style::{RGBColor, ShapeStyle};
+
+use super::super::error::ToolError;
+use super::super::motor::MotorReport;
+use super::super::motor::step::response;
+use super::canvas::{
+    Area, Axes, BLUE, DARK, DrawingError, GREEN, Key, LEFT, PALE, VERMILION, axes, legend, line, px, range,
+    render, text,
+};
+use super::{WIDTH, curve};
+
+/// Of a row of frames, of title and legend; pixels.
+const ROW: i32 = 210;
+const HEAD: i32 = 56;
+
+/// A curve over time.
+struct Trace<'a> {
+    time: &'a [f64],
+    values: &'a [f64],
+    style: ShapeStyle,
+}
+
+fn thin(colour: RGBColor) -> ShapeStyle {
+    line(colour, 6)
+}
+
+/// A frame with curves.
+fn frame(
+    area: &Area<'_>,
+    title: &str,
+    y_label: &str,
+    end_ms: f64,
+    traces: &[Trace<'_>],
+) -> Result<(), DrawingError> {
+    text(area, (LEFT, 10), 12, HPos::Left, title)?;
+    let (_, area) = area.split_vertically(px(20));
+    let begin = traces.iter().filter_map(|trace| trace.time.first()).copied().fold(0.0, f64::min);
+    let mut chart = axes(
+        &area,
+        &Axes {
+            x: begin..end_ms,
+            y: range(traces.iter().flat_map(|trace| trace.values)),
+            x_label: "time, ms",
+            y_label,
+            x_ticks: 7,
+            y_ticks: 6,
+        },
+    )?;
+    for trace in traces {
+        let shown =
+            trace.time.iter().zip(trace.values).map(|(time, value)| (*time <= end_ms).then_some(*value));
+        curve::draw(&mut chart, trace.time, shown, trace.style)?;
+    }
+    Ok(())
+}
+
+fn steps(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
+    text(area, (12, 14), 13, HPos::Left, "Steps of the quadrature current against the designed loop")?;
+    let (with, without, design) = (thin(BLUE), thin(VERMILION), line(PALE, 18));
+    let entries = [
+        ("designed", Key::Curve(design)),
+        ("with feedforward", Key::Curve(with)),
+        ("without feedforward", Key::Curve(without)),
+        ("direct current of both", Key::Curve(line(DARK, 3))),
+    ];
+    legend(area, (LEFT, 35), &entries)?;
+    let (_, cells) = area.split_vertically(px(HEAD));
+    for (part, pair) in cells.split_evenly((2, 2)).iter().zip(report.steps.chunks(2)) {
+        let Some(first) = pair.first() else { continue };
+        let (Some(from), Some(to)) = (first.quadrature_a.first(), report.steps[0].quadrature_a.last()) else {
+            continue;
+        };
+        let ideal: Vec<f64> =
+            response(report.bandwidth_hz).iter().map(|share| from + share * (to - from)).collect();
+        let mut traces = vec![Trace { time: &first.time_ms, values: &ideal, style: design }];
+        for (step, style) in pair.iter().zip([with, without]) {
+            traces.push(Trace { time: &step.time_ms, values: &step.quadrature_a, style });
+            traces.push(Trace { time: &step.time_ms, values: &step.direct_a, style: line(DARK, 3) });
+        }
+        frame(part, &format!("{:.0} rad/s", first.speed_rad_s), "current, A", 2.0, &traces)?;
+    }
+    Ok(())
+}
+
+fn limit(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
+    text(
+        area,
+        (12, 14),
+        13,
+        HPos::Left,
+        "From 50 A, which a weak supply cannot hold, back within the limit",
+    )?;
+    let (weak, strong) = (thin(VERMILION), line(PALE, 18));
+    let entries = [("48 V: nothing limited", Key::Curve(strong)), ("12 V: limited before", Key::Curve(weak))];
+    legend(area, (LEFT, 35), &entries)?;
+    let (_, cells) = area.split_vertically(px(HEAD));
+    for (part, pair) in cells.split_evenly((1, 2)).iter().zip(report.limit.chunks(2)) {
+        let traces: Vec<_> = pair
+            .iter()
+            .zip([weak, strong])
+            .rev()
+            .map(|(limit, style)| Trace { time: &limit.time_ms, values: &limit.quadrature_a, style })
+            .collect();
+        let speed = pair.first().map_or(0.0, |limit| limit.speed_rad_s);
+        frame(part, &format!("{speed:.0} rad/s"), "quadrature current, A", 2.5, &traces)?;
+    }
+    Ok(())
+}
+
+fn regeneration(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
+    text(area, (12, 14), 13, HPos::Left, "A joint's inertia is braked: bus voltage and speed")?;
+    let styles = [thin(BLUE), thin(VERMILION)];
+    let entries = [("with chopper", Key::Curve(styles[0])), ("without", Key::Curve(styles[1]))];
+    legend(area, (LEFT, 35), &entries)?;
+    let (_, cells) = area.split_vertically(px(HEAD));
+    let parts = cells.split_evenly((1, 2));
+    let [left, right] = parts.as_slice() else { return Ok(()) };
+    let end =
+        report.regeneration.iter().filter_map(|braking| braking.time_ms.last()).copied().fold(1.0, f64::max);
+    let bus: Vec<_> = report
+        .regeneration
+        .iter()
+        .zip(styles)
+        .map(|(braking, style)| Trace { time: &braking.time_ms, values: &braking.bus_v, style })
+        .collect();
+    frame(left, "bus", "V", end, &bus)?;
+    let speed: Vec<_> = report
+        .regeneration
+        .iter()
+        .zip(styles)
+        .map(|(braking, style)| Trace { time: &braking.time_ms, values: &braking.speed_rad_s, style })
+        .collect();
+    frame(right, "rotor", "rad/s", end, &speed)
+}
+
+fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
+    text(
+        area,
+        (12, 14),
+        13,
+        HPos::Left,
+        "Torque ripple at 20 A without sensor noise, sixth harmonic and rms",
+    )?;
+    let (rms, sixth) = (thin(BLUE), thin(GREEN));
+    legend(area, (LEFT, 35), &[("rms", Key::Curve(rms)), ("sixth harmonic", Key::Curve(sixth))])?;
+    let (_, area) = area.split_vertically(px(HEAD));
+    let quiet: Vec<_> = report.ripple.iter().filter(|ripple| !ripple.noise).collect();
+    let largest = quiet.iter().map(|ripple| ripple.torque_percent).fold(0.01, f64::max);
+    for (index, ripple) in quiet.iter().enumerate() {
+        let y = 14 + 20 * index as i32;
+        let compensated = if ripple.compensated { "dead time given back" } else { "not given back" };
+        let words = format!("{:.0} rad/s, {} sine, {compensated}", ripple.speed_rad_s, ripple.sine);
+        text(&area, (12, y), 12, HPos::Left, words)?;
+        for (value, style, offset) in [(ripple.torque_percent, rms, -3), (ripple.sixth_percent, sixth, 3)] {
+            let end = 330 + (440.0 * value / largest) as i32;
+            let ends = vec![(px(330), px(y + offset)), (px(end), px(y + offset))];
+            area.draw(&plotters::element::PathElement::new(ends, style))?;
+        }
+        text(&area, (790, y), 12, HPos::Left, format!("{:.2} %", ripple.torque_percent))?;
+    }
+    Ok(())
+}
+
+/// Draws all of them into a directory, which is made if need be.
+pub fn write(directory: &Path, report: &MotorReport) -> Result<(), ToolError> {
+    type Drawing = fn(&Area<'_>, &MotorReport) -> Result<(), DrawingError>;
+    std::fs::create_dir_all(directory).map_err(|error| ToolError::cannot_write(directory, &error))?;
+    let quiet = report.ripple.iter().filter(|ripple| !ripple.noise).count() as i32;
+    let figures: [(&str, i32, Drawing); 4] = [
+        ("current-steps.svg", HEAD + 2 * ROW, steps),
+        ("torque-ripple.svg", HEAD + 20 * quiet + 12, ripple),
+        ("voltage-limit.svg", HEAD + ROW, limit),
+        ("regeneration.svg", HEAD + ROW, regeneration),
+    ];
+    for (file, height, draw) in figures {
+        let svg = render(WIDTH, height.unsigned_abs(), &|area| draw(area, report))
+            .map_err(|error| ToolError::input(format!("{file}: cannot be drawn: {error}")))?;
+        let path = directory.join(file);
+        std::fs::write(&path, svg).map_err(|error| ToolError::cannot_write(&path, &error))?;
+    }
+    Ok(())
+}

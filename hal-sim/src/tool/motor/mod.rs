@@ -1,0 +1,166 @@
+//! `motor`: the board's current loop on one of a leg's motors, measured on a test stand.
+//!
+//! | part | what is measured |
+//! | --- | --- |
+//! | [`step`] | steps of current at rest and at three speeds, with and without feedforward, against the designed loop |
+//! | [`ripple`] | torque ripple: fast against exact sine, with and without dead-time compensation |
+//! | [`limit`] | a target that the voltage cannot hold, and the way back |
+//! | [`regeneration`] | a spinning inertia braked, with and without the chopper |
+//!
+//! The stand's motor is calibrated first, by the firmware. Currents are those that flow, not those that are measured.
+
+pub mod limit;
+pub mod regeneration;
+pub mod ripple;
+pub mod step;
+pub mod text;
+
+use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ};
+use scarab::motor::{Axis, AxisConfiguration, AxisRequest, Calibration, Chopper, SenseScale};
+use scarab::units::{Ampere, Volt};
+use serde::Serialize;
+
+use super::board::{BANDWIDTH, CHOPPER, axis_configuration, commission};
+use super::error::ToolError;
+use super::leg_file::{LegFile, MotorFile};
+use super::report::SCHEMA;
+use crate::drive::description::{AxisDescription, SupplyDescription};
+use crate::drive::stand::{Load, Stand};
+
+/// PWM period, s.
+pub const PERIOD_S: f64 = 1.0 / CURRENT_RATE_HZ as f64;
+
+/// A motor with its board, before anything is changed about it.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    /// Joint whose motor it is.
+    pub joint: String,
+    /// The firmware's.
+    pub configuration: AxisConfiguration,
+    /// What is simulated.
+    pub axis: AxisDescription,
+    /// What feeds it.
+    pub supply: SupplyDescription,
+    /// What the firmware found on the stand.
+    calibration: Calibration,
+    /// Rotor speed at the joint's speed limit, rad/s.
+    pub top_speed: f64,
+    /// Of the sensors' noise.
+    pub seed: u64,
+}
+
+impl Bench {
+    /// The motor of a joint, by its place in the leg.
+    pub fn new(leg: &LegFile, joint: usize, seed: u64) -> Result<Self, ToolError> {
+        let found = leg.joints.get(joint).and_then(|joint| Some((joint, joint.motor.as_ref()?)));
+        let Some((file, motor)) = found else {
+            return Err(ToolError::input(format!("{}: the joint has no `[joint.motor]`", leg.name)));
+        };
+        let motor: &MotorFile = motor;
+        let configuration = axis_configuration(file, motor);
+        let (axis, supply) = (motor.axis(file), leg.supply.description());
+        Ok(Self {
+            joint: file.name.clone(),
+            configuration,
+            axis,
+            supply,
+            calibration: commission(&file.name, &configuration, &axis, &supply, seed)?,
+            top_speed: file.speed_limit_deg_s.to_radians() * file.encoder.ratio,
+            seed,
+        })
+    }
+
+    /// On its stand again, rotor turned at `speed` from `angle` on (rad/s, rad).
+    pub fn rig(&self, speed: f64, angle: f64) -> Result<Rig, ToolError> {
+        let mut stand = Stand::new(&self.axis, &self.supply, Load::Turned(speed), angle, self.seed);
+        let sample = stand.period(&AxisCommand::RELEASED, 0.0);
+        let axis = Axis::new(&self.configuration, &self.calibration, &sample).map_err(|error| {
+            ToolError::input(format!(
+                "axis `{}`: the firmware refuses its configuration: {error:?}",
+                self.joint
+            ))
+        })?;
+        Ok(Rig { stand, axis, command: AxisCommand::RELEASED, chopper: None, brake: 0.0, sample })
+    }
+}
+
+/// A motor on its stand under the board's current loop.
+#[derive(Clone, Debug)]
+pub struct Rig {
+    /// The plant.
+    pub stand: Stand,
+    /// The firmware.
+    pub axis: Axis,
+    command: AxisCommand,
+    chopper: Option<Chopper>,
+    /// Share of the time for which the brake resistor is on.
+    pub brake: f32,
+    sample: AxisSample,
+}
+
+impl Rig {
+    /// With the board's brake chopper.
+    #[must_use]
+    pub fn with_chopper(mut self) -> Self {
+        self.chopper = Chopper::new(CHOPPER[0], CHOPPER[1]);
+        self
+    }
+
+    /// One PWM period with this target; the currents that flow along and across the magnets' axis at its end, A.
+    pub fn period(&mut self, target: f64) -> [f64; 2] {
+        self.sample = self.stand.period(&self.command, f64::from(self.brake));
+        let request = AxisRequest { enabled: true, current: Ampere(target as f32) };
+        self.command = self.axis.tick(&self.sample, request);
+        if let Some(chopper) = &self.chopper {
+            let bus: Volt = SenseScale::ODRIVE_3_6.bus(self.sample.bus_code);
+            self.brake = chopper.duty(bus);
+        }
+        self.stand.rotor_currents()
+    }
+
+    /// So many seconds with this target.
+    pub fn hold(&mut self, target: f64, seconds: f64) {
+        for _ in 0..(seconds / PERIOD_S) as u32 {
+            self.period(target);
+        }
+    }
+}
+
+/// Everything that `motor` measures.
+#[derive(Clone, Debug, Serialize)]
+pub struct MotorReport {
+    /// Of the JSON.
+    pub schema: u32,
+    /// Name of the leg.
+    pub leg: String,
+    /// Name of the joint.
+    pub joint: String,
+    /// Of the current loop, Hz.
+    pub bandwidth_hz: f64,
+    /// The loop as designed.
+    pub designed: step::Shape,
+    /// Steps.
+    pub steps: Vec<step::StepReport>,
+    /// Ripple.
+    pub ripple: Vec<ripple::RippleReport>,
+    /// Voltage limit.
+    pub limit: Vec<limit::LimitReport>,
+    /// Braking.
+    pub regeneration: Vec<regeneration::RegenerationReport>,
+}
+
+/// Measures everything.
+pub fn measure(leg: &LegFile, joint: usize, seed: u64) -> Result<MotorReport, ToolError> {
+    let bench = Bench::new(leg, joint, seed)?;
+    Ok(MotorReport {
+        schema: SCHEMA,
+        leg: leg.name.clone(),
+        joint: bench.joint.clone(),
+        bandwidth_hz: f64::from(BANDWIDTH.0),
+        designed: step::designed(f64::from(BANDWIDTH.0)),
+        steps: step::measure(&bench)?,
+        ripple: ripple::measure(&bench)?,
+        limit: limit::measure(&bench)?,
+        regeneration: regeneration::measure(&bench)?,
+    })
+}

@@ -1,0 +1,94 @@
+//! A spinning inertia is braked into a supply that takes nothing back.
+//!
+//! The inertia is that of a leg's joint of 2.5 kg m^2 as the motor feels it through the joint's gear, at the joint's top speed;
+//! braked with 50 A to a tenth of it. With and without the brake chopper.
+
+use scarab::motor::AxisFault;
+use serde::Serialize;
+
+use super::super::error::ToolError;
+use super::{Bench, PERIOD_S};
+use crate::drive::stand::Load;
+
+/// Of a joint, kg m^2.
+const INERTIA: f64 = 2.5;
+/// A.
+const CURRENT: f64 = -50.0;
+/// Of the initial speed, where braking ends.
+const END: f64 = 0.1;
+/// At the latest, s.
+const LONGEST_S: f64 = 1.0;
+/// Drawn is every so manieth period.
+const STRIDE: usize = 24;
+
+/// One braking.
+#[derive(Clone, Debug, Serialize)]
+pub struct RegenerationReport {
+    /// The chopper works.
+    pub chopper: bool,
+    /// V.
+    pub highest_bus_v: f64,
+    /// Energy of the motion at the beginning, J.
+    pub motion_j: f64,
+    /// Given back to the bus, J.
+    pub returned_j: f64,
+    /// Of it into the brake resistor, J.
+    pub brake_j: f64,
+    /// Why the firmware released the bridge, if it did.
+    pub fault: Option<&'static str>,
+    /// ms.
+    pub time_ms: Vec<f64>,
+    /// V.
+    pub bus_v: Vec<f64>,
+    /// Of the rotor, rad/s.
+    pub speed_rad_s: Vec<f64>,
+}
+
+/// With and without.
+pub fn measure(bench: &Bench) -> Result<Vec<RegenerationReport>, ToolError> {
+    [true, false].into_iter().map(|chopper| one(bench, chopper)).collect()
+}
+
+fn one(bench: &Bench, chopper: bool) -> Result<RegenerationReport, ToolError> {
+    let inertia = INERTIA / (bench.axis.ratio * bench.axis.ratio);
+    let mut rig = bench.rig(bench.top_speed, 0.0)?;
+    if chopper {
+        rig = rig.with_chopper();
+    }
+    rig.hold(0.0, 0.02);
+    rig.stand.set_load(Load::Free { inertia, coulomb: 0.0, viscous: 0.0, torque: 0.0 });
+    let before = *rig.stand.supply().energy();
+    let (mut highest, mut time_ms, mut bus_v, mut speed_rad_s) =
+        (0.0_f64, Vec::new(), Vec::new(), Vec::new());
+    for period in 0..(LONGEST_S / PERIOD_S) as usize {
+        rig.period(CURRENT);
+        let (bus, speed) = (rig.stand.supply().voltage(), rig.stand.rotor().speed);
+        highest = highest.max(bus);
+        if period.is_multiple_of(STRIDE) {
+            time_ms.push(1e3 * period as f64 * PERIOD_S);
+            bus_v.push(bus);
+            speed_rad_s.push(speed);
+        }
+        if speed < END * bench.top_speed || rig.axis.fault().is_some() {
+            break;
+        }
+    }
+    let energy = rig.stand.supply().energy();
+    Ok(RegenerationReport {
+        chopper,
+        highest_bus_v: highest,
+        motion_j: 0.5 * inertia * bench.top_speed * bench.top_speed,
+        returned_j: before.bridges - energy.bridges,
+        brake_j: energy.brake - before.brake,
+        fault: rig.axis.fault().map(|fault| match fault {
+            AxisFault::CurrentSense => "current_sense",
+            AxisFault::Overcurrent => "overcurrent",
+            AxisFault::BusVoltage => "bus_voltage",
+            AxisFault::Encoder => "encoder",
+            AxisFault::NotANumber => "not_a_number",
+        }),
+        time_ms,
+        bus_v,
+        speed_rad_s,
+    })
+}
