@@ -13,8 +13,8 @@ use crate::units::Ampere;
 /// PWM periods per second, and so samples and commands of one axis.
 pub const CURRENT_RATE_HZ: u32 = 24_000;
 
-/// What one axis' converter and counter say in one PWM period, taken at the same instant: the middle of the zero vector in
-/// which all low sides conduct.
+/// What one axis' converter and counter say in one PWM period, of the same instant: the middle of the zero vector in which all
+/// low sides conduct. A board samples the shunts later than that by what their amplifiers lag (docs/motor.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AxisSample {
     /// Codes of the shunt amplifiers of the phases B and C, 12 bits; half of the range is no current.

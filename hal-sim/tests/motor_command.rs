@@ -33,8 +33,9 @@ fn steps_of_current_rise_as_designed_at_every_speed() {
     assert_eq!(entries("steps").len(), 8);
     for step in entries("steps") {
         let (rise, overshoot) = (number(step, "rise_ms"), number(step, "overshoot_percent"));
-        // Inductance is measured to 2 %, the current between samples is a straight line.
-        assert!((rise / number(designed, "rise_ms") - 1.0).abs() < 0.15, "{rise} {designed}");
+        // Inductance is measured to 2 %; at the top speed the axis turns by 9 degrees while the step rises.
+        let tolerance = if step["feedforward"] == true { 0.08 } else { 0.15 };
+        assert!((rise / number(designed, "rise_ms") - 1.0).abs() < tolerance, "{rise} {designed}");
         assert!(overshoot < number(designed, "overshoot_percent") + 6.0, "{overshoot} {designed}");
         assert!(number(step, "error_a").abs() < 0.3, "{}", step["error_a"]);
     }
@@ -98,7 +99,10 @@ fn a_voltage_limit_costs_no_more_than_a_step_to_come_back_from() {
 fn the_chopper_keeps_the_bus_within_bounds_and_without_it_the_firmware_lets_go() {
     let [with, without] = entries("regeneration") else { panic!("two brakings") };
     assert!(number(with, "highest_bus_v") < 54.0 && with["fault"].is_null(), "{}", with["highest_bus_v"]);
-    assert!(number(with, "brake_j") > 0.8 * number(with, "returned_j"), "what comes back is burnt");
+    // The rest raised the capacitor's voltage and is drawn from it again at the end.
+    let burnt = number(with, "brake_j") / number(with, "returned_j");
+    assert!((0.8..1.0).contains(&burnt), "what comes back is burnt, and only that: {burnt}");
+    assert!(number(with, "returned_j") < number(with, "motion_j"));
     assert_eq!(without["fault"], "bus_voltage");
     // Beyond 58 V the bridge is released within two ticks.
     assert!((57.0..60.0).contains(&number(without, "highest_bus_v")), "{}", without["highest_bus_v"]);

@@ -7,11 +7,11 @@
 //! v = u within |v| <= V,  d first:  |v_d| <= 0.87 V,  |v_q| <= sqrt(V^2 - v_d^2)
 //! s += (1 - exp(-R T / L)) (v - fed forward - s)                              integral of what was realised
 //!
-//! kp = 2 pi f L
+//! kp = 2 pi f T R / (1 - exp(-R T / L))                   2 pi f L for R T << L
 //! ```
 //!
 //! Where the limit leaves v = u alone the last line is s += ki e with ki = kp (1 - exp(-R T / L)), so the controller's
-//! zero lies on the motor's pole.
+//! zero lies on the pole of the motor as it is sampled, and what is left is `2 pi f T / (z (z - 1))` whatever R and L are.
 //!
 //! `w` electrical speed, rad/s; `f` bandwidth (crossover of the open loop), Hz; `T` PWM period. Open loop:
 //! `2 pi f / s exp(-1.5 T s)`, one period of computing and half of one of holding, so
@@ -80,13 +80,15 @@ impl CurrentGains {
             && (1e-6..=1e-2).contains(&inductance_h.d)
             && (1e-6..=1e-2).contains(&inductance_h.q)
             && (0.0..=1.0).contains(&motor.flux.0);
-        let proportional = core::f32::consts::TAU * bandwidth.0;
+        let period_s = 1.0 / CURRENT_RATE_HZ as f32;
+        let volt_per_ampere = core::f32::consts::TAU * bandwidth.0 * period_s * motor.resistance.0;
         let renewal =
             |inductance: f32| 1.0 - exp(-motor.resistance.0 / (inductance * CURRENT_RATE_HZ as f32));
         let forward = if feedforward { 1.0 } else { 0.0 };
+        let renewal = Rotating { d: renewal(inductance_h.d), q: renewal(inductance_h.q) };
         sensible.then(|| Self {
-            proportional_ohm: Rotating { d: proportional * inductance_h.d, q: proportional * inductance_h.q },
-            renewal: Rotating { d: renewal(inductance_h.d), q: renewal(inductance_h.q) },
+            proportional_ohm: Rotating { d: volt_per_ampere / renewal.d, q: volt_per_ampere / renewal.q },
+            renewal,
             inductance_h: Rotating { d: forward * inductance_h.d, q: forward * inductance_h.q },
             flux_vs: forward * motor.flux.0,
             bandwidth,

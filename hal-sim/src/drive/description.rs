@@ -57,6 +57,8 @@ pub struct ShuntDescription {
     pub gain: f64,
     /// Of the amplifier's first-order settling, s: 1 % after 1.2 us.
     pub settling: f64,
+    /// From the middle of the lower zero vector to what the converter holds, s.
+    pub delay: f64,
     /// Between which the amplifier's output stays, V.
     pub rails: [f64; 2],
     /// Code without current, less half of the range.
@@ -73,6 +75,8 @@ impl Default for ShuntDescription {
             resistance: 500e-6,
             gain: 40.0,
             settling: 0.26e-6,
+            // A trigger 20 timer clocks beyond the middle, 3 converter clocks of sampling.
+            delay: 20.0 / 168e6 + 3.0 / 21e6,
             rails: [0.15, 3.15],
             offset_codes: [12.0, -9.0],
             gain_error: [0.0; 2],

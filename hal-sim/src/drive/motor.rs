@@ -1,26 +1,28 @@
-//! Permanent-magnet motor by the flux linkages of its three phases.
+//! Permanent-magnet motor by the flux linkages of its windings, at rest with the stator.
 //!
-//! Why another formulation than the firmware's: its rotating frame appears nowhere here. States are the flux linkages of the
-//! phases themselves, inductances depend on the rotor's position, and the back-EMF is nothing apart: it is the part of the
-//! flux's change that the magnets make.
+//! Why another formulation than the firmware's: its rotating frame appears nowhere here. States are the flux linkages
+//! themselves, inductances depend on the rotor's position, and the back-EMF is nothing apart: it is the part of the
+//! flux's change that the magnets make. Fluxes, currents and voltages of the three phases less their mean are two numbers,
+//! one along phase 0 and one across:
 //!
 //! ```text
-//! d psi_k / dt = v_k - v_star - R i_k                      v_star so that the fluxes keep their sum, 0
-//! i_k = sum_m G_km (psi_m - flux cos(angle - 120 m))       G_kk = g0 + g2 cos(2 angle - 240 k)
-//!                                                          G_km = -g0/2 + g2 cos(2 angle - 120 (k + m))
-//! g0 = (1/Ld + 1/Lq) / 3,   g2 = (1/Ld - 1/Lq) / 3
-//! torque = pole pairs sqrt(3)/2 (psi_0 (i_1 - i_2) - (psi_1 - psi_2) i_0)
+//! x_a = (2 x_0 - x_1 - x_2) / 3,   x_b = (x_1 - x_2) / sqrt 3;       x_0 = x_a,  x_1,2 = -x_a/2 +- sqrt 3/2 x_b
+//! d psi / dt = v - R i
+//! i_a = (m + s cos 2 angle) f_a + s sin 2 angle f_b          f = psi - flux (cos angle, sin angle)
+//! i_b = s sin 2 angle f_a + (m - s cos 2 angle) f_b          m, s = (1/Ld +- 1/Lq) / 2
+//! torque = 3/2 pole pairs (psi_a i_b - psi_b i_a)
 //! ```
 //!
-//! `v_k` terminal voltages (V), `R` of winding and switch (ohm), angle electrical (degrees in the text, rad in the code),
-//! `Ld`, `Lq` along and across the magnets' axis (H). With i_k = -i sin(angle - 120 k) the torque is 1.5 pole pairs flux i.
-//! Source: Park 1929 in phase quantities, as in Krause, Wasynczuk and Sudhoff, Analysis of Electric Machinery, chapter 1;
-//! G is the inverse of the phases' inductance matrix on currents of sum 0.
+//! `v` terminal voltages (V), `R` of winding and switch (ohm), angle electrical (rad), `Ld`, `Lq` along and across the
+//! magnets' axis (H). With i_k = -i sin(angle - 120 k) the torque is 1.5 pole pairs flux i.
+//! Source: Park 1929 in quantities of the stator, as in Krause, Wasynczuk and Sudhoff, Analysis of Electric Machinery,
+//! chapter 1.
 //!
-//! A step is the midpoint rule with terminal voltages and speed held. An output with both switches off carries what its
-//! diodes allow: its voltage is that which ends the step without current, kept between the diodes' limits
-//! (complementarity, implicit Euler; several such outputs by Gauss-Seidel). Cost: two evaluations of the currents, some 70
-//! operations. Known limits: sinusoidal flux, no saturation, no iron losses, magnets that do not warm.
+//! A step is the midpoint rule with terminal voltages and speed held. An output with both switches off is led by the diode that
+//! its current keeps open; where the current could end within the step, its voltage is that which ends the step without
+//! current, kept between the diodes' limits (complementarity, implicit Euler; several such outputs by Gauss-Seidel).
+//! Cost: two evaluations of the currents, some 60 operations. Known limits: sinusoidal flux, no saturation, no iron losses,
+//! magnets that do not warm.
 
 use super::description::MotorDescription;
 use crate::maths::sin_cos;
@@ -63,18 +65,22 @@ impl Direction {
         }
     }
 
-    /// Cosines of the angle, of 120 degrees less and of 240 degrees less.
-    fn phases(&self) -> [f64; 3] {
-        let (along, across) = (-0.5 * self.cosine, SIN_60 * self.sine);
-        [self.cosine, along + across, along - across]
+    /// Cosine and sine of twice the angle.
+    fn doubled(&self) -> [f64; 2] {
+        [self.cosine * self.cosine - self.sine * self.sine, 2.0 * self.sine * self.cosine]
     }
+}
 
-    fn doubled(&self) -> Self {
-        Self {
-            cosine: self.cosine * self.cosine - self.sine * self.sine,
-            sine: 2.0 * self.sine * self.cosine,
-        }
-    }
+/// A quantity of the three phases less their mean: along phase 0 and across.
+type Pair = [f64; 2];
+
+fn pair(phases: &[f64; 3]) -> Pair {
+    [(2.0 * phases[0] - phases[1] - phases[2]) / 3.0, (phases[1] - phases[2]) / (2.0 * SIN_60)]
+}
+
+fn phases(pair: &Pair) -> [f64; 3] {
+    let (along, across) = (-0.5 * pair[0], SIN_60 * pair[1]);
+    [pair[0], along + across, along - across]
 }
 
 /// What a terminal is connected to during a step.
@@ -101,7 +107,7 @@ pub struct Flow {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motor {
     description: MotorDescription,
-    /// Of the inverse inductances, mean and swing: g0 and g2, 1/H.
+    /// Of the inverse inductances, mean and swing: m and s, 1/H.
     mean: f64,
     swing: f64,
     /// Of winding at its temperature and switch, ohm.
@@ -110,12 +116,12 @@ pub struct Motor {
     torque_factor: f64,
     /// Winding, degrees Celsius.
     temperature: f64,
-    /// Of the phases, V s; sum 0.
-    flux: [f64; 3],
+    /// V s.
+    flux: Pair,
     /// Electrical angle now.
     angle: Direction,
     /// What follows from both, A.
-    currents: [f64; 3],
+    currents: Pair,
 }
 
 impl Motor {
@@ -125,21 +131,21 @@ impl Motor {
         let (along, across) = (1.0 / description.inductance_d, 1.0 / description.inductance_q);
         Self {
             description: *description,
-            mean: (along + across) / 3.0,
-            swing: (along - across) / 3.0,
+            mean: 0.5 * (along + across),
+            swing: 0.5 * (along - across),
             resistance: description.resistance + on_resistance,
             on_resistance,
-            torque_factor: f64::from(description.pole_pairs) * SIN_60,
+            torque_factor: 1.5 * f64::from(description.pole_pairs),
             temperature: AMBIENT,
-            flux: angle.phases().map(|share| description.flux * share),
+            flux: [description.flux * angle.cosine, description.flux * angle.sine],
             angle,
-            currents: [0.0; 3],
+            currents: [0.0; 2],
         }
     }
 
     /// Puts the rotor elsewhere, without current.
     pub fn place(&mut self, angle: Direction) {
-        (self.angle, self.flux, self.currents) = (angle, self.of_magnets(&angle), [0.0; 3]);
+        (self.angle, self.flux, self.currents) = (angle, self.of_magnets(&angle), [0.0; 2]);
     }
 
     /// Puts right what small turns have added up; fluxes stay.
@@ -162,26 +168,21 @@ impl Motor {
     /// Currents into the phases, A.
     #[must_use]
     pub fn currents(&self) -> [f64; 3] {
-        self.currents
+        phases(&self.currents)
     }
 
     /// Amplitudes of the currents along and across the magnets' axis, A.
     #[must_use]
     pub fn rotor_currents(&self) -> [f64; 2] {
-        let [first, second, third] = self.angle.phases();
-        let [one, two, three] = self.currents;
-        // Of a sum of 0 the shares along and a quarter turn ahead: -sin is the difference of the other cosines over sqrt 3.
-        let along = 2.0 / 3.0 * (first * one + second * two + third * three);
-        let across =
-            (one * (third - second) + two * (first - third) + three * (second - first)) / (3.0 * SIN_60);
-        [along, across]
+        let ([along, across], Direction { cosine, sine }) = (self.currents, self.angle);
+        [cosine * along + sine * across, cosine * across - sine * along]
     }
 
     /// Energy of the currents' field, J.
     #[must_use]
     pub fn field_energy(&self) -> f64 {
         let magnets = self.of_magnets(&self.angle);
-        (0..3).map(|phase| 0.5 * self.currents[phase] * (self.flux[phase] - magnets[phase])).sum()
+        (0..2).map(|part| 0.75 * self.currents[part] * (self.flux[part] - magnets[part])).sum()
     }
 
     /// Warms the winding by `heat` (J) within `duration` s.
@@ -196,37 +197,55 @@ impl Motor {
 
     /// One step of `duration` s with the rotor turning at `speed` (electrical, rad/s).
     pub fn advance(&mut self, terminals: &[Terminal; 3], speed: f64, duration: f64) -> Flow {
-        match terminals {
-            [Terminal::Held(one), Terminal::Held(two), Terminal::Held(three)] => {
-                self.driven([*one, *two, *three], speed, duration)
-            }
-            _ => self.partly_off(terminals, speed, duration),
+        let mut voltages = [0.0; 3];
+        let currents = phases(&self.currents);
+        for ((voltage, terminal), current) in voltages.iter_mut().zip(terminals).zip(currents) {
+            *voltage = match *terminal {
+                Terminal::Held(held) => held,
+                // A current into the motor comes through the lower diode.
+                Terminal::Off(low, high) if current.abs() > self.largest_change(high - low, duration) => {
+                    if current > 0.0 {
+                        low
+                    } else {
+                        high
+                    }
+                }
+                Terminal::Off(..) => return self.partly_off(terminals, speed, duration),
+            };
         }
+        self.driven(&voltages, speed, duration)
     }
 
-    /// All terminals held: midpoint rule.
-    fn driven(&mut self, voltages: [f64; 3], speed: f64, duration: f64) -> Flow {
-        let star = (voltages[0] + voltages[1] + voltages[2]) / 3.0;
+    /// No current changes by more within a step, A: twice what the bus makes of the smaller inductance; infinite where the wire
+    /// is broken.
+    fn largest_change(&self, bus: f64, duration: f64) -> f64 {
+        2.0 * bus * duration * (self.mean + self.swing.abs())
+    }
+
+    /// All terminals at known voltages: midpoint rule.
+    fn driven(&mut self, voltages: &[f64; 3], speed: f64, duration: f64) -> Flow {
+        let driving = pair(voltages);
         let middle = self.angle.turned(0.5 * speed * duration);
         let start = self.currents;
-        let half: [f64; 3] = core::array::from_fn(|phase| {
-            self.flux[phase] + 0.5 * duration * (voltages[phase] - star - self.resistance * start[phase])
+        let half: Pair = core::array::from_fn(|part| {
+            self.flux[part] + 0.5 * duration * (driving[part] - self.resistance * start[part])
         });
         let currents = self.currents_of(&half, &middle);
-        for phase in 0..3 {
-            self.flux[phase] += duration * (voltages[phase] - star - self.resistance * currents[phase]);
+        for part in 0..2 {
+            self.flux[part] += duration * (driving[part] - self.resistance * currents[part]);
         }
         self.set_angle(middle.turned(0.5 * speed * duration));
         self.flow(&half, &currents, duration)
     }
 
-    /// Some terminal is off: implicit in its voltage.
+    /// Some terminal is off and its current may end: implicit in its voltage.
+    #[inline(never)]
     fn partly_off(&mut self, terminals: &[Terminal; 3], speed: f64, duration: f64) -> Flow {
         let start = self.currents;
         let end = self.angle.turned(speed * duration);
         let all_off = terminals.iter().all(|terminal| matches!(terminal, Terminal::Off(..)));
         if all_off
-            && start.iter().all(|current| current.abs() < NO_CURRENT)
+            && phases(&start).iter().all(|current| current.abs() < NO_CURRENT)
             && self.stays_dark(terminals, speed)
         {
             self.place(end);
@@ -237,27 +256,30 @@ impl Motor {
             Terminal::Off(low, high) if low.is_finite() && high.is_finite() => 0.5 * (low + high),
             Terminal::Off(..) => 0.0,
         });
-        let doubled = end.doubled().phases();
-        let flux_at = |voltages: &[f64; 3]| -> [f64; 3] {
-            let star = (voltages[0] + voltages[1] + voltages[2]) / 3.0;
-            core::array::from_fn(|phase| {
-                self.flux[phase] + duration * (voltages[phase] - star - self.resistance * start[phase])
+        let flux_at = |voltages: &[f64; 3]| -> Pair {
+            let driving = pair(voltages);
+            core::array::from_fn(|part| {
+                self.flux[part] + duration * (driving[part] - self.resistance * start[part])
             })
         };
+        // Cosines of twice the angle, turned to each phase: cos(2 angle - 240 k).
+        let [cosine, sine] = end.doubled();
+        let [first, third, second] = phases(&[cosine, sine]);
+        let swings = [first, second, third];
         let off = terminals.iter().filter(|terminal| matches!(terminal, Terminal::Off(..))).count();
         for _ in 0..if off == 1 { 1 } else { SWEEPS } {
             for phase in 0..3 {
                 let Terminal::Off(low, high) = terminals[phase] else { continue };
-                let current = self.currents_of(&flux_at(&voltages), &end)[phase];
-                let slope = (self.mean + self.swing * doubled[2 * phase % 3]) * duration;
+                let current = phases(&self.currents_of(&flux_at(&voltages), &end))[phase];
+                let slope = 2.0 / 3.0 * (self.mean + self.swing * swings[phase]) * duration;
                 voltages[phase] = (voltages[phase] - current / slope).clamp(low, high);
             }
         }
         let before = self.flux;
         self.flux = flux_at(&voltages);
         self.set_angle(end);
-        let half = core::array::from_fn(|phase| 0.5 * (before[phase] + self.flux[phase]));
-        let currents = core::array::from_fn(|phase| 0.5 * (start[phase] + self.currents[phase]));
+        let half = core::array::from_fn(|part| 0.5 * (before[part] + self.flux[part]));
+        let currents = core::array::from_fn(|part| 0.5 * (start[part] + self.currents[part]));
         self.flow(&half, &currents, duration)
     }
 
@@ -270,32 +292,27 @@ impl Motor {
         })
     }
 
-    fn flow(&self, flux: &[f64; 3], currents: &[f64; 3], duration: f64) -> Flow {
-        let torque =
-            self.torque_factor * (flux[0] * (currents[1] - currents[2]) - (flux[1] - flux[2]) * currents[0]);
-        let squares = currents[0] * currents[0] + currents[1] * currents[1] + currents[2] * currents[2];
+    fn flow(&self, flux: &Pair, currents: &Pair, duration: f64) -> Flow {
+        let torque = self.torque_factor * (flux[0] * currents[1] - flux[1] * currents[0]);
+        let squares = 1.5 * (currents[0] * currents[0] + currents[1] * currents[1]);
         Flow {
             impulse: torque * duration,
-            charge: currents.map(|current| current * duration),
+            charge: phases(currents).map(|current| current * duration),
             heat: self.resistance * squares * duration,
         }
     }
 
-    fn of_magnets(&self, angle: &Direction) -> [f64; 3] {
-        angle.phases().map(|share| self.description.flux * share)
+    fn of_magnets(&self, angle: &Direction) -> Pair {
+        [self.description.flux * angle.cosine, self.description.flux * angle.sine]
     }
 
     #[inline]
-    fn currents_of(&self, flux: &[f64; 3], angle: &Direction) -> [f64; 3] {
+    fn currents_of(&self, flux: &Pair, angle: &Direction) -> Pair {
         let magnets = self.of_magnets(angle);
-        let [one, two, three] = [flux[0] - magnets[0], flux[1] - magnets[1], flux[2] - magnets[2]];
-        let [first, second, third] = angle.doubled().phases();
-        let mean = 1.5 * self.mean;
-        [
-            mean * one + self.swing * (first * one + second * two + third * three),
-            mean * two + self.swing * (second * one + third * two + first * three),
-            mean * three + self.swing * (third * one + first * two + second * three),
-        ]
+        let [along, across] = [flux[0] - magnets[0], flux[1] - magnets[1]];
+        let [cosine, sine] = angle.doubled();
+        let (swing, coupling) = (self.swing * cosine, self.swing * sine);
+        [(self.mean + swing) * along + coupling * across, coupling * along + (self.mean - swing) * across]
     }
 
     /// Cogging torque at a rotor angle (rad), N m: the negative slope of a potential, so it does no work over a turn.

@@ -1,12 +1,13 @@
 //! Shunts under the low sides of B and C, their amplifiers and the converter.
 //!
 //! ```text
-//! seen    = (i - settling di/dt) (1 - exp(-t / settling))        t since the low side began to conduct, else nothing
+//! seen    = (i + (delay - settling) di/dt) (1 - exp(-t / settling))        t since the low side began to conduct, else nothing
 //! volt    = middle + gain (1 + error) shunt seen,                within the rails
 //! code    = nearest whole number of volt / 3.3 * 4096 + offset + noise,    0..=4095
 //! ```
 //!
-//! A first-order amplifier that follows a ramp is late by its time constant, and after the edge it first has to get there: a
+//! A first-order amplifier that follows a ramp is late by its time constant; the converter holds `delay` after the middle of
+//! the lower zero vector what it sees. After the edge the amplifier first has to get there: a
 //! duty that leaves the low side too little time is read wrong, here as on the board. Half of the range is no current; a
 //! higher code is a current from the bridge into the motor. Sources: board facts in `description`.
 //! Cost: two exponentials and two random numbers per axis and period.
@@ -43,7 +44,7 @@ impl ShuntDescription {
     #[must_use]
     pub fn code(&self, channel: usize, state: &ShuntState, generator: &mut Xoshiro256PlusPlus) -> u16 {
         let settled = 1.0 - exp(-state.conducting / self.settling);
-        let seen = (state.current - self.settling * state.slope) * settled;
+        let seen = (state.current + (self.delay - self.settling) * state.slope) * settled;
         let gain = self.gain * (1.0 + self.gain_error.get(channel).copied().unwrap_or(0.0));
         let [low, high] = self.rails;
         let volt = (0.5 * CONVERTER_VOLT + gain * self.resistance * seen).clamp(low, high);

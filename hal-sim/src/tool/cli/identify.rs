@@ -37,7 +37,6 @@ pub struct IdentifyArguments {
     /// Ideal currents, or motors, bridges and sensors under the board's current loops.
     #[arg(long, value_enum, default_value = "ideal")]
     drive: DriveArgument,
-    #[arg(long)]
     /// Identify again with a known mass, KG@JOINT:X_M[:Y_M] (JOINT: name or number; X along the link): tells the torque constants.
     #[arg(long)]
     payload: Option<PlacedMass>,

@@ -30,7 +30,7 @@ pub struct RegenerationReport {
     pub highest_bus_v: f64,
     /// Energy of the motion at the beginning, J.
     pub motion_j: f64,
-    /// Given back to the bus, J.
+    /// Given back to the bus while the motor generated, J; at low speed the windings take more than the motion gives.
     pub returned_j: f64,
     /// Of it into the brake resistor, J.
     pub brake_j: f64,
@@ -60,8 +60,11 @@ fn one(bench: &Bench, chopper: bool) -> Result<RegenerationReport, ToolError> {
     let before = *rig.stand.supply().energy();
     let (mut highest, mut time_ms, mut bus_v, mut speed_rad_s) =
         (0.0_f64, Vec::new(), Vec::new(), Vec::new());
+    let mut returned_j = 0.0;
     for period in 0..(LONGEST_S / PERIOD_S) as usize {
+        let taken = rig.stand.supply().energy().bridges;
         rig.period(CURRENT);
+        returned_j += (taken - rig.stand.supply().energy().bridges).max(0.0);
         let (bus, speed) = (rig.stand.supply().voltage(), rig.stand.rotor().speed);
         highest = highest.max(bus);
         if period.is_multiple_of(STRIDE) {
@@ -78,7 +81,7 @@ fn one(bench: &Bench, chopper: bool) -> Result<RegenerationReport, ToolError> {
         chopper,
         highest_bus_v: highest,
         motion_j: 0.5 * inertia * bench.top_speed * bench.top_speed,
-        returned_j: before.bridges - energy.bridges,
+        returned_j,
         brake_j: energy.brake - before.brake,
         fault: rig.axis.fault().map(|fault| match fault {
             AxisFault::CurrentSense => "current_sense",

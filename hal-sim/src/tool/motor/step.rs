@@ -2,7 +2,7 @@
 //!
 //! From 5 to 25 A at constant speed; the mean over eight rotor angles, so that ripple and timer steps average out and what is
 //! left is the loop. Designed is `i[k+1] = i[k] + w T (target - i[k-1])`, w = 2 pi f: the integrator that the controller's zero
-//! leaves of motor and controller, one period late and held for one.
+//! leaves of motor and controller, one period late and held for one. The step comes with the sample of index 0.
 
 use core::f64::consts::TAU;
 
@@ -72,11 +72,9 @@ fn shape(values: &[f64]) -> Shape {
 #[must_use]
 pub fn response(bandwidth_hz: f64) -> Vec<f64> {
     let gain = TAU * bandwidth_hz * PERIOD_S;
-    let (mut before, mut now) = (0.0, 0.0);
-    let mut values = vec![0.0];
-    for _ in 0..PERIODS {
-        (before, now) = (now, now + gain * (1.0 - before));
-        values.push(now);
+    let mut values = vec![0.0, 0.0];
+    while let (true, &[.., before, now]) = (values.len() <= PERIODS, values.as_slice()) {
+        values.push(now + gain * (1.0 - before));
     }
     values
 }
