@@ -1,0 +1,169 @@
+//! Calibration of many motors and wirings: the firmware's machine against the simulated hardware.
+//!
+//! Everything differs from seed to seed: motor, encoder, shunts, friction, cogging, which leads are moved on in a circle.
+//! Twenty of each are run here; a hundred with `cargo test --release -p hal-sim --test calibration -- --ignored --nocapture`.
+
+mod trial;
+
+use core::f64::consts::TAU;
+
+use hal_sim::drive::description::EncoderWiring;
+use hal_sim::drive::stand::Load;
+use scarab::hal::AxisCommand;
+use scarab::motor::{Axis, AxisRequest, Direction, Phase, Refusal};
+use scarab::units::Ampere;
+use trial::Trial;
+
+/// Errors of a sound motor: resistance, both inductances (relative), offset (electrical degrees).
+fn errors(seed: u64) -> [f64; 4] {
+    let trial = Trial::sound(seed);
+    let (mut stand, result, _) = trial.run(seed);
+    let found = result.unwrap_or_else(|reason| panic!("seed {seed}: {reason:?}\n{trial:?}"));
+    let motor = &trial.axis.motor;
+    // A switch that conducts is part of what the modulator's voltage sees.
+    let resistance = motor.resistance + trial.axis.bridge.on_resistance;
+
+    // A quadrature current on a blocked rotor: what of it lies along the true flux is the offset's error.
+    stand.set_load(Load::Turned(0.0));
+    let mut sample = stand.period(&AxisCommand::RELEASED, 0.0);
+    let mut axis = Axis::new(&trial.configuration, &found, &sample).expect("sensible");
+    let request = AxisRequest { enabled: true, current: Ampere(10.0) };
+    let mut sums = [0.0; 2];
+    for tick in 0..1200 {
+        sample = stand.period(&axis.tick(&sample, request), 0.0);
+        if tick >= 600 {
+            let [d, q] = stand.rotor_currents();
+            sums = [sums[0] + d, sums[1] + q];
+        }
+    }
+    assert_eq!(axis.fault(), None, "seed {seed}");
+    let [d, q] = sums;
+    let positive = match trial.configuration.counter {
+        Direction::Up => q,
+        Direction::Down => -q,
+    };
+    assert!(positive > 0.0, "seed {seed}: the torque has the wrong sign");
+    [
+        f64::from(found.resistance().0) / resistance - 1.0,
+        f64::from(found.direct_inductance().0) / motor.inductance_d - 1.0,
+        f64::from(found.quadrature_inductance().0) / motor.inductance_q - 1.0,
+        // Small enough to be its own tangent.
+        d / q.abs() / TAU * 360.0,
+    ]
+}
+
+fn sound(seeds: core::ops::RangeInclusive<u64>) {
+    let mut worst = [0.0_f64; 4];
+    for seed in seeds {
+        let errors = errors(seed);
+        println!(
+            "{seed:>3}  R {:+.4}  Ld {:+.4}  Lq {:+.4}  offset {:+.2}",
+            errors[0], errors[1], errors[2], errors[3]
+        );
+        for (worst, error) in worst.iter_mut().zip(errors) {
+            *worst = worst.max(error.abs());
+        }
+    }
+    println!("worst R {:.4} Ld {:.4} Lq {:.4} offset {:.2}", worst[0], worst[1], worst[2], worst[3]);
+    // The bounds: 2 %, 1 electrical degree.
+    assert!(worst[..3].iter().all(|error| *error < 0.02) && worst[3] < 1.0, "{worst:?}");
+}
+
+/// Each wrong wiring in turn and what it has to be called.
+fn spoil(trial: &mut Trial, seed: u64) -> Refusal {
+    let wiring = &mut trial.axis.wiring;
+    match seed % 12 {
+        0 => {
+            wiring.phases.swap(0, 1);
+            Refusal::Direction
+        }
+        1 => {
+            wiring.phases.swap(1, 2);
+            Refusal::Direction
+        }
+        2 => {
+            wiring.encoder = match wiring.encoder {
+                EncoderWiring::Reversed => EncoderWiring::Forward,
+                _ => EncoderWiring::Reversed,
+            };
+            Refusal::Direction
+        }
+        3 => {
+            wiring.encoder = EncoderWiring::Missing;
+            Refusal::NoCounts
+        }
+        output @ 4..=6 => {
+            wiring.open = Some(output as usize - 4);
+            Refusal::PhaseOpen([Phase::A, Phase::B, Phase::C][output as usize - 4])
+        }
+        7 => {
+            wiring.shunts_exchanged = true;
+            Refusal::ShuntsSwapped
+        }
+        shunt @ 8..=9 => {
+            wiring.shunts_inverted[shunt as usize - 8] = true;
+            Refusal::ShuntInverted([Phase::B, Phase::C][shunt as usize - 8])
+        }
+        10 => {
+            wiring.shunts_inverted = [true; 2];
+            Refusal::ShuntsInverted
+        }
+        _ => {
+            let pairs = trial.configuration.pole_pairs;
+            trial.configuration.pole_pairs = if pairs == 7 { 8 } else { 7 };
+            Refusal::PolePairs(pairs)
+        }
+    }
+}
+
+fn wrong(seeds: core::ops::RangeInclusive<u64>) {
+    for seed in seeds {
+        let mut trial = Trial::sound(seed);
+        let expected = spoil(&mut trial, seed);
+        let (stand, result, furthest) = trial.run(seed);
+        assert_eq!(result.err(), Some(expected), "seed {seed}\n{trial:?}");
+        // Nothing ran away: the rotor went no further than the field took it, and half an electrical turn to align.
+        let pairs = f64::from(trial.axis.motor.pole_pairs);
+        let field = (f64::from(trial.configuration.pole_pairs) + 1.6) / pairs;
+        assert!(furthest < field, "seed {seed}: {furthest} turns, {:?}", stand.rotor());
+    }
+}
+
+#[test]
+fn sound_motors_are_measured_and_their_torque_has_the_right_sign() {
+    sound(1..=20);
+}
+
+#[test]
+fn every_wrong_wiring_is_refused_by_name_and_no_rotor_runs_away() {
+    wrong(1..=24);
+}
+
+#[test]
+#[ignore = "some minutes"]
+fn a_hundred_sound_motors() {
+    sound(1..=100);
+}
+
+#[test]
+#[ignore = "some minutes"]
+fn a_hundred_wrong_wirings() {
+    wrong(1..=100);
+}
+
+#[test]
+fn counts_per_turn_that_are_not_the_encoders_are_refused() {
+    for seed in 1..=4 {
+        let mut trial = Trial::sound(seed);
+        trial.configuration.counts_per_turn = 6000;
+        let (_, result, _) = trial.run(seed);
+        let true_counts = trial.axis.counter.counts;
+        let Err(Refusal::CountsPerTurn(found)) = result else { panic!("seed {seed}: {result:?}") };
+        // An eighth of an electrical turn of friction's lag.
+        let error = f64::from(found) / true_counts - 1.0;
+        assert!(
+            error.abs() < 0.125 / f64::from(trial.axis.motor.pole_pairs),
+            "seed {seed}: {found} of {true_counts}"
+        );
+    }
+}

@@ -1,0 +1,138 @@
+//! A motor on its stand with what its axis was told about it.
+
+use core::f64::consts::TAU;
+
+use hal_sim::drive::description::{
+    AxisDescription, BridgeDescription, CounterDescription, EncoderWiring, MotorDescription,
+    ShuntDescription, SupplyDescription, Wiring,
+};
+use hal_sim::drive::stand::{Load, Stand};
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use scarab::hal::AxisCommand;
+use scarab::motor::{
+    AxisConfiguration, BridgeTiming, Calibration, CalibrationSettings, CalibrationStep, Calibrator, DeadTime,
+    Direction, Refusal, SenseScale, Sine,
+};
+use scarab::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
+
+#[derive(Debug)]
+pub struct Trial {
+    pub axis: AxisDescription,
+    pub load: Load,
+    pub angle: f64,
+    pub configuration: AxisConfiguration,
+    pub settings: CalibrationSettings,
+}
+
+struct Dice(Xoshiro256PlusPlus);
+
+impl Dice {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn one_of<T: Copy, const N: usize>(&mut self, all: [T; N]) -> T {
+        all[(self.0.next_u64() >> 33) as usize % N]
+    }
+}
+
+/// A, holding current.
+const CURRENT: f64 = 20.0;
+
+impl Trial {
+    /// Wired as its axis was told.
+    pub fn sound(seed: u64) -> Self {
+        let mut dice = Dice(Xoshiro256PlusPlus::seed_from_u64(seed));
+        let pole_pairs = dice.one_of([4, 5, 7, 10, 14, 21]);
+        let counts = dice.one_of([2400.0, 4000.0, 8192.0, 10_000.0, 16_384.0]);
+        // 30 mOhm to 0.3 Ohm, as many small as large; L/R of 0.3 ms to 1.5 ms; 20 to 100 mN m/A.
+        let resistance = dice.one_of([0.03, 0.05, 0.08, 0.13, 0.2]) * dice.between(1.0, 1.5);
+        let inductance_d = resistance * dice.between(0.3e-3, 1.5e-3);
+        let torque_per_ampere = dice.between(0.02, 0.1);
+        let holding = torque_per_ampere * CURRENT;
+        let flux = torque_per_ampere / (1.5 * f64::from(pole_pairs));
+        let motor = MotorDescription {
+            resistance,
+            inductance_d,
+            inductance_q: inductance_d * dice.between(1.0, 1.4),
+            flux,
+            pole_pairs,
+            electrical_zero: dice.between(0.0, TAU),
+            cogging: dice.between(0.0, 0.03) * holding,
+            cogging_periods: 6 * pole_pairs,
+            thermal_resistance: 1.0,
+            thermal_time: 600.0,
+        };
+        let shunts = ShuntDescription {
+            offset_codes: [dice.between(-80.0, 80.0), dice.between(-80.0, 80.0)],
+            gain_error: [dice.between(-0.003, 0.003), dice.between(-0.003, 0.003)],
+            noise_codes: dice.between(0.5, 2.0),
+            ..ShuntDescription::default()
+        };
+        let reversed = dice.one_of([true, false]);
+        let wiring = Wiring {
+            phases: dice.one_of([[0, 1, 2], [1, 2, 0], [2, 0, 1]]),
+            encoder: if reversed { EncoderWiring::Reversed } else { EncoderWiring::Forward },
+            ..Wiring::default()
+        };
+        let counter = CounterDescription {
+            counts,
+            start: dice.one_of([0, 1, 40_000, 65_535]),
+            index: dice.between(0.0, TAU),
+        };
+        let bridge = BridgeDescription::default();
+        let load = Load::Free {
+            inertia: dice.between(0.5e-4, 10e-4),
+            coulomb: dice.between(0.0, 0.15) * holding,
+            viscous: dice.between(1e-4, 5e-4),
+            torque: 0.0,
+        };
+        let configuration = AxisConfiguration {
+            sense: SenseScale::ODRIVE_3_6,
+            timing: BridgeTiming::ODRIVE_3_6,
+            dead_time: DeadTime::Compensated { band: Ampere(0.5) },
+            pole_pairs: pole_pairs as u8,
+            flux: Weber(flux as f32),
+            counts_per_turn: counts as u32,
+            index: true,
+            counter: if reversed { Direction::Down } else { Direction::Up },
+            flexion: Direction::Up,
+            bandwidth: Hertz(1000.0),
+            feedforward: true,
+            sine: Sine::Fast,
+            current_limit: Ampere(40.0),
+            overcurrent: Ampere(58.0),
+            bus: [Volt(20.0), Volt(58.0)],
+            greatest_speed: RadianPerSecond(400.0),
+        };
+        Self {
+            axis: AxisDescription { motor, bridge, shunts, counter, wiring, ratio: 50.0 },
+            load,
+            angle: dice.between(0.0, 6.0),
+            configuration,
+            settings: CalibrationSettings {
+                current: Ampere(CURRENT as f32),
+                voltage: Volt(9.0),
+                turns_per_s: 12.0,
+            },
+        }
+    }
+
+    /// Runs the machine to its end; with the furthest that the rotor was from where it began, turns.
+    pub fn run(&self, seed: u64) -> (Stand, Result<Calibration, Refusal>, f64) {
+        let mut stand = Stand::new(&self.axis, &SupplyDescription::default(), self.load, self.angle, seed);
+        let mut calibrator = Calibrator::new(&self.configuration, self.settings).expect("sensible");
+        let mut sample = stand.period(&AxisCommand::RELEASED, 0.0);
+        let mut furthest = 0.0_f64;
+        loop {
+            let command = match calibrator.tick(&sample) {
+                CalibrationStep::Running(command) => command,
+                CalibrationStep::Done(found) => return (stand, Ok(found), furthest),
+                CalibrationStep::Refused(reason) => return (stand, Err(reason), furthest),
+            };
+            sample = stand.period(&command, 0.0);
+            furthest = furthest.max((stand.rotor().angle - self.angle).abs() / TAU);
+        }
+    }
+}
