@@ -117,7 +117,7 @@ mod tests {
             bus.advance(0.0, 1.0, 1e-6);
         }
         // Implicit steps of 1 us: first order in 1 us / 3 ms.
-        assert!((bus.voltage() / (above * (-50e-6 / 3e-3_f64).exp()) - 1.0).abs() < 1e-5);
+        assert!((bus.voltage() / (above * crate::maths::exp(-50e-6 / 3e-3)) - 1.0).abs() < 1e-5);
         for _ in 0..100_000 {
             bus.advance(0.0, 1.0, 1e-6);
         }
