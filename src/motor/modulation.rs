@@ -19,7 +19,7 @@
 //! (1 - d_max) / (2 f) >= max(t_d + t_settle, t_adc)
 //! ```
 //!
-//! 119 ns + 1.2 us (DRV8301 at 40 V/V to 1 % of 2 V, from memory of its data sheet SLOS719: to be checked), 3 + 12 cycles of 21 MHz: 0.71 us;
+//! 119 ns + 1.2 us (DRV8301 at 40 V/V to 1 % of 2 V, from memory of its data sheet SLOS719: to be checked), the trigger's delay (docs/motor.md) and 3 + 12 cycles of 21 MHz: 0.83 us;
 //! so at 24 kHz d_max = 0.9367. Centred about one half and not about d_max / 2, because only equal zero vectors make the
 //! sample the mean of the ripple: by the shift the error is v s / (2 L f) at most, s the shift. It arises above
 //! 0.873 of the largest voltage only.
@@ -45,14 +45,21 @@ pub struct BridgeTiming {
     pub dead_time: Second,
     /// From a phase current's change of path to a settled shunt amplifier.
     pub settling: Second,
-    /// Sampling and conversion after the trigger.
+    /// Sampling and conversion after the middle of the lower zero vector.
     pub conversion: Second,
+    /// Share of a period by which the timer can change a duty.
+    pub duty_step: f32,
 }
 
 impl BridgeTiming {
-    /// ODrive v3.6: 20 cycles of 168 MHz, DRV8301 at 40 V/V, 15 cycles of 21 MHz.
-    pub const ODRIVE_3_6: Self =
-        Self { dead_time: Second(119e-9), settling: Second(1.2e-6), conversion: Second(0.714e-6) };
+    /// ODrive v3.6: 20 cycles of 168 MHz, DRV8301 at 40 V/V, 20 cycles of 168 MHz to the trigger and 15 of 21 MHz from there,
+    /// 3,500 steps up and as many down.
+    pub const ODRIVE_3_6: Self = Self {
+        dead_time: Second(119e-9),
+        settling: Second(1.2e-6),
+        conversion: Second(0.833e-6),
+        duty_step: 1.0 / 3500.0,
+    };
 }
 
 /// How dead time is treated.
@@ -75,6 +82,7 @@ pub struct Modulator {
     /// Duty that the dead time takes; 0 where it is not given back.
     dead_duty: f32,
     per_band: f32,
+    duty_step: f32,
 }
 
 impl Modulator {
@@ -92,15 +100,28 @@ impl Modulator {
         let sensible = times.iter().all(|time| (0.0..1.0).contains(&time.0))
             && greatest_duty >= 0.5
             && (0.0..=100.0).contains(&per_band)
+            && (0.0..=0.01).contains(&timing.duty_step)
             && dead_duty < 0.1;
         let circle_per_bus = (greatest_duty - 2.0 * dead_duty) * ONE_OVER_SQRT_3;
-        sensible.then_some(Self { greatest_duty, circle_per_bus, dead_duty, per_band })
+        sensible.then_some(Self {
+            greatest_duty,
+            circle_per_bus,
+            dead_duty,
+            per_band,
+            duty_step: timing.duty_step,
+        })
     }
 
     /// Largest duty at which the shunts can still be read.
     #[must_use]
     pub const fn greatest_duty(&self) -> f32 {
         self.greatest_duty
+    }
+
+    /// Share of a period by which a duty changes at least.
+    #[must_use]
+    pub const fn duty_step(&self) -> f32 {
+        self.duty_step
     }
 
     /// Longest voltage vector in any direction.

@@ -58,7 +58,7 @@ pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfigura
         flexion: Direction::Up,
         bandwidth: BANDWIDTH,
         feedforward: true,
-        sine: Sine::Fast,
+        sine: Sine::default(),
         current_limit: Ampere(joint.current_limit() as f32),
         overcurrent: OVERCURRENT,
         bus: BUS,

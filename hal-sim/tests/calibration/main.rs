@@ -1,7 +1,7 @@
 //! Calibration of many motors and wirings: the firmware's machine against the simulated hardware.
 //!
 //! Everything differs from seed to seed: motor, encoder, shunts, friction, cogging, which leads are moved on in a circle.
-//! Twenty of each are run here; a hundred with `cargo test --release -p hal-sim --test calibration -- --ignored --nocapture`.
+//! Figures: `cargo test -p hal-sim --test calibration -- --nocapture`.
 
 mod trial;
 
@@ -23,13 +23,14 @@ fn errors(seed: u64) -> [f64; 4] {
     // A switch that conducts is part of what the modulator's voltage sees.
     let resistance = motor.resistance + trial.axis.bridge.on_resistance;
 
-    // A quadrature current on a blocked rotor: what of it lies along the true flux is the offset's error.
-    stand.set_load(Load::Turned(0.0));
+    // A quadrature current on a rotor that is turned slowly over many counts (2,400 of them and 21 pole pairs are 3 degrees
+    // each): what of it lies along the true flux is the offset's error.
+    stand.set_load(Load::Turned(2.0));
     let mut sample = stand.period(&AxisCommand::RELEASED, 0.0);
     let mut axis = Axis::new(&trial.configuration, &found, &sample).expect("sensible");
     let request = AxisRequest { enabled: true, current: Ampere(10.0) };
     let mut sums = [0.0; 2];
-    for tick in 0..1200 {
+    for tick in 0..12_600 {
         sample = stand.period(&axis.tick(&sample, request), 0.0);
         if tick >= 600 {
             let [d, q] = stand.rotor_currents();
@@ -65,7 +66,7 @@ fn sound(seeds: core::ops::RangeInclusive<u64>) {
         }
     }
     println!("worst R {:.4} Ld {:.4} Lq {:.4} offset {:.2}", worst[0], worst[1], worst[2], worst[3]);
-    // The bounds: 2 %, 1 electrical degree.
+    // Gains to 2 % keep the loop's margins; 1 electrical degree costs 0.02 % of the torque.
     assert!(worst[..3].iter().all(|error| *error < 0.02) && worst[3] < 1.0, "{worst:?}");
 }
 
@@ -124,30 +125,18 @@ fn wrong(seeds: core::ops::RangeInclusive<u64>) {
         assert_eq!(result.err(), Some(expected), "seed {seed}\n{trial:?}");
         // Nothing ran away: the rotor went no further than the field took it, and half an electrical turn to align.
         let pairs = f64::from(trial.axis.motor.pole_pairs);
-        let field = (f64::from(trial.configuration.pole_pairs) + 1.6) / pairs;
+        let field = (f64::from(trial.configuration.pole_pairs) + 2.6) / pairs;
         assert!(furthest < field, "seed {seed}: {furthest} turns, {:?}", stand.rotor());
     }
 }
 
 #[test]
 fn sound_motors_are_measured_and_their_torque_has_the_right_sign() {
-    sound(1..=20);
-}
-
-#[test]
-fn every_wrong_wiring_is_refused_by_name_and_no_rotor_runs_away() {
-    wrong(1..=24);
-}
-
-#[test]
-#[ignore = "some minutes"]
-fn a_hundred_sound_motors() {
     sound(1..=100);
 }
 
 #[test]
-#[ignore = "some minutes"]
-fn a_hundred_wrong_wirings() {
+fn every_wrong_wiring_is_refused_by_name_and_no_rotor_runs_away() {
     wrong(1..=100);
 }
 
@@ -158,7 +147,12 @@ fn counts_per_turn_that_are_not_the_encoders_are_refused() {
         trial.configuration.counts_per_turn = 6000;
         let (_, result, _) = trial.run(seed);
         let true_counts = trial.axis.counter.counts;
-        let Err(Refusal::CountsPerTurn(found)) = result else { panic!("seed {seed}: {result:?}") };
+        let found = match result {
+            Err(Refusal::CountsPerTurn(found)) => found,
+            // The same counts per electrical turn, and one index seen only: nothing tells it from other pole pairs.
+            Err(Refusal::PolePairs(pairs)) => 6000 * trial.axis.motor.pole_pairs / u32::from(pairs),
+            other => panic!("seed {seed}: {other:?}"),
+        };
         // An eighth of an electrical turn of friction's lag.
         let error = f64::from(found) / true_counts - 1.0;
         assert!(

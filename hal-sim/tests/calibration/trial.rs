@@ -100,16 +100,19 @@ impl Trial {
             flexion: Direction::Up,
             bandwidth: Hertz(1000.0),
             feedforward: true,
-            sine: Sine::Fast,
+            sine: Sine::default(),
             current_limit: Ampere(40.0),
             overcurrent: Ampere(58.0),
             bus: [Volt(20.0), Volt(58.0)],
             greatest_speed: RadianPerSecond(400.0),
         };
+        // Where cogging lets a rotor rest.
+        let tooth = TAU / f64::from(motor.cogging_periods);
+        let angle = (dice.between(0.0, 6.0) / tooth).round() * tooth;
         Self {
             axis: AxisDescription { motor, bridge, shunts, counter, wiring, ratio: 50.0 },
             load,
-            angle: dice.between(0.0, 6.0),
+            angle,
             configuration,
             settings: CalibrationSettings {
                 current: Ampere(CURRENT as f32),

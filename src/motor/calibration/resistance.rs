@@ -11,16 +11,22 @@
 //! A current that flows must lie within 15 degrees of the voltage; each wrong wiring bends it by 30 or more on one of the
 //! axes, with its own pattern of signs. Where a wrong sign turns the hold's feedback around, a quarter of the current is enough.
 //!
+//! **Dither.** A timer's step of 48 V / 3500 is 14 mV where 10 A through 50 mOhm are 500: a duty that stands still is rounded
+//! the same way for as long as it stands, and R would be 1 to 3 % off. So the voltage along the axis moves up a saw tooth of 16
+//! ticks by 4/3 of a step, of which the centred modulation makes one step in every phase, up in one and down in two.
+//!
 //! The rotor swings towards the field, and while it does its flux takes or gives voltage along it; so means of 0.1 s are
 //! taken until two in a row agree to 0.2 % (at least 0.3 s, at most 4 s), twice per axis.
 
 use super::hold::Hold;
 use super::{ElectricalAngle, Outcome, Phase, Reading, Refusal, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
-use crate::units::{Ampere, Ohm};
+use crate::units::{Ampere, Ohm, Volt};
 
 const RISE_TICKS: u32 = CURRENT_RATE_HZ / 10;
 const MEAN_TICKS: u32 = CURRENT_RATE_HZ / 10;
+/// Of the saw tooth.
+const DITHER_TICKS: u32 = 16;
 const RELEASE_TICKS: u32 = CURRENT_RATE_HZ / 10;
 const LEVEL_TICKS: u32 = 4 * CURRENT_RATE_HZ;
 /// Share by which two means of a settled rotor may differ.
@@ -126,7 +132,14 @@ impl ResistanceStage {
             }
             (self.ticks, self.before) = (0, None);
         }
-        Ok(Outcome::Running(self.hold.voltage()))
+        Ok(Outcome::Running(self.hold.voltage_with(self.dither(reading), Volt::ZERO)))
+    }
+
+    /// From one half of a saw tooth's height below nothing to one above.
+    fn dither(&self, reading: &Reading<'_>) -> Volt {
+        let height = reading.bus * (4.0 / 3.0 * reading.bench.modulator.duty_step());
+        let share = ((self.ticks % DITHER_TICKS) as f32 + 0.5) / DITHER_TICKS as f32 - 0.5;
+        height * share
     }
 
     /// The sums of a mean that agrees with the one before.
@@ -181,7 +194,6 @@ impl ResistanceStage {
         }
     }
 
-    /// By the mean at half current: a rotor that swings towards the field bends the current as well.
     /// By the mean at half current: a rotor that swings towards the field bends the current as well.
     fn judge_direction(&self, half: Sums, phase: Phase) -> Result<(), Refusal> {
         let (along, across) = (self.hold.along_axis(half.current), self.hold.across_axis(half.current));

@@ -7,8 +7,16 @@
 //! ```
 //!
 //! Whole turns, so that cogging and an encoder off its centre average out; both ways, so that friction and the loop's delay
-//! cancel. Each way begins with one electrical turn in which nothing is measured. Current is held by the current loop of
-//! the axis in a frame that the field defines, not the encoder: its quadrature axis lies along the field.
+//! cancel. Current is held by the current loop of the axis in a frame that the field defines, not the encoder: its
+//! quadrature axis lies along the field.
+//!
+//! Field and rotor are a spring and a mass with hardly a damper: sqrt(pole pairs * holding torque / inertia), some 20 Hz. A field
+//! that jumps to its speed leaves the rotor swinging by a tenth of an electrical turn and more, for as long as the way lasts; so
+//! it takes and loses its speed evenly within one electrical turn at either end, in which nothing is measured.
+//!
+//! ```text
+//! t_a = 2 run-in / v;     field = v t^2 / (2 t_a),  v (t - t_a / 2),  way - v (t_end - t)^2 / (2 t_a)
+//! ```
 //!
 //! Judged in this order: the counter moved at all; with the field; by one turn's counts to an eighth of an electrical
 //! turn; evenly (deviations within a third of a turn of their first, lag below a sixth); the index at one place.
@@ -21,7 +29,7 @@ use crate::hal::CURRENT_RATE_HZ;
 use crate::motor::{CurrentGains, CurrentLoop, ElectricalAngle, Rotating, Sine};
 use crate::units::Volt;
 
-/// The rotor swings to rest at the beginning of each way, electrical turns of the field.
+/// The field takes its speed at the beginning of each way and loses it at the end, electrical turns.
 const RUN_IN_TURNS: f32 = 1.0;
 const REST_TICKS: u32 = CURRENT_RATE_HZ / 5;
 const FALL_TICKS: u32 = CURRENT_RATE_HZ / 20;
@@ -81,6 +89,27 @@ impl Deviation {
     }
 }
 
+/// How far the field has come on a way of `length` turns after so many s.
+fn travelled(seconds: f32, length: f32, turns_per_s: f32) -> f32 {
+    let half_rise_s = RUN_IN_TURNS / turns_per_s;
+    let end_s = length / turns_per_s + 2.0 * half_rise_s;
+    let curved = |seconds: f32| 0.25 * turns_per_s / half_rise_s * seconds * seconds;
+    if seconds < 2.0 * half_rise_s {
+        curved(seconds)
+    } else if seconds < end_s - 2.0 * half_rise_s {
+        turns_per_s * (seconds - half_rise_s)
+    } else if seconds < end_s {
+        length - curved(end_s - seconds)
+    } else {
+        length
+    }
+}
+
+/// The field has its speed there.
+fn steadily(turned: f32, length: f32) -> bool {
+    turned > RUN_IN_TURNS && turned <= length - RUN_IN_TURNS
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scan {
     gains: CurrentGains,
@@ -95,7 +124,8 @@ pub(super) struct Scan {
     counter: Option<u16>,
     /// Counts from the beginning, growing with the field where all is well.
     way: i32,
-    measured_from: Option<i32>,
+    /// The way where measuring began and where it is now.
+    measured: Option<[i32; 2]>,
     deviation: Deviation,
     forwards: Option<ElectricalAngle>,
     /// Where on the way the index came first.
@@ -118,7 +148,7 @@ impl Scan {
             field_turns: 0.0,
             counter: None,
             way: 0,
-            measured_from: None,
+            measured: None,
             deviation: Deviation::default(),
             forwards: None,
             index: None,
@@ -131,8 +161,8 @@ impl Scan {
         let bench = reading.bench;
         self.follow(reading);
         let pairs = f32::from(bench.pole_pairs);
-        let length = pairs + RUN_IN_TURNS;
-        let turned = self.ticks as f32 * (bench.settings.turns_per_s / CURRENT_RATE_HZ as f32);
+        let length = pairs + 2.0 * RUN_IN_TURNS;
+        let seconds = self.ticks as f32 * (1.0 / CURRENT_RATE_HZ as f32);
         self.ticks += 1;
         let mut share = 1.0;
         match self.leg {
@@ -140,11 +170,12 @@ impl Scan {
             Leg::Rest if self.field_turns > 0.0 => self.begin(Leg::Backwards),
             Leg::Rest => self.begin(Leg::Forwards),
             Leg::Forwards => {
-                self.field_turns = turned.min(length);
+                let turned = travelled(seconds, length, bench.settings.turns_per_s);
+                self.field_turns = turned;
                 if self.searched() {
                     self.begin(Leg::Judge);
                 } else {
-                    self.measure(reading, turned > RUN_IN_TURNS);
+                    self.measure(reading, steadily(turned, length));
                     if turned >= length {
                         self.end_forwards(reading)?;
                         self.begin(Leg::Rest);
@@ -152,21 +183,26 @@ impl Scan {
                 }
             }
             Leg::Backwards => {
-                let end = if self.stored.is_some() { -length } else { 0.0 };
-                self.field_turns = (self.begin_turns - turned).max(end);
+                let length = if self.stored.is_some() { 2.0 * length } else { length };
+                let turned = travelled(seconds, length, bench.settings.turns_per_s);
+                self.field_turns = self.begin_turns - turned;
                 if self.searched() {
                     self.begin(Leg::Judge);
                 } else {
-                    self.measure(reading, turned > RUN_IN_TURNS);
-                    if self.field_turns <= end {
+                    self.measure(reading, steadily(turned, length));
+                    if turned >= length {
                         self.end_backwards(reading)?;
                         self.begin(Leg::Fall);
                     }
                 }
             }
-            Leg::Judge if self.ticks < REST_TICKS => {}
+            Leg::Judge if self.ticks < REST_TICKS => {
+                if self.ticks > REST_TICKS / 2 {
+                    self.measure_from_index(reading);
+                }
+            }
             Leg::Judge => {
-                self.judge_stored(reading)?;
+                self.judge_stored()?;
                 self.begin(Leg::Fall);
             }
             Leg::Fall => {
@@ -192,7 +228,7 @@ impl Scan {
         self.leg = leg;
         self.ticks = 0;
         self.begin_turns = self.field_turns;
-        self.measured_from = None;
+        self.measured = None;
         self.deviation = Deviation::default();
     }
 
@@ -230,7 +266,8 @@ impl Scan {
 
     fn measure(&mut self, reading: &Reading<'_>, measuring: bool) {
         if measuring {
-            let _ = self.measured_from.get_or_insert(self.way);
+            let [from, _] = self.measured.unwrap_or([self.way; 2]);
+            self.measured = Some([from, self.way]);
             let rotor = reading.bench.scale.angle(self.place(reading, self.way));
             self.deviation.push(self.field().minus(rotor));
         }
@@ -241,7 +278,8 @@ impl Scan {
             return Ok(());
         }
         let bench = reading.bench;
-        let travel = self.way.wrapping_sub(self.measured_from.unwrap_or(self.way));
+        let [from, to] = self.measured.unwrap_or_default();
+        let travel = to.wrapping_sub(from);
         let turn = bench.scale.counts_per_turn() as f32;
         let pairs = f32::from(bench.pole_pairs);
         let electrical = travel as f32 * pairs / turn;
@@ -285,10 +323,18 @@ impl Scan {
         Ok(())
     }
 
-    fn judge_stored(&mut self, reading: &Reading<'_>) -> Result<(), Refusal> {
-        let (Some(offset), Some(index)) = (self.stored, self.index) else { return Err(Refusal::NoIndex) };
-        let rotor = reading.bench.scale.angle(self.place(reading, self.way.wrapping_sub(index))).plus(offset);
-        if self.field().since(rotor).abs() > GREATEST_LAG {
+    /// As `measure`, of places from the index on.
+    fn measure_from_index(&mut self, reading: &Reading<'_>) {
+        let Some(index) = self.index else { return };
+        let rotor = reading.bench.scale.angle(self.place(reading, self.way.wrapping_sub(index)));
+        self.deviation.push(self.field().minus(rotor));
+    }
+
+    fn judge_stored(&self) -> Result<(), Refusal> {
+        let Some(offset) = self.stored.filter(|_| self.deviation.ticks > 0) else {
+            return Err(Refusal::NoIndex);
+        };
+        if self.deviation.mean().since(offset).abs() > GREATEST_LAG {
             return Err(Refusal::StoredOffset);
         }
         Ok(())

@@ -150,7 +150,8 @@ fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     legend(area, (LEFT, 35), &[("rms", Key::Curve(rms)), ("sixth harmonic", Key::Curve(sixth))])?;
     let (_, area) = area.split_vertically(px(HEAD));
     let quiet: Vec<_> = report.ripple.iter().filter(|ripple| !ripple.noise).collect();
-    let largest = quiet.iter().map(|ripple| ripple.torque_percent).fold(0.01, f64::max);
+    let largest =
+        quiet.iter().map(|ripple| ripple.torque_percent.max(ripple.sixth_percent)).fold(0.01, f64::max);
     for (index, ripple) in quiet.iter().enumerate() {
         let y = 14 + 20 * index as i32;
         let compensated = if ripple.compensated { "dead time given back" } else { "not given back" };
