@@ -351,8 +351,12 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             sum.add(velocity * velocity);
         }
         let rows = self.filter.push(&self.low_pass, &model.rows(&instant));
-        if let Some(rows) = &rows {
-            self.take(rows);
+        match &rows {
+            Some(rows) => self.take(rows),
+            // Nine of ten samples finish no row.
+            None => {
+                self.window.tidy();
+            }
         }
         Some(Progress { instant, rows })
     }

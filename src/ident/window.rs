@@ -13,7 +13,8 @@
 //!
 //! Memory: `ROOM` numbers and about 1 kB. For the default leg (9 + 3 and 7 + 3 columns) a block takes 161 numbers, so
 //! 8192 numbers hold 50 blocks: 22 s of motion in pieces of 0.32 and 0.64 s.
-//! Cost: a row is rotated into a factor of its joint's columns; every eighth output two blocks are merged.
+//! Cost: a row is rotated into a factor of its joint's columns. Every eighth output two blocks are merged, one joint at each
+//! call of [`Window::tidy`], so that no sample bears the whole; the blocks say the same at any time.
 //! Limits: with three joints and 28 columns there is room for 10 blocks only; a chain whose joint sees more than
 //! 32 columns is not held.
 
@@ -83,6 +84,8 @@ pub struct Window<T, const N: usize, const B: usize, const ROOM: usize> {
     /// Filter outputs in each slot, those of joints that stood still included.
     outputs: [u32; LARGEST_BLOCKS],
     closed: usize,
+    /// Place of the pair that is being joined, and the joint that comes next.
+    joining: Option<(u8, u8)>,
     room: [T; ROOM],
 }
 
@@ -98,6 +101,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
             level: [0; LARGEST_BLOCKS],
             outputs: [0; LARGEST_BLOCKS],
             closed: 0,
+            joining: None,
             room: [T::zero(); ROOM],
         }
     }
@@ -105,6 +109,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
     /// Forgets all rows.
     pub fn clear(&mut self) {
         (self.stride, self.capacity, self.closed) = (0, 0, 0);
+        self.joining = None;
     }
 
     /// Columns of each joint.
@@ -158,7 +163,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         let fits = self.columns.iter().all(|columns| columns.all() <= LARGEST_COLUMNS);
         self.capacity = if fits { (ROOM / start.max(1)).min(LARGEST_BLOCKS) } else { 0 };
         self.order = core::array::from_fn(|slot| slot as u8);
-        self.closed = 0;
+        (self.closed, self.joining) = (0, None);
         if self.capacity > 0 {
             self.empty(0);
         }
@@ -181,6 +186,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         if self.capacity < 2 {
             return false;
         }
+        while self.tidy() {}
         let slot = self.slot(self.closed);
         for joint in (0..N).filter(|&joint| taken[joint]) {
             let columns = self.columns[joint];
@@ -201,38 +207,51 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         }
         self.outputs[slot] += 1;
         if self.outputs[slot] >= BLOCK_ROWS {
-            self.close();
+            self.end_block();
         }
         true
     }
 
     /// Ends the open block: what follows does not continue it.
     pub fn close(&mut self) {
-        if self.capacity < 2 || self.outputs[self.slot(self.closed)] == 0 {
-            return;
+        while self.tidy() {}
+        if self.capacity >= 2 && self.outputs[self.slot(self.closed)] > 0 {
+            self.end_block();
         }
-        self.closed += 1;
-        if self.closed >= self.capacity {
-            self.make_room();
-        }
-        let next = self.slot(self.closed);
-        self.empty(next);
+        while self.tidy() {}
     }
 
-    /// Joins the pair of neighbours that [`Window`] speaks of; where levels differ everywhere, the shortest pair.
-    fn make_room(&mut self) {
+    fn end_block(&mut self) {
+        self.closed += 1;
+        if self.closed >= self.capacity {
+            self.joining = self.pair_to_join().map(|place| (place as u8, 0));
+        } else {
+            self.empty(self.slot(self.closed));
+        }
+    }
+
+    /// The pair of neighbours that [`Window`] speaks of; where levels differ everywhere, the shortest pair.
+    fn pair_to_join(&self) -> Option<usize> {
         let pair = |place: &usize| (self.slot(*place), self.slot(*place + 1));
         let equal = (0..self.closed - 1)
             .filter(|place| self.level[pair(place).0] == self.level[pair(place).1])
             .min_by_key(|place| self.level[pair(place).0]);
-        let place = equal.or_else(|| {
+        equal.or_else(|| {
             (0..self.closed - 1)
                 .min_by_key(|place| self.outputs[pair(place).0].saturating_add(self.outputs[pair(place).1]))
-        });
-        let Some(place) = place else { return };
-        let (kept, freed) = pair(&place);
-        for joint in 0..N {
-            self.merge(kept, freed, joint);
+        })
+    }
+
+    /// Makes room where the last block took it: one joint's part of two blocks becomes one. Tells whether there was
+    /// something to do. [`Self::insert`] does what is left over.
+    pub fn tidy(&mut self) -> bool {
+        let Some((place, joint)) = self.joining else { return false };
+        let (place, joint) = (usize::from(place), usize::from(joint));
+        let (kept, freed) = (self.slot(place), self.slot(place + 1));
+        self.merge(kept, freed, joint);
+        if joint + 1 < N {
+            self.joining = Some((place as u8, joint as u8 + 1));
+            return true;
         }
         self.level[kept] = self.level[kept].max(self.level[freed]).saturating_add(1);
         self.outputs[kept] = self.outputs[kept].saturating_add(self.outputs[freed]);
@@ -241,6 +260,9 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
             younger.rotate_left(1);
         }
         self.closed -= 1;
+        self.joining = None;
+        self.empty(self.slot(self.closed));
+        true
     }
 
     fn merge(&mut self, kept: usize, freed: usize, joint: usize) {
@@ -253,10 +275,11 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         let (Some(low), Some(high)) = (low, high) else { return };
         let (into, from) = if kept < freed { (low, high) } else { (high, low) };
         packed::merge(into, from, columns.all(), T::one());
-        if let ([.., absolute, rows], [.., other_absolute, other_rows]) = (into, from) {
+        if let ([.., absolute, rows], [.., other_absolute, other_rows]) = (into, &mut *from) {
             *absolute += *other_absolute;
             *rows += *other_rows;
         }
+        from.fill(T::zero());
     }
 
     fn part_mut(&mut self, slot: usize, joint: usize) -> Option<&mut [T]> {
@@ -268,7 +291,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
     /// Number of blocks with rows, the open one included.
     #[must_use]
     pub fn blocks(&self) -> usize {
-        let open = self.capacity > 1 && self.outputs[self.slot(self.closed)] > 0;
+        let open = self.capacity > 1 && self.joining.is_none() && self.outputs[self.slot(self.closed)] > 0;
         self.closed + usize::from(open)
     }
 

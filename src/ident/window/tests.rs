@@ -93,3 +93,36 @@ fn a_window_without_room_says_so() {
     assert!(!window.insert(&rounded(&row(0)), &[true]));
     assert_eq!(window.blocks(), 0);
 }
+
+#[test]
+fn blocks_say_the_same_before_while_and_after_two_of_them_are_joined() {
+    let mut window = Window::<f64, 2, COLUMNS, 1500>::of_columns(COLUMNS, [None; 2], 0);
+    let (mut joined, parameters) = (0, [0.5; COLUMNS]);
+    for index in 0..2000 {
+        let [one, torque] = [row(index), row(index)].map(|rows| (rows.regressor[0], rows.torque[0]));
+        let rows = FilteredRows {
+            regressor: [one.0; 2],
+            stribeck: [[0.0; BANK]; 2],
+            torque: [torque.1, 2.0 * torque.1],
+            still: [0.0; 2],
+        };
+        assert!(window.insert(&rows, &[true; 2]));
+        let told = |window: &Window<f64, 2, COLUMNS, 1500>, joint| {
+            let parts = (0..window.blocks()).filter_map(|block| window.part(block, joint));
+            parts.fold((0.0, 0.0), |(rows, cost), part| {
+                (rows + part.rows, cost + packed::cost(part.factor, COLUMNS, &parameters))
+            })
+        };
+        let before = [told(&window, 0), told(&window, 1)];
+        while window.tidy() {
+            joined += 1;
+            for joint in 0..2 {
+                let now = told(&window, joint);
+                assert_eq!(now.0, f64::from(index + 1));
+                // Two thousand rows in double precision.
+                assert!((now.1 / before[joint].1 - 1.0).abs() < 1e-11, "{now:?} {before:?}");
+            }
+        }
+    }
+    assert!(joined > 100, "{joined} parts joined: the room was never full");
+}
