@@ -8,8 +8,8 @@
 //! 3. The monitor decides, last.
 //! 4. The integrals learn what was applied.
 //!
-//! Cost, counted in the emulator (Cortex-M4F, two joints, enabled, no model): 840 instructions; the log 50, and the
-//! commanded state of a gait of six harmonics 300 before it.
+//! Cost, `scripts/count-instructions` (Cortex-M4F, two joints, enabled): 1,118 instructions without a model, 1,988 with one,
+//! and 296 before it for the commanded state of six harmonics.
 //!
 //! What is not finite passes through to the monitor, which switches off in the same tick, and is kept out of every
 //! state: observers only take integers and a bounded acceleration, integrals are emptied.

@@ -26,7 +26,7 @@ pub const PENDING: usize = 26;
 /// The leg as the device holds it.
 pub type DeviceLeg<const N: usize, const B: usize> = Leg<N, B, TAPS, PENDING>;
 
-/// Evaluations of the search per servo tick: 8,000 per second. One costs some 7,800 instructions of the device at 13 base
+/// Evaluations of the search per servo tick: 8,000 per second. One costs some 7,900 instructions of the device at 13 base
 /// parameters, so the search takes half of the processor while it runs.
 pub const EVALUATIONS_PER_TICK: u32 = 2;
 

@@ -77,6 +77,10 @@ impl Tally {
         self.most = self.most.max(other.most);
     }
 
+    pub fn number(&self) -> u32 {
+        self.number
+    }
+
     pub fn mean(&self) -> u32 {
         ((self.sum + u64::from(self.number / 2)) / u64::from(self.number.max(1))) as u32
     }

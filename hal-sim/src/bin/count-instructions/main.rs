@@ -10,6 +10,9 @@
 mod axis_parts;
 mod axis_tick;
 mod counter;
+mod identification;
+mod leg;
+mod leg_tick;
 mod motor;
 mod peers;
 
@@ -20,15 +23,24 @@ fn main() -> ! {
     let kept = counter::start() && {
         let tick = axis_tick::report();
         peers::report();
-        tick
+        let leg = leg::model().and_then(|model| {
+            let tick = leg_tick::report(&model)?;
+            Some(identification::report(&model)? && tick)
+        });
+        tick && leg == Some(true)
     };
+    end(kept)
+}
+
+fn end(kept: bool) -> ! {
     debug::exit(if kept { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
-    loop {}
+    loop {
+        core::hint::spin_loop();
+    }
 }
 
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     hprintln!("{}", info);
-    debug::exit(debug::EXIT_FAILURE);
-    loop {}
+    end(false)
 }
