@@ -126,10 +126,10 @@ impl<const N: usize, const B: usize> Background<N, B> {
         })
     }
 
-    /// Not estimated, and so zero in the model.
-    pub fn is_zero(&self, solver: &Solver<f32, N, B>, joint: usize, parameter: Parameter) -> bool {
+    /// Not estimated, and so zero in the model; `dropped` are the base parameters held at zero.
+    pub fn is_zero(&self, dropped: &[bool; B], joint: usize, parameter: Parameter) -> bool {
         self.model.base.standing(joint, parameter) == Standing::Off
-            || solver.record().selection.drops(&self.device, joint, parameter)
+            || self.device.drive(joint, parameter).is_some_and(|base| dropped[base])
     }
 
     fn unit(&self, base: usize) -> &'static str {
@@ -164,6 +164,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
         let costs = self.costs(solver);
         let cost = costs.factor.excess(&solver.search().values().map(f64::from));
         let searched = solver.search().state() == SearchState::Done;
+        let dropped = &solver.record().selection.dropped;
+        let stribeck = self.stribeck(solver, &estimate.values);
         RunReport {
             schema: SCHEMA,
             leg: self.leg.clone(),
@@ -180,20 +182,26 @@ impl<const N: usize, const B: usize> Background<N, B> {
             condition: solver.condition().into(),
             parameters: self.parameters(solver, &estimate),
             base_parameters: self
-                .base_parameters(solver, &estimate, circumstances.cramer_rao.as_ref())
+                .base_parameters(dropped, &estimate, circumstances.cramer_rao.as_ref())
                 .into_iter()
-                .chain(self.surpluses(solver, &estimate.values, circumstances))
+                .chain(self.surpluses(&stribeck, &circumstances.surplus_cramer_rao))
                 .collect(),
-            stribeck: self.stribeck(solver, &estimate.values),
-            model_choice: self.model_choice(solver),
-            asymmetric_coulomb: self.directions(solver, &estimate),
+            stribeck,
+            model_choice: self.model_choice(
+                &solver.record().selection,
+                &core::array::from_fn(|joint| {
+                    let record = solver.record();
+                    (record.stribeck[joint].is_some(), record.torque[joint].root_mean_square)
+                }),
+            ),
+            asymmetric_coulomb: self.directions(dropped, &estimate),
             temperature_c: self.temperature_c.into(),
             outliers: OutliersReport::of(solver.record(), estimator_name(circumstances.estimator)),
             training: fits(training, &estimate.values),
             validation: fits(validation, &estimate.values),
             least_squares: LeastSquaresReport {
                 base_parameters: self
-                    .kept(solver)
+                    .kept(dropped)
                     .map(|base| (self.base_name(base), solver.least_squares().values[base].into()))
                     .chain(
                         self.stribeck(solver, &solver.least_squares().values)
@@ -217,8 +225,9 @@ impl<const N: usize, const B: usize> Background<N, B> {
             drive: circumstances.drive,
             simulated_s: circumstances.simulated_s,
             wall_s: circumstances.wall.as_secs_f64(),
-            detail: self.detail(solver, &estimate),
+            detail: self.detail(dropped, &estimate),
             compared: None,
+            trace: None,
         }
     }
 
@@ -228,13 +237,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
     }
 
     /// Surplus of static over Coulomb friction, of joints that have one or for which one was found.
-    fn surpluses(
-        &self,
-        solver: &Solver<f32, N, B>,
-        values: &[f32; B],
-        circumstances: &Circumstances<B>,
-    ) -> Vec<BaseReport> {
-        let found = self.stribeck(solver, values);
+    pub fn surpluses(&self, found: &[StribeckReport], cramer_rao: &[Option<f64>]) -> Vec<BaseReport> {
         let of = |joint: usize| {
             let found = found.iter().find(|found| found.joint == joint + 1);
             let truth = self.stribeck_truth[joint];
@@ -248,25 +251,26 @@ impl<const N: usize, const B: usize> Background<N, B> {
                     Some(_) => truth.map_or(0.0, |truth| truth.surplus).into(),
                     None => Number::UNKNOWN,
                 },
-                cramer_rao: circumstances.surplus_cramer_rao.get(joint).copied().flatten().into(),
+                cramer_rao: cramer_rao.get(joint).copied().flatten().into(),
             })
         };
         (0..N).filter_map(of).collect()
     }
 
     /// Base parameters that are not held at zero.
-    pub fn kept<'a>(&self, solver: &'a Solver<f32, N, B>) -> impl Iterator<Item = usize> + 'a {
-        (0..self.model.base.rank()).filter(|&base| !solver.record().selection.dropped[base])
+    pub fn kept<'a>(&self, dropped: &'a [bool; B]) -> impl Iterator<Item = usize> + 'a {
+        (0..self.model.base.rank()).filter(|&base| !dropped[base])
     }
 
-    fn base_parameters(
+    /// What torque determines.
+    pub fn base_parameters(
         &self,
-        solver: &Solver<f32, N, B>,
+        dropped: &[bool; B],
         estimate: &Estimate<f32, B>,
         cramer_rao: Option<&[f64; B]>,
     ) -> Vec<BaseReport> {
         let truth = self.truth.as_ref().map(|truth| self.model.base.project(truth));
-        self.kept(solver)
+        self.kept(dropped)
             .map(|base| BaseReport {
                 name: self.base_name(base),
                 terms: self
@@ -282,6 +286,19 @@ impl<const N: usize, const B: usize> Background<N, B> {
             .collect()
     }
 
+    /// The others of a parameter's base parameters.
+    #[must_use]
+    pub fn grouped_with(&self, joint: usize, parameter: Parameter) -> Vec<String> {
+        let carriers = self.model.base.carriers(joint, parameter);
+        let others = carriers
+            .flat_map(|base| self.terms(base))
+            .filter(|&(other, symbol, _)| (other, symbol) != (joint, parameter));
+        let mut names: Vec<String> = others.map(|(other, symbol, _)| self.name(other, symbol)).collect();
+        names.sort();
+        names.dedup();
+        names
+    }
+
     fn parameters(&self, solver: &Solver<f32, N, B>, estimate: &Estimate<f32, B>) -> Vec<ParameterReport> {
         let record = solver.record();
         let prior = self.prior.as_ref().map(prior_parameters);
@@ -295,19 +312,11 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 let alone =
                     matches!(status, Status::Identified | Status::Weak).then(|| carriers.first().copied());
                 let base = alone.flatten().filter(|&base| estimate.determined[base]);
-                let mut grouped_with: Vec<String> = carriers
-                    .iter()
-                    .flat_map(|&base| self.terms(base))
-                    .filter(|&(other, symbol, _)| (other, symbol) != (joint, parameter))
-                    .map(|(other, symbol, _)| self.name(other, symbol))
-                    .collect();
-                grouped_with.sort();
-                grouped_with.dedup();
                 reports.push(ParameterReport {
                     name: self.name(joint, parameter),
                     joint: joint + 1,
                     value: match (base, &completed) {
-                        _ if self.is_zero(solver, joint, parameter) => 0.0.into(),
+                        _ if self.is_zero(&record.selection.dropped, joint, parameter) => 0.0.into(),
                         (Some(base), _) => estimate.values[base].into(),
                         (None, Some(parameters)) => parameters[joint][parameter.index()].into(),
                         (None, None) => Number::UNKNOWN,
@@ -315,7 +324,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
                     unit: parameter.unit(),
                     sigma: base.and_then(|base| estimate.sigma(base)).into(),
                     status: status.name(),
-                    grouped_with,
+                    grouped_with: self.grouped_with(joint, parameter),
                     truth: self.truth.map(|truth| truth[joint][parameter.index()]).into(),
                     prior: prior.map(|prior| prior[joint][parameter.index()]).into(),
                 });
@@ -337,7 +346,8 @@ pub struct Costs<const B: usize> {
 }
 
 /// Name of static friction.
-fn surplus_name(joint: usize) -> String {
+#[must_use]
+pub fn surplus_name(joint: usize) -> String {
     format!("FS{}", joint + 1)
 }
 

@@ -12,6 +12,7 @@ mod noise;
 mod predict;
 mod regressor;
 mod replay;
+mod trace;
 
 use std::process::ExitCode;
 
@@ -35,6 +36,8 @@ enum Command {
     Excite(excite::ExciteArguments),
     /// Identify a leg from recordings.
     Replay(replay::ReplayArguments),
+    /// Report what a board told: a trace, decoded.
+    Trace(trace::TraceArguments),
     /// Predict the torque of given states with a model that was kept: CSV.
     Predict(predict::PredictArguments),
     /// Write a model that was kept as a robot description.
@@ -65,6 +68,7 @@ pub fn main() -> ExitCode {
     let outcome = match Cli::parse_from(words).command {
         Command::Excite(arguments) => excite::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
+        Command::Trace(arguments) => trace::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),

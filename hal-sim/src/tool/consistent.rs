@@ -57,7 +57,7 @@ pub fn compare<const N: usize, const B: usize>(
         settled: found.map(|_| solver.completion().converged()),
         excess_chi2: found.map(|found| cost(&found) - optimum).into(),
         iterations_to_half_chi2: iterations_to_half_chi2.filter(|_| found.is_some()),
-        consistent: found.is_some_and(|found| Limits::consistent(&found)),
+        consistent: Some(found.is_some_and(|found| Limits::consistent(&found))),
         parameters: named(background, found.as_ref()),
     };
     ConsistentReport {
@@ -65,7 +65,7 @@ pub fn compare<const N: usize, const B: usize>(
         optimum_over_least_squares: optimum.into(),
         result_over_least_squares: consistency.map(|found| found.excess).into(),
         degrees_of_freedom: consistency.map(|found| found.degrees_of_freedom),
-        full: full(background, solver, optimum, &cost),
+        full: Some(full(background, solver, optimum, &cost)),
         base,
     }
 }
@@ -91,7 +91,7 @@ fn full<const N: usize, const B: usize>(
         settled: None,
         excess_chi2: Number::UNKNOWN,
         iterations_to_half_chi2: None,
-        consistent: true,
+        consistent: Some(true),
         parameters: BTreeMap::new(),
     };
     let seed = solver.search().seed();
@@ -105,7 +105,7 @@ fn full<const N: usize, const B: usize>(
             ended = search.advance(&objective, 1);
         }
         let Some(found) = search.parameters(&objective) else { break };
-        report.consistent &= Limits::consistent(&found);
+        report.consistent = report.consistent.map(|before| before && Limits::consistent(&found));
         let excess = data_cost(&found) - optimum;
         report.excess_chi2 = excess.into();
         if excess <= ARRIVED && report.iterations_to_half_chi2.is_none() {

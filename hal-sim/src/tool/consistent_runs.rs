@@ -9,7 +9,7 @@ const ITERATIONS: u32 = 125;
 const EXCESS: f64 = 0.5;
 
 /// Picks one of a run's two searches.
-type Search = fn(&RunReport) -> &ConsistentSearchReport;
+type Search = fn(&RunReport) -> Option<&ConsistentSearchReport>;
 
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
@@ -38,11 +38,11 @@ pub fn print(runs: &[RunReport]) -> Result<(), ToolError> {
         "impossible legs",
     ]);
     let searches: [(&str, Search); 2] = [
-        ("base values, completed (the result)", |run| &run.consistent.base),
-        ("whole legs", |run| &run.consistent.full),
+        ("base values, completed (the result)", |run| Some(&run.consistent.base)),
+        ("whole legs", |run| run.consistent.full.as_ref()),
     ];
     for (name, search) in searches {
-        let all: Vec<_> = runs.iter().map(search).collect();
+        let all: Vec<_> = runs.iter().filter_map(search).collect();
         let column =
             |of: &dyn Fn(&ConsistentSearchReport) -> f64| all.iter().map(|&run| of(run)).collect::<Vec<_>>();
         let excess = column(&|run| run.excess_chi2.known().unwrap_or(f64::INFINITY));
@@ -62,7 +62,7 @@ pub fn print(runs: &[RunReport]) -> Result<(), ToolError> {
             quantile(evaluations.clone(), 0.5).to_string(),
             quantile(evaluations, 0.95).to_string(),
             all.iter().map(|run| run.steps).max().unwrap_or(0).to_string(),
-            of(all.iter().filter(|run| !run.consistent).count()),
+            of(all.iter().filter(|run| run.consistent == Some(false)).count()),
         ]);
     }
     say!("\n{table}");
@@ -89,7 +89,7 @@ fn hidden(runs: &[RunReport]) -> Result<(), ToolError> {
         let off = |values: Vec<f64>| values.into_iter().map(|value| value - truth).collect::<Vec<_>>();
         let prior = off(values(&|run| run.parameters.get(index)?.prior.known()));
         let base = off(values(&|run| run.consistent.base.parameters.get(&parameter.name)?.known()));
-        let full = off(values(&|run| run.consistent.full.parameters.get(&parameter.name)?.known()));
+        let full = off(values(&|run| run.consistent.full.as_ref()?.parameters.get(&parameter.name)?.known()));
         if base.is_empty() || full.len() != base.len() {
             continue;
         }

@@ -64,7 +64,11 @@ pub fn identify_many<const N: usize, const B: usize>(
 }
 
 /// The training motion in the format that `replay` reads: anatomical angles and torques.
-fn write_log<const N: usize>(path: &Path, leg: &LegFile, log: &[LoggedSample<N>]) -> Result<(), ToolError> {
+pub fn write_log<const N: usize>(
+    path: &Path,
+    leg: &LegFile,
+    log: &[LoggedSample<N>],
+) -> Result<(), ToolError> {
     let mut recording = Recording {
         file: path.to_owned(),
         time_s: Vec::with_capacity(log.len()),

@@ -7,6 +7,7 @@
 //! | [`size`], [`anthropometry`], [`posture`] | a leg file for other lengths, another wearer, side or trunk |
 //! | [`setup`] | from a leg file to what the firmware is built from |
 //! | [`recording`], [`resample`], [`replay`] | identification on recordings |
+//! | [`trace`] | what a board told, read back and reported |
 //! | [`board`] | the firmware's current loops against complete drives |
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
 //! | [`excite`] | an exciting motion designed, and what it will tell |
@@ -66,6 +67,7 @@ pub mod size;
 pub mod spread;
 pub mod tables;
 pub mod temperature;
+pub mod trace;
 pub mod urdf;
 pub mod watch;
 pub mod words;

@@ -11,7 +11,7 @@
 //! | off | off | not there |
 //! | on | on | refused: they are one column |
 
-use scarab::ident::{Choice, Constant, DriveChoice, Estimate, Solver, selection, stribeck};
+use scarab::ident::{Choice, Constant, DriveChoice, Estimate, Selection, selection, stribeck};
 use scarab::model::{Parameter, Standing};
 use serde::Serialize;
 
@@ -127,9 +127,14 @@ impl<const N: usize, const B: usize> Background<N, B> {
         self.device.drive_choice.get(joint).map_or(Constant::Offset, |choice| choice.meaning)
     }
 
-    /// All options of all joints.
+    /// All options of all joints, with what the data told and of each joint whether its Stribeck friction is used and the root
+    /// mean square of its torque. A gain that is not a number was not told.
     #[must_use]
-    pub fn model_choice(&self, solver: &Solver<f32, N, B>) -> Vec<ModelChoiceReport> {
+    pub fn model_choice(
+        &self,
+        found: &Selection<f32, N, B>,
+        stribeck: &[(bool, f32); N],
+    ) -> Vec<ModelChoiceReport> {
         let of = |(joint, asked): (usize, &Asked)| {
             let report = |option, asked: Switch, decision: Decision| ModelChoiceReport {
                 joint: joint + 1,
@@ -141,10 +146,14 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 why: decision.why,
             };
             [
-                report("rotor", asked.rotor, self.column(solver, joint, Parameter::IA, asked.rotor)),
-                report("offset", asked.offset, self.offset(solver, joint, asked)),
-                report("stribeck", asked.stribeck, self.stribeck_decision(solver, joint, asked.stribeck)),
-                report("asymmetric_coulomb", asked.asymmetric, self.asymmetry(solver, joint, asked)),
+                report("rotor", asked.rotor, self.column(found, joint, Parameter::IA, asked.rotor)),
+                report("offset", asked.offset, self.offset(found, joint, asked)),
+                report(
+                    "stribeck",
+                    asked.stribeck,
+                    self.stribeck_decision(found, stribeck[joint], joint, asked.stribeck),
+                ),
+                report("asymmetric_coulomb", asked.asymmetric, self.asymmetry(found, joint, asked)),
             ]
         };
         self.asked.iter().enumerate().flat_map(of).collect()
@@ -152,7 +161,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
 
     fn column(
         &self,
-        solver: &Solver<f32, N, B>,
+        found: &Selection<f32, N, B>,
         joint: usize,
         parameter: Parameter,
         asked: Switch,
@@ -170,13 +179,14 @@ impl<const N: usize, const B: usize> Background<N, B> {
             }
             Standing::Unseen | Standing::Off => return decided(false, "torque never sees it"),
         };
-        let found = &solver.record().selection;
         if !found.is_made {
             return decided(true, "the identification ended before it was decided");
         }
         let (used, gain, limit) =
             (!found.dropped[base], f64::from(found.gain[base]), selection::SMALLEST_GAIN);
-        let why = if used {
+        let why = if gain.is_nan() {
+            if used { "the data tell it" } else { "the data do not tell it: held at zero" }.into()
+        } else if used {
             format!("explains {} chi-square units, {limit} are asked for", number(gain.into()))
         } else if gain > 0.0 {
             format!("explains {} chi-square units, fewer than {limit}: held at zero", number(gain.into()))
@@ -186,7 +196,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
         Decision { used, gain: Some(gain), limit: Some(limit), why }
     }
 
-    fn offset(&self, solver: &Solver<f32, N, B>, joint: usize, asked: &Asked) -> Decision {
+    fn offset(&self, found: &Selection<f32, N, B>, joint: usize, asked: &Asked) -> Decision {
         if self.meaning(joint) == Constant::Asymmetry {
             return decided(
                 false,
@@ -196,20 +206,25 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 },
             );
         }
-        self.column(solver, joint, Parameter::OFF, asked.offset)
+        self.column(found, joint, Parameter::OFF, asked.offset)
     }
 
-    fn asymmetry(&self, solver: &Solver<f32, N, B>, joint: usize, asked: &Asked) -> Decision {
+    fn asymmetry(&self, found: &Selection<f32, N, B>, joint: usize, asked: &Asked) -> Decision {
         match (asked.asymmetric, self.meaning(joint)) {
             (Switch::Off, _) => decided(false, "ruled out"),
             (_, Constant::Offset) => decided(false, "not told apart from the offset, which is taken for it"),
-            (asymmetric, Constant::Asymmetry) => self.column(solver, joint, Parameter::OFF, asymmetric),
+            (asymmetric, Constant::Asymmetry) => self.column(found, joint, Parameter::OFF, asymmetric),
         }
     }
 
-    fn stribeck_decision(&self, solver: &Solver<f32, N, B>, joint: usize, asked: Switch) -> Decision {
-        let used = solver.record().stribeck[joint].is_some();
-        let Some((gain, surplus)) = solver.record().selection.stribeck[joint] else {
+    fn stribeck_decision(
+        &self,
+        found: &Selection<f32, N, B>,
+        (used, size): (bool, f32),
+        joint: usize,
+        asked: Switch,
+    ) -> Decision {
+        let Some((gain, surplus)) = found.stribeck[joint] else {
             return decided(
                 used,
                 match asked {
@@ -224,8 +239,10 @@ impl<const N: usize, const B: usize> Background<N, B> {
             return Decision { gain: Some(gain), ..decided(used, why) };
         }
         let limit = stribeck::SMALLEST_GAIN;
-        let size = f64::from(solver.record().torque[joint].root_mean_square);
-        let share = 100.0 * surplus / size;
+        if gain.is_nan() {
+            return decided(used, "the data do not show it");
+        }
+        let share = 100.0 * surplus / f64::from(size);
         let why = format!(
             "explains {} chi-square units, {limit} are asked for; {} % of the torque's rms, {} are asked for",
             number(gain.into()),
@@ -237,18 +254,14 @@ impl<const N: usize, const B: usize> Background<N, B> {
 
     /// Coulomb friction of both directions, of joints where they differ by what was measured.
     #[must_use]
-    pub fn directions(
-        &self,
-        solver: &Solver<f32, N, B>,
-        estimate: &Estimate<f32, B>,
-    ) -> Vec<DirectionsReport> {
+    pub fn directions(&self, dropped: &[bool; B], estimate: &Estimate<f32, B>) -> Vec<DirectionsReport> {
         let of = |joint: usize| {
             if self.meaning(joint) != Constant::Asymmetry {
                 return None;
             }
             let [level, half] =
                 [Parameter::FC, Parameter::OFF].map(|parameter| self.device.drive(joint, parameter));
-            let (level, half) = (level?, half.filter(|&base| !solver.record().selection.dropped[base])?);
+            let (level, half) = (level?, half.filter(|&base| !dropped[base])?);
             let direction = |sign: f32| {
                 let mut weights = [0.0; B];
                 (weights[level], weights[half]) = (1.0, sign);

@@ -4,6 +4,7 @@
 
 use super::findings::FindingReport;
 use super::scale::ScaleReport;
+use super::trace::TraceReport;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
@@ -212,8 +213,9 @@ pub struct ConsistentSearchReport {
     pub excess_chi2: Number,
     /// Iterations until the excess was at most a half; unknown where it never was.
     pub iterations_to_half_chi2: Option<u32>,
-    /// The leg that was found (of the search over whole legs: the best of every iteration) is a possible one.
-    pub consistent: bool,
+    /// The leg that was found (of the search over whole legs: the best of every iteration) is a possible one; unknown where
+    /// it was not told.
+    pub consistent: Option<bool>,
     /// Its parameters by name; empty without a prior.
     pub parameters: BTreeMap<String, Number>,
 }
@@ -229,8 +231,8 @@ pub struct ConsistentReport {
     pub result_over_least_squares: Number,
     /// Most degrees of freedom of that chi-square.
     pub degrees_of_freedom: Option<usize>,
-    /// Log-Cholesky coordinates of every link.
-    pub full: ConsistentSearchReport,
+    /// Log-Cholesky coordinates of every link; only the host searches there.
+    pub full: Option<ConsistentSearchReport>,
     /// Base values, completed.
     pub base: ConsistentSearchReport,
 }
@@ -314,6 +316,9 @@ pub struct RunReport {
     /// Against a model that was kept, where one was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub compared: Option<ComparisonReport>,
+    /// What else a board told, where the run is one of a board.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trace: Option<TraceReport>,
     /// For the model file; not in the JSON.
     #[serde(skip)]
     pub detail: ModelDetail,

@@ -263,12 +263,19 @@ fn consistent_line(run: &RunReport) -> String {
             number(search.excess_chi2)
         )
     };
+    let Some(full) = &found.full else {
+        return format!(
+            "legs that can exist: the result costs {} chi-square units more than least squares ({} steps)",
+            number(found.result_over_least_squares),
+            found.base.steps
+        );
+    };
     format!(
         "legs that can exist: the best of them costs {} chi-square units more than least squares. base values, completed \
          (the result): {}. whole legs: {}",
         number(found.optimum_over_least_squares),
         search(&found.base),
-        search(&found.full)
+        search(full)
     )
 }
 

@@ -55,6 +55,33 @@ pub enum Test {
 }
 
 impl Test {
+    /// All tests, in their order.
+    pub const ALL: [Self; 23] = [
+        Self::Rows,
+        Self::NotFinite,
+        Self::Torque,
+        Self::Search,
+        Self::Drive,
+        Self::Speed,
+        Self::Determined,
+        Self::Condition,
+        Self::PredictedUncertainty,
+        Self::Finite,
+        Self::NegativeParameter,
+        Self::NegativeEnergy,
+        Self::PriorBox,
+        Self::DynamicShare,
+        Self::TrainingError,
+        Self::WholeError,
+        Self::ValidationError,
+        Self::SlowResidual,
+        Self::LinkLength,
+        Self::EncoderZero,
+        Self::CommonDisturbance,
+        Self::ReplacedShare,
+        Self::DisturbedShare,
+    ];
+
     /// The word used in reports.
     #[must_use]
     pub const fn name(self) -> &'static str {

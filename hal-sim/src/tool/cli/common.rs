@@ -106,16 +106,29 @@ pub fn draw(
     series: &Series,
     sources: &[Source],
 ) -> Result<(), ToolError> {
-    if !common.is_drawn() {
+    let (directory, page) = (common.figures.as_deref(), common.report.as_deref());
+    draw_into(leg, directory, page, run, series, sources)
+}
+
+/// The same into a directory and a page, where they are named.
+pub fn draw_into(
+    leg: &LegFile,
+    directory: Option<&Path>,
+    page: Option<&Path>,
+    run: &RunReport,
+    series: &Series,
+    sources: &[Source],
+) -> Result<(), ToolError> {
+    if directory.is_none() && page.is_none() {
         return Ok(());
     }
     let names: Vec<_> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
     let drawn = figures::all(&names, run, series)?;
-    if let Some(directory) = &common.figures {
+    if let Some(directory) = directory {
         figures::write(directory, &drawn)?;
         tables::print(&format!("figures: {}\n", directory.display()))?;
     }
-    if let Some(path) = &common.report {
+    if let Some(path) = page {
         let circumstances = html::Circumstances::now(leg);
         let page = html::page(&circumstances, run, sources, &drawn)?;
         std::fs::write(path, page).map_err(|error| ToolError::cannot_write(path, &error))?;

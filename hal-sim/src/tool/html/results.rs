@@ -127,7 +127,7 @@ pub fn consistent(run: &RunReport) -> Markup {
             td { (words) @if found.chosen == name { " (the result)" } } td.n { (search.iterations) } td.n { (search.evaluations) }
             td.n { (search.steps) } td.n { (number(search.excess_chi2)) }
             td.n { @match search.iterations_to_half_chi2 { Some(half) => { (half) }, None => { "\u{2013}" } } }
-            td { (if search.consistent { "yes" } else { "no" }) }
+            td { (match search.consistent { Some(true) => "yes", Some(false) => "no", None => "\u{2013}" }) }
         } }
     };
     html! {
@@ -145,7 +145,7 @@ pub fn consistent(run: &RunReport) -> Markup {
                 } }
                 tbody {
                     (row("base values, completed by the prior", "base", &found.base))
-                    (row("whole legs", "full", &found.full))
+                    @if let Some(full) = &found.full { (row("whole legs", "full", full)) }
                 }
             } }
         }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use scarab::ident::{Estimate, Solver};
+use scarab::ident::Estimate;
 
 use super::StoredStribeck;
 use super::{
@@ -17,9 +17,9 @@ use crate::tool::report::{FitReport, ModelDetail, RunReport};
 impl<const N: usize, const B: usize> Background<N, B> {
     /// What a model file keeps beyond the report. The covariance is symmetric up to rounding and is made exactly so.
     #[must_use]
-    pub fn detail(&self, solver: &Solver<f32, N, B>, estimate: &Estimate<f32, B>) -> ModelDetail {
+    pub fn detail(&self, dropped: &[bool; B], estimate: &Estimate<f32, B>) -> ModelDetail {
         let base = &self.model.base;
-        let kept: Vec<usize> = self.kept(solver).collect();
+        let kept: Vec<usize> = self.kept(dropped).collect();
         let element = |row: usize, column: usize| {
             0.5 * (f64::from(estimate.covariance[row][column]) + f64::from(estimate.covariance[column][row]))
         };
@@ -33,7 +33,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 .collect(),
             carriers: carriers.map(|(joint, parameter)| self.name(joint, parameter)).collect(),
             not_estimated: parameters
-                .filter(|&(joint, parameter)| self.is_zero(solver, joint, parameter))
+                .filter(|&(joint, parameter)| self.is_zero(dropped, joint, parameter))
                 .map(|(joint, parameter)| self.name(joint, parameter))
                 .collect(),
         }

@@ -1,0 +1,90 @@
+//! `trace`: what a board told, decoded and reported.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::common::{draw_into, write_json};
+use super::model::ModelArguments;
+use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::leg_file::LegFile;
+use crate::tool::series::Series;
+use crate::tool::tables;
+use crate::tool::trace::{Trace, log, run as told, run_report};
+
+/// What to read and what to keep of it.
+#[derive(Args, Debug)]
+pub struct TraceArguments {
+    /// A recorded trace, or - for standard input: text as a debug probe prints it, or with --image a defmt stream.
+    file: PathBuf,
+    /// The image (ELF) that sent the stream; it holds the texts of the records.
+    #[arg(long, value_name = "ELF")]
+    image: Option<PathBuf>,
+    /// Name of a shipped leg, or a leg file; the one the image names unless given.
+    #[arg(long)]
+    leg: Option<String>,
+    /// Write the report here, for exit codes 0 and 3.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write the 500 Hz log of the motion identified from here, in the format that replay reads.
+    #[arg(long)]
+    csv: Option<PathBuf>,
+    /// Write the run as one HTML page here.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Draw what the trace tells into this directory, as SVG.
+    #[arg(long)]
+    figures: Option<PathBuf>,
+    /// Print all fourteen parameters of every joint with their status.
+    #[arg(long)]
+    parameters: bool,
+    #[command(flatten)]
+    model: ModelArguments,
+}
+
+/// Reads and reports; the exit code.
+pub fn run(arguments: &TraceArguments) -> Result<u8, ToolError> {
+    let trace = told::read(&arguments.file, arguments.image.as_deref())?;
+    tables::print(&told::preface(&trace))?;
+    let outcome = report(arguments, &trace);
+    tables::print(&told::attention(&trace))?;
+    outcome
+}
+
+fn report(arguments: &TraceArguments, trace: &Trace) -> Result<u8, ToolError> {
+    let leg = &leg(arguments, trace)?;
+    if let Some(path) = &arguments.csv {
+        let written = log::write(trace, leg, path)?;
+        let missing = match written.missing {
+            0 => String::new(),
+            missing => format!(", {missing} between them are missing"),
+        };
+        tables::print(&format!("log: {}, {} samples{missing}\n\n", path.display(), written.samples))?;
+    }
+    let kept = arguments.model.kept(leg)?;
+    let mut run = run_report(trace, leg)?;
+    arguments.model.compare(kept.as_ref(), &mut run);
+    if let Some(path) = &arguments.json {
+        write_json(path, &run)?;
+    }
+    tables::print_run(&run)?;
+    if arguments.parameters {
+        tables::print(&format!("\n{}", tables::parameters(&run)))?;
+    }
+    let (figures, page) = (arguments.figures.as_deref(), arguments.report.as_deref());
+    draw_into(leg, figures, page, &run, &Series::default(), &[])?;
+    arguments.model.save(leg, &run, leg.bandwidth_hz)?;
+    Ok(if run.accepted() { EXIT_ACCEPTED } else { EXIT_REFUSED })
+}
+
+fn leg(arguments: &TraceArguments, trace: &Trace) -> Result<LegFile, ToolError> {
+    if let Some(name) = &arguments.leg {
+        return Ok(LegFile::load(name)?);
+    }
+    let Some(boot) = &trace.boot else {
+        return Err(ToolError::input("the trace does not tell which leg it is of (no record `boot`): --leg"));
+    };
+    LegFile::load(&boot.leg).map_err(|error| {
+        ToolError::input(format!("the trace is of the leg `{}`: --leg FILE is needed ({error})", boot.leg))
+    })
+}

@@ -1,0 +1,149 @@
+//! From a `defmt` stream to lines.
+//!
+//! The device sends indices and bare values; the image that runs there holds the texts. Frames end with a zero and hold none
+//! (rzCOBS), so a listener who joins late or loses bytes finds the next frame again: what does not decode is counted and
+//! passed over. Single-precision values come back with the same bits: `defmt-decoder` writes the shortest digits that do so.
+//!
+//! Cost: one frame is kept at a time, however long the stream is.
+//! Limits: an image that sends frames without an encoding is refused, since nothing could be found again after a gap. A frame
+//! that was damaged and still decodes is told as it reads; its number then hardly continues the others.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use defmt_decoder::{Encoding, Table};
+
+use crate::tool::error::ToolError;
+
+/// Longer frames are no frames: the longest record has fewer than 200 bytes.
+const LONGEST_FRAME: usize = 4096;
+
+/// What did not decode.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Skipped {
+    /// Frames.
+    pub frames: u64,
+    /// Bytes of them.
+    pub bytes: u64,
+    /// Bytes of them before the first frame that decoded: a listener who joined late.
+    pub first_bytes: u64,
+    /// Bytes at the end without an end of their frame.
+    pub cut_bytes: u64,
+}
+
+/// Decodes the stream of one image.
+#[derive(Debug)]
+pub struct Decoder {
+    table: Table,
+    frame: Vec<u8>,
+    /// Bytes of a frame that was too long to be kept.
+    overlong: u64,
+    decoded: u64,
+    skipped: Skipped,
+}
+
+impl Decoder {
+    /// A decoder with the texts of an image (ELF).
+    ///
+    /// # Errors
+    /// Not an image, one of another program or without `defmt`, or of another version of `defmt`.
+    pub fn new(image: &[u8]) -> Result<Self, ToolError> {
+        let table = Table::parse(image)
+            .map_err(|error| ToolError::input(format!("cannot be used as an image: {error}")))?
+            .ok_or_else(|| {
+                ToolError::input(
+                    "holds no texts of records (no section .defmt): not an image that sends a trace, or a stripped one",
+                )
+            })?;
+        if table.encoding() != Encoding::Rzcobs {
+            return Err(ToolError::input("sends frames without an encoding; rzcobs is needed"));
+        }
+        if !table.raw_symbols().any(|symbol| symbol.contains("boot n={=u32}")) {
+            return Err(ToolError::input("holds no record of a Scarab trace: an image of another program"));
+        }
+        Ok(Self { table, frame: Vec::new(), overlong: 0, decoded: 0, skipped: Skipped::default() })
+    }
+
+    /// Takes bytes as they come, in pieces of any size; hands on each line.
+    pub fn feed(&mut self, bytes: &[u8], mut line: impl FnMut(&str)) {
+        for &byte in bytes {
+            if byte != 0 {
+                if self.frame.len() < LONGEST_FRAME {
+                    self.frame.push(byte);
+                } else {
+                    self.overlong += 1;
+                }
+                continue;
+            }
+            if self.frame.is_empty() {
+                continue;
+            }
+            match self.frame() {
+                Some(text) => {
+                    self.decoded += 1;
+                    line(&text);
+                }
+                None => self.skip(),
+            }
+            self.frame.clear();
+            self.overlong = 0;
+        }
+    }
+
+    /// The stream is at its end: what did not decode of it.
+    pub fn finish(&mut self) -> Skipped {
+        self.skipped.cut_bytes += self.frame.len() as u64 + self.overlong;
+        self.frame.clear();
+        self.overlong = 0;
+        self.skipped
+    }
+
+    /// Frames that were decoded.
+    #[must_use]
+    pub fn decoded(&self) -> u64 {
+        self.decoded
+    }
+
+    fn skip(&mut self) {
+        let bytes = self.frame.len() as u64 + self.overlong + 1;
+        self.skipped.frames += 1;
+        self.skipped.bytes += bytes;
+        if self.decoded == 0 {
+            self.skipped.first_bytes += bytes;
+        }
+    }
+
+    /// The frame that is complete, as text.
+    fn frame(&self) -> Option<String> {
+        if self.overlong > 0 {
+            return None;
+        }
+        // The decoder trusts its image; bytes that only look like a frame must not end the tool.
+        catch_unwind(AssertUnwindSafe(|| {
+            let mut stream = self.table.new_stream_decoder();
+            stream.received(&self.frame);
+            stream.received(&[0]);
+            stream.decode().ok().map(|frame| frame.display_message().to_string())
+        }))
+        .ok()
+        .flatten()
+    }
+}
+
+impl Skipped {
+    /// In words; `None` where everything decoded.
+    #[must_use]
+    pub fn words(&self) -> Option<String> {
+        let mut words = Vec::new();
+        if self.first_bytes > 0 {
+            words.push(format!("{} bytes before the first whole frame", self.first_bytes));
+        }
+        let later = self.bytes - self.first_bytes;
+        if later > 0 {
+            words.push(format!("{later} bytes later that are no frames of this image"));
+        }
+        if self.cut_bytes > 0 {
+            words.push(format!("{} bytes at the end, of a frame that was cut", self.cut_bytes));
+        }
+        (!words.is_empty()).then(|| format!("passed over: {}", words.join("; ")))
+    }
+}

@@ -1,0 +1,227 @@
+//! The timeline: what happened, in the order it was told, in words.
+//!
+//! What a person who straps the leg on must not overlook (a fault, a crash, a refusal) has a weight of its own and is printed
+//! before the tables and again behind the verdict.
+
+use scarab::trace::{GRAMMAR, Line, LineError};
+
+use super::fields::{Board, Boot, State, hex, list, text, value};
+
+/// How much it matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Weight {
+    /// For the record.
+    Note,
+    /// Something was refused, lost or not as it should be.
+    Warning,
+    /// The drive stopped, or may not be enabled.
+    Fault,
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// Since the start, s; unknown of records without a tick.
+    pub time_s: Option<f64>,
+    /// How much it matters.
+    pub weight: Weight,
+    /// In words.
+    pub words: String,
+}
+
+impl Event {
+    /// One line of the timeline.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let time = self.time_s.map_or_else(|| format!("{:>10}", ""), |time| format!("{time:10.3}"));
+        let mark = match self.weight {
+            Weight::Note => "  ",
+            Weight::Warning => "! ",
+            Weight::Fault => "!!",
+        };
+        format!("{time} s {mark} {}", self.words).replacen(
+            &format!("{:>10} s", ""),
+            &format!("{:>12}", ""),
+            1,
+        )
+    }
+}
+
+type Read<T> = Result<T, LineError<'static>>;
+
+/// What a record means for the timeline; `None` for kinds that do not belong there.
+///
+/// # Errors
+/// A key that is missing, a value that is none.
+pub fn of(line: &Line<'_>, servo_hz: f64) -> Read<Option<Event>> {
+    let tick = || -> Read<Option<f64>> { Ok(Some(f64::from(value::<u32>(line, "tick")?) / servo_hz)) };
+    let event = |time_s, weight, words| Ok(Some(Event { time_s, weight, words }));
+    match line.kind() {
+        "boot" => boot(line),
+        "board" => event(None, Weight::Note, board(&Board::read(line)?)),
+        "crash" => event(None, Weight::Fault, crash(line)?),
+        "refused" => {
+            let words = format!(
+                "the drive may not be enabled: {} ({:#x})",
+                spaced(&text(line, "why")?),
+                hex(line, "value")?
+            );
+            event(None, Weight::Fault, words)
+        }
+        "state" => {
+            let state = State::read(line)?;
+            let stopped = ["fault", "fault_reaction_active"].contains(&state.drive.as_str());
+            let weight = if stopped { Weight::Warning } else { Weight::Note };
+            event(tick()?, weight, doing(&state))
+        }
+        "request" => {
+            let (name, accepted) = (text(line, "name")?, value::<bool>(line, "accepted")?);
+            let weight = if accepted { Weight::Note } else { Weight::Warning };
+            let answer = if accepted { "accepted" } else { "REFUSED" };
+            event(tick()?, weight, format!("the operator asks: {}, {answer}", spaced(&name)))
+        }
+        "not_enabled" => {
+            let words =
+                format!("the drive is NOT enabled: {}, {}", joint(line)?, spaced(&text(line, "why")?));
+            event(tick()?, Weight::Warning, words)
+        }
+        "fault" => {
+            let (name, code) = (text(line, "name")?, hex(line, "code")?);
+            event(tick()?, Weight::Fault, format!("FAULT {code:#06x} {}: {}", spaced(&name), joint(line)?))
+        }
+        "axis_fault" => {
+            let words = format!("FAULT of the axis, {}: {}", spaced(&text(line, "name")?), joint(line)?);
+            event(tick()?, Weight::Fault, words)
+        }
+        "calibration" => calibration(line),
+        "change" => change(line),
+        "update" => update(line),
+        _ => Ok(None),
+    }
+}
+
+fn boot(line: &Line<'_>) -> Read<Option<Event>> {
+    let boot = Boot::read(line)?;
+    let newer = if boot.grammar > GRAMMAR {
+        format!("; its records are of version {}, this program knows {GRAMMAR}", boot.grammar)
+    } else {
+        String::new()
+    };
+    let words = format!(
+        "start ({}): scarab {}, leg {}, {} joints, {} base parameters{newer}",
+        spaced(&boot.reset),
+        boot.version,
+        boot.leg,
+        boot.joints,
+        boot.base
+    );
+    let weight = if newer.is_empty() { Weight::Note } else { Weight::Warning };
+    Ok(Some(Event { time_s: None, weight, words }))
+}
+
+/// Which board, in words.
+#[must_use]
+pub fn board(board: &Board) -> String {
+    if is_emulated(board) {
+        return format!("emulated board, {} MHz", f64::from(board.clock_hz) / 1e6);
+    }
+    let version = if board.version == u8::MAX {
+        "version not burnt in".into()
+    } else {
+        format!("v{}.{}-{}V", board.version, board.version_minor, board.version_volt)
+    };
+    format!(
+        "board {:08x}{:08x}{:08x}, {version}, {} MHz",
+        board.uid2,
+        board.uid1,
+        board.uid0,
+        f64::from(board.clock_hz) / 1e6
+    )
+}
+
+/// Its plant is the one of the leg file, so that the truth is known.
+#[must_use]
+pub fn is_emulated(board: &Board) -> bool {
+    (board.uid0, board.uid1, board.uid2) == (0, 0, 0)
+}
+
+fn crash(line: &Line<'_>) -> Read<String> {
+    let (file, source) = (text(line, "file")?, value::<u32>(line, "line")?);
+    let place = if file == "-" { String::new() } else { format!(" in {file} line {source}") };
+    let address = match hex(line, "address")? {
+        u32::MAX => String::new(),
+        address => format!(", address {address:#010x}"),
+    };
+    Ok(format!(
+        "the image CRASHED before this start: {}{place}, at {:#010x}, called from {:#010x}, status {:#x}{address}",
+        spaced(&text(line, "cause")?),
+        hex(line, "pc")?,
+        hex(line, "lr")?,
+        hex(line, "status")?
+    ))
+}
+
+/// What the leg does, in words.
+#[must_use]
+pub fn doing(state: &State) -> String {
+    let phase = if state.phase == "-" { String::new() } else { format!(", {}", spaced(&state.phase)) };
+    let motion = if state.motion == 0 { String::new() } else { format!(" {}", state.motion) };
+    format!("drive {}; {}{phase}{motion}", spaced(&state.drive), spaced(&state.activity))
+}
+
+fn calibration(line: &Line<'_>) -> Read<Option<Event>> {
+    let (result, number) = (text(line, "result")?, value::<u32>(line, "number")?);
+    let joint = value::<usize>(line, "joint")?;
+    if result != "done" {
+        let number = if number == 0 { String::new() } else { format!(" ({number})") };
+        let words = format!("calibration of joint {joint} REFUSED: {}{number}", spaced(&result));
+        return Ok(Some(Event { time_s: None, weight: Weight::Warning, words }));
+    }
+    let number = |key| value::<f64>(line, key);
+    let words = format!(
+        "calibration of joint {joint} done: R {:.4} ohm, L {:.1} and {:.1} uH, offset {:.4} turns, shunts at {:.1} and {:.1}",
+        number("resistance_ohm")?,
+        1e6 * number("direct_h")?,
+        1e6 * number("quadrature_h")?,
+        number("offset_turns")?,
+        number("zero_b")?,
+        number("zero_c")?
+    );
+    Ok(Some(Event { time_s: None, weight: Weight::Note, words }))
+}
+
+fn change(line: &Line<'_>) -> Read<Option<Event>> {
+    let joints: Vec<bool> = list(line, "joints")?;
+    let named = joints.iter().enumerate().filter(|(_, shows)| **shows);
+    let named: Vec<String> = named.map(|(joint, _)| (joint + 1).to_string()).collect();
+    let words = format!(
+        "the model no longer fits since {:.1} s, joints {}",
+        value::<f64>(line, "since_s")?,
+        named.join(", ")
+    );
+    Ok(Some(Event { time_s: None, weight: Weight::Warning, words }))
+}
+
+fn update(line: &Line<'_>) -> Read<Option<Event>> {
+    let (cause, verdict) = (text(line, "cause")?, text(line, "verdict")?);
+    let place = match value::<u8>(line, "link")? {
+        0 => String::new(),
+        link => format!(" on link {link}"),
+    };
+    let offered =
+        if value::<bool>(line, "offered")? { ", a new model is offered" } else { ", the old model stays" };
+    let words = format!("the change was taken for: {}{place}; {verdict}{offered}", spaced(&cause));
+    Ok(Some(Event { time_s: None, weight: Weight::Note, words }))
+}
+
+fn joint(line: &Line<'_>) -> Read<String> {
+    Ok(match value::<usize>(line, "joint")? {
+        0 => "the board".into(),
+        joint => format!("joint {joint}"),
+    })
+}
+
+/// A word of the grammar as it is read.
+fn spaced(word: &str) -> String {
+    word.replace('_', " ")
+}

@@ -1,0 +1,172 @@
+//! How loops, stack and supply did over a whole trace.
+
+use serde::Serialize;
+
+use super::fields::{Loops, Supply};
+
+/// Over all records; counts since a start are added up over the starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct LoopReport {
+    /// Longest current tick, processor cycles (instructions in the emulator).
+    pub current_worst: u32,
+    /// Longest servo tick, the same; interrupted by current ticks.
+    pub servo_worst: u32,
+    /// Current ticks that came late or not at all.
+    pub current_missed: u32,
+    /// Servo ticks, the same.
+    pub servo_missed: u32,
+    /// Of the servo.
+    pub cycles_per_tick: u32,
+    /// Deepest.
+    pub stack_used: u32,
+    /// There are.
+    pub stack_bytes: u32,
+    /// Logged samples that identification did not take in time.
+    pub samples_lost: u32,
+    /// Records that the board gave up because nobody read.
+    pub records_lost: u32,
+}
+
+/// Lowest, highest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SupplySeen {
+    /// V.
+    pub low_v: f32,
+    /// V.
+    pub high_v: f32,
+    /// Hottest bridge, degrees Celsius.
+    pub bridge_c: f32,
+    /// Degrees Celsius.
+    pub chopper_c: f32,
+}
+
+/// Collects records.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Statistics {
+    /// Of earlier starts.
+    before: LoopReport,
+    now: Option<LoopReport>,
+    seen: bool,
+    supply: Option<SupplySeen>,
+}
+
+impl Statistics {
+    /// A record of loops.
+    pub fn take(&mut self, loops: &Loops) {
+        let now = self.now.unwrap_or_default();
+        self.seen = true;
+        self.now = Some(LoopReport {
+            current_worst: now.current_worst.max(loops.current_worst),
+            servo_worst: now.servo_worst.max(loops.servo_worst),
+            current_missed: loops.current_missed,
+            servo_missed: loops.servo_missed,
+            cycles_per_tick: loops.cycles_per_tick,
+            stack_used: now.stack_used.max(loops.stack_used),
+            stack_bytes: loops.stack_bytes,
+            samples_lost: loops.samples_lost,
+            records_lost: loops.records_lost,
+        });
+    }
+
+    /// A record of the supply. What is not a number counts for nothing.
+    pub fn take_supply(&mut self, supply: &Supply) {
+        let before = self.supply.unwrap_or(SupplySeen {
+            low_v: f32::NAN,
+            high_v: f32::NAN,
+            bridge_c: f32::NAN,
+            chopper_c: f32::NAN,
+        });
+        self.supply = Some(SupplySeen {
+            low_v: before.low_v.min(supply.bus_low_v),
+            high_v: before.high_v.max(supply.bus_high_v),
+            bridge_c: supply.bridge_c.iter().copied().fold(before.bridge_c, f32::max),
+            chopper_c: before.chopper_c.max(supply.chopper_c),
+        });
+    }
+
+    /// The board started anew: its counts begin at zero.
+    pub fn restart(&mut self) {
+        if let Some(all) = self.loops() {
+            self.before = all;
+        }
+        self.now = None;
+    }
+
+    /// Over all starts; `None` where nothing was told.
+    #[must_use]
+    pub fn loops(&self) -> Option<LoopReport> {
+        if !self.seen {
+            return None;
+        }
+        let before = self.before;
+        let now = self.now.unwrap_or(LoopReport {
+            current_missed: 0,
+            servo_missed: 0,
+            samples_lost: 0,
+            records_lost: 0,
+            ..before
+        });
+        Some(LoopReport {
+            current_worst: before.current_worst.max(now.current_worst),
+            servo_worst: before.servo_worst.max(now.servo_worst),
+            current_missed: before.current_missed.saturating_add(now.current_missed),
+            servo_missed: before.servo_missed.saturating_add(now.servo_missed),
+            cycles_per_tick: now.cycles_per_tick,
+            stack_used: before.stack_used.max(now.stack_used),
+            stack_bytes: now.stack_bytes,
+            samples_lost: before.samples_lost.saturating_add(now.samples_lost),
+            records_lost: before.records_lost.saturating_add(now.records_lost),
+        })
+    }
+
+    /// In words, a line each.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if let Some(loops) = self.loops() {
+            let share = |worst: u32, periods: f64| {
+                if loops.cycles_per_tick == 0 {
+                    return String::new();
+                }
+                format!(" ({:.1} %)", 100.0 * periods * f64::from(worst) / f64::from(loops.cycles_per_tick))
+            };
+            lines.push(format!(
+                "loops: worst servo tick {} of {} cycles{}, worst current tick {}; missed: servo {}, current {}",
+                loops.servo_worst,
+                loops.cycles_per_tick,
+                share(loops.servo_worst, 1.0),
+                loops.current_worst,
+                loops.servo_missed,
+                loops.current_missed
+            ));
+            lines.push(format!(
+                "stack: {} of {} bytes; not taken in time: samples {}, records {}",
+                loops.stack_used, loops.stack_bytes, loops.samples_lost, loops.records_lost
+            ));
+        }
+        if let Some(supply) = self.supply {
+            lines.push(format!(
+                "supply: {:.1} to {:.1} V; hottest: bridges {:.0}, chopper {:.0} degrees Celsius",
+                supply.low_v, supply.high_v, supply.bridge_c, supply.chopper_c
+            ));
+        }
+        lines
+    }
+
+    /// What should not be, in words.
+    #[must_use]
+    pub fn complaints(&self) -> Vec<String> {
+        let Some(loops) = self.loops() else { return Vec::new() };
+        let missed = [("servo", loops.servo_missed), ("current", loops.current_missed)];
+        let missed = missed.into_iter().filter(|(_, count)| *count > 0);
+        let mut words: Vec<String> =
+            missed.map(|(name, count)| format!("{count} {name} ticks were MISSED")).collect();
+        if loops.samples_lost > 0 {
+            words.push(format!("identification LOST {} samples of the log", loops.samples_lost));
+        }
+        if loops.records_lost > 0 {
+            words.push(format!("the board gave up {} records because nobody read", loops.records_lost));
+        }
+        words
+    }
+}

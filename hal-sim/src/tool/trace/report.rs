@@ -1,0 +1,392 @@
+//! The last complete result of a trace as the report of a run: same schema, same names.
+//!
+//! Values, sigma, fits, findings and verdict are the board's own. Names, groups and units come from the leg file, which must be
+//! the one the image was built from: joints, base parameters and their carriers are compared. What the board does not tell
+//! (costs of the searches in double precision, gains of columns) is unknown; truth is known of an emulated board only.
+
+use scarab::ident::{Estimate, Estimator, Evidence, Plan, Reason, Selection, Status, Test};
+use scarab::model::Parameter;
+use serde::Serialize;
+
+use super::events::is_emulated;
+use super::loops::LoopReport;
+use super::read::Trace;
+use super::told::{Fit, Solver, Told};
+use crate::tool::analysis::{Background, estimator_name, plan_name, surplus_name};
+use crate::tool::disturbances::{OutliersReport, StribeckReport};
+use crate::tool::error::ToolError;
+use crate::tool::findings::FindingReport;
+use crate::tool::leg_file::LegFile;
+use crate::tool::motions::VALIDATION_NAMES;
+use crate::tool::report::{
+    ConsistentReport, ConsistentSearchReport, FitReport, LeastSquaresReport, Number, ParameterReport,
+    RunReport, SCHEMA, SwarmReport,
+};
+use crate::tool::scale::ScaleReport;
+use crate::tool::setup::{PriorChoice, background};
+use crate::with_leg_size;
+
+/// What else a board told.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TraceReport {
+    /// Version of the firmware.
+    pub firmware: Option<String>,
+    /// Which board.
+    pub board: Option<String>,
+    /// Records read.
+    pub records: u64,
+    /// Records lost on the way.
+    pub lost_records: u64,
+    /// Lines that are records but cannot be read.
+    pub unreadable_lines: u64,
+    /// Identifications that were told completely; the last one is reported.
+    pub identifications: usize,
+    /// Faults, crashes and refusals to be enabled, in order.
+    pub faults: Vec<String>,
+    /// What else should not be.
+    pub warnings: Vec<String>,
+    /// How the loops did.
+    pub loops: Option<LoopReport>,
+}
+
+impl TraceReport {
+    /// Of a trace that is at its end.
+    #[must_use]
+    pub fn of(trace: &Trace) -> Self {
+        Self {
+            firmware: trace.boot.as_ref().map(|boot| boot.version.clone()),
+            board: trace.board.as_ref().map(super::events::board),
+            records: trace.records,
+            lost_records: trace.lost(),
+            unreadable_lines: trace.problem_count,
+            identifications: trace.results.len(),
+            faults: trace.faults().map(|event| event.words.clone()).collect(),
+            warnings: trace.warnings(),
+            loops: trace.statistics.loops(),
+        }
+    }
+}
+
+/// The last complete result.
+///
+/// # Errors
+/// There is none, or it is not of this leg.
+pub fn run_report(trace: &Trace, leg: &LegFile) -> Result<RunReport, ToolError> {
+    let told = trace
+        .results
+        .last()
+        .ok_or_else(|| ToolError::input(format!("the trace {}", trace.without_result())))?;
+    check_leg(trace, leg)?;
+    with_leg_size!(leg, of_size(trace, told, leg))
+}
+
+/// The leg that the image says it is for.
+fn check_leg(trace: &Trace, leg: &LegFile) -> Result<(), ToolError> {
+    let Some(boot) = &trace.boot else { return Ok(()) };
+    // A word of the grammar holds no space.
+    if boot.leg != "-" && boot.leg != leg.name.replace(' ', "_") {
+        return Err(other(leg, format!("the image is built for the leg `{}`", boot.leg)));
+    }
+    if boot.joints != leg.joints.len() {
+        let (told, own) = (boot.joints, leg.joints.len());
+        return Err(other(leg, format!("the board's leg has {told} joints, this one {own}")));
+    }
+    Ok(())
+}
+
+fn other(leg: &LegFile, reason: impl std::fmt::Display) -> ToolError {
+    ToolError::input(format!("leg `{}` is not that of the trace: {reason} (--leg)", leg.name))
+}
+
+fn of_size<const N: usize, const B: usize>(
+    trace: &Trace,
+    told: &Told,
+    leg: &LegFile,
+) -> Result<RunReport, ToolError> {
+    let background = known::<N, B>(trace, told, leg)?;
+    let reader = Reader { background: &background, leg, told };
+    let solver = told.solver.as_ref().ok_or_else(|| ToolError::input("the result has no solver"))?;
+    let (estimate, dropped) = reader.base(solver)?;
+    let stribeck = reader.stribeck();
+    let base = background.base_parameters(&dropped, &estimate, None);
+    let (training, validation): (Vec<_>, Vec<_>) = told.fits.iter().partition(|fit| fit.motion == 0);
+    let reasons = reader.reasons()?;
+    let samples: u32 = told.motions.iter().map(|motion| motion.samples).sum();
+    let log_hz = trace.boot.as_ref().map_or(scarab::ident::SAMPLE_RATE_HZ, |boot| f64::from(boot.log_hz));
+    Ok(RunReport {
+        schema: SCHEMA,
+        leg: leg.name.clone(),
+        seed: None,
+        swarm_seed: solver.swarm_seed,
+        prior: background.prior_name.clone(),
+        plan: word(&solver.plan, &[Plan::OneTime, Plan::Sequential].map(plan_name), "plan")?,
+        verdict: if reasons.is_empty() { "accepted" } else { "refused" },
+        validated: !validation.is_empty(),
+        reasons,
+        findings: told.findings.iter().map(finding).collect::<Result<_, _>>()?,
+        rank: solver.rank,
+        columns: background.columns - dropped.iter().filter(|dropped| **dropped).count(),
+        condition: solver.condition.into(),
+        parameters: reader.parameters()?,
+        base_parameters: base.into_iter().chain(background.surpluses(&stribeck, &[])).collect(),
+        model_choice: reader.model_choice(&dropped),
+        asymmetric_coulomb: background.directions(&dropped, &estimate),
+        temperature_c: background.temperature_c.into(),
+        outliers: reader.outliers(),
+        training: training.into_iter().map(|fit| fit_report(fit, "fourier".into())).collect(),
+        validation: validation.into_iter().map(|fit| fit_report(fit, motion_name(fit.motion))).collect(),
+        least_squares: LeastSquaresReport {
+            base_parameters: background
+                .kept(&dropped)
+                .map(|base| (background.base_name(base), reader.least_squares(base)))
+                // What static friction least squares would have is not told.
+                .chain(stribeck.iter().map(|found| (surplus_name(found.joint - 1), Number::UNKNOWN)))
+                .collect(),
+            cost: Number::UNKNOWN,
+        },
+        bso: SwarmReport {
+            seed: solver.swarm_seed,
+            iterations: solver.iterations,
+            evaluations: solver.evaluations,
+            cost_over_least_squares: Number::UNKNOWN,
+            excess_chi2: Number::UNKNOWN,
+            iterations_to_half_chi2: None,
+        },
+        consistent: consistent(solver),
+        tracking: Vec::new(),
+        scale: ScaleReport::default(),
+        drive: None,
+        simulated_s: f64::from(samples) / log_hz,
+        wall_s: 0.0,
+        compared: None,
+        detail: background.detail(&dropped, &estimate),
+        stribeck,
+        trace: Some(TraceReport::of(trace)),
+    })
+}
+
+/// What is known of the leg beside the trace; a prior only where the board had one.
+fn known<const N: usize, const B: usize>(
+    trace: &Trace,
+    told: &Told,
+    leg: &LegFile,
+) -> Result<Background<N, B>, ToolError> {
+    // Only a prior splits sums and fills in what torque does not see.
+    let split = told.parameters.iter().filter(|told| ["grouped", "prior"].contains(&told.status.as_str()));
+    let has_prior = split.into_iter().any(|told| told.value.is_finite() && told.value != 0.0);
+    let choice = if has_prior { PriorChoice::Default } else { PriorChoice::None };
+    let mut background = background::<N, B>(leg, choice, 0)?;
+    if has_prior && background.prior.is_none() {
+        background.prior_name = "unknown".into();
+    }
+    background.use_estimator(Estimator::default());
+    if !trace.board.as_ref().is_some_and(is_emulated) {
+        background.truth = None;
+        background.stribeck_truth = [None; N];
+    }
+    Ok(background)
+}
+
+/// A result beside what is known of its leg.
+struct Reader<'a, const N: usize, const B: usize> {
+    background: &'a Background<N, B>,
+    leg: &'a LegFile,
+    told: &'a Told,
+}
+
+impl<const N: usize, const B: usize> Reader<'_, N, B> {
+    /// Values and covariance, and what is held at zero; the base parameters must be the leg file's.
+    fn base(&self, solver: &Solver) -> Result<(Estimate<f32, B>, [bool; B]), ToolError> {
+        let base = &self.background.model.base;
+        let rank = base.rank();
+        if (solver.base, self.told.base.len()) != (rank, rank) {
+            let reason = format!("the board has {} base parameters, this leg {rank}", solver.base);
+            return Err(other(self.leg, reason));
+        }
+        let (mut estimate, mut dropped) = (Estimate::<f32, B>::nothing(), [false; B]);
+        let mut seen = [false; B];
+        for told in &self.told.base {
+            let own = base.independent(told.index).map(|(joint, parameter)| (joint + 1, parameter.symbol()));
+            if own != Some((told.joint, told.symbol.as_str())) || seen[told.index] {
+                let own = own.map_or("nothing".into(), |(joint, symbol)| format!("{symbol}{joint}"));
+                return Err(other(
+                    self.leg,
+                    format!(
+                        "its base parameter {} is {own}, the board's {}{}",
+                        told.index, told.symbol, told.joint
+                    ),
+                ));
+            }
+            (seen[told.index], dropped[told.index]) = (true, told.dropped);
+            if told.value.is_finite() {
+                (estimate.values[told.index], estimate.determined[told.index]) = (told.value, true);
+            }
+        }
+        for told in &self.told.covariance {
+            if told.row >= rank || told.column >= rank {
+                return Err(other(self.leg, "an element of the covariance lies beyond its base parameters"));
+            }
+            estimate.covariance[told.row][told.column] = told.value;
+            estimate.covariance[told.column][told.row] = told.value;
+        }
+        Ok((estimate, dropped))
+    }
+
+    fn parameters(&self) -> Result<Vec<ParameterReport>, ToolError> {
+        let background = self.background;
+        let truth = background.truth.as_ref();
+        let prior = background.prior.as_ref().map(scarab::ident::prior_parameters);
+        let mut reports = Vec::with_capacity(N * Parameter::ALL.len());
+        for joint in 0..N {
+            for parameter in Parameter::ALL {
+                let mut all = self.told.parameters.iter();
+                let told = all
+                    .find(|told| (told.joint, told.symbol.as_str()) == (joint + 1, parameter.symbol()))
+                    .ok_or_else(|| {
+                        other(self.leg, format!("parameter {}{} was not told", parameter.symbol(), joint + 1))
+                    })?;
+                const STATUS: [Status; 4] =
+                    [Status::Identified, Status::Grouped, Status::Weak, Status::Prior];
+                reports.push(ParameterReport {
+                    name: background.name(joint, parameter),
+                    joint: joint + 1,
+                    value: told.value.into(),
+                    unit: parameter.unit(),
+                    sigma: told.sigma.into(),
+                    status: word(&told.status, &STATUS.map(Status::name), "status")?,
+                    grouped_with: background.grouped_with(joint, parameter),
+                    truth: truth.map(|truth| truth[joint][parameter.index()]).into(),
+                    prior: prior.map(|prior| prior[joint][parameter.index()]).into(),
+                });
+            }
+        }
+        Ok(reports)
+    }
+
+    fn stribeck(&self) -> Vec<StribeckReport> {
+        let told = self.told.stribeck.iter().filter(|told| (1..=N).contains(&told.joint));
+        told.map(|told| StribeckReport {
+            joint: told.joint,
+            surplus_nm: told.surplus_nm.into(),
+            surplus_sigma_nm: told.surplus_sigma_nm.into(),
+            speed_rad_s: told.speed_rad_s.into(),
+            speed_sigma_rad_s: told.speed_sigma_rad_s.into(),
+            gain_chi2: told.gain_chi2.into(),
+        })
+        .collect()
+    }
+
+    /// Gains of columns are not told; that of Stribeck friction is where it was found.
+    fn model_choice(&self, dropped: &[bool; B]) -> Vec<crate::tool::model_choice::ModelChoiceReport> {
+        let found = |joint: usize| self.told.stribeck.iter().find(|told| told.joint == joint + 1);
+        let gain =
+            |joint| Some(found(joint).map_or((f32::NAN, f32::NAN), |told| (told.gain_chi2, told.surplus_nm)));
+        let looked_for = |joint: usize| self.background.device.stribeck_choice[joint].is_possible();
+        let selection = Selection {
+            is_made: true,
+            dropped: *dropped,
+            gain: [f32::NAN; B],
+            stribeck: core::array::from_fn(|joint| gain(joint).filter(|_| looked_for(joint))),
+        };
+        let size = |joint| self.training(joint).map_or(f32::NAN, |fit| fit.torque_rms_nm);
+        self.background
+            .model_choice(&selection, &core::array::from_fn(|joint| (found(joint).is_some(), size(joint))))
+    }
+
+    fn training(&self, joint: usize) -> Option<&Fit> {
+        self.told.fits.iter().find(|fit| (fit.motion, fit.joint) == (0, joint + 1))
+    }
+
+    fn outliers(&self) -> OutliersReport {
+        let motion = self.told.motions.iter().find(|motion| motion.motion == 0);
+        let number = |of: fn(&Fit) -> f32| (0..N).map(|joint| self.training(joint).map(of).into()).collect();
+        OutliersReport {
+            estimator: estimator_name(Estimator::default()),
+            samples: motion.map_or(0, |motion| motion.samples),
+            replaced: (0..N).map(|joint| self.training(joint).map_or(0, |fit| fit.replaced)).collect(),
+            disturbed_share: number(|fit| fit.disturbed_share),
+            longest_s: number(|fit| fit.disturbed_longest_s),
+            longest_common_s: motion.map(|motion| motion.longest_common_s).into(),
+        }
+    }
+
+    fn least_squares(&self, base: usize) -> Number {
+        self.told.base.iter().find(|told| told.index == base).map(|told| told.least_squares).into()
+    }
+
+    fn reasons(&self) -> Result<Vec<&'static str>, ToolError> {
+        let names = Reason::ALL.map(Reason::name);
+        self.told.reasons.iter().map(|told| word(&told.reason, &names, "reason")).collect()
+    }
+}
+
+fn consistent(solver: &Solver) -> ConsistentReport {
+    ConsistentReport {
+        chosen: "base",
+        optimum_over_least_squares: Number::UNKNOWN,
+        result_over_least_squares: solver.consistency_chi2.into(),
+        degrees_of_freedom: None,
+        full: None,
+        base: ConsistentSearchReport {
+            iterations: solver.iterations,
+            evaluations: solver.evaluations,
+            steps: solver.steps,
+            settled: None,
+            excess_chi2: Number::UNKNOWN,
+            iterations_to_half_chi2: None,
+            consistent: None,
+            parameters: std::collections::BTreeMap::new(),
+        },
+    }
+}
+
+/// Unused motions have the names of a simulated run's.
+fn motion_name(motion: usize) -> String {
+    let name = motion.checked_sub(1).and_then(|unused| VALIDATION_NAMES.get(unused));
+    name.map_or_else(|| format!("motion {motion}"), |name| (*name).to_owned())
+}
+
+fn fit_report(fit: &Fit, motion: String) -> FitReport {
+    let percent = |of: f32| Number::from(100.0 * f64::from(fit.rms_nm) / f64::from(of));
+    FitReport {
+        joint: fit.joint,
+        motion,
+        rms_nm: fit.rms_nm.into(),
+        percent_of_mean_abs: percent(fit.mean_abs_nm),
+        percent_of_rms: percent(fit.torque_rms_nm),
+        percent_of_mean_abs_vs_truth: Number::UNKNOWN,
+        sticking_share: Number::UNKNOWN,
+        disturbed_share: fit.disturbed_share.into(),
+        disturbed_longest_s: fit.disturbed_longest_s.into(),
+        replaced: fit.replaced,
+    }
+}
+
+fn finding(told: &super::told::Finding) -> Result<FindingReport, ToolError> {
+    let tests = Test::ALL.into_iter().find(|test| test.name() == told.test);
+    let reasons = Reason::ALL.into_iter().find(|reason| reason.name() == told.reason);
+    let (Some(test), Some(reason)) = (tests, reasons) else {
+        let words = format!("the finding `{}` ({}) is of a later version", told.test, told.reason);
+        return Err(ToolError::input(words));
+    };
+    let evidence = Evidence {
+        reason,
+        test,
+        joint: told.joint.checked_sub(1),
+        motion: told.motion.checked_sub(1),
+        value: told.value,
+        limit: told.limit,
+        passed: told.passed,
+    };
+    Ok(FindingReport::new(&evidence, &VALIDATION_NAMES))
+}
+
+/// A word of a closed list.
+fn word(told: &str, all: &[&'static str], what: &str) -> Result<&'static str, ToolError> {
+    all.iter().find(|word| **word == told).copied().ok_or_else(|| {
+        ToolError::input(format!(
+            "the {what} `{told}` is not one of {}: a later version's trace",
+            all.join(", ")
+        ))
+    })
+}

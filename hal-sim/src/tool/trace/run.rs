@@ -1,0 +1,147 @@
+//! All of a trace for the command line: read, told in words, reported.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::Decoder;
+use super::events::{Event, Weight};
+use super::read::Trace;
+use crate::tool::error::ToolError;
+
+/// Bytes read at a time.
+const PIECE: usize = 64 * 1024;
+/// A line without an end is no line.
+const LONGEST_LINE: usize = 64 * 1024;
+
+/// Where a trace comes from: a file, or `-` for standard input.
+pub fn read(source: &Path, image: Option<&Path>) -> Result<Trace, ToolError> {
+    let cannot = |path: &Path, error: &dyn std::fmt::Display| {
+        ToolError::input(format!("{}: cannot be read: {error}", path.display()))
+    };
+    let decoder = match image {
+        Some(path) => {
+            let bytes = std::fs::read(path).map_err(|error| cannot(path, &error))?;
+            let named = |error: ToolError| ToolError::input(format!("{}: {error}", path.display()));
+            Some(Decoder::new(&bytes).map_err(named)?)
+        }
+        None => None,
+    };
+    let mut input: Box<dyn Read> = if source == Path::new("-") {
+        Box::new(std::io::stdin().lock())
+    } else {
+        Box::new(std::fs::File::open(source).map_err(|error| cannot(source, &error))?)
+    };
+    let mut reader = StreamReader::new(decoder);
+    let mut piece = vec![0; PIECE];
+    loop {
+        match input.read(&mut piece) {
+            Ok(0) => break,
+            Ok(count) => reader.feed(&piece[..count]),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(cannot(source, &error)),
+        }
+    }
+    reader.finish(source)
+}
+
+/// Bytes to a trace, text or `defmt` frames.
+pub struct StreamReader {
+    decoder: Option<Decoder>,
+    trace: Trace,
+    line: Vec<u8>,
+    zeros: u64,
+}
+
+impl StreamReader {
+    /// Frames where there is a decoder, text where there is none.
+    #[must_use]
+    pub fn new(decoder: Option<Decoder>) -> Self {
+        Self { decoder, trace: Trace::default(), line: Vec::new(), zeros: 0 }
+    }
+
+    /// Takes bytes as they come.
+    pub fn feed(&mut self, bytes: &[u8]) {
+        if let Some(decoder) = &mut self.decoder {
+            decoder.feed(bytes, |line| self.trace.push(line));
+            return;
+        }
+        for &byte in bytes {
+            self.zeros += u64::from(byte == 0);
+            if byte == b'\n' {
+                self.trace.push(&String::from_utf8_lossy(&self.line));
+                self.line.clear();
+            } else if self.line.len() < LONGEST_LINE {
+                self.line.push(byte);
+            }
+        }
+    }
+
+    /// The stream is at its end. `source` is named in errors.
+    ///
+    /// # Errors
+    /// There is no record in it.
+    pub fn finish(mut self, source: &Path) -> Result<Trace, ToolError> {
+        if !self.line.is_empty() {
+            self.trace.push(&String::from_utf8_lossy(&self.line));
+        }
+        let skipped = self.decoder.as_mut().map(Decoder::finish);
+        let decoded = self.decoder.as_ref().map_or(0, Decoder::decoded);
+        if self.trace.records == 0 {
+            let hint = match &skipped {
+                Some(_) if decoded == 0 => {
+                    ": no frame of this image; is --image what ran there, and the input its stream and not text?"
+                }
+                None if self.zeros > 0 => ": it is not text; a defmt stream needs --image ELF",
+                _ => "",
+            };
+            let source = source.display();
+            return Err(ToolError::input(format!("{source}: holds no record of a trace{hint}")));
+        }
+        if let Some(words) = skipped.and_then(|skipped| skipped.words()) {
+            self.trace.events.push(Event { time_s: None, weight: Weight::Warning, words });
+        }
+        self.trace.finish();
+        Ok(self.trace)
+    }
+}
+
+/// Timeline and loops, to stand before the tables.
+#[must_use]
+pub fn preface(trace: &Trace) -> String {
+    let mut lines: Vec<String> = trace.events.iter().map(Event::line).collect();
+    lines.push(String::new());
+    lines.extend(trace.statistics.lines());
+    let lines_without = trace.lines - trace.records;
+    lines.push(format!(
+        "records: {} read, {} lost{}{}",
+        trace.records,
+        trace.lost(),
+        count(trace.unknown, "of a kind that is not known here"),
+        count(lines_without, "lines without a record"),
+    ));
+    if trace.results.len() > 1 {
+        lines.push(format!("identifications: {}; this is the last", trace.results.len()));
+    }
+    lines.join("\n") + "\n\n"
+}
+
+fn count(count: u64, words: &str) -> String {
+    if count == 0 { String::new() } else { format!(", {count} {words}") }
+}
+
+/// What must not be overlooked, to stand behind everything.
+#[must_use]
+pub fn attention(trace: &Trace) -> String {
+    let faults: Vec<String> = trace.faults().map(|event| format!("  !! {}", event.words)).collect();
+    let warnings: Vec<String> = trace.warnings().iter().map(|words| format!("  !  {words}")).collect();
+    if faults.is_empty() && warnings.is_empty() {
+        return String::new();
+    }
+    let title = match faults.len() {
+        0 => "\nwarnings:".to_owned(),
+        1 => "\nATTENTION, 1 fault:".to_owned(),
+        many => format!("\nATTENTION, {many} faults:"),
+    };
+    let lines: Vec<String> = std::iter::once(title).chain(faults).chain(warnings).collect();
+    lines.join("\n") + "\n"
+}

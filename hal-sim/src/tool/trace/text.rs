@@ -1,0 +1,117 @@
+//! The record in a line of text.
+//!
+//! A debug probe's program puts time, level, place or colours around what the board told. A record is found where a kind is
+//! followed by ` n=` and digits: at the start of the line any kind, behind something else only one that is known.
+
+use std::borrow::Cow;
+
+use scarab::trace::{Line, LineError, Record};
+
+/// A kind of this version's grammar.
+#[must_use]
+pub fn is_known(kind: &str) -> bool {
+    Record::<1>::FORMATS
+        .iter()
+        .any(|format| format.strip_prefix(kind).is_some_and(|rest| rest.starts_with(' ')))
+}
+
+/// The record's part of a line; `None` where there is none.
+#[must_use]
+pub fn record(line: &str) -> Option<Cow<'_, str>> {
+    let line = without_colours(line);
+    let (start, end) = place(&line)?;
+    Some(match line {
+        Cow::Borrowed(line) => Cow::Borrowed(&line[start..end]),
+        Cow::Owned(line) => Cow::Owned(line[start..end].to_owned()),
+    })
+}
+
+/// Where the record begins and ends.
+fn place(line: &str) -> Option<(usize, usize)> {
+    let trimmed = line.trim_end();
+    for (at, _) in trimmed.match_indices(" n=") {
+        let digits = trimmed[at + 3..].split(' ').next().unwrap_or("");
+        let before = &trimmed[..at];
+        let kind = before.rsplit(|letter: char| !is_letter(letter)).next().unwrap_or("");
+        let prefix = &before[..before.len() - kind.len()];
+        let is_alone = prefix.trim().is_empty();
+        let is_apart = is_alone || prefix.ends_with([' ', '\t', ']', ':', '>']);
+        if kind.is_empty() || !is_number(digits) || !is_apart || !(is_alone || is_known(kind)) {
+            continue;
+        }
+        return Some((prefix.len(), end(trimmed, prefix.len())));
+    }
+    None
+}
+
+/// Without the place in the source that a logger puts behind, ` (scarab src/leg/control.rs:12)`.
+fn end(line: &str, start: usize) -> usize {
+    let without = line.ends_with(')').then(|| line.rfind(" (")).flatten();
+    match without {
+        Some(at) if at > start && matches!(Line::parse(&line[start..]), Err(LineError::Pair(_))) => {
+            line[..at].trim_end().len()
+        }
+        _ => line.len(),
+    }
+}
+
+const fn is_letter(letter: char) -> bool {
+    matches!(letter, 'a'..='z' | '0'..='9' | '_')
+}
+
+fn is_number(digits: &str) -> bool {
+    !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Without terminal colours (`ESC [ ... letter`).
+fn without_colours(line: &str) -> Cow<'_, str> {
+    if !line.contains('\u{1b}') {
+        return Cow::Borrowed(line);
+    }
+    let mut plain = String::with_capacity(line.len());
+    let mut parts = line.split('\u{1b}');
+    plain.extend(parts.next());
+    for part in parts {
+        let rest = part.strip_prefix('[').unwrap_or(part);
+        let end = rest.find(|letter: char| letter.is_ascii_alphabetic()).map_or(rest.len(), |at| at + 1);
+        plain.push_str(&rest[end..]);
+    }
+    Cow::Owned(plain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_is_found_behind_what_loggers_write() {
+        let plain = "fault n=7 tick=12 code=0x8400 name=overspeed joint=1";
+        for line in [
+            plain.to_owned(),
+            format!("  {plain}\r\n"),
+            format!("0.000274 INFO  {plain}"),
+            format!("12:03:44.120 [INFO ] {plain} (scarab src/trace/record.rs:12)"),
+            format!("\u{1b}[32m[INFO ]\u{1b}[0m {plain} \u{1b}[2m(scarab record.rs:12)\u{1b}[0m"),
+            format!("0x20000400: {plain}"),
+        ] {
+            assert_eq!(record(&line).as_deref(), Some(plain), "{line}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_record_is_not_taken_for_one() {
+        for line in [
+            "",
+            "      Erasing sectors [00:00:01]",
+            "the loop ran with n=4 of 5",
+            "note: loops n=many",
+            "nofault n = 7",
+            "INFO later_kind n=7 a=1",
+            "a-fault n=7",
+        ] {
+            assert_eq!(record(line), None, "{line}");
+        }
+        // A kind that this version does not know stands alone.
+        assert_eq!(record("later_kind n=7 a=1").as_deref(), Some("later_kind n=7 a=1"));
+    }
+}
