@@ -106,12 +106,19 @@ pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figu
             })?;
         }
     }
-    let (file, title) = ("residuals.svg".into(), "Distribution and autocorrelation of the residuals".into());
-    add(Group::Residuals, file, title, residuals::height(joints.len()), &|area| {
-        residuals::whole(area, joints, series)
-    })?;
-    let title = "Cost of the beetle swarm above the optimum".into();
-    add(Group::Search, "search.svg".into(), title, 330, &|area| search::whole(area, series))?;
+    // A board may have sent no log, and never tells its cost above the optimum of its box.
+    let is_told = run.trace.is_some();
+    if !is_told || !series.motions.is_empty() {
+        let (file, title) =
+            ("residuals.svg".into(), "Distribution and autocorrelation of the residuals".into());
+        add(Group::Residuals, file, title, residuals::height(joints.len()), &|area| {
+            residuals::whole(area, joints, series)
+        })?;
+    }
+    if !is_told {
+        let title = "Cost of the beetle swarm above the optimum".into();
+        add(Group::Search, "search.svg".into(), title, 330, &|area| search::whole(area, series))?;
+    }
     let rows = run.base_parameters.len() as u32;
     let title = format!("Base parameters: {}", parameters::what(run));
     add(Group::BaseParameters, "base-parameters.svg".into(), title, 90 + 24 * rows, &|area| {

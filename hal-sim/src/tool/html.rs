@@ -91,6 +91,7 @@ pub fn page(
             body {
                 main {
                     (head::title(circumstances, run))
+                    (verdict::alarms(run))
                     (verdict::banner(run))
                     (head::facts(circumstances, run))
                     section { h2 { "At a glance" } (head::numbers(run)) (group(Group::Summary)) }

@@ -178,12 +178,14 @@ impl<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize
     pub fn series(self, solver: &Solver<f32, N, B>, motions: Vec<MotionSeries>) -> Series {
         let record = solver.record();
         let overlap = f64::from(record.row_information).sqrt();
-        Series {
-            motions,
-            noise_nm: noise(record).iter().map(|independent| f64::from(*independent) * overlap).collect(),
-            white_correlation: self.white_correlation,
-            ..Series::default()
-        }
+        let noise_nm = noise(record).iter().map(|independent| f64::from(*independent) * overlap).collect();
+        Series { noise_nm, ..self.of_motions(motions) }
+    }
+
+    /// The same where there is no solver to ask.
+    #[must_use]
+    pub fn of_motions(self, motions: Vec<MotionSeries>) -> Series {
+        Series { motions, white_correlation: self.white_correlation, ..Series::default() }
     }
 }
 

@@ -204,14 +204,7 @@ fn run_text(run: &RunReport) -> String {
         String::new(),
         base_parameters(run),
         fits(run),
-        format!(
-            "least squares: cost {} chi-square units. beetle swarm: {} iterations, {} evaluations, ends {} units \
-             above the optimum of its box",
-            number(run.least_squares.cost),
-            run.bso.iterations,
-            run.bso.evaluations,
-            number(run.bso.excess_chi2),
-        ),
+        search_line(run),
     ];
     lines.push(consistent_line(run));
     lines.extend(run.stribeck.iter().map(StribeckReport::line));
@@ -249,6 +242,20 @@ fn run_text(run: &RunReport) -> String {
             .map(|words| format!("warning: {words}")),
     );
     lines.join("\n") + "\n"
+}
+
+/// What the search took and how far it came; a board tells the first only.
+fn search_line(run: &RunReport) -> String {
+    let swarm =
+        format!("beetle swarm: {} iterations, {} evaluations", run.bso.iterations, run.bso.evaluations);
+    if run.trace.is_some() {
+        return swarm;
+    }
+    format!(
+        "least squares: cost {} chi-square units. {swarm}, ends {} units above the optimum of its box",
+        number(run.least_squares.cost),
+        number(run.bso.excess_chi2),
+    )
 }
 
 /// What physical consistency costs, and both searches for it.

@@ -148,7 +148,11 @@ fn faults_and_crashes_stand_before_the_tables_and_behind_the_verdict() {
     assert!(boot < lines.len());
     let folder = Folder::new();
     let (trace, json) = (folder.write("trace.txt", &text(&lines)), folder.path("told.json"));
-    let run = scarab("trace --json", &[&json, &trace]).ends_with(0);
+    let page = folder.path("told.html");
+    let run = scarab("trace --json", &[&json, &trace, "--report".as_ref(), &page]).ends_with(0);
+    let page = std::fs::read_to_string(page).expect("written");
+    let alarm = page.find("3 faults of the drive").expect("the page begins with the faults");
+    assert!(alarm < page.find("The model explains").expect("a verdict"));
     let (before, behind) = run.printed.split_once("verdict: accepted").expect("a verdict");
     for words in [
         "FAULT 0x8400 overspeed: joint 2",

@@ -1,6 +1,7 @@
 //! The report of a trace against the run's own.
 
 use hal_sim::tool::simulate::{SimulationOptions, simulate};
+use hal_sim::tool::trace::curves::curves;
 use hal_sim::tool::trace::run_report;
 use serde_json::Value;
 
@@ -97,7 +98,10 @@ fn the_log_of_a_trace_is_the_log_of_the_run_and_replay_finds_the_same_parameters
     let same = std::fs::read(&own_log).expect("written") == std::fs::read(&log).expect("written");
     assert!(same, "the trace's log differs from the run's");
     let page = std::fs::read_to_string(page).expect("written");
-    assert!(page.contains("emulated board") && page.contains("Trace"), "the page shows what the board told");
+    assert!(page.contains("emulated board") && page.contains("trace of a board"), "it is the board's page");
+    for figure in ["motions.svg", "torque-1.svg", "torque-2.svg", "residuals.svg", "base-parameters.svg"] {
+        assert!(page.contains(figure), "{figure} is drawn from the log");
+    }
 
     // The host resamples and filters anew: what it finds from the log is the board's result within a quarter of a sigma.
     let replayed = folder.path("replayed.json");
@@ -178,4 +182,38 @@ fn every_kind_and_key_is_documented_and_none_that_there_is_not() {
     let documented: Vec<_> = rows.iter().map(|(kind, keys, _)| (*kind, keys.clone())).collect();
     assert_eq!(documented, formats.collect::<Vec<_>>());
     assert!(rows.iter().all(|(.., about)| *about > 5));
+}
+
+/// Curves from the board's log are those of the run itself: same samples, same filter, same result.
+#[test]
+fn the_curves_of_a_trace_are_those_of_the_run() {
+    let leg = default_leg();
+    let options = SimulationOptions { with_series: true, ..SimulationOptions::of_seed(1) };
+    let own = simulate::<2, 13>(&leg, &options).expect("simulated").series;
+    let told = curves(&read(accepted()), &leg).expect("of this leg");
+    assert_eq!((told.motions.len(), &told.white_correlation), (4, &own.white_correlation));
+    for (told, own) in told.motions.iter().zip(&own.motions) {
+        assert_eq!((&told.name, told.role, &told.time_s), (&own.name, own.role, &own.time_s));
+        for (told, own) in told.joints.iter().zip(&own.joints) {
+            assert!(!told.measured_nm.is_empty());
+            assert_eq!((&told.measured_nm, &told.predicted_nm), (&own.measured_nm, &own.predicted_nm));
+            assert_eq!((&told.measured_deg, &told.still), (&own.measured_deg, &own.still));
+        }
+    }
+    // The noise is what is left over; the identification counts its parameters off, thirteen of a thousand rows.
+    for (told, own) in told.noise_nm.iter().zip(&own.noise_nm) {
+        assert!((told / own - 1.0).abs() < 0.02, "{told} {own}");
+    }
+    // A motion with a hole is not drawn.
+    let hole =
+        accepted().iter().position(|line| line.contains(" segment=validation motion=2 ")).expect("a log");
+    let mut lines = accepted().to_vec();
+    lines.remove(hole + 500);
+    let names: Vec<_> = curves(&read(&lines), &leg)
+        .expect("of this leg")
+        .motions
+        .into_iter()
+        .map(|motion| motion.name)
+        .collect();
+    assert_eq!(names, ["excitation", "gait-6.5", "fourier"]);
 }

@@ -8,8 +8,8 @@ use super::common::{draw_into, write_json};
 use super::model::ModelArguments;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::leg_file::LegFile;
-use crate::tool::series::Series;
 use crate::tool::tables;
+use crate::tool::trace::curves::curves;
 use crate::tool::trace::{Trace, log, run as told, run_report};
 
 /// What to read and what to keep of it.
@@ -72,7 +72,9 @@ fn report(arguments: &TraceArguments, trace: &Trace) -> Result<u8, ToolError> {
         tables::print(&format!("\n{}", tables::parameters(&run)))?;
     }
     let (figures, page) = (arguments.figures.as_deref(), arguments.report.as_deref());
-    draw_into(leg, figures, page, &run, &Series::default(), &[])?;
+    if figures.is_some() || page.is_some() {
+        draw_into(leg, figures, page, &run, &curves(trace, leg)?, &[])?;
+    }
     arguments.model.save(leg, &run, leg.bandwidth_hz)?;
     Ok(if run.accepted() { EXIT_ACCEPTED } else { EXIT_REFUSED })
 }

@@ -7,7 +7,11 @@ use super::{Circumstances, number, signed};
 
 /// Name of the leg and date.
 pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
-    let kind = if run.seed.is_some() { "simulated run" } else { "recording" };
+    let kind = match (&run.trace, run.seed) {
+        (Some(_), _) => "trace of a board",
+        (None, Some(_)) => "simulated run",
+        (None, None) => "recording",
+    };
     html! {
         header {
             p.over { "Scarab \u{b7} identification report \u{b7} " (kind) }
@@ -27,10 +31,10 @@ pub fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
         ("Gravity in the base frame", format!("{} m/s\u{b2}", gravity.join(", "))),
         (
             "Scale",
-            match (run.scale.scale, run.seed) {
+            match (run.scale.scale, run.seed.is_some() || run.trace.is_some()) {
                 ("absolute", _) => "absolute: identified torque constants",
-                (_, Some(_)) => "relative to the torque constants",
-                (_, None) => "that of the recorded torque",
+                (_, true) => "relative to the torque constants",
+                (_, false) => "that of the recorded torque",
             }
             .into(),
         ),
@@ -110,9 +114,10 @@ pub fn numbers(run: &RunReport) -> Markup {
 
 /// The last line.
 pub fn colophon(run: &RunReport) -> Markup {
+    let time = if run.trace.is_some() { String::new() } else { format!(" in {:.2} s", run.wall_s) };
     html! {
         footer {
-            p { "Made by Scarab " (env!("CARGO_PKG_VERSION")) " in " (format!("{:.2}", run.wall_s)) " s. Values are SI; sigma \
+            p { "Made by Scarab " (env!("CARGO_PKG_VERSION")) (time) ". Values are SI; sigma \
                 is one standard deviation, of the torque's noise alone." }
         }
     }

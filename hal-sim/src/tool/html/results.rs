@@ -36,6 +36,8 @@ pub fn trajectory_words(run: &RunReport) -> Markup {
     let words = if run.seed.is_some() {
         "The first motion is identified from, the others are only predicted. The deviation is that of the position loop \
          without a model."
+    } else if run.trace.is_some() {
+        "Angles as the board logged them, of motions whose log was sent and has no gap. What was commanded is not logged."
     } else {
         "Angles as recorded, on the firmware's grid of 500 samples a second. A recording does not tell what was commanded."
     };
@@ -94,6 +96,12 @@ pub fn fits(run: &RunReport) -> Markup {
 
 /// What the search did.
 pub fn search(run: &RunReport) -> Markup {
+    if run.trace.is_some() {
+        return html! { p {
+            "The beetle swarm started cold and took " (run.bso.iterations) " iterations and " (run.bso.evaluations)
+            " evaluations. How far it ends above the optimum of its box a board does not tell: that takes double precision."
+        } };
+    }
     let half = run.bso.iterations_to_half_chi2;
     html! { p {
         "The beetle swarm started cold and took " (run.bso.iterations) " iterations and " (run.bso.evaluations)

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::super::findings::FindingReport;
 use super::super::report::{Number, RunReport};
 use super::super::tables;
-use super::number;
+use super::{count, number};
 
 /// The verdict, large and in words, with each reason and what it was measured against.
 pub fn banner(run: &RunReport) -> Markup {
@@ -25,6 +25,24 @@ pub fn banner(run: &RunReport) -> Markup {
                 p { "Do not use this model. It was refused because of:" }
                 ul { @for reason in &run.reasons { li { (sentences(reason, run)) } } }
             }
+        }
+    }
+}
+
+/// What a board told that must not be overlooked; nothing for a run without.
+pub fn alarms(run: &RunReport) -> Markup {
+    let told = run.trace.as_ref();
+    let (faults, warnings) = told.map_or((&[][..], &[][..]), |told| (&told.faults, &told.warnings));
+    html! {
+        @if !faults.is_empty() {
+            section.verdict.refused {
+                p.word { (count(faults.len(), "fault")) " of the drive" }
+                p { "Whatever the verdict on the model, the board told:" }
+                ul { @for words in faults { li { (words) } } }
+            }
+        }
+        @if !warnings.is_empty() {
+            section { h2 { "Warnings" } ul { @for words in warnings { li { (words) } } } }
         }
     }
 }

@@ -18,9 +18,10 @@
 //! | [`events`] | the timeline in words |
 //! | [`loops`] | statistics of loops, stack and supply |
 //! | [`report`] | the last complete result as a run's report |
-//! | [`log`] | the 500 Hz log as a recording |
+//! | [`log`], [`curves`] | the 500 Hz log as a recording, and drawn |
 //! | [`run`] | all of it for the command line |
 
+pub mod curves;
 pub mod decode;
 pub mod events;
 pub mod fields;

@@ -104,13 +104,13 @@ fn of_size<const N: usize, const B: usize>(
     leg: &LegFile,
 ) -> Result<RunReport, ToolError> {
     let background = known::<N, B>(trace, told, leg)?;
-    let reader = Reader { background: &background, leg, told };
+    let found = Found { background: &background, leg, told };
     let solver = told.solver.as_ref().ok_or_else(|| ToolError::input("the result has no solver"))?;
-    let (estimate, dropped) = reader.base(solver)?;
-    let stribeck = reader.stribeck();
+    let (estimate, dropped) = found.base(solver)?;
+    let stribeck = found.stribeck();
     let base = background.base_parameters(&dropped, &estimate, None);
     let (training, validation): (Vec<_>, Vec<_>) = told.fits.iter().partition(|fit| fit.motion == 0);
-    let reasons = reader.reasons()?;
+    let reasons = found.reasons()?;
     let samples: u32 = told.motions.iter().map(|motion| motion.samples).sum();
     let log_hz = trace.boot.as_ref().map_or(scarab::ident::SAMPLE_RATE_HZ, |boot| f64::from(boot.log_hz));
     Ok(RunReport {
@@ -127,18 +127,18 @@ fn of_size<const N: usize, const B: usize>(
         rank: solver.rank,
         columns: background.columns - dropped.iter().filter(|dropped| **dropped).count(),
         condition: solver.condition.into(),
-        parameters: reader.parameters()?,
+        parameters: found.parameters()?,
         base_parameters: base.into_iter().chain(background.surpluses(&stribeck, &[])).collect(),
-        model_choice: reader.model_choice(&dropped),
+        model_choice: found.model_choice(&dropped),
         asymmetric_coulomb: background.directions(&dropped, &estimate),
         temperature_c: background.temperature_c.into(),
-        outliers: reader.outliers(),
+        outliers: found.outliers(),
         training: training.into_iter().map(|fit| fit_report(fit, "fourier".into())).collect(),
         validation: validation.into_iter().map(|fit| fit_report(fit, motion_name(fit.motion))).collect(),
         least_squares: LeastSquaresReport {
             base_parameters: background
                 .kept(&dropped)
-                .map(|base| (background.base_name(base), reader.least_squares(base)))
+                .map(|base| (background.base_name(base), found.least_squares(base)))
                 // What static friction least squares would have is not told.
                 .chain(stribeck.iter().map(|found| (surplus_name(found.joint - 1), Number::UNKNOWN)))
                 .collect(),
@@ -166,7 +166,7 @@ fn of_size<const N: usize, const B: usize>(
 }
 
 /// What is known of the leg beside the trace; a prior only where the board had one.
-fn known<const N: usize, const B: usize>(
+pub(super) fn known<const N: usize, const B: usize>(
     trace: &Trace,
     told: &Told,
     leg: &LegFile,
@@ -188,15 +188,15 @@ fn known<const N: usize, const B: usize>(
 }
 
 /// A result beside what is known of its leg.
-struct Reader<'a, const N: usize, const B: usize> {
-    background: &'a Background<N, B>,
-    leg: &'a LegFile,
-    told: &'a Told,
+pub(super) struct Found<'a, const N: usize, const B: usize> {
+    pub background: &'a Background<N, B>,
+    pub leg: &'a LegFile,
+    pub told: &'a Told,
 }
 
-impl<const N: usize, const B: usize> Reader<'_, N, B> {
+impl<const N: usize, const B: usize> Found<'_, N, B> {
     /// Values and covariance, and what is held at zero; the base parameters must be the leg file's.
-    fn base(&self, solver: &Solver) -> Result<(Estimate<f32, B>, [bool; B]), ToolError> {
+    pub fn base(&self, solver: &Solver) -> Result<(Estimate<f32, B>, [bool; B]), ToolError> {
         let base = &self.background.model.base;
         let rank = base.rank();
         if (solver.base, self.told.base.len()) != (rank, rank) {
