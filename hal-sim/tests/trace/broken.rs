@@ -18,7 +18,7 @@ fn a_trace_cut_anywhere_says_how_far_it_went() {
     for cut in 0..CUTS {
         let length = whole.len() * cut / CUTS;
         let mut reader = StreamReader::new(None);
-        reader.feed(&whole.as_bytes()[..length]);
+        reader.feed(&whole.as_bytes()[..length]).expect("nothing is written");
         let reported = reader.finish(Path::new("cut")).and_then(|trace| run_report(&trace, &leg));
         let complete = length > result_end + "\nend n=1000 records=999".len();
         match reported {

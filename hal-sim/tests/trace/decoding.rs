@@ -213,10 +213,15 @@ fn a_stream_and_its_text_are_reported_alike() {
     let (bytes, plain) = (folder.path("trace.bin"), folder.write("trace.txt", &text(&lines)));
     std::fs::write(&bytes, stream(&lines)).expect("written");
     let [one, other] = ["one.json", "other.json"].map(|name| folder.path(name));
-    let decoded = scarab("trace --image", &[&elf, &bytes, "--json".as_ref(), &one]).ends_with(0);
+    let lines_again = folder.path("again.txt");
+    let decoded =
+        scarab("trace --image", &[&elf, &bytes, "--json".as_ref(), &one, "--text".as_ref(), &lines_again])
+            .ends_with(0);
     let read = scarab("trace --json", &[&other, &plain]).ends_with(0);
     assert_eq!(decoded.printed, read.printed);
     assert_eq!(folder.json("one.json"), folder.json("other.json"));
+    let again = std::fs::read_to_string(lines_again).expect("written");
+    assert!(again.lines().map(meaning).eq(lines.iter().map(|line| meaning(line))), "the lines need no image");
     // A stream without its image, text with one.
     let told = scarab("trace", &[&bytes]).ends_with(2).errors;
     assert!(told.contains("--image"), "{told}");
@@ -242,6 +247,6 @@ fn an_image_that_cannot_have_sent_the_stream_is_refused() {
     }
     // The right image, and bytes of another: none of it is a record.
     let mut reader = StreamReader::new(Some(Decoder::new(&own_image()).expect("an image")));
-    reader.feed(&[1, 2, 3, 0, 9, 9, 9, 9, 0, 0, 0, 7]);
+    reader.feed(&[1, 2, 3, 0, 9, 9, 9, 9, 0, 0, 0, 7]).expect("nothing is written");
     assert!(reader.finish(Path::new("stream")).is_err());
 }

@@ -35,6 +35,9 @@ pub struct TraceArguments {
     /// Draw what the trace tells into this directory, as SVG.
     #[arg(long)]
     figures: Option<PathBuf>,
+    /// Write the records here as lines of text, which can be read without the image.
+    #[arg(long)]
+    text: Option<PathBuf>,
     /// Print all fourteen parameters of every joint with their status.
     #[arg(long)]
     parameters: bool,
@@ -44,7 +47,7 @@ pub struct TraceArguments {
 
 /// Reads and reports; the exit code.
 pub fn run(arguments: &TraceArguments) -> Result<u8, ToolError> {
-    let trace = told::read(&arguments.file, arguments.image.as_deref())?;
+    let trace = told::read(&arguments.file, arguments.image.as_deref(), arguments.text.as_deref())?;
     tables::print(&told::preface(&trace))?;
     let outcome = report(arguments, &trace);
     tables::print(&told::attention(&trace))?;

@@ -1,7 +1,8 @@
 //! All of a trace for the command line: read, told in words, reported.
 
-use std::io::Read;
-use std::path::Path;
+use std::fs::File;
+use std::io::{BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
 
 use super::Decoder;
 use super::events::{Event, Weight};
@@ -13,8 +14,8 @@ const PIECE: usize = 64 * 1024;
 /// A line without an end is no line.
 const LONGEST_LINE: usize = 64 * 1024;
 
-/// Where a trace comes from: a file, or `-` for standard input.
-pub fn read(source: &Path, image: Option<&Path>) -> Result<Trace, ToolError> {
+/// Reads a file, or `-` for standard input; writes the records as lines where `text` says.
+pub fn read(source: &Path, image: Option<&Path>, text: Option<&Path>) -> Result<Trace, ToolError> {
     let cannot = |path: &Path, error: &dyn std::fmt::Display| {
         ToolError::input(format!("{}: cannot be read: {error}", path.display()))
     };
@@ -29,14 +30,18 @@ pub fn read(source: &Path, image: Option<&Path>) -> Result<Trace, ToolError> {
     let mut input: Box<dyn Read> = if source == Path::new("-") {
         Box::new(std::io::stdin().lock())
     } else {
-        Box::new(std::fs::File::open(source).map_err(|error| cannot(source, &error))?)
+        Box::new(File::open(source).map_err(|error| cannot(source, &error))?)
     };
     let mut reader = StreamReader::new(decoder);
+    if let Some(path) = text {
+        let file = File::create(path).map_err(|error| ToolError::cannot_write(path, &error))?;
+        reader.text = Some((path.to_owned(), BufWriter::new(file)));
+    }
     let mut piece = vec![0; PIECE];
     loop {
         match input.read(&mut piece) {
             Ok(0) => break,
-            Ok(count) => reader.feed(&piece[..count]),
+            Ok(count) => reader.feed(&piece[..count])?,
             Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
             Err(error) => return Err(cannot(source, &error)),
         }
@@ -50,39 +55,54 @@ pub struct StreamReader {
     trace: Trace,
     line: Vec<u8>,
     zeros: u64,
+    text: Option<(PathBuf, BufWriter<File>)>,
 }
 
 impl StreamReader {
     /// Frames where there is a decoder, text where there is none.
     #[must_use]
     pub fn new(decoder: Option<Decoder>) -> Self {
-        Self { decoder, trace: Trace::default(), line: Vec::new(), zeros: 0 }
+        Self { decoder, trace: Trace::default(), line: Vec::new(), zeros: 0, text: None }
     }
 
     /// Takes bytes as they come.
-    pub fn feed(&mut self, bytes: &[u8]) {
+    ///
+    /// # Errors
+    /// The file of lines cannot be written.
+    pub fn feed(&mut self, bytes: &[u8]) -> Result<(), ToolError> {
         if let Some(decoder) = &mut self.decoder {
-            decoder.feed(bytes, |line| self.trace.push(line));
-            return;
+            let (trace, text) = (&mut self.trace, &mut self.text);
+            let mut outcome = Ok(());
+            decoder.feed(bytes, |line| {
+                let pushed = push(trace, text, line);
+                if outcome.is_ok() {
+                    outcome = pushed;
+                }
+            });
+            return outcome;
         }
         for &byte in bytes {
             self.zeros += u64::from(byte == 0);
             if byte == b'\n' {
-                self.trace.push(&String::from_utf8_lossy(&self.line));
+                push(&mut self.trace, &mut self.text, &String::from_utf8_lossy(&self.line))?;
                 self.line.clear();
             } else if self.line.len() < LONGEST_LINE {
                 self.line.push(byte);
             }
         }
+        Ok(())
     }
 
     /// The stream is at its end. `source` is named in errors.
     ///
     /// # Errors
-    /// There is no record in it.
+    /// There is no record in it, or the file of lines cannot be written.
     pub fn finish(mut self, source: &Path) -> Result<Trace, ToolError> {
         if !self.line.is_empty() {
-            self.trace.push(&String::from_utf8_lossy(&self.line));
+            push(&mut self.trace, &mut self.text, &String::from_utf8_lossy(&self.line))?;
+        }
+        if let Some((path, mut out)) = self.text.take() {
+            out.flush().map_err(|error| ToolError::cannot_write(&path, &error))?;
         }
         let skipped = self.decoder.as_mut().map(Decoder::finish);
         let decoded = self.decoder.as_ref().map_or(0, Decoder::decoded);
@@ -103,6 +123,19 @@ impl StreamReader {
         self.trace.finish();
         Ok(self.trace)
     }
+}
+
+/// A line to the trace, and its record to the file of lines.
+fn push(
+    trace: &mut Trace,
+    text: &mut Option<(PathBuf, BufWriter<File>)>,
+    line: &str,
+) -> Result<(), ToolError> {
+    trace.push(line);
+    if let (Some((path, out)), Some(record)) = (text, super::text::record(line)) {
+        writeln!(out, "{record}").map_err(|error| ToolError::cannot_write(path, &error))?;
+    }
+    Ok(())
 }
 
 /// Timeline and loops, to stand before the tables.
