@@ -97,6 +97,16 @@ impl ElectricalAngle {
         Rotation { sine, cosine }
     }
 
+    /// Units of 2^-32 turns, from half a turn back to half a turn on.
+    pub(super) const fn units(self) -> i32 {
+        self.0.cast_signed()
+    }
+
+    /// From units of 2^-32 turns.
+    pub(super) const fn from_units(units: i32) -> Self {
+        Self(units.cast_unsigned())
+    }
+
     /// Turned on by less than half a turn, given in units of 2^-32 turns.
     fn turned_by(self, units: f32) -> Self {
         Self(self.0.wrapping_add((units as i32).cast_unsigned()))
@@ -177,6 +187,13 @@ impl CountScale {
         } else {
             place
         }
+    }
+
+    /// Any number of counts within one turn.
+    #[must_use]
+    pub fn within_turn(&self, counts: i32) -> i32 {
+        // A turn is 16 counts at least; said so that nothing is left that could panic.
+        counts.checked_rem_euclid(self.counts_per_turn).unwrap_or_default()
     }
 
     /// The electrical angle of the middle of a count.

@@ -13,13 +13,19 @@
 //! **Borders.** A target that is not a number, a voltage that is none, a current beyond the bound release the bridge in the
 //! same tick. A saturated amplifier, a bus voltage out of range and an encoder step that no motor makes have one tick of
 //! patience, in which the duties of the tick before are kept; the second in a row releases. Released stays released until
-//! [`Axis::clear_fault`].
+//! [`Axis::clear_fault`]. An index pulse more than 4 counts from its place releases at once, whether or not anything switches:
+//! counts were lost, and with them the angle.
+//!
+//! **Known limit.** A counter that stops while current flows looks like a rotor that is held: the current keeps its direction,
+//! the torque falls with the cosine of what is missed and the rotor comes to rest a quarter of an electrical turn further. The servo's
+//! following error is what sees it; so does the index, where counts come back too few. Without an index lost counts are not seen.
 //!
 //! **Signs.** Inside, positive current makes torque towards growing electrical angle. Outside, counts and current both grow
 //! with the joint's flexion: [`AxisConfiguration::flexion`] says which way the counter runs then.
 //!
 //! Cost: `scripts/count-instructions`.
 
+use super::calibration::INDEX_WIDTH;
 use super::configuration::{AxisConfiguration, AxisError, Constants};
 use super::current_loop::DELAY_PERIODS;
 use super::{Calibration, CurrentLoop, Rotating, SpeedTracker};
@@ -50,7 +56,8 @@ pub enum AxisFault {
     Overcurrent,
     /// Bus voltage out of its range, two ticks in a row.
     BusVoltage,
-    /// Two encoder steps in a row that no motor makes. The place is lost: only a new calibration helps.
+    /// Two encoder steps in a row that no motor makes, or an index pulse away from the index's place. The place is lost: only a
+    /// new calibration helps.
     Encoder,
     /// Target or voltage not a number.
     NotANumber,
@@ -127,6 +134,12 @@ impl Axis {
             self.counter = sample.encoder_count;
             self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
             self.place = constants.scale.moved(self.place, constants.counter_sign * step);
+            if let Some(at) = sample.index_count
+                && constants.indexed
+                && self.index_distance(at) > INDEX_WIDTH
+            {
+                return Err(AxisFault::Encoder);
+            }
         }
         let angle = constants.scale.angle(self.place).plus(constants.offset);
         self.speed.track(angle);
@@ -185,6 +198,14 @@ impl Axis {
         let target = Rotating { d: Ampere::ZERO, q: target }.to_stationary(acting);
         let duty = constants.modulator.duties(voltage.to_stationary(acting), 1.0 / bus.0, target);
         Ok(AxisCommand { enabled: true, duty })
+    }
+
+    /// From the place where the index came to where it belongs, counts.
+    fn index_distance(&self, at: u16) -> i32 {
+        let scale = &self.constants.scale;
+        let since = self.constants.counter_sign * i32::from(self.counter.wrapping_sub(at).cast_signed());
+        let distance = scale.within_turn(self.place - since);
+        distance.min(scale.counts_per_turn() - distance)
     }
 
     /// Means of count and current since the last call, in the joint's sense; both of the same ticks, so that they belong to one

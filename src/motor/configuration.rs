@@ -1,8 +1,8 @@
 //! What an axis must be told, the refusal of what makes no sense, and the constants that follow.
 
 use super::{
-    BridgeTiming, Calibration, CountScale, CurrentGains, DeadTime, ElectricalAngle, Modulator,
-    MotorConstants, SenseScale, Sine,
+    BridgeTiming, Calibration, CountScale, CurrentGains, DeadTime, ElectricalAngle, EncoderSetting,
+    Modulator, MotorConstants, SenseScale, Sine,
 };
 use crate::hal::CURRENT_RATE_HZ;
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
@@ -59,9 +59,9 @@ pub struct AxisConfiguration {
     pub current_limit: Ampere,
     /// Length of the current vector at which the bridge is released.
     pub overcurrent: Ampere,
-    /// Bus voltage within which the bridge may switch.
+    /// Bus voltage within which the bridge may switch; the second no more than [`SenseScale::greatest_bus`].
     pub bus: [Volt; 2],
-    /// No motor of this axis turns faster.
+    /// No motor of this axis turns faster; there a released bridge must not rectify more than the greatest bus voltage.
     pub greatest_speed: RadianPerSecond,
 }
 
@@ -80,8 +80,12 @@ pub enum AxisError {
     Motor,
     /// Current limit positive, below the overcurrent bound, that within the amplifiers' range.
     Current,
-    /// Bus voltages: 5 V..=100 V, the first below the second.
+    /// Bus voltages: from 5 V on, the first below the second, that within the converter's range.
     Bus,
+    /// At the greatest speed a released bridge rectifies more than the greatest bus voltage: sqrt(3) pole pairs speed flux.
+    BackEmf,
+    /// The calibration was found with another direction of the counter, other pole pairs or other counts per turn.
+    Calibration,
 }
 
 impl AxisConfiguration {
@@ -102,7 +106,10 @@ impl AxisConfiguration {
             && self.overcurrent <= self.sense.range(ZERO_SPREAD_CODES);
         must(currents, AxisError::Current)?;
         let [low, high] = self.bus;
-        must(low.0 >= 5.0 && low < high && high.0 <= 100.0, AxisError::Bus)
+        let buses = low.0 >= 5.0 && low < high && high <= self.sense.greatest_bus();
+        must(buses, AxisError::Bus)?;
+        let rectified = SQRT_3 * f32::from(self.pole_pairs) * self.greatest_speed.0 * self.flux.0;
+        must(rectified <= high.0, AxisError::BackEmf)
     }
 
     pub(super) fn scale(&self) -> Result<CountScale, AxisError> {
@@ -127,6 +134,8 @@ impl AxisConfiguration {
     }
 }
 
+const SQRT_3: f32 = 1.732_050_8;
+
 /// How far a shunt's zero may lie from the middle of the converter's range: 6 A on the board's scale.
 pub const ZERO_SPREAD_CODES: u16 = 150;
 
@@ -138,6 +147,8 @@ pub(super) struct Constants {
     pub bus_codes: [u16; 2],
     pub scale: CountScale,
     pub offset: ElectricalAngle,
+    /// Places count from an index.
+    pub indexed: bool,
     pub counter_sign: i32,
     pub flexion_sign: i32,
     /// Joint's sense to the electrical one.
@@ -156,6 +167,9 @@ impl Constants {
         calibration: &Calibration,
     ) -> Result<Self, AxisError> {
         configuration.check()?;
+        if calibration.encoder() != EncoderSetting::of(configuration) {
+            return Err(AxisError::Calibration);
+        }
         let motor = MotorConstants {
             resistance: calibration.resistance(),
             direct_inductance: calibration.direct_inductance(),
@@ -171,6 +185,7 @@ impl Constants {
             bus_codes: configuration.bus_codes(),
             scale: configuration.scale()?,
             offset: calibration.offset(),
+            indexed: calibration.indexed(),
             counter_sign: signs[0],
             flexion_sign: signs[1],
             current_sign: (signs[0] * signs[1]) as f32,

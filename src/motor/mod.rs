@@ -35,7 +35,8 @@ pub mod transmission;
 pub use angle::{CountScale, ElectricalAngle, Rotation, Sine, SpeedTracker};
 pub use axis::{Axis, AxisFault, AxisRequest};
 pub use calibration::{
-    Calibration, CalibrationSettings, CalibrationStep, Calibrator, Phase, Refusal, StoredCalibration,
+    Calibration, CalibrationSettings, CalibrationStep, Calibrator, EncoderSetting, Phase, Refusal,
+    StoredCalibration,
 };
 pub use chopper::{Chopper, GREATEST_BRAKE_DUTY};
 pub use configuration::{AxisConfiguration, AxisError, Direction};

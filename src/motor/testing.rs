@@ -51,6 +51,8 @@ pub(super) struct TestMotor {
     pub encoder_zero: f64,
     pub encoder_sign: f64,
     pub encoder_dead: bool,
+    /// Width of the index pulse, counts: its other end is seen on the way back.
+    pub index_width: i64,
     /// What the converter makes of the currents of B and C.
     pub shunts: fn([f64; 2]) -> [f64; 2],
     /// d and q, A.
@@ -83,6 +85,7 @@ impl Default for TestMotor {
             encoder_zero: 0.137,
             encoder_sign: 1.0,
             encoder_dead: false,
+            index_width: 0,
             shunts: |currents| currents,
             current: [0.0; 2],
             angle: 0.3,
@@ -144,7 +147,10 @@ impl TestMotor {
         let counts = (place * self.counts_per_turn).floor() as i64;
         let turn = place.floor() as i64;
         let before = self.turn.replace(turn).unwrap_or(turn);
-        let at = (turn.max(before) as f64 * self.counts_per_turn) as i64;
+        let mut at = (turn.max(before) as f64 * self.counts_per_turn) as i64;
+        if turn < before {
+            at += self.index_width;
+        }
         let index_count = (before != turn).then_some(at as u16);
         let bus_code = (self.bus / (3.3 * 19.0 / 4096.0)) as u16;
         AxisSample { shunt_codes, bus_code, encoder_count: counts as u16, index_count }

@@ -34,9 +34,14 @@ pub const CHOPPER: [Volt; 2] = [Volt(50.0), Volt(54.0)];
 /// Faster than the joint's limit by this the counter is not believed.
 const SPEED_MARGIN: f64 = 2.0;
 
-/// How a motor is calibrated on its stand.
-pub const CALIBRATION: CalibrationSettings =
-    CalibrationSettings { current: Ampere(15.0), voltage: Volt(3.0), turns_per_s: 10.0 };
+/// Most that a motor is calibrated with on its stand.
+const CALIBRATION_CURRENT_A: f64 = 15.0;
+/// Voltage vectors of a calibration: what is enough for motors of the default leg, and less than half of the lowest bus.
+const CALIBRATION_VOLTAGE_V: [f64; 2] = [3.0, 9.5];
+const CALIBRATION_TURNS_PER_S: f32 = 10.0;
+/// Half of a wave with which the firmware measures inductances, s, and the share of the current that it aims at.
+const HALF_WAVE_S: f64 = 2.0 / 24_000.0;
+const WAVE_SHARE: f64 = 0.3;
 /// What turns on the stand: the rotor alone, kg m^2; bearings, N m; a little of drag, N m s/rad.
 const ROTOR: Load = Load::Free { inertia: 1e-4, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
 /// A calibration takes some seconds.
@@ -66,17 +71,35 @@ pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfigura
     }
 }
 
+/// How a motor is calibrated on its stand: no more than its axis' current and what its resistance lets through at the voltage
+/// allowed; that by resistance and inductance.
+#[must_use]
+pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile) -> CalibrationSettings {
+    let [usual, most] = CALIBRATION_VOLTAGE_V;
+    let limit = f64::from(configuration.current_limit.0);
+    let current = CALIBRATION_CURRENT_A.min(limit).min(0.7 * most / motor.resistance_ohm);
+    let inductance = 1e-6 * motor.inductance_d_uh.max(motor.inductance_q_uh);
+    let wave = WAVE_SHARE * current * inductance / HALF_WAVE_S;
+    let voltage = (1.4 * current * motor.resistance_ohm).max(wave).clamp(usual, most);
+    CalibrationSettings {
+        current: Ampere(current as f32),
+        voltage: Volt(voltage as f32),
+        turns_per_s: CALIBRATION_TURNS_PER_S,
+    }
+}
+
 /// Calibrates a motor on its stand; `name` is for the message where that fails.
 pub fn commission(
     name: &str,
     configuration: &AxisConfiguration,
+    settings: CalibrationSettings,
     axis: &AxisDescription,
     supply: &SupplyDescription,
     seed: u64,
 ) -> Result<Calibration, ToolError> {
     let refused = |reason: String| ToolError::input(format!("axis `{name}`: {reason}"));
     let mut stand = Stand::new(axis, supply, ROTOR, 0.0, seed);
-    let mut calibrator = Calibrator::new(configuration, CALIBRATION)
+    let mut calibrator = Calibrator::new(configuration, settings)
         .map_err(|error| refused(format!("the firmware refuses its configuration: {error:?}")))?;
     let mut command = AxisCommand::RELEASED;
     for _ in 0..LONGEST_CALIBRATION {
@@ -119,7 +142,9 @@ impl<const N: usize> Board<N> {
                 .ok_or_else(|| ToolError::input(format!("joint `{}` has no motor", joint.name)))?;
             let configuration = axis_configuration(joint, motor);
             let (name, simulated) = (&joint.name, &description.axes[index]);
-            let calibration = commission(name, &configuration, simulated, &description.supply, seed)?;
+            let settings = calibration_settings(&configuration, motor);
+            let calibration =
+                commission(name, &configuration, settings, simulated, &description.supply, seed)?;
             let mut axis = Axis::new(&configuration, &calibration, &samples[index]).map_err(|error| {
                 ToolError::input(format!("axis `{name}`: the firmware refuses its configuration: {error:?}"))
             })?;

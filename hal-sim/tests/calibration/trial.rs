@@ -12,7 +12,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::AxisCommand;
 use scarab::motor::{
     AxisConfiguration, BridgeTiming, Calibration, CalibrationSettings, CalibrationStep, Calibrator, DeadTime,
-    Direction, Refusal, SenseScale, Sine,
+    Direction, Refusal, SenseScale, Sine, StoredCalibration,
 };
 use scarab::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
 
@@ -52,14 +52,18 @@ impl Trial {
         let torque_per_ampere = dice.between(0.02, 0.1);
         let holding = torque_per_ampere * CURRENT;
         let flux = torque_per_ampere / (1.5 * f64::from(pole_pairs));
+        // A rotor whose saliency outweighs its magnets would not rest along them.
+        let inductance_q = (inductance_d * dice.between(1.0, 1.4)).min(inductance_d + 0.8 * flux / CURRENT);
+        // A current along the flux of a salient rotor holds it with less: torque = 3/2 p i sin(x) (flux - (Lq - Ld) i cos(x)).
+        let held = holding * (1.0 - (inductance_q - inductance_d) * CURRENT / flux).max(0.2);
         let motor = MotorDescription {
             resistance,
             inductance_d,
-            inductance_q: inductance_d * dice.between(1.0, 1.4),
+            inductance_q,
             flux,
             pole_pairs,
             electrical_zero: dice.between(0.0, TAU),
-            cogging: dice.between(0.0, 0.03) * holding,
+            cogging: dice.between(0.0, 0.03) * held,
             cogging_periods: 6 * pole_pairs,
             thermal_resistance: 1.0,
             thermal_time: 600.0,
@@ -84,7 +88,7 @@ impl Trial {
         let bridge = BridgeDescription::default();
         let load = Load::Free {
             inertia: dice.between(0.5e-4, 10e-4),
-            coulomb: dice.between(0.0, 0.15) * holding,
+            coulomb: dice.between(0.0, 0.15) * held,
             viscous: dice.between(1e-4, 5e-4),
             torque: 0.0,
         };
@@ -122,10 +126,28 @@ impl Trial {
         }
     }
 
+    /// Torque with which the field holds a rotor without saliency, N m.
+    pub fn holding(&self) -> f64 {
+        1.5 * f64::from(self.axis.motor.pole_pairs) * self.axis.motor.flux * CURRENT
+    }
+
     /// Runs the machine to its end; with the furthest that the rotor was from where it began, turns.
     pub fn run(&self, seed: u64) -> (Stand, Result<Calibration, Refusal>, f64) {
+        self.run_with(seed, Calibrator::new(&self.configuration, self.settings).expect("sensible"))
+    }
+
+    /// As `run`, after a power-up.
+    pub fn run_stored(
+        &self,
+        seed: u64,
+        stored: StoredCalibration,
+    ) -> (Stand, Result<Calibration, Refusal>, f64) {
+        let calibrator = Calibrator::from_stored(&self.configuration, self.settings, stored);
+        self.run_with(seed, calibrator.expect("sensible"))
+    }
+
+    fn run_with(&self, seed: u64, mut calibrator: Calibrator) -> (Stand, Result<Calibration, Refusal>, f64) {
         let mut stand = Stand::new(&self.axis, &SupplyDescription::default(), self.load, self.angle, seed);
-        let mut calibrator = Calibrator::new(&self.configuration, self.settings).expect("sensible");
         let mut sample = stand.period(&AxisCommand::RELEASED, 0.0);
         let mut furthest = 0.0_f64;
         loop {

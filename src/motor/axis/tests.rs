@@ -1,7 +1,7 @@
 use super::*;
 use crate::motor::calibration::tests::calibrate;
 use crate::motor::testing::{CONFIGURATION, TestMotor};
-use crate::motor::{AxisConfiguration, Direction, Sine};
+use crate::motor::{AxisConfiguration, DeadTime, Direction, Sine};
 use crate::units::{Volt, Weber};
 
 const fn ask(current: f32) -> AxisRequest {
@@ -72,16 +72,32 @@ fn the_torque_current_follows_and_the_field_stays_zero_at_every_speed_and_sign()
 }
 
 #[test]
-fn turning_the_voltage_by_the_delay_is_what_keeps_the_axes_apart_at_speed() {
-    // Without the angle ahead 1,575 rad/s times 62.5 us are 5.6 degrees: the voltage would be turned by them.
-    let mut bench = Bench::at(225.0, &AxisConfiguration { feedforward: true, ..CONFIGURATION });
-    let mut worst = 0.0_f64;
-    bench.run(ask(0.0), 480);
-    for _ in 0..240 {
-        bench.tick(ask(10.0));
-        worst = worst.max(bench.motor.current[0].abs());
+fn the_voltage_is_turned_to_where_the_rotor_will_be_in_the_middle_of_its_period() {
+    // A loop that has just been enabled, without feedforward, at no measured current: its voltage is a quadrature voltage of
+    // kp times the target, so the duties lie a quarter turn ahead of the angle in which it acts.
+    for counts_per_tick in [5_i32, -5, 12, -12] {
+        let configuration =
+            AxisConfiguration { feedforward: false, dead_time: DeadTime::Uncompensated, ..CONFIGURATION };
+        let mut bench = Bench::at(0.0, &configuration);
+        let mut sample = bench.sample;
+        sample.shunt_codes = bench.axis.constants.zeros.map(|zero| (zero + 0.5) as u16);
+        sample.index_count = None;
+        for _ in 0..2400 {
+            bench.axis.tick(&sample, AxisRequest::RELEASED);
+            sample.encoder_count = sample.encoder_count.wrapping_add(counts_per_tick as u16);
+        }
+        let [a, b, c] = bench.axis.tick(&sample, ask(10.0)).duty;
+        let alpha = f64::from(2.0 * a - b - c) / 3.0;
+        let beta = f64::from(b - c) * 0.577_350_269;
+        let scale = &bench.axis.constants.scale;
+        let angle = scale.angle(bench.axis.place).plus(bench.axis.constants.offset);
+        let duty_turns = crate::real::atan2(beta, alpha) / core::f64::consts::TAU;
+        let ahead = duty_turns - 0.25 - f64::from(angle.turns());
+        let expected = 1.5 * f64::from(counts_per_tick) * 7.0 / 8192.0;
+        // Half a code of current against ten ampere is a tenth of a degree; one period more or less is 1.5 degrees and more.
+        let error = (ahead - expected - (ahead - expected).round()) * 360.0;
+        assert!(error.abs() < 0.3, "{counts_per_tick} counts per tick: {error} degrees");
     }
-    assert!(worst < 1.0, "{worst} A");
 }
 
 #[test]
@@ -101,7 +117,6 @@ fn the_fast_sine_costs_less_than_two_thousandths_of_ripple() {
 
 #[test]
 fn dead_time_given_back_leaves_less_of_the_sixth_harmonic() {
-    use crate::motor::DeadTime;
     let ripple = |dead_time| {
         let mut bench = Bench::at(60.0, &AxisConfiguration { dead_time, ..CONFIGURATION });
         bench.motor.noise_codes = 0.0;
@@ -193,6 +208,27 @@ fn one_bad_sample_alone_is_survived_and_a_lost_place_is_not_cleared() {
 }
 
 #[test]
+fn an_index_away_from_its_place_is_a_lost_place() {
+    for (missed, lost) in [(3, false), (-3, false), (6, true), (-6, true), (300, true)] {
+        for request in [ask(5.0), AxisRequest::RELEASED] {
+            for speed in [50.0, -50.0] {
+                let mut bench = Bench::at(speed, &CONFIGURATION);
+                bench.run(request, 100);
+                bench.motor.encoder_zero += f64::from(missed) / 8192.0;
+                // The index stays where it is on the shaft: three turns.
+                for _ in 0..9048 {
+                    bench.sample.index_count =
+                        bench.sample.index_count.map(|at| at.wrapping_add(missed as u16));
+                    bench.tick(request);
+                }
+                assert_eq!(bench.axis.fault(), lost.then_some(AxisFault::Encoder), "{missed} {speed}");
+                assert_eq!(bench.axis.clear_fault(), !lost);
+            }
+        }
+    }
+}
+
+#[test]
 fn nothing_that_is_not_finite_reaches_the_bridge() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut bench = Bench::at(0.0, &CONFIGURATION);
@@ -222,5 +258,9 @@ fn an_axis_of_absurd_numbers_is_refused_by_part() {
     assert_eq!(refused(|c| c.current_limit.0 = 56.0), AxisError::Current);
     assert_eq!(refused(|c| c.overcurrent.0 = 70.0), AxisError::Current);
     assert_eq!(refused(|c| c.bus = [Volt(30.0), Volt(20.0)]), AxisError::Bus);
+    // The divider ends at 62.7 V.
+    assert_eq!(refused(|c| c.bus[1] = Volt(60.0)), AxisError::Bus);
+    // 7 pole pairs, 2.9 mV s: 58 V between two phases at 1650 rad/s.
+    assert_eq!(refused(|c| c.greatest_speed.0 = 1700.0), AxisError::BackEmf);
     assert_eq!(CONFIGURATION.check(), Ok(()));
 }

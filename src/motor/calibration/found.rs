@@ -1,12 +1,36 @@
 //! What a passed calibration found, and what of it outlives the power.
 
 use super::inductance::Inductances;
-use crate::motor::{CountScale, Direction, ElectricalAngle};
+use crate::motor::{AxisConfiguration, CountScale, Direction, ElectricalAngle};
 use crate::units::{Henry, Ohm};
+
+/// The part of a configuration on which an offset depends: with another one it is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EncoderSetting {
+    /// How the counter runs while the field turns from A over B to C.
+    pub counter: Direction,
+    /// Of the motor.
+    pub pole_pairs: u8,
+    /// Of the encoder.
+    pub counts_per_turn: u32,
+}
+
+impl EncoderSetting {
+    /// Of an axis.
+    #[must_use]
+    pub const fn of(configuration: &AxisConfiguration) -> Self {
+        Self {
+            counter: configuration.counter,
+            pole_pairs: configuration.pole_pairs,
+            counts_per_turn: configuration.counts_per_turn,
+        }
+    }
+}
 
 /// What a passed calibration found. There is no other way to one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
+    pub(super) encoder: EncoderSetting,
     pub(super) zeros: [f32; 2],
     pub(super) resistance: Ohm,
     pub(super) inductances: Inductances,
@@ -28,9 +52,23 @@ pub struct StoredCalibration {
     pub quadrature_inductance: Henry,
     /// Electrical angle at the index.
     pub offset: ElectricalAngle,
+    /// With which configuration it was found.
+    pub encoder: EncoderSetting,
 }
 
 impl Calibration {
+    /// With which configuration it was found.
+    #[must_use]
+    pub fn encoder(&self) -> EncoderSetting {
+        self.encoder
+    }
+
+    /// Whether places count from the index.
+    #[must_use]
+    pub fn indexed(&self) -> bool {
+        self.indexed
+    }
+
     /// Codes of the shunts without current.
     #[must_use]
     pub fn zeros(&self) -> [f32; 2] {
@@ -75,11 +113,12 @@ impl Calibration {
             direct_inductance: self.inductances.direct,
             quadrature_inductance: self.inductances.quadrature,
             offset: self.offset,
+            encoder: self.encoder,
         })
     }
 
     pub(in crate::motor) fn place_of(&self, scale: &CountScale, direction: Direction, counter: u16) -> i32 {
         let moved = i32::from(counter.wrapping_sub(self.counter).cast_signed());
-        (self.place + direction.sign() * moved).rem_euclid(scale.counts_per_turn())
+        scale.within_turn(self.place + direction.sign() * moved)
     }
 }

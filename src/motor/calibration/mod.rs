@@ -18,21 +18,31 @@
 //! | encoder without counts, rotor blocked | travel | [`Refusal::NoCounts`] |
 //! | pole pairs, counts per turn | counts per electrical turn | [`Refusal::PolePairs`], [`Refusal::CountsPerTurn`] |
 //! | index missing, or not at one place per turn | index | [`Refusal::NoIndex`], [`Refusal::IndexMoved`] |
+//! | load, friction or cogging too large | way and deviation, both ways | [`Refusal::Slipped`] |
+//! | encoder turned on its shaft since it was stored | offset at the index | [`Refusal::StoredOffset`] |
 //!
 //! Nothing is corrected in silence. Exchanged motor leads and an exchanged encoder look the same from here (the counter runs
 //! against the field), but the second also reverses the joint's angle: so the direction is part of the commissioned
 //! configuration, and the other one is refused. All three leads moved on by one are the same motor with another offset, which
 //! is found. Counts per electrical turn tell pole pairs and counts per turn apart only where the first come out whole.
 //!
+//! **What cannot be seen.** Two motor leads *and* the encoder's A and B exchanged together are an electrically sound drive that
+//! turns the other way: field, counter and torque agree, the joint's sense is reversed. Nothing within the drive knows which way
+//! the joint flexes. So commissioning ends with a step by hand: bridge released, flex the joint, and its angle must grow; the
+//! same after every work on leads or encoder. What was found is of use to the same configuration only: [`super::Axis::new`]
+//! refuses another direction, other pole pairs and other counts than those it was found with.
+//!
 //! Known limits: gain errors of shunts and of the bus divider scale R and L; a constant torque (gravity)
 //! shifts the offset by asin(torque / holding torque), friction does not; calibrate with the leg hanging or unloaded.
 
+mod field;
 mod found;
 mod hold;
 mod inductance;
 mod refusal;
 mod resistance;
 mod scan;
+mod track;
 mod zeros;
 
 use super::configuration::{AxisConfiguration, AxisError, Direction};
@@ -42,12 +52,13 @@ use super::{
 };
 use crate::hal::{AxisCommand, AxisSample};
 use crate::units::{Ampere, Hertz, Ohm, Volt, Weber};
-pub use found::{Calibration, StoredCalibration};
+pub use found::{Calibration, EncoderSetting, StoredCalibration};
 use hold::Hold;
 use inductance::{InductanceStage, Inductances};
 pub use refusal::{Phase, Refusal};
 use resistance::ResistanceStage;
 use scan::{Scan, ScanResult};
+pub(super) use track::INDEX_WIDTH;
 use zeros::Zeros;
 
 /// What a calibration may do to a motor.
@@ -82,6 +93,7 @@ struct Bench {
     pole_pairs: u8,
     direction: Direction,
     index: bool,
+    encoder: EncoderSetting,
     bus_codes: [u16; 2],
     overcurrent_square: f32,
     sine: Sine,
@@ -137,6 +149,7 @@ impl Calibrator {
     pub fn new(configuration: &AxisConfiguration, settings: CalibrationSettings) -> Result<Self, AxisError> {
         configuration.check()?;
         let sensible = settings.current.0 > 0.0
+            && settings.current <= configuration.current_limit
             && settings.current.0 * 1.3 < configuration.overcurrent.0
             && settings.voltage.0 > 0.0
             && settings.voltage.0 < 0.5 * configuration.bus[0].0
@@ -152,6 +165,7 @@ impl Calibrator {
             pole_pairs: configuration.pole_pairs,
             direction: configuration.counter,
             index: configuration.index,
+            encoder: EncoderSetting::of(configuration),
             bus_codes: configuration.bus_codes(),
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
             sine: configuration.sine,
@@ -166,10 +180,12 @@ impl Calibrator {
         })
     }
 
-    /// After a power-up: zeros and wiring again, inductances as stored, and the index instead of the offset.
+    /// After a power-up: everything is checked again as by [`Self::new`], only inductances are taken as stored, and so is the
+    /// offset, if the one that is found agrees with it.
     ///
     /// # Errors
-    /// As [`Self::new`]; also [`AxisError::Encoder`] where there is no index.
+    /// As [`Self::new`]; also [`AxisError::Encoder`] where there is no index, and [`AxisError::Calibration`] where the stored
+    /// values are those of another configuration.
     pub fn from_stored(
         configuration: &AxisConfiguration,
         settings: CalibrationSettings,
@@ -177,6 +193,9 @@ impl Calibrator {
     ) -> Result<Self, AxisError> {
         if !configuration.index {
             return Err(AxisError::Encoder);
+        }
+        if stored.encoder != EncoderSetting::of(configuration) {
+            return Err(AxisError::Calibration);
         }
         Ok(Self { stored: Some(stored), ..Self::new(configuration, settings)? })
     }
@@ -277,6 +296,7 @@ impl Calibrator {
 
     fn passed(&self, found: ScanResult, sample: &AxisSample) -> Calibration {
         Calibration {
+            encoder: self.bench.encoder,
             zeros: self.zeros,
             resistance: self.resistance,
             inductances: self.inductances,

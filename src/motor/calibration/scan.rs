@@ -3,46 +3,52 @@
 //! ```text
 //! deviation = field - angle(place)                         of every tick, turns
 //! offset = (mean deviation forwards + mean deviation backwards) / 2
-//! lag    = (mean deviation forwards - mean deviation backwards) / 2        friction / holding torque
+//! lag    = (mean deviation forwards - mean deviation backwards) / 2        asin(friction / holding torque)
 //! ```
 //!
 //! Whole turns, so that cogging and an encoder off its centre average out; both ways, so that friction and the loop's delay
 //! cancel. Current is held by the current loop of the axis in a frame that the field defines, not the encoder: its
-//! quadrature axis lies along the field.
+//! quadrature axis lies along the field, which moves as [`super::field`] says.
 //!
-//! Field and rotor are a spring and a mass with hardly a damper: sqrt(pole pairs * holding torque / inertia), some 20 Hz. A field
-//! that jumps to its speed leaves the rotor swinging by a tenth of an electrical turn and more, for as long as the way lasts; so
-//! it takes and loses its speed evenly within one electrical turn at either end, in which nothing is measured.
+//! Judged in this order, the way there: the counter moved at all; with the field; equally far in every electrical turn of the
+//! field (or the rotor slipped, and its counts say nothing); by one turn's counts to 0.4 of an electrical turn, which is what
+//! other pole pairs make; the deviation's drift, which is what slightly other counts make; deviations within 90 degrees of their
+//! first; by one turn's counts to an eighth of an electrical turn. The way back: as even and as long; the lag; the index at one place.
 //!
-//! ```text
-//! t_a = 2 run-in / v;     field = v t^2 / (2 t_a),  v (t - t_a / 2),  way - v (t_end - t)^2 / (2 t_a)
-//! ```
+//! **How much lag.** What cancels is friction that is equal both ways. Up to 30 degrees it takes half of the holding torque, so
+//! the rotor still has a margin of two before it slips, and friction that differs by an eighth between the ways
+//! shifts the offset by tan 30 / 16 rad: 2 degrees. At a lag of 60 degrees it would be 6, and hardly anything holds.
 //!
-//! Judged in this order: the counter moved at all; with the field; by one turn's counts to an eighth of an electrical
-//! turn; evenly (deviations within a third of a turn of their first, lag below a sixth); the index at one place.
-//!
-//! With a stored offset the field turns until the index has come, one turn forwards or else back, and the rotor must stand
-//! where the offset says, to a sixth of an electrical turn.
+//! **With a stored offset** the way is the same, and the offset found must agree with the stored one to 5 degrees (0.4 % of the
+//! torque); the stored one, of the commissioning, is then used. Reversed wiring, other pole pairs or counts and an index that
+//! moved are so found at every power-up.
 
+use super::field::FieldWay;
+use super::track::{Followed, Track};
 use super::{Outcome, Reading, Refusal};
 use crate::hal::CURRENT_RATE_HZ;
 use crate::motor::{CurrentGains, CurrentLoop, ElectricalAngle, Rotating, Sine};
 use crate::units::Volt;
 
-/// The field takes its speed at the beginning of each way and loses it at the end, electrical turns.
-const RUN_IN_TURNS: f32 = 1.0;
 const REST_TICKS: u32 = CURRENT_RATE_HZ / 5;
 const FALL_TICKS: u32 = CURRENT_RATE_HZ / 20;
 /// Electrical turns.
 const GREATEST_TRAVEL_ERROR: f32 = 0.125;
-const GREATEST_UNEVENNESS: f32 = 1.0 / 3.0;
-const GREATEST_LAG: f32 = 1.0 / 6.0;
+/// What other pole pairs make nearly at least: p and p + 1 differ by p / (p + 1). Electrical turns.
+const LEAST_MISTAKE: f32 = 0.4;
+/// Of the deviation, electrical turns per turn of the motor: 18 degrees. 100 simulated motors swing by up to 13; 4,000 counts
+/// told of 4,096 make 34 with 4 pole pairs.
+const GREATEST_DRIFT: f32 = 0.05;
+/// Between both ways, electrical turns.
+const GREATEST_DIFFERENCE: f32 = 0.125;
+/// Electrical turns: see the module.
+const GREATEST_LAG: f32 = 1.0 / 12.0;
+/// Between the offset found and the stored one, electrical turns.
+const GREATEST_STORED_ERROR: f32 = 5.0 / 360.0;
 /// Less is vibration, electrical turns.
 const LEAST_TRAVEL: f32 = 0.1;
 /// How far pole pairs may be from a whole number to be named.
 const WHOLE: f32 = 0.1;
-/// Counts between index pulses read from either side.
-const INDEX_WIDTH: i32 = 4;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ScanResult {
@@ -58,56 +64,8 @@ enum Leg {
     Rest,
     Forwards,
     Backwards,
-    /// At the place of the index, with a stored offset.
-    Judge,
     /// The current falls to zero.
     Fall,
-}
-
-/// Mean deviation of field and rotor over one way.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Deviation {
-    first: ElectricalAngle,
-    sum: f32,
-    ticks: u32,
-    uneven: bool,
-}
-
-impl Deviation {
-    fn push(&mut self, deviation: ElectricalAngle) {
-        if self.ticks == 0 {
-            self.first = deviation;
-        }
-        let from_first = deviation.since(self.first);
-        self.uneven |= from_first.abs() > GREATEST_UNEVENNESS;
-        self.sum += from_first;
-        self.ticks += 1;
-    }
-
-    fn mean(&self) -> ElectricalAngle {
-        self.first.plus(ElectricalAngle::from_turns(self.sum / self.ticks.max(1) as f32))
-    }
-}
-
-/// How far the field has come on a way of `length` turns after so many s.
-fn travelled(seconds: f32, length: f32, turns_per_s: f32) -> f32 {
-    let half_rise_s = RUN_IN_TURNS / turns_per_s;
-    let end_s = length / turns_per_s + 2.0 * half_rise_s;
-    let curved = |seconds: f32| 0.25 * turns_per_s / half_rise_s * seconds * seconds;
-    if seconds < 2.0 * half_rise_s {
-        curved(seconds)
-    } else if seconds < end_s - 2.0 * half_rise_s {
-        turns_per_s * (seconds - half_rise_s)
-    } else if seconds < end_s {
-        length - curved(end_s - seconds)
-    } else {
-        length
-    }
-}
-
-/// The field has its speed there.
-fn steadily(turned: f32, length: f32) -> bool {
-    turned > RUN_IN_TURNS && turned <= length - RUN_IN_TURNS
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,17 +79,9 @@ pub(super) struct Scan {
     /// Field at the beginning of the leg and now, electrical turns, not reduced.
     begin_turns: f32,
     field_turns: f32,
-    counter: Option<u16>,
-    /// Counts from the beginning, growing with the field where all is well.
-    way: i32,
-    /// The way where measuring began and where it is now.
-    measured: Option<[i32; 2]>,
-    deviation: Deviation,
-    forwards: Option<ElectricalAngle>,
-    /// Where on the way the index came first.
-    index: Option<i32>,
-    /// A distance of two index pulses that is no whole number of turns.
-    index_distance: Option<i32>,
+    track: Track,
+    followed: Followed,
+    forwards: Option<Followed>,
     offset: ElectricalAngle,
 }
 
@@ -146,64 +96,39 @@ impl Scan {
             ticks: 0,
             begin_turns: 0.0,
             field_turns: 0.0,
-            counter: None,
-            way: 0,
-            measured: None,
-            deviation: Deviation::default(),
+            track: Track::default(),
+            followed: Followed::default(),
             forwards: None,
-            index: None,
-            index_distance: None,
             offset: ElectricalAngle::ZERO,
         }
     }
 
     pub(super) fn tick(&mut self, reading: &Reading<'_>) -> Result<Outcome<ScanResult>, Refusal> {
         let bench = reading.bench;
-        self.follow(reading);
-        let pairs = f32::from(bench.pole_pairs);
-        let length = pairs + 2.0 * RUN_IN_TURNS;
-        let seconds = self.ticks as f32 * (1.0 / CURRENT_RATE_HZ as f32);
+        self.track.follow(reading);
+        let way = FieldWay::over(f32::from(bench.pole_pairs), bench.settings.turns_per_s);
+        let turned = way.travelled(self.ticks as f32 * (1.0 / CURRENT_RATE_HZ as f32));
         self.ticks += 1;
         let mut share = 1.0;
         match self.leg {
             Leg::Rest if self.ticks < REST_TICKS => {}
-            Leg::Rest if self.field_turns > 0.0 => self.begin(Leg::Backwards),
+            Leg::Rest if self.forwards.is_some() => self.begin(Leg::Backwards),
             Leg::Rest => self.begin(Leg::Forwards),
             Leg::Forwards => {
-                let turned = travelled(seconds, length, bench.settings.turns_per_s);
                 self.field_turns = turned;
-                if self.searched() {
-                    self.begin(Leg::Judge);
-                } else {
-                    self.measure(reading, steadily(turned, length));
-                    if turned >= length {
-                        self.end_forwards(reading)?;
-                        self.begin(Leg::Rest);
-                    }
+                self.measure(reading, way.steady(turned));
+                if way.ended(turned) {
+                    self.end_forwards(reading)?;
+                    self.begin(Leg::Rest);
                 }
             }
             Leg::Backwards => {
-                let length = if self.stored.is_some() { 2.0 * length } else { length };
-                let turned = travelled(seconds, length, bench.settings.turns_per_s);
                 self.field_turns = self.begin_turns - turned;
-                if self.searched() {
-                    self.begin(Leg::Judge);
-                } else {
-                    self.measure(reading, steadily(turned, length));
-                    if turned >= length {
-                        self.end_backwards(reading)?;
-                        self.begin(Leg::Fall);
-                    }
+                self.measure(reading, way.steady(turned));
+                if way.ended(turned) {
+                    self.end_backwards(reading)?;
+                    self.begin(Leg::Fall);
                 }
-            }
-            Leg::Judge if self.ticks < REST_TICKS => {
-                if self.ticks > REST_TICKS / 2 {
-                    self.measure_from_index(reading);
-                }
-            }
-            Leg::Judge => {
-                self.judge_stored()?;
-                self.begin(Leg::Fall);
             }
             Leg::Fall => {
                 share = 1.0 - self.ticks as f32 / FALL_TICKS as f32;
@@ -228,126 +153,98 @@ impl Scan {
         self.leg = leg;
         self.ticks = 0;
         self.begin_turns = self.field_turns;
-        self.measured = None;
-        self.deviation = Deviation::default();
+        self.followed = Followed::default();
     }
 
     fn field(&self) -> ElectricalAngle {
         ElectricalAngle::from_turns(self.field_turns)
     }
 
-    /// The index has come and is all that is looked for.
-    fn searched(&self) -> bool {
-        self.stored.is_some() && self.index.is_some()
-    }
-
-    /// Moves the way on by what the counter did, and notes the index.
-    fn follow(&mut self, reading: &Reading<'_>) {
-        let sign = reading.bench.direction.sign();
-        let now = reading.sample.encoder_count;
-        let step = now.wrapping_sub(self.counter.unwrap_or(now)).cast_signed();
-        self.counter = Some(now);
-        self.way = self.way.wrapping_add(sign * i32::from(step));
-        let Some(at) = reading.sample.index_count.filter(|_| reading.bench.index) else { return };
-        let index = self.way.wrapping_sub(sign * i32::from(now.wrapping_sub(at).cast_signed()));
-        let first = *self.index.get_or_insert(index);
-        let distance = (index.wrapping_sub(first)).wrapping_abs();
-        let turn = reading.bench.scale.counts_per_turn();
-        let beyond = distance.rem_euclid(turn);
-        if beyond.min(turn - beyond) > INDEX_WIDTH {
-            self.index_distance = Some(distance);
+    fn measure(&mut self, reading: &Reading<'_>, steady_turns: Option<f32>) {
+        if let Some(turns) = steady_turns {
+            let field = self.field();
+            let turns = [turns, f32::from(reading.bench.pole_pairs)];
+            self.followed.push(&reading.bench.scale, self.track.way, field, turns);
         }
     }
 
-    /// Place on the way within one turn.
-    fn place(&self, reading: &Reading<'_>, way: i32) -> i32 {
-        way.rem_euclid(reading.bench.scale.counts_per_turn())
-    }
-
-    fn measure(&mut self, reading: &Reading<'_>, measuring: bool) {
-        if measuring {
-            let [from, _] = self.measured.unwrap_or([self.way; 2]);
-            self.measured = Some([from, self.way]);
-            let rotor = reading.bench.scale.angle(self.place(reading, self.way));
-            self.deviation.push(self.field().minus(rotor));
-        }
+    /// Electrical turns of a travel, as the counts were told.
+    fn electrical(reading: &Reading<'_>, counts: i32) -> f32 {
+        let turn = reading.bench.scale.counts_per_turn() as f32;
+        counts as f32 * f32::from(reading.bench.pole_pairs) / turn
     }
 
     fn end_forwards(&mut self, reading: &Reading<'_>) -> Result<(), Refusal> {
-        if self.stored.is_some() {
-            return Ok(());
-        }
-        let bench = reading.bench;
-        let [from, to] = self.measured.unwrap_or_default();
-        let travel = to.wrapping_sub(from);
-        let turn = bench.scale.counts_per_turn() as f32;
-        let pairs = f32::from(bench.pole_pairs);
-        let electrical = travel as f32 * pairs / turn;
+        let counts = self.followed.travel.counts();
+        let pairs = f32::from(reading.bench.pole_pairs);
+        let electrical = Self::electrical(reading, counts);
         if electrical.abs() < LEAST_TRAVEL {
             return Err(Refusal::NoCounts);
         }
         if electrical < 0.0 {
             return Err(Refusal::Direction);
         }
-        if (electrical - pairs).abs() > GREATEST_TRAVEL_ERROR {
-            let fitting = pairs * turn / travel as f32;
+        self.followed.must_be_even()?;
+        if (electrical - pairs).abs() > LEAST_MISTAKE {
+            let fitting = pairs * pairs / electrical;
             let whole = (fitting + 0.5) as u8;
-            return Err(match self.index_distance {
+            return Err(match self.track.index_distance {
                 Some(distance) => Refusal::CountsPerTurn(distance.unsigned_abs()),
                 None if (fitting - f32::from(whole)).abs() < WHOLE => Refusal::PolePairs(whole),
-                None => Refusal::CountsPerTurn(travel.unsigned_abs()),
+                None => Refusal::CountsPerTurn(counts.unsigned_abs()),
             });
         }
-        if self.deviation.uneven {
+        let drift = self.followed.deviation.drift_per_turn();
+        if drift.abs() * pairs > GREATEST_DRIFT {
+            let told = reading.bench.scale.counts_per_turn() as f32;
+            return Err(Refusal::CountsPerTurn((told * (1.0 - drift) + 0.5) as u32));
+        }
+        self.followed.must_keep_to_the_field()?;
+        if (electrical - pairs).abs() > GREATEST_TRAVEL_ERROR {
             return Err(Refusal::Slipped);
         }
-        self.forwards = Some(self.deviation.mean());
+        self.forwards = Some(self.followed);
         Ok(())
     }
 
     fn end_backwards(&mut self, reading: &Reading<'_>) -> Result<(), Refusal> {
-        let index_missing = reading.bench.index && self.index.is_none();
-        let Some(forwards) = self.forwards else { return Err(Refusal::NoIndex) };
-        let backwards = self.deviation.mean();
-        let lag = forwards.since(backwards) * 0.5;
-        if self.deviation.uneven || lag.abs() > GREATEST_LAG {
+        let Some(forwards) = self.forwards else { return Err(Refusal::Slipped) };
+        self.followed.must_be_even()?;
+        self.followed.must_keep_to_the_field()?;
+        let apart = forwards.travel.counts().wrapping_add(self.followed.travel.counts());
+        let (there, back) = (forwards.deviation.mean(), self.followed.deviation.mean());
+        let lag = there.since(back) * 0.5;
+        if Self::electrical(reading, apart).abs() > GREATEST_DIFFERENCE || lag.abs() > GREATEST_LAG {
             return Err(Refusal::Slipped);
         }
-        if index_missing {
+        if reading.bench.index && self.track.index.is_none() {
             return Err(Refusal::NoIndex);
         }
-        if self.index_distance.is_some() {
+        if self.track.index_distance.is_some() {
             return Err(Refusal::IndexMoved);
         }
-        self.offset = backwards.plus(ElectricalAngle::from_turns(lag));
-        Ok(())
-    }
-
-    /// As `measure`, of places from the index on.
-    fn measure_from_index(&mut self, reading: &Reading<'_>) {
-        let Some(index) = self.index else { return };
-        let rotor = reading.bench.scale.angle(self.place(reading, self.way.wrapping_sub(index)));
-        self.deviation.push(self.field().minus(rotor));
-    }
-
-    fn judge_stored(&self) -> Result<(), Refusal> {
-        let Some(offset) = self.stored.filter(|_| self.deviation.ticks > 0) else {
-            return Err(Refusal::NoIndex);
-        };
-        if self.deviation.mean().since(offset).abs() > GREATEST_LAG {
-            return Err(Refusal::StoredOffset);
+        self.offset = back.plus(ElectricalAngle::from_turns(lag)).plus(self.index_angle(reading));
+        match self.stored {
+            Some(stored) if self.offset.since(stored).abs() > GREATEST_STORED_ERROR => {
+                Err(Refusal::StoredOffset)
+            }
+            Some(stored) => {
+                self.offset = stored;
+                Ok(())
+            }
+            None => Ok(()),
         }
-        Ok(())
     }
 
-    /// Places from the index on, if there is one.
-    fn result(&self, reading: &Reading<'_>) -> ScanResult {
+    /// What the offset grows by because places count from the index on, if there is one.
+    fn index_angle(&self, reading: &Reading<'_>) -> ElectricalAngle {
         let scale = &reading.bench.scale;
-        let Some(index) = self.index else {
-            return ScanResult { offset: self.offset, place: self.place(reading, self.way) };
-        };
-        let moved = scale.angle(self.place(reading, index)).minus(scale.angle(0));
-        let offset = self.stored.unwrap_or(self.offset.plus(moved));
-        ScanResult { offset, place: self.place(reading, self.way.wrapping_sub(index)) }
+        let index = self.track.index.unwrap_or(0);
+        scale.angle(scale.within_turn(index)).minus(scale.angle(0))
+    }
+
+    fn result(&self, reading: &Reading<'_>) -> ScanResult {
+        let from_index = self.track.way.wrapping_sub(self.track.index.unwrap_or(0));
+        ScanResult { offset: self.offset, place: reading.bench.scale.within_turn(from_index) }
     }
 }

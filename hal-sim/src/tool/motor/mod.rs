@@ -20,7 +20,7 @@ use scarab::motor::{Axis, AxisConfiguration, AxisRequest, Calibration, Chopper, 
 use scarab::units::{Ampere, Volt};
 use serde::Serialize;
 
-use super::board::{BANDWIDTH, CHOPPER, axis_configuration, commission};
+use super::board::{BANDWIDTH, CHOPPER, axis_configuration, calibration_settings, commission};
 use super::error::ToolError;
 use super::leg_file::{LegFile, MotorFile};
 use super::report::SCHEMA;
@@ -58,13 +58,14 @@ impl Bench {
         };
         let motor: &MotorFile = motor;
         let configuration = axis_configuration(file, motor);
+        let settings = calibration_settings(&configuration, motor);
         let (axis, supply) = (motor.axis(file), leg.supply.description());
         Ok(Self {
             joint: file.name.clone(),
             configuration,
             axis,
             supply,
-            calibration: commission(&file.name, &configuration, &axis, &supply, seed)?,
+            calibration: commission(&file.name, &configuration, settings, &axis, &supply, seed)?,
             top_speed: file.speed_limit_deg_s.to_radians() * file.encoder.ratio,
             seed,
         })

@@ -1,0 +1,77 @@
+//! How the field of a scan moves: evenly, and gradually into motion and out of it.
+//!
+//! Field and rotor are a spring and a mass with hardly a damper: sqrt(pole pairs * holding torque / inertia), some 20 Hz. A field
+//! that jumps to its speed leaves the rotor swinging by a tenth of an electrical turn and more, for as long as the way lasts; so
+//! it takes and loses its speed evenly within one electrical turn at either end, in which nothing is measured.
+//!
+//! ```text
+//! t_a = 2 run-in / v;     field = v t^2 / (2 t_a),  v (t - t_a / 2),  way - v (t_end - t)^2 / (2 t_a)
+//! ```
+
+/// The field takes its speed at the beginning of each way and loses it at the end, electrical turns.
+const RUN_IN_TURNS: f32 = 1.0;
+
+/// One way of the field; electrical turns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct FieldWay {
+    length: f32,
+    turns_per_s: f32,
+}
+
+impl FieldWay {
+    /// Over so many turns at constant speed, and what it takes to reach and to leave it.
+    pub(super) fn over(turns: f32, turns_per_s: f32) -> Self {
+        Self { length: turns + 2.0 * RUN_IN_TURNS, turns_per_s }
+    }
+
+    /// How far the field has come after so many s.
+    pub(super) fn travelled(&self, seconds: f32) -> f32 {
+        let half_rise_s = RUN_IN_TURNS / self.turns_per_s;
+        let end_s = self.length / self.turns_per_s + 2.0 * half_rise_s;
+        let curved = |seconds: f32| 0.25 * self.turns_per_s / half_rise_s * seconds * seconds;
+        if seconds < 2.0 * half_rise_s {
+            curved(seconds)
+        } else if seconds < end_s - 2.0 * half_rise_s {
+            self.turns_per_s * (seconds - half_rise_s)
+        } else if seconds < end_s {
+            self.length - curved(end_s - seconds)
+        } else {
+            self.length
+        }
+    }
+
+    /// Turns at constant speed so far; `None` where it is not constant.
+    pub(super) fn steady(&self, travelled: f32) -> Option<f32> {
+        let steadily = travelled > RUN_IN_TURNS && travelled <= self.length - RUN_IN_TURNS;
+        steadily.then_some(travelled - RUN_IN_TURNS)
+    }
+
+    /// The end is reached.
+    pub(super) fn ended(&self, travelled: f32) -> bool {
+        travelled >= self.length
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_field_begins_and_ends_at_rest_and_never_jumps() {
+        let way = FieldWay::over(7.0, 8.0);
+        let (mut place, mut speed) = (0.0, 0.0);
+        for tick in 1..=36_000 {
+            let travelled = way.travelled(tick as f32 / 24_000.0);
+            let step = travelled - place;
+            // 8 turns per second are 3.3e-4 of a turn per tick, reached in a quarter of a second: 5.6e-8 more each; half a
+            // millionth is what nine turns are rounded to.
+            assert!(
+                (0.0..3.4e-4).contains(&step) && (step - speed).abs() < 2e-6,
+                "{tick}: {step} after {speed}"
+            );
+            assert_eq!(way.steady(travelled).is_some(), travelled > 1.0 && travelled <= 8.0);
+            (place, speed) = (travelled, step);
+        }
+        assert!(way.ended(place) && place == 9.0);
+    }
+}

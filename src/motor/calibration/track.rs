@@ -1,0 +1,208 @@
+//! What the rotor does while the field of a scan turns: counts along the way, the index on it, deviation from the field.
+
+use super::{Reading, Refusal};
+use crate::motor::{CountScale, ElectricalAngle};
+
+/// Deviation that a rotor which follows keeps to, from where it began, electrical turns: beyond 90 degrees the field no longer
+/// holds it. Lightly damped rotors swing by up to 39 (100 simulated motors), salient ones that hardly hold by 65.
+const GREATEST_UNEVENNESS: f32 = 0.25;
+/// Counts between index pulses read from either side.
+pub(in crate::motor) const INDEX_WIDTH: i32 = 4;
+/// A rotor that followed goes equally far in every electrical turn of the field, to one part in so many: swinging makes up to
+/// 0.16 (100 simulated motors), a turn missed 0.67 at least.
+const EVEN_SHARE: i32 = 2;
+
+/// The counter unwrapped, growing with the field where all is well, and the index on the way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Track {
+    counter: Option<u16>,
+    /// Counts from the beginning.
+    pub way: i32,
+    /// Where on the way the index came first.
+    pub index: Option<i32>,
+    /// A distance of two index pulses that is no whole number of turns.
+    pub index_distance: Option<i32>,
+}
+
+impl Track {
+    /// Moves the way on by what the counter did, and notes the index.
+    pub(super) fn follow(&mut self, reading: &Reading<'_>) {
+        let sign = reading.bench.direction.sign();
+        let now = reading.sample.encoder_count;
+        let step = now.wrapping_sub(self.counter.unwrap_or(now)).cast_signed();
+        self.counter = Some(now);
+        self.way = self.way.wrapping_add(sign * i32::from(step));
+        let Some(at) = reading.sample.index_count.filter(|_| reading.bench.index) else { return };
+        let index = self.way.wrapping_sub(sign * i32::from(now.wrapping_sub(at).cast_signed()));
+        let first = *self.index.get_or_insert(index);
+        let distance = index.wrapping_sub(first).wrapping_abs();
+        let beyond = reading.bench.scale.within_turn(distance);
+        if beyond.min(reading.bench.scale.counts_per_turn() - beyond) > INDEX_WIDTH {
+            self.index_distance = Some(distance);
+        }
+    }
+}
+
+/// Field less rotor over one way: mean, and the straight line through it.
+///
+/// ```text
+/// drift per turn = sum(x deviation) / sum(x^2)           x field turns from the middle of the way
+/// ```
+///
+/// Summed up as integers, 2^-32 turns for the mean, 2^-12 and 2^-16 for the line: exact for as long as any way takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Deviation {
+    first: ElectricalAngle,
+    sum: i64,
+    moment: i64,
+    squares: i64,
+    ticks: u32,
+    uneven: bool,
+}
+
+impl Deviation {
+    fn push(&mut self, deviation: ElectricalAngle, from_middle: f32) {
+        if self.ticks == 0 {
+            self.first = deviation;
+        }
+        let from_first = deviation.minus(self.first);
+        self.uneven |= from_first.turns().abs() > GREATEST_UNEVENNESS;
+        self.sum += i64::from(from_first.units());
+        let x = i64::from((from_middle * 4096.0) as i32);
+        self.moment += x * i64::from(from_first.units() >> 16);
+        self.squares += x * x;
+        self.ticks += 1;
+    }
+
+    /// Mean of the way.
+    pub(super) fn mean(&self) -> ElectricalAngle {
+        let mean = self.sum / i64::from(self.ticks.max(1));
+        self.first.plus(ElectricalAngle::from_units(mean as i32))
+    }
+
+    /// What the rotor stays behind more with every turn of the field, turns.
+    pub(super) fn drift_per_turn(&self) -> f32 {
+        self.moment as f32 / self.squares.max(1) as f32 * (4096.0 / 65_536.0)
+    }
+}
+
+/// Counts of one way while the field turned steadily, in all and in each electrical turn of the field.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Travel {
+    begin: Option<i32>,
+    /// Of the way, where this turn of the field began, and which it is.
+    turn_begin: i32,
+    turn: u8,
+    now: i32,
+    least: i32,
+    most: i32,
+}
+
+impl Travel {
+    fn push(&mut self, way: i32, field_turns: f32) {
+        let turn = field_turns as u8;
+        if self.begin.is_none() {
+            *self =
+                Self { begin: Some(way), turn_begin: way, turn, now: way, least: i32::MAX, most: i32::MIN };
+        }
+        self.now = way;
+        if turn != self.turn {
+            let counts = way.wrapping_sub(self.turn_begin);
+            (self.least, self.most) = (self.least.min(counts), self.most.max(counts));
+            (self.turn, self.turn_begin) = (turn, way);
+        }
+    }
+
+    /// In all.
+    pub(super) fn counts(&self) -> i32 {
+        self.now.wrapping_sub(self.begin.unwrap_or(self.now))
+    }
+
+    /// The rotor went equally far in every turn of the field: it may be another rotor than was told, but it followed. One
+    /// turn alone has nothing to be compared with.
+    fn is_even(&self) -> bool {
+        let mean = self.least / 2 + self.most / 2;
+        self.least > self.most || self.most.wrapping_sub(self.least) <= mean.wrapping_abs() / EVEN_SHARE
+    }
+}
+
+/// One way: how far, how evenly, with which deviation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Followed {
+    pub travel: Travel,
+    pub deviation: Deviation,
+}
+
+impl Followed {
+    /// One tick of steady motion: `field`, how far it has come of how far it will go steadily, electrical turns.
+    pub(super) fn push(&mut self, scale: &CountScale, way: i32, field: ElectricalAngle, turns: [f32; 2]) {
+        let [now, all] = turns;
+        self.travel.push(way, now);
+        self.deviation.push(field.minus(scale.angle(scale.within_turn(way))), now - 0.5 * all);
+    }
+
+    /// Whether rotor and field kept together at all, whatever the scale of the counts.
+    ///
+    /// # Errors
+    /// [`Refusal::Slipped`].
+    pub(super) fn must_be_even(&self) -> Result<(), Refusal> {
+        if self.travel.is_even() { Ok(()) } else { Err(Refusal::Slipped) }
+    }
+
+    /// Whether the rotor kept to the field, with the scale that it was told.
+    ///
+    /// # Errors
+    /// [`Refusal::Slipped`].
+    pub(super) fn must_keep_to_the_field(&self) -> Result<(), Refusal> {
+        if self.deviation.uneven { Err(Refusal::Slipped) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_of_the_longest_way_is_exact() {
+        // 64 electrical turns at half a turn per second.
+        let mut deviation = Deviation::default();
+        for tick in 0..3_072_000 {
+            deviation.push(ElectricalAngle::from_turns(if tick % 2 == 0 { 0.4 } else { 0.5 }), 0.0);
+        }
+        assert!((deviation.mean().since(ElectricalAngle::from_turns(0.45))).abs() < 1e-6);
+        assert!(!deviation.uneven);
+        deviation.push(ElectricalAngle::from_turns(0.66), 0.0);
+        assert!(deviation.uneven);
+    }
+
+    #[test]
+    fn a_drift_is_told_from_what_swings() {
+        for (turns, drift) in [(4.0, 0.024), (64.0, -0.002), (7.0, 0.0)] {
+            let mut deviation = Deviation::default();
+            for tick in 0..100_000 {
+                let x = turns * (tick as f32 / 100_000.0 - 0.5);
+                let swing = 0.05 * crate::real::sin_cos(x * 9.7).0;
+                deviation.push(ElectricalAngle::from_turns(0.3 + drift * x + swing), x);
+            }
+            // 6 A / (pi N) of the whole way is left of an amplitude A that swings N times, six here at least.
+            assert!((deviation.drift_per_turn() - drift).abs() * turns < 0.02, "{drift}: {deviation:?}");
+        }
+    }
+
+    #[test]
+    fn a_turn_of_the_field_that_was_missed_is_seen() {
+        let travel = |missed: Option<usize>| {
+            let (mut travel, mut way) = (Travel::default(), 0.0);
+            for tick in 0..=7000 {
+                if missed != Some(tick / 1000) {
+                    way += 1.1703;
+                }
+                travel.push(way as i32, tick as f32 / 1000.0);
+            }
+            travel
+        };
+        assert!(travel(None).is_even());
+        assert!((0..7).all(|missed| !travel(Some(missed)).is_even()));
+        assert_eq!(travel(None).counts(), 8192);
+    }
+}
