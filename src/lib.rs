@@ -14,18 +14,24 @@
 //! | [`motor`] | field-oriented current control of one axis, 24 kHz, and its calibration |
 //! | [`safety`], [`servo`] | monitor and drive states; the 4 kHz tick |
 //! | [`leg`] | one leg: the activity machine, a control half and an identification half |
+//! | [`operator`] | two contacts in the operator's hand, and what they ask for |
 //! | [`trace`] | what leaves the board: records, one line each |
+//! | [`board`], `task` | one board's registers and interrupts; what runs at which priority (microcontroller only) |
 #![no_std]
 
+pub mod board;
 pub mod hal;
 pub mod ident;
 pub mod leg;
 pub mod model;
 pub mod motion;
 pub mod motor;
+pub mod operator;
 pub mod real;
 pub mod safety;
 pub mod servo;
 pub mod swarm;
+#[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
+pub mod task;
 pub mod trace;
 pub mod units;

@@ -24,10 +24,12 @@ pub mod consistent;
 pub mod constrained;
 pub mod estimate;
 pub mod factor;
+pub mod filters;
 pub mod hampel;
 pub mod held_out;
 pub mod kernel;
 pub mod monitor;
+mod motion_record;
 pub mod noise;
 pub mod outliers;
 pub mod packed;
@@ -56,13 +58,14 @@ pub use consistent::{Completion, Effort, FullObjective, FullSearch, LegCost, Lim
 pub use constrained::{ParameterBox, least_squares_in_box};
 pub use estimate::{Estimate, Plan, Problem, Stage, noise};
 pub use factor::Factor;
+pub use filters::Filters;
 pub use held_out::HeldOut;
 pub use kernel::{Kernel, KernelError, LowPass};
 pub use monitor::{Change, Monitor, MonitorSettings, ROWS_PER_BLOCK};
 pub use outliers::Outliers;
 pub use record::{
-    LARGEST_STILL_SHARE, Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS,
-    TorqueSize,
+    LARGEST_STILL_SHARE, MotionWindow, Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ,
+    SMOOTHING_BANDWIDTHS, TorqueSize,
 };
 pub use residual::{JointResidual, Residual};
 pub use row_model::no_stribeck;

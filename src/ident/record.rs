@@ -9,19 +9,20 @@
 //! the size of the filtered torque. The fit of *any* parameters to the motion follows from it without the samples:
 //! training and validation use the same type.
 
+use core::borrow::BorrowMut;
+
 use super::assembly::{Choices, assemble};
 use super::choice::Estimator;
-use super::estimate::Estimate;
-use super::factor::Factor;
+use super::filters::Filters;
 use super::hampel::{self, Hampel, Quantity};
 use super::kernel::{Kernel, KernelError, LowPass};
+pub use super::motion_record::{Record, TorqueSize};
 use super::noise::NoiseLevel;
 use super::outliers::Outliers;
 pub use super::row_model::RowModel;
 use super::rows::{DECIMATION, Ends, FilteredRows, RowFilter};
 use super::selection::Selection;
 use super::smoothing::{Smoothed, Smoother};
-use super::stribeck::StribeckFit;
 use super::sum::Sum;
 use super::window::{self, Window};
 use crate::real::{self, Real};
@@ -42,104 +43,19 @@ pub const STILL_SPEED: f64 = 0.03;
 /// 0.3 biases the knee's rotor inertia by 2.5 standard deviations, 0.05 by 0.1.
 pub const LARGEST_STILL_SHARE: f64 = 0.05;
 
-/// What one joint's part of a motion looked like.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TorqueSize<T> {
-    /// Mean of the absolute filtered torque, N m.
-    pub mean_absolute: T,
-    /// Root mean square of the filtered torque, N m.
-    pub root_mean_square: T,
-    /// Root mean square of the smoothed speed, rad/s.
-    pub speed: T,
-}
+/// Window of the blocks of one motion, as large as the device's.
+pub type MotionWindow<T, const N: usize, const B: usize> = Window<T, N, B, { window::ROOM }>;
 
-/// Everything that identification and validation need of one motion.
+/// Accumulates one motion after the other. The window is its own, or (`W` a reference) one that lies elsewhere in memory.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Record<T, const N: usize, const B: usize> {
-    /// Rows of each joint's torque.
-    pub factors: [Factor<T, B>; N],
-    /// Size of each joint's torque.
-    pub torque: [TorqueSize<T>; N],
-    /// Filtered rows of each joint.
-    pub rows: [u32; N],
-    /// Samples and rows that were not finite.
-    pub rejected: u32,
-    /// Information of one row in units of independent ones, `m sum h^2`: below one because rows overlap.
-    pub row_information: T,
-    /// Standard deviation of the torque noise of one 500 Hz sample, from its own scatter, N m; zero where not known.
-    pub noise: [T; N],
-    /// What was set aside.
-    pub outliers: Outliers<T, N>,
-    /// Stribeck friction of each joint that shows it; its parameters are eliminated from the factor.
-    pub stribeck: [Option<StribeckFit<T, B>>; N],
-    /// Which columns are held at zero; those of motions held out all are there.
-    pub selection: Selection<T, N, B>,
-}
-
-impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
-    /// The same record in another precision.
-    #[must_use]
-    pub fn convert<U: Real>(&self) -> Record<U, N, B> {
-        let convert = |value: T| U::of(value.to_double());
-        Record {
-            factors: core::array::from_fn(|joint| self.factors[joint].convert()),
-            torque: self.torque.map(|size| TorqueSize {
-                mean_absolute: convert(size.mean_absolute),
-                root_mean_square: convert(size.root_mean_square),
-                speed: convert(size.speed),
-            }),
-            rows: self.rows,
-            rejected: self.rejected,
-            row_information: convert(self.row_information),
-            noise: self.noise.map(convert),
-            outliers: self.outliers.convert(),
-            stribeck: core::array::from_fn(|joint| self.stribeck[joint].as_ref().map(StribeckFit::convert)),
-            selection: self.selection.convert(),
-        }
-    }
-
-    /// Standard deviation that noise alone leaves of one joint's filtered torque, N m; `None` where it is not known.
-    #[must_use]
-    pub fn filtered_noise(&self, joint: usize) -> Option<T> {
-        let energy = self.row_information / T::of(DECIMATION as f64); // sum h^2
-        self.noise.get(joint).filter(|&&noise| noise > T::zero()).map(|&noise| noise * real::sqrt(energy))
-    }
-
-    /// Root mean square of what the parameters' covariance leaves uncertain of one joint's torque, N m:
-    /// `tr(R Cov R') / rows`.
-    #[must_use]
-    #[inline(never)]
-    pub fn uncertainty(&self, joint: usize, estimate: &Estimate<T, B>) -> T {
-        let (Some(factor), Some(&rows)) = (self.factors.get(joint), self.rows.get(joint)) else {
-            return T::zero();
-        };
-        let mut sum = T::zero();
-        for row in factor.triangle() {
-            for (one, covariances) in row.iter().zip(&estimate.covariance) {
-                for (other, &covariance) in row.iter().zip(covariances) {
-                    sum += *one * covariance * *other;
-                }
-            }
-        }
-        real::sqrt(real::max(sum, T::zero()) / T::of(f64::from(rows.max(1))))
-    }
-
-    /// Root mean square torque error of one joint with these base parameters, N m.
-    #[must_use]
-    pub fn torque_error(&self, joint: usize, base: &[T; B]) -> Option<T> {
-        let factor = self.factors.get(joint)?;
-        let rows = *self.rows.get(joint)?;
-        if rows == 0 {
-            return None;
-        }
-        let mean = (factor.excess(base) + factor.residual()) / T::of(f64::from(rows));
-        Some(real::sqrt(mean))
-    }
-}
-
-/// Accumulates one motion after the other.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Recorder<T, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
+pub struct Recorder<
+    T,
+    const N: usize,
+    const B: usize,
+    const TAPS: usize,
+    const PENDING: usize,
+    W = MotionWindow<T, N, B>,
+> {
     smoothing: Kernel<T, TAPS>,
     low_pass: LowPass<T, TAPS>,
     smoother: Smoother<T, N, TAPS>,
@@ -150,7 +66,7 @@ pub struct Recorder<T, const N: usize, const B: usize, const TAPS: usize, const 
     reweights: bool,
     /// Angle and torque of each joint.
     hampel: [[Hampel<T>; 2]; N],
-    window: Window<T, N, B, { window::ROOM }>,
+    window: W,
     choices: Option<Choices<N>>,
     samples: u32,
     replaced: [u32; N],
@@ -178,22 +94,38 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     /// # Errors
     /// [`KernelError`] when the bandwidth is absurd or its kernel does not fit `TAPS` and `PENDING`.
     pub fn new(bandwidth_hz: T) -> Result<Self, KernelError> {
-        let rate = T::of(SAMPLE_RATE_HZ);
-        let low_pass = LowPass::new(bandwidth_hz, rate)?;
-        if RowFilter::<T, N, B, PENDING>::outputs_needed(low_pass.taps()) > PENDING {
-            return Err(KernelError::TooLong { needed: low_pass.taps() });
-        }
-        let smoothing = Kernel::new(T::of(SMOOTHING_BANDWIDTHS) * bandwidth_hz, rate)?;
-        Ok(Self {
-            smoothing,
-            low_pass,
+        Self::with_window(bandwidth_hz, Window::new())
+    }
+}
+
+impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>
+    Recorder<T, N, B, TAPS, PENDING, W>
+where
+    W: BorrowMut<MotionWindow<T, N, B>>,
+{
+    /// The same with a window that is empty.
+    ///
+    /// # Errors
+    /// See [`Recorder::new`].
+    #[inline]
+    pub fn with_window(bandwidth_hz: T, window: W) -> Result<Self, KernelError> {
+        Ok(Self::of_filters(&Filters::new(bandwidth_hz)?, Estimator::Robust, window))
+    }
+
+    /// The same with filters that fit.
+    #[inline]
+    #[must_use]
+    pub fn of_filters(filters: &Filters<T, N, B, TAPS, PENDING>, estimator: Estimator, window: W) -> Self {
+        Self {
+            smoothing: filters.smoothing.clone(),
+            low_pass: filters.low_pass.clone(),
             smoother: Smoother::new(),
             filter: RowFilter::new(Ends::Cut),
-            estimator: Estimator::Robust,
+            estimator,
             ends: Ends::Cut,
             reweights: true,
             hampel: core::array::from_fn(|_| [Hampel::new(Quantity::Angle), Hampel::new(Quantity::Torque)]),
-            window: Window::new(),
+            window,
             choices: None,
             samples: 0,
             replaced: [0; N],
@@ -202,7 +134,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             instants: 0,
             rows: [0; N],
             rejected: 0,
-        })
+        }
     }
 
     /// Samples by which the smoothed motion lags the newest one.
@@ -237,7 +169,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         self.smoother.clear();
         self.hampel.iter_mut().flatten().for_each(Hampel::restart);
         self.filter = RowFilter::new(ends);
-        self.window.clear();
+        self.window.borrow_mut().clear();
         self.choices = None;
         self.ends = ends;
         self.reweights = true;
@@ -275,7 +207,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             self.take(&rows);
             finished += 1;
         }
-        self.window.close();
+        self.window.borrow_mut().close();
         finished
     }
 
@@ -285,7 +217,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             return;
         }
         let taken = rows.still.map(|still| !(still > T::of(LARGEST_STILL_SHARE)));
-        if !self.window.insert(rows, &taken) {
+        if !self.window.borrow_mut().insert(rows, &taken) {
             self.rejected = self.rejected.saturating_add(1);
             return;
         }
@@ -331,7 +263,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         if self.choices.is_none() {
             let choices = Choices::of(model);
             self.choices = Some(if self.ends == Ends::Cut { choices } else { choices.without_stribeck() });
-            self.window.lay_out(model);
+            self.window.borrow_mut().lay_out(model);
         }
         self.samples = self.samples.saturating_add(1);
         let (position, torque) = self.clean(position, torque)?;
@@ -355,7 +287,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
             Some(rows) => self.take(rows),
             // Nine of ten samples finish no row.
             None => {
-                self.window.tidy();
+                self.window.borrow_mut().tidy();
             }
         }
         Some(Progress { instant, rows })
@@ -376,7 +308,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     fn record(&self) -> Record<T, N, B> {
         let information = T::of(DECIMATION as f64) * self.low_pass.energy();
         let estimator = if self.reweights { self.estimator } else { Estimator::Plain };
-        let assembly = assemble(&self.window, self.choices.as_ref(), estimator, information);
+        let assembly = assemble(self.window.borrow(), self.choices.as_ref(), estimator, information);
         let instants = T::of(f64::from(self.instants.max(1)));
         Record {
             factors: assembly.factors,

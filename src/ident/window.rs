@@ -89,6 +89,21 @@ pub struct Window<T, const N: usize, const B: usize, const ROOM: usize> {
     room: [T; ROOM],
 }
 
+impl<const N: usize, const B: usize, const ROOM: usize> Window<f32, N, B, ROOM> {
+    /// Empty, without any columns yet: for a place of its own in the device's memory, where it is never moved.
+    pub const EMPTY: Self = Self {
+        columns: [Columns { base: [0; B], count: 0, friction: [None; 2], bank: 0, start: 0 }; N],
+        stride: 0,
+        capacity: 0,
+        order: [0; LARGEST_BLOCKS],
+        level: [0; LARGEST_BLOCKS],
+        outputs: [0; LARGEST_BLOCKS],
+        closed: 0,
+        joining: None,
+        room: [0.0; ROOM],
+    };
+}
+
 impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B, ROOM> {
     /// Empty, without any columns yet.
     #[must_use]

@@ -1,14 +1,16 @@
 //! The half of a leg that finds out: records logged motions, solves in slices, judges.
 
+use core::borrow::BorrowMut;
+
 use super::activity::{Segment, VALIDATION_MOTIONS};
 use super::configuration::{LegConfiguration, LegError};
 use super::control::LoggedSample;
 use super::model::IdentifiedModel;
 use super::upkeep::Upkeep;
 use crate::ident::{
-    Baseline, Cause, Change, Ends, Evidence, HeldOut, LinkPrior, LowPass, Misalignments, Plan, Progress,
-    Reason, Record, Recorder, Residual, RowModel, SAMPLE_RATE_HZ, SearchState, Solver, Thresholds, Unused,
-    Verdict, no_stribeck,
+    Baseline, Cause, Change, Ends, Evidence, Filters, HeldOut, LinkPrior, Misalignments, MotionWindow, Plan,
+    Progress, Reason, Record, Recorder, Residual, RowModel, SearchState, Solver, Thresholds, Unused, Verdict,
+    no_stribeck,
 };
 use crate::model::friction::Stribeck;
 
@@ -48,15 +50,22 @@ enum Work {
     Solving,
 }
 
-/// Recorder, solver and records of one identification.
+/// Recorder, solver and records of one identification. Its window is its own, or (`W` a reference) one that lies elsewhere in
+/// memory.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Identification<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
+pub struct Identification<
+    const N: usize,
+    const B: usize,
+    const TAPS: usize,
+    const PENDING: usize,
+    W = MotionWindow<f32, N, B>,
+> {
     model: RowModel<f32, N, B>,
     prior: Option<[LinkPrior<f32>; N]>,
     plan: Plan,
     swarm_seed: u64,
     thresholds: Thresholds<f32>,
-    recorder: Recorder<f32, N, B, TAPS, PENDING>,
+    recorder: Recorder<f32, N, B, TAPS, PENDING, W>,
     work: Work,
     solver: Option<Solver<f32, N, B>>,
     validation: [Option<Record<f32, N, B>>; VALIDATION_MOTIONS],
@@ -78,13 +87,35 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     /// # Errors
     /// [`LegError::Kernel`] when the filter does not fit.
     pub fn new(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
-        let mut recorder = Recorder::new(configuration.bandwidth_hz)?;
-        recorder.set_estimator(configuration.estimator);
-        let low_pass = LowPass::<f32, TAPS>::new(configuration.bandwidth_hz, SAMPLE_RATE_HZ as f32)?;
-        Ok(Self {
-            held_out: HeldOut::new(recorder.reach()),
+        Self::with_window(configuration, MotionWindow::new())
+    }
+}
+
+impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>
+    Identification<N, B, TAPS, PENDING, W>
+where
+    W: BorrowMut<MotionWindow<f32, N, B>>,
+{
+    /// The same with a window that is empty.
+    ///
+    /// # Errors
+    /// See [`Identification::new`].
+    pub fn with_window(configuration: &LegConfiguration<N, B>, window: W) -> Result<Self, LegError> {
+        Ok(Self::of_filters(configuration, &Filters::new(configuration.bandwidth_hz)?, window))
+    }
+
+    /// The same with filters that fit: nothing can fail any more, so that it can be built where it is to lie.
+    #[inline]
+    #[must_use]
+    pub fn of_filters(
+        configuration: &LegConfiguration<N, B>,
+        filters: &Filters<f32, N, B, TAPS, PENDING>,
+        window: W,
+    ) -> Self {
+        Self {
+            held_out: HeldOut::new(filters.low_pass().reach()),
             residuals: [Residual::new(); VALIDATION_MOTIONS],
-            recorder,
+            recorder: Recorder::of_filters(filters, configuration.estimator, window),
             model: configuration.model.clone(),
             prior: configuration.prior,
             plan: configuration.plan,
@@ -95,10 +126,10 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
             validation: [const { None }; VALIDATION_MOTIONS],
             verdict: None,
             report_due: false,
-            upkeep: Upkeep::new(&low_pass, configuration.monitor),
+            upkeep: Upkeep::new(filters.low_pass(), configuration.monitor),
             accepted_stribeck: no_stribeck(),
             change_due: false,
-        })
+        }
     }
 
     /// Takes a logged sample. The first one without a segment, or of another, ends the motion recorded so far.
@@ -263,6 +294,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     }
 
     /// The verdict on what was recorded so far; every piece of evidence goes to `hand_on`.
+    #[inline(never)]
     pub fn judge_with(&self, hand_on: &mut dyn FnMut(&Evidence<f32>)) -> Verdict {
         self.solver.as_ref().map_or(Verdict::refused(Reason::Input), |solver| {
             let recorded = self.validation.iter().zip(&self.residuals);

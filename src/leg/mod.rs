@@ -22,6 +22,7 @@
 mod activity;
 mod configuration;
 mod control;
+mod description;
 mod identification;
 mod model;
 mod results;
@@ -32,6 +33,9 @@ mod upkeep;
 pub use activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
 pub use configuration::{LegConfiguration, LegError, ProvedMotion};
 pub use control::{Control, ControlOutput, ControlRequest, LoggedSample};
+pub use description::{
+    DescriptionError, JointDescription, LegDescription, LinkDescription, MotorDescription,
+};
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
 pub use results::{FoundBase, FoundFit, FoundParameter};
@@ -40,11 +44,12 @@ pub use upkeep::{UPDATE_ROWS, Upkeep};
 
 // What crosses the leg's border: rooms that tell or keep it look no deeper.
 pub use crate::ident::{
-    Cause, Change, Estimate, Evidence, Plan, Reason, SearchState, Status, StribeckFit, Test, Verdict,
+    Cause, Change, Estimate, Evidence, Filters, MotionWindow, Plan, Reason, SearchState, Status, StribeckFit,
+    Test, Verdict,
 };
 pub use crate::model::Parameter;
 pub use crate::motor::{AxisFault, Calibration, Phase, Refusal as CalibrationRefusal};
-pub use crate::safety::{DriveState, Fault, FaultCode, PowerRequest, RefusalReason};
+pub use crate::safety::{DriveState, Event as DriveEvent, Fault, FaultCode, PowerRequest, RefusalReason};
 
 use crate::hal::Sample;
 

@@ -4,8 +4,10 @@
 //! a group or an unseen one is to be split, nothing otherwise (such a value would be made up). What is not estimated is zero
 //! in the model, and so here.
 
+use core::borrow::BorrowMut;
+
 use super::identification::Identification;
-use crate::ident::{Estimate, Record, Status, status};
+use crate::ident::{Estimate, MotionWindow, Record, Status, status};
 use crate::model::{Parameter, Standing};
 
 /// One of a joint's fourteen parameters.
@@ -57,8 +59,10 @@ pub struct FoundFit {
     pub replaced: u32,
 }
 
-impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
-    Identification<N, B, TAPS, PENDING>
+impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>
+    Identification<N, B, TAPS, PENDING, W>
+where
+    W: BorrowMut<MotionWindow<f32, N, B>>,
 {
     /// The base parameters that are judged; `None` before there is a solver.
     #[must_use]

@@ -37,7 +37,7 @@ pub mod words;
 pub use fill::Value;
 pub use line::{Line, LineError};
 pub use record::Record;
-pub use report::Report;
+pub use report::{Report, judged};
 
 /// Of the records and keys; grows when one is added.
 pub const GRAMMAR: u8 = 1;

@@ -349,7 +349,7 @@ records! {
         stack_bytes: u32,
         /// Logged samples that identification did not take in time, since the start.
         samples_lost: u32,
-        /// Records that were given up because nobody read, since the start.
+        /// Records that found no room on their way to the probe, since the start; what the probe itself lost, the gaps tell.
         records_lost: u32,
     }
     /// Supply and temperatures.

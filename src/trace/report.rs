@@ -7,8 +7,12 @@
 //! Cost: one judgement for every eight findings, a copy of the covariance for each record.
 //! Limits: the identification must not be begun anew meanwhile; then the report is to be dropped.
 
+use core::borrow::BorrowMut;
+
 use super::{Record, words};
-use crate::leg::{Estimate, Evidence, Identification, Parameter, Plan, SearchState, VALIDATION_MOTIONS};
+use crate::leg::{
+    Estimate, Evidence, Identification, MotionWindow, Parameter, Plan, SearchState, VALIDATION_MOTIONS,
+};
 
 /// Parameters of a joint.
 const PARAMETERS: usize = Parameter::ALL.len();
@@ -48,9 +52,15 @@ impl Default for Report {
 
 impl Report {
     /// The next record; `None` once all is told, or where nothing was identified.
-    pub fn advance<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+    pub fn advance<
+        const N: usize,
+        const B: usize,
+        const TAPS: usize,
+        const PENDING: usize,
+        W: BorrowMut<MotionWindow<f32, N, B>>,
+    >(
         &mut self,
-        identification: &Identification<N, B, TAPS, PENDING>,
+        identification: &Identification<N, B, TAPS, PENDING, W>,
     ) -> Option<Record<N>> {
         let estimate = identification.estimate()?;
         while self.part != Part::Told {
@@ -80,9 +90,15 @@ impl Report {
     }
 
     /// The record at `index` of this part: `None` where the part ends, `Some(None)` where there is none at this place.
-    fn record<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+    fn record<
+        const N: usize,
+        const B: usize,
+        const TAPS: usize,
+        const PENDING: usize,
+        W: BorrowMut<MotionWindow<f32, N, B>>,
+    >(
         &mut self,
-        identification: &Identification<N, B, TAPS, PENDING>,
+        identification: &Identification<N, B, TAPS, PENDING, W>,
         estimate: &Estimate<f32, B>,
     ) -> Option<Option<Record<N>>> {
         let index = self.index;
@@ -110,9 +126,15 @@ impl Report {
         }
     }
 
-    fn finding<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
+    fn finding<
+        const N: usize,
+        const B: usize,
+        const TAPS: usize,
+        const PENDING: usize,
+        W: BorrowMut<MotionWindow<f32, N, B>>,
+    >(
         &mut self,
-        identification: &Identification<N, B, TAPS, PENDING>,
+        identification: &Identification<N, B, TAPS, PENDING, W>,
     ) -> Option<Record<N>> {
         let place = self.index % CHUNK;
         if place == 0 {
@@ -152,8 +174,14 @@ fn known(value: Option<f32>) -> f32 {
     value.unwrap_or(f32::NAN)
 }
 
-fn solver<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
-    identification: &Identification<N, B, TAPS, PENDING>,
+fn solver<
+    const N: usize,
+    const B: usize,
+    const TAPS: usize,
+    const PENDING: usize,
+    W: BorrowMut<MotionWindow<f32, N, B>>,
+>(
+    identification: &Identification<N, B, TAPS, PENDING, W>,
 ) -> Option<Record<N>> {
     let solver = identification.solver()?;
     let search = solver.search();
@@ -179,8 +207,14 @@ fn solver<const N: usize, const B: usize, const TAPS: usize, const PENDING: usiz
     })
 }
 
-fn parameter<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
-    identification: &Identification<N, B, TAPS, PENDING>,
+fn parameter<
+    const N: usize,
+    const B: usize,
+    const TAPS: usize,
+    const PENDING: usize,
+    W: BorrowMut<MotionWindow<f32, N, B>>,
+>(
+    identification: &Identification<N, B, TAPS, PENDING, W>,
     estimate: &Estimate<f32, B>,
     index: usize,
 ) -> Option<Record<N>> {
@@ -197,8 +231,14 @@ fn parameter<const N: usize, const B: usize, const TAPS: usize, const PENDING: u
     })
 }
 
-fn base<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
-    identification: &Identification<N, B, TAPS, PENDING>,
+fn base<
+    const N: usize,
+    const B: usize,
+    const TAPS: usize,
+    const PENDING: usize,
+    W: BorrowMut<MotionWindow<f32, N, B>>,
+>(
+    identification: &Identification<N, B, TAPS, PENDING, W>,
     estimate: &Estimate<f32, B>,
     index: usize,
 ) -> Option<Record<N>> {
@@ -227,8 +267,14 @@ fn covariance<const N: usize, const B: usize>(
     (both && column <= row).then_some(Record::Covariance { row: row as u8, column: column as u8, value })
 }
 
-fn stribeck<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
-    identification: &Identification<N, B, TAPS, PENDING>,
+fn stribeck<
+    const N: usize,
+    const B: usize,
+    const TAPS: usize,
+    const PENDING: usize,
+    W: BorrowMut<MotionWindow<f32, N, B>>,
+>(
+    identification: &Identification<N, B, TAPS, PENDING, W>,
     estimate: &Estimate<f32, B>,
     joint: usize,
 ) -> Option<Record<N>> {
@@ -244,8 +290,14 @@ fn stribeck<const N: usize, const B: usize, const TAPS: usize, const PENDING: us
 }
 
 /// Of each motion its own record, then one for each joint.
-fn motion<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>(
-    identification: &Identification<N, B, TAPS, PENDING>,
+fn motion<
+    const N: usize,
+    const B: usize,
+    const TAPS: usize,
+    const PENDING: usize,
+    W: BorrowMut<MotionWindow<f32, N, B>>,
+>(
+    identification: &Identification<N, B, TAPS, PENDING, W>,
     estimate: &Estimate<f32, B>,
     index: usize,
 ) -> Option<Record<N>> {

@@ -4,6 +4,7 @@ mod common;
 mod excite;
 mod export;
 mod identify;
+mod image;
 mod leg_options;
 mod model;
 mod monitor;
@@ -48,6 +49,10 @@ enum Command {
     Motor(motor::MotorArguments),
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     Regressor(regressor::RegressorArguments),
+    /// Build the flash image of a leg and print its size (`cargo fw`).
+    Fw(image::FirmwareArguments),
+    /// Build the flash image, write it onto a board and print its records (`cargo flash-leg`).
+    FlashLeg(image::FlashArguments),
 }
 
 /// What a run without any arguments is.
@@ -74,6 +79,8 @@ pub fn main() -> ExitCode {
         Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Motor(arguments) => motor::run(&arguments),
         Command::Regressor(arguments) => regressor::run(&arguments),
+        Command::Fw(arguments) => image::firmware(&arguments),
+        Command::FlashLeg(arguments) => image::flash_leg(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
     };
     match outcome {

@@ -22,6 +22,7 @@
 //! | [`regressor`] | torques and regressor of given states |
 //! | [`consistent`], [`consistent_runs`] | legs that can exist: both searches and their optimum |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
+//! | [`image`] | the flash image: its leg, its build, its size |
 //! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
 
 #![expect(
@@ -42,6 +43,7 @@ pub mod figures;
 pub mod findings;
 pub mod html;
 pub mod identify;
+pub mod image;
 pub mod information;
 pub mod leg_file;
 pub mod model_choice;

@@ -1,0 +1,26 @@
+//! Links the flash image: memory layout, vector table, records. Programs of the host need nothing of it.
+
+use std::env;
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=memory.x");
+    let target = env::var("CARGO_CFG_TARGET_OS").unwrap_or_default();
+    if target != "none" || env::var_os("CARGO_FEATURE_BOARD_ODRIVE_V3_6").is_none() {
+        return;
+    }
+    // The leg the image is for: a constant that `cargo sim image-leg` writes from a leg file.
+    let leg = env::var("SCARAB_LEG").unwrap_or_else(|_| {
+        concat!(env!("CARGO_MANIFEST_DIR"), "/hal-sim/legs/x2-wearer-75kg.rs").to_owned()
+    });
+    println!("cargo::rerun-if-env-changed=SCARAB_LEG");
+    println!("cargo::rerun-if-env-changed=SCARAB_TRACE_LOG");
+    println!("cargo::rerun-if-env-changed=SCARAB_BRAKE_RESISTOR");
+    println!("cargo::rerun-if-env-changed=SCARAB_BOARD_VOLTS");
+    println!("cargo::rerun-if-changed={leg}");
+    println!("cargo::rustc-env=SCARAB_LEG_SOURCE={leg}");
+    println!("cargo::rustc-link-search={}", env!("CARGO_MANIFEST_DIR"));
+    for script in ["link.x", "defmt.x"] {
+        println!("cargo::rustc-link-arg-bins=-T{script}");
+    }
+}

@@ -1,0 +1,104 @@
+//! `fw` and `flash-leg`: the flash image, its size, and the way onto a board.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::leg_options::LegOptions;
+use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::image::build::{Options, build, flash};
+use crate::tool::image::leg_source::{describe, source};
+use crate::tool::image::size::ImageSize;
+use crate::tool::tables;
+
+/// What an image is built with.
+#[derive(Args, Debug)]
+pub struct ImageOptions {
+    #[command(flatten)]
+    leg: LegOptions,
+    /// The image tells every sample of the 500 Hz log.
+    #[arg(long)]
+    log: bool,
+    /// A brake resistor is connected: the image uses it.
+    #[arg(long)]
+    brake_resistor: bool,
+    /// 24 or 56: of a board on which the factory has written no version; one that has keeps its own.
+    #[arg(long, value_name = "V", value_parser = board_volts)]
+    board_volts: Option<u8>,
+}
+
+fn board_volts(text: &str) -> Result<u8, String> {
+    match text {
+        "24" => Ok(24),
+        "56" => Ok(56),
+        _ => Err(format!("`{text}` is neither 24 nor 56")),
+    }
+}
+
+impl ImageOptions {
+    fn load(&self) -> Result<Options, ToolError> {
+        Ok(Options {
+            leg: self.leg.load()?,
+            log: self.log,
+            brake_resistor: self.brake_resistor,
+            board_volts: self.board_volts,
+        })
+    }
+}
+
+/// The image and its size.
+#[derive(Args, Debug)]
+pub struct FirmwareArguments {
+    #[command(flatten)]
+    image: ImageOptions,
+    /// Write the sizes here.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Only write the leg as the constant that an image holds, here.
+    #[arg(long, value_name = "FILE.rs")]
+    source: Option<PathBuf>,
+}
+
+/// Onto the board.
+#[derive(Args, Debug)]
+pub struct FlashArguments {
+    #[command(flatten)]
+    image: ImageOptions,
+    /// Handed on to `probe-rs run`.
+    #[arg(last = true)]
+    probe: Vec<String>,
+}
+
+/// Builds and prints the sizes; exit code 3 where a goal is not kept.
+pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
+    let options = arguments.image.load()?;
+    if let Some(path) = &arguments.source {
+        let (description, _) = describe(&options.leg)?;
+        std::fs::write(path, source(&description)).map_err(|error| ToolError::cannot_write(path, &error))?;
+        return Ok(EXIT_ACCEPTED);
+    }
+    let image = build(&options)?;
+    let size = ImageSize::of(&image)?;
+    tables::print(&format!("{}\n\n{}", image.display(), size.text()))?;
+    if let Some(path) = &arguments.json {
+        let text =
+            serde_json::to_string_pretty(&size).map_err(|error| ToolError::cannot_write(path, &error))?;
+        std::fs::write(path, text + "\n").map_err(|error| ToolError::cannot_write(path, &error))?;
+    }
+    let missed = size.missed();
+    for goal in &missed {
+        eprintln!("too large: {goal}");
+    }
+    Ok(if missed.is_empty() { EXIT_ACCEPTED } else { EXIT_REFUSED })
+}
+
+/// Builds, checks the size, writes it onto the board and prints its records.
+pub fn flash_leg(arguments: &FlashArguments) -> Result<u8, ToolError> {
+    let image = build(&arguments.image.load()?)?;
+    let missed = ImageSize::of(&image)?.missed();
+    if !missed.is_empty() {
+        return Err(ToolError::Refused(format!("the image is too large: {}", missed.join("; "))));
+    }
+    flash(&image, &arguments.probe)?;
+    Ok(EXIT_ACCEPTED)
+}

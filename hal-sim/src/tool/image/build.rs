@@ -1,0 +1,109 @@
+//! Builds the image with whichever compiler the machine has for it, and puts it onto a board.
+
+use std::env;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use super::leg_source::{describe, source};
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::LegFile;
+
+/// Feature and package of the one board there is.
+const ARGUMENTS: [&str; 8] = [
+    "--quiet",
+    "--profile",
+    "image",
+    "--package",
+    "scarab",
+    "--bin",
+    "scarab",
+    "--features=board-odrive-v3-6",
+];
+/// Below the target directory.
+const IMAGE: &str = "firmware/thumbv7em-none-eabihf/image/scarab";
+/// Of the microcontroller, as `probe-rs` knows it.
+const CHIP: &str = "STM32F405RGTx";
+
+/// What an image is built with.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Its leg.
+    pub leg: LegFile,
+    /// Every sample of the 500 Hz log is told.
+    pub log: bool,
+    /// A brake resistor is connected.
+    pub brake_resistor: bool,
+    /// Voltage of a board on which the factory has written no version.
+    pub board_volts: Option<u8>,
+}
+
+/// The workspace this tool was built from.
+fn workspace() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+}
+
+fn target_directory() -> PathBuf {
+    env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from)
+}
+
+/// Builds the image; where it lies.
+pub fn build(options: &Options) -> Result<PathBuf, ToolError> {
+    let (description, _) = describe(&options.leg)?;
+    let constant = target_directory().join("firmware").join("leg.rs");
+    let text = source(&description);
+    // Untouched where nothing changed, so that nothing is compiled again.
+    if std::fs::read_to_string(&constant).ok().as_deref() != Some(&text) {
+        let directory = constant.parent().unwrap_or(Path::new("."));
+        std::fs::create_dir_all(directory)
+            .and_then(|()| std::fs::write(&constant, text))
+            .map_err(|error| ToolError::cannot_write(&constant, &error))?;
+    }
+    let constant = constant.canonicalize().map_err(|error| ToolError::cannot_write(&constant, &error))?;
+    let mut command = Command::new(workspace().join("scripts/firmware-build"));
+    command.args(ARGUMENTS).env("SCARAB_LEG", constant).env("DEFMT_LOG", "info");
+    // Room for a report's records while the probe looks elsewhere.
+    command.env("DEFMT_RTT_BUFFER_SIZE", "4096");
+    for (name, asked) in
+        [("SCARAB_TRACE_LOG", options.log), ("SCARAB_BRAKE_RESISTOR", options.brake_resistor)]
+    {
+        if asked {
+            command.env(name, "1");
+        } else {
+            command.env_remove(name);
+        }
+    }
+    match options.board_volts {
+        Some(volts) => command.env("SCARAB_BOARD_VOLTS", volts.to_string()),
+        None => command.env_remove("SCARAB_BOARD_VOLTS"),
+    };
+    // What this tool was built with is not what the image is built with.
+    for name in ["RUSTFLAGS", "RUSTC", "RUSTUP_TOOLCHAIN", "CARGO"] {
+        command.env_remove(name);
+    }
+    run(&mut command, "scripts/firmware-build")?;
+    let image = target_directory().join(IMAGE);
+    Ok(image.canonicalize().unwrap_or(image))
+}
+
+/// Writes an image onto the board that hangs on a probe, starts it and prints its records until interrupted.
+pub fn flash(image: &Path, further: &[String]) -> Result<(), ToolError> {
+    let mut command = Command::new("probe-rs");
+    command.args([OsStr::new("run"), OsStr::new("--chip"), OsStr::new(CHIP)]);
+    command.args(further).arg(image);
+    run(&mut command, "probe-rs").map_err(|error| {
+        if error.to_string().contains("cannot be started") {
+            ToolError::input(format!("{error}; it is installed by `cargo install probe-rs-tools --locked`"))
+        } else {
+            error
+        }
+    })
+}
+
+fn run(command: &mut Command, name: &str) -> Result<(), ToolError> {
+    match command.status() {
+        Err(error) => Err(ToolError::input(format!("{name} cannot be started: {error}"))),
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(ToolError::input(format!("{name} failed ({status})"))),
+    }
+}

@@ -1,0 +1,134 @@
+//! A leg file as a constant of the firmware.
+//!
+//! The numbers are those of the configuration that the simulation runs with, in the device's precision; the board makes
+//! the same configuration of them again, and a test holds the two against each other.
+
+use nalgebra::Matrix3;
+use scarab::ident::{LinkPrior, Plan};
+use scarab::leg::{JointDescription, LegConfiguration, LegDescription, LinkDescription, MotorDescription};
+use scarab::model::DenavitHartenberg;
+use scarab::motion::{ExcitationTable, Periodic};
+use scarab::servo::SERVO_RATE_HZ;
+use scarab::units::{Radian, Weber};
+
+use crate::tool::leg_file::{JointFile, LegFile};
+use crate::tool::setup::{
+    DEFAULT_SEED, PriorChoice, SetupError, background, base_rank, chain, configuration,
+};
+
+/// Joints and base parameters of the legs an image can hold.
+const JOINTS: usize = 2;
+/// See [`JOINTS`].
+const BASE: usize = 13;
+
+/// What an image holds of a leg, and the configuration it stands for.
+pub type Described = (LegDescription<JOINTS>, LegConfiguration<JOINTS, BASE>);
+
+/// The description of a leg of two joints with up to 13 base parameters: what the board can hold.
+pub fn describe(leg: &LegFile) -> Result<Described, SetupError> {
+    if leg.joints.len() != JOINTS || base_rank(leg) > BASE {
+        return Err(SetupError::new(leg, "an image holds two joints with up to 13 base parameters"));
+    }
+    let background = background::<JOINTS, BASE>(leg, PriorChoice::Default, DEFAULT_SEED)?;
+    let (configuration, _) = configuration(leg, &background, Plan::default(), DEFAULT_SEED)?;
+    chain::<JOINTS>(leg)?;
+    let model = &configuration.model;
+    let joints = core::array::from_fn(|index| {
+        let (joint, file) = (&configuration.joints[index], &leg.joints[index]);
+        let single = |value: f64| value as f32;
+        JointDescription {
+            geometry: DenavitHartenberg {
+                alpha: single(file.dh.alpha),
+                a: single(file.dh.a),
+                d: single(file.dh.d),
+            },
+            direction: if file.direction < 0 { -1 } else { 1 },
+            zero_offset: joint.scale.anatomy.zero_offset(),
+            mirrored: joint.scale.mirrored,
+            radian_per_count: joint.scale.radian_per_count,
+            torque_per_ampere: joint.scale.torque_per_ampere,
+            range: [joint.low, joint.high] as [Radian; 2],
+            speed: joint.speed,
+            acceleration: configuration.acceleration[index],
+            torque: joint.torque,
+            current: joint.current,
+            inertia: joint.inertia,
+            bandwidth: joint.bandwidth,
+            drive: model.drive_choice[index],
+            stribeck: model.stribeck_choice[index],
+            motor: motor(file),
+        }
+    });
+    let description = LegDescription {
+        name: Box::leak(leg.name.replace(char::is_whitespace, "_").into_boxed_str()),
+        gravity: model.gravity.into(),
+        joints,
+        prior: configuration.prior.map(|prior| prior.map(|link| link_description(&link))),
+        plan: configuration.plan,
+        swarm_seed: configuration.swarm_seed,
+        estimator: configuration.estimator,
+        bandwidth_hz: configuration.bandwidth_hz,
+        excitation: table(&configuration.excitation),
+        validation: configuration.validation.map(|motion| table(&motion)),
+    };
+    Ok((description, configuration))
+}
+
+/// As the leg file has it; of one that says nothing of its motors the default leg's, with the torque constant it states.
+fn motor(joint: &JointFile) -> MotorDescription {
+    const POLE_PAIRS: u32 = 7;
+    let pole_pairs = joint.motor.as_ref().map_or(POLE_PAIRS, |motor| motor.pole_pairs);
+    MotorDescription {
+        pole_pairs: pole_pairs as u8,
+        // Joint torque per ampere = 3/2 pole pairs flux ratio.
+        flux: Weber((joint.torque_per_ampere / (1.5 * f64::from(pole_pairs) * joint.encoder.ratio)) as f32),
+        counts_per_turn: joint.encoder.counts,
+        ratio: joint.encoder.ratio as f32,
+    }
+}
+
+fn link_description(link: &LinkPrior<f32>) -> LinkDescription {
+    let inertia: Matrix3<f32> = link.body.inertia;
+    LinkDescription {
+        mass: link.body.mass,
+        centre_of_mass: link.body.centre_of_mass.into(),
+        inertia: core::array::from_fn(|row| core::array::from_fn(|column| inertia[(row, column)])),
+        rotor_inertia: link.rotor_inertia,
+        coulomb_friction: link.coulomb_friction,
+        viscous_friction: link.viscous_friction,
+        offset: link.offset,
+    }
+}
+
+fn table(motion: &Periodic<JOINTS>) -> ExcitationTable<JOINTS> {
+    let (blend, all) = (motion.blend_ticks(), motion.duration_ticks());
+    ExcitationTable {
+        period_s: motion.curve().period().0,
+        blend_s: blend as f32 / SERVO_RATE_HZ as f32,
+        cycles: (all - 2 * blend) / motion.period_ticks(),
+        centre_rad: motion.curve().centre_rad(),
+        sine_rad: motion.curve().sine_rad(),
+        cosine_rad: motion.curve().cosine_rad(),
+    }
+}
+
+/// The constant as Rust source, to be included where `crate` is the firmware.
+#[must_use]
+pub fn source(description: &LegDescription<JOINTS>) -> String {
+    // The debug form of plain data is its source; `?` writes numbers so that they are read back bit for bit.
+    format!(
+        "// The leg `{}`, written by `cargo fw --leg ... --source ...` from its leg file: not to be changed by hand.\n\n\
+         #[rustfmt::skip]\n\
+         mod described {{\n\
+         use crate::ident::{{Choice::*, Constant::*, DriveChoice, Estimator::*, Plan::*}};\n\
+         use crate::leg::{{JointDescription, LegDescription, LinkDescription, MotorDescription}};\n\
+         use crate::model::DenavitHartenberg;\n\
+         use crate::motion::ExcitationTable;\n\
+         use crate::units::*;\n\n\
+         /// The leg.\n\
+         pub const LEG: LegDescription<{JOINTS}> = {description:#?};\n\
+         }}\n\
+         pub use described::LEG;\n",
+        description.name,
+    )
+}

@@ -1,0 +1,36 @@
+//! The ODrive v3.6 (and v3.5) joint drive board: STM32F405RG, two bridges with DRV8301, one board per leg.
+//!
+//! Why register tables: the drivers of `embassy-stm32` end where this board begins (two timers locked in phase, conversions
+//! triggered by both, a chopper). What is written there is a list of plain values ([`settings`]) that a test on the host holds
+//! against the board's facts; on the device one loop writes the list. Clocks, SPI, time and executors are `embassy`'s.
+//!
+//! Order of start (`start`): bridges off by reset, gate drivers off, watchdog, interrupt priorities, clocks, caches, timers
+//! without outputs, gate drivers configured and read back, timers in phase, triggers, interrupts. No output is ever
+//! switched on here: that is the current loop's, for an axis with a calibration, as long as nothing speaks against it.
+//!
+//! Source of every constant: ODrive firmware v0.5.6 (`Board/v3`, MIT) and ST's RM0090; each names its own.
+
+pub mod settings;
+
+macro_rules! target_only {
+    ($($item:item)*) => { $( #[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))] $item )* };
+}
+
+target_only! {
+    pub mod brake;
+    pub mod bridge;
+    pub mod contacts;
+    pub mod converter;
+    pub mod crash;
+    pub mod critical_section;
+    pub mod encoder;
+    pub mod gate_driver;
+    pub mod identity;
+    pub mod interrupts;
+    pub mod memory;
+    pub mod registers;
+    pub mod stack;
+    pub mod start;
+    pub mod vectors;
+    pub mod watchdog;
+}

@@ -1,0 +1,36 @@
+//! What the converters found, read in the interrupt at their end.
+
+use super::registers::{load, store};
+use super::settings::converters::{BASES, DR, EOC, JDR1, JEOC, SR, cleared};
+
+const ADC1: u32 = BASES[0];
+const ADC2: u32 = BASES[1];
+const ADC3: u32 = BASES[2];
+
+/// Which axes' conversions have ended since the last call, for each whether both shunts' did; clears what it saw.
+#[inline(always)]
+pub fn finished() -> [Option<bool>; 2] {
+    let (other, status) = (load(ADC2 + SR), load(ADC3 + SR));
+    let seen = status & (JEOC | EOC);
+    store(ADC3 + SR, cleared(seen));
+    store(ADC2 + SR, cleared(seen));
+    [JEOC, EOC].map(|flag| (status & flag != 0).then_some(other & flag != 0))
+}
+
+/// Codes of the shunts of B and C of an axis.
+#[inline(always)]
+pub fn shunts(axis: usize) -> [u16; 2] {
+    let result = if axis == 0 { JDR1 } else { DR };
+    [load(ADC2 + result) as u16, load(ADC3 + result) as u16]
+}
+
+/// Code of the bus voltage.
+#[inline(always)]
+pub fn bus() -> u16 {
+    load(ADC1 + JDR1) as u16
+}
+
+/// Codes of the thermistors of bridge 0, bridge 1 and chopper.
+pub fn thermistors() -> [u16; 3] {
+    [JDR1 + 4, JDR1 + 8, JDR1 + 12].map(|result| load(ADC1 + result) as u16)
+}

@@ -1,0 +1,98 @@
+//! Two DRV8301 on one SPI: reset, configured, read back, and read back again while they run.
+//!
+//! Both share their enable line and their fault line: what resets one resets the other. A transfer takes 6 us and is waited for;
+//! it runs below the servo.
+
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::spi::{Config, MODE_1, Spi, mode::Master};
+use embassy_stm32::time::Hertz;
+
+use super::contacts::drive;
+use super::settings::CLOCK_HZ;
+use super::settings::gate_driver::{CONTROL_1, CONTROL_2, Register, TIMES, data, read, write};
+
+/// Select lines, on port C (`main.h:77-80`).
+const SELECT: [u32; 2] = [13, 14];
+/// Both drivers' enable, on port B.
+const ENABLE: u32 = 12;
+const CYCLES_PER_US: u32 = CLOCK_HZ / 1_000_000;
+
+/// Both gate drivers.
+pub struct GateDrivers {
+    spi: Spi<'static, Blocking, Master>,
+}
+
+/// SPI as the drivers want it: second edge, 42 MHz / 16 (`spi.c:71-76`, `drv8301.cpp:7-19`).
+pub(super) fn configuration() -> Config {
+    let mut configuration = Config::default();
+    configuration.mode = MODE_1;
+    configuration.frequency = Hertz(2_625_000);
+    configuration.miso_pull = embassy_stm32::gpio::Pull::Up;
+    configuration
+}
+
+impl GateDrivers {
+    pub(super) fn new(spi: Spi<'static, Blocking, Master>) -> Self {
+        Self { spi }
+    }
+
+    /// Both off, for at least 40 us; the bridges must be released.
+    pub fn off(&mut self) {
+        drive(b'B', ENABLE, false);
+    }
+
+    /// Both on; they answer 20 ms later.
+    pub fn on(&mut self) {
+        drive(b'B', ENABLE, true);
+    }
+
+    /// Off and on again, waiting: for the start.
+    pub(super) fn restart(&mut self) {
+        self.off();
+        cortex_m::asm::delay(40 * CYCLES_PER_US);
+        self.on();
+        cortex_m::asm::delay(20_000 * CYCLES_PER_US);
+    }
+
+    /// Tells both what they are to do; whether each axis' driver holds it. Takes 0.3 ms.
+    pub fn configure(&mut self) -> [bool; 2] {
+        for axis in 0..2 {
+            for _ in 0..TIMES {
+                self.frame(axis, write(Register::Control1, CONTROL_1));
+            }
+            self.frame(axis, write(Register::Control2, CONTROL_2));
+        }
+        cortex_m::asm::delay(100 * CYCLES_PER_US);
+        [self.holds(0), self.holds(1)]
+    }
+
+    /// Whether a driver still holds what it was told.
+    pub fn holds(&mut self, axis: usize) -> bool {
+        let first = self.register(axis, Register::Control1);
+        let second = self.register(axis, Register::Control2);
+        first == Some(CONTROL_1) && second == Some(CONTROL_2)
+    }
+
+    /// Both status registers of a driver, the first in the upper half; all ones of one that does not answer.
+    pub fn status(&mut self, axis: usize) -> u32 {
+        let mut status = |register| u32::from(self.register(axis, register).unwrap_or(u16::MAX));
+        status(Register::Status1) << 16 | status(Register::Status2)
+    }
+
+    fn register(&mut self, axis: usize, register: Register) -> Option<u16> {
+        self.frame(axis, read(register));
+        data(self.frame(axis, read(register))?)
+    }
+
+    #[inline(never)]
+    fn frame(&mut self, axis: usize, frame: u16) -> Option<u16> {
+        let select = *SELECT.get(axis)?;
+        let mut word = [frame];
+        drive(b'C', select, false);
+        let sent = self.spi.blocking_transfer_in_place(&mut word);
+        drive(b'C', select, true);
+        // 400 ns between frames at least (DRV8301, tHI_SCS).
+        cortex_m::asm::delay(CYCLES_PER_US);
+        sent.ok().map(|()| word[0])
+    }
+}

@@ -1,0 +1,35 @@
+//! Where the identification lies: in the memory that only the processor reaches; its window of blocks, half of it all, in the other.
+#![expect(unsafe_code, reason = "a section of the linker's")]
+
+use heapless::spsc::Queue;
+use static_cell::{ConstStaticCell, StaticCell};
+
+use crate::leg::Filters;
+use crate::task::links::{TOLD as TOLD_LENGTH, Told};
+use crate::task::leg::{LEG, Leg, LegIdentification, LegWindow};
+
+#[unsafe(link_section = ".ccm.identification")]
+static IDENTIFICATION: StaticCell<LegIdentification> = StaticCell::new();
+
+#[unsafe(link_section = ".ccm.configuration")]
+static CONFIGURATION: StaticCell<Leg> = StaticCell::new();
+
+/// What this leg is built from, and its identification, once; `None` where the description makes no leg.
+#[inline(never)]
+pub fn identification() -> Option<(&'static Leg, &'static mut LegIdentification)> {
+    static WINDOW: ConstStaticCell<LegWindow> = ConstStaticCell::new(LegWindow::EMPTY);
+    let configuration: &'static Leg = CONFIGURATION.init(LEG.configuration().ok()?);
+    let filters = Filters::new(configuration.bandwidth_hz).ok()?;
+    let window = WINDOW.take();
+    let built =
+        IDENTIFICATION.init_with(|| LegIdentification::of_filters(configuration, &filters, window));
+    Some((configuration, built))
+}
+
+#[unsafe(link_section = ".ccm.told")]
+static TOLD: StaticCell<Queue<Told, TOLD_LENGTH>> = StaticCell::new();
+
+/// The queue from the servo to the identification, once.
+pub fn told() -> &'static mut Queue<Told, TOLD_LENGTH> {
+    TOLD.init_with(Queue::new)
+}

@@ -1,0 +1,32 @@
+//! The one place where addresses become memory.
+#![expect(unsafe_code, reason = "registers are reached by their addresses")]
+
+use super::settings::Write;
+
+/// What a register holds.
+pub(super) fn load(address: u32) -> u32 {
+    // SAFETY: every caller in this board's layer passes the address of a register of the STM32F405 or of a word of its system
+    // memory, all aligned and readable without a side effect on memory.
+    unsafe { core::ptr::read_volatile(address as *const u32) }
+}
+
+/// Writes a register.
+pub(super) fn store(address: u32, value: u32) {
+    // SAFETY: as for `load`; none of these registers is the address of a variable, and none starts DMA.
+    unsafe { core::ptr::write_volatile(address as *mut u32, value) }
+}
+
+/// Writes a list in its order. One copy of the loop: in line it would be as long as the lists.
+#[inline(never)]
+pub(super) fn apply(writes: &[Write]) {
+    for write in writes {
+        let before = if write.mask == u32::MAX { 0 } else { load(write.address) };
+        store(write.address, write.applied_to(before));
+    }
+}
+
+/// One byte of system memory.
+pub(super) fn byte(address: u32) -> u8 {
+    // SAFETY: the callers read one-time programmable memory, which is there and readable.
+    unsafe { core::ptr::read_volatile(address as *const u8) }
+}

@@ -1,0 +1,40 @@
+//! TIM2: the half bridge of the brake resistor.
+//!
+//! ```text
+//! low side (channel 3) on while counter < low      off state: low = 0, high = 4097
+//! high side (channel 4) on while counter >= high   duty = 1 - high / 4096,  low <= high - 40
+//! 84 MHz / (2 * 4096) = 10.25 kHz
+//! ```
+//!
+//! No hardware keeps the two apart, only the values do. Source: `Board/v3/Inc/main.h:72-74`, `Src/tim.c:158-186`,
+//! `MotorControl/low_level.cpp:97-136`; registers RM0090 18.4. Without a brake resistor the off state stays.
+
+use super::Write;
+
+/// TIM2.
+pub const BASE: u32 = 0x4000_0000;
+/// Top of the counter.
+pub const TOP: u32 = 4096;
+/// Counts of the timer that lie between the two sides at least: 0.48 us.
+pub const GAP: u32 = 40;
+
+/// Running in its off state; pins come afterwards.
+pub const CHOPPER: [Write; 6] = [
+    // PWM mode 2, compare values buffered.
+    Write::whole("TIM2_CCMR2", BASE + 0x1C, 0x7878),
+    Write::whole("TIM2_ARR", BASE + 0x2C, TOP),
+    Write::whole("TIM2_CCR3", BASE + 0x3C, 0),
+    Write::whole("TIM2_CCR4", BASE + 0x40, TOP + 1),
+    // Channel 3 active low.
+    Write::whole("TIM2_CCER", BASE + 0x20, 1 << 8 | 1 << 9 | 1 << 12),
+    Write::whole("TIM2_CR1", BASE, 0b11 << 5 | 1),
+];
+
+/// Compare values of the low and the high side for a duty of the resistor, 0..=0.95; anything else, also what is no
+/// number, counts as the nearest (0 of NaN). Never less than [`GAP`] apart.
+#[must_use]
+pub fn compare(duty: f32) -> [u16; 2] {
+    let on = (duty * TOP as f32) as u32;
+    let high = TOP - on.min(TOP * 95 / 100);
+    [(high - GAP) as u16, high as u16]
+}

@@ -1,0 +1,92 @@
+//! What is written into the microcontroller's registers, as plain values.
+//!
+//! A test on the host (`cargo test --test board_registers -- --nocapture`) applies these lists to empty registers, derives
+//! from the result what the board does (frequency, phase, dead time, channels, pins) and prints the table.
+
+pub mod analog;
+pub mod chopper;
+pub mod converters;
+pub mod drives;
+pub mod encoders;
+pub mod gate_driver;
+pub mod pins;
+pub mod timers;
+
+/// One register and the bits of it that are set to a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Write {
+    /// Name as in RM0090; the device has no use for it.
+    #[cfg(not(target_os = "none"))]
+    pub register: &'static str,
+    /// Where.
+    pub address: u32,
+    /// Bits that are meant; with all of them the register is not read before.
+    pub mask: u32,
+    /// Their value.
+    pub value: u32,
+}
+
+impl Write {
+    /// A whole register.
+    #[must_use]
+    pub const fn whole(register: &'static str, address: u32, value: u32) -> Self {
+        Self::bits(register, address, u32::MAX, value)
+    }
+
+    /// Some bits of a register.
+    #[must_use]
+    pub const fn bits(register: &'static str, address: u32, mask: u32, value: u32) -> Self {
+        #[cfg(target_os = "none")]
+        let _ = register;
+        Self {
+            #[cfg(not(target_os = "none"))]
+            register,
+            address,
+            mask,
+            value,
+        }
+    }
+
+    /// What a register that held `before` holds afterwards.
+    #[must_use]
+    pub const fn applied_to(&self, before: u32) -> u32 {
+        (before & !self.mask) | (self.value & self.mask)
+    }
+}
+
+/// The processor's clock, Hz: 8 MHz / 4 * 168 / 2 (`Board/v3/Src/main.c:177-182`).
+pub const CLOCK_HZ: u32 = 168_000_000;
+/// Of the timers on APB2 (TIM1, TIM8), Hz.
+pub const FAST_TIMER_HZ: u32 = 168_000_000;
+/// Of the timers on APB1 (TIM2 to TIM5), Hz.
+pub const SLOW_TIMER_HZ: u32 = 84_000_000;
+
+const RCC: u32 = 0x4002_3800;
+const FLASH: u32 = 0x4002_3C00;
+const DEBUG: u32 = 0xE004_2000;
+
+/// Flash: prefetch and both caches, which reset and `embassy-stm32` leave off (RM0090 3.9.1: PRFTEN, ICEN, DCEN).
+pub const CACHES: [Write; 1] = [Write::bits("FLASH_ACR", FLASH, 7 << 8, 7 << 8)];
+
+/// Clocks of what is used (RM0090 7.3): ports A to D; TIM2, TIM3, TIM4; TIM1, TIM8, ADC1 to ADC3, SYSCFG.
+pub const CLOCKS: [Write; 3] = [
+    Write::bits("RCC_AHB1ENR", RCC + 0x30, 0b1111, 0b1111),
+    Write::bits("RCC_APB1ENR", RCC + 0x40, 0b111, 0b111),
+    Write::bits("RCC_APB2ENR", RCC + 0x44, 0x4703, 0x4703),
+];
+
+/// While a debugger holds the processor, the bridges' timers stand with their outputs off, and so does the watchdog
+/// (RM0090 38.16: DBG_TIM1_STOP, DBG_TIM8_STOP, DBG_IWDG_STOP).
+pub const DEBUG_FREEZE: [Write; 2] = [
+    Write::bits("DBGMCU_APB1_FZ", DEBUG + 0x08, 1 << 12, 1 << 12),
+    Write::bits("DBGMCU_APB2_FZ", DEBUG + 0x0C, 0b11, 0b11),
+];
+
+/// Clock security: a crystal that fails stops TIM1 and TIM8 in hardware and raises the non-maskable interrupt (RCC_CR CSSON).
+pub const CLOCK_SECURITY: [Write; 1] = [Write::bits("RCC_CR", RCC, 1 << 19, 1 << 19)];
+
+/// Clears the interrupt of clock security (RCC_CIR CSSC).
+pub const CLOCK_FAILURE_SEEN: Write = Write::bits("RCC_CIR", RCC + 0x0C, 1 << 23, 1 << 23);
+
+/// RCC_CSR, in which the reasons of the last reset stand from bit 25 on, and the bit that clears them (RMVF).
+pub const RESET_REASONS: Write = Write::bits("RCC_CSR", RCC + 0x74, 1 << 24, 1 << 24);

@@ -1,0 +1,127 @@
+//! TIM1 and TIM8: both bridges at 24 kHz, a quarter of a period apart.
+//!
+//! ```text
+//! counter   0 -> 3500 -> 0, 168 MHz              f = 168 MHz / (2 * 3500) = 24 kHz
+//! high side on while counter >= compare          compare = (1 - duty) * 3500          PWM mode 2
+//! trigger   when the counter falls to 40         the converter samples from there: low sides on, 0.24 us before zero
+//! ```
+//!
+//! Source: `Board/v3/Inc/main.h:69-75`, `Src/tim.c:77-143`, `board.cpp:388-397`; registers RM0090 17.4. ODrive takes every
+//! third update; here compare values are taken over once a period, at zero, by a repetition counter of 1.
+//! RM0090 17.3.3: for an odd value the update is at the end that follows the register's write, so [`repetition`] is written while
+//! the counter falls, and the start checks it ([`crate::board`]).
+
+use super::Write;
+
+/// Which of the two bridges: 0 is the hip's, 1 the knee's.
+pub const BASES: [u32; 2] = [0x4001_0000, 0x4001_0400];
+/// Top of the counter: half a period.
+pub const TOP: u16 = 3500;
+/// Dead time in cycles of the timer: 119 ns.
+pub const DEAD_TIME: u32 = 20;
+/// Counter at which the converter is triggered, falling.
+pub const TRIGGER: u16 = 40;
+/// Counters at the start: TIM1 leads by a quarter of a period.
+pub const START: [u16; 2] = [TOP / 2, 0];
+
+/// Offset of the control register, 1 << 0 of which starts the counter.
+pub const CR1: u32 = 0x00;
+/// Offset of the status register, bit 0 of which tells an update.
+pub const SR: u32 = 0x10;
+/// Offset of the counter.
+pub const CNT: u32 = 0x24;
+/// Offset of the first compare register; three follow each other.
+pub const CCR1: u32 = 0x34;
+/// Offset of the register with the main output.
+pub const BDTR: u32 = 0x44;
+/// Main output enable.
+pub const MOE: u32 = 1 << 15;
+/// Counting down (CR1).
+pub const DOWN: u32 = 1 << 4;
+
+/// Centre-aligned, interrupt flags at both ends, reload buffered; dead-time clock undivided.
+const CR1_VALUE: u32 = 0b11 << 5 | 1 << 7;
+/// Off-state selection for run and idle: outputs are driven to their idle level, low. Main output off, no break input.
+const BDTR_VALUE: u32 = DEAD_TIME | 1 << 10 | 1 << 11;
+/// PWM mode 2, compare value buffered.
+const MODE: u32 = 0b111 << 4 | 1 << 3;
+/// PWM mode 1, compare value buffered: high below the compare value.
+const TRIGGER_MODE: u32 = 0b110 << 4 | 1 << 3;
+/// Both outputs of channels 1 to 3, active high.
+const OUTPUTS: u32 = 0b0101_0101_0101;
+
+/// A bridge's timer, stopped, its main output off, every phase at one half.
+#[must_use]
+pub const fn bridge(axis: usize) -> [Write; 15] {
+    let base = BASES[if axis == 0 { 0 } else { 1 }];
+    macro_rules! write {
+        ($name:literal, $offset:expr, $value:expr) => {
+            Write::whole(
+                if axis == 0 { concat!("TIM1_", $name) } else { concat!("TIM8_", $name) },
+                base + $offset,
+                $value,
+            )
+        };
+    }
+    let half = (TOP / 2) as u32;
+    [
+        write!("BDTR", BDTR, BDTR_VALUE),
+        write!("CR1", CR1, CR1_VALUE),
+        write!("CR2", 0x04, 0),
+        write!("SMCR", 0x08, 0),
+        write!("DIER", 0x0C, 0),
+        write!("CCMR1", 0x18, MODE | MODE << 8),
+        write!("CCMR2", 0x1C, MODE | TRIGGER_MODE << 8),
+        write!("PSC", 0x28, 0),
+        write!("ARR", 0x2C, TOP as u32),
+        write!("RCR", 0x30, 0),
+        write!("CCR1", CCR1, half),
+        write!("CCR2", CCR1 + 4, half),
+        write!("CCR3", CCR1 + 8, half),
+        write!("CCR4", CCR1 + 12, TRIGGER as u32),
+        // The buffered values are taken over now.
+        write!("EGR", 0x14, 1),
+    ]
+}
+
+/// Outputs of the channels, and the counter's place; the last before the start.
+#[must_use]
+pub const fn ready() -> [Write; 4] {
+    [
+        Write::whole("TIM1_CCER", BASES[0] + 0x20, OUTPUTS),
+        Write::whole("TIM8_CCER", BASES[1] + 0x20, OUTPUTS),
+        Write::whole("TIM1_CNT", BASES[0] + CNT, START[0] as u32),
+        Write::whole("TIM8_CNT", BASES[1] + CNT, START[1] as u32),
+    ]
+}
+
+/// TIM1's enable starts TIM8 in the same cycle (its internal trigger 0 is TIM1, RM0090 table 93), which starts both.
+pub const LOCK_AND_START: [Write; 3] = [
+    Write::whole("TIM1_CR2", BASES[0] + 0x04, 0b001 << 4),
+    Write::whole("TIM8_SMCR", BASES[1] + 0x08, 0b110),
+    Write::whole("TIM1_CR1", BASES[0] + CR1, CR1_VALUE | 1),
+];
+
+/// Both run: from now on each triggers the converters by its channel 4.
+pub const TRIGGERS: [Write; 3] = [
+    Write::whole("TIM8_SMCR", BASES[1] + 0x08, 0),
+    Write::whole("TIM1_CR2", BASES[0] + 0x04, 0b111 << 4),
+    Write::whole("TIM8_CR2", BASES[1] + 0x04, 0b111 << 4),
+];
+
+/// Compare values are taken over at every second end; to be written while the counter falls.
+#[must_use]
+pub const fn repetition(axis: usize) -> Write {
+    if axis == 0 {
+        Write::whole("TIM1_RCR", BASES[0] + 0x30, 1)
+    } else {
+        Write::whole("TIM8_RCR", BASES[1] + 0x30, 1)
+    }
+}
+
+/// The compare value of a duty 0..=1; anything else, also what is no number, counts as the nearest (0 of NaN: low side on).
+#[must_use]
+pub fn compare(duty: f32) -> u16 {
+    let high = duty * f32::from(TOP) + 0.5;
+    TOP - (high as u16).min(TOP)
+}

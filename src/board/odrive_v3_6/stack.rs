@@ -1,0 +1,59 @@
+//! The stack: painted at the start, so that its deepest point can be found; and the core-coupled memory, cleared.
+//!
+//! The stack lies at the bottom of the memory (memory.x). One that grows too far reaches below the memory and faults
+//! in the same instruction; see [`super::crash`].
+#![expect(unsafe_code, reason = "memory between symbols of the linker")]
+
+use core::ptr;
+
+const PAINT: u32 = 0x5AFE_57AC;
+/// Of the stack in use while it is painted.
+const MARGIN: usize = 256;
+
+unsafe extern "C" {
+    static mut _stack_start: u32;
+    static mut _stack_end: u32;
+    static mut __sccm: u32;
+    static mut __eccm: u32;
+}
+
+fn ends() -> (*mut u32, *mut u32) {
+    (&raw mut _stack_end, &raw mut _stack_start)
+}
+
+/// Bytes there are.
+#[must_use]
+pub fn bytes() -> u32 {
+    let (bottom, top) = ends();
+    (top as usize - bottom as usize) as u32
+}
+
+/// Fills the stack below its user and clears the core-coupled memory: the first thing of all.
+pub(super) fn prepare() {
+    let (bottom, _) = ends();
+    let here = cortex_m::register::msp::read() as usize - MARGIN;
+    let words = (here - bottom as usize) / 4;
+    let (first, last) = (&raw mut __sccm, &raw mut __eccm);
+    let core_coupled = (last as usize - first as usize) / 4;
+    // SAFETY: from the stack's end to a quarter of a kilobyte below the stack pointer nothing lives: no interrupt is enabled
+    // and this function's frame lies above. The symbols are aligned to words. Of the core-coupled memory nobody has made
+    // use yet: it is called before anything else in `main`.
+    unsafe {
+        for word in 0..words {
+            ptr::write_volatile(bottom.add(word), PAINT);
+        }
+        for word in 0..core_coupled {
+            ptr::write_volatile(first.add(word), 0);
+        }
+    }
+}
+
+/// Bytes used at the deepest so far.
+#[must_use]
+pub fn used() -> u32 {
+    let (bottom, top) = ends();
+    let words = (top as usize - bottom as usize) / 4;
+    // SAFETY: reads words of the stack, which are always there; what others write meanwhile is above the paint.
+    let untouched = (0..words).take_while(|&word| unsafe { ptr::read_volatile(bottom.add(word)) } == PAINT);
+    (words - untouched.count()) as u32 * 4
+}

@@ -1,0 +1,147 @@
+//! The start, in the only order that is safe: nothing here switches an output on.
+
+use embassy_stm32::interrupt::Priority;
+use embassy_stm32::rcc::{
+    APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllSource, Sysclk, mux,
+};
+use embassy_stm32::spi::Spi;
+use embassy_stm32::time::Hertz;
+
+use super::crash::{self, Crash};
+use super::gate_driver::{self, GateDrivers};
+use super::identity::Identity;
+use super::registers::{apply, load, store};
+use super::settings::timers::{BASES, CNT, CR1, DOWN, SR, TOP};
+use super::settings::{
+    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, chopper, converters, encoders, pins, timers,
+};
+use super::{interrupts, stack, watchdog};
+
+/// A board that has started, all outputs off.
+pub struct Board {
+    /// To be asked again and again.
+    pub gate_drivers: GateDrivers,
+    /// Which board it is.
+    pub identity: Identity,
+    /// What ended the image before this one.
+    pub crash: Option<&'static Crash>,
+    /// Of the processor, as it turned out, Hz.
+    pub clock_hz: u32,
+    /// Each axis' gate driver holds its configuration.
+    pub gates_configured: [bool; 2],
+    /// Both bridges' timers run and take their values over where they should.
+    pub timers_in_phase: bool,
+}
+
+/// Longest wait for something of the timers: two of their periods, and then some.
+const PATIENCE: u32 = 100_000;
+
+/// Starts everything but the interrupts of the current loops; to be called once, first of all.
+pub fn start() -> Board {
+    stack::prepare();
+    watchdog::start();
+    interrupts::set_levels();
+    let peripherals = embassy_stm32::init(configuration());
+    for list in [&CACHES[..], &CLOCK_SECURITY, &CLOCKS, &DEBUG_FREEZE] {
+        apply(list);
+    }
+    let identity = Identity::read();
+    let crash = crash::take();
+
+    for pin in &pins::GATES_OFF {
+        apply(&pin.writes());
+    }
+    for axis in 0..2 {
+        apply(&timers::bridge(axis));
+    }
+    apply(&chopper::CHOPPER);
+    for list in &encoders::ENCODERS {
+        apply(list);
+    }
+    apply(&timers::ready());
+    for pin in &pins::PINS {
+        apply(&pin.writes());
+    }
+    apply(&converters::CONVERTERS);
+
+    let spi = Spi::new_blocking(
+        peripherals.SPI3,
+        peripherals.PC10,
+        peripherals.PC12,
+        peripherals.PC11,
+        gate_driver::configuration(),
+    );
+    let mut gate_drivers = GateDrivers::new(spi);
+    gate_drivers.restart();
+    let gates_configured = gate_drivers.configure();
+
+    let timers_in_phase = start_timers();
+    apply(&converters::TRIGGERED);
+    apply(&encoders::INDEX);
+    let mut core = cortex_m::Peripherals::take();
+    if let Some(core) = core.as_mut() {
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+    }
+    Board { gate_drivers, identity, crash, clock_hz: CLOCK_HZ, gates_configured, timers_in_phase }
+}
+
+/// 8 MHz crystal, 168 MHz, buses at 42 and 84 MHz (`Board/v3/Src/main.c:170-197`). A crystal that does not swing is waited
+/// for until the watchdog bites.
+fn configuration() -> embassy_stm32::Config {
+    let mut configuration = embassy_stm32::Config::default();
+    // No DMA is used; its vectors would be at level 0 otherwise.
+    configuration.dma_interrupt_priority = Priority::P6;
+    let rcc = &mut configuration.rcc;
+    rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Oscillator });
+    rcc.pll_src = PllSource::HSE;
+    rcc.pll = Some(Pll {
+        prediv: PllPreDiv::DIV4,
+        mul: PllMul::MUL168,
+        divp: Some(PllPDiv::DIV2),
+        divq: Some(PllQDiv::DIV7),
+        divr: None,
+    });
+    rcc.sys = Sysclk::PLL1_P;
+    rcc.apb1_pre = APBPrescaler::DIV4;
+    rcc.apb2_pre = APBPrescaler::DIV2;
+    rcc.mux.clk48sel = mux::Clk48sel::PLL1_Q;
+    configuration
+}
+
+/// Starts both bridges' timers in one cycle and has them take compare values over at zero; whether they do.
+fn start_timers() -> bool {
+    apply(&timers::LOCK_AND_START);
+    let running = wait(|| BASES.iter().all(|base| load(base + CR1) & 1 == 1));
+    apply(&timers::TRIGGERS);
+    let mut in_phase = running;
+    for (axis, &base) in BASES.iter().enumerate() {
+        // Well inside the falling half: neither end may pass between this and the write.
+        in_phase &= wait(|| is_falling(base) && (TOP / 4..3 * (TOP / 4)).contains(&count(base)));
+        apply(&[timers::repetition(axis)]);
+        in_phase &= takes_over_at_zero(base);
+    }
+    in_phase
+}
+
+/// An update flag that is cleared while the counter rises must not come at the top and must come at zero.
+fn takes_over_at_zero(base: u32) -> bool {
+    // One period later the repetition counter has been loaded.
+    let settled = wait(|| !is_falling(base)) && wait(|| is_falling(base)) && wait(|| !is_falling(base));
+    store(base + SR, !1);
+    let top_is_silent = wait(|| is_falling(base)) && load(base + SR) & 1 == 0;
+    let zero_speaks = wait(|| !is_falling(base)) && load(base + SR) & 1 == 1;
+    settled && top_is_silent && zero_speaks
+}
+
+fn is_falling(base: u32) -> bool {
+    load(base + CR1) & DOWN != 0
+}
+
+fn count(base: u32) -> u16 {
+    load(base + CNT) as u16
+}
+
+fn wait(reached: impl Fn() -> bool) -> bool {
+    (0..PATIENCE).any(|_| reached())
+}

@@ -1,0 +1,51 @@
+//! The interrupt vectors of this board, each one call.
+#![expect(unsafe_code, reason = "to unmask a vector, and to tell an executor of its own interrupt")]
+
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::{ADC, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS};
+
+use super::encoder;
+use crate::task;
+
+/// From now on converters, index pulses and the servo interrupt; what they work on must be in its place.
+pub fn enable() {
+    // SAFETY: called once, from `main`, outside any critical section; levels are set, and the handlers' data is behind locks
+    // that are only tried.
+    unsafe {
+        for vector in [EXTI9_5, EXTI15_10, OTG_HS, ADC] {
+            vector.enable();
+        }
+    }
+}
+
+#[interrupt]
+fn ADC() {
+    task::current::interrupt();
+}
+
+#[interrupt]
+fn OTG_HS() {
+    task::servo::interrupt();
+}
+
+#[interrupt]
+fn EXTI9_5() {
+    encoder::index_came(0);
+}
+
+#[interrupt]
+fn EXTI15_10() {
+    encoder::index_came(1);
+}
+
+/// The executor of the housekeeping.
+pub static HOUSEKEEPING: embassy_executor::InterruptExecutor = embassy_executor::InterruptExecutor::new();
+
+/// Its vector.
+pub const HOUSEKEEPING_VECTOR: interrupt::Interrupt = I2C3_EV;
+
+#[interrupt]
+unsafe fn I2C3_EV() {
+    // SAFETY: this is the vector with which the executor is started.
+    unsafe { HOUSEKEEPING.on_interrupt() }
+}

@@ -1,0 +1,262 @@
+//! Level 0: the current loops of both axes, one after the other, each when its converters are done.
+//!
+//! In this order, every tick of either axis: what forbids to enable is looked at, then the axis' machine answers, then the bridge
+//! is told. So from an emergency stop to both bridges off it is half a PWM period at most. Nothing here waits, formats
+//! or uses a critical section.
+//!
+//! A bridge switches only for an axis with a calibration (or one that is being calibrated), with a target of the servo, while
+//! the interlock is clear, and while the servo goes on answering.
+
+use cortex_m::peripheral::DWT;
+use heapless::spsc::{Consumer, Producer};
+
+use super::interlock::{self, Cause};
+use super::leg::JOINTS;
+use super::links::{Order, Outcome};
+use super::servo::target;
+use super::statistics;
+use crate::board::odrive_v3_6::settings::{CLOCK_HZ, analog, drives};
+use crate::board::odrive_v3_6::{brake, bridge, contacts, converter, encoder, interrupts};
+use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, JointSample};
+use crate::motor::{Axis, AxisRequest, CalibrationStep, Calibrator, Chopper};
+use crate::servo::SERVO_RATE_HZ;
+use crate::units::Volt;
+
+/// Current ticks for one of the servo.
+const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
+/// Processor cycles between two ticks of one axis, and how many make one late.
+const CYCLES: u32 = CLOCK_HZ / CURRENT_RATE_HZ;
+const LATE_CYCLES: u32 = CYCLES + CYCLES / 2;
+/// Late ticks, or unanswered ones of the servo, in a row that are too many.
+const PATIENCE: u8 = 3;
+
+/// A brake resistor is connected: said when the image is built.
+const HAS_BRAKE_RESISTOR: bool = option_env!("SCARAB_BRAKE_RESISTOR").is_some();
+
+/// What an axis does.
+#[expect(clippy::large_enum_variant, reason = "there is one of each axis, and no heap to box it on")]
+enum Stage {
+    Off,
+    Calibrating(Calibrator),
+    Running(Axis),
+}
+
+/// One axis.
+struct AxisLoop {
+    stage: Stage,
+    orders: Consumer<'static, Order>,
+    outcomes: Producer<'static, Outcome>,
+    samples: Producer<'static, JointSample>,
+    /// Since the last sample for the servo.
+    ticks: u32,
+    /// Cycle counter at the last tick.
+    last: Option<u32>,
+    late: u8,
+    faulted: bool,
+}
+
+/// What level 0 works on.
+pub struct CurrentLoops {
+    axes: [AxisLoop; JOINTS],
+    /// Of the servo, at its last pending, and how often in a row it has not moved since.
+    servo_ticks: u32,
+    unanswered: u8,
+    /// Of the brake resistor, if there is one.
+    chopper: Option<Chopper>,
+    volt_per_code: Volt,
+}
+
+/// What level 0 works on, once it is there.
+pub static LOOPS: spin::Mutex<Option<&'static mut CurrentLoops>> = spin::Mutex::new(None);
+
+/// An end of each queue that level 0 has.
+pub type Ends = (Consumer<'static, Order>, Producer<'static, Outcome>, Producer<'static, JointSample>);
+
+impl CurrentLoops {
+    /// Both axes off, on a board with this divider of the bus voltage.
+    #[must_use]
+    pub fn new(ends: [Ends; JOINTS], divider: f32) -> Self {
+        let axes = ends.map(|(orders, outcomes, samples)| AxisLoop {
+            stage: Stage::Off,
+            orders,
+            outcomes,
+            samples,
+            ticks: 0,
+            last: None,
+            late: 0,
+            faulted: false,
+        });
+        let [begin, full] = drives::chopper(divider);
+        let chopper = if HAS_BRAKE_RESISTOR { Chopper::new(begin, full) } else { None };
+        let volt_per_code = analog::sense(divider).volt_per_code;
+        Self { axes, servo_ticks: 0, unanswered: 0, chopper, volt_per_code }
+    }
+
+    /// One tick of one axis; `complete` if both of its shunts were converted.
+    #[inline(never)]
+    fn tick(&mut self, axis: usize, complete: bool) {
+        let begun = DWT::cycle_count();
+        if contacts::emergency_stop() {
+            interlock::raise(Cause::EmergencyStop);
+        }
+        if contacts::gate_fault() {
+            interlock::raise(Cause::GateFault);
+        }
+        if !complete {
+            interlock::raise(Cause::Conversion);
+        }
+        let bus = converter::bus();
+        if axis == 0
+            && let Some(chopper) = &self.chopper
+        {
+            brake::set(chopper.duty(self.volt_per_code * f32::from(bus)));
+        }
+        let Some(this) = self.axes.get_mut(axis) else { return };
+        this.watch(begun);
+        let sample = AxisSample {
+            shunt_codes: converter::shunts(axis),
+            bus_code: bus,
+            encoder_count: encoder::count(axis),
+            index_count: encoder::index(axis),
+        };
+        let allowed = interlock::is_clear();
+        if !allowed {
+            bridge::release_all();
+        }
+        let command = this.step(axis, &sample, allowed);
+        bridge::set(axis, &command);
+        this.ticks += 1;
+        if this.ticks >= TICKS_PER_SERVO {
+            this.ticks = 0;
+            if let Stage::Running(axis) = &mut this.stage {
+                // A servo that does not fetch is noticed below.
+                let _ = this.samples.enqueue(axis.joint_sample());
+            }
+            if axis + 1 == JOINTS {
+                self.call_servo();
+            }
+        }
+        let [now, low, high] = &statistics::BUS;
+        now.set(bus.into());
+        low.lower(bus.into());
+        high.raise(bus.into());
+        statistics::CURRENT_TICKS.add();
+        statistics::CURRENT_WORST.raise(DWT::cycle_count().wrapping_sub(begun));
+    }
+
+    fn call_servo(&mut self) {
+        let ticks = statistics::SERVO_TICKS.get();
+        if ticks == self.servo_ticks {
+            statistics::SERVO_MISSED.add();
+            self.unanswered = self.unanswered.saturating_add(1);
+            if self.unanswered >= PATIENCE {
+                interlock::raise(Cause::ServoTicks);
+            }
+        } else {
+            self.unanswered = 0;
+        }
+        self.servo_ticks = ticks;
+        interrupts::pend_servo();
+    }
+}
+
+impl AxisLoop {
+    /// The time since the last tick.
+    fn watch(&mut self, now: u32) {
+        let late = self.last.is_some_and(|last| now.wrapping_sub(last) > LATE_CYCLES);
+        self.last = Some(now);
+        self.late = if late { self.late.saturating_add(1) } else { 0 };
+        if late {
+            statistics::CURRENT_MISSED.add();
+            if self.late >= PATIENCE {
+                interlock::raise(Cause::CurrentTicks);
+            }
+        }
+    }
+
+    fn step(&mut self, axis: usize, sample: &AxisSample, allowed: bool) -> AxisCommand {
+        if self.orders.ready() {
+            self.obey();
+        }
+        match &mut self.stage {
+            Stage::Off => AxisCommand::RELEASED,
+            Stage::Calibrating(_) if !allowed => {
+                self.end_calibration(Outcome::Interrupted);
+                AxisCommand::RELEASED
+            }
+            Stage::Calibrating(calibrator) => match calibrator.tick(sample) {
+                CalibrationStep::Running(command) => command,
+                CalibrationStep::Done(calibration) => {
+                    self.end_calibration(Outcome::Calibrated(calibration));
+                    AxisCommand::RELEASED
+                }
+                CalibrationStep::Refused(refusal) => {
+                    self.end_calibration(Outcome::Refused(refusal));
+                    AxisCommand::RELEASED
+                }
+            },
+            Stage::Running(running) => {
+                let request = if allowed { target(axis) } else { AxisRequest::RELEASED };
+                let command = running.tick(sample, request);
+                if let Some(fault) = running.fault().filter(|_| !self.faulted) {
+                    self.faulted = true;
+                    interlock::raise(if axis == 0 { Cause::Axis1 } else { Cause::Axis2 });
+                    // A fault of one axis takes the other.
+                    bridge::release_all();
+                    let _ = self.outcomes.enqueue(Outcome::Fault(fault));
+                }
+                command
+            }
+        }
+    }
+
+    /// The queue has room: a calibration is ordered only after the one before has been heard of.
+    fn end_calibration(&mut self, outcome: Outcome) {
+        self.stage = Stage::Off;
+        let _ = self.outcomes.enqueue(outcome);
+    }
+
+    #[inline(never)]
+    fn obey(&mut self) {
+        let Some(order) = self.orders.dequeue() else { return };
+        match order {
+            Order::Off if matches!(self.stage, Stage::Calibrating(_)) => {
+                self.end_calibration(Outcome::Interrupted);
+            }
+            Order::Off => self.stage = Stage::Off,
+            Order::Calibrate(calibrator) => self.stage = Stage::Calibrating(calibrator),
+            Order::Run(axis) => {
+                self.faulted = false;
+                self.stage = Stage::Running(axis);
+            }
+            Order::Place(counts) => {
+                if let Stage::Running(axis) = &mut self.stage {
+                    axis.set_counts(counts);
+                }
+            }
+            Order::ClearFault => {
+                if let Stage::Running(axis) = &mut self.stage {
+                    // A place that was lost stays lost: only a new calibration helps, and the fault is told again.
+                    let _ = axis.clear_fault();
+                    self.faulted = false;
+                }
+            }
+        }
+    }
+}
+
+/// The converters' vector.
+#[inline(always)]
+pub fn interrupt() {
+    let finished = converter::finished();
+    // Nothing else takes this lock once the interrupt is enabled.
+    if let Some(mut loops) = LOOPS.try_lock()
+        && let Some(loops) = loops.as_mut()
+    {
+        for (axis, done) in finished.into_iter().enumerate() {
+            if let Some(complete) = done {
+                loops.tick(axis, complete);
+            }
+        }
+    }
+}

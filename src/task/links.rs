@@ -1,0 +1,111 @@
+//! What passes between the levels, and the two ends of every queue.
+
+use heapless::spsc::{Consumer, Producer, Queue};
+use static_cell::ConstStaticCell;
+
+use super::leg::JOINTS;
+use crate::board::odrive_v3_6::memory;
+use crate::hal::JointSample;
+use crate::leg::{
+    Activity, AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, Finding, LoggedSample,
+};
+use crate::motor::{Axis, Calibrator};
+use crate::trace::Record;
+
+/// What an axis is to do from its next tick on.
+#[expect(clippy::large_enum_variant, reason = "there is one of each axis, and no heap to box it on")]
+pub enum Order {
+    /// Bridge released.
+    Off,
+    /// Measure.
+    Calibrate(Calibrator),
+    /// Control its current.
+    Run(Axis),
+    /// The joint now stands at these counts.
+    Place(i32),
+    /// Forget a fault.
+    ClearFault,
+}
+
+/// What came of an axis.
+pub enum Outcome {
+    /// Measured.
+    Calibrated(Calibration),
+    /// Not measured.
+    Refused(CalibrationRefusal),
+    /// The interlock or an order ended the measurement.
+    Interrupted,
+    /// It released itself.
+    Fault(AxisFault),
+}
+
+/// What the servo tells the identification, in its order.
+#[expect(clippy::large_enum_variant, reason = "queues hold values, and there is no heap to box them on")]
+pub enum Told {
+    /// A sample of the log.
+    Sample(LoggedSample<JOINTS>),
+    /// The leg does something else now.
+    Activity(Activity),
+    /// An identification begins.
+    Begun,
+    /// The update offered is in use now.
+    TookUpdate,
+    /// To be passed on.
+    Say(Record<JOINTS>),
+}
+
+/// Both ends of every queue.
+pub struct Links {
+    /// To the current loops and back.
+    pub orders: [(Producer<'static, Order>, Consumer<'static, Order>); JOINTS],
+    /// Back from the current loops.
+    pub outcomes: [(Producer<'static, Outcome>, Consumer<'static, Outcome>); JOINTS],
+    /// From the current loops to the servo.
+    pub samples: [(Producer<'static, JointSample>, Consumer<'static, JointSample>); JOINTS],
+    /// To the servo.
+    pub requests: (Producer<'static, ControlRequest<JOINTS>>, Consumer<'static, ControlRequest<JOINTS>>),
+    /// To the servo.
+    pub findings: (Producer<'static, Finding<JOINTS>>, Consumer<'static, Finding<JOINTS>>),
+    /// From the servo.
+    pub drive: (Producer<'static, DriveState>, Consumer<'static, DriveState>),
+    /// From the servo.
+    pub told: (Producer<'static, Told>, Consumer<'static, Told>),
+    /// From the housekeeping.
+    pub notes: (Producer<'static, Record<JOINTS>>, Consumer<'static, Record<JOINTS>>),
+}
+
+/// Samples and events on their way to the identification: 240 ms of the log. Closing a motion takes 11 million
+/// instructions in one call, 89 ms of a processor that does nothing else.
+pub const TOLD: usize = 128;
+/// Of them this many are kept free for events.
+pub const EVENTS: usize = 8;
+
+macro_rules! queue {
+    ($type:ty, $length:expr) => {{
+        static QUEUE: ConstStaticCell<Queue<$type, { $length }>> = ConstStaticCell::new(Queue::new());
+        QUEUE.take().split()
+    }};
+}
+
+impl Links {
+    /// All queues, empty; once.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            orders: [queue!(Order, 3), queue!(Order, 3)],
+            outcomes: [queue!(Outcome, 3), queue!(Outcome, 3)],
+            samples: [queue!(JointSample, 4), queue!(JointSample, 4)],
+            requests: queue!(ControlRequest<JOINTS>, 3),
+            findings: queue!(Finding<JOINTS>, 3),
+            drive: queue!(DriveState, 8),
+            told: memory::told().split(),
+            notes: queue!(Record<JOINTS>, 16),
+        }
+    }
+}
+
+impl Default for Links {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,222 @@
+//! Level 1: both joints at 4 kHz, pended by the current loop after the second axis' sixth tick.
+//!
+//! The servo begins to tick once both joints have a calibration and a zero; until then the drive is not even ready. While the
+//! interlock is not clear it keeps its drive off, whatever is asked.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use cortex_m::peripheral::DWT;
+use heapless::spsc::{Consumer, Producer};
+
+use super::leg::{JOINTS, LEG};
+use super::links::{EVENTS, TOLD, Told};
+use super::{interlock, statistics};
+use crate::hal::{DriveCommand, JointSample, Sample};
+use crate::leg::{Activity, Control, ControlOutput, ControlRequest, DriveState, Finding, PowerRequest};
+use crate::motor::AxisRequest;
+use crate::trace::{Record, words};
+use crate::units::Ampere;
+
+/// Current target of each axis as bits, or [`RELEASED`].
+static TARGETS: [AtomicU32; JOINTS] = [const { AtomicU32::new(RELEASED) }; JOINTS];
+/// A pattern no computation makes: what is not a number elsewhere is one of the others, and the axis refuses it.
+const RELEASED: u32 = u32::MAX;
+/// The joints' zeros are known, so samples mean something.
+static READY: AtomicBool = AtomicBool::new(false);
+
+/// What an axis is asked for.
+#[inline(always)]
+pub fn target(axis: usize) -> AxisRequest {
+    match TARGETS.get(axis).map(|target| target.load(Ordering::Relaxed)) {
+        None | Some(RELEASED) => AxisRequest::RELEASED,
+        Some(bits) => AxisRequest { enabled: true, current: Ampere(f32::from_bits(bits)) },
+    }
+}
+
+/// From now on the joints' samples are theirs.
+pub fn begin() {
+    READY.store(true, Ordering::Relaxed);
+}
+
+/// The joints' samples mean nothing any more.
+pub fn end() {
+    READY.store(false, Ordering::Relaxed);
+    release();
+}
+
+/// Whether [`begin`] was called.
+pub fn has_begun() -> bool {
+    READY.load(Ordering::Relaxed)
+}
+
+fn release() {
+    for target in &TARGETS {
+        target.store(RELEASED, Ordering::Relaxed);
+    }
+}
+
+/// What level 1 works on.
+pub struct ServoLoop {
+    /// The half of the leg that moves.
+    pub control: Control<JOINTS>,
+    /// From each axis.
+    pub samples: [Consumer<'static, JointSample>; JOINTS],
+    /// From the housekeeping.
+    pub requests: Consumer<'static, ControlRequest<JOINTS>>,
+    /// From the identification.
+    pub findings: Consumer<'static, Finding<JOINTS>>,
+    /// To the housekeeping.
+    pub drive: Producer<'static, DriveState>,
+    /// To the identification.
+    pub told: Producer<'static, Told>,
+    /// The newest of each joint.
+    pub sample: [JointSample; JOINTS],
+    /// What was told of last.
+    pub state: Option<DriveState>,
+    /// The same.
+    pub activity: Activity,
+    /// Ticks of the leg.
+    pub tick: u32,
+}
+
+/// What level 1 works on, once it is there.
+pub static SERVO: spin::Mutex<Option<&'static mut ServoLoop>> = spin::Mutex::new(None);
+
+impl ServoLoop {
+    fn run(&mut self) {
+        for (slot, samples) in self.sample.iter_mut().zip(&mut self.samples) {
+            while let Some(sample) = samples.dequeue() {
+                *slot = sample;
+            }
+        }
+        for (count, sample) in statistics::COUNTS.iter().zip(&self.sample) {
+            count.set(sample.encoder_counts.cast_unsigned());
+        }
+        if !has_begun() {
+            release();
+            return;
+        }
+        self.tick = self.tick.wrapping_add(1);
+        if let Some(finding) = self.findings.dequeue() {
+            self.control.receive(finding);
+        }
+        let request = self.requests.dequeue();
+        let asked = self.permitted(request);
+        let output = self.control.tick(&Sample { joints: self.sample }, asked, LEG.gravity);
+        command(output.servo.drive());
+        self.tell(request.as_ref(), asked.as_ref(), &output);
+    }
+
+    /// What of a request may reach the leg: while anything forbids it, only what switches off.
+    fn permitted(&self, request: Option<ControlRequest<JOINTS>>) -> Option<ControlRequest<JOINTS>> {
+        use PowerRequest::{DisableVoltage, ResetFault};
+        if interlock::is_clear() {
+            return request;
+        }
+        match request {
+            Some(ControlRequest::Power(
+                PowerRequest::DisableOperation | PowerRequest::QuickStop | DisableVoltage | ResetFault,
+            )) if self.is_off() => request,
+            _ if self.is_off() => None,
+            _ => Some(ControlRequest::Power(DisableVoltage)),
+        }
+    }
+
+    fn is_off(&self) -> bool {
+        matches!(
+            self.control.state(),
+            DriveState::NotReadyToSwitchOn | DriveState::SwitchOnDisabled | DriveState::Fault { .. }
+        )
+    }
+
+    /// What changed, and the sample of the log.
+    fn tell(
+        &mut self,
+        request: Option<&ControlRequest<JOINTS>>,
+        asked: Option<&ControlRequest<JOINTS>>,
+        output: &ControlOutput<JOINTS>,
+    ) {
+        let tick = self.tick;
+        let accepted = asked.is_some() && !output.refused;
+        if let Some(request) = request {
+            let name = match request {
+                ControlRequest::Power(_) => None,
+                ControlRequest::Identify => Some("identify"),
+                ControlRequest::Track { .. } => Some("track"),
+                ControlRequest::TakeUpdate => Some("take_update"),
+            };
+            if let Some(name) = name {
+                self.say(Record::Request { tick, name, accepted });
+            }
+        }
+        if accepted && asked == Some(&ControlRequest::Identify) {
+            self.event(Told::Begun);
+        }
+        let decision = &output.servo.decision;
+        let activity = self.control.activity();
+        let changed = self.state.is_none_or(|before| words::drive(before) != words::drive(decision.state));
+        if changed {
+            // A fault before the state that follows from it.
+            if let Some(fault) = decision.fault {
+                let (code, name) = (fault.code.number(), words::fault(fault.code));
+                self.say(Record::Fault { tick, code, name, joint: fault.joint.saturating_add(1) });
+            }
+            let _ = self.drive.enqueue(decision.state);
+        }
+        if let Some(refused) = decision.refused {
+            let why = words::refusal(refused.reason);
+            self.say(Record::NotEnabled { tick, joint: refused.joint.saturating_add(1), why });
+        }
+        if changed || activity != self.activity {
+            let (name, phase, motion) = words::activity(activity);
+            let drive = words::drive(decision.state);
+            self.say(Record::State { tick, drive, activity: name, phase, motion });
+        }
+        self.state = Some(decision.state);
+        if output.took_update {
+            self.event(Told::TookUpdate);
+        }
+        // A sample belongs to what was done in its ticks, so it goes before what begins.
+        if let Some(logged) = output.logged {
+            let room = self.told.len() + EVENTS < TOLD;
+            if !room || self.told.enqueue(Told::Sample(logged)).is_err() {
+                statistics::SAMPLES_LOST.add();
+            }
+        }
+        if activity != self.activity {
+            self.activity = activity;
+            self.event(Told::Activity(activity));
+        }
+    }
+
+    fn say(&mut self, record: Record<JOINTS>) {
+        self.event(Told::Say(record));
+    }
+
+    /// Events have room kept free for them; one that still finds none is counted.
+    fn event(&mut self, event: Told) {
+        if self.told.enqueue(event).is_err() {
+            statistics::RECORDS_LOST.add();
+        }
+    }
+}
+
+fn command(command: &DriveCommand<JOINTS>) {
+    for (target, current) in TARGETS.iter().zip(command.currents) {
+        let bits = if command.enabled { current.0.to_bits() } else { RELEASED };
+        target.store(bits, Ordering::Relaxed);
+    }
+}
+
+/// The servo's vector.
+#[inline(always)]
+pub fn interrupt() {
+    let begun = DWT::cycle_count();
+    if let Some(mut servo) = SERVO.try_lock()
+        && let Some(servo) = servo.as_mut()
+    {
+        servo.run();
+    }
+    statistics::SERVO_TICKS.add();
+    statistics::SERVO_WORST.raise(DWT::cycle_count().wrapping_sub(begun));
+}

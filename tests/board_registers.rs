@@ -1,0 +1,292 @@
+//! The board's registers as the start leaves them, derived from the record of what is written, against the board's facts.
+//!
+//! `cargo test --test board_registers -- --nocapture` prints the record. The facts are those of ODrive's firmware v0.5.6
+//! (`Firmware/Board/v3`, `Drivers`, `MotorControl`); the meaning of the bits is RM0090's. What silicon does with them, only silicon shows.
+
+use std::collections::BTreeMap;
+
+use scarab::board::odrive_v3_6::settings::pins::{GATES_OFF, PINS};
+use scarab::board::odrive_v3_6::settings::{
+    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, FAST_TIMER_HZ, SLOW_TIMER_HZ, Write, analog,
+    chopper, converters, encoders, gate_driver, timers,
+};
+
+/// Registers by address; what was never written is zero, as after a reset (but for the debug pins' modes).
+#[derive(Default)]
+struct Registers {
+    values: BTreeMap<u32, u32>,
+    record: Vec<Write>,
+}
+
+impl Registers {
+    fn apply(&mut self, writes: &[Write]) {
+        for write in writes {
+            let before = self.at(write.address);
+            self.values.insert(write.address, write.applied_to(before));
+            self.record.push(*write);
+        }
+    }
+
+    fn at(&self, address: u32) -> u32 {
+        self.values.get(&address).copied().unwrap_or(0)
+    }
+
+    /// Bits `low..low + count` of a register.
+    fn bits(&self, address: u32, low: u32, count: u32) -> u32 {
+        self.at(address) >> low & ((1 << count) - 1)
+    }
+}
+
+/// All that the start writes, in its order.
+fn started() -> Registers {
+    let mut registers = Registers::default();
+    for list in [&CACHES[..], &CLOCK_SECURITY, &CLOCKS, &DEBUG_FREEZE] {
+        registers.apply(list);
+    }
+    GATES_OFF.iter().for_each(|pin| registers.apply(&pin.writes()));
+    (0..2).for_each(|axis| registers.apply(&timers::bridge(axis)));
+    registers.apply(&chopper::CHOPPER);
+    encoders::ENCODERS.iter().for_each(|list| registers.apply(list));
+    registers.apply(&timers::ready());
+    PINS.iter().for_each(|pin| registers.apply(&pin.writes()));
+    registers.apply(&converters::CONVERTERS);
+    registers.apply(&timers::LOCK_AND_START);
+    registers.apply(&timers::TRIGGERS);
+    (0..2).for_each(|axis| registers.apply(&[timers::repetition(axis)]));
+    registers.apply(&converters::TRIGGERED);
+    registers.apply(&encoders::INDEX);
+    registers
+}
+
+const TIM1: u32 = 0x4001_0000;
+const TIM8: u32 = 0x4001_0400;
+const TIM2: u32 = 0x4000_0000;
+const TIM3: u32 = 0x4000_0400;
+const TIM4: u32 = 0x4000_0800;
+const ADC: [u32; 3] = [0x4001_2000, 0x4001_2100, 0x4001_2200];
+
+#[test]
+fn the_record_of_writes_is_what_the_start_does() {
+    let registers = started();
+    println!("register            address       mask      value");
+    for write in &registers.record {
+        println!("{:<16} {:#010x} {:#010x} {:#010x}", write.register, write.address, write.mask, write.value);
+        assert!(write.address.is_multiple_of(4) && write.mask != 0, "{write:?}");
+        assert_eq!(write.value & !write.mask, 0, "{write:?} sets a bit that it does not mean");
+    }
+    println!("{} writes", registers.record.len());
+}
+
+#[test]
+fn both_bridges_switch_at_24_khz_with_119_ns_of_dead_time_and_no_output_on() {
+    let registers = started();
+    for base in [TIM1, TIM8] {
+        let period = f64::from(registers.at(base + 0x2C)) * 2.0 * f64::from(registers.at(base + 0x28) + 1);
+        assert_eq!(f64::from(FAST_TIMER_HZ) / period, 24_000.0);
+        assert_eq!(registers.bits(base, 5, 2), 0b11, "centre-aligned 3");
+        assert_eq!(registers.bits(base, 8, 2), 0, "dead time of the undivided clock");
+        let dead_time = registers.bits(base + 0x44, 0, 8);
+        assert!(dead_time < 128, "linear range");
+        let dead_time_ns = f64::from(dead_time) / f64::from(FAST_TIMER_HZ) * 1e9;
+        assert!((dead_time_ns - 119.0).abs() < 0.1, "{dead_time_ns}");
+        assert_eq!(registers.bits(base + 0x44, 15, 1), 0, "main output off");
+        assert_eq!(registers.bits(base + 0x44, 14, 1), 0, "never switched on by hardware");
+        assert_eq!(registers.bits(base + 0x44, 10, 2), 0b11, "idle levels are driven");
+        assert_eq!(registers.bits(base + 0x44, 12, 1), 0, "no break input: its pins are taken");
+        for channel in 0..3 {
+            let shift = 8 * (channel % 2);
+            let mode = registers.bits(base + 0x18 + 4 * (channel / 2), shift, 8);
+            assert_eq!(mode, 0b0111_1000, "PWM mode 2, buffered, channel {}", channel + 1);
+            assert_eq!(registers.bits(base + 0x20, 4 * channel, 4), 0b0101, "both outputs, active high");
+        }
+        assert_eq!(registers.bits(base + 0x1C, 8, 8), 0b0110_1000, "channel 4: PWM mode 1, buffered");
+        assert_eq!(registers.bits(base + 0x04, 4, 3), 0b111, "channel 4 triggers the converters");
+        // From 40 counts to zero: the sampling of 3 of 21 MHz ends there, to the nearest 0.1 us.
+        let before_zero = f64::from(registers.at(base + 0x40)) / f64::from(FAST_TIMER_HZ);
+        assert!((before_zero - 3.0 / 21e6).abs() < 1e-7);
+        assert_eq!(registers.at(base + 0x30), 1, "compare values are taken over once a period");
+    }
+}
+
+#[test]
+fn the_bridges_run_a_quarter_of_a_period_apart() {
+    let registers = started();
+    let [first, second] = [TIM1, TIM8].map(|base| registers.at(base + 0x24));
+    // Both count up from there in the same cycle; a period has 7000.
+    assert_eq!(first - second, 7000 / 4);
+    let order: Vec<_> = registers.record.iter().map(|write| write.register).collect();
+    let place = |name: &str| order.iter().rposition(|register| *register == name).expect(name);
+    let begins = |name: &str| order.iter().position(|register| *register == name).expect(name);
+    // TIM8 waits for TIM1 before TIM1 starts, and is let go before either triggers.
+    let lock = timers::LOCK_AND_START;
+    assert_eq!((lock[1].register, lock[1].value), ("TIM8_SMCR", 0b110));
+    assert_eq!((lock[2].register, lock[2].value & 1), ("TIM1_CR1", 1));
+    assert_eq!(registers.at(TIM8 + 0x08), 0);
+    // No conversion before both run in phase, no output pin before its timer holds it low.
+    assert!(place("ADC3_CR2") > place("TIM8_CR2") && place("TIM8_CR2") > place("TIM1_CR1"));
+    assert!(begins("TIM1_BDTR") < begins("TIM1_CCER"));
+}
+
+#[test]
+fn the_converters_sample_the_shunts_of_the_board() {
+    let registers = started();
+    assert_eq!(f64::from(SLOW_TIMER_HZ) / f64::from(converters::CLOCK_HZ), 4.0);
+    assert_eq!(registers.bits(0x4001_2304, 16, 2), 0b01, "84 MHz / 4");
+    // M0: B on IN10 by ADC2, C on IN11 by ADC3, injected by TIM1's trigger. M1: B on IN13, C on IN12, regular by TIM8's.
+    for (adc, injected, regular) in [(ADC[1], 10, 13), (ADC[2], 11, 12)] {
+        assert_eq!((registers.bits(adc + 0x38, 20, 2), registers.bits(adc + 0x38, 15, 5)), (0, injected));
+        assert_eq!((registers.bits(adc + 0x2C, 20, 4), registers.bits(adc + 0x34, 0, 5)), (0, regular));
+        assert_eq!((registers.bits(adc + 0x08, 16, 4), registers.bits(adc + 0x08, 20, 2)), (0b0001, 0b01));
+        assert_eq!((registers.bits(adc + 0x08, 24, 4), registers.bits(adc + 0x08, 28, 2)), (0b1110, 0b01));
+        assert_eq!((registers.at(adc + 0x0C), registers.at(adc + 0x10)), (0, 0), "3 cycles");
+    }
+    // Bus voltage IN6, thermistors IN15, IN4, IN5: four injected ones in a row.
+    let sequence = registers.at(ADC[0] + 0x38);
+    assert_eq!(registers.bits(ADC[0] + 0x38, 20, 2), 3);
+    assert_eq!([0, 5, 10, 15].map(|place| sequence >> place & 0x1F), [6, 15, 4, 5]);
+    assert_eq!(registers.bits(ADC[0] + 0x04, 8, 1), 1, "scan");
+    // Only ADC3 interrupts, at the end of either kind; all resolve 12 bits, right-aligned.
+    let interrupts = ADC.map(|adc| registers.bits(adc + 0x04, 5, 3));
+    assert_eq!(interrupts, [0, 0, 0b101]);
+    for adc in ADC {
+        assert_eq!((registers.bits(adc + 0x04, 24, 2), registers.bits(adc + 0x08, 11, 1)), (0, 0));
+        assert_eq!(registers.bits(adc + 0x08, 0, 1), 1);
+    }
+}
+
+#[test]
+fn currents_volts_and_degrees_are_the_board_s() {
+    let sense = analog::sense(19.0);
+    assert_eq!(sense, scarab::motor::SenseScale::ODRIVE_3_6);
+    // 500 uOhm, 40 V/V, 3.3 V of 4096 codes: 0.0403 A a code, 60.75 A at 0.9 of 1.35 V.
+    for scale in sense.ampere_per_code {
+        assert!((scale.0 - 3.3 / 4096.0 / gate_driver::GAIN / 500e-6).abs() < 1e-6, "{scale:?}");
+    }
+    // 0.3 V and 3.0 V.
+    assert_eq!(sense.rails, [372, 3723]);
+    assert!((analog::sense(11.0).volt_per_code.0 - 3.3 * 11.0 / 4096.0).abs() < 1e-7);
+    for (version, ratio) in [
+        ([3, 6, 56], Some(19.0)),
+        ([3, 5, 48], Some(19.0)),
+        ([3, 6, 24], Some(11.0)),
+        ([3, 4, 24], None),
+        ([4, 4, 58], None),
+        ([analog::BLANK; 3], None),
+    ] {
+        assert_eq!(analog::divider(version), ratio, "{version:?}");
+    }
+    assert_eq!(analog::divider(analog::stated(Some("24"))), Some(11.0));
+    assert_eq!([None, Some("48")].map(|volts| analog::divider(analog::stated(volts))), [None; 2]);
+    // It grows with the code, without a turn.
+    let degrees: Vec<f32> = (0..4096_u16).filter_map(analog::temperature_c).collect();
+    assert!(degrees.windows(2).all(|pair| pair[0] < pair[1]), "not monotonous");
+    assert!(degrees[0] < 0.0 && *degrees.last().expect("some") > 120.0);
+    assert_eq!([0, 4095].map(analog::temperature_c), [None; 2]);
+}
+
+#[test]
+fn encoders_count_every_edge_behind_a_filter_and_their_index_pulses_interrupt() {
+    let registers = started();
+    for base in [TIM3, TIM4] {
+        assert_eq!(registers.bits(base + 0x08, 0, 3), 0b011, "both inputs");
+        assert_eq!(registers.at(base + 0x2C), 0xFFFF);
+        assert_eq!(registers.at(base + 0x18), 0x4141, "inputs 1 and 2, filter 4");
+        assert_eq!(registers.at(base + 0x20), 0, "not inverted");
+        assert_eq!(registers.bits(base, 0, 1), 1);
+    }
+    // PC9 and PC15.
+    assert_eq!(registers.bits(0x4001_3810, 4, 4), 2);
+    assert_eq!(registers.bits(0x4001_3814, 12, 4), 2);
+    assert_eq!([0x00, 0x08].map(|offset| registers.at(0x4001_3C00 + offset)), [1 << 9 | 1 << 15; 2]);
+}
+
+#[test]
+fn the_chopper_stays_off() {
+    let registers = started();
+    let top = registers.at(TIM2 + 0x2C);
+    let frequency = f64::from(SLOW_TIMER_HZ) / (2.0 * f64::from(top));
+    assert!((frequency - 10_254.0).abs() < 1.0, "{frequency}");
+    // Low side on below 0, high side on from above the top: neither ever.
+    assert_eq!((registers.at(TIM2 + 0x3C), registers.at(TIM2 + 0x40)), (0, top + 1));
+    assert_eq!(registers.at(TIM2 + 0x1C), 0x7878, "PWM mode 2 on channels 3 and 4, buffered");
+    assert_eq!(registers.bits(TIM2 + 0x20, 8, 8), 0b0001_0011, "channel 3 active low, 4 high");
+    for duty in [0.0, 0.3, 0.95, 1.0, f32::NAN, -1.0] {
+        let [low, high] = chopper::compare(duty).map(u32::from);
+        assert!(high - low >= chopper::GAP && high <= chopper::TOP, "{duty}");
+        let share = f64::from(top - high) / f64::from(top);
+        assert!((share - f64::from(duty.clamp(0.0, 0.95))).abs() < 3e-4 || duty.is_nan(), "{duty}: {share}");
+    }
+    let begins = |name: &str| registers.record.iter().position(|write| write.register == name);
+    assert!(begins("TIM2_CCR3") < begins("TIM2_CR1") && begins("TIM2_CCR4") < begins("TIM2_CR1"));
+}
+
+/// Pins and functions of `Board/v3/Inc/main.h` for version 3.5 and later: analog `a`, input `i`, output `o`, or the
+/// alternate function's number.
+const BOARD_PINS: &str = "A8:1 A9:1 A10:1 B13:1 B14:1 B15:1 C6:3 C7:3 C8:3 A7:3 B0:3 B1:3 C0:a C1:a C2:a C3:a A6:a C5:a A4:a A5:a \
+     B4:2 B5:2 B6:2 B7:2 C9:i C15:i D2:i C4:i A2:i A3:i B10:1 B11:1 B12:o C13:o C14:o";
+
+#[test]
+fn every_pin_is_what_the_board_wires_it_to() {
+    let registers = started();
+    let mut expected = 0;
+    for entry in BOARD_PINS.split_whitespace() {
+        let (pin, function) = entry.split_once(':').expect("pin:function");
+        let number: u32 = pin[1..].parse().expect("a number");
+        let port = 0x4002_0000 + 0x400 * u32::from(pin.as_bytes()[0] - b'A');
+        let mode = registers.bits(port, 2 * number, 2);
+        let alternate = registers.bits(port + 0x20 + 4 * (number / 8), 4 * (number % 8), 4);
+        let found = match mode {
+            0 => "i".into(),
+            1 => "o".into(),
+            2 => alternate.to_string(),
+            _ => "a".to_owned(),
+        };
+        assert_eq!(found, function, "P{pin}");
+        expected += 1;
+    }
+    assert_eq!(PINS.len() + GATES_OFF.len(), expected);
+    // Contacts and outputs that must be low without their driver are pulled down, the fault line up.
+    let pull = |port: u32, number: u32| registers.bits(0x4002_000C + 0x400 * port, 2 * number, 2);
+    assert_eq!([pull(2, 4), pull(0, 2), pull(0, 3), pull(3, 2), pull(0, 8), pull(1, 1)], [2, 2, 2, 1, 2, 2]);
+    // Debug port untouched: PA13, PA14.
+    assert!(PINS.iter().all(|pin| pin.port != b'A' || !(13..=14).contains(&pin.number)));
+    // The first levels written: enable low, selects high.
+    let levels: Vec<u32> = GATES_OFF.iter().map(|pin| pin.writes()[0].value).collect();
+    assert_eq!(levels, [1 << (12 + 16), 1 << 13, 1 << 14]);
+}
+
+#[test]
+fn a_duty_is_the_share_of_the_period_above_its_compare_value() {
+    for (duty, compare) in [(0.0, 3500), (0.5, 1750), (1.0, 0), (0.9367, 222), (2.0, 0), (-1.0, 3500)] {
+        assert_eq!(timers::compare(duty), compare, "{duty}");
+    }
+    // What is no number leaves the low side on.
+    assert_eq!(timers::compare(f32::NAN), 3500);
+    assert_eq!(timers::compare(f32::INFINITY), 0);
+}
+
+#[test]
+fn gate_driver_frames_carry_register_and_data_where_the_driver_reads_them() {
+    use gate_driver::{CONTROL_1, CONTROL_2, Register, data, read, write};
+    assert_eq!(CONTROL_1, 0x0550, "number 21, latched shutdown, six inputs, 1.7 A");
+    assert_eq!(CONTROL_2, 0x0008, "40 V/V");
+    assert_eq!(write(Register::Control1, CONTROL_1), 0x1550);
+    assert_eq!(write(Register::Control2, CONTROL_2), 0x1808);
+    assert_eq!([read(Register::Status1), read(Register::Control2)], [0x8000, 0x9800]);
+    assert_eq!(data(0x1550), Some(0x0550));
+    assert_eq!(data(0xBEEF), None);
+}
+
+#[test]
+fn clocks_and_caches_are_on_and_a_failed_crystal_is_noticed() {
+    let registers = started();
+    assert_eq!(CLOCK_HZ, 8_000_000 / 4 * 168 / 2);
+    assert_eq!(registers.bits(0x4002_3C00, 8, 3), 0b111, "prefetch, instruction and data cache");
+    assert_eq!(registers.bits(0x4002_3800, 19, 1), 1, "clock security");
+    // Ports A to D; TIM2 to TIM4; TIM1, TIM8, ADC1 to ADC3, SYSCFG.
+    assert_eq!(registers.at(0x4002_3830), 0b1111);
+    assert_eq!(registers.at(0x4002_3840), 0b111);
+    assert_eq!(registers.at(0x4002_3844), 1 | 1 << 1 | 0b111 << 8 | 1 << 14);
+    // Watchdog and both bridges' timers stand while a debugger holds the processor.
+    assert_eq!((registers.at(0xE004_2008), registers.at(0xE004_200C)), (1 << 12, 0b11));
+}
