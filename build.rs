@@ -1,15 +1,16 @@
-//! Links the flash image: memory layout, vector table, records. Programs of the host need nothing of it.
+//! Says which leg an image is for, and links the flash image: memory layout, vector table, records. Programs of the host need nothing of it.
 
 use std::env;
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=memory.x");
+    println!("cargo::rerun-if-changed=src/board/odrive_v3_6/layout.x");
     let target = env::var("CARGO_CFG_TARGET_OS").unwrap_or_default();
-    if target != "none" || env::var_os("CARGO_FEATURE_BOARD_ODRIVE_V3_6").is_none() {
+    if target != "none" || env::var_os("CARGO_FEATURE_TASKS").is_none() {
         return;
     }
-    // The leg the image is for: a constant that `cargo sim image-leg` writes from a leg file.
+    // The leg the image is for: a constant that `cargo fw --source` writes from a leg file.
     let leg = env::var("SCARAB_LEG").unwrap_or_else(|_| {
         concat!(env!("CARGO_MANIFEST_DIR"), "/hal-sim/legs/x2-wearer-75kg.rs").to_owned()
     });
@@ -19,7 +20,11 @@ fn main() {
     println!("cargo::rerun-if-env-changed=SCARAB_BOARD_VOLTS");
     println!("cargo::rerun-if-changed={leg}");
     println!("cargo::rustc-env=SCARAB_LEG_SOURCE={leg}");
+    if env::var_os("CARGO_FEATURE_BOARD_ODRIVE_V3_6").is_none() {
+        return;
+    }
     println!("cargo::rustc-link-search={}", env!("CARGO_MANIFEST_DIR"));
+    println!("cargo::rustc-link-search={}/src/board/odrive_v3_6", env!("CARGO_MANIFEST_DIR"));
     for script in ["link.x", "defmt.x"] {
         println!("cargo::rustc-link-arg-bins=-T{script}");
     }

@@ -1,15 +1,24 @@
 //! Links images for the emulated microcontroller; programs of the host need nothing.
 
 use std::env;
-use std::path::Path;
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=../memory.x");
+    println!("cargo::rerun-if-changed=layout.x");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    println!("cargo::rustc-link-search={}", workspace.display());
+    println!("cargo::rustc-link-search={}/..", env!("CARGO_MANIFEST_DIR"));
+    println!("cargo::rustc-link-search={}", env!("CARGO_MANIFEST_DIR"));
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
-    println!("cargo::rerun-if-changed=../memory.x");
+    if env::var_os("CARGO_FEATURE_EMULATED").is_some() {
+        println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
+        // The plant as a constant, which `cargo emulate` writes from a leg file.
+        println!("cargo::rerun-if-env-changed=SCARAB_PLANT");
+        if let Ok(plant) = env::var("SCARAB_PLANT") {
+            println!("cargo::rerun-if-changed={plant}");
+            println!("cargo::rustc-env=SCARAB_PLANT_SOURCE={plant}");
+        }
+    }
 }

@@ -27,11 +27,12 @@ pub mod model;
 pub mod motion;
 pub mod motor;
 pub mod operator;
+mod place;
 pub mod real;
 pub mod safety;
 pub mod servo;
 pub mod swarm;
-#[cfg(all(feature = "board-odrive-v3-6", target_os = "none"))]
+#[cfg(all(feature = "tasks", target_os = "none"))]
 pub mod task;
 pub mod trace;
 pub mod units;

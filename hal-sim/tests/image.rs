@@ -14,7 +14,7 @@ fn leg(name: &str) -> LegFile {
 #[test]
 fn the_board_makes_of_the_constant_the_configuration_the_simulation_runs_with() {
     for name in [DEFAULT_LEG, "x2-rough", "mujoco-leg"] {
-        let (description, configuration) = describe(&leg(name)).expect("two joints");
+        let (description, configuration) = describe(&leg(name), 1).expect("two joints");
         let made = description.configuration::<13>().expect("the constant makes a leg");
         assert_eq!(made.joints, configuration.joints, "{name}");
         assert_eq!(made.model, configuration.model, "{name}");
@@ -40,7 +40,7 @@ fn the_board_makes_of_the_constant_the_configuration_the_simulation_runs_with() 
 #[test]
 fn the_board_s_axes_are_those_of_the_simulated_drive() {
     let file = leg(DEFAULT_LEG);
-    let (description, _) = describe(&file).expect("two joints");
+    let (description, _) = describe(&file, 1).expect("two joints");
     for (joint, axis) in file.joints.iter().zip(drives::axes(&description, 19.0)) {
         let motor = joint.motor.as_ref().expect("the default leg has motors");
         let simulated = axis_configuration(joint, motor);
@@ -60,7 +60,7 @@ fn the_board_s_axes_are_those_of_the_simulated_drive() {
 
 #[test]
 fn the_shipped_constant_is_the_default_leg_s() {
-    let (description, _) = describe(&leg(DEFAULT_LEG)).expect("two joints");
+    let (description, _) = describe(&leg(DEFAULT_LEG), 1).expect("two joints");
     let shipped = include_str!("../legs/x2-wearer-75kg.rs");
     assert!(
         source(&description) == shipped,
@@ -70,7 +70,7 @@ fn the_shipped_constant_is_the_default_leg_s() {
 
 #[test]
 fn a_leg_that_no_image_holds_is_refused_by_name() {
-    let refused = describe(&leg("sp")).expect_err("one joint").to_string();
+    let refused = describe(&leg("sp"), 1).expect_err("one joint").to_string();
     assert!(refused.contains("two joints"), "{refused}");
 }
 

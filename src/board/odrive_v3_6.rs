@@ -22,14 +22,12 @@ target_only! {
     pub mod contacts;
     pub mod converter;
     pub mod crash;
-    pub mod critical_section;
     pub mod encoder;
     pub mod gate_driver;
     pub mod identity;
     pub mod interrupts;
     pub mod memory;
     pub mod registers;
-    pub mod stack;
     pub mod start;
     pub mod vectors;
     pub mod watchdog;

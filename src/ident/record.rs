@@ -10,6 +10,7 @@
 //! training and validation use the same type.
 
 use core::borrow::BorrowMut;
+use core::mem::MaybeUninit;
 
 use super::assembly::{Choices, assemble};
 use super::choice::Estimator;
@@ -25,6 +26,7 @@ use super::selection::Selection;
 use super::smoothing::{Smoothed, Smoother};
 use super::sum::Sum;
 use super::window::{self, Window};
+use crate::place::{fill, made};
 use crate::real::{self, Real};
 
 /// Bandwidth of the smoothing over that of the rows: the motion is undisturbed where the rows are sensitive, so that
@@ -109,23 +111,27 @@ where
     /// See [`Recorder::new`].
     #[inline]
     pub fn with_window(bandwidth_hz: T, window: W) -> Result<Self, KernelError> {
-        Ok(Self::of_filters(&Filters::new(bandwidth_hz)?, Estimator::Robust, window))
+        let filters = Filters::new(bandwidth_hz)?;
+        Ok(made(|slot| Self::place(slot, &filters, Estimator::Robust, window)))
     }
 
-    /// The same with filters that fit.
-    #[inline]
-    #[must_use]
-    pub fn of_filters(filters: &Filters<T, N, B, TAPS, PENDING>, estimator: Estimator, window: W) -> Self {
-        Self {
+    /// The same with filters that fit, built in its place.
+    pub fn place<'a>(
+        slot: &'a mut MaybeUninit<Self>,
+        filters: &Filters<T, N, B, TAPS, PENDING>,
+        estimator: Estimator,
+        window: W,
+    ) -> &'a mut Self {
+        fill!(slot, {
             smoothing: filters.smoothing.clone(),
             low_pass: filters.low_pass.clone(),
             smoother: Smoother::new(),
             filter: RowFilter::new(Ends::Cut),
-            estimator,
+            estimator: estimator,
             ends: Ends::Cut,
             reweights: true,
             hampel: core::array::from_fn(|_| [Hampel::new(Quantity::Angle), Hampel::new(Quantity::Torque)]),
-            window,
+            window: window,
             choices: None,
             samples: 0,
             replaced: [0; N],
@@ -134,7 +140,7 @@ where
             instants: 0,
             rows: [0; N],
             rejected: 0,
-        }
+        }, {})
     }
 
     /// Samples by which the smoothed motion lags the newest one.

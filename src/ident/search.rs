@@ -3,8 +3,11 @@
 //! On this quadratic cost least squares is exact and instant; the search is run on the same factor, in the box of
 //! the prior, from a cold start, and shown beside it. Cost of one evaluation: `B^2 / 2` multiplications.
 
+use core::mem::MaybeUninit;
+
 use super::constrained::ParameterBox;
 use super::estimate::{Plan, Problem, Stage};
+use crate::place::{Slot, empty_slot, fill};
 use crate::real::Real;
 use crate::swarm::{Bso, BsoSettings, Objective, Search, SwarmError};
 
@@ -56,7 +59,7 @@ pub struct SwarmSearch<T: Real, const B: usize> {
     bounds: ParameterBox<T, B>,
     stage: Stage<T, B>,
     stage_index: usize,
-    swarm: Option<Bso<T, BEETLES, B>>,
+    swarm: Slot<Bso<T, BEETLES, B>>,
     state: SearchState,
     values: [T; B],
     determined: [bool; B],
@@ -67,47 +70,62 @@ pub struct SwarmSearch<T: Real, const B: usize> {
 }
 
 impl<T: Real, const B: usize> SwarmSearch<T, B> {
-    /// A cold start: beetles scattered uniformly over the box.
-    #[must_use]
-    pub fn new<const N: usize>(
+    /// A cold start: beetles scattered uniformly over the box, with the first of [`Self::advance`].
+    /// Built in its place.
+    pub fn place<'a, const N: usize>(
+        slot: &'a mut MaybeUninit<Self>,
         problem: &Problem<'_, T, N, B>,
         plan: Plan,
-        bounds: ParameterBox<T, B>,
+        bounds: &ParameterBox<T, B>,
         settings: BsoSettings<T>,
         seed: u64,
-    ) -> Self {
+    ) -> &'a mut Self {
         let (values, determined) = ([T::zero(); B], [false; B]);
         let stage = problem.stage(plan, 0, &values, &determined);
-        let mut search = Self {
-            plan,
-            settings,
-            seed,
-            bounds,
-            stage,
+        fill!(slot, {
+            plan: plan,
+            settings: settings,
+            seed: seed,
+            bounds: *bounds,
+            stage: stage,
             stage_index: 0,
-            swarm: None,
             state: SearchState::Running,
-            values,
-            determined,
+            values: values,
+            determined: determined,
             iterations: 0,
             evaluations: 0,
             watched_value: T::LARGEST,
             watched_iteration: 0,
-        };
-        if search.stage.columns().is_empty() {
-            search.next_stage(problem);
-        } else {
-            search.start_stage();
-        }
-        search
+        }, { swarm: empty_slot })
     }
 
+    /// Begins anew, cold, with the columns that are left.
+    pub fn restart<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
+        (self.values, self.determined) = ([T::zero(); B], [false; B]);
+        self.stage = problem.stage(self.plan, 0, &self.values, &self.determined);
+        self.swarm.clear();
+        (self.stage_index, self.state) = (0, SearchState::Running);
+        (self.iterations, self.evaluations) = (0, 0);
+        (self.watched_value, self.watched_iteration) = (T::LARGEST, 0);
+    }
+
+    /// The first stage that has something to search; a large swarm, so it is made where it stays and not with `new`.
+    #[inline(never)]
+    fn start<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
+        if self.stage.columns().is_empty() {
+            self.next_stage(problem);
+        } else {
+            self.start_stage();
+        }
+    }
+
+    #[inline(never)]
     fn start_stage(&mut self) {
         let cost = StageCost { stage: &self.stage, bounds: &self.bounds };
         // Each stage draws its own numbers.
         let seed = self.seed.wrapping_add(self.stage_index as u64);
         match Bso::new(&cost, self.settings, seed) {
-            Ok(swarm) => self.swarm = Some(swarm),
+            Ok(swarm) => self.swarm.fill(|slot| slot.write(swarm)),
             Err(error) => self.state = SearchState::Failed(error),
         }
         (self.watched_value, self.watched_iteration) = (T::LARGEST, 0);
@@ -119,6 +137,9 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
         problem: &Problem<'_, T, N, B>,
         evaluations: u32,
     ) -> SearchState {
+        if self.swarm.is_empty() && self.state == SearchState::Running && evaluations > 0 {
+            self.start(problem);
+        }
         // One at a time: the rule that ends a stage looks at whole iterations, wherever a slice ends.
         for _ in 0..evaluations {
             let (Some(swarm), SearchState::Running) = (self.swarm.as_mut(), self.state) else { break };
@@ -160,9 +181,9 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
 
     /// Starts the next stage that has something to search, or ends.
     fn next_stage<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
-        self.swarm = None;
+        self.swarm.clear();
         // A stage that determines nothing has nothing to search.
-        while self.swarm.is_none() && self.state == SearchState::Running {
+        while self.swarm.is_empty() && self.state == SearchState::Running {
             self.stage_index += 1;
             if self.stage_index >= Problem::<T, N, B>::stages(self.plan) {
                 self.state = SearchState::Done;

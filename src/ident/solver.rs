@@ -5,6 +5,8 @@
 //! exist ([`super::consistent`]), whose base values are the result. The covariance is that of the least-squares problem,
 //! whose optimum the swarm is measured against.
 
+use core::mem::MaybeUninit;
+
 use super::alignment::Misalignments;
 use super::bounds::{LinkPrior, search_box};
 use super::consistent::{Completion, Effort};
@@ -18,6 +20,7 @@ use super::selection;
 use super::verdict::{Docket, Evidence, Reason, Test, Thresholds, Unused, Verdict};
 use crate::model::friction::Stribeck;
 use crate::model::{LegParameters, Parameter};
+use crate::place::{fill, made};
 use crate::real::{self, Real};
 use crate::swarm::BsoSettings;
 
@@ -57,21 +60,44 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     #[must_use]
     pub fn new(
         model: &RowModel<T, N, B>,
-        mut record: Record<T, N, B>,
+        record: Record<T, N, B>,
         plan: Plan,
         prior: Option<&[LinkPrior<T>; N]>,
         swarm_seed: u64,
     ) -> Self {
+        made(|slot| Self::place(slot, model, record, plan, prior, swarm_seed))
+    }
+
+    /// As [`Self::new`], built in its place: it takes a third of the device's stack.
+    pub fn place<'a>(
+        slot: &'a mut MaybeUninit<Self>,
+        model: &RowModel<T, N, B>,
+        mut record: Record<T, N, B>,
+        plan: Plan,
+        prior: Option<&[LinkPrior<T>; N]>,
+        swarm_seed: u64,
+    ) -> &'a mut Self {
         record.selection.is_made |= selection::candidates(model).next().is_none();
         let problem = Problem::new(&record, model);
         let whole = problem.whole();
         let least_squares = problem.least_squares(plan);
         let bounds = search_box(model, &record, prior);
-        let search = SwarmSearch::new(&problem, plan, bounds, BsoSettings::default(), swarm_seed);
         let condition = whole.condition();
         let completion = Completion::new(model, &record, prior, Effort::device(prior.is_some()));
-        let completed = None;
-        Self { record, plan, least_squares, condition, search, bounds, completion, completed, given: None }
+        fill!(slot, {
+            plan: plan,
+            least_squares: least_squares,
+            condition: condition,
+            bounds: bounds,
+            completion: completion,
+            completed: None,
+            given: None,
+            record: record.clone(),
+        }, {
+            search: |search| SwarmSearch::place(
+                search, &problem, plan, &bounds, BsoSettings::default(), swarm_seed,
+            ),
+        })
     }
 
     /// Whether it is decided which columns are there; always where none may be dropped.
@@ -87,8 +113,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         let problem = Problem::new(&self.record, model);
         self.least_squares = problem.least_squares(self.plan);
         self.condition = problem.whole().condition();
-        let seed = self.search.seed();
-        self.search = SwarmSearch::new(&problem, self.plan, self.bounds, BsoSettings::default(), seed);
+        self.search.restart(&problem);
     }
 
     /// Spends up to `evaluations` of the cost on the choice of columns, then on the search, then steps of the completion for as many; any slicing

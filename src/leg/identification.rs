@@ -1,6 +1,7 @@
 //! The half of a leg that finds out: records logged motions, solves in slices, judges.
 
 use core::borrow::BorrowMut;
+use core::mem::MaybeUninit;
 
 use super::activity::{Segment, VALIDATION_MOTIONS};
 use super::configuration::{LegConfiguration, LegError};
@@ -13,6 +14,7 @@ use crate::ident::{
     no_stribeck,
 };
 use crate::model::friction::Stribeck;
+use crate::place::{Slot, each, empty_slot, fill, made};
 
 /// What identification tells control.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +69,7 @@ pub struct Identification<
     thresholds: Thresholds<f32>,
     recorder: Recorder<f32, N, B, TAPS, PENDING, W>,
     work: Work,
-    solver: Option<Solver<f32, N, B>>,
+    solver: Slot<Solver<f32, N, B>>,
     validation: [Option<Record<f32, N, B>>; VALIDATION_MOTIONS],
     held_out: HeldOut<f32, N, B, PENDING>,
     residuals: [Residual<f32, N>; VALIDATION_MOTIONS],
@@ -101,35 +103,36 @@ where
     /// # Errors
     /// See [`Identification::new`].
     pub fn with_window(configuration: &LegConfiguration<N, B>, window: W) -> Result<Self, LegError> {
-        Ok(Self::of_filters(configuration, &Filters::new(configuration.bandwidth_hz)?, window))
+        let filters = Filters::new(configuration.bandwidth_hz)?;
+        Ok(made(|slot| Self::place(slot, configuration, &filters, window)))
     }
 
-    /// The same with filters that fit: nothing can fail any more, so that it can be built where it is to lie.
-    #[inline]
-    #[must_use]
-    pub fn of_filters(
+    /// The same with filters that fit, built in its place: it is larger than the device's stack.
+    pub fn place<'a>(
+        slot: &'a mut MaybeUninit<Self>,
         configuration: &LegConfiguration<N, B>,
         filters: &Filters<f32, N, B, TAPS, PENDING>,
         window: W,
-    ) -> Self {
-        Self {
-            held_out: HeldOut::new(filters.low_pass().reach()),
-            residuals: [Residual::new(); VALIDATION_MOTIONS],
-            recorder: Recorder::of_filters(filters, configuration.estimator, window),
+    ) -> &'a mut Self {
+        fill!(slot, {
             model: configuration.model.clone(),
             prior: configuration.prior,
             plan: configuration.plan,
             swarm_seed: configuration.swarm_seed,
             thresholds: configuration.thresholds,
             work: Work::Idle,
-            solver: None,
-            validation: [const { None }; VALIDATION_MOTIONS],
+            held_out: HeldOut::new(filters.low_pass().reach()),
+            residuals: [Residual::new(); VALIDATION_MOTIONS],
             verdict: None,
             report_due: false,
             upkeep: Upkeep::new(filters.low_pass(), configuration.monitor),
             accepted_stribeck: no_stribeck(),
             change_due: false,
-        }
+        }, {
+            solver: empty_slot,
+            validation: |records| each(records, || None),
+            recorder: |recorder| Recorder::place(recorder, filters, configuration.estimator, window),
+        })
     }
 
     /// Takes a logged sample. The first one without a segment, or of another, ends the motion recorded so far.
@@ -181,16 +184,17 @@ where
         self.work = Work::Recording(segment);
         if segment == Segment::Training {
             self.model.stribeck = no_stribeck();
-            self.solver = None;
+            self.solver.clear();
             self.held_out.clear();
             self.validation = [const { None }; VALIDATION_MOTIONS];
             self.verdict = None;
-        } else if let Some(solver) = &self.solver {
+        } else if let Some(solver) = self.solver.as_ref() {
             let dropped = &solver.record().selection.dropped;
             self.held_out.begin(&solver.values(), &solver.unexpected(), &solver.row_noise(), dropped);
         }
     }
 
+    #[inline(never)]
     fn close(&mut self, segment: Segment) {
         if segment == Segment::Tracking {
             self.work = Work::Idle;
@@ -202,12 +206,7 @@ where
         self.held_out.break_off();
         let record = self.recorder.finish();
         match segment {
-            Segment::Training => {
-                let solver =
-                    Solver::new(&self.model, record, self.plan, self.prior.as_ref(), self.swarm_seed);
-                self.solver = Some(solver);
-                self.work = Work::Solving;
-            }
+            Segment::Training => self.begin_solving(record),
             Segment::Validation(motion) => {
                 let motion = usize::from(motion);
                 if let (Some(slot), Some(residual)) =
@@ -221,6 +220,14 @@ where
             }
             Segment::Tracking => {}
         }
+    }
+
+    /// Apart from [`Self::close`], so that recorder and solver need the stack one after the other.
+    #[inline(never)]
+    fn begin_solving(&mut self, record: Record<f32, N, B>) {
+        let (model, prior) = (&self.model, self.prior.as_ref());
+        self.solver.fill(|slot| Solver::place(slot, model, record, self.plan, prior, self.swarm_seed));
+        self.work = Work::Solving;
     }
 
     /// Spends up to `evaluations` on the search; tells when something is found.
@@ -285,7 +292,7 @@ where
         self.verdict = Some(verdict);
         let estimate = self.solver.as_ref().map(Solver::estimate).filter(|_| verdict.is_accepted());
         let model = estimate.as_ref().map(|estimate| IdentifiedModel::new(&self.model, &estimate.values));
-        if let (Some(estimate), Some(solver)) = (estimate, &self.solver) {
+        if let (Some(estimate), Some(solver)) = (estimate, self.solver.as_ref()) {
             let others = self.validation.iter().flatten();
             self.upkeep.accept(Baseline::new(estimate, solver.record(), others));
             self.accepted_stribeck = self.model.stribeck;

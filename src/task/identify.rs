@@ -14,15 +14,10 @@ use heapless::spsc::{Consumer, Producer};
 use super::leg::{BASE, JOINTS, LEG, LegIdentification};
 use super::links::Told;
 use super::statistics;
-use crate::board::odrive_v3_6::identity::Identity;
-use crate::board::odrive_v3_6::settings::CLOCK_HZ;
-use crate::board::odrive_v3_6::settings::analog::temperature_c;
-use crate::board::odrive_v3_6::start::Board;
-use crate::board::odrive_v3_6::{brake, converter, stack};
+use super::surroundings::{Introduction, Surroundings};
 use crate::leg::{Activity, Finding, IdentifyPhase, LoggedSample, Reason, SearchState, Segment, Verdict};
 use crate::servo::{LOG_RATE_HZ, SERVO_RATE_HZ, TICKS_PER_LOG};
 use crate::trace::{GRAMMAR, Record, Report, judged, words};
-use crate::units::Volt;
 
 /// Evaluations of the search in one slice: some 0.25 ms.
 const EVALUATIONS: u32 = 4;
@@ -50,8 +45,8 @@ pub struct Thread {
     pub findings: Producer<'static, Finding<JOINTS>>,
     /// From the housekeeping.
     pub notes: Consumer<'static, Record<JOINTS>>,
-    /// Of the bus voltage.
-    pub volt_per_code: Volt,
+    /// The board.
+    pub surroundings: Surroundings,
 }
 
 /// What changes.
@@ -68,9 +63,9 @@ struct State {
 }
 
 /// What is told once at the start.
-pub fn introduce(board: &Board) {
-    let Identity { unique: [uid0, uid1, uid2], version: [version, version_minor, version_volt], reset } =
-        board.identity;
+pub fn introduce(introduction: &Introduction, clock_hz: u32) {
+    let Introduction { unique, version, reset, crash } = introduction;
+    let ([uid0, uid1, uid2], [version, version_minor, version_volt]) = (*unique, *version);
     tell(&Record::Boot {
         grammar: GRAMMAR,
         version: env!("CARGO_PKG_VERSION"),
@@ -79,20 +74,11 @@ pub fn introduce(board: &Board) {
         base: BASE as u8,
         servo_hz: SERVO_RATE_HZ,
         log_hz: LOG_RATE_HZ,
-        reset: reset.name(),
+        reset,
     });
-    let clock_hz = board.clock_hz;
     tell(&Record::Board { uid0, uid1, uid2, version, version_minor, version_volt, clock_hz });
-    if let Some(crash) = board.crash {
-        tell(&Record::Crash {
-            cause: crash.cause(),
-            pc: crash.pc,
-            lr: crash.lr,
-            status: crash.status,
-            address: crash.address,
-            line: crash.line,
-            file: crash.file(),
-        });
+    if let Some(crash) = crash {
+        tell(crash);
     }
 }
 
@@ -136,6 +122,7 @@ async fn embassy_futures_yield() {
 
 impl Thread {
     /// Takes what the servo told; whether there was anything.
+    #[inline(never)]
     fn hear(&mut self, state: &mut State) -> bool {
         let mut heard = false;
         // No more than there is room for at once, so that the search is not starved by what comes meanwhile.
@@ -161,6 +148,7 @@ impl Thread {
         heard
     }
 
+    #[inline(never)]
     fn take(&mut self, logged: &LoggedSample<JOINTS>, state: &mut State) {
         let tick = logged.sample.tick;
         if let (Some((before, segment)), Some(now)) = (state.last, logged.segment)
@@ -188,6 +176,7 @@ impl Thread {
     }
 
     /// One slice; whether there was anything to do.
+    #[inline(never)]
     fn work(&mut self, state: &mut State) -> bool {
         use IdentifyPhase::{Judge, Settle, Solve};
         if state.gap {
@@ -225,6 +214,7 @@ impl Thread {
     }
 
     /// What can wait.
+    #[inline(never)]
     fn speak(&mut self, state: &mut State) {
         let now = Instant::now();
         if now < state.next_paced {
@@ -237,7 +227,11 @@ impl Thread {
         if let Some(report) = &mut state.report {
             match report.advance(self.identification) {
                 Some(record) => return tell(&record),
-                None => state.report = None,
+                None => {
+                    state.report = None;
+                    self.tell_loops(state);
+                    (self.surroundings.told)();
+                }
             }
         }
         if now >= state.next_progress && matches!(state.activity, Activity::Identify(IdentifyPhase::Solve)) {
@@ -246,7 +240,7 @@ impl Thread {
         }
         if now >= state.next_loops {
             state.next_loops = now + LOOPS;
-            tell_loops(state);
+            self.tell_loops(state);
             self.tell_supply(state);
         }
     }
@@ -263,10 +257,11 @@ impl Thread {
     }
 
     fn tell_supply(&self, state: &State) {
+        let board = &self.surroundings;
+        let Some(volt_per_code) = board.volt_per_code else { return };
         let [now, low, high] = &statistics::BUS;
-        let volt = |code: u32| self.volt_per_code.0 * code.min(4095) as f32;
-        let [first, second, chopper] =
-            converter::thermistors().map(|code| temperature_c(code).unwrap_or(f32::NAN));
+        let volt = |code: u32| volt_per_code.0 * code.min(4095) as f32;
+        let [first, second, chopper] = (board.temperatures_c)();
         tell(&Record::Supply {
             tick: state.last.map_or(0, |(tick, _)| tick),
             bus_v: volt(now.get()),
@@ -274,22 +269,23 @@ impl Thread {
             bus_high_v: volt(high.swap(0)),
             bridge_c: [first, second],
             chopper_c: chopper,
-            chopper_duty: brake::duty(),
+            chopper_duty: (board.chopper_duty)(),
         });
     }
-}
 
-fn tell_loops(state: &State) {
-    tell(&Record::Loops {
-        tick: state.last.map_or(0, |(tick, _)| tick),
-        current_worst: statistics::CURRENT_WORST.swap(0),
-        servo_worst: statistics::SERVO_WORST.swap(0),
-        current_missed: statistics::CURRENT_MISSED.get(),
-        servo_missed: statistics::SERVO_MISSED.get(),
-        cycles_per_tick: CLOCK_HZ / SERVO_RATE_HZ,
-        stack_used: stack::used(),
-        stack_bytes: stack::bytes(),
-        samples_lost: statistics::SAMPLES_LOST.get(),
-        records_lost: statistics::RECORDS_LOST.get(),
-    });
+    fn tell_loops(&self, state: &State) {
+        let board = &self.surroundings;
+        tell(&Record::Loops {
+            tick: state.last.map_or(0, |(tick, _)| tick),
+            current_worst: statistics::CURRENT_WORST.swap(0),
+            servo_worst: statistics::SERVO_WORST.swap(0),
+            current_missed: statistics::CURRENT_MISSED.get(),
+            servo_missed: statistics::SERVO_MISSED.get(),
+            cycles_per_tick: board.clock_hz / SERVO_RATE_HZ,
+            stack_used: (board.stack_used)(),
+            stack_bytes: (board.stack_bytes)(),
+            samples_lost: statistics::SAMPLES_LOST.get(),
+            records_lost: statistics::RECORDS_LOST.get(),
+        });
+    }
 }

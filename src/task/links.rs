@@ -4,7 +4,6 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use static_cell::ConstStaticCell;
 
 use super::leg::JOINTS;
-use crate::board::odrive_v3_6::memory;
 use crate::hal::JointSample;
 use crate::leg::{
     Activity, AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, Finding, LoggedSample,
@@ -88,9 +87,9 @@ macro_rules! queue {
 }
 
 impl Links {
-    /// All queues, empty; once.
+    /// All queues, empty; once. The long one lies where the board has room for it.
     #[must_use]
-    pub fn new() -> Self {
+    pub fn new(told: &'static mut Queue<Told, TOLD>) -> Self {
         Self {
             orders: [queue!(Order, 3), queue!(Order, 3)],
             outcomes: [queue!(Outcome, 3), queue!(Outcome, 3)],
@@ -98,14 +97,8 @@ impl Links {
             requests: queue!(ControlRequest<JOINTS>, 3),
             findings: queue!(Finding<JOINTS>, 3),
             drive: queue!(DriveState, 8),
-            told: memory::told().split(),
+            told: told.split(),
             notes: queue!(Record<JOINTS>, 16),
         }
-    }
-}
-
-impl Default for Links {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -5,7 +5,6 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use cortex_m::peripheral::DWT;
 use heapless::spsc::{Consumer, Producer};
 
 use super::leg::{JOINTS, LEG};
@@ -77,6 +76,8 @@ pub struct ServoLoop {
     pub activity: Activity,
     /// Ticks of the leg.
     pub tick: u32,
+    /// Processor cycles; wraps.
+    pub clock: fn() -> u32,
 }
 
 /// What level 1 works on, once it is there.
@@ -211,12 +212,12 @@ fn command(command: &DriveCommand<JOINTS>) {
 /// The servo's vector.
 #[inline(always)]
 pub fn interrupt() {
-    let begun = DWT::cycle_count();
     if let Some(mut servo) = SERVO.try_lock()
         && let Some(servo) = servo.as_mut()
     {
+        let begun = (servo.clock)();
         servo.run();
+        statistics::SERVO_WORST.raise((servo.clock)().wrapping_sub(begun));
     }
     statistics::SERVO_TICKS.add();
-    statistics::SERVO_WORST.raise(DWT::cycle_count().wrapping_sub(begun));
 }

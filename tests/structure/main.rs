@@ -12,9 +12,10 @@ use std::path::{Path, PathBuf};
 use tokens::{Token, tokens};
 
 /// Each room and the rooms it may use beside itself and the open ones.
-const HOUSE: [(&str, &[&str]); 15] = [
+const HOUSE: [(&str, &[&str]); 16] = [
     ("units", &[]),
     ("real", &[]),
+    ("place", &[]),
     ("hal", &[]),
     ("model", &[]),
     ("motion", &["model"]),
@@ -31,7 +32,7 @@ const HOUSE: [(&str, &[&str]); 15] = [
 ];
 
 /// Rooms every other room may use.
-const OPEN: [&str; 2] = ["units", "real"];
+const OPEN: [&str; 3] = ["units", "real", "place"];
 
 /// What the simulated hardware may see of the firmware. The tool and the programs may see everything.
 const PLANT: [&str; 2] = ["hal", "units"];
@@ -41,8 +42,13 @@ const MATHS_DOORS: [&str; 2] = ["src/real.rs", "hal-sim/src/maths.rs"];
 
 /// The files (and the folder) that may contain `unsafe`: the hardware square root, the counter of the image that counts
 /// instructions, and the boards' layers.
-const UNSAFE_ALLOWED: [&str; 3] =
-    ["src/real.rs", "hal-sim/src/bin/count-instructions/counter.rs", "src/board/"];
+const UNSAFE_ALLOWED: [&str; 5] = [
+    "src/real.rs",
+    "src/place.rs",
+    "src/board/",
+    "hal-sim/src/bin/count-instructions/counter.rs",
+    "hal-sim/src/bin/emulated/",
+];
 
 /// Absolute folders that no other machine has; split, so that this file does not name one itself.
 const FOLDERS_OF_ONE_MACHINE: [&str; 4] =

@@ -1,6 +1,7 @@
 //! The command line: one file for each command.
 
 mod common;
+mod emulate;
 mod excite;
 mod export;
 mod identify;
@@ -49,6 +50,8 @@ enum Command {
     Motor(motor::MotorArguments),
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     Regressor(regressor::RegressorArguments),
+    /// Run the whole firmware on an emulated microcontroller (`cargo emulate`).
+    Emulate(emulate::EmulateArguments),
     /// Build the flash image of a leg and print its size (`cargo fw`).
     Fw(image::FirmwareArguments),
     /// Build the flash image, write it onto a board and print its records (`cargo flash-leg`).
@@ -79,6 +82,7 @@ pub fn main() -> ExitCode {
         Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Motor(arguments) => motor::run(&arguments),
         Command::Regressor(arguments) => regressor::run(&arguments),
+        Command::Emulate(arguments) => emulate::emulate(&arguments),
         Command::Fw(arguments) => image::firmware(&arguments),
         Command::FlashLeg(arguments) => image::flash_leg(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),

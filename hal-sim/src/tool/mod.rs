@@ -37,6 +37,7 @@ pub mod cli;
 pub mod consistent;
 pub mod consistent_runs;
 pub mod disturbances;
+pub mod emulate;
 pub mod error;
 pub mod excite;
 pub mod figures;

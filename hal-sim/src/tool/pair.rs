@@ -81,6 +81,24 @@ impl<const N: usize, const B: usize> Context<N, B> {
     }
 }
 
+impl<const N: usize, const B: usize> Context<N, B> {
+    /// The noise as one of each joint's current, A.
+    #[must_use]
+    pub fn current_noise(&self, leg: &LegFile) -> [f64; N] {
+        core::array::from_fn(|joint| self.noise[joint] / leg.joints[joint].torque_per_ampere)
+    }
+}
+
+/// Where a leg hangs before anything moves, rad: a tenth into the range, inside it, and near to hanging for a leg that hangs at
+/// its lower end.
+#[must_use]
+pub fn start_position<const N: usize>(leg: &LegFile) -> [f64; N] {
+    core::array::from_fn(|joint| {
+        let [low, high] = leg.joints[joint].range_deg;
+        (low + 0.1 * (high - low)).to_radians()
+    })
+}
+
 /// Of the motor torque along a motion, anatomical.
 fn mean_absolute_torque<const N: usize>(leg: &LegFile, world: &World<N>, motion: &Periodic<N>) -> [f64; N] {
     let mut sum = [0.0; N];
@@ -130,14 +148,8 @@ impl<const N: usize, const B: usize> Pair<N, B> {
             Some(drives) => World::with_complete_drives(&description, drives, seed),
             None => World::new(&description, seed),
         };
-        world.set_current_noise(&core::array::from_fn(|joint| {
-            context.noise[joint] / leg.joints[joint].torque_per_ampere
-        }));
-        // A tenth into the range: inside it, and near to hanging for a leg that hangs at its lower end.
-        world.place(&core::array::from_fn(|joint| {
-            let [low, high] = leg.joints[joint].range_deg;
-            (low + 0.1 * (high - low)).to_radians()
-        }));
+        world.set_current_noise(&context.current_noise(leg));
+        world.place(&start_position(leg));
         let device = DeviceLeg::new(&context.configuration)
             .map_err(|error| SetupError::new(leg, leg_error(leg, error)))?;
         let sample = world.sample();

@@ -21,8 +21,7 @@ pub fn identification() -> Option<(&'static Leg, &'static mut LegIdentification)
     let configuration: &'static Leg = CONFIGURATION.init(LEG.configuration().ok()?);
     let filters = Filters::new(configuration.bandwidth_hz).ok()?;
     let window = WINDOW.take();
-    let built =
-        IDENTIFICATION.init_with(|| LegIdentification::of_filters(configuration, &filters, window));
+    let built = LegIdentification::place(IDENTIFICATION.uninit(), configuration, &filters, window);
     Some((configuration, built))
 }
 

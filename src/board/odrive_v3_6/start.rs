@@ -15,7 +15,8 @@ use super::settings::timers::{BASES, CNT, CR1, DOWN, SR, TOP};
 use super::settings::{
     CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, chopper, converters, encoders, pins, timers,
 };
-use super::{interrupts, stack, watchdog};
+use super::{interrupts, watchdog};
+use crate::board::stack;
 
 /// A board that has started, all outputs off.
 pub struct Board {

@@ -38,6 +38,7 @@ const STEPS: usize = 4;
 const STEP_S: f32 = 1.0 / 24_000.0 / STEPS as f32;
 const AMPERE_PER_CODE: f32 = 3.3 / 4096.0 / 40.0 / 0.0005;
 
+#[derive(Clone, Copy)]
 pub struct Motor {
     current: [f32; 2],
     /// Mechanical turns, `0..TURNS`.
@@ -81,6 +82,14 @@ impl Motor {
         let bus_code = (self.bus / (3.3 * 19.0 / 4096.0)) as u16;
         let encoder_count = (self.turns * COUNTS) as u32 as u16;
         AxisSample { shunt_codes, bus_code, encoder_count, index_count: index.then_some(encoder_count) }
+    }
+
+    /// What the sensors say where the counter stands at `count` and the quadrature current is `current` (A).
+    #[cfg(feature = "emulated")]
+    pub fn seen(&mut self, count: u16, current: f32) -> AxisSample {
+        self.turns = f32::from(count) / COUNTS;
+        self.current = [0.0, current];
+        self.sample(false)
     }
 
     /// One PWM period; `command` acts in the next one.

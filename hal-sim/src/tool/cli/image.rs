@@ -9,6 +9,7 @@ use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::image::build::{Options, build, flash};
 use crate::tool::image::leg_source::{describe, source};
 use crate::tool::image::size::ImageSize;
+use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
 
 /// What an image is built with.
@@ -73,7 +74,7 @@ pub struct FlashArguments {
 pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     let options = arguments.image.load()?;
     if let Some(path) = &arguments.source {
-        let (description, _) = describe(&options.leg)?;
+        let (description, _) = describe(&options.leg, DEFAULT_SEED)?;
         std::fs::write(path, source(&description)).map_err(|error| ToolError::cannot_write(path, &error))?;
         return Ok(EXIT_ACCEPTED);
     }

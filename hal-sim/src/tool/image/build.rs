@@ -8,6 +8,7 @@ use std::process::Command;
 use super::leg_source::{describe, source};
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
+use crate::tool::setup::DEFAULT_SEED;
 
 /// Feature and package of the one board there is.
 const ARGUMENTS: [&str; 8] = [
@@ -43,47 +44,58 @@ fn workspace() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
-fn target_directory() -> PathBuf {
+/// Where everything is built.
+#[must_use]
+pub fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from)
 }
 
 /// Builds the image; where it lies.
 pub fn build(options: &Options) -> Result<PathBuf, ToolError> {
-    let (description, _) = describe(&options.leg)?;
+    let (description, _) = describe(&options.leg, DEFAULT_SEED)?;
     let constant = target_directory().join("firmware").join("leg.rs");
-    let text = source(&description);
-    // Untouched where nothing changed, so that nothing is compiled again.
-    if std::fs::read_to_string(&constant).ok().as_deref() != Some(&text) {
-        let directory = constant.parent().unwrap_or(Path::new("."));
-        std::fs::create_dir_all(directory)
-            .and_then(|()| std::fs::write(&constant, text))
-            .map_err(|error| ToolError::cannot_write(&constant, &error))?;
+    let constant = write_if_changed(&constant, &source(&description))?;
+    let mut command = firmware_build(options.log);
+    command.args(ARGUMENTS).env("SCARAB_LEG", constant);
+    if options.brake_resistor {
+        command.env("SCARAB_BRAKE_RESISTOR", "1");
     }
-    let constant = constant.canonicalize().map_err(|error| ToolError::cannot_write(&constant, &error))?;
-    let mut command = Command::new(workspace().join("scripts/firmware-build"));
-    command.args(ARGUMENTS).env("SCARAB_LEG", constant).env("DEFMT_LOG", "info");
-    // Room for a report's records while the probe looks elsewhere.
-    command.env("DEFMT_RTT_BUFFER_SIZE", "4096");
-    for (name, asked) in
-        [("SCARAB_TRACE_LOG", options.log), ("SCARAB_BRAKE_RESISTOR", options.brake_resistor)]
-    {
-        if asked {
-            command.env(name, "1");
-        } else {
-            command.env_remove(name);
-        }
-    }
-    match options.board_volts {
-        Some(volts) => command.env("SCARAB_BOARD_VOLTS", volts.to_string()),
-        None => command.env_remove("SCARAB_BOARD_VOLTS"),
-    };
-    // What this tool was built with is not what the image is built with.
-    for name in ["RUSTFLAGS", "RUSTC", "RUSTUP_TOOLCHAIN", "CARGO"] {
-        command.env_remove(name);
+    if let Some(volts) = options.board_volts {
+        command.env("SCARAB_BOARD_VOLTS", volts.to_string());
     }
     run(&mut command, "scripts/firmware-build")?;
     let image = target_directory().join(IMAGE);
     Ok(image.canonicalize().unwrap_or(image))
+}
+
+/// Untouched where nothing changed, so that nothing is compiled again; the whole path.
+pub fn write_if_changed(path: &Path, text: &str) -> Result<PathBuf, ToolError> {
+    let cannot = |error| ToolError::cannot_write(path, &error);
+    if std::fs::read_to_string(path).ok().as_deref() != Some(text) {
+        let directory = path.parent().unwrap_or(Path::new("."));
+        std::fs::create_dir_all(directory).and_then(|()| std::fs::write(path, text)).map_err(cannot)?;
+    }
+    path.canonicalize().map_err(cannot)
+}
+
+/// The build for the microcontroller; `log`: the image tells every sample of the 500 Hz log.
+#[must_use]
+pub fn firmware_build(log: bool) -> Command {
+    let mut command = Command::new(workspace().join("scripts/firmware-build"));
+    command.env("DEFMT_LOG", "info");
+    // Room for a report's records while the probe looks elsewhere.
+    command.env("DEFMT_RTT_BUFFER_SIZE", "4096");
+    // What this tool was built with is not what the image is built with.
+    for name in ["RUSTFLAGS", "RUSTC", "RUSTUP_TOOLCHAIN", "CARGO"] {
+        command.env_remove(name);
+    }
+    for name in ["SCARAB_TRACE_LOG", "SCARAB_BRAKE_RESISTOR", "SCARAB_BOARD_VOLTS"] {
+        command.env_remove(name);
+    }
+    if log {
+        command.env("SCARAB_TRACE_LOG", "1");
+    }
+    command
 }
 
 /// Writes an image onto the board that hangs on a probe, starts it and prints its records until interrupted.
@@ -100,7 +112,8 @@ pub fn flash(image: &Path, further: &[String]) -> Result<(), ToolError> {
     })
 }
 
-fn run(command: &mut Command, name: &str) -> Result<(), ToolError> {
+/// Runs a program to its end.
+pub fn run(command: &mut Command, name: &str) -> Result<(), ToolError> {
     match command.status() {
         Err(error) => Err(ToolError::input(format!("{name} cannot be started: {error}"))),
         Ok(status) if status.success() => Ok(()),

@@ -13,7 +13,7 @@ use scarab::units::{Radian, Weber};
 
 use crate::tool::leg_file::{JointFile, LegFile};
 use crate::tool::setup::{
-    DEFAULT_SEED, PriorChoice, SetupError, background, base_rank, chain, configuration,
+    PriorChoice, SetupError, background, base_rank, chain, configuration,
 };
 
 /// Joints and base parameters of the legs an image can hold.
@@ -25,12 +25,12 @@ const BASE: usize = 13;
 pub type Described = (LegDescription<JOINTS>, LegConfiguration<JOINTS, BASE>);
 
 /// The description of a leg of two joints with up to 13 base parameters: what the board can hold.
-pub fn describe(leg: &LegFile) -> Result<Described, SetupError> {
+pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, SetupError> {
     if leg.joints.len() != JOINTS || base_rank(leg) > BASE {
         return Err(SetupError::new(leg, "an image holds two joints with up to 13 base parameters"));
     }
-    let background = background::<JOINTS, BASE>(leg, PriorChoice::Default, DEFAULT_SEED)?;
-    let (configuration, _) = configuration(leg, &background, Plan::default(), DEFAULT_SEED)?;
+    let background = background::<JOINTS, BASE>(leg, PriorChoice::Default, swarm_seed)?;
+    let (configuration, _) = configuration(leg, &background, Plan::default(), swarm_seed)?;
     chain::<JOINTS>(leg)?;
     let model = &configuration.model;
     let joints = core::array::from_fn(|index| {

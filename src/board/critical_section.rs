@@ -8,6 +8,8 @@
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
+use cortex_m::peripheral::SCB;
+use cortex_m::peripheral::scb::{Exception, VectActive};
 use cortex_m::register::{basepri, basepri_max};
 use critical_section::{Impl, RawRestoreState, set_impl};
 
@@ -17,8 +19,8 @@ const FLOOR: u8 = 0x20;
 struct Masked;
 set_impl!(Masked);
 
-// SAFETY: on this single core nothing that uses critical sections runs above the floor (see `interrupts`: ADC, EXTI and the servo
-// are all that does, and they do not), so between acquire and release nobody else is in one. Nested ones keep the stricter mask,
+// SAFETY: on this single core nothing that uses critical sections runs above the floor (a board's `interrupts`: current loops, index
+// pulses and the servo are all that does, and they do not), so between acquire and release nobody else is in one. Nested ones keep the stricter mask,
 // and release restores what acquire found.
 unsafe impl Impl for Masked {
     unsafe fn acquire() -> RawRestoreState {
@@ -36,10 +38,10 @@ unsafe impl Impl for Masked {
     }
 }
 
-/// Called from one of the vectors that are never masked: 18, 23, 40, 77 (RM0090 table 61).
+/// Called from one of the vectors that are never masked: 18, 23, 40, 77 (RM0090 table 61), or from the emulator's clock.
 fn is_above_the_floor() -> bool {
     matches!(
-        cortex_m::peripheral::SCB::vect_active(),
-        cortex_m::peripheral::scb::VectActive::Interrupt { irqn: 18 | 23 | 40 | 77 }
+        SCB::vect_active(),
+        VectActive::Interrupt { irqn: 18 | 23 | 40 | 77 } | VectActive::Exception(Exception::SysTick)
     )
 }

@@ -1,7 +1,7 @@
 //! The stack: painted at the start, so that its deepest point can be found; and the core-coupled memory, cleared.
 //!
 //! The stack lies at the bottom of the memory (memory.x). One that grows too far reaches below the memory and faults
-//! in the same instruction; see [`super::crash`].
+//! in the same instruction; a board's crash handler takes the whole stack anew.
 #![expect(unsafe_code, reason = "memory between symbols of the linker")]
 
 use core::ptr;
@@ -29,7 +29,7 @@ pub fn bytes() -> u32 {
 }
 
 /// Fills the stack below its user and clears the core-coupled memory: the first thing of all.
-pub(super) fn prepare() {
+pub fn prepare() {
     let (bottom, _) = ends();
     let here = cortex_m::register::msp::read() as usize - MARGIN;
     let words = (here - bottom as usize) / 4;

@@ -1,0 +1,71 @@
+//! The current loops of both axes, ticked with what their sensors would say of a drive that follows its target.
+//!
+//! Their answer goes nowhere: what they cost is real, what they do to a motor is shown elsewhere. The calibration that makes
+//! them is real as well, on a small motor in single precision.
+
+use scarab::hal::AxisSample;
+use scarab::motor::{Axis, AxisRequest, CalibrationSettings, CalibrationStep, Calibrator};
+use scarab::task::leg::JOINTS;
+use scarab::units::{Ampere, Volt};
+
+use super::motor::{CONFIGURATION, Motor};
+
+const SETTINGS: CalibrationSettings =
+    CalibrationSettings { current: Ampere(10.0), voltage: Volt(2.0), turns_per_s: 10.0 };
+/// PWM periods; a calibration takes some seconds.
+const LONGEST: u32 = 24_000 * 20;
+
+/// Both axes with what they see.
+pub struct Axes {
+    axes: [(Axis, Motor); JOINTS],
+    /// The counter after the calibration, and where the leg's counts stood then.
+    counter: u16,
+    begin: [i32; JOINTS],
+}
+
+impl Axes {
+    /// One motor is calibrated, and both axes take it for theirs.
+    pub fn calibrated(begin: [i32; JOINTS]) -> Option<Self> {
+        let mut motor = Motor::at_rest();
+        let mut calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).ok()?;
+        let mut sample = motor.sample(false);
+        for _ in 0..LONGEST {
+            match calibrator.tick(&sample) {
+                CalibrationStep::Running(command) => sample = motor.period(command),
+                CalibrationStep::Refused(_) => return None,
+                CalibrationStep::Done(calibration) => {
+                    let axis = Axis::new(&CONFIGURATION, &calibration, &sample).ok()?;
+                    return Some(Self {
+                        axes: [(axis, motor), (axis, motor)],
+                        counter: sample.encoder_count,
+                        begin,
+                    });
+                }
+            }
+        }
+        None
+    }
+
+    /// What the sensors of the next tick say: counts since the beginning and current of each joint's drive.
+    pub fn look(&mut self, counts: [i32; JOINTS], currents: [f32; JOINTS]) -> [AxisSample; JOINTS] {
+        let mut samples = [AxisSample::default(); JOINTS];
+        for (joint, ((_, motor), sample)) in self.axes.iter_mut().zip(&mut samples).enumerate() {
+            let moved = counts[joint].wrapping_sub(self.begin[joint]);
+            *sample = motor.seen(self.counter.wrapping_add(moved as u16), currents[joint]);
+        }
+        samples
+    }
+
+    /// One tick of both.
+    #[inline(always)]
+    pub fn tick(&mut self, samples: &[AxisSample; JOINTS], requests: [AxisRequest; JOINTS]) {
+        for (((axis, _), sample), request) in self.axes.iter_mut().zip(samples).zip(requests) {
+            let _ = core::hint::black_box(axis.tick(sample, request));
+        }
+    }
+
+    /// An axis released itself, which no sample here gives it a reason to.
+    pub fn has_fault(&self) -> bool {
+        self.axes.iter().any(|(axis, _)| axis.fault().is_some())
+    }
+}

@@ -1,0 +1,143 @@
+//! The whole firmware over a simulated leg, for the emulated microcontroller (`cargo emulate`).
+//!
+//! Why: no board needs to be at hand to see the leg's code, its executors and priorities, its search and its records run on a
+//! Cortex-M4F. What is the board's is the same crate and the same tasks as in the flash image; what is not is a small board layer.
+//!
+//! | module | instead of |
+//! | --- | --- |
+//! | [`clock`] | the timers: SysTick at 24 kHz, the executors' time, a clock that counts instructions |
+//! | [`axes`] | converters and bridges: two axes that are ticked with what they would see, their answer goes nowhere |
+//! | [`plant`] | the leg: `hal_sim::world` with ideal drives, one step per servo tick, in time that is not the firmware's |
+//! | [`vectors`] | interrupts and their levels |
+//!
+//! QEMU models neither PWM timers nor converters of this part, so the current loops cannot close here: they run and are counted,
+//! and the leg's torque comes from drives that follow their target. `cargo sim identify --drive full` closes them on the host.
+#![no_std]
+#![no_main]
+
+mod axes;
+mod clock;
+#[path = "../count-instructions/motor.rs"]
+mod motor;
+mod plant;
+mod vectors;
+
+use core::panic::PanicInfo;
+
+use cortex_m_semihosting::{debug, heprintln};
+use defmt_semihosting as _;
+use heapless::spsc::Queue;
+use embassy_executor::{SpawnToken, raw};
+use scarab::board::stack;
+use scarab::hal::JointSample;
+use scarab::leg::{Activity, Control, Filters};
+use scarab::task::surroundings::{Introduction, Surroundings};
+use scarab::task::{identify, leg, links, servo};
+use static_cell::{ConstStaticCell, StaticCell};
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    stack::prepare();
+    let introduction = Introduction { unique: [0; 3], version: [0; 3], reset: "emulator", crash: None };
+    identify::introduce(&introduction, SURROUNDINGS.clock_hz);
+    let thread = hand_out();
+    vectors::enable();
+    servo::begin();
+    clock::start();
+    if let Ok(task) = identify::run(thread) {
+        spin(task);
+    }
+    refuse("the task of the identification runs already")
+}
+
+/// The thread's executor, turned without end. `embassy_executor::Executor::run` sleeps in between, and the emulator takes six
+/// times as long for a processor that sleeps and is woken 24,000 times per second.
+#[expect(unsafe_code, reason = "an executor is polled")]
+fn spin<S>(task: SpawnToken<S>) -> ! {
+    static EXECUTOR: StaticCell<raw::Executor> = StaticCell::new();
+    let executor: &'static raw::Executor = EXECUTOR.init(raw::Executor::new(THREAD as *mut ()));
+    executor.spawner().spawn(task);
+    loop {
+        // SAFETY: polled here only, at thread level, and never from within itself.
+        unsafe { executor.poll() };
+    }
+}
+
+/// How `embassy_executor` knows the thread's executor: it is woken by an event.
+const THREAD: usize = usize::MAX;
+
+const SURROUNDINGS: Surroundings = Surroundings {
+    clock: clock::instructions,
+    clock_hz: clock::INSTRUCTIONS_PER_S,
+    stack_used: stack::used,
+    stack_bytes: stack::bytes,
+    volt_per_code: None,
+    temperatures_c: || [f32::NAN; leg::JOINTS + 1],
+    chopper_duty: || 0.0,
+    told: || end(true),
+};
+
+/// Both halves of the leg in their places. Apart, as the next, so that what it takes of the stack is free again.
+#[inline(never)]
+fn halves() -> (Control<{ leg::JOINTS }>, &'static mut leg::LegIdentification) {
+    let Ok(configuration) = leg::LEG.configuration() else { refuse("the leg's constants make no sense") };
+    let Ok(filters) = Filters::new(configuration.bandwidth_hz) else { refuse("the leg's filter does not fit") };
+    static WINDOW: ConstStaticCell<leg::LegWindow> = ConstStaticCell::new(leg::LegWindow::EMPTY);
+    static IDENTIFICATION: StaticCell<leg::LegIdentification> = StaticCell::new();
+    let place = IDENTIFICATION.uninit();
+    let identification = leg::LegIdentification::place(place, &configuration, &filters, WINDOW.take());
+    let Ok(control) = Control::new(&configuration) else { refuse("the leg's limits and motions do not fit") };
+    (control, identification)
+}
+
+/// Everything to its level.
+#[inline(never)]
+fn hand_out() -> identify::Thread {
+    let (control, identification) = halves();
+    static TOLD: ConstStaticCell<Queue<links::Told, { links::TOLD }>> = ConstStaticCell::new(Queue::new());
+    let links::Links { samples, requests, findings, drive, told, notes, .. } = links::Links::new(TOLD.take());
+    let [(sample_1, sampled_1), (sample_2, sampled_2)] = samples;
+    static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
+    let servo = SERVO.init(servo::ServoLoop {
+        control,
+        samples: [sampled_1, sampled_2],
+        requests: requests.1,
+        findings: findings.1,
+        drive: drive.0,
+        told: told.0,
+        sample: [JointSample::default(); leg::JOINTS],
+        state: None,
+        activity: Activity::Idle,
+        tick: 0,
+        clock: SURROUNDINGS.clock,
+    });
+    if let Some(mut home) = servo::SERVO.try_lock() {
+        *home = Some(servo);
+    }
+    plant::prepare([sample_1, sample_2], requests.0, drive.1);
+    identify::Thread {
+        identification,
+        told: told.1,
+        findings: findings.0,
+        notes: notes.1,
+        surroundings: SURROUNDINGS,
+    }
+}
+
+/// Ends the emulator.
+fn end(success: bool) {
+    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+}
+
+fn refuse(why: &str) -> ! {
+    heprintln!("emulated: {}", why);
+    end(false);
+    loop {}
+}
+
+#[panic_handler]
+fn panic(information: &PanicInfo<'_>) -> ! {
+    heprintln!("emulated: {}", information);
+    end(false);
+    loop {}
+}

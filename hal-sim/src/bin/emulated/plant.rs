@@ -1,0 +1,175 @@
+//! Level 0: both axes' current ticks, and once per servo tick the leg's 250 us, which cost the firmware nothing.
+//!
+//! The order is that of the simulation on the host: the servo's command of this tick acts until the next, then the sensors are read
+//! and the servo is pended. What an operator would do is done here, on the same ticks as there: enable, then identify.
+
+use heapless::spsc::{Consumer, Producer};
+use scarab::hal::{AxisSample, CURRENT_RATE_HZ, DriveCommand, JointSample, LegDrives, Sample};
+use scarab::leg::{ControlRequest, DriveState, PowerRequest};
+use scarab::servo::SERVO_RATE_HZ;
+use scarab::task::leg::JOINTS;
+use scarab::task::{servo, statistics};
+use scarab::units::Ampere;
+
+use super::axes::Axes;
+use super::{clock, end, refuse, vectors};
+use hal_sim::world::World;
+
+/// The leg, as `cargo emulate` writes it from a leg file.
+mod described {
+    include!(env!("SCARAB_PLANT_SOURCE"));
+}
+
+const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
+/// No identification takes longer.
+const LONGEST_TICKS: u32 = 300 * SERVO_RATE_HZ;
+/// After a fault, for its records.
+const LAST_TICKS: u32 = SERVO_RATE_HZ / 2;
+/// What the operator asks for, servo tick by servo tick; nothing in the first.
+const ASKED: [ControlRequest<JOINTS>; 4] = [
+    ControlRequest::Power(PowerRequest::Shutdown),
+    ControlRequest::Power(PowerRequest::SwitchOn),
+    ControlRequest::Power(PowerRequest::EnableOperation),
+    ControlRequest::Identify,
+];
+
+/// What level 0 works on.
+pub struct Plant {
+    world: World<JOINTS>,
+    axes: Axes,
+    samples: [Producer<'static, JointSample>; JOINTS],
+    requests: Producer<'static, ControlRequest<JOINTS>>,
+    drive: Consumer<'static, DriveState>,
+    /// The sensors now.
+    seen: Sample<JOINTS>,
+    /// What converters and counters say in the six PWM periods until the next servo tick.
+    ahead: [[AxisSample; JOINTS]; TICKS_PER_SERVO as usize],
+    servo_ticks: u32,
+    answered: u32,
+    /// After which servo tick nothing more is expected.
+    last: u32,
+}
+
+/// What level 0 works on, once it is there.
+pub static PLANT: spin::Mutex<Option<Plant>> = spin::Mutex::new(None);
+
+impl Plant {
+    /// The described leg where it begins; `None` where the axes cannot be calibrated.
+    pub fn new(
+        samples: [Producer<'static, JointSample>; JOINTS],
+        requests: Producer<'static, ControlRequest<JOINTS>>,
+        drive: Consumer<'static, DriveState>,
+    ) -> Option<Self> {
+        let mut world = World::new(&described::PLANT, described::SEED);
+        world.set_current_noise(&described::CURRENT_NOISE_A);
+        world.place(&described::START_RAD);
+        let sample = world.sample();
+        let axes = Axes::calibrated(sample.joints.map(|joint| joint.encoder_counts))?;
+        let mut plant = Self {
+            world,
+            axes,
+            samples,
+            requests,
+            drive,
+            seen: sample,
+            ahead: [[AxisSample::default(); JOINTS]; TICKS_PER_SERVO as usize],
+            servo_ticks: 0,
+            answered: 0,
+            last: LONGEST_TICKS,
+        };
+        plant.look_ahead(&sample);
+        Some(plant)
+    }
+
+    fn tick(&mut self) {
+        let place = clock::tick() % TICKS_PER_SERVO;
+        if place == 0 {
+            clock::stopped(|| self.advance());
+            self.call_servo();
+        }
+        if let Some(samples) = self.ahead.get(place as usize) {
+            let begun = clock::instructions();
+            self.axes.tick(samples, [servo::target(0), servo::target(1)]);
+            statistics::CURRENT_TICKS.add();
+            statistics::CURRENT_WORST.raise(clock::instructions().wrapping_sub(begun));
+        }
+    }
+
+    /// Between two servo ticks the rotors turn evenly.
+    fn look_ahead(&mut self, before: &Sample<JOINTS>) {
+        // Without the noise that a leg file adds to what is logged: it is not the shunts'.
+        let currents = core::array::from_fn(|joint| servo::target(joint).current.0);
+        for (samples, way) in self.ahead.iter_mut().zip(1..) {
+            let counts = core::array::from_fn(|joint| {
+                let (from, to) =
+                    (before.joints[joint].encoder_counts, self.seen.joints[joint].encoder_counts);
+                from + (to - from) * way / TICKS_PER_SERVO as i32
+            });
+            *samples = self.axes.look(counts, currents);
+        }
+    }
+
+    /// To the next servo tick.
+    fn advance(&mut self) {
+        if self.servo_ticks > 0 {
+            let requests = [servo::target(0), servo::target(1)];
+            let enabled = requests.iter().all(|request| request.enabled);
+            let currents =
+                requests.map(|request| if request.enabled { request.current } else { Ampere::ZERO });
+            let sample = self.world.tick(&DriveCommand { enabled, currents });
+            let before = core::mem::replace(&mut self.seen, sample);
+            self.look_ahead(&before);
+        }
+        for (queue, sample) in self.samples.iter_mut().zip(self.seen.joints) {
+            // A servo that does not fetch is counted as missed.
+            let _ = queue.enqueue(sample);
+        }
+        if let Some(request) = (self.servo_ticks as usize).checked_sub(1).and_then(|index| ASKED.get(index)) {
+            let _ = self.requests.enqueue(*request);
+        }
+        while let Some(state) = self.drive.dequeue() {
+            if matches!(state, DriveState::Fault { .. }) {
+                self.last = self.last.min(self.servo_ticks + LAST_TICKS);
+            }
+        }
+        self.servo_ticks += 1;
+        if self.axes.has_fault() {
+            refuse("an axis released itself");
+        }
+        if self.servo_ticks > self.last {
+            end(false);
+        }
+    }
+
+    fn call_servo(&mut self) {
+        let answered = statistics::SERVO_TICKS.get();
+        if answered == self.answered && self.servo_ticks > 1 {
+            statistics::SERVO_MISSED.add();
+        }
+        self.answered = answered;
+        vectors::pend_servo();
+    }
+}
+
+/// The described leg in its place, where it begins.
+#[inline(never)]
+pub fn prepare(
+    samples: [Producer<'static, JointSample>; JOINTS],
+    requests: Producer<'static, ControlRequest<JOINTS>>,
+    drive: Consumer<'static, DriveState>,
+) {
+    let Some(plant) = Plant::new(samples, requests, drive) else { refuse("the axes cannot be calibrated") };
+    if let Some(mut home) = PLANT.try_lock() {
+        *home = Some(plant);
+    }
+}
+
+/// SysTick.
+#[inline(always)]
+pub fn interrupt() {
+    if let Some(mut plant) = PLANT.try_lock()
+        && let Some(plant) = plant.as_mut()
+    {
+        plant.tick();
+    }
+}

@@ -1,0 +1,69 @@
+//! `emulate`: the whole firmware on an emulated microcontroller (`cargo emulate`).
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::common::write_json;
+use super::leg_options::LegOptions;
+use crate::tool::emulate::report::EmulationReport;
+use crate::tool::emulate::run::{build, run};
+use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::setup::DEFAULT_SEED;
+use crate::tool::tables;
+use crate::tool::trace::{log, run as told, run_report};
+
+/// Exit code of a run in which a tick was missed.
+const EXIT_MISSED: u8 = 1;
+
+/// A leg, and what to keep of its run.
+#[derive(Args, Debug)]
+pub struct EmulateArguments {
+    #[command(flatten)]
+    leg: LegOptions,
+    /// Of noise and swarm.
+    #[arg(long, default_value_t = DEFAULT_SEED)]
+    seed: u64,
+    /// Keep the records here as the image sent them, for `cargo sim trace`.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Write the report here, for exit codes 0 and 3.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the 500 Hz log of the motion identified from here, in the format that replay reads; the image then tells every sample.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+/// Builds, runs, decodes; the exit code.
+pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
+    let leg = arguments.leg.load()?;
+    let image = build(&leg, arguments.seed, arguments.csv.is_some())?;
+    let path = arguments.trace.clone().unwrap_or_else(|| image.with_extension("trace"));
+    let wall = run(&image, &path)?;
+    let trace = told::read(&path, Some(&image), None)?;
+    tables::print(&told::preface(&trace))?;
+    let attention = told::attention(&trace);
+    if let Some(csv) = &arguments.csv {
+        let written = log::write(&trace, &leg, csv)?;
+        tables::print(&format!("log: {}, {} samples\n\n", csv.display(), written.samples))?;
+    }
+    let Some(loops) = trace.statistics.loops() else {
+        return Err(ToolError::input(format!("the image told nothing of its loops\n{attention}")));
+    };
+    let identification = run_report(&trace, &leg).map_err(|error| ToolError::input(format!("{error}\n{attention}")))?;
+    tables::print_run(&identification)?;
+    let bytes = std::fs::read(&path).map_err(|error| ToolError::input(format!("{}: {error}", path.display())))?;
+    let accepted = identification.accepted();
+    let report = EmulationReport::new(identification, &loops, &bytes);
+    tables::print(&report.lines(loops.stack_bytes, wall.as_secs_f64()))?;
+    tables::print(&attention)?;
+    if let Some(json) = &arguments.json {
+        write_json(json, &report)?;
+    }
+    Ok(match (report.missed_ticks, accepted) {
+        (0, true) => EXIT_ACCEPTED,
+        (0, false) => EXIT_REFUSED,
+        _ => EXIT_MISSED,
+    })
+}

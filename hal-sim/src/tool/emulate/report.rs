@@ -1,0 +1,75 @@
+//! What an emulated run adds to the report of an identification.
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::tool::report::RunReport;
+use crate::tool::trace::loops::LoopReport;
+
+/// An identification that ran on the emulated microcontroller.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EmulationReport {
+    /// As of any trace.
+    #[serde(flatten)]
+    pub run: RunReport,
+    /// Current and servo ticks that came late or not at all.
+    pub missed_ticks: u32,
+    /// Longest servo tick, current ticks in it included.
+    pub worst_tick_instructions: u32,
+    /// Counted by the firmware while it ran.
+    pub instructions: Instructions,
+    /// Of the stack, at its deepest.
+    pub stack_bytes: u32,
+    /// Of the records as they were sent.
+    pub trace_bytes: usize,
+    /// Of the same, base 16.
+    pub trace_sha256: String,
+}
+
+/// One instruction takes 8 ns of the emulated time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Instructions {
+    /// Longest current tick of both axes together, at 24 kHz.
+    pub current_tick_worst: u32,
+    /// Longest servo tick, current ticks in it included, at 4 kHz.
+    pub servo_tick_worst: u32,
+    /// That pass between two servo ticks.
+    pub servo_period: u32,
+}
+
+impl EmulationReport {
+    /// Of a run, its loops, and its records as they were sent.
+    #[must_use]
+    pub fn new(run: RunReport, loops: &LoopReport, trace: &[u8]) -> Self {
+        Self {
+            run,
+            missed_ticks: loops.current_missed + loops.servo_missed,
+            worst_tick_instructions: loops.servo_worst,
+            instructions: Instructions {
+                current_tick_worst: loops.current_worst,
+                servo_tick_worst: loops.servo_worst,
+                servo_period: loops.cycles_per_tick,
+            },
+            stack_bytes: loops.stack_used,
+            trace_bytes: trace.len(),
+            trace_sha256: Sha256::digest(trace).iter().map(|byte| format!("{byte:02x}")).collect(),
+        }
+    }
+
+    /// A few lines for people.
+    #[must_use]
+    pub fn lines(&self, stack_there_is: u32, wall_s: f64) -> String {
+        let Instructions { current_tick_worst, servo_tick_worst, servo_period } = self.instructions;
+        format!(
+            "\nemulated processor: {} ticks missed; longest servo tick {servo_tick_worst} of {servo_period} instructions, current \
+             ticks in it included; longest current tick of both axes {current_tick_worst} of {}\n\
+             stack: {} of {stack_there_is} bytes used; trace: {} bytes, SHA-256 {}\n\
+             the run took {wall_s:.0} s\n",
+            self.missed_ticks,
+            servo_period / 6,
+            self.stack_bytes,
+            self.trace_bytes,
+            self.trace_sha256,
+        )
+    }
+}
