@@ -15,6 +15,7 @@
 //! | [`safety`], [`servo`] | monitor and drive states; the 4 kHz tick |
 //! | [`leg`] | one leg: the activity machine, a control half and an identification half |
 //! | [`operator`] | two contacts in the operator's hand, and what they ask for |
+//! | `place` | large values built where they stay |
 //! | [`trace`] | what leaves the board: records, one line each |
 //! | [`board`], `task` | one board's registers and interrupts; what runs at which priority (microcontroller only) |
 #![no_std]

@@ -25,7 +25,8 @@ fn base(report: &Value) -> Vec<(String, f64, f64, f64)> {
 #[ignore = "needs an emulator and a compiler for the microcontroller"]
 fn the_emulated_leg_finds_what_the_simulated_one_does_bit_by_bit_the_same_every_time() {
     let folder = Folder::new();
-    let [json, once, again, host] = ["emulated.json", "once", "again", "host.json"].map(|name| folder.path(name));
+    let [json, once, again, host] =
+        ["emulated.json", "once", "again", "host.json"].map(|name| folder.path(name));
     let run = scarab("emulate --json", &[&json, "--trace".as_ref(), &once]).ends_with(0);
     assert!(run.printed.contains("verdict: accepted"), "{}", run.printed);
     scarab("emulate --trace", &[&again]).ends_with(0);

@@ -3,19 +3,19 @@
 use embassy_executor::Executor;
 use static_cell::StaticCell;
 
+use super::interlock::{self, Cause};
+use super::surroundings::{Introduction, Surroundings};
+use super::{current, housekeeping, identify, leg, links, servo};
 use crate::board::odrive_v3_6::identity::Reset;
 use crate::board::odrive_v3_6::settings::analog::temperature_c;
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
 use crate::board::odrive_v3_6::{brake, converter, memory, vectors, watchdog};
 use crate::board::stack;
-use crate::trace::Record;
-use cortex_m::peripheral::DWT;
 use crate::hal::JointSample;
 use crate::leg::{Activity, Control};
-use super::interlock::{self, Cause};
-use super::surroundings::{Introduction, Surroundings};
-use super::{current, housekeeping, identify, leg, links, servo};
+use crate::trace::Record;
+use cortex_m::peripheral::DWT;
 
 /// Builds the leg, hands everything to its level and starts them; does not return.
 pub fn run(board: Board) -> ! {

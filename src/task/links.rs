@@ -73,9 +73,9 @@ pub struct Links {
     pub notes: (Producer<'static, Record<JOINTS>>, Consumer<'static, Record<JOINTS>>),
 }
 
-/// Samples and events on their way to the identification: 240 ms of the log. Closing a motion takes 11 million
+/// Samples and events on their way to the identification: 190 ms of the log. Closing a motion takes 11 million
 /// instructions in one call, 89 ms of a processor that does nothing else.
-pub const TOLD: usize = 128;
+pub const TOLD: usize = 104;
 /// Of them this many are kept free for events.
 pub const EVENTS: usize = 8;
 

@@ -26,8 +26,8 @@ use core::panic::PanicInfo;
 
 use cortex_m_semihosting::{debug, heprintln};
 use defmt_semihosting as _;
-use heapless::spsc::Queue;
 use embassy_executor::{SpawnToken, raw};
+use heapless::spsc::Queue;
 use scarab::board::stack;
 use scarab::hal::JointSample;
 use scarab::leg::{Activity, Control, Filters};
@@ -81,7 +81,9 @@ const SURROUNDINGS: Surroundings = Surroundings {
 #[inline(never)]
 fn halves() -> (Control<{ leg::JOINTS }>, &'static mut leg::LegIdentification) {
     let Ok(configuration) = leg::LEG.configuration() else { refuse("the leg's constants make no sense") };
-    let Ok(filters) = Filters::new(configuration.bandwidth_hz) else { refuse("the leg's filter does not fit") };
+    let Ok(filters) = Filters::new(configuration.bandwidth_hz) else {
+        refuse("the leg's filter does not fit")
+    };
     static WINDOW: ConstStaticCell<leg::LegWindow> = ConstStaticCell::new(leg::LegWindow::EMPTY);
     static IDENTIFICATION: StaticCell<leg::LegIdentification> = StaticCell::new();
     let place = IDENTIFICATION.uninit();

@@ -51,9 +51,11 @@ pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
     let Some(loops) = trace.statistics.loops() else {
         return Err(ToolError::input(format!("the image told nothing of its loops\n{attention}")));
     };
-    let identification = run_report(&trace, &leg).map_err(|error| ToolError::input(format!("{error}\n{attention}")))?;
+    let identification =
+        run_report(&trace, &leg).map_err(|error| ToolError::input(format!("{error}\n{attention}")))?;
     tables::print_run(&identification)?;
-    let bytes = std::fs::read(&path).map_err(|error| ToolError::input(format!("{}: {error}", path.display())))?;
+    let bytes =
+        std::fs::read(&path).map_err(|error| ToolError::input(format!("{}: {error}", path.display())))?;
     let accepted = identification.accepted();
     let report = EmulationReport::new(identification, &loops, &bytes);
     tables::print(&report.lines(loops.stack_bytes, wall.as_secs_f64()))?;

@@ -12,9 +12,7 @@ use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::{Radian, Weber};
 
 use crate::tool::leg_file::{JointFile, LegFile};
-use crate::tool::setup::{
-    PriorChoice, SetupError, background, base_rank, chain, configuration,
-};
+use crate::tool::setup::{PriorChoice, SetupError, background, base_rank, chain, configuration};
 
 /// Joints and base parameters of the legs an image can hold.
 const JOINTS: usize = 2;
