@@ -147,6 +147,8 @@ impl<T: core::fmt::Debug> core::fmt::Debug for Slot<T> {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
     use core::mem::MaybeUninit;
 
     use super::{Slot, each, empty_slot, made};
