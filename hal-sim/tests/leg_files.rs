@@ -126,7 +126,7 @@ fn every_fault_is_told_with_file_line_and_reason() {
         (joint("colour = \"red\""), Some(7), "unknown field `colour`"),
         (joint("[joint.motor]\npoles = 7"), Some(8), "unknown field `poles`"),
         (motor("resistance_ohm = 0.039", "39.0"), Some(9), "`motor.resistance_ohm` is 39, outside 0.001..10"),
-        (motor("inductance_d_uh = 15.0", "1.5"), Some(10), "its time constant is below 0.05 ms"),
+        (motor("inductance_d_uh = 15.0", "1.5"), Some(10), "its time constant is below 0.08 ms"),
         (motor("pole_pairs = 7", "0"), Some(8), "`motor.pole_pairs` is 0, outside 1..64"),
         (
             joint(&format!("encoder = {{ side = \"joint\", counts = 8192, ratio = 1.0 }}\n{MOTOR}")),
@@ -139,7 +139,7 @@ fn every_fault_is_told_with_file_line_and_reason() {
                 "supply = { voltage_v = 480.0, resistance_ohm = 0.05, capacitance_uf = 1500.0, brake_ohm = 2.0 }",
             ),
             Some(4),
-            "`supply.voltage_v` is 480, outside 10..60",
+            "`supply.voltage_v` is 480, outside 22..50",
         ),
         (joint("direction = 2"), Some(7), "joint `hip`: `direction` is 2; it must be 1 or -1"),
         (joint("\nrange_deg = [50.0, 2.0]"), Some(8), "`range_deg` is inverted or empty: 50 to 2"),

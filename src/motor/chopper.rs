@@ -13,6 +13,7 @@
 //! ODrive's firmware allows the resistor. A voltage that is not a number makes no duty: the axes release on it.
 //! Source: the ramp of ODrive v0.5.6 (`dc_bus_overvoltage_ramp`). Cost: 4 operations.
 
+use super::SenseScale;
 use crate::real::{clamp, is_finite};
 use crate::units::Volt;
 
@@ -27,10 +28,12 @@ pub struct Chopper {
 }
 
 impl Chopper {
-    /// `None` unless 5 V <= begin, and full lies at least half a volt above it, up to 100 V.
+    /// `None` unless 5 V <= begin, and full lies at least half a volt above it and within what the board's divider can tell
+    /// ([`SenseScale::greatest_bus`], 59.6 V): beyond, the ramp would never be reached.
     #[must_use]
     pub fn new(begin: Volt, full: Volt) -> Option<Self> {
-        let sensible = begin.0 >= 5.0 && full.0 >= begin.0 + 0.5 && full.0 <= 100.0;
+        let sensible =
+            begin.0 >= 5.0 && full.0 >= begin.0 + 0.5 && full <= SenseScale::ODRIVE_3_6.greatest_bus();
         sensible.then(|| Self { begin, per_volt: 1.0 / (full.0 - begin.0) })
     }
 
@@ -60,7 +63,7 @@ mod tests {
 
     #[test]
     fn absurd_voltages_are_refused() {
-        for (begin, full) in [(54.0, 50.0), (50.0, 50.2), (0.0, 10.0), (50.0, 101.0), (f32::NAN, 54.0)] {
+        for (begin, full) in [(54.0, 50.0), (50.0, 50.2), (0.0, 10.0), (50.0, 60.0), (f32::NAN, 54.0)] {
             assert_eq!(Chopper::new(Volt(begin), Volt(full)), None, "{begin} {full}");
         }
         assert_eq!(Chopper::new(Volt(50.0), Volt(f32::NAN)), None);

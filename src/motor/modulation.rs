@@ -19,7 +19,7 @@
 //! (1 - d_max) / (2 f) >= max(t_d + t_settle, t_adc)
 //! ```
 //!
-//! 119 ns + 1.2 us (DRV8301 at 40 V/V to 1 % of 2 V, from memory of its data sheet SLOS719: to be checked), the trigger's delay (docs/motor.md) and 3 + 12 cycles of 21 MHz: 0.83 us;
+//! 119 ns + 1.2 us (assumed for the DRV8301 at 40 V/V to 1 % of 2 V, to be measured on the board: 0.3 us more would lower d_max by 0.0144, 1.5 % of the voltage), the trigger's delay (docs/motor.md) and 3 + 12 cycles of 21 MHz: 0.83 us;
 //! so at 24 kHz d_max = 0.9367. Centred about one half and not about d_max / 2, because only equal zero vectors make the
 //! sample the mean of the ripple: by the shift the error is v s / (2 L f) at most, s the shift. It arises above
 //! 0.873 of the largest voltage only.

@@ -33,7 +33,7 @@ pub struct EndStopSettings {
     pub lead: f32,
     /// Current per speed, A s per count.
     pub damping: f32,
-    /// Furthest way to the stop, counts.
+    /// Furthest way to the stop, counts, up to 2^24.
     pub way: i32,
     /// Counts by which it backs off.
     pub back_off: i32,
@@ -93,6 +93,8 @@ pub struct EndStopSearch {
     resting: u32,
 }
 
+/// Counts of way and tolerance: exact in single precision, and no sum of them overflows.
+const GREATEST_WAY: i32 = 1 << 24;
 /// Counts within which a joint rests.
 const REST_COUNTS: i32 = 4;
 
@@ -106,9 +108,10 @@ impl EndStopSearch {
             && settings.current.is_finite()
             && (1.0..=1e6).contains(&settings.lead)
             && (0.0..=1e3).contains(&settings.damping)
-            && settings.way > settings.back_off
-            && settings.back_off > settings.tolerance + 4 * REST_COUNTS
-            && settings.tolerance > 0;
+            && (1..=GREATEST_WAY).contains(&settings.tolerance)
+            && settings.way <= GREATEST_WAY
+            && settings.back_off < settings.way
+            && settings.back_off > settings.tolerance + 4 * REST_COUNTS;
         if !sensible {
             return Err(ReferenceRefusal::Settings);
         }

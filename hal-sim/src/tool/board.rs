@@ -4,13 +4,20 @@
 //! the plant says in a period is answered in the same period and acts in the next; the servo's sample is the mean of the six
 //! periods since its last tick.
 //!
-//! A run begins with a drive that is ready: every motor was calibrated on a stand, free of its gear and at rest, and the
-//! pose in which the leg stands was stated as the reference.
+//! A run begins with a drive that is ready: every motor was calibrated on a stand, free of its gear and at rest, with the rotor
+//! and the counter where they are in the leg, and the pose in which the leg stands is taken for the reference (a released leg
+//! would swing for the half second that `StatedPose` waits).
+//!
+//! An axis that releases itself takes the others with it: a leg on which one joint still pulls is worse than a leg that lets go.
+
+pub mod words;
+
+use core::f64::consts::TAU;
 
 use scarab::hal::{AxisCommand, DriveCommand, JointSample, LegDrives, Sample};
 use scarab::motor::{
-    Axis, AxisConfiguration, AxisRequest, BridgeTiming, Calibration, CalibrationSettings, CalibrationStep,
-    Calibrator, Chopper, DeadTime, Direction, SenseScale, Sine,
+    Axis, AxisConfiguration, AxisFault, AxisRequest, BridgeTiming, Calibration, CalibrationSettings,
+    CalibrationStep, Calibrator, Chopper, DeadTime, Direction, SenseScale, Sine,
 };
 use scarab::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
 
@@ -23,12 +30,13 @@ use crate::world::periods::PERIODS_PER_TICK;
 
 /// Of the current loops.
 pub const BANDWIDTH: Hertz = Hertz(1000.0);
-/// Within it the dead time is given back smoothly.
+/// Within it the dead time is given back smoothly: the ripple at half duty is about as large, and the sign of a smaller current is not
+/// known.
 const DEAD_TIME_BAND: Ampere = Ampere(2.0);
 /// Shunts are trusted up to here: 3,723 codes less 150 of zero.
 const OVERCURRENT: Ampere = Ampere(61.0);
 /// Within which the bridges may switch.
-const BUS: [Volt; 2] = [Volt(20.0), Volt(58.0)];
+pub const BUS: [Volt; 2] = [Volt(20.0), Volt(58.0)];
 /// Where the brake resistor begins to conduct, and where it does all the time it may.
 pub const CHOPPER: [Volt; 2] = [Volt(50.0), Volt(54.0)];
 /// Faster than the joint's limit by this the counter is not believed.
@@ -44,6 +52,8 @@ const HALF_WAVE_S: f64 = 2.0 / 24_000.0;
 const WAVE_SHARE: f64 = 0.3;
 /// What turns on the stand: the rotor alone, kg m^2; bearings, N m; a little of drag, N m s/rad.
 const ROTOR: Load = Load::Free { inertia: 1e-4, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
+/// Before a calibration: half a second.
+const REST_PERIODS: u32 = 12_000;
 /// A calibration takes some seconds.
 const LONGEST_CALIBRATION: u32 = 24_000 * 60;
 
@@ -88,26 +98,31 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
     }
 }
 
-/// Calibrates a motor on its stand; `name` is for the message where that fails.
+/// Calibrates a motor on its stand, the rotor at `angle` (rad); `name` is for the message where that fails.
 pub fn commission(
     name: &str,
     configuration: &AxisConfiguration,
     settings: CalibrationSettings,
     axis: &AxisDescription,
     supply: &SupplyDescription,
+    angle: f64,
     seed: u64,
 ) -> Result<Calibration, ToolError> {
     let refused = |reason: String| ToolError::input(format!("axis `{name}`: {reason}"));
-    let mut stand = Stand::new(axis, supply, ROTOR, 0.0, seed);
-    let mut calibrator = Calibrator::new(configuration, settings)
-        .map_err(|error| refused(format!("the firmware refuses its configuration: {error:?}")))?;
+    let mut stand = Stand::new(axis, supply, ROTOR, angle, seed);
+    let mut calibrator =
+        Calibrator::new(configuration, settings).map_err(|error| refused(words::axis_error(error)))?;
     let mut command = AxisCommand::RELEASED;
+    // Cogging takes the rotor to a place where it rests.
+    for _ in 0..REST_PERIODS {
+        stand.period(&command, 0.0);
+    }
     for _ in 0..LONGEST_CALIBRATION {
         match calibrator.tick(&stand.period(&command, 0.0)) {
             CalibrationStep::Running(next) => command = next,
             CalibrationStep::Done(calibration) => return Ok(calibration),
             CalibrationStep::Refused(reason) => {
-                return Err(refused(format!("the calibration is refused: {reason:?}")));
+                return Err(refused(words::refusal(reason)));
             }
         }
     }
@@ -121,6 +136,7 @@ pub struct Board<const N: usize> {
     commands: [AxisCommand; N],
     chopper: Chopper,
     brake: f32,
+    fault: Option<(usize, AxisFault)>,
 }
 
 impl<const N: usize> Board<N> {
@@ -143,12 +159,14 @@ impl<const N: usize> Board<N> {
             let configuration = axis_configuration(joint, motor);
             let (name, simulated) = (&joint.name, &description.axes[index]);
             let settings = calibration_settings(&configuration, motor);
-            let calibration =
-                commission(name, &configuration, settings, simulated, &description.supply, seed)?;
-            let mut axis = Axis::new(&configuration, &calibration, &samples[index]).map_err(|error| {
-                ToolError::input(format!("axis `{name}`: the firmware refuses its configuration: {error:?}"))
-            })?;
-            axis.set_counts(pose.joints[index].encoder_counts);
+            let counts = pose.joints[index].encoder_counts;
+            // The counter wraps at 16 bits, which are no whole turns of every encoder: it has to begin where the leg's does.
+            let angle = TAU * f64::from(counts) / simulated.counter.counts;
+            let supply = &description.supply;
+            let calibration = commission(name, &configuration, settings, simulated, supply, angle, seed)?;
+            let mut axis = Axis::new(&configuration, &calibration, &samples[index])
+                .map_err(|error| ToolError::input(format!("axis `{name}`: {}", words::axis_error(error))))?;
+            axis.set_counts(counts);
             axes.push(axis);
         }
         let chopper = Chopper::new(CHOPPER[0], CHOPPER[1])
@@ -158,7 +176,7 @@ impl<const N: usize> Board<N> {
         for _ in 1..PERIODS_PER_TICK {
             world.period(&[AxisCommand::RELEASED; N], 0.0);
         }
-        Ok(Self { axes, commands: [AxisCommand::RELEASED; N], chopper, brake: 0.0 })
+        Ok(Self { axes, commands: [AxisCommand::RELEASED; N], chopper, brake: 0.0, fault: None })
     }
 
     /// One servo tick of drives and plant; what the servo sees at its end.
@@ -166,8 +184,13 @@ impl<const N: usize> Board<N> {
         for _ in 0..PERIODS_PER_TICK {
             let samples = world.period(&self.commands, f64::from(self.brake));
             for (joint, axis) in self.axes.iter_mut().enumerate() {
-                let request = AxisRequest { enabled: command.enabled, current: command.currents[joint] };
+                let enabled = command.enabled && self.fault.is_none();
+                let request = AxisRequest { enabled, current: command.currents[joint] };
                 self.commands[joint] = axis.tick(&samples[joint], request);
+                self.fault = self.fault.or(axis.fault().map(|fault| (joint, fault)));
+            }
+            if self.fault.is_some() {
+                self.commands = [AxisCommand::RELEASED; N];
             }
             let bus = samples.first().map_or(0, |sample| sample.bus_code);
             self.brake = self.chopper.duty(SenseScale::ODRIVE_3_6.bus(bus));
@@ -177,6 +200,12 @@ impl<const N: usize> Board<N> {
             *joint = axis.joint_sample();
         }
         world.observe(&Sample { joints })
+    }
+
+    /// The first axis that released itself, and why; since then all are released.
+    #[must_use]
+    pub fn fault(&self) -> Option<(usize, AxisFault)> {
+        self.fault
     }
 
     /// The current loops.

@@ -21,7 +21,6 @@ use super::leg_file::{LegFile, PushesFile};
 use super::pair::{Context, Pair};
 use super::setup::SetupError;
 use super::simulate::SimulationOptions;
-use super::words::drive_stop;
 use crate::description::PushDescription;
 use crate::world::TICK_S;
 use report::update_report;
@@ -102,7 +101,7 @@ fn identified<const N: usize, const B: usize>(
         if (!identifying && pair.leg.control().verdict().is_none())
             || pair.ticks > ticks(LONGEST_IDENTIFICATION_S)
         {
-            return Err(SetupError::new(leg, drive_stop(leg, pair.leg.control().state())).into());
+            return Err(SetupError::new(leg, pair.stop_words(leg)).into());
         }
     }
     let reasons = pair.leg.control().verdict().into_iter().flat_map(|verdict| verdict.reasons());
@@ -161,7 +160,7 @@ impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
         if matches!(self.activity(), Activity::Track(_)) {
             return Ok(());
         }
-        Err(SetupError::new(self.leg, drive_stop(self.leg, self.pair.leg.control().state())).into())
+        Err(SetupError::new(self.leg, self.pair.stop_words(self.leg)).into())
     }
 
     /// Root mean square position error of all joints since the last call, degrees.

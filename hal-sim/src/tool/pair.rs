@@ -11,11 +11,13 @@ use scarab::safety::{DriveState, PowerRequest};
 
 use super::analysis::Background;
 use super::board::Board;
+use super::board::words::axis_fault;
 use super::error::ToolError;
 use super::leg_file::LegFile;
 use super::motions::Motions;
 use super::setup::{SetupError, background, configuration};
 use super::simulate::{DriveModel, SimulationOptions};
+use super::words::drive_stop;
 use super::words::leg_error;
 use crate::world::World;
 
@@ -176,6 +178,10 @@ impl<const N: usize, const B: usize> Pair<N, B> {
 
     /// One servo tick of both.
     pub fn tick(&mut self, request: Option<ControlRequest<N>>, gravity: [f32; 3]) -> ControlOutput<N> {
+        // As on the board: an axis that released itself takes the drive out of operation.
+        let released = self.board.as_ref().is_some_and(|board| board.fault().is_some());
+        let off = ControlRequest::Power(PowerRequest::DisableVoltage);
+        let request = if released { Some(off) } else { request };
         let output = self.leg.tick(&self.sample, request, gravity, self.evaluations);
         let mut command = *output.servo.drive();
         for (joint, &wired) in self.wiring.iter().enumerate() {
@@ -188,6 +194,16 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         self.sample.joints = self.wiring.map(|wired| sample.joints[wired]);
         self.ticks += 1;
         output
+    }
+
+    /// Why the drive is no longer enabled, in words.
+    #[must_use]
+    pub fn stop_words(&self, leg: &LegFile) -> String {
+        let Some((joint, fault)) = self.board.as_ref().and_then(Board::fault) else {
+            return drive_stop(leg, self.leg.control().state());
+        };
+        let name = leg.joints.get(joint).map_or("?", |joint| joint.name.as_str());
+        format!("axis `{name}` released its bridge, and with it all others: {}", axis_fault(fault))
     }
 
     /// From off to enabled; tells whether the drive is.

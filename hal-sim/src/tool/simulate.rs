@@ -18,7 +18,6 @@ use super::scale::Scale;
 use super::series::Series;
 use super::setup::{PriorChoice, SetupError};
 use super::watch::Watch;
-use super::words::drive_stop;
 use crate::world::TICK_S;
 
 /// No run takes longer, s.
@@ -154,7 +153,7 @@ pub fn simulate<const N: usize, const B: usize>(
             Activity::Identify(_) => {}
             _ if pair.leg.control().verdict().is_some() => break,
             _ => {
-                let words = drive_stop(leg, pair.leg.control().state());
+                let words = pair.stop_words(leg);
                 return run.report(&pair, options, Vec::new(), Some(words), started);
             }
         }

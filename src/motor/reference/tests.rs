@@ -109,5 +109,6 @@ fn settings_that_make_no_sense_are_refused() {
         EndStopSearch::new(settings) == Err(ReferenceRefusal::Settings)
     };
     assert!(refused(|s| s.current.0 = 0.0) && refused(|s| s.counts_per_s = f32::NAN));
+    assert!(refused(|s| s.tolerance = i32::MAX) && refused(|s| s.way = i32::MAX));
     assert!(refused(|s| s.way = 0) && refused(|s| s.back_off = 50) && !refused(|_| ()));
 }

@@ -29,7 +29,6 @@ use crate::tool::leg_file::LegFile;
 use crate::tool::pair::{Context, Pair};
 use crate::tool::setup::SetupError;
 use crate::tool::simulate::SimulationOptions;
-use crate::tool::words::drive_stop;
 use crate::world::TICK_S;
 
 /// No excitation takes longer, s.
@@ -101,8 +100,7 @@ pub fn rehearse<const N: usize, const B: usize>(
             Activity::Identify(IdentifyPhase::Approach | IdentifyPhase::Excite | IdentifyPhase::Settle)
         );
         if !exciting || pair.ticks as f64 * TICK_S > LONGEST_S {
-            let state = pair.leg.control().state();
-            return Err(SetupError::new(assumed, drive_stop(assumed, state)).into());
+            return Err(SetupError::new(assumed, pair.stop_words(assumed)).into());
         }
     }
     let Some(solver) = pair.leg.identification().solver() else {

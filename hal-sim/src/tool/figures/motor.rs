@@ -5,12 +5,13 @@ use std::path::Path;
 use plotters::style::text_anchor::HPos;
 use plotters::style::{RGBColor, ShapeStyle};
 
+use super::super::board::BUS;
 use super::super::error::ToolError;
 use super::super::motor::MotorReport;
 use super::super::motor::step::response;
 use super::canvas::{
-    Area, Axes, BLUE, DARK, DrawingError, GREEN, Key, LEFT, PALE, VERMILION, axes, legend, line, px, range,
-    render, text,
+    Area, Axes, BLUE, DARK, DrawingError, GREEN, GRID, Key, LEFT, PALE, VERMILION, axes, legend, line, px,
+    range, render, short, text,
 };
 use super::{WIDTH, curve};
 
@@ -72,9 +73,7 @@ fn steps(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     let (_, cells) = area.split_vertically(px(HEAD));
     for (part, pair) in cells.split_evenly((2, 2)).iter().zip(report.steps.chunks(2)) {
         let Some(first) = pair.first() else { continue };
-        let (Some(from), Some(to)) = (first.quadrature_a.first(), report.steps[0].quadrature_a.last()) else {
-            continue;
-        };
+        let (from, to) = (first.from_a, first.to_a);
         let ideal: Vec<f64> =
             response(report.bandwidth_hz).iter().map(|share| from + share * (to - from)).collect();
         let mut traces = vec![Trace { time: &first.time_ms, values: &ideal, style: design }];
@@ -93,21 +92,33 @@ fn limit(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
         (12, 14),
         13,
         HPos::Left,
-        "From 50 A, which a weak supply cannot hold, back within the limit",
+        "From a current that a weak supply cannot hold, back within the limit",
     )?;
-    let (weak, strong) = (thin(VERMILION), line(PALE, 18));
-    let entries = [("48 V: nothing limited", Key::Curve(strong)), ("12 V: limited before", Key::Curve(weak))];
+    let (weak, strong, direct) = (thin(VERMILION), line(PALE, 18), line(DARK, 3));
+    let label = |index: usize, words: &str| {
+        let supply = report.limit.get(index).map_or(0.0, |limit| limit.supply_v);
+        format!("{supply:.0} V: {words}")
+    };
+    let (limited, free) = (label(0, "limited before"), label(1, "nothing limited"));
+    let entries = [
+        (free.as_str(), Key::Curve(strong)),
+        (limited.as_str(), Key::Curve(weak)),
+        ("direct current of both", Key::Curve(direct)),
+    ];
     legend(area, (LEFT, 35), &entries)?;
     let (_, cells) = area.split_vertically(px(HEAD));
     for (part, pair) in cells.split_evenly((1, 2)).iter().zip(report.limit.chunks(2)) {
-        let traces: Vec<_> = pair
+        let mut traces: Vec<_> = pair
             .iter()
             .zip([weak, strong])
             .rev()
             .map(|(limit, style)| Trace { time: &limit.time_ms, values: &limit.quadrature_a, style })
             .collect();
+        for limit in pair {
+            traces.push(Trace { time: &limit.time_ms, values: &limit.direct_current_a, style: direct });
+        }
         let speed = pair.first().map_or(0.0, |limit| limit.speed_rad_s);
-        frame(part, &format!("{speed:.0} rad/s"), "quadrature current, A", 2.5, &traces)?;
+        frame(part, &format!("{speed:.0} rad/s"), "current, A", 2.5, &traces)?;
     }
     Ok(())
 }
@@ -115,19 +126,28 @@ fn limit(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
 fn regeneration(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, "A joint's inertia is braked: bus voltage and speed")?;
     let styles = [thin(BLUE), thin(VERMILION)];
-    let entries = [("with chopper", Key::Curve(styles[0])), ("without", Key::Curve(styles[1]))];
+    let released = line(DARK, 3);
+    let border = f64::from(BUS[1].0);
+    let words = format!("{border:.0} V: released");
+    let entries = [
+        ("with chopper", Key::Curve(styles[0])),
+        ("without", Key::Curve(styles[1])),
+        (words.as_str(), Key::Curve(released)),
+    ];
     legend(area, (LEFT, 35), &entries)?;
     let (_, cells) = area.split_vertically(px(HEAD));
     let parts = cells.split_evenly((1, 2));
     let [left, right] = parts.as_slice() else { return Ok(()) };
     let end =
         report.regeneration.iter().filter_map(|braking| braking.time_ms.last()).copied().fold(1.0, f64::max);
-    let bus: Vec<_> = report
+    let mut bus: Vec<_> = report
         .regeneration
         .iter()
         .zip(styles)
         .map(|(braking, style)| Trace { time: &braking.time_ms, values: &braking.bus_v, style })
         .collect();
+    let (ends, borders) = ([0.0, end], [border; 2]);
+    bus.push(Trace { time: &ends, values: &borders, style: released });
     frame(left, "bus", "V", end, &bus)?;
     let speed: Vec<_> = report
         .regeneration
@@ -144,7 +164,7 @@ fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
         (12, 14),
         13,
         HPos::Left,
-        "Torque ripple at 20 A without sensor noise, sixth harmonic and rms",
+        "Torque ripple without sensor noise, rms and sixth harmonic, percent of the mean",
     )?;
     let (rms, sixth) = (thin(BLUE), thin(GREEN));
     legend(area, (LEFT, 35), &[("rms", Key::Curve(rms)), ("sixth harmonic", Key::Curve(sixth))])?;
@@ -152,6 +172,15 @@ fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     let quiet: Vec<_> = report.ripple.iter().filter(|ripple| !ripple.noise).collect();
     let largest =
         quiet.iter().map(|ripple| ripple.torque_percent.max(ripple.sixth_percent)).fold(0.01, f64::max);
+    // The axis: a line every tenth of a percent, or every tenth of the largest power of ten.
+    let step = 0.1 * 10_f64.powf((largest.log10() + 0.5).floor());
+    let bottom = 20 * quiet.len() as i32 + 4;
+    for tick in 0..=(largest / step) as i32 {
+        let x = 330 + (440.0 * step * f64::from(tick) / largest) as i32;
+        let ends = vec![(px(x), px(4)), (px(x), px(bottom))];
+        area.draw(&plotters::element::PathElement::new(ends, line(GRID, 4)))?;
+        text(&area, (x, bottom + 8), 12, HPos::Center, format!("{} %", short(step * f64::from(tick))))?;
+    }
     for (index, ripple) in quiet.iter().enumerate() {
         let y = 14 + 20 * index as i32;
         let compensated = if ripple.compensated { "dead time given back" } else { "not given back" };
@@ -174,7 +203,7 @@ pub fn write(directory: &Path, report: &MotorReport) -> Result<(), ToolError> {
     let quiet = report.ripple.iter().filter(|ripple| !ripple.noise).count() as i32;
     let figures: [(&str, i32, Drawing); 4] = [
         ("current-steps.svg", HEAD + 2 * ROW, steps),
-        ("torque-ripple.svg", HEAD + 20 * quiet + 12, ripple),
+        ("torque-ripple.svg", HEAD + 20 * quiet + 28, ripple),
         ("voltage-limit.svg", HEAD + ROW, limit),
         ("regeneration.svg", HEAD + ROW, regeneration),
     ];

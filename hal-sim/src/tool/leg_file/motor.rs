@@ -12,8 +12,10 @@ use crate::drive::description::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Slower than a step of the simulation needs, s.
-const LEAST_TIME_CONSTANT_S: f64 = 50e-6;
+/// Of a winding, s: below it the board cannot measure an inductance within its PWM periods.
+const LEAST_TIME_CONSTANT_S: f64 = 80e-6;
+/// Of the supply without load, V: the board's bridges switch from 20 V on, and its brake resistor begins to conduct at 50 V.
+const SUPPLY_V: [f64; 2] = [22.0, 50.0];
 /// Of a 16-bit counter.
 const MOST_COUNTS: u32 = 1 << 16;
 
@@ -108,7 +110,14 @@ impl SupplyFile {
 
     pub(super) fn check(&self) -> Result<(), Fault> {
         let place = Place { joint: None, table: Some("supply") };
-        place.within("voltage_v", self.voltage_v, 10.0, 60.0)?;
+        let [low, high] = SUPPLY_V;
+        if !(low..=high).contains(&self.voltage_v) {
+            let complaint = format!(
+                "is {}, outside {low}..{high}: the board's bridges switch from 20 V on, and from 50 V on its brake resistor would burn what the supply gives",
+                self.voltage_v
+            );
+            return Err(place.fault("voltage_v", &complaint));
+        }
         place.within("resistance_ohm", self.resistance_ohm, 0.001, 10.0)?;
         place.within("capacitance_uf", self.capacitance_uf, 50.0, 1e6)?;
         place.within("brake_ohm", self.brake_ohm, 0.1, 1000.0)
@@ -143,7 +152,7 @@ impl MotorFile {
             place.within(key, inductance, 1.0, 1e5)?;
             if inductance * 1e-6 / self.resistance_ohm < LEAST_TIME_CONSTANT_S {
                 let complaint = format!(
-                    "is {inductance}: with {} ohm its time constant is below {millisecond} ms, which is not simulated",
+                    "is {inductance}: with {} ohm its time constant is below {millisecond} ms, in which the board cannot measure it",
                     self.resistance_ohm
                 );
                 return Err(place.fault(key, &complaint));

@@ -20,12 +20,16 @@ use scarab::motor::{Axis, AxisConfiguration, AxisRequest, Calibration, Chopper, 
 use scarab::units::{Ampere, Volt};
 use serde::Serialize;
 
+use super::board::words;
 use super::board::{BANDWIDTH, CHOPPER, axis_configuration, calibration_settings, commission};
 use super::error::ToolError;
 use super::leg_file::{LegFile, MotorFile};
 use super::report::SCHEMA;
 use crate::drive::description::{AxisDescription, SupplyDescription};
 use crate::drive::stand::{Load, Stand};
+
+/// A rotor turns so long before the bridge switches, s.
+const TRACKED_S: f64 = 0.02;
 
 /// PWM period, s.
 pub const PERIOD_S: f64 = 1.0 / CURRENT_RATE_HZ as f64;
@@ -65,7 +69,7 @@ impl Bench {
             configuration,
             axis,
             supply,
-            calibration: commission(&file.name, &configuration, settings, &axis, &supply, seed)?,
+            calibration: commission(&file.name, &configuration, settings, &axis, &supply, 0.0, seed)?,
             top_speed: file.speed_limit_deg_s.to_radians() * file.encoder.ratio,
             seed,
         })
@@ -76,12 +80,30 @@ impl Bench {
         let mut stand = Stand::new(&self.axis, &self.supply, Load::Turned(speed), angle, self.seed);
         let sample = stand.period(&AxisCommand::RELEASED, 0.0);
         let axis = Axis::new(&self.configuration, &self.calibration, &sample).map_err(|error| {
-            ToolError::input(format!(
-                "axis `{}`: the firmware refuses its configuration: {error:?}",
-                self.joint
-            ))
+            ToolError::input(format!("axis `{}`: {}", self.joint, words::axis_error(error)))
         })?;
-        Ok(Rig { stand, axis, command: AxisCommand::RELEASED, chopper: None, brake: 0.0, sample })
+        let mut rig = Rig { stand, axis, command: AxisCommand::RELEASED, chopper: None, brake: 0.0, sample };
+        // The rotor turns already: its speed is found before anything switches.
+        for _ in 0..(TRACKED_S / PERIOD_S) as u32 {
+            rig.tick(AxisRequest::RELEASED);
+        }
+        Ok(rig)
+    }
+
+    /// A current, or the axis' limit where that is smaller, A.
+    #[must_use]
+    pub fn within_limit(&self, current: f64) -> f64 {
+        current.min(f64::from(self.configuration.current_limit.0))
+    }
+
+    /// Refuses what was measured of an axis that had released itself.
+    pub fn must_hold(&self, rig: &Rig, what: &str, speed: f64) -> Result<(), ToolError> {
+        let Some(fault) = rig.axis.fault() else { return Ok(()) };
+        Err(ToolError::Refused(format!(
+            "axis `{}` released its bridge ({what}, rotor at {speed:.0} rad/s): {}",
+            self.joint,
+            words::axis_fault(fault)
+        )))
     }
 }
 
@@ -109,14 +131,17 @@ impl Rig {
 
     /// One PWM period with this target; the currents that flow along and across the magnets' axis at its end, A.
     pub fn period(&mut self, target: f64) -> [f64; 2] {
+        self.tick(AxisRequest { enabled: true, current: Ampere(target as f32) });
+        self.stand.rotor_currents()
+    }
+
+    fn tick(&mut self, request: AxisRequest) {
         self.sample = self.stand.period(&self.command, f64::from(self.brake));
-        let request = AxisRequest { enabled: true, current: Ampere(target as f32) };
         self.command = self.axis.tick(&self.sample, request);
         if let Some(chopper) = &self.chopper {
             let bus: Volt = SenseScale::ODRIVE_3_6.bus(self.sample.bus_code);
             self.brake = chopper.duty(bus);
         }
-        self.stand.rotor_currents()
     }
 
     /// So many seconds with this target.

@@ -12,8 +12,8 @@ use crate::drive::stand::Load;
 
 /// Of a joint, kg m^2.
 const INERTIA: f64 = 2.5;
-/// A.
-const CURRENT: f64 = -50.0;
+/// A, or the axis' limit.
+const CURRENT: f64 = 50.0;
 /// Of the initial speed, where braking ends.
 const END: f64 = 0.1;
 /// At the latest, s.
@@ -26,6 +26,8 @@ const STRIDE: usize = 24;
 pub struct RegenerationReport {
     /// The chopper works.
     pub chopper: bool,
+    /// Braked with, A.
+    pub current_a: f64,
     /// V.
     pub highest_bus_v: f64,
     /// Energy of the motion at the beginning, J.
@@ -51,6 +53,7 @@ pub fn measure(bench: &Bench) -> Result<Vec<RegenerationReport>, ToolError> {
 
 fn one(bench: &Bench, chopper: bool) -> Result<RegenerationReport, ToolError> {
     let inertia = INERTIA / (bench.axis.ratio * bench.axis.ratio);
+    let current = bench.within_limit(CURRENT);
     let mut rig = bench.rig(bench.top_speed, 0.0)?;
     if chopper {
         rig = rig.with_chopper();
@@ -63,22 +66,28 @@ fn one(bench: &Bench, chopper: bool) -> Result<RegenerationReport, ToolError> {
     let mut returned_j = 0.0;
     for period in 0..(LONGEST_S / PERIOD_S) as usize {
         let taken = rig.stand.supply().energy().bridges;
-        rig.period(CURRENT);
+        rig.period(-current);
         returned_j += (taken - rig.stand.supply().energy().bridges).max(0.0);
         let (bus, speed) = (rig.stand.supply().voltage(), rig.stand.rotor().speed);
         highest = highest.max(bus);
-        if period.is_multiple_of(STRIDE) {
+        let ended = speed < END * bench.top_speed || rig.axis.fault().is_some();
+        // The last one too: it is the highest where the axis releases.
+        if ended || period.is_multiple_of(STRIDE) {
             time_ms.push(1e3 * period as f64 * PERIOD_S);
             bus_v.push(bus);
             speed_rad_s.push(speed);
         }
-        if speed < END * bench.top_speed || rig.axis.fault().is_some() {
+        if ended {
             break;
         }
+    }
+    if chopper {
+        bench.must_hold(&rig, "braking", bench.top_speed)?;
     }
     let energy = rig.stand.supply().energy();
     Ok(RegenerationReport {
         chopper,
+        current_a: current,
         highest_bus_v: highest,
         motion_j: 0.5 * inertia * bench.top_speed * bench.top_speed,
         returned_j,

@@ -14,7 +14,7 @@ use super::{Bench, PERIOD_S};
 
 /// A.
 const CURRENT: f64 = 20.0;
-/// rad/s of the rotor: a joint at 0.2 rad/s, and at a third of its top speed.
+/// rad/s of the rotor, its top speed at most: a joint of the default leg at 0.2 rad/s, and at a third of its top speed.
 const SPEEDS: [f64; 2] = [10.0, 75.0];
 /// To rest before, s.
 const SETTLE_S: f64 = 0.1;
@@ -27,6 +27,8 @@ const HARMONIC: f64 = 6.0;
 pub struct RippleReport {
     /// Of the rotor, rad/s.
     pub speed_rad_s: f64,
+    /// Asked for, A.
+    pub current_a: f64,
     /// `fast` or `exact`.
     pub sine: &'static str,
     /// Dead time given back.
@@ -46,7 +48,7 @@ pub struct RippleReport {
 /// All kinds at all speeds.
 pub fn measure(bench: &Bench) -> Result<Vec<RippleReport>, ToolError> {
     let mut reports = Vec::new();
-    for speed in SPEEDS {
+    for speed in SPEEDS.map(|speed| speed.min(bench.top_speed)) {
         for noise in [false, true] {
             for compensated in [true, false] {
                 for sine in [Sine::Fast, Sine::Exact] {
@@ -74,14 +76,15 @@ fn one(
     if !noise {
         bench.axis.shunts.noise_codes = 0.0;
     }
+    let current = bench.within_limit(CURRENT);
     let mut rig = bench.rig(speed, 0.0)?;
-    rig.hold(CURRENT, SETTLE_S);
+    rig.hold(current, SETTLE_S);
     let motor = &bench.axis.motor;
     let (pairs, periods) = (f64::from(motor.pole_pairs), (TURNS * TAU / speed / PERIOD_S) as u32);
     let (mut sum, mut squares, mut harmonic, mut direct, mut count) = (0.0, 0.0, [0.0; 2], [0.0; 2], 0.0);
     for _ in 0..periods {
         let middle = rig.stand.rotor().angle + 0.5 * speed * PERIOD_S;
-        let [d, _] = rig.period(CURRENT);
+        let [d, _] = rig.period(current);
         let (torque, phase) = (rig.stand.torque(), HARMONIC * pairs * middle);
         sum += torque;
         squares += torque * torque;
@@ -91,9 +94,11 @@ fn one(
     }
     let mean = sum / count;
     let spread = |sum: f64, squares: f64| (squares / count - (sum / count) * (sum / count)).max(0.0).sqrt();
-    let expected = 1.5 * pairs * motor.flux * CURRENT;
+    let expected = 1.5 * pairs * motor.flux * current;
+    bench.must_hold(&rig, "torque ripple", speed)?;
     Ok(RippleReport {
         speed_rad_s: speed,
+        current_a: current,
         sine: if sine == Sine::Fast { "fast" } else { "exact" },
         compensated,
         noise,

@@ -1,6 +1,6 @@
 //! Steps of the quadrature current.
 //!
-//! From 5 to 25 A at constant speed; the mean over eight rotor angles, so that ripple and timer steps average out and what is
+//! From 5 to 25 A, or the same shares of a smaller current limit, at constant speed; the mean over eight rotor angles, so that ripple and timer steps average out and what is
 //! left is the loop. Designed is `i[k+1] = i[k] + w T (target - i[k-1])`, w = 2 pi f: the integrator that the controller's zero
 //! leaves of motor and controller, one period late and held for one. The step comes with the sample of index 0.
 
@@ -26,8 +26,8 @@ const SPEEDS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
 /// What a step response looks like.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Shape {
-    /// From 10 to 90 % of the step, ms.
-    pub rise_ms: f64,
+    /// From 10 to 90 % of the step, ms; none where it does not get there.
+    pub rise_ms: Option<f64>,
     /// Beyond the target, percent of the step.
     pub overshoot_percent: f64,
 }
@@ -39,6 +39,10 @@ pub struct StepReport {
     pub speed_rad_s: f64,
     /// Cross-coupling and back-EMF fed forward.
     pub feedforward: bool,
+    /// Before the step, A.
+    pub from_a: f64,
+    /// What is asked for with it, A.
+    pub to_a: f64,
     /// Of the quadrature current.
     #[serde(flatten)]
     pub shape: Shape,
@@ -56,14 +60,15 @@ pub struct StepReport {
 
 /// Of a normalised response at the ends of periods.
 fn shape(values: &[f64]) -> Shape {
-    let crossing = |level: f64| -> f64 {
-        let after = values.iter().position(|value| *value >= level).unwrap_or(values.len() - 1).max(1);
-        let (low, high) = (values[after - 1], values[after]);
-        (after as f64 - 1.0 + (level - low) / (high - low)) * PERIOD_S
+    let crossing = |level: f64| -> Option<f64> {
+        let after = values.iter().position(|value| *value >= level)?;
+        let before = after.checked_sub(1)?;
+        let (low, high) = (values[before], values[after]);
+        Some((before as f64 + (level - low) / (high - low)) * PERIOD_S)
     };
     let highest = values.iter().copied().fold(0.0, f64::max);
     Shape {
-        rise_ms: 1e3 * (crossing(0.9) - crossing(0.1)),
+        rise_ms: crossing(0.9).zip(crossing(0.1)).map(|(late, early)| 1e3 * (late - early)),
         overshoot_percent: 100.0 * (highest - 1.0).max(0.0),
     }
 }
@@ -101,33 +106,54 @@ fn one(bench: &Bench, speed: f64, feedforward: bool) -> Result<StepReport, ToolE
     bench.configuration.feedforward = feedforward;
     let (mut quadrature, mut direct) = (vec![0.0; PERIODS + 1], vec![0.0; PERIODS + 1]);
     let mut largest_direct = 0.0_f64;
+    let to = bench.within_limit(TO);
+    let from = FROM / TO * to;
     for number in 0..ANGLES {
         let angle = f64::from(number) / f64::from(ANGLES) * TAU / f64::from(bench.axis.motor.pole_pairs);
         let mut rig = bench.rig(speed, angle)?;
-        rig.hold(FROM, SETTLE_S);
-        let [d, q] = rig.period(FROM);
+        rig.hold(from, SETTLE_S);
+        let [d, q] = rig.period(from);
         let weight = 1.0 / f64::from(ANGLES);
         direct[0] += weight * d;
         quadrature[0] += weight * q;
         for (direct, quadrature) in direct.iter_mut().zip(&mut quadrature).skip(1) {
-            let [d, q] = rig.period(TO);
+            let [d, q] = rig.period(to);
             *direct += weight * d;
             *quadrature += weight * q;
         }
+        let what = if feedforward { "steps" } else { "steps without feedforward" };
+        bench.must_hold(&rig, what, speed)?;
     }
     for value in &direct {
         largest_direct = largest_direct.max(value.abs());
     }
-    let normal: Vec<_> = quadrature.iter().map(|current| (current - FROM) / (TO - FROM)).collect();
+    let normal: Vec<_> = quadrature.iter().map(|current| (current - from) / (to - from)).collect();
     let last = &quadrature[PERIODS - PERIODS / 5..];
     Ok(StepReport {
         speed_rad_s: speed,
         feedforward,
+        from_a: from,
+        to_a: to,
         shape: shape(&normal),
-        coupling_percent: 100.0 * largest_direct / (TO - FROM),
-        error_a: last.iter().sum::<f64>() / last.len() as f64 - TO,
+        coupling_percent: 100.0 * largest_direct / (to - from),
+        error_a: last.iter().sum::<f64>() / last.len() as f64 - to,
         time_ms: (0..=PERIODS).map(|period| 1e3 * period as f64 * PERIOD_S).collect(),
         quadrature_a: quadrature,
         direct_a: direct,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_response_that_never_arrives_has_no_rise() {
+        assert_eq!(shape(&[0.0, 0.05, 0.3, 0.6]).rise_ms, None);
+        assert_eq!(shape(&[0.0; 8]).rise_ms, None);
+        // 0.1 at 0.5 periods, 0.9 at 4.5.
+        let line: Vec<_> = (0..8).map(|period| 0.2 * f64::from(period)).collect();
+        let rise = shape(&line).rise_ms.expect("it arrives");
+        assert!((rise - 4e3 * PERIOD_S).abs() < 1e-12, "{rise}");
+    }
 }

@@ -6,9 +6,14 @@ use super::MotorReport;
 /// All tables.
 #[must_use]
 pub fn tables(report: &MotorReport) -> String {
+    let [from, to] = report.steps.first().map_or([0.0; 2], |step| [step.from_a, step.to_a]);
     let mut text = format!(
-        "{}, {}: current loop of {:.0} Hz at 24 kHz\n\nsteps of the quadrature current, 5 to 25 A\n",
-        report.leg, report.joint, report.bandwidth_hz
+        "{}, {}: current loop of {:.0} Hz at 24 kHz\n\nsteps of the quadrature current, {} to {} A\n",
+        report.leg,
+        report.joint,
+        report.bandwidth_hz,
+        ampere(from),
+        ampere(to)
     );
     let mut table =
         headed(&["speed, rad/s", "feedforward", "rise, ms", "overshoot, %", "coupling, %", "error, A"]);
@@ -16,7 +21,7 @@ pub fn tables(report: &MotorReport) -> String {
     table.add_row(vec![
         "designed".to_owned(),
         String::new(),
-        format!("{:.3}", designed.rise_ms),
+        rise(designed.rise_ms),
         format!("{:.1}", designed.overshoot_percent),
         "0.0".into(),
         "0.00".into(),
@@ -25,13 +30,14 @@ pub fn tables(report: &MotorReport) -> String {
         table.add_row(vec![
             format!("{:.0}", step.speed_rad_s),
             yes(step.feedforward),
-            format!("{:.3}", step.shape.rise_ms),
+            rise(step.shape.rise_ms),
             format!("{:.1}", step.shape.overshoot_percent),
             format!("{:.1}", step.coupling_percent),
             format!("{:+.2}", step.error_a),
         ]);
     }
-    text += &format!("{}\n\ntorque ripple at 20 A, no cogging\n", table.trim_fmt());
+    let current = report.ripple.first().map_or(0.0, |ripple| ripple.current_a);
+    text += &format!("{}\n\ntorque ripple at {} A, no cogging\n", table.trim_fmt(), ampere(current));
     let mut table = headed(&[
         "speed, rad/s",
         "sensor noise",
@@ -54,14 +60,17 @@ pub fn tables(report: &MotorReport) -> String {
             format!("{:.3}", ripple.direct_a),
         ]);
     }
+    let asked = report.limit.first().map_or(0.0, |limit| limit.asked_a);
     text += &format!(
-        "{}\n\nvoltage limit: 50 A asked for 100 ms, then 10 A against the limit\n",
-        table.trim_fmt()
+        "{}\n\nvoltage limit: {} A asked for 100 ms, and then less\n",
+        table.trim_fmt(),
+        ampere(asked)
     );
     let mut table = headed(&[
         "speed, rad/s",
         "supply, V",
         "reached, A",
+        "then, A",
         "direct, A",
         "recovery, ms",
         "overshoot, A",
@@ -72,13 +81,16 @@ pub fn tables(report: &MotorReport) -> String {
             format!("{:.0}", limit.speed_rad_s),
             format!("{:.0}", limit.supply_v),
             format!("{:.1}", limit.reached_a),
+            ampere(limit.target_a),
             format!("{:+.2}", limit.direct_a),
             limit.recovery_ms.map_or("never".into(), |time| format!("{time:.2}")),
             format!("{:.2}", limit.overshoot_a),
             yes(limit.released),
         ]);
     }
-    text += &format!("{}\n\nbraking with 50 A from the joint's top speed\n", table.trim_fmt());
+    let current = report.regeneration.first().map_or(0.0, |braking| braking.current_a);
+    let words = format!("braking with {} A from the joint's top speed", ampere(current));
+    text += &format!("{}\n\n{words}\n", table.trim_fmt());
     let mut table = headed(&[
         "chopper",
         "highest bus, V",
@@ -98,6 +110,15 @@ pub fn tables(report: &MotorReport) -> String {
         ]);
     }
     text + &table.trim_fmt() + "\n"
+}
+
+/// Whole amperes without a fraction.
+fn ampere(current: f64) -> String {
+    if current.fract() == 0.0 { format!("{current:.0}") } else { format!("{current:.2}") }
+}
+
+fn rise(ms: Option<f64>) -> String {
+    ms.map_or("never".into(), |ms| format!("{ms:.3}"))
 }
 
 fn yes(value: bool) -> String {

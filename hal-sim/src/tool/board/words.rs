@@ -1,0 +1,92 @@
+//! What the firmware's axes refuse or report, as sentences with the key of the leg file that mends it.
+
+use scarab::motor::{AxisError, AxisFault, Phase, Refusal};
+
+/// Why the firmware refuses an axis' configuration.
+#[must_use]
+pub fn axis_error(error: AxisError) -> String {
+    let words = match error {
+        AxisError::Sense => "amplifiers, converter or bus divider make no sense",
+        AxisError::Timing => "dead time, settling and conversion leave less than half of a PWM period",
+        AxisError::Encoder => {
+            "an encoder of 16 to 65,536 counts (`encoder.counts`) with more than four per pole pair (`motor.pole_pairs`) is needed"
+        }
+        AxisError::Speed => {
+            "at twice the speed limit (`speed_limit_deg_s`) the rotor would turn by a quarter of an electrical turn per PWM period"
+        }
+        AxisError::Motor => {
+            "flux, resistance or inductance is none that its current loop can be set for (`torque_per_ampere`, `motor`)"
+        }
+        AxisError::Current => {
+            "its current limit (`current_limit_a`, or torque_limit_nm / torque_per_ampere) must be below the 61 A at which the bridge is released"
+        }
+        AxisError::Bus => "the bus borders lie beyond what the divider can measure",
+        AxisError::BackEmf => {
+            "at twice the speed limit a released bridge would rectify more than the greatest bus voltage of 58 V: lower `speed_limit_deg_s`, `torque_per_ampere` or `encoder.ratio`"
+        }
+        AxisError::Calibration => "its calibration was made for another configuration",
+    };
+    format!("the firmware refuses its configuration: {words}")
+}
+
+/// Why the firmware found no calibration.
+#[must_use]
+pub fn refusal(reason: Refusal) -> String {
+    let words = match reason {
+        Refusal::Overcurrent => "the current went beyond 61 A".to_owned(),
+        Refusal::CurrentSense => "a shunt amplifier is at its rail".into(),
+        Refusal::BusVoltage => {
+            "the bus voltage left 20 V..58 V (`supply.voltage_v`, `supply.resistance_ohm`)".into()
+        }
+        Refusal::ShuntZero(phase) => {
+            format!("the shunt of phase {} has its zero too far off, or too much noise", name(phase))
+        }
+        Refusal::Turning => "the rotor turns although the bridge is off".into(),
+        Refusal::PhaseOpen(phase) => format!("no current flows in phase {}", name(phase)),
+        Refusal::ShuntInverted(phase) => format!("the shunt of phase {} reads with the wrong sign", name(phase)),
+        Refusal::ShuntsInverted => "both shunts read with the wrong sign".into(),
+        Refusal::ShuntsSwapped => "the shunts of phases B and C are exchanged".into(),
+        Refusal::CurrentDirection => "currents do not flow where the voltage points".into(),
+        Refusal::PhaseImbalance => "the phases' resistances differ by more than 15 %".into(),
+        Refusal::MotorConstants => {
+            "resistance or inductance is out of range, or too large for 9.5 V at the calibration's current (`motor.resistance_ohm`, `motor.inductance_d_uh`, `motor.inductance_q_uh`)".into()
+        }
+        Refusal::OtherMotor => "the resistance is more than 40 % from the stored one: another motor".into(),
+        Refusal::TimeOut => "the current does not settle".into(),
+        Refusal::NoCounts => "the field turned, the counter did not: encoder, or a blocked rotor".into(),
+        Refusal::Direction => {
+            "the counter runs against the field: two motor leads or the encoder's A and B are exchanged".into()
+        }
+        Refusal::PolePairs(pairs) => format!("the counts fit {pairs} pole pairs (`motor.pole_pairs`)"),
+        Refusal::CountsPerTurn(counts) => format!("the counts fit {counts} per turn (`encoder.counts`)"),
+        Refusal::Slipped => {
+            "the rotor did not follow the field evenly: load, friction or cogging (`motor.cogging_nm`) take more than half of the holding torque".into()
+        }
+        Refusal::NoIndex => "no index pulse came in a whole turn".into(),
+        Refusal::IndexMoved => "the index pulse came at different places of the turn".into(),
+        Refusal::StoredOffset => "the rotor does not stand where the stored offset says".into(),
+    };
+    format!("the calibration is refused: {words}")
+}
+
+const fn name(phase: Phase) -> &'static str {
+    match phase {
+        Phase::A => "A",
+        Phase::B => "B",
+        Phase::C => "C",
+    }
+}
+
+/// Why an axis released its bridge.
+#[must_use]
+pub const fn axis_fault(fault: AxisFault) -> &'static str {
+    match fault {
+        AxisFault::CurrentSense => "a shunt amplifier stayed at its rail",
+        AxisFault::Overcurrent => "the current went beyond 61 A",
+        AxisFault::BusVoltage => "the bus voltage left 20 V..58 V (`supply`)",
+        AxisFault::Encoder => {
+            "its counts jumped or the index came at another place: the rotor's angle is lost"
+        }
+        AxisFault::NotANumber => "a current or voltage was not a number",
+    }
+}
