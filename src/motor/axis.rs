@@ -13,8 +13,8 @@
 //! **Borders.** A target that is not a number, a voltage that is none, a current beyond the bound release the bridge in the
 //! same tick. A saturated amplifier, a bus voltage out of range and an encoder step that no motor makes have one tick of
 //! patience, in which the duties of the tick before are kept; the second in a row releases. Released stays released until
-//! [`Axis::clear_fault`]. An index pulse more than 4 counts from its place releases at once, whether or not anything switches:
-//! counts were lost, and with them the angle.
+//! [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases at once, whether or
+//! not anything switches: counts were lost, and with them the angle.
 //!
 //! **Known limit.** A counter that stops while current flows looks like a rotor that is held: the current keeps its direction,
 //! the torque falls with the cosine of what is missed and the rotor comes to rest a quarter of an electrical turn further. The servo's
@@ -32,6 +32,9 @@ use super::{Calibration, CurrentLoop, Rotating, SpeedTracker};
 use crate::hal::{AxisCommand, AxisSample, JointSample};
 use crate::real::{clamp, is_finite};
 use crate::units::{Ampere, RadianPerSecond};
+
+/// A count that is taken by an interrupt at the index may be late by one part in so many of a period: 10 us.
+const INDEX_LATENCY: i32 = 4;
 
 /// What an axis is asked for in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -136,7 +139,7 @@ impl Axis {
             self.place = constants.scale.moved(self.place, constants.counter_sign * step);
             if let Some(at) = sample.index_count
                 && constants.indexed
-                && self.index_distance(at) > INDEX_WIDTH
+                && self.index_distance(at) > INDEX_WIDTH + step.abs() / INDEX_LATENCY
             {
                 return Err(AxisFault::Encoder);
             }
@@ -200,7 +203,10 @@ impl Axis {
         Ok(AxisCommand { enabled: true, duty })
     }
 
-    /// From the place where the index came to where it belongs, counts.
+    /// From the place where the index came to where it belongs, counts. Once per turn of the motor: kept out of the way of the
+    /// other ticks.
+    #[cold]
+    #[inline(never)]
     fn index_distance(&self, at: u16) -> i32 {
         let scale = &self.constants.scale;
         let since = self.constants.counter_sign * i32::from(self.counter.wrapping_sub(at).cast_signed());

@@ -66,7 +66,7 @@ fn share(all: &Tally) -> bool {
 fn calibrated(motor: &mut Motor, configuration: &AxisConfiguration) -> Option<Calibration> {
     let settings = CalibrationSettings { current: Ampere(20.0), voltage: Volt(4.0), turns_per_s: 16.0 };
     let mut calibrator = Calibrator::new(configuration, settings).ok()?;
-    let mut sample = motor.sample(false);
+    let mut sample = motor.sample(None);
     let mut tally = Tally::default();
     loop {
         let (instructions, step) = count(|| calibrator.tick(&sample));
@@ -91,7 +91,7 @@ fn ticks(motor: &mut Motor, configuration: &AxisConfiguration, calibration: &Cal
     motor.driven = true;
     for (speed, current) in SPEEDS {
         motor.speed_rad_per_s = speed;
-        let mut sample = motor.sample(false);
+        let mut sample = motor.sample(None);
         let mut axis = Axis::new(configuration, calibration, &sample).ok()?;
         for _ in 0..240 {
             sample = motor.period(tick(&mut axis, &sample, AxisRequest::RELEASED));

@@ -72,7 +72,7 @@ impl Motor {
         (self.seed % 5) as f32 - 2.0
     }
 
-    pub fn sample(&mut self, index: bool) -> AxisSample {
+    pub fn sample(&mut self, index_count: Option<u16>) -> AxisSample {
         let (sine, cosine) = sin_cos(self.turns * PAIRS * core::f32::consts::TAU);
         let [d, q] = self.current;
         let (alpha, beta) = (d * cosine - q * sine, d * sine + q * cosine);
@@ -81,7 +81,7 @@ impl Motor {
             .map(|current| (2050.0 + current / AMPERE_PER_CODE + self.noise()) as u16);
         let bus_code = (self.bus / (3.3 * 19.0 / 4096.0)) as u16;
         let encoder_count = (self.turns * COUNTS) as u32 as u16;
-        AxisSample { shunt_codes, bus_code, encoder_count, index_count: index.then_some(encoder_count) }
+        AxisSample { shunt_codes, bus_code, encoder_count, index_count }
     }
 
     /// What the sensors say where the counter stands at `count` and the quadrature current is `current` (A).
@@ -89,7 +89,7 @@ impl Motor {
     pub fn seen(&mut self, count: u16, current: f32) -> AxisSample {
         self.turns = f32::from(count) / COUNTS;
         self.current = [0.0, current];
-        self.sample(false)
+        self.sample(None)
     }
 
     /// One PWM period; `command` acts in the next one.
@@ -100,7 +100,8 @@ impl Motor {
             self.step(&acting);
         }
         // Place zero of any turn.
-        let index = before as u32 != self.turns as u32;
+        let passed = self.turns.max(before) as u32;
+        let index = (before as u32 != self.turns as u32).then_some((passed * COUNTS as u32) as u16);
         if self.turns >= TURNS {
             self.turns -= TURNS;
         } else if self.turns < 0.0 {

@@ -28,7 +28,7 @@ impl Axes {
     pub fn calibrated(begin: [i32; JOINTS]) -> Option<Self> {
         let mut motor = Motor::at_rest();
         let mut calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).ok()?;
-        let mut sample = motor.sample(false);
+        let mut sample = motor.sample(None);
         for _ in 0..LONGEST {
             match calibrator.tick(&sample) {
                 CalibrationStep::Running(command) => sample = motor.period(command),
