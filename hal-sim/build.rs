@@ -5,14 +5,16 @@ use std::env;
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=../memory.x");
-    println!("cargo::rerun-if-changed=layout.x");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
     println!("cargo::rustc-link-search={}/..", env!("CARGO_MANIFEST_DIR"));
-    println!("cargo::rustc-link-search={}", env!("CARGO_MANIFEST_DIR"));
+    let emulated = env::var_os("CARGO_FEATURE_EMULATED").is_some();
+    let image = if emulated { "emulated" } else { "count-instructions" };
+    println!("cargo::rerun-if-changed=src/bin/{image}/layout.x");
+    println!("cargo::rustc-link-search={}/src/bin/{image}", env!("CARGO_MANIFEST_DIR"));
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
-    if env::var_os("CARGO_FEATURE_EMULATED").is_some() {
+    if emulated {
         println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
         // The plant as a constant, which `cargo emulate` writes from a leg file.
         println!("cargo::rerun-if-env-changed=SCARAB_PLANT");

@@ -1,11 +1,13 @@
 //! What identification costs: each 500 Hz sample, closing a motion, and the search.
 
 use core::hint::black_box;
+use core::mem::MaybeUninit;
 
 use cortex_m_semihosting::hprintln;
-use scarab::ident::{LinkPrior, Plan, Record, Recorder, SearchState, Solver};
+use scarab::ident::{LinkPrior, MotionWindow, Plan, Record, Recorder, SearchState, Solver};
 use scarab::model::{JointState, joint_torques};
 use scarab::servo::{LOG_RATE_HZ, TICKS_PER_LOG};
+use static_cell::ConstStaticCell;
 
 use crate::counter::{Tally, count, heading};
 use crate::leg::{self, BASE, JOINTS, Model};
@@ -48,7 +50,11 @@ pub fn report(model: &Model) -> Option<bool> {
 #[inline(never)]
 fn recorded(model: &Model) -> Option<(bool, Record<f32, JOINTS, BASE>)> {
     let (motion, truth, scales) = (leg::excitation()?, leg::truth(), leg::scales());
-    let mut recorder = Recorder::<f32, JOINTS, BASE, TAPS, PENDING>::new(leg::BANDWIDTH_HZ).ok()?;
+    type Window = MotionWindow<f32, JOINTS, BASE>;
+    static WINDOW: ConstStaticCell<Window> = ConstStaticCell::new(Window::EMPTY);
+    let window = WINDOW.take();
+    let mut recorder =
+        Recorder::<f32, JOINTS, BASE, TAPS, PENDING, _>::with_window(leg::BANDWIDTH_HZ, window).ok()?;
     let (mut tally, mut with_rows, mut seed) = (Tally::default(), Tally::default(), 1);
     for sample in 0..motion.duration_ticks() / TICKS_PER_LOG {
         let state = motion.state_at(sample * TICKS_PER_LOG);
@@ -87,13 +93,14 @@ fn searched(
     name: &str,
 ) -> bool {
     heading(name);
-    let (instructions, mut solver) = count(|| Solver::new(model, record, Plan::default(), prior, 1));
+    let mut slot = MaybeUninit::uninit();
+    let (instructions, solver) = count(|| Solver::place(&mut slot, model, record, Plan::default(), prior, 1));
     hprintln!("{:<48} {:>8}", "once: Solver::new, least squares included", instructions);
     let (mut evaluation, mut completion) = (Tally::default(), Tally::default());
     let (mut last, mut total) = (0, 0_u64);
     for _ in 0..MOST_EVALUATIONS {
         let before = solver.search().evaluations();
-        let (instructions, state) = count(|| black_box(&mut solver).advance(model, 1));
+        let (instructions, state) = count(|| black_box(&mut *solver).advance(model, 1));
         total += u64::from(instructions);
         let searching = solver.search().state() == SearchState::Running;
         match (solver.search().evaluations() > before, searching) {
