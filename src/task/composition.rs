@@ -12,8 +12,7 @@ use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
 use crate::board::odrive_v3_6::{brake, converter, memory, vectors, watchdog};
 use crate::board::stack;
-use crate::hal::JointSample;
-use crate::leg::{Activity, Control};
+use crate::leg::Control;
 use crate::trace::Record;
 use cortex_m::peripheral::DWT;
 
@@ -66,19 +65,15 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, housekeeping::Housekeepi
     match control {
         Some(control) => {
             static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
-            let servo = SERVO.init(servo::ServoLoop {
+            let servo = SERVO.init(servo::ServoLoop::new(
                 control,
-                samples: [sampled_1, sampled_2],
-                requests: requests.1,
-                findings: findings.1,
-                drive: drive.0,
-                told: told.0,
-                sample: [JointSample::default(); leg::JOINTS],
-                state: None,
-                activity: Activity::Idle,
-                tick: 0,
-                clock: surroundings.clock,
-            });
+                [sampled_1, sampled_2],
+                requests.1,
+                findings.1,
+                drive.0,
+                told.0,
+                surroundings.clock,
+            ));
             place(&servo::SERVO, servo);
         }
         None => interlock::raise(Cause::Configuration),

@@ -57,33 +57,59 @@ fn release() {
 /// What level 1 works on.
 pub struct ServoLoop {
     /// The half of the leg that moves.
-    pub control: Control<JOINTS>,
+    control: Control<JOINTS>,
     /// From each axis.
-    pub samples: [Consumer<'static, JointSample>; JOINTS],
+    samples: [Consumer<'static, JointSample>; JOINTS],
     /// From the housekeeping.
-    pub requests: Consumer<'static, ControlRequest<JOINTS>>,
+    requests: Consumer<'static, ControlRequest<JOINTS>>,
     /// From the identification.
-    pub findings: Consumer<'static, Finding<JOINTS>>,
+    findings: Consumer<'static, Finding<JOINTS>>,
     /// To the housekeeping.
-    pub drive: Producer<'static, DriveState>,
+    drive: Producer<'static, DriveState>,
     /// To the identification.
-    pub told: Producer<'static, Told>,
+    told: Producer<'static, Told>,
     /// The newest of each joint.
-    pub sample: [JointSample; JOINTS],
+    sample: [JointSample; JOINTS],
     /// What was told of last.
-    pub state: Option<DriveState>,
+    state: Option<DriveState>,
     /// The same.
-    pub activity: Activity,
+    activity: Activity,
     /// Ticks of the leg.
-    pub tick: u32,
+    tick: u32,
     /// Processor cycles; wraps.
-    pub clock: fn() -> u32,
+    clock: fn() -> u32,
 }
 
 /// What level 1 works on, once it is there.
 pub static SERVO: spin::Mutex<Option<&'static mut ServoLoop>> = spin::Mutex::new(None);
 
 impl ServoLoop {
+    /// Nothing heard or told yet.
+    #[must_use]
+    pub fn new(
+        control: Control<JOINTS>,
+        samples: [Consumer<'static, JointSample>; JOINTS],
+        requests: Consumer<'static, ControlRequest<JOINTS>>,
+        findings: Consumer<'static, Finding<JOINTS>>,
+        drive: Producer<'static, DriveState>,
+        told: Producer<'static, Told>,
+        clock: fn() -> u32,
+    ) -> Self {
+        Self {
+            control,
+            samples,
+            requests,
+            findings,
+            drive,
+            told,
+            sample: [JointSample::default(); JOINTS],
+            state: None,
+            activity: Activity::Idle,
+            tick: 0,
+            clock,
+        }
+    }
+
     fn run(&mut self) {
         for (slot, samples) in self.sample.iter_mut().zip(&mut self.samples) {
             while let Some(sample) = samples.dequeue() {

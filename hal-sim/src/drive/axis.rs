@@ -3,7 +3,7 @@
 //! Switching is not averaged. Within a quarter the step goes from edge to edge of the bridge, each with constant
 //! terminal voltages; bus voltage is held within the quarter, the rotor's speed as long as [`Axis::set_rotor`] is not called.
 //! Against steps a hundred times finer the currents differ by 4 mA and the torque by 4e-5 of its size, at 50 A, 250 Hz
-//! electrical and 48 V (`cargo test --test complete_drive edges_alone`): a tenth of a converter's step.
+//! electrical and 48 V (`cargo test -p hal-sim --test plant edges_alone`): a tenth of a converter's step.
 //!
 //! ```text
 //! sample, command acts                                  sample, next command acts

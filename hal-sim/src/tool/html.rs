@@ -79,15 +79,7 @@ pub fn page(
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                meta name="color-scheme" content="light";
-                link rel="icon" href="data:,";
-                title { "Identification of " (run.leg) ": " (run.verdict) }
-                style { (PreEscaped(STYLE)) }
-            }
+            (page_head(&format!("Identification of {}: {}", run.leg, run.verdict)))
             body {
                 main {
                     (head::title(circumstances, run))
@@ -154,6 +146,21 @@ fn unit(plain: &str) -> String {
 /// `1 thing`, `2 things`.
 fn count(number: usize, thing: &str) -> String {
     format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
+}
+
+/// What every page has before its body: no network, no script.
+fn page_head(title: &str) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta http-equiv="Content-Security-Policy" content=(POLICY);
+            meta name="color-scheme" content="light";
+            link rel="icon" href="data:,";
+            title { (title) }
+            style { (PreEscaped(STYLE)) }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -29,8 +29,7 @@ use defmt_semihosting as _;
 use embassy_executor::{SpawnToken, raw};
 use heapless::spsc::Queue;
 use scarab::board::stack;
-use scarab::hal::JointSample;
-use scarab::leg::{Activity, Control, Filters};
+use scarab::leg::{Control, Filters};
 use scarab::task::surroundings::{Introduction, Surroundings};
 use scarab::task::{identify, leg, links, servo};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -100,19 +99,15 @@ fn hand_out() -> identify::Thread {
     let links::Links { samples, requests, findings, drive, told, notes, .. } = links::Links::new(TOLD.take());
     let [(sample_1, sampled_1), (sample_2, sampled_2)] = samples;
     static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
-    let servo = SERVO.init(servo::ServoLoop {
+    let servo = SERVO.init(servo::ServoLoop::new(
         control,
-        samples: [sampled_1, sampled_2],
-        requests: requests.1,
-        findings: findings.1,
-        drive: drive.0,
-        told: told.0,
-        sample: [JointSample::default(); leg::JOINTS],
-        state: None,
-        activity: Activity::Idle,
-        tick: 0,
-        clock: SURROUNDINGS.clock,
-    });
+        [sampled_1, sampled_2],
+        requests.1,
+        findings.1,
+        drive.0,
+        told.0,
+        SURROUNDINGS.clock,
+    ));
     if let Some(mut home) = servo::SERVO.try_lock() {
         *home = Some(servo);
     }

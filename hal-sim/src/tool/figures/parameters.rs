@@ -78,13 +78,7 @@ fn dots(
         let largest = bases.iter().filter_map(error).map(f64::abs).fold(3.5, f64::max);
         let end = (largest + 0.3).min(20.0);
         let mut chart = frame(area, margins).build_cartesian_2d(-end..end, 0.0..rows)?;
-        for (half, colour) in [(3.0, THREE_SIGMA), (1.0, ONE_SIGMA)] {
-            chart.draw_series([Rectangle::new([(-half, 0.0), (half, rows)], colour.filled())])?;
-        }
-        mesh(&mut chart, "(value \u{2212} truth) / sigma", &|value| {
-            format!("{value:.0}").replace('-', "\u{2212}")
-        })?;
-        chart.draw_series([PathElement::new(vec![(0.0, 0.0), (0.0, rows)], line(DARK, 3))])?;
+        sigma_axis(&mut chart, rows)?;
         let place = |base: &BaseReport| error(base).map(|error| error.clamp(-end, end));
         rows_of(area, &mut chart, bases, margins, &place, values)
     } else {
@@ -109,6 +103,18 @@ pub fn frame<'a, 'b>(area: &'a Area<'b>, (left, right): (i32, i32)) -> ChartBuil
     let mut builder = ChartBuilder::on(area);
     builder.margin_left(px(left)).margin_right(px(right)).x_label_area_size(px(36));
     builder
+}
+
+/// Errors about truth in sigma: bands of one and three, a line at none.
+pub fn sigma_axis(
+    chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
+    rows: f64,
+) -> Result<(), DrawingError> {
+    for (half, colour) in [(3.0, THREE_SIGMA), (1.0, ONE_SIGMA)] {
+        chart.draw_series([Rectangle::new([(-half, 0.0), (half, rows)], colour.filled())])?;
+    }
+    mesh(chart, "(value \u{2212} truth) / sigma", &|value| format!("{value:.0}").replace('-', "\u{2212}"))?;
+    chart.draw_series([PathElement::new(vec![(0.0, 0.0), (0.0, rows)], line(DARK, 3))]).map(|_| ())
 }
 
 /// Lines up from one axis of numbers.

@@ -1,11 +1,11 @@
 //! Base parameters over many runs: a dot for each run, a bar from one standard deviation below their mean to one above.
 
-use plotters::element::{Circle, PathElement, Rectangle};
+use plotters::element::{Circle, PathElement};
 use plotters::style::Color;
 
 use super::super::spread::Spread;
 use super::canvas::{Area, BLUE, DARK, DrawingError, line, px};
-use super::parameters::{ONE_SIGMA, THREE_SIGMA, frame, labels, mesh};
+use super::parameters::{frame, labels, sigma_axis};
 
 /// More dots are a blot; what is said in numbers counts all.
 pub const LARGEST_RUNS: usize = 500;
@@ -16,13 +16,7 @@ pub fn whole(area: &Area<'_>, spreads: &[Spread]) -> Result<(), DrawingError> {
     let all = spreads.iter().flat_map(|spread| &spread.errors);
     let end = all.fold(3.5_f64, |largest, error| largest.max(error.abs())).min(20.0) + 0.3;
     let mut chart = frame(area, margins).build_cartesian_2d(-end..end, 0.0..rows)?;
-    for (half, colour) in [(3.0, THREE_SIGMA), (1.0, ONE_SIGMA)] {
-        chart.draw_series([Rectangle::new([(-half, 0.0), (half, rows)], colour.filled())])?;
-    }
-    mesh(&mut chart, "(value \u{2212} truth) / sigma", &|value| {
-        format!("{value:.0}").replace('-', "\u{2212}")
-    })?;
-    chart.draw_series([PathElement::new(vec![(0.0, 0.0), (0.0, rows)], line(DARK, 3))])?;
+    sigma_axis(&mut chart, rows)?;
     for (row, spread) in spreads.iter().enumerate() {
         let middle = rows - row as f64 - 0.5;
         // In three lanes, so that dots of like errors stay apart.

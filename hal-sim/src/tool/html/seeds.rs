@@ -1,13 +1,13 @@
 //! Many runs of one leg as one page: verdicts, how parameters lie about truth, how near the tests came to their limits.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{DOCTYPE, Markup, html};
 
 use super::super::error::ToolError;
 use super::super::figures::Figure;
 use super::super::findings::FindingReport;
 use super::super::report::RunReport;
 use super::super::spread::Spread;
-use super::{Circumstances, POLICY, STYLE, count, drawing, number, signed, unit, verdict};
+use super::{Circumstances, count, drawing, number, page_head, signed, unit, verdict};
 
 /// The page of runs that differ in their seed.
 pub fn page(
@@ -21,15 +21,7 @@ pub fn page(
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                meta name="color-scheme" content="light";
-                link rel="icon" href="data:,";
-                title { (count(runs.len(), "run")) " of " (first.leg) }
-                style { (PreEscaped(STYLE)) }
-            }
+            (page_head(&format!("{} of {}", count(runs.len(), "run"), first.leg)))
             body {
                 main {
                     header {

@@ -1,0 +1,8 @@
+//! The simulated hardware against the textbook.
+
+mod common;
+mod complete_drive;
+mod friction;
+mod integration;
+mod mechanism;
+mod world;

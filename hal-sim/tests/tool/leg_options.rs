@@ -1,0 +1,106 @@
+//! A leg set to a wearer, on either side, below a leaning trunk: what stays the same and what is refused.
+
+use crate::command::{Folder, scarab};
+use serde_json::Value;
+
+/// The report of a run with these options.
+fn identified(options: &str) -> Value {
+    let folder = Folder::new();
+    scarab(&format!("identify {options} --json"), &[&folder.path("run.json")]).ends_with(0);
+    folder.json("run.json")
+}
+
+fn bases(run: &Value) -> Vec<Value> {
+    run["base_parameters"].as_array().expect("a list").clone()
+}
+
+fn number(of: &Value, key: &str) -> f64 {
+    of[key].as_f64().expect("known")
+}
+
+/// All base parameters lie within four sigma of the simulated leg's.
+fn assert_true(run: &Value) {
+    for base in bases(run) {
+        let off = (number(&base, "value") - number(&base, "truth")).abs();
+        assert!(off < 4.0 * number(&base, "sigma"), "{} of {}", base["name"], run["leg"]);
+    }
+}
+
+#[test]
+fn left_and_right_leg_have_the_same_anatomical_parameters() {
+    let folder = Folder::new();
+    let run = |side: &str| {
+        let files = [format!("{side}.json"), format!("{side}.csv")];
+        let [json, log] = files.each_ref().map(|name| folder.path(name).display().to_string());
+        // Without noise: the same draws would stand against the motion on one side.
+        scarab(&format!("identify --torque-noise 0 --side {side} --json {json} --log {log}"), &[])
+            .ends_with(0);
+        (folder.json(&files[0]), std::fs::read_to_string(folder.path(&files[1])).expect("written"))
+    };
+    let ((right, right_log), (left, left_log)) = (run("right"), run("left"));
+    assert_eq!(left["leg"], "x2-wearer-75kg --side left");
+    // Counts and currents are exactly each other's negatives, so anatomically nothing differs to the last bit.
+    assert_eq!(bases(&right), bases(&left));
+    assert!(right_log.lines().count() > 1000 && right_log == left_log);
+}
+
+#[test]
+fn a_known_trunk_pitch_turns_gravity_and_leaves_the_base_set_as_it_is() {
+    let upright = identified("");
+    for pitch in ["5", "-10"] {
+        let leaning = identified(&format!("--trunk-pitch {pitch}"));
+        for (one, other) in bases(&upright).iter().zip(&bases(&leaning)) {
+            assert_eq!(one["name"], other["name"]);
+            // The analysis rounds differently; factors and values are near 1.
+            assert!((number(one, "truth") - number(other, "truth")).abs() < 1e-9);
+            for (name, factor) in one["terms"].as_object().expect("terms") {
+                assert!((number(&other["terms"], name) - factor.as_f64().expect("known")).abs() < 1e-9);
+            }
+        }
+        assert_true(&leaning);
+        // The same parameters under another gravity need another torque.
+        let size = |run: &Value| {
+            100.0 * number(&run["training"][0], "rms_nm") / number(&run["training"][0], "percent_of_rms")
+        };
+        assert!((size(&leaning) / size(&upright) - 1.0).abs() > 0.01);
+    }
+}
+
+#[test]
+fn legs_of_any_size_are_identified_and_say_so() {
+    for options in
+        ["--thigh 0.505 --shank 0.506", "--wearer 95,1.95", "--wearer 55,1.65 --side left --trunk-pitch 5"]
+    {
+        let run = identified(options);
+        assert_eq!(run["leg"], format!("x2-wearer-75kg {options}"));
+        assert_true(&run);
+    }
+    // The heavier and taller leg is heavier and longer.
+    let of = |run: &Value, name: &str| {
+        number(bases(run).iter().find(|base| base["name"] == name).expect("there"), "value")
+    };
+    let (default, tall) = (identified(""), identified("--wearer 95,1.95"));
+    assert!(of(&tall, "HX2") > 1.3 * of(&default, "HX2") && of(&tall, "ZZ2") > 1.5 * of(&default, "ZZ2"));
+}
+
+#[test]
+fn what_a_leg_cannot_be_set_to_is_refused_by_option_and_reason() {
+    for (options, reason) in [
+        ("--thigh 0.3", "--thigh 0.3 is outside 0.402..0.505 m"),
+        ("--shank -1", "--shank -1 is outside 0.397..0.506 m"),
+        ("--wearer 60,1.55", "--wearer 60,1.55: a thigh of 0.380 m is outside 0.402..0.505 m"),
+        ("--wearer 60", "is not KG,M"),
+        ("--wearer 60,170", "a height of 170 m"),
+        (
+            "--leg sp --thigh 0.45",
+            "sp: --thigh, --shank and --wearer need a leg that says what its thigh and shank are",
+        ),
+        ("--leg paper-chain --side left", "only legs with parallel axes are mirrored"),
+        ("--trunk-pitch 91", "--trunk-pitch 91: degrees forward, from -90 to 90"),
+        ("--trunk-pitch nan", "--trunk-pitch NaN: degrees forward"),
+        ("--side middle", "invalid value 'middle'"),
+    ] {
+        let refusal = scarab(&format!("identify {options}"), &[]).refusal();
+        assert!(refusal.contains(reason), "{options}: {refusal}");
+    }
+}

@@ -1,0 +1,26 @@
+//! The tool as its users run it: each command, what it prints, writes and refuses. One program, so that helpers stand once.
+#![cfg(feature = "tool")]
+
+mod command;
+mod emulation;
+mod excite;
+mod figures;
+mod kept;
+mod leg_options;
+mod model_choice;
+mod model_file;
+mod model_predict;
+mod model_urdf;
+mod monitor;
+mod motor;
+mod pendulum;
+mod regressor;
+mod replay;
+mod replay_mujoco;
+mod replay_real;
+mod replay_refusals;
+mod report_page;
+mod robust;
+mod scale;
+mod trace;
+mod verdict;

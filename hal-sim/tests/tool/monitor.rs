@@ -1,0 +1,38 @@
+//! `cargo sim monitor` as its users run it.
+
+use crate::command::{Folder, scarab};
+
+#[test]
+fn a_payload_is_noticed_and_written_down_and_pushes_are_not_noticed() {
+    let folder = Folder::new();
+    let arguments = "monitor --payload 3@knee:0.2 --seed 2 --at 5 --hours 0.02 --pushes 6:20 --json";
+    scarab(arguments, &[&folder.path("monitor.json")]).ends_with(0);
+    let report = folder.json("monitor.json");
+    let run = &report["runs"][0];
+    assert_eq!(run["false_alarms_at_s"].as_array().map(Vec::len), Some(0));
+    assert!(run["alarm"]["after_s"].as_f64().is_some_and(|after| (3.0..10.0).contains(&after)), "{run}");
+    let update = &run["update"];
+    assert_eq!((update["cause"].as_str(), update["link"].as_str()), (Some("payload"), Some("knee")));
+    let mass = &update["values"][0];
+    assert_eq!((mass["name"].as_str(), mass["truth"].as_f64()), (Some("M2"), Some(3.0)));
+    // Five standard deviations.
+    assert!(mass["value"].as_f64().is_some_and(|value| (value - 3.0).abs() < 0.09), "{mass}");
+}
+
+#[test]
+fn bad_input_names_the_option() {
+    for (arguments, words) in [
+        ("--payload 3@foot:0.2", "`foot` is no joint"),
+        ("--payload -50@knee:0.2", "--payload -50@knee:0.2: the link has 6.935 kg"),
+        ("--payload nan@knee:0.2", "--payload nan@knee:0.2"),
+        ("--friction nan", "--friction: NaN"),
+        ("--hours 1e9", "--hours"),
+        ("--at -1", "--at"),
+        ("--pushes 6", "--pushes 6: is not PER_MINUTE:PEAK_NM"),
+        ("--pushes 0:5", "--pushes PER_MINUTE"),
+        ("--leg sp", "has no `truth`"),
+    ] {
+        let message = scarab(&format!("monitor {arguments}"), &[]).refusal();
+        assert!(message.contains(words), "{arguments}: {message}");
+    }
+}

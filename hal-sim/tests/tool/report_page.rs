@@ -1,0 +1,216 @@
+//! The report page: whole, well-formed, honest about what is not known, and safe against what a file may contain.
+
+use std::fs;
+
+use crate::command::{Folder, MUJOCO, Run, scarab};
+use scraper::{Html, Selector};
+
+const LEG: &str = include_str!("../../legs/x2-wearer-75kg.toml");
+
+/// A page as a browser reads it.
+struct Page {
+    text: String,
+    document: Html,
+}
+
+impl Page {
+    fn read(folder: &Folder) -> Self {
+        let text = fs::read_to_string(folder.path("report.html")).expect("the page was written");
+        let document = Html::parse_document(&text);
+        assert_eq!(document.errors, Vec::<String>::new(), "HTML that a browser must mend");
+        Self { text, document }
+    }
+
+    fn all(&self, selector: &str) -> Vec<String> {
+        let selector = Selector::parse(selector).expect("a selector");
+        self.document.select(&selector).map(|found| found.text().collect()).collect()
+    }
+
+    fn one(&self, selector: &str) -> String {
+        let found = self.all(selector);
+        assert_eq!(found.len(), 1, "{selector}");
+        found.into_iter().next().expect("one")
+    }
+}
+
+fn reported(arguments: &str, code: i32) -> (Folder, Run, Page) {
+    let folder = Folder::new();
+    let (page, json) = (folder.path("report.html"), folder.path("run.json"));
+    let paths = format!("{arguments} --json {} --report", json.display());
+    let run = scarab(&paths, &[&page]).ends_with(code);
+    let page = Page::read(&folder);
+    (folder, run, page)
+}
+
+#[test]
+fn a_page_shows_the_whole_run_and_fetches_nothing() {
+    let (folder, run, page) = reported("identify --seed 2", 0);
+    let report = folder.json("run.json");
+    assert!(
+        run.printed.trim_end().ends_with("report.html"),
+        "the last line says where it is: {}",
+        run.printed
+    );
+    assert_eq!(page.one(".verdict .word"), "Accepted");
+    assert!(page.all("tr.failed").is_empty() && page.all("table.tests tbody tr").len() > 10);
+    let names = page.all("tbody th");
+    let parameters = report["parameters"].as_array().expect("a list");
+    let bases = report["base_parameters"].as_array().expect("a list");
+    assert_eq!((parameters.len(), bases.len()), (28, 13));
+    for parameter in parameters.iter().chain(bases) {
+        let name = parameter["name"].as_str().expect("a name");
+        assert!(names.iter().any(|shown| shown == name), "{name}");
+    }
+    // Every parameter has its bar, every figure its drawing.
+    assert_eq!(page.all("svg.bar").len(), 28);
+    let figures = page.all("figure svg");
+    assert_eq!(figures.len(), 7);
+    for words in [
+        "excitation (identified from)",
+        "gait-6.5 (unused, predicted)",
+        "autocorrelation",
+        "swarm, cold start",
+    ] {
+        assert!(figures.iter().any(|figure| figure.contains(words)), "{words}");
+    }
+    let text = page.text.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
+    for reference in ["http:", "https:", "<script", "src=", "@import", "url("] {
+        assert!(!text.contains(reference), "{reference}");
+    }
+    let limits = page.one(".limits");
+    for name in ["ZZ1", "HX1", "IA1", "M2", "XX1", "HY1", "OFF1"] {
+        assert!(limits.contains(name), "{name}: {limits}");
+    }
+}
+
+#[test]
+fn what_a_leg_is_called_is_text_and_nothing_else() {
+    let folder = Folder::new();
+    let hostile = "</title></svg><script>alert(1)</script><b>&\\\"'";
+    let text = LEG.replacen("name = \"x2-wearer-75kg\"", &format!("name = \"{hostile}\""), 1).replacen(
+        "name = \"hip\"",
+        "name = \"<i>hip</i>\"",
+        1,
+    );
+    assert!(text.contains("<script>") && text.contains("<i>hip</i>"), "the leg file has other names by now");
+    let leg = folder.write("leg.toml", &text);
+    let page = folder.path("report.html");
+    scarab(&format!("identify --leg {} --report", leg.display()), &[&page]).ends_with(0);
+    let page = Page::read(&folder);
+    assert_eq!(page.one("h1"), "</title></svg><script>alert(1)</script><b>&\"'");
+    assert_eq!((page.all("script").len(), page.all("b").len(), page.all("i").len()), (0, 0, 0));
+    assert!(page.one("head title").contains("<script>"), "it is shown as it is written");
+    assert!(page.all("figure svg text").iter().any(|words| words.contains("<i>hip</i>")));
+}
+
+#[test]
+fn a_refused_run_says_so_first_and_gives_every_reason() {
+    let folder = Folder::new();
+    // A recording whose torque is another joint's motion: nothing explains it.
+    let recording = fs::read_to_string(MUJOCO).expect("a recording");
+    let mut lines = recording.lines();
+    let header = lines.next().expect("a header");
+    let torque = header.split(',').position(|name| name == "tau1_Nm").expect("a torque");
+    let mut wrong = format!("{header}\n");
+    for (number, line) in lines.enumerate() {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        fields[torque] = format!("{}", (number % 480) as f64 / 6.0 - 40.0);
+        wrong += &(fields.join(",") + "\n");
+    }
+    let file = folder.write("wrong.csv", &wrong);
+    let (page, json) = (folder.path("report.html"), folder.path("run.json"));
+    let arguments = format!("replay {} --leg mujoco-leg --json {} --report", file.display(), json.display());
+    scarab(&arguments, &[&page]).ends_with(3);
+    let page = Page::read(&folder);
+    assert_eq!(page.one(".verdict.refused .word"), "Refused");
+    assert!(page.one("head title").contains("refused"));
+    let report = folder.json("run.json");
+    let given = page.all(".verdict > ul > li");
+    let reasons = crate::command::reasons(&report);
+    assert!(reasons.contains(&"residual"), "{reasons:?}");
+    assert_eq!(given.len(), reasons.len());
+    for (words, reason) in given.iter().zip(reasons) {
+        assert!(words.starts_with(&reason.replace('_', " ")), "{words}");
+        assert!(words.len() > reason.len() + 20, "no sentence: {words}");
+    }
+    let residual = given.iter().find(|words| words.starts_with("residual")).expect("a reason");
+    assert!(residual.contains("joint 1 is off by") && residual.contains("at most"), "{residual}");
+    // Nothing that failed is left out, and the table marks it.
+    for finding in report["findings"].as_array().expect("a list") {
+        let words = finding["words"].as_str().expect("a sentence");
+        assert!(finding["passed"] == true || page.one(".verdict").contains(words), "{words}");
+    }
+    assert!(page.all("tr.failed").iter().any(|row| row.starts_with("residual")));
+}
+
+#[test]
+fn what_a_recording_without_a_prior_does_not_tell_is_a_dash() {
+    let folder = Folder::new();
+    let (page, json) = (folder.path("report.html"), folder.path("run.json"));
+    let arguments =
+        format!("replay {MUJOCO} --leg mujoco-leg --prior none --json {} --report", json.display());
+    // Whether it is accepted is not this test's matter.
+    scarab(&arguments, &[&page]);
+    let page = Page::read(&folder);
+    let report = folder.json("run.json");
+    let unknown = report["parameters"].as_array().expect("a list").iter();
+    let unknown: Vec<_> = unknown.filter(|parameter| parameter["value"].is_null()).collect();
+    assert!(unknown.len() > 10, "a planar leg without a prior knows few of its parameters");
+    // Name, value and sigma of each; a value that is not known has no bar either.
+    let rows = page.all("table.parameters tbody tr");
+    assert_eq!((rows.len(), page.all("svg.bar").len()), (28, 28 - unknown.len()));
+    for parameter in unknown {
+        let name = parameter["name"].as_str().expect("a name");
+        let row = rows.iter().find(|row| row.starts_with(name)).expect("a row");
+        assert!(row.starts_with(&format!("{name}\u{2013}\u{2013}")), "{row}");
+    }
+    assert!(!page.text.contains("NaN") && !page.text.contains("null"), "a number that is not one");
+    assert!(page.all("table td").iter().any(|cell| cell.ends_with("fourier.csv")), "no source");
+}
+
+#[test]
+fn many_runs_are_a_page_of_how_they_lie_about_truth() {
+    let (folder, _, page) = reported("identify --seeds 1..6", 0);
+    let report = folder.json("run.json");
+    let runs = report["runs"].as_array().expect("a list");
+    assert_eq!((page.one(".verdict .word"), page.all("figure svg").len()), ("6 of 6 accepted".into(), 1));
+    let rows = page.all("table.spread tbody tr");
+    assert_eq!(rows.len(), 13);
+    for (row, base) in rows.iter().zip(runs[0]["base_parameters"].as_array().expect("a list")) {
+        assert!(row.starts_with(base["name"].as_str().expect("a name")) && row.ends_with('6'), "{row}");
+    }
+    // Mean error of the first parameter in the sigma of each run, as the page says it.
+    let errors = runs.iter().map(|run| {
+        let of = |key: &str| run["base_parameters"][0][key].as_f64().expect("a number");
+        (of("value") - of("truth")) / of("sigma")
+    });
+    let mean = format!("{:+.1}", errors.sum::<f64>() / 6.0).replace('-', "\u{2212}");
+    assert!(rows[0].contains(&mean), "{mean} in {}", rows[0]);
+    assert!(page.all("figure svg").iter().all(|figure| figure.contains("mean") && figure.contains("spread")));
+    assert!(!page.text.contains("NaN") && !page.text.contains("<script"));
+    let tests = page.all("table.tests tbody tr");
+    assert!(tests.len() > 10 && tests.iter().any(|row| row.contains("36 of 36")), "{tests:?}");
+}
+
+#[test]
+fn runs_that_were_refused_are_told_with_their_seeds() {
+    let (_, _, page) = reported("identify --seeds 3..4 --perturb stuck=knee", 3);
+    assert_eq!(page.one(".verdict.refused .word"), "0 of 2 accepted");
+    assert!(page.one(".verdict.refused").contains("unexcited: 2 runs, seeds 3, 4"));
+}
+
+#[test]
+fn a_page_that_cannot_be_written_is_said_so() {
+    let folder = Folder::new();
+    let nowhere = folder.path("no/such/folder/report.html");
+    let run = scarab("identify --report", &[&nowhere]).ends_with(2);
+    assert!(run.errors.contains("report.html: cannot be written"), "{}", run.errors);
+}
+
+#[test]
+fn an_accepted_recording_of_which_nothing_was_held_out_is_not_called_validated() {
+    let (_, _, page) = reported(&format!("replay {MUJOCO} --leg mujoco-leg"), 0);
+    assert!(page.one(".verdict.accepted").contains("Not validated"));
+    let (_, _, page) = reported(&format!("replay {MUJOCO} --leg mujoco-leg --split 0.7"), 0);
+    assert!(!page.one(".verdict.accepted").contains("Not validated"));
+}

@@ -1,0 +1,113 @@
+//! Known masses on the command line: what is found, what is said, what is refused.
+
+use crate::command::{Folder, scarab};
+
+#[test]
+fn without_a_known_mass_everything_is_relative_and_the_report_says_so() {
+    let folder = Folder::new();
+    let run = scarab("identify --json", &[&folder.path("run.json")]).ends_with(0);
+    assert!(run.printed.contains("scale: relative to the torque constants used"), "{}", run.printed);
+    let json = folder.json("run.json");
+    assert_eq!(json["scale"], "relative");
+    assert!(json["payload"].is_null() && json["load"].is_null());
+    for (joint, constant) in json["torque_constant"].as_array().expect("one per joint").iter().enumerate() {
+        assert_eq!(constant["joint"], joint + 1);
+        assert_eq!(constant["used"], 1.5);
+        assert!(constant["identified"].is_null() && constant["sigma"].is_null());
+    }
+}
+
+#[test]
+fn a_known_mass_makes_the_report_absolute_and_widens_sigma() {
+    let folder = Folder::new();
+    scarab("identify --json", &[&folder.path("relative.json")]).ends_with(0);
+    let run = scarab("identify --payload 5@knee:0.2 --json", &[&folder.path("absolute.json")]).ends_with(0);
+    assert!(run.printed.contains("scale: absolute"), "{}", run.printed);
+    let (relative, absolute) = (folder.json("relative.json"), folder.json("absolute.json"));
+    assert_eq!(absolute["scale"], "absolute");
+    assert_eq!(absolute["payload"]["mass"], 5.0);
+    assert_eq!(absolute["payload"]["joint"], 2);
+    for constant in absolute["torque_constant"].as_array().expect("one per joint") {
+        let (found, sigma) = (constant["identified"].as_f64(), constant["sigma"].as_f64());
+        // 0.3 % of sigma at most; four of them.
+        assert!((found.expect("found") - 1.5).abs() < 0.018 && sigma.expect("known") < 0.0045);
+        assert_eq!(constant["consistent"], true);
+    }
+    let sigma = |json: &serde_json::Value, base: usize| json["base_parameters"][base]["sigma"].as_f64();
+    for base in 0..13 {
+        let (narrow, wide) = (sigma(&relative, base).expect("known"), sigma(&absolute, base).expect("known"));
+        // The records differ by less than a percent.
+        assert!(wide > 0.98 * narrow, "{base}");
+    }
+    // HX2 is known to 0.17 %, the constants to 0.16 and 0.22 %: it must show.
+    assert!(sigma(&absolute, 4) > sigma(&relative, 4).map(|sigma| 1.2 * sigma));
+}
+
+#[test]
+fn a_load_that_is_stated_is_taken_off_and_one_that_is_not_is_found_in_the_parameters() {
+    let folder = Folder::new();
+    let run = scarab("identify --load 3@knee:0.3 --json", &[&folder.path("run.json")]).ends_with(0);
+    assert!(run.printed.contains("3 kg on link 2 at x 0.3, y 0 m taken off"), "{}", run.printed);
+    let json = folder.json("run.json");
+    assert_eq!(json["scale"], "relative");
+    for base in json["base_parameters"].as_array().expect("thirteen") {
+        let [value, truth, sigma] = ["value", "truth", "sigma"].map(|key| base[key].as_f64().expect("known"));
+        // 0.9 kg m of first moment would be 300 sigma.
+        assert!((value - truth).abs() < 4.0 * sigma, "{}", base["name"]);
+    }
+}
+
+#[test]
+fn masses_that_cannot_be_meant_are_refused_by_option_and_reason() {
+    for (arguments, reason) in [
+        ("identify --payload 0@knee:0.2", "above 0 and at most 50"),
+        ("identify --payload 5@ankle:0.2", "--payload: `ankle` is no joint of `x2-wearer-75kg`"),
+        ("identify --payload 5@hip:0.5", "--payload: x 0.5 m, y 0 m lies outside the link of `hip`"),
+        ("identify --load 5@hip:0.5", "--load: x 0.5 m, y 0 m lies outside the link of `hip`"),
+        ("identify --load 5@", "is not KG@JOINT:X_M"),
+    ] {
+        let refusal = scarab(arguments, &[]).refusal();
+        assert!(refusal.contains(reason), "{arguments}: {refusal}");
+    }
+}
+
+#[test]
+fn geometry_is_asked_of_corrected_torques_too() {
+    // Without a known mass each of them is refused; a constant that makes up for a wrong length must not excuse it.
+    for options in [
+        "--perturb length=1.1 --payload 5@knee:0.2",
+        "--perturb length=1.05 --payload 5@knee:0.2",
+        "--perturb zero=5 --payload 5@knee:0.2",
+        "--perturb length=1.1 --load 3@knee:0.2",
+        "--perturb zero=5 --load 3@knee:0.2",
+    ] {
+        let folder = Folder::new();
+        scarab(&format!("identify {options} --json"), &[&folder.path("run.json")]).ends_with(3);
+        let json = folder.json("run.json");
+        let reasons = json["reasons"].as_array().expect("reasons");
+        assert!(reasons.iter().any(|reason| reason == "residual"), "{options}: {reasons:?}");
+        assert_eq!(json["scale"], "relative", "{options}");
+        let findings = json["findings"].as_array().expect("findings");
+        assert!(findings.iter().any(|finding| finding["test"] == "encoder_zero"), "{options}");
+    }
+}
+
+#[test]
+fn a_mass_too_light_to_tell_is_called_that() {
+    let run = scarab("identify --payload 0.001@knee:0.2", &[]).ends_with(0);
+    assert!(
+        run.printed.contains("too light to tell") && !run.printed.contains("contradicted"),
+        "{}",
+        run.printed
+    );
+}
+
+#[test]
+fn values_tampered_with_are_not_replaced_in_silence() {
+    for mass in ["--payload 5@knee:0.2", "--load 3@knee:0.2"] {
+        for tampering in ["inertia=0.7", "com=0.8"] {
+            let refusal = scarab(&format!("identify --perturb {tampering} {mass}"), &[]).refusal();
+            assert!(refusal.contains("one of the two"), "{refusal}");
+        }
+    }
+}
