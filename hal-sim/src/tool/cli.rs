@@ -11,6 +11,7 @@ mod model;
 mod monitor;
 mod motor;
 mod noise;
+mod paper;
 mod predict;
 mod regressor;
 mod replay;
@@ -48,6 +49,8 @@ enum Command {
     Monitor(monitor::MonitorArguments),
     /// Measure the current loop on a motor's test stand: steps, torque ripple, voltage limit, regeneration.
     Motor(motor::MotorArguments),
+    /// Run the paper's tables and figures again and set them beside what it prints.
+    Paper(paper::PaperArguments),
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     Regressor(regressor::RegressorArguments),
     /// Run the whole firmware on an emulated microcontroller (`cargo emulate`).
@@ -81,6 +84,7 @@ pub fn main() -> ExitCode {
         Command::Export(arguments) => export::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Motor(arguments) => motor::run(&arguments),
+        Command::Paper(arguments) => paper::run(&arguments),
         Command::Regressor(arguments) => regressor::run(&arguments),
         Command::Emulate(arguments) => emulate::emulate(&arguments),
         Command::Fw(arguments) => image::firmware(&arguments),

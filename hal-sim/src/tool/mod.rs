@@ -12,6 +12,7 @@
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
 //! | [`excite`] | an exciting motion designed, and what it will tell |
 //! | [`motor`] | the current loop measured on a test stand |
+//! | [`paper`] | the paper's experiments, run again |
 //! | [`monitor`] | an accepted model watched while the leg walks and something changes |
 //! | [`series`], [`figures`], [`html`] | a run as curves, drawn, and on one page |
 //! | [`model_choice`], [`temperature`] | what of the model was left to the data; when a model is another day's |
@@ -53,6 +54,7 @@ pub mod monitor;
 pub mod motions;
 pub mod motor;
 pub mod pair;
+pub mod paper;
 pub mod perturb;
 pub mod placed_mass;
 pub mod posture;

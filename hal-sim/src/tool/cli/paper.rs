@@ -1,0 +1,83 @@
+//! `paper`: the paper's tables and figures, run again and put beside what it prints.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::common::write_json;
+use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::figures;
+use crate::tool::paper::{self, PaperOptions, Part, document};
+use crate::tool::tables;
+
+/// More runs at once are a mistake.
+const MOST_SEEDS: u64 = 100_000;
+
+/// A table of the paper.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum TableArgument {
+    /// The test functions and their least values.
+    #[value(name = "III")]
+    Three,
+}
+
+/// A figure of the paper.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FigureArgument {}
+
+/// Which tables and figures, of how many runs, and what to keep.
+#[derive(Args, Debug)]
+pub struct PaperArguments {
+    /// A table; may be repeated. Without a table and a figure everything is made.
+    #[arg(long, value_enum, ignore_case = true)]
+    table: Vec<TableArgument>,
+    /// A figure; may be repeated.
+    #[arg(long, value_enum)]
+    figure: Vec<FigureArgument>,
+    /// Runs of each row, each with a seed of its own.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
+    seeds: Option<u64>,
+    /// Draw into this directory, as SVG.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Write the rows here.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Put the tables into this document, each between its markers.
+    #[arg(long)]
+    docs: Option<PathBuf>,
+}
+
+impl PaperArguments {
+    fn parts(&self) -> Vec<Part> {
+        if self.table.is_empty() && self.figure.is_empty() {
+            return Part::ALL.to_vec();
+        }
+        let tables = self.table.iter().map(|table| match table {
+            TableArgument::Three => Part::TableThree,
+        });
+        tables.collect()
+    }
+}
+
+/// Runs, prints and keeps; the exit code.
+pub fn run(arguments: &PaperArguments) -> Result<u8, ToolError> {
+    let options = PaperOptions { seeds: arguments.seeds };
+    let sections = paper::run(&arguments.parts(), &options)?;
+    if let Some(path) = &arguments.json {
+        write_json(path, &paper::report(&sections))?;
+    }
+    for section in &sections {
+        tables::print(&format!("{}\n", section.markdown))?;
+    }
+    if let Some(directory) = &arguments.out {
+        let drawn: Vec<_> = sections.iter().flat_map(|section| section.figures.iter().cloned()).collect();
+        figures::write(directory, &drawn)?;
+        tables::print(&format!("figures: {}\n", directory.display()))?;
+    }
+    if let Some(path) = &arguments.docs {
+        document::update(path, &sections)?;
+        tables::print(&format!("document: {}\n", path.display()))?;
+    }
+    Ok(EXIT_ACCEPTED)
+}
