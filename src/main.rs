@@ -8,7 +8,8 @@
 use core::panic::PanicInfo;
 
 use defmt_rtt as _;
-use scarab::board::odrive_v3_6::{crash, start};
+use scarab::board::crash;
+use scarab::board::odrive_v3_6::start;
 use scarab::task;
 
 #[cortex_m_rt::entry]

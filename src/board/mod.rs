@@ -3,6 +3,8 @@
 //! What a board must provide, and how to port: docs/board.md.
 
 #[cfg(all(feature = "tasks", target_os = "none"))]
+pub mod crash;
+#[cfg(all(feature = "tasks", target_os = "none"))]
 pub mod critical_section;
 pub mod odrive_v3_6;
 #[cfg(all(feature = "tasks", target_os = "none"))]

@@ -21,6 +21,21 @@ fn ends() -> (*mut u32, *mut u32) {
     (&raw mut _stack_end, &raw mut _stack_start)
 }
 
+/// Address of the last word there is.
+#[must_use]
+pub fn bottom() -> u32 {
+    ends().0 as u32
+}
+
+/// A word of the stack; `None` for addresses that are not on it.
+#[must_use]
+pub fn word(address: u32) -> Option<u32> {
+    let (bottom, top) = ends();
+    let inside = (bottom as u32..top as u32).contains(&address) && address.is_multiple_of(4);
+    // SAFETY: an aligned word between the stack's ends, which are the linker's; it may hold anything.
+    inside.then(|| unsafe { ptr::read_volatile(address as *const u32) })
+}
+
 /// Bytes there are.
 #[must_use]
 pub fn bytes() -> u32 {

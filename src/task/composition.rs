@@ -4,7 +4,7 @@ use embassy_executor::Executor;
 use static_cell::StaticCell;
 
 use super::interlock::{self, Cause};
-use super::surroundings::{Introduction, Surroundings};
+use super::surroundings::{Introduction, Surroundings, crashed};
 use super::{current, housekeeping, identify, leg, links, servo};
 use crate::board::odrive_v3_6::identity::Reset;
 use crate::board::odrive_v3_6::settings::analog::temperature_c;
@@ -13,7 +13,6 @@ use crate::board::odrive_v3_6::start::Board;
 use crate::board::odrive_v3_6::{brake, converter, memory, vectors, watchdog};
 use crate::board::stack;
 use crate::leg::Control;
-use crate::trace::Record;
 use cortex_m::peripheral::DWT;
 
 /// Builds the leg, hands everything to its level and starts them; does not return.
@@ -102,15 +101,7 @@ const LARGEST_DIVIDER: f32 = 19.0;
 
 fn introduction(board: &Board) -> Introduction {
     let identity = &board.identity;
-    let crash = board.crash.map(|crash| Record::Crash {
-        cause: crash.cause(),
-        pc: crash.pc,
-        lr: crash.lr,
-        status: crash.status,
-        address: crash.address,
-        line: crash.line,
-        file: crash.file(),
-    });
+    let crash = board.crash.map(crashed);
     Introduction { unique: identity.unique, version: identity.version, reset: identity.reset.name(), crash }
 }
 

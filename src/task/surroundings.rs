@@ -1,6 +1,7 @@
 //! What the tasks ask of the board around them, as values: so the same tasks run on the board and in the emulator.
 
 use super::leg::JOINTS;
+use crate::board::crash::Crash;
 use crate::trace::Record;
 use crate::units::Volt;
 
@@ -36,4 +37,11 @@ pub struct Introduction {
     pub reset: &'static str,
     /// How the image before this one ended.
     pub crash: Option<Record<JOINTS>>,
+}
+
+/// A crash as it is told.
+#[must_use]
+pub fn crashed(crash: &'static Crash) -> Record<JOINTS> {
+    let Crash { pc, lr, status, address, line, released, kept, .. } = *crash;
+    Record::Crash { cause: crash.cause(), pc, lr, status, address, line, file: crash.file(), released, kept }
 }

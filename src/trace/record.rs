@@ -46,12 +46,12 @@ records! {
         clock_hz: u32,
     }
     /// How the image before this one ended. The drive stays refused until its fault is reset.
-    Crash "crash n={=u32} cause={=str} pc={=u32:#x} lr={=u32:#x} status={=u32:#x} address={=u32:#x} line={=u32} file={=str}" {
-        /// `panic`, `hard_fault`, `interrupt`, `clock`.
+    Crash "crash n={=u32} cause={=str} pc={=u32:#x} lr={=u32:#x} status={=u32:#x} address={=u32:#x} line={=u32} file={=str} released={=u32} kept={=u32}" {
+        /// `panic`, `hard_fault`, `stack_overflow`, `interrupt`, `clock`.
         cause: &'static str,
-        /// Where.
+        /// Where; zero where the processor could not store it.
         pc: u32,
-        /// Called from.
+        /// Called from; of a stack overflow from where its deepest function may have been called.
         lr: u32,
         /// Fault status register, or the number of an interrupt nobody handles.
         status: u32,
@@ -61,6 +61,10 @@ records! {
         line: u32,
         /// End of a panic's file name, or `-`.
         file: &'static str,
+        /// Clock (that of `loops`) when the bridges were off.
+        released: u32,
+        /// Clock when this record was complete, before the reset.
+        kept: u32,
     }
     /// Why the drive may not be enabled at all until the board is started again or the cause is gone.
     Refused "refused n={=u32} why={=str} value={=u32:#x}" {

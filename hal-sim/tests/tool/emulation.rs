@@ -1,8 +1,9 @@
 //! The whole firmware on the emulated microcontroller against the same on the host.
 //!
-//! Needs QEMU and a compiler for the microcontroller, and takes minutes: `cargo test -p hal-sim --test tool emulation -- --ignored`.
+//! Needs QEMU and a compiler for the microcontroller, and takes minutes: `cargo test -p hal-sim --test tool emulated -- --ignored`.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::command::{Folder, scarab};
 use serde_json::Value;
@@ -20,8 +21,14 @@ fn base(report: &Value) -> Vec<(String, f64, f64, f64)> {
     entries.iter().map(entry).collect()
 }
 
+/// There is one image at a time; every test that builds and runs it holds this.
+pub fn the_image() -> MutexGuard<'static, ()> {
+    static IMAGE: Mutex<()> = Mutex::new(());
+    IMAGE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// A leg file that is not the shipped one: the knee's viscous friction half as large again.
-fn changed_leg(folder: &Folder) -> PathBuf {
+pub fn changed_leg(folder: &Folder) -> PathBuf {
     let text = include_str!("../../legs/x2-wearer-75kg.toml");
     let changed = text.replacen("coulomb = 4.67, viscous = 3.26", "coulomb = 4.67, viscous = 4.89", 1);
     assert_ne!(text, changed);
@@ -31,6 +38,7 @@ fn changed_leg(folder: &Folder) -> PathBuf {
 #[test]
 #[ignore = "needs an emulator and a compiler for the microcontroller: a step of .ci/run"]
 fn the_emulated_leg_finds_what_the_simulated_one_does_and_tells_the_same_bytes_every_time() {
+    let _image = the_image();
     let folder = Folder::new();
     let leg = changed_leg(&folder);
     let [json, once, again, host] =

@@ -2,6 +2,7 @@
 #![cfg(feature = "tool")]
 
 mod command;
+mod crash;
 mod emulation;
 mod excite;
 mod figures;

@@ -7,7 +7,6 @@ use embassy_stm32::rcc::{
 use embassy_stm32::spi::Spi;
 use embassy_stm32::time::Hertz;
 
-use super::crash::{self, Crash};
 use super::gate_driver::{self, GateDrivers};
 use super::identity::Identity;
 use super::registers::{apply, load, store};
@@ -16,6 +15,7 @@ use super::settings::{
     CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, chopper, converters, encoders, pins, timers,
 };
 use super::{interrupts, watchdog};
+use crate::board::crash::{self, Crash};
 use crate::board::stack;
 
 /// A board that has started, all outputs off.

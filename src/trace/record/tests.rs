@@ -137,6 +137,8 @@ const EXAMPLES: [Record<2>; 27] = [
         address: u32::MAX,
         line: 77,
         file: "a.rs",
+        released: 1_000,
+        kept: 2_000,
     },
     Record::Refused { why: "-", value: 0 },
     Record::State { tick: 1, drive: "-", activity: "-", phase: "-", motion: 0 },

@@ -103,6 +103,12 @@ pub fn stopped<R>(work: impl FnOnce() -> R) -> R {
     result
 }
 
+/// Counts of SysTick until the next tick, of 7,000.
+pub fn left() -> u32 {
+    // SAFETY: a register of the processor, always there; reading it changes nothing.
+    unsafe { SYST_CVR.read_volatile() }
+}
+
 /// One tick has begun; its number.
 pub fn tick() -> u32 {
     count();

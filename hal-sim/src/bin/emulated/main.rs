@@ -9,6 +9,8 @@
 //! | [`axes`] | converters and bridges: two axes that are ticked with what they would see, their answer goes nowhere |
 //! | [`plant`] | the leg: `hal_sim::world` with ideal drives, one step per servo tick, in time that is not the firmware's |
 //! | [`vectors`] | interrupts and their levels |
+//! | [`bridges`] | the bridges' main outputs, which only a crash writes |
+//! | [`rehearsal`] | whatever crashes a board |
 //!
 //! QEMU models neither PWM timers nor converters of this part, so the current loops cannot close here: they run and are counted,
 //! and the leg's torque comes from drives that follow their target. `cargo sim identify --drive full` closes them on the host.
@@ -16,10 +18,12 @@
 #![no_main]
 
 mod axes;
+mod bridges;
 mod clock;
 #[path = "../count-instructions/motor.rs"]
 mod motor;
 mod plant;
+mod rehearsal;
 mod vectors;
 
 use core::panic::PanicInfo;
@@ -28,18 +32,27 @@ use cortex_m_semihosting::{debug, heprintln};
 use defmt_semihosting as _;
 use embassy_executor::{SpawnToken, raw};
 use heapless::spsc::Queue;
-use scarab::board::stack;
+use rehearsal::Start;
+use scarab::board::{crash, stack};
 use scarab::leg::{Control, Filters};
-use scarab::task::surroundings::{Introduction, Surroundings};
+use scarab::task::interlock::{self, Cause};
+use scarab::task::surroundings::{Introduction, Surroundings, crashed};
 use scarab::task::{identify, leg, links, servo};
+use scarab::trace::Record;
 use static_cell::{ConstStaticCell, StaticCell};
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
     stack::prepare();
-    let introduction = Introduction { unique: [0; 3], version: [0; 3], reset: "emulator", crash: None };
+    let found = crash::take();
+    let start = rehearsal::start(found.is_some());
+    if found.is_some() {
+        interlock::raise(Cause::Crash);
+    }
+    let crash = found.map(crashed);
+    let introduction = Introduction { unique: [0; 3], version: [0; 3], reset: start.name(), crash };
     identify::introduce(&introduction, SURROUNDINGS.clock_hz);
-    let thread = hand_out();
+    let thread = hand_out(start);
     vectors::enable();
     servo::begin();
     clock::start();
@@ -59,6 +72,7 @@ fn spin<S>(task: SpawnToken<S>) -> ! {
     loop {
         // SAFETY: polled here only, at thread level, and never from within itself.
         unsafe { executor.poll() };
+        rehearsal::in_thread();
     }
 }
 
@@ -93,10 +107,11 @@ fn halves() -> (Control<{ leg::JOINTS }>, &'static mut leg::LegIdentification) {
 
 /// Everything to its level.
 #[inline(never)]
-fn hand_out() -> identify::Thread {
+fn hand_out(start: Start) -> identify::Thread {
     let (control, identification) = halves();
     static TOLD: ConstStaticCell<Queue<links::Told, { links::TOLD }>> = ConstStaticCell::new(Queue::new());
-    let links::Links { samples, requests, findings, drive, told, notes, .. } = links::Links::new(TOLD.take());
+    let links::Links { samples, requests, findings, drive, told, mut notes, .. } =
+        links::Links::new(TOLD.take());
     let [(sample_1, sampled_1), (sample_2, sampled_2)] = samples;
     static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
     let servo = SERVO.init(servo::ServoLoop::new(
@@ -111,7 +126,10 @@ fn hand_out() -> identify::Thread {
     if let Some(mut home) = servo::SERVO.try_lock() {
         *home = Some(servo);
     }
-    plant::prepare([sample_1, sample_2], requests.0, drive.1);
+    if !interlock::is_clear() {
+        let _ = notes.0.enqueue(Record::Refused { why: Cause::Crash.name(), value: interlock::causes() });
+    }
+    plant::prepare([sample_1, sample_2], requests.0, drive.1, start);
     identify::Thread {
         identification,
         told: told.1,
@@ -134,7 +152,5 @@ fn refuse(why: &str) -> ! {
 
 #[panic_handler]
 fn panic(information: &PanicInfo<'_>) -> ! {
-    heprintln!("emulated: {}", information);
-    end(false);
-    loop {}
+    crash::panic(information)
 }

@@ -8,10 +8,11 @@ use scarab::hal::{AxisSample, CURRENT_RATE_HZ, DriveCommand, JointSample, LegDri
 use scarab::leg::{ControlRequest, DriveState, PowerRequest};
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::task::leg::JOINTS;
-use scarab::task::{servo, statistics};
+use scarab::task::{interlock, servo, statistics};
 use scarab::units::Ampere;
 
 use super::axes::Axes;
+use super::rehearsal::Start;
 use super::{clock, end, refuse, vectors};
 use hal_sim::world::World;
 
@@ -48,6 +49,10 @@ pub struct Plant {
     answered: u32,
     /// After which servo tick nothing more is expected.
     last: u32,
+    /// What the operator does depends on it.
+    start: Start,
+    /// Servo tick at which the operator began.
+    began: u32,
 }
 
 /// What level 0 works on, once it is there.
@@ -59,6 +64,7 @@ impl Plant {
         samples: [Producer<'static, JointSample>; JOINTS],
         requests: Producer<'static, ControlRequest<JOINTS>>,
         drive: Consumer<'static, DriveState>,
+        start: Start,
     ) -> Option<Self> {
         let mut world = World::new(&described::PLANT, described::SEED);
         world.set_current_noise(&described::CURRENT_NOISE_A);
@@ -76,6 +82,8 @@ impl Plant {
             servo_ticks: 0,
             answered: 0,
             last: LONGEST_TICKS,
+            start,
+            began: 0,
         };
         plant.look_ahead(&sample);
         Some(plant)
@@ -124,9 +132,7 @@ impl Plant {
             // A servo that does not fetch is counted as missed.
             let _ = queue.enqueue(sample);
         }
-        if let Some(request) = (self.servo_ticks as usize).checked_sub(1).and_then(|index| ASKED.get(index)) {
-            let _ = self.requests.enqueue(*request);
-        }
+        self.operate();
         while let Some(state) = self.drive.dequeue() {
             if matches!(state, DriveState::Fault { .. }) {
                 self.last = self.last.min(self.servo_ticks + LAST_TICKS);
@@ -139,6 +145,20 @@ impl Plant {
         if self.servo_ticks > self.last {
             end(false);
         }
+    }
+
+    /// What the operator does in this tick.
+    fn operate(&mut self) {
+        if self.start.resets(self.servo_ticks) {
+            interlock::reset();
+            let _ = self.requests.enqueue(ControlRequest::Power(PowerRequest::ResetFault));
+            self.began = self.servo_ticks;
+        } else if let Some(index) = (self.servo_ticks - self.began).checked_sub(1)
+            && let Some(request) = ASKED.get(index as usize)
+        {
+            let _ = self.requests.enqueue(*request);
+        }
+        self.start.act(self.servo_ticks);
     }
 
     fn call_servo(&mut self) {
@@ -157,8 +177,11 @@ pub fn prepare(
     samples: [Producer<'static, JointSample>; JOINTS],
     requests: Producer<'static, ControlRequest<JOINTS>>,
     drive: Consumer<'static, DriveState>,
+    start: Start,
 ) {
-    let Some(plant) = Plant::new(samples, requests, drive) else { refuse("the axes cannot be calibrated") };
+    let Some(plant) = Plant::new(samples, requests, drive, start) else {
+        refuse("the axes cannot be calibrated")
+    };
     if let Some(mut home) = PLANT.try_lock() {
         *home = Some(plant);
     }

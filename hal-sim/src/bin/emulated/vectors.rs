@@ -14,7 +14,7 @@ use cortex_m_rt::exception;
 use scarab::task::{servo, statistics};
 use stm32_metapac::{Interrupt, interrupt};
 
-use super::{clock, plant};
+use super::{clock, plant, rehearsal};
 
 /// Interrupt priority registers of the processor, a byte for each of 82 vectors.
 const PRIORITIES: *mut u8 = 0xE000_E400 as *mut u8;
@@ -55,6 +55,7 @@ fn SysTick() {
 #[interrupt]
 fn OTG_HS() {
     servo::interrupt();
+    rehearsal::in_servo();
 }
 
 #[interrupt]

@@ -1,19 +1,20 @@
 //! `emulate`: the whole firmware on an emulated microcontroller (`cargo emulate`).
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::common::write_json;
 use super::leg_options::LegOptions;
+use crate::tool::emulate::crash::{CrashKind, CrashReport};
 use crate::tool::emulate::report::EmulationReport;
-use crate::tool::emulate::run::{build, run};
+use crate::tool::emulate::run::{build, crash, run};
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
 use crate::tool::trace::{log, run as told, run_report};
 
-/// Exit code of a run in which a tick was missed.
+/// Exit code of a run in which a tick was missed, and of a crash that was not handled as it has to be.
 const EXIT_MISSED: u8 = 1;
 
 /// A leg, and what to keep of its run.
@@ -33,6 +34,13 @@ pub struct EmulateArguments {
     /// Write the 500 Hz log of the motion identified from here, in the format that replay reads; the image then tells every sample.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Crash while the leg identifies, and show what comes of it: exit code 0 if the bridges were released first, the record
+    /// survived and the next start refused to enable, else 1.
+    #[arg(long, value_name = "KIND", conflicts_with_all = ["json", "csv"])]
+    crash: Option<CrashKind>,
+    /// Servo tick (of 4,000 per second) in which it crashes.
+    #[arg(long, value_name = "TICK", requires = "crash", default_value_t = 4_000)]
+    crash_tick: u32,
 }
 
 /// Builds, runs, decodes; the exit code.
@@ -40,6 +48,9 @@ pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load()?;
     let image = build(&leg, arguments.seed, arguments.csv.is_some())?;
     let path = arguments.trace.clone().unwrap_or_else(|| image.with_extension("trace"));
+    if let Some(kind) = arguments.crash {
+        return show(kind, arguments.crash_tick, &image, &path);
+    }
     let wall = run(&image, &path)?;
     let trace = told::read(&path, Some(&image), None)?;
     tables::print(&told::preface(&trace))?;
@@ -68,4 +79,28 @@ pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
         (0, false) => EXIT_REFUSED,
         _ => EXIT_MISSED,
     })
+}
+
+/// Crashes the image and says what came of it.
+fn show(kind: CrashKind, tick: u32, image: &Path, trace: &Path) -> Result<u8, ToolError> {
+    let beside = |what: &str| {
+        let mut name = trace.as_os_str().to_owned();
+        name.push(what);
+        PathBuf::from(name)
+    };
+    let [log, lines] = [".log", ".txt"].map(beside);
+    let begun = crash(image, trace, &log, kind, tick)?;
+    tables::print(&told::preface(&told::read(trace, Some(image), Some(&lines))?))?;
+    let text = |path: &Path| {
+        let bytes = std::fs::read(path);
+        let bytes = bytes.map_err(|error| ToolError::input(format!("{}: {error}", path.display())))?;
+        Ok::<_, ToolError>(String::from_utf8_lossy(&bytes).into_owned())
+    };
+    let report = CrashReport::new(kind, &text(&lines)?, &text(&log)?, begun, image)?;
+    // Megabytes, and nobody's but ours.
+    for file in [log, lines] {
+        let _ = std::fs::remove_file(file);
+    }
+    tables::print(&report.lines())?;
+    Ok(if report.complaints.is_empty() { EXIT_ACCEPTED } else { EXIT_MISSED })
 }

@@ -6,7 +6,9 @@
 //! | build | `scripts/firmware-build` |
 //! | run | `qemu-system-arm -M netduinoplus2 -icount shift=3`: 8 ns for each instruction, so every run is the same |
 //! | decode | `trace`, as from a probe |
+//! | where it was asked to crash | [`crash`]: what came of it |
 
+pub mod crash;
 pub mod plant_source;
 pub mod report;
 pub mod run;

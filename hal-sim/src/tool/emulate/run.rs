@@ -1,10 +1,12 @@
 //! Builds the emulated image and runs it.
 
 use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use super::crash::CrashKind;
 use super::plant_source;
 use crate::tool::error::ToolError;
 use crate::tool::image::build::{firmware_build, target_directory, write_if_changed};
@@ -25,21 +27,12 @@ const ARGUMENTS: [&str; 9] = [
 /// Below the target directory.
 const IMAGE: &str = "firmware/thumbv7em-none-eabihf/release/emulated";
 const EMULATOR: &str = "qemu-system-arm";
-const MACHINE: [&str; 13] = [
-    "-M",
-    "netduinoplus2",
-    "-nographic",
-    "-monitor",
-    "none",
-    "-serial",
-    "null",
-    "-semihosting-config",
-    "enable=on,target=native",
-    "-icount",
-    "shift=3",
-    "-no-reboot",
-    "-kernel",
-];
+const MACHINE: [&str; 9] =
+    ["-M", "netduinoplus2", "-nographic", "-monitor", "none", "-serial", "null", "-icount", "shift=3"];
+/// Records leave by the debugger's calls, and what the image is asked for comes by them.
+const SEMIHOSTING: [&str; 2] = ["-semihosting-config", "enable=on,target=native"];
+/// Exceptions, resets, and what is written to devices that are not modelled.
+const LOGGED: [&str; 2] = ["-d", "int,unimp,cpu_reset"];
 /// An identification takes some tens of seconds.
 const LONGEST: Duration = Duration::from_secs(300);
 
@@ -57,25 +50,46 @@ pub fn build(leg: &LegFile, seed: u64, log: bool) -> Result<PathBuf, ToolError> 
 
 /// Runs an image to its end; its records go to a file. How long it took.
 pub fn run(image: &Path, trace: &Path) -> Result<Duration, ToolError> {
+    let started = Instant::now();
+    let mut emulator = Command::new(EMULATOR);
+    emulator.args(MACHINE).args(SEMIHOSTING).arg("-kernel").arg(image);
+    wait(emulator, trace)?;
+    Ok(started.elapsed())
+}
+
+/// Has an image crash in a servo tick; its records go to a file, the emulator's log to another. The clock when it was begun.
+pub fn crash(image: &Path, trace: &Path, log: &Path, kind: CrashKind, tick: u32) -> Result<u32, ToolError> {
+    let [option, semihosting] = SEMIHOSTING;
+    let asked = format!("{semihosting},arg=scarab,arg=crash={}@{tick}", kind.name());
+    let mut emulator = Command::new(EMULATOR);
+    emulator.args(MACHINE).args([option, &asked]).args(LOGGED).arg("-D").arg(log).arg("-kernel").arg(image);
+    emulator.stderr(Stdio::piped());
+    let said = wait(emulator, trace)?;
+    let begun = said.lines().find_map(|line| line.rsplit_once(" was begun at instruction ")?.1.parse().ok());
+    begun.ok_or_else(|| {
+        ToolError::input(format!("the image does not tell when it crashed: `{}`", said.trim()))
+    })
+}
+
+/// Waits for the emulator's end; what it said, where that is kept.
+fn wait(mut emulator: Command, trace: &Path) -> Result<String, ToolError> {
     let output = File::create(trace).map_err(|error| ToolError::cannot_write(trace, &error))?;
     let started = Instant::now();
-    let mut emulator = Command::new(EMULATOR)
-        .args(MACHINE)
-        .arg(image)
-        .stdin(Stdio::null())
-        .stdout(output)
-        .spawn()
-        .map_err(|error| {
-            ToolError::input(format!(
-                "{EMULATOR} cannot be started: {error}; it is installed by `apt-get install qemu-system-arm`, `brew install \
-                 qemu` or from qemu.org"
-            ))
-        })?;
+    let mut emulator = emulator.stdin(Stdio::null()).stdout(output).spawn().map_err(|error| {
+        ToolError::input(format!(
+            "{EMULATOR} cannot be started: {error}; it is installed by `apt-get install qemu-system-arm`, `brew install qemu` or \
+             from qemu.org"
+        ))
+    })?;
     loop {
         let ended = emulator.try_wait().map_err(|error| ToolError::input(format!("{EMULATOR}: {error}")))?;
         // What the image thinks of its end is in its records.
         if ended.is_some() {
-            return Ok(started.elapsed());
+            let mut said = String::new();
+            if let Some(mut errors) = emulator.stderr.take() {
+                let _ = errors.read_to_string(&mut said);
+            }
+            return Ok(said);
         }
         if started.elapsed() > LONGEST {
             let _ = emulator.kill();

@@ -152,12 +152,25 @@ fn crash(line: &Line<'_>) -> Read<String> {
         u32::MAX => String::new(),
         address => format!(", address {address:#010x}"),
     };
+    // Older images do not tell these.
+    let clock = |key| value::<u32>(line, key);
+    let kept = match (clock("released"), clock("kept")) {
+        (Ok(released), Ok(kept)) => {
+            format!("; bridges off {} cycles before the record was complete", kept.wrapping_sub(released))
+        }
+        _ => String::new(),
+    };
+    // Zero is where nothing is known: a panic has its file and line instead.
+    let known = |words: &str, key| match hex(line, key)? {
+        0 => Read::Ok(String::new()),
+        known => Ok(format!(", {words} {known:#010x}")),
+    };
     Ok(format!(
-        "the image CRASHED before this start: {}{place}, at {:#010x}, called from {:#010x}, status {:#x}{address}",
+        "the image CRASHED before this start: {}{place}{}{}{}{address}{kept}",
         spaced(&text(line, "cause")?),
-        hex(line, "pc")?,
-        hex(line, "lr")?,
-        hex(line, "status")?
+        known("at", "pc")?,
+        known("called from", "lr")?,
+        known("status", "status")?
     ))
 }
 

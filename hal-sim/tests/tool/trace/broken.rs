@@ -143,6 +143,8 @@ fn faults_and_crashes_stand_before_the_tables_and_behind_the_verdict() {
         address: u32::MAX,
         line: 77,
         file: "control.rs",
+        released: 1_000,
+        kept: 1_300,
     });
     let lines = [teller.lines, after.lines].concat();
     assert!(boot < lines.len());
@@ -158,6 +160,7 @@ fn faults_and_crashes_stand_before_the_tables_and_behind_the_verdict() {
         "FAULT 0x8400 overspeed: joint 2",
         "FAULT of the axis, brake resistor: the board",
         "the image CRASHED before this start: panic in control.rs line 77, at 0x08001234",
+        "bridges off 300 cycles before the record was complete",
     ] {
         assert!(before.contains(words) && behind.contains(words), "{words}\n{}", run.printed);
     }

@@ -1,0 +1,238 @@
+//! Panic, hard fault, stack overflow, an interrupt nobody handles: outputs off first, then a record, then a reset.
+//!
+//! The record lies in memory that a reset leaves alone. The next start finds it, tells it, and refuses to enable until the
+//! operator has reset the fault. Nothing is told from here: a record to the probe may be what crashed.
+//!
+//! **Off, and staying off.** A current loop that interrupts a handler would switch its bridge on again. So a handler that can be
+//! interrupted masks interrupts, which is one instruction, and releases; nothing comes before, nothing in between. The release is
+//! the board's, found by the linker: a pointer to it would be memory that what crashed may have overwritten.
+//!
+//! **A stack that ran out** cannot be used to handle that: the hard fault's entry takes the stack anew where little is left of it.
+//! The processor could not store where it happened; what is found is the caller of the deepest function, at the bottom of the stack.
+//!
+//! Cost: `cargo emulate --crash`, in docs/board.md. Known limit: of an overflow the caller is the first word at the stack's bottom
+//! that may be a return address; a function that keeps one in an array would be taken for it.
+#![expect(
+    unsafe_code,
+    reason = "memory that outlives a reset, the stack pointer, and what the linker provides"
+)]
+
+use core::panic::PanicInfo;
+use core::ptr;
+
+use cortex_m::peripheral::SCB;
+use static_cell::StaticCell;
+
+use super::stack;
+
+/// Active vector of the processor, and its fault status and address registers.
+const ACTIVE: *const u32 = 0xE000_ED04 as *const u32;
+const FAULT_STATUS: *const u32 = 0xE000_ED28 as *const u32;
+const BUS_FAULT_ADDRESS: *const u32 = 0xE000_ED38 as *const u32;
+/// The address register holds the address of the fault (BFARVALID).
+const ADDRESS_IS_VALID: u32 = 1 << 15;
+
+const MAGIC: u32 = 0x4352_5348;
+/// Of a panic's file name so much is kept: its end.
+const NAME: usize = 40;
+/// Words at the stack's bottom among which a return address is looked for.
+const SEARCHED: u32 = 512;
+
+unsafe extern "C" {
+    /// Provided by the image's board: both bridges off, now, without lock or wait; then its clock, as in records.
+    safe fn scarab_release() -> u32;
+    static __stext: u32;
+    static __etext: u32;
+}
+
+/// What ended the image before this one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct Crash {
+    magic: u32,
+    cause: u32,
+    /// Where; zero where the processor could not store it.
+    pub pc: u32,
+    /// Called from.
+    pub lr: u32,
+    /// Fault status, or the number of an interrupt.
+    pub status: u32,
+    /// Address of a bus fault, or all ones.
+    pub address: u32,
+    /// Of a panic.
+    pub line: u32,
+    /// Clock when the bridges were off.
+    pub released: u32,
+    /// Clock when this record was complete but for its check.
+    pub kept: u32,
+    length: u32,
+    name: [u8; NAME],
+    check: u32,
+}
+
+/// Kinds of crashes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Cause {
+    /// Of the language.
+    Panic = 1,
+    /// Of the processor.
+    HardFault,
+    /// Nobody handles it.
+    Interrupt,
+    /// The crystal failed.
+    Clock,
+    /// The stack left its memory.
+    StackOverflow,
+}
+
+impl Crash {
+    const NONE: Self = Self {
+        magic: MAGIC,
+        cause: 0,
+        pc: 0,
+        lr: 0,
+        status: 0,
+        address: u32::MAX,
+        line: 0,
+        released: 0,
+        kept: 0,
+        length: 0,
+        name: [0; NAME],
+        check: 0,
+    };
+
+    fn of(cause: Cause, released: u32) -> Self {
+        Self { cause: cause as u32, released, ..Self::NONE }
+    }
+
+    fn sum(&self) -> u32 {
+        let [place, about] = [
+            [self.magic, self.cause, self.pc, self.lr, self.status],
+            [self.address, self.line, self.released, self.kept, self.length],
+        ];
+        let names = self.name.iter().map(|&byte| u32::from(byte));
+        let words = place.into_iter().chain(about).chain(names);
+        words.fold(0x811C_9DC5, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193))
+    }
+
+    /// The word in records.
+    #[must_use]
+    pub const fn cause(&self) -> &'static str {
+        match self.cause {
+            1 => "panic",
+            2 => "hard_fault",
+            3 => "interrupt",
+            4 => "clock",
+            5 => "stack_overflow",
+            _ => "unknown",
+        }
+    }
+
+    /// End of a panic's file name, or `-`.
+    #[must_use]
+    pub fn file(&self) -> &str {
+        let name = self.name.get(..self.length as usize).unwrap_or(&[]);
+        let name = core::str::from_utf8(name).unwrap_or("");
+        if name.is_empty() { "-" } else { name }
+    }
+}
+
+#[unsafe(link_section = ".uninit.crash")]
+static mut RECORD: core::mem::MaybeUninit<Crash> = core::mem::MaybeUninit::uninit();
+
+/// The record of the image before this one, once.
+pub fn take() -> Option<&'static Crash> {
+    static FOUND: StaticCell<Crash> = StaticCell::new();
+    let place = (&raw mut RECORD).cast::<Crash>();
+    // SAFETY: the static is there, aligned, and every pattern of bits is a `Crash`; volatile, because what it holds was
+    // written before this image began. Nobody else reaches it but a crash, which never returns.
+    let found = unsafe { ptr::read_volatile(place) };
+    // SAFETY: as above.
+    unsafe { ptr::write_volatile(place, Crash { magic: 0, ..Crash::NONE }) };
+    let whole = found.magic == MAGIC && found.check == found.sum();
+    whole.then(|| FOUND.try_init(found)).flatten().map(|found| &*found)
+}
+
+fn end(mut crash: Crash) -> ! {
+    crash.kept = scarab_release();
+    crash.check = crash.sum();
+    // SAFETY: the static is there and aligned; whoever else might be writing it was interrupted by this and never returns.
+    unsafe { ptr::write_volatile((&raw mut RECORD).cast::<Crash>(), crash) };
+    SCB::sys_reset()
+}
+
+/// What a panic does.
+pub fn panic(information: &PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    let mut crash = Crash::of(Cause::Panic, scarab_release());
+    if let Some(location) = information.location() {
+        let name = location.file().as_bytes();
+        let kept = name.get(name.len().saturating_sub(NAME)..).unwrap_or(&[]);
+        for (slot, &byte) in crash.name.iter_mut().zip(kept) {
+            *slot = byte;
+        }
+        (crash.line, crash.length) = (location.line(), kept.len() as u32);
+    }
+    end(crash)
+}
+
+/// What a board's own handler does that cannot go on; `status` is its to choose.
+pub fn give_up(cause: Cause, status: u32) -> ! {
+    cortex_m::interrupt::disable();
+    end(Crash { status, ..Crash::of(cause, scarab_release()) })
+}
+
+/// Takes the frame's address, and the stack anew where less than half a kilobyte of it is left; then handles the fault.
+#[unsafe(naked)]
+#[unsafe(export_name = "HardFault")]
+unsafe extern "C" fn hard_fault_entry() {
+    core::arch::naked_asm!(
+        "mrs r0, msp",
+        "ldr r1, =_stack_end + 512",
+        "cmp r0, r1",
+        "bhs 1f",
+        "ldr r1, =_stack_start",
+        "msr msp, r1",
+        "1: b {handle}",
+        handle = sym hard_fault,
+    )
+}
+
+/// No interrupt reaches this level.
+extern "C" fn hard_fault(frame: u32) -> ! {
+    let released = scarab_release();
+    // Of a frame outside the stack nothing was stored.
+    let stored = stack::word(frame).is_some();
+    let cause = if stored { Cause::HardFault } else { Cause::StackOverflow };
+    let word = |place: u32| stack::word(frame.wrapping_add(4 * place));
+    let status = load(FAULT_STATUS);
+    end(Crash {
+        pc: word(6).unwrap_or(0),
+        lr: word(5).or_else(deepest_caller).unwrap_or(0),
+        status,
+        address: if status & ADDRESS_IS_VALID != 0 { load(BUS_FAULT_ADDRESS) } else { u32::MAX },
+        ..Crash::of(cause, released)
+    })
+}
+
+/// The first word at the stack's bottom that may be a return address: odd, and among the instructions.
+fn deepest_caller() -> Option<u32> {
+    let code = (&raw const __stext as u32)..(&raw const __etext as u32);
+    (0..SEARCHED)
+        .filter_map(|place| stack::word(stack::bottom() + 4 * place))
+        .find(|word| word & 1 == 1 && code.contains(word))
+}
+
+#[unsafe(export_name = "DefaultHandler")]
+extern "C" fn unhandled() -> ! {
+    cortex_m::interrupt::disable();
+    let released = scarab_release();
+    let number = (load(ACTIVE) & 0x1FF) as i16 - 16;
+    end(Crash { status: number.cast_unsigned().into(), ..Crash::of(Cause::Interrupt, released) })
+}
+
+fn load(register: *const u32) -> u32 {
+    // SAFETY: the callers pass registers of the processor's system control block, readable without a side effect.
+    unsafe { ptr::read_volatile(register) }
+}
