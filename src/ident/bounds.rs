@@ -148,8 +148,7 @@ pub fn search_box<T: Real, const N: usize, const B: usize>(
 ) -> ParameterBox<T, B> {
     let mut bounds = measured_box(model, record);
     let Some(prior) = prior else { return bounds };
-    let ranges: [[Interval<T>; PARAMETERS_PER_JOINT]; N] =
-        core::array::from_fn(|joint| prior[joint].ranges(segment_length(model, prior, joint)));
+    let ranges = ranges(model, prior);
     for base in 0..model.base.rank() {
         let mut total = Interval::zero();
         for (terms, ranges) in model.base.terms(base).iter().zip(&ranges) {
@@ -164,6 +163,24 @@ pub fn search_box<T: Real, const N: usize, const B: usize>(
         }
     }
     bounds
+}
+
+fn ranges<T: Real, const N: usize, const B: usize>(
+    model: &RowModel<T, N, B>,
+    prior: &[LinkPrior<T>; N],
+) -> [[Interval<T>; PARAMETERS_PER_JOINT]; N] {
+    core::array::from_fn(|joint| prior[joint].ranges(segment_length(model, prior, joint)))
+}
+
+/// Smallest and largest values that a prior allows the single parameters: the ranges of which the box of the base
+/// parameters is made.
+#[must_use]
+pub fn parameter_box<T: Real, const N: usize, const B: usize>(
+    model: &RowModel<T, N, B>,
+    prior: &[LinkPrior<T>; N],
+) -> (LegParameters<T, N>, LegParameters<T, N>) {
+    let ranges = ranges(model, prior);
+    (ranges.map(|joint| joint.map(|range| range.0)), ranges.map(|joint| joint.map(|range| range.1)))
 }
 
 /// Distance to the next joint; of the last segment, what its centre of mass suggests.

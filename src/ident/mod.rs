@@ -51,7 +51,7 @@ pub mod window;
 
 pub use alignment::{Alignment, Direction, Misalignment, Misalignments};
 pub use baseline::Baseline;
-pub use bounds::{LinkPrior, prior_parameters, search_box};
+pub use bounds::{LinkPrior, parameter_box, prior_parameters, search_box};
 pub use choice::{Choice, Constant, DriveChoice, Estimator};
 pub use completion::{Status, complete, status};
 pub use consistent::{Completion, Effort, FullObjective, FullSearch, LegCost, Limits};

@@ -19,6 +19,7 @@
 //! of that size, since the backend rounds to whole pixels.
 
 mod canvas;
+pub mod chain;
 mod curve;
 pub mod motor;
 mod parameters;

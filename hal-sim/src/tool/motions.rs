@@ -69,7 +69,9 @@ pub fn random_excitation<const N: usize, const B: usize>(
     most_informative(model, limits, period, cycles, EXCITATION_SEED, CANDIDATES)
 }
 
-fn most_informative<const N: usize, const B: usize>(
+/// The most informative of `candidates` random motions, drawn with seeds from `seed` on.
+#[must_use]
+pub fn most_informative<const N: usize, const B: usize>(
     model: &RowModel<f64, N, B>,
     limits: &[JointEnvelope; N],
     period: Second,
@@ -151,7 +153,7 @@ fn log_determinant<const N: usize, const B: usize>(model: &RowModel<f64, N, B>, 
     (0..model.base.rank()).map(|base| factor.triangle()[base][base].abs().max(1e-30).ln()).sum()
 }
 
-/// The paper's gait, hip then knee (a third joint before them stands still), in the leg's own range where that is not
+/// The paper's gait, hip then knee (a third joint before them goes with the hip), in the leg's own range where that is not
 /// the paper's.
 fn walk<const N: usize>(
     leg: &LegFile,

@@ -4,8 +4,8 @@
 //! different requests.
 
 use scarab::hal::{LegDrives, Sample};
-use scarab::ident::{Kernel, LowPass, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
-use scarab::leg::{ControlOutput, ControlRequest, Leg, LegConfiguration};
+use scarab::ident::{Kernel, LowPass, Record, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
+use scarab::leg::{Activity, ControlOutput, ControlRequest, IdentifyPhase, Leg, LegConfiguration};
 use scarab::motion::Periodic;
 use scarab::safety::{DriveState, PowerRequest};
 
@@ -19,7 +19,7 @@ use super::setup::{SetupError, background, configuration};
 use super::simulate::{DriveModel, SimulationOptions};
 use super::words::drive_stop;
 use super::words::leg_error;
-use crate::world::World;
+use crate::world::{TICK_S, World};
 
 /// Taps of the device's filter.
 pub const TAPS: usize = 256;
@@ -194,6 +194,22 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         self.sample.joints = self.wiring.map(|wired| sample.joints[wired]);
         self.ticks += 1;
         output
+    }
+
+    /// Goes along the exciting motion, and no further than the record of it; `None` where the drive does not complete it.
+    pub fn recorded(&mut self, gravity: [f32; 3], longest_s: f64) -> Option<Record<f32, N, B>> {
+        let mut request = Some(ControlRequest::Identify);
+        for _ in 0..(longest_s / TICK_S) as u32 {
+            let output = self.tick(request.take(), gravity);
+            match (self.leg.control().activity(), self.leg.identification().solver()) {
+                (Activity::Identify(IdentifyPhase::Solve), Some(solver)) => {
+                    return Some(solver.record().clone());
+                }
+                (Activity::Identify(_), _) if !output.refused => {}
+                _ => break,
+            }
+        }
+        None
     }
 
     /// Why the drive is no longer enabled, in words.

@@ -16,7 +16,7 @@ use scarab::ident::{
     ConstantRatio, Ends, HeldOut, Misalignments, Record, Recorder, Residual, SearchState, Solver, Thresholds,
     Unused as HeldOutMotion, Verdict, torque_constant_ratio,
 };
-use scarab::leg::{Activity, ControlRequest, IdentifyPhase, LoggedSample, Segment, VALIDATION_MOTIONS};
+use scarab::leg::{LoggedSample, Segment, VALIDATION_MOTIONS};
 use scarab::model::Payload;
 
 use super::error::ToolError;
@@ -242,18 +242,11 @@ fn second_run<const N: usize, const B: usize>(
     for _ in 0..(ATTACHING_S / TICK_S) as u32 {
         pair.tick(None, gravity);
     }
-    let mut request = Some(ControlRequest::Identify);
-    for _ in 0..(LONGEST_RUN_S / TICK_S) as u32 {
-        let output = pair.tick(request.take(), gravity);
-        match (pair.leg.control().activity(), pair.leg.identification().solver()) {
-            (Activity::Identify(IdentifyPhase::Solve), Some(solver)) => return Ok(solver.record().clone()),
-            (Activity::Identify(_), _) if !output.refused => {}
-            _ => break,
-        }
-    }
-    Err(ToolError::input(format!(
-        "--payload: the drive did not complete the second run with {} kg on joint {}: too heavy?",
-        payload.mass,
-        payload.joint + 1
-    )))
+    pair.recorded(gravity, LONGEST_RUN_S).ok_or_else(|| {
+        ToolError::input(format!(
+            "--payload: the drive did not complete the second run with {} kg on joint {}: too heavy?",
+            payload.mass,
+            payload.joint + 1
+        ))
+    })
 }

@@ -115,15 +115,42 @@ pub fn simulate<const N: usize, const B: usize>(
     let simulated = perturb::simulated(leg, wrong)?;
     let mut context = Context::<N, B>::new(&perturb::believed(leg, wrong)?, options)?;
     perturb::configure(&mut context, wrong)?;
-    let mut pair = Pair::new(&simulated, &context, options.seed)?;
+    let Driven { pair, mut watch, stopped } = drive(leg, &simulated, &context, options)?;
+    if stopped.is_some() {
+        return watch.report(&pair, options, Vec::new(), stopped, started);
+    }
+    let tracking = track(&context, &pair);
+    watch.scale = Some(Scale::find(&context, &pair, options.payload.as_ref(), options.load.as_ref())?);
+    watch.report(&pair, options, tracking, None, started)
+}
+
+/// A leg that has been through one identification, and what was seen of it.
+pub struct Driven<'a, const N: usize, const B: usize> {
+    /// Leg and plant as the verdict left them.
+    pub pair: Pair<N, B>,
+    /// What the firmware does not know.
+    pub watch: Watch<'a, N, B>,
+    /// Why there is no verdict, in words.
+    pub stopped: Option<String>,
+}
+
+/// From off to the verdict: the firmware of `context` against the plant `simulated`; `leg` is how its user calls it.
+pub fn drive<'a, const N: usize, const B: usize>(
+    leg: &LegFile,
+    simulated: &LegFile,
+    context: &'a Context<N, B>,
+    options: &SimulationOptions,
+) -> Result<Driven<'a, N, B>, ToolError> {
+    let wrong = options.perturbations.as_slice();
+    let mut pair = Pair::new(simulated, context, options.seed)?;
     if let Some(load) = &options.load {
         pair.world.attach(load.joint, load.mass, load.place.into());
     }
     perturb::at_start(leg, &mut pair, wrong)?;
-    let mut run = Watch::new(&context);
+    let mut watch = Watch::new(context);
     if !pair.enable(context.gravity) {
         let words = "the drive refused to be enabled at the start: the leg is not where it may be";
-        return run.report(&pair, options, Vec::new(), Some(words.into()), started);
+        return Ok(Driven { pair, watch, stopped: Some(words.into()) });
     }
     let mut request = Some(ControlRequest::Identify);
     let largest = (LONGEST_RUN_S / TICK_S) as u64;
@@ -132,18 +159,18 @@ pub fn simulate<const N: usize, const B: usize>(
         // What the sensors of this tick saw, without noise.
         let (torque, sticking) = (pair.world.motor_torque(), pair.world.sticking());
         let output = pair.tick(request.take(), context.gravity);
-        run.see(&pair, &torque, &sticking, output.logged.as_ref());
+        watch.see(&pair, &torque, &sticking, output.logged.as_ref());
         let activity = pair.leg.control().activity();
         if activity != before {
             match activity {
                 Activity::Identify(IdentifyPhase::Excite) => {
-                    perturb::at_excitation(&simulated, &context, &mut pair, wrong);
+                    perturb::at_excitation(simulated, context, &mut pair, wrong);
                 }
                 Activity::Identify(IdentifyPhase::Settle) => {
-                    perturb::after_excitation(&simulated, &mut pair, wrong);
+                    perturb::after_excitation(simulated, &mut pair, wrong);
                 }
                 Activity::Identify(IdentifyPhase::Validate { motion: 0, step: Step::Approach }) => {
-                    perturb::before_validation(&context, &mut pair, wrong);
+                    perturb::before_validation(context, &mut pair, wrong);
                 }
                 _ => {}
             }
@@ -151,19 +178,16 @@ pub fn simulate<const N: usize, const B: usize>(
         }
         match activity {
             Activity::Identify(_) => {}
-            _ if pair.leg.control().verdict().is_some() => break,
+            _ if pair.leg.control().verdict().is_some() => return Ok(Driven { pair, watch, stopped: None }),
             _ => {
-                let words = pair.stop_words(leg);
-                return run.report(&pair, options, Vec::new(), Some(words), started);
+                let stopped = Some(pair.stop_words(leg));
+                return Ok(Driven { pair, watch, stopped });
             }
         }
         if pair.ticks > largest {
             return Err(SetupError::new(leg, "identification did not end").into());
         }
     }
-    let tracking = track(&context, &pair);
-    run.scale = Some(Scale::find(&context, &pair, options.payload.as_ref(), options.load.as_ref())?);
-    run.report(&pair, options, tracking, None, started)
 }
 
 /// Position error on the 3 s gait, feedback alone and with the model, from the same instant.

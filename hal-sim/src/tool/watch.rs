@@ -138,6 +138,17 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         }
     }
 
+    /// Rows of a motion that was predicted, with the noise-free torque; the last motion's are there once it is reported.
+    #[must_use]
+    pub fn noise_free(&self, motion: usize) -> &[FilteredRows<f32, N, B>] {
+        self.validation_rows.get(motion).map_or(&[], Vec::as_slice)
+    }
+
+    /// What was logged of a motion.
+    pub fn logged(&self, segment: Segment) -> impl Iterator<Item = &LoggedSample<N>> {
+        self.log.iter().filter(move |logged| logged.segment == Some(segment))
+    }
+
     /// Looks at the tick that was just run, `torque` and `sticking` from before it.
     pub fn see(
         &mut self,

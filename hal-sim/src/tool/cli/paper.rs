@@ -19,11 +19,25 @@ enum TableArgument {
     /// The test functions and their least values.
     #[value(name = "III")]
     Three,
+    /// The chain's parameters one by one; always with VI.
+    #[value(name = "V")]
+    Five,
+    /// The chain's combinations that torque determines; always with V.
+    #[value(name = "VI")]
+    Six,
+    /// The chain identified before and after its load changes; no table of the paper, but what it argues from.
+    LoadChange,
+    /// Iterations of the default swarm on identification problems; no table of the paper.
+    Convergence,
 }
 
 /// A figure of the paper.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum FigureArgument {}
+enum FigureArgument {
+    /// The chain's torque, predicted and real.
+    #[value(name = "7")]
+    Seven,
+}
 
 /// Which tables and figures, of how many runs, and what to keep.
 #[derive(Args, Debug)]
@@ -55,8 +69,20 @@ impl PaperArguments {
         }
         let tables = self.table.iter().map(|table| match table {
             TableArgument::Three => Part::TableThree,
+            TableArgument::Five | TableArgument::Six => Part::TablesFiveSix,
+            TableArgument::LoadChange => Part::LoadChange,
+            TableArgument::Convergence => Part::Convergence,
         });
-        tables.collect()
+        let figures = self.figure.iter().map(|figure| match figure {
+            FigureArgument::Seven => Part::FigureSeven,
+        });
+        let mut parts: Vec<Part> = Vec::new();
+        for part in tables.chain(figures) {
+            if !parts.contains(&part) {
+                parts.push(part);
+            }
+        }
+        parts
     }
 }
 

@@ -6,9 +6,22 @@
 //! | part | what is made |
 //! | --- | --- |
 //! | [`table_three`] | the test functions as printed and as intended, and their least values |
+//! | [`tables_five_six`] | parameters of the three-joint chain, by both methods |
+//! | [`figure_seven`] | its torque on the verification motion |
+//! | [`load_change`] | the chain identified before and after its load changes |
+//! | [`convergence`] | iterations of the default swarm on identification problems |
 
+pub mod chain;
+pub mod convergence;
 pub mod document;
+pub mod figure_seven;
+pub mod load_change;
+pub mod markdown;
+pub mod printed;
+pub mod raw_cost;
 pub mod table_three;
+pub mod tables_five_six;
+pub mod verification;
 
 use serde_json::{Map, Value};
 
@@ -21,11 +34,19 @@ use super::report::SCHEMA;
 pub enum Part {
     /// The test functions.
     TableThree,
+    /// The chain's parameters; both tables come from the same runs.
+    TablesFiveSix,
+    /// The chain's torque on the verification motion.
+    FigureSeven,
+    /// The chain before and after its load changes.
+    LoadChange,
+    /// The swarm on identification problems.
+    Convergence,
 }
 
 impl Part {
     /// Everything, in the paper's order.
-    pub const ALL: [Self; 1] = [Self::TableThree];
+    pub const ALL: [Self; 4] = [Self::TableThree, Self::TablesFiveSix, Self::FigureSeven, Self::LoadChange];
 }
 
 /// What holds for all parts.
@@ -53,10 +74,19 @@ pub fn run(parts: &[Part], options: &PaperOptions) -> Result<Vec<Section>, ToolE
     parts.iter().map(|part| section(*part, options)).collect()
 }
 
-fn section(part: Part, _options: &PaperOptions) -> Result<Section, ToolError> {
+fn section(part: Part, options: &PaperOptions) -> Result<Section, ToolError> {
     match part {
         Part::TableThree => table_three::section(),
+        Part::TablesFiveSix => tables_five_six::section(options),
+        Part::FigureSeven => figure_seven::section(options),
+        Part::LoadChange => load_change::section(options),
+        Part::Convergence => convergence::section(options),
     }
+}
+
+/// A part of the report as JSON.
+fn to_json(part: &impl serde::Serialize) -> Result<Value, ToolError> {
+    serde_json::to_value(part).map_err(|error| ToolError::input(format!("no JSON: {error}")))
 }
 
 /// The JSON report: the schema, the rows of Table IV and whatever else was made.
