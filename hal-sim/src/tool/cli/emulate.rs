@@ -56,7 +56,7 @@ pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
     tables::print(&told::preface(&trace))?;
     let attention = told::attention(&trace);
     if let Some(csv) = &arguments.csv {
-        let written = log::write(&trace, &leg, csv)?;
+        let written = log::write(&trace, &leg, log::TRAINING, csv)?;
         tables::print(&format!("log: {}, {} samples\n\n", csv.display(), written.samples))?;
     }
     let Some(loops) = trace.statistics.loops() else {

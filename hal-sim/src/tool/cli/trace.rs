@@ -26,9 +26,12 @@ pub struct TraceArguments {
     /// Write the report here, for exit codes 0 and 3.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Write the 500 Hz log of the motion identified from here, in the format that replay reads.
+    /// Write the 500 Hz log of one motion here, in the format that replay reads.
     #[arg(long)]
     csv: Option<PathBuf>,
+    /// Which one: 0 is the motion identified from, 1 and more are those that were only predicted.
+    #[arg(long, value_name = "NUMBER", requires = "csv", default_value_t = log::TRAINING)]
+    csv_motion: u8,
     /// Write the run as one HTML page here.
     #[arg(long)]
     report: Option<PathBuf>,
@@ -57,12 +60,18 @@ pub fn run(arguments: &TraceArguments) -> Result<u8, ToolError> {
 fn report(arguments: &TraceArguments, trace: &Trace) -> Result<u8, ToolError> {
     let leg = &leg(arguments, trace)?;
     if let Some(path) = &arguments.csv {
-        let written = log::write(trace, leg, path)?;
+        let motion = arguments.csv_motion;
+        let written = log::write(trace, leg, motion, path)?;
         let missing = match written.missing {
             0 => String::new(),
             missing => format!(", {missing} between them are missing"),
         };
-        tables::print(&format!("log: {}, {} samples{missing}\n\n", path.display(), written.samples))?;
+        let others = match log::others(trace, motion) {
+            others if others.is_empty() => String::new(),
+            others => format!("; the trace holds motions {others} as well (--csv-motion)"),
+        };
+        let (path, samples) = (path.display(), written.samples);
+        tables::print(&format!("log: {path}, {samples} samples of motion {motion}{missing}{others}\n\n"))?;
     }
     let kept = arguments.model.kept(leg)?;
     let mut run = run_report(trace, leg)?;

@@ -1,4 +1,4 @@
-//! The 500 Hz log of a trace as recordings that `replay` reads.
+//! The 500 Hz log of a trace as recordings that `replay` reads, one motion a file.
 
 use std::path::Path;
 
@@ -21,19 +21,25 @@ pub struct Written {
     pub missing: u64,
 }
 
-/// Writes the motion identified from, of the last identification that logged one: anatomical angles and torques.
+/// Number of the motion identified from; those that were only predicted follow.
+pub const TRAINING: u8 = 0;
+
+/// Writes one motion of the last identification that logged it: anatomical angles and torques.
 ///
 /// # Errors
-/// Nothing was logged, the leg has other joints, or the file cannot be written.
-pub fn write(trace: &Trace, leg: &LegFile, path: &Path) -> Result<Written, ToolError> {
-    let training = || trace.log.iter().filter(|(_, sample)| sample.segment == "training");
-    let Some((last, _)) = training().next_back() else {
-        return Err(ToolError::input(
-            "--csv: the trace holds no log of a motion that was identified from (records `log`, sent on request)",
-        ));
+/// It was not logged, the leg has other joints, or the file cannot be written.
+pub fn write(trace: &Trace, leg: &LegFile, motion: u8, path: &Path) -> Result<Written, ToolError> {
+    let of_motion = || trace.log.iter().filter(|(_, sample)| number(sample) == Some(motion));
+    let Some((last, _)) = of_motion().next_back() else {
+        return Err(ToolError::input(match others(trace, motion) {
+            others if others.is_empty() => {
+                "--csv: the trace holds no log of a motion (records `log`, sent on request)".to_owned()
+            }
+            others => format!("--csv: the trace holds no log of motion {motion}, but of {others}"),
+        }));
     };
     let samples: Vec<&Sample> =
-        training().filter(|(results, _)| results == last).map(|(_, sample)| sample).collect();
+        of_motion().filter(|(results, _)| results == last).map(|(_, sample)| sample).collect();
     if let Some(sample) = samples.iter().find(|sample| sample.counts.len() != leg.joints.len()) {
         let (told, own) = (sample.counts.len(), leg.joints.len());
         return Err(ToolError::input(format!("--csv: the log is of {told} joints, the leg has {own}")));
@@ -46,6 +52,25 @@ pub fn write(trace: &Trace, leg: &LegFile, path: &Path) -> Result<Written, ToolE
     let missing = steps.map(|steps| steps.saturating_sub(1)).sum();
     with_leg_size!(leg, write_sized(path, leg, samples))?;
     Ok(Written { samples: samples.len(), missing })
+}
+
+/// The other motions that were logged, as a list; empty where there are none.
+#[must_use]
+pub fn others(trace: &Trace, motion: u8) -> String {
+    let mut numbers: Vec<u8> = trace.log.iter().filter_map(|(_, sample)| number(sample)).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let others = numbers.iter().filter(|number| **number != motion).map(u8::to_string);
+    others.collect::<Vec<_>>().join(", ")
+}
+
+/// Of the motion that a sample belongs to.
+fn number(sample: &Sample) -> Option<u8> {
+    match sample.segment.as_str() {
+        "training" => Some(TRAINING),
+        "validation" => Some(sample.motion),
+        _ => None,
+    }
 }
 
 /// The ticks began anew, or nothing was logged for longer than a gap may be.

@@ -97,6 +97,17 @@ fn the_log_of_a_trace_is_the_log_of_the_run_and_replay_finds_the_same_parameters
     assert!(run.printed.contains("verdict: accepted"), "{}", run.printed);
     let same = std::fs::read(&own_log).expect("written") == std::fs::read(&log).expect("written");
     assert!(same, "the trace's log differs from the run's");
+    assert!(run.printed.contains("samples of motion 0; the trace holds motions 1, 2, 3"), "{}", run.printed);
+
+    // Another motion on request: that many samples of it were told, at its own angles.
+    let other = folder.path("other.csv");
+    scarab("trace --csv-motion 2 --csv", &[&other, &trace]).ends_with(0);
+    let told = accepted().iter().filter(|line| line.contains("segment=validation motion=2 ")).count();
+    let (first, other) = (folder.table("log.csv"), folder.table("other.csv"));
+    assert_eq!((&other.header, other.rows.len()), (&first.header, told));
+    assert_ne!(other.rows[100], first.rows[100]);
+    let none = scarab("trace --csv-motion 9 --csv", &[&folder.path("none.csv"), &trace]).ends_with(2).errors;
+    assert!(none.contains("no log of motion 9, but of 0, 1, 2, 3"), "{none}");
     let page = std::fs::read_to_string(page).expect("written");
     assert!(page.contains("emulated board") && page.contains("trace of a board"), "it is the board's page");
     for figure in ["motions.svg", "torque-1.svg", "torque-2.svg", "residuals.svg", "base-parameters.svg"] {
