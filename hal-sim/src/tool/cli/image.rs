@@ -8,6 +8,7 @@ use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::image::build::{Options, build, flash};
 use crate::tool::image::leg_source::{describe, source};
+use crate::tool::image::panics::Panics;
 use crate::tool::image::size::ImageSize;
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
@@ -70,7 +71,7 @@ pub struct FlashArguments {
     probe: Vec<String>,
 }
 
-/// Builds and prints the sizes; exit code 3 where a goal is not kept.
+/// Builds and prints the sizes; exit code 3 where a goal is not kept or an interrupt can panic.
 pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     let options = arguments.image.load()?;
     if let Some(path) = &arguments.source {
@@ -80,7 +81,8 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     }
     let image = build(&options)?;
     let size = ImageSize::of(&image)?;
-    tables::print(&format!("{}\n\n{}", image.display(), size.text()))?;
+    let panics = Panics::of(&image)?;
+    tables::print(&format!("{}\n\n{}\n{}", image.display(), size.text(), panics.text()))?;
     if let Some(path) = &arguments.json {
         let text =
             serde_json::to_string_pretty(&size).map_err(|error| ToolError::cannot_write(path, &error))?;
@@ -90,7 +92,11 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     for goal in &missed {
         eprintln!("too large: {goal}");
     }
-    Ok(if missed.is_empty() { EXIT_ACCEPTED } else { EXIT_REFUSED })
+    for place in panics.missed() {
+        eprintln!("{place}");
+    }
+    let kept = missed.is_empty() && panics.missed().is_empty();
+    Ok(if kept { EXIT_ACCEPTED } else { EXIT_REFUSED })
 }
 
 /// Builds, checks the size, writes it onto the board and prints its records.

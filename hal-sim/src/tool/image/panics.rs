@@ -1,0 +1,306 @@
+//! Where an image can panic, and which of these places its interrupts reach.
+//!
+//! Why: a panic of the current loops or the servo would stop the leg, so there is to be none, and no compiler says whether there is. The
+//! image says it: every branch to one of the functions with which the language panics is a place, and the functions that the
+//! vectors reach by branches are the interrupts'.
+//!
+//! ```text
+//! BL      11110 S imm10 | 11 J1 1 J2 imm11       target = pc + 4 + imm25, I = not(J xor S)        call
+//! B.W     11110 S imm10 | 10 J1 1 J2 imm11       the same                                        last call
+//! Bc.W    11110 S c imm6 | 10 J1 0 J2 imm11      target = pc + 4 + imm21                         to a cold end
+//! B, Bc   11100 imm11, 1101 c imm8               target = pc + 4 + imm12, imm9                   to a neighbour
+//! ```
+//!
+//! Source: Armv7-M Architecture Reference Manual (DDI 0403), A7.7.12, A7.7.18. Words between code are known by the mapping symbols
+//! `$t` and `$d` (Arm ELF, IHI 0044, 4.5.5).
+//!
+//! Known limits: calls by a pointer are counted and not followed; a division by zero is told and not refused, since the remainders of
+//! queues ([`REMAINDER`]) are as many as the compiler makes of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
+
+use crate::tool::error::ToolError;
+
+/// Vectors of levels 0 and 1: converters, index pulses, servo.
+const VECTORS: [&str; 4] = ["ADC", "EXTI9_5", "EXTI15_10", "OTG_HS"];
+/// How the names of functions begin with which the language and `defmt` panic.
+const PANICS: [&str; 8] = [
+    "core::panicking::",
+    "core::option::unwrap_failed",
+    "core::option::expect_failed",
+    "core::result::unwrap_failed",
+    "core::cell::panic_",
+    "core::slice::index::slice_index_fail",
+    "_defmt_panic",
+    "__defmt_default_panic",
+];
+/// The one that interrupts may have: a queue of `heapless` keeps its capacity as a value and takes the remainder of an index by
+/// it, and the compiler does not see that every capacity is a constant above zero.
+const REMAINDER: &str = "core::panicking::panic_const::panic_const_div_by_zero";
+
+/// A branch to a panic.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Place {
+    /// Function.
+    pub within: String,
+    /// Which panic.
+    pub panic: String,
+}
+
+/// Places of an image.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Panics {
+    /// All of them.
+    pub all: Vec<Place>,
+    /// Those that levels 0 and 1 reach.
+    pub interrupts: Vec<Place>,
+    /// Functions that levels 0 and 1 reach.
+    pub reached: usize,
+    /// Calls in them by a pointer.
+    pub by_pointer: usize,
+}
+
+/// One function.
+struct Function {
+    name: String,
+    end: u32,
+    /// Where its branches go.
+    targets: Vec<u32>,
+    by_pointer: usize,
+}
+
+impl Panics {
+    /// Of an image.
+    pub fn of(image: &Path) -> Result<Self, ToolError> {
+        let wrong = |error: &dyn std::fmt::Display| ToolError::input(format!("{}: {error}", image.display()));
+        let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
+        let file = object::File::parse(&*bytes).map_err(|error| wrong(&error))?;
+        let text = file.section_by_name(".text").ok_or_else(|| wrong(&"no section .text"))?;
+        let code = text.data().map_err(|error| wrong(&error))?;
+        let words = Code { base: text.address() as u32, bytes: code, data: data_ranges(&file) };
+        let mut functions = BTreeMap::new();
+        for symbol in file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text && symbol.size() > 0) {
+            let begin = symbol.address() as u32 & !1;
+            let end = begin + symbol.size() as u32;
+            let name = format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or("?")));
+            let (targets, by_pointer) = words.branches(begin, end);
+            // Of several names for one place a vector's is kept.
+            let known = functions.get(&begin).is_some_and(|known: &Function| VECTORS.contains(&&*known.name));
+            if !known {
+                functions.insert(begin, Function { name, end, targets, by_pointer });
+            }
+        }
+        if VECTORS.iter().any(|vector| functions.values().all(|function| function.name != *vector)) {
+            return Err(wrong(&format!("lacks one of the vectors {}", VECTORS.join(", "))));
+        }
+        Ok(Self::within(&functions))
+    }
+
+    fn within(functions: &BTreeMap<u32, Function>) -> Self {
+        let mut reached: BTreeSet<u32> = BTreeSet::new();
+        let mut open: Vec<u32> = functions
+            .iter()
+            .filter(|(_, function)| VECTORS.contains(&&*function.name))
+            .map(|(begin, _)| *begin)
+            .collect();
+        while let Some(begin) = open.pop() {
+            if reached.insert(begin) {
+                open.extend(callees(functions, begin).filter(|callee| !is_panic(functions, *callee)));
+            }
+        }
+        let mut panics = Self { reached: reached.len(), ..Self::default() };
+        for (begin, function) in functions.iter().filter(|(begin, _)| !is_panic(functions, **begin)) {
+            let places = callees(functions, *begin).filter(|callee| is_panic(functions, *callee));
+            let places = places.map(|callee| Place {
+                within: function.name.clone(),
+                panic: functions.get(&callee).map_or_else(String::new, |callee| callee.name.clone()),
+            });
+            let places: Vec<Place> = places.collect();
+            if reached.contains(begin) {
+                panics.by_pointer += function.by_pointer;
+                panics.interrupts.extend(places.iter().cloned());
+            }
+            panics.all.extend(places);
+        }
+        panics
+    }
+
+    /// What interrupts may not have, in words.
+    #[must_use]
+    pub fn missed(&self) -> Vec<String> {
+        let others = self.interrupts.iter().filter(|place| !place.panic.starts_with(REMAINDER));
+        others.map(|place| format!("an interrupt can panic: {} in {}", place.panic, place.within)).collect()
+    }
+
+    /// Some lines.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let functions: BTreeSet<&str> = self.all.iter().map(|place| &*place.within).collect();
+        let mut text = format!(
+            "panics: {} places in {} functions; {} of them in the {} functions that the current loops and the servo reach ({} calls by a \
+             pointer in these are not followed)\n",
+            self.all.len(),
+            functions.len(),
+            self.interrupts.len(),
+            self.reached,
+            self.by_pointer
+        );
+        for place in &self.interrupts {
+            text += &format!("  {} in {}\n", place.panic, place.within);
+        }
+        text
+    }
+}
+
+/// Functions that a function's branches lead to, itself not among them; one for each branch.
+fn callees(functions: &BTreeMap<u32, Function>, begin: u32) -> impl Iterator<Item = u32> {
+    let function = functions.get(&begin);
+    let targets = function.map_or(&[][..], |function| &function.targets);
+    let end = function.map_or(begin, |function| function.end);
+    targets.iter().filter(move |target| !(begin..end).contains(target)).filter_map(|target| {
+        let (callee, function) = functions.range(..=target).next_back()?;
+        (*target < function.end).then_some(*callee)
+    })
+}
+
+fn is_panic(functions: &BTreeMap<u32, Function>, begin: u32) -> bool {
+    functions.get(&begin).is_some_and(|function| PANICS.iter().any(|panic| function.name.starts_with(panic)))
+}
+
+/// Addresses between `$d` and the next `$t`.
+fn data_ranges(file: &object::File<'_>) -> Vec<(u32, u32)> {
+    let mut marks: Vec<(u32, bool)> = file
+        .symbols()
+        .filter_map(|symbol| {
+            let name = symbol.name().ok()?;
+            let is = |mark: &str| {
+                name == mark || name.strip_prefix(mark).is_some_and(|rest| rest.starts_with('.'))
+            };
+            (is("$d") || is("$t")).then_some((symbol.address() as u32, is("$d")))
+        })
+        .collect();
+    marks.sort_unstable();
+    let pairs = marks.windows(2).filter(|pair| pair[0].1);
+    pairs.map(|pair| (pair[0].0, pair[1].0)).collect()
+}
+
+/// The instructions of an image.
+struct Code<'a> {
+    base: u32,
+    bytes: &'a [u8],
+    data: Vec<(u32, u32)>,
+}
+
+impl Code<'_> {
+    fn half(&self, address: u32) -> Option<u32> {
+        let place = address.checked_sub(self.base)? as usize;
+        let pair = self.bytes.get(place..place + 2)?;
+        Some(u32::from(u16::from_le_bytes([pair[0], pair[1]])))
+    }
+
+    /// Where the branches of a function go, and how many calls by a pointer it has.
+    fn branches(&self, begin: u32, end: u32) -> (Vec<u32>, usize) {
+        let (mut targets, mut by_pointer, mut place) = (Vec::new(), 0, begin);
+        while place < end {
+            let after = self.data.partition_point(|(first, _)| *first <= place);
+            if let Some((_, last)) = after.checked_sub(1).and_then(|range| self.data.get(range))
+                && *last > place
+            {
+                place = *last;
+                continue;
+            }
+            let Some(first) = self.half(place) else { break };
+            if first >> 11 >= 0b11101 {
+                if let Some(second) = self.half(place + 2) {
+                    targets.extend(wide(first, second).map(|way| place.wrapping_add_signed(4 + way)));
+                }
+                place += 4;
+            } else {
+                targets.extend(narrow(first).map(|way| place.wrapping_add_signed(4 + way)));
+                // BLX to what a register holds.
+                by_pointer += usize::from(first & 0xFF87 == 0x4780);
+                place += 2;
+            }
+        }
+        (targets, by_pointer)
+    }
+}
+
+/// Sign of a field of so many bits.
+fn signed(field: u32, bits: u32) -> i32 {
+    (field << (32 - bits)).cast_signed() >> (32 - bits)
+}
+
+/// How far a branch of 16 bits leads.
+fn narrow(code: u32) -> Option<i32> {
+    match (code >> 11, code >> 12, code >> 8 & 0xF) {
+        (0b11100, ..) => Some(signed((code & 0x7FF) << 1, 12)),
+        (_, 0b1101, 0..=13) => Some(signed((code & 0xFF) << 1, 9)),
+        _ => None,
+    }
+}
+
+/// How far a branch of 32 bits leads.
+fn wide(first: u32, second: u32) -> Option<i32> {
+    if first >> 11 != 0b11110 || second >> 15 == 0 {
+        return None;
+    }
+    let (sign, j1, j2, low) = (first >> 10 & 1, second >> 13 & 1, second >> 11 & 1, (second & 0x7FF) << 1);
+    if second >> 12 & 1 == 1 {
+        // Of BLX the core has none: 14 and 12 set are BL, 12 alone B.
+        let (i1, i2) = (!(j1 ^ sign) & 1, !(j2 ^ sign) & 1);
+        return Some(signed(sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12 | low, 25));
+    }
+    let condition = first >> 6 & 0xF;
+    (second >> 14 & 1 == 0 && condition < 14)
+        .then(|| signed(sign << 20 | j2 << 19 | j1 << 18 | (first & 0x3F) << 12 | low, 21))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// From the disassembly of an image by `llvm-objdump`.
+    #[test]
+    fn branches_lead_where_the_disassembler_says() {
+        // 800022c: f000 f80b   bl 0x8000246
+        assert_eq!(wide(0xF000, 0xF80B), Some(0x8000246 - 0x800022C - 4));
+        // 8000254: f7ff fff7   bl 0x8000246
+        assert_eq!(wide(0xF7FF, 0xFFF7), Some(0x8000246 - 0x8000254 - 4));
+        // 8000194: d001        beq 0x800019a
+        assert_eq!(narrow(0xD001), Some(0x800019A - 0x8000194 - 4));
+        // 8000198: e7fb        b 0x8000192
+        assert_eq!(narrow(0xE7FB), Some(0x8000192 - 0x8000198 - 4));
+        // UDF and SVC are no branches, MOVW and a load are none either.
+        assert_eq!(
+            (narrow(0xDE00), narrow(0xDF00), wide(0xF240, 0x0300), wide(0xF8D0, 0x8000)),
+            (None, None, None, None)
+        );
+    }
+
+    fn function(name: &str, begin: u32, targets: &[u32]) -> (u32, Function) {
+        (begin, Function { name: name.into(), end: begin + 10, targets: targets.to_vec(), by_pointer: 0 })
+    }
+
+    #[test]
+    fn what_an_interrupt_reaches_may_only_take_remainders() {
+        let functions = |callee: u32| {
+            BTreeMap::from([
+                function("ADC", 100, &[200]),
+                function("loops", 200, &[105, callee]),
+                function("thread", 300, &[400]),
+                function("core::panicking::panic_bounds_check", 400, &[600]),
+                function(REMAINDER, 500, &[600]),
+                function("core::panicking::panic_fmt", 600, &[]),
+            ])
+        };
+        let kept = Panics::within(&functions(500));
+        assert_eq!((kept.all.len(), kept.interrupts.len(), kept.reached), (2, 1, 2));
+        assert!(kept.missed().is_empty());
+        let missed = Panics::within(&functions(400)).missed();
+        assert_eq!(missed, ["an interrupt can panic: core::panicking::panic_bounds_check in loops"]);
+    }
+}
