@@ -103,9 +103,13 @@ fn the_swarm_arrives_on_single_base_and_consistent_parameters_of_the_leg() {
         ("chain-whole-log-cholesky", 42),
     ];
     assert_eq!(rows, expected);
-    assert!(
-        report.rows.iter().filter(|row| row.problem.ends_with("base")).all(|row| row.success_rate == 1.0)
-    );
+    for row in &report.rows {
+        assert!(!row.problem.ends_with("base") || row.rows.success_rate == 1.0, "{}", row.problem);
+        // No search is better than the optimum it is measured by, but for rounding of numbers near a thousand and what
+        // barriers and the pull on flat directions leave.
+        let lowest = row.lowest_chi2.known().expect("searched");
+        assert!(lowest > -1e-4, "{}: {lowest} chi-square units below the optimum", row.problem);
+    }
 }
 
 #[test]

@@ -19,6 +19,7 @@ pub mod load_change;
 pub mod markdown;
 pub mod printed;
 pub mod raw_cost;
+pub mod swarm_bench;
 pub mod table_three;
 pub mod tables_five_six;
 pub mod verification;
