@@ -11,6 +11,7 @@ use crate::command::{Folder, scarab};
 fn torque_tells_nine_of_twenty_parameters_and_fifteen_sums() {
     let report = tables_five_six::report(1).expect("the chain is identified");
     assert_eq!((report.rank.of_table_v, report.rank.of_all_inertial), (15, 15));
+    assert_eq!(report.rank.joint_by_joint, 15, "one joint at a time tells neither more nor less");
     assert_eq!((report.rank.of_the_leg, report.rank.columns), (25, 42));
     assert_eq!(report.accepted, [1, 1]);
     let names: Vec<_> = report.table_v.iter().map(|line| line.name.as_str()).collect();

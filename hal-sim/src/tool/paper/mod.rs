@@ -18,6 +18,7 @@ pub mod figure_seven;
 pub mod load_change;
 pub mod markdown;
 pub mod printed;
+pub mod ranks;
 pub mod raw_cost;
 pub mod swarm_bench;
 pub mod table_three;

@@ -9,21 +9,18 @@
 //! error/sigma    root mean square over the runs of (value - truth) / sigma, sigma that of each run
 //! ```
 
-use nalgebra::Vector3;
 use scarab::ident::Plan;
-use scarab::model::{BaseParameters, Parameter};
 use serde::Serialize;
 use serde_json::Map;
 
-use super::chain::{self, ChainOptions, JOINTS, LEG, NOISE_PERCENT, PLANS, ROOM, median, run_all};
+use super::chain::{self, ChainOptions, LEG, NOISE_PERCENT, PLANS, median, run_all};
 use super::markdown::{Table, number, percent};
 use super::printed::{Printed, TABLE_FIVE, TABLE_SIX};
+use super::ranks::Ranks;
 use super::{PaperOptions, Section};
-use crate::tool::analysis::{parameter_name, plan_name};
+use crate::tool::analysis::plan_name;
 use crate::tool::error::ToolError;
-use crate::tool::leg_file::LegFile;
 use crate::tool::report::{Number, RunReport};
-use crate::tool::setup;
 
 /// Runs of each method unless asked for otherwise.
 const RUNS: u64 = 20;
@@ -137,19 +134,6 @@ pub struct BaseLine {
     pub least_squares: Found,
 }
 
-/// How many combinations torque determines.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Ranks {
-    /// Of the 20 parameters of Table V.
-    pub of_table_v: usize,
-    /// Of all 30 inertial parameters of three links.
-    pub of_all_inertial: usize,
-    /// Of what is estimated here, rotors, friction and offsets included.
-    pub of_the_leg: usize,
-    /// So many are estimated.
-    pub columns: usize,
-}
-
 /// Both tables.
 #[derive(Clone, Debug, Serialize)]
 pub struct TablesReport {
@@ -201,7 +185,7 @@ pub fn report(runs: u64) -> Result<TablesReport, ToolError> {
         runs,
         accepted,
         iterations_median,
-        rank: ranks(&leg, methods[0].first().copied())?,
+        rank: Ranks::of(&leg, methods[0].first().copied())?,
         table_v: TABLE_FIVE.iter().filter_map(|printed| parameter_line(printed, &methods)).collect(),
         table_vi: TABLE_SIX.iter().filter_map(|printed| base_line(printed, &methods)).collect(),
     })
@@ -260,25 +244,6 @@ fn base_line(printed: &Printed, methods: &[Vec<&RunReport>; 2]) -> Option<BaseLi
         sequential: of(1),
         least_squares: Found::of(first.truth, &squares),
         name: first.name,
-    })
-}
-
-fn ranks(leg: &LegFile, run: Option<&RunReport>) -> Result<Ranks, ToolError> {
-    let rank = |of: &dyn Fn(usize, Parameter) -> bool| -> Result<usize, ToolError> {
-        let columns = core::array::from_fn(|joint| Parameter::ALL.map(|parameter| of(joint, parameter)));
-        let chain = setup::chain::<JOINTS>(leg)?;
-        BaseParameters::<f64, JOINTS, ROOM>::analyse(&chain, &Vector3::from(leg.gravity), &columns)
-            .map(|base| base.rank())
-            .map_err(|error| ToolError::input(format!("{}: {error:?}", leg.name)))
-    };
-    let listed = |joint: usize, parameter: Parameter| {
-        TABLE_FIVE.iter().any(|line| line.name == parameter_name(joint, parameter))
-    };
-    Ok(Ranks {
-        of_table_v: rank(&listed)?,
-        of_all_inertial: rank(&|_, parameter| parameter.index() < scarab::model::INERTIAL_PARAMETERS)?,
-        of_the_leg: run.map_or(0, |run| run.rank),
-        columns: run.map_or(0, |run| run.columns),
     })
 }
 
@@ -356,8 +321,8 @@ fn words(report: &TablesReport) -> String {
     format!(
         "{} runs of each method, {} % torque noise, leg `{}`; medians over the runs, \u{b1} the reported standard deviation; \
          errors are those of single runs. Accepted: {} one-time, {} sequential. SI units.\n\n\
-         The 20 parameters of Table V have rank {}, all 30 of three links {}, and with rotors, friction and offsets {} of \
-         {} are determined. Alone are measured: {} ({}).\n\n**Table V**\n\n{five}\n**Table VI**\n\n{six}",
+         The 20 parameters of Table V have rank {}, all 30 of three links {}, {} where one joint moves at a time and its own \
+         torque is read; with rotors, friction and offsets {} of {} are determined. Alone are measured: {} ({}).\n\n**Table V**\n\n{five}\n**Table VI**\n\n{six}",
         report.runs,
         report.noise_percent,
         report.leg,
@@ -365,6 +330,7 @@ fn words(report: &TablesReport) -> String {
         report.accepted[1],
         rank.of_table_v,
         rank.of_all_inertial,
+        rank.joint_by_joint,
         rank.of_the_leg,
         rank.columns,
         alone.join(" "),
