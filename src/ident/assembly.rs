@@ -71,7 +71,7 @@ pub(super) fn assemble<T: Real, const N: usize, const B: usize, const ROOM: usiz
         let divisor = real::max(rows, T::one());
         assembly.torque[joint].mean_absolute = absolute / divisor;
         assembly.torque[joint].root_mean_square = real::sqrt(power / divisor);
-        assembly.rows[joint] = (rows + T::of(0.5)).to_double() as u32;
+        assembly.rows[joint] = (rows + T::of(0.5)).to_count();
         assembly.outliers.whole_error_share[joint] = whole_error_share(window, joint, &joints[joint]);
         let free = rows - T::of(columns as f64) / real::max(information, T::of(1e-3));
         let variance = packed::residual(&joints[joint], columns)
@@ -180,7 +180,7 @@ fn disturbed<T: Real, const N: usize, const B: usize, const ROOM: usize>(
     let (mut all, mut hit) = ([T::zero(); N], [T::zero(); N]);
     let (mut state, mut stretch, mut common) = ([false; N], [T::zero(); N], T::zero());
     for block in 0..window.blocks() {
-        let seconds = T::of(f64::from(window.outputs(block)) / ROW_RATE_HZ);
+        let seconds = T::of(f64::from(window.outputs(block))) / T::of(ROW_RATE_HZ);
         for joint in 0..N {
             let rows = window.part(block, joint).map_or(T::zero(), |part| part.rows);
             all[joint] += rows;

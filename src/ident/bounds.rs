@@ -50,8 +50,8 @@ impl<T: Real> Interval<T> {
     fn around(centre: T, reach: T) -> Self {
         Self(centre - reach, centre + reach)
     }
-    fn shares(value: T, low: f64, high: f64) -> Self {
-        Self(value * T::of(low), value * T::of(high))
+    fn shares(value: T, (low, high): (T, T)) -> Self {
+        Self(value * low, value * high)
     }
     fn add(self, other: Self) -> Self {
         Self(self.0 + other.0, self.1 + other.1)
@@ -95,24 +95,24 @@ impl<T: Real> LinkPrior<T> {
 
     /// Ranges of the fourteen parameters for a segment of this length.
     fn ranges(&self, length: T) -> [Interval<T>; PARAMETERS_PER_JOINT] {
-        let (least, most) = SHARE;
-        let mass = Interval::shares(self.body.mass, least, most);
+        let share = (T::of(SHARE.0), T::of(SHARE.1));
+        let most = share.1;
+        let mass = Interval::shares(self.body.mass, share);
         let reach = T::of(0.5) * length;
         let centre: [_; 3] =
             core::array::from_fn(|axis| Interval::around(self.body.centre_of_mass[axis], reach));
         let inertia = &self.body.inertia;
         let largest = real::max(inertia.m11, real::max(inertia.m22, inertia.m33));
-        let product_reach = T::of(0.5 * most) * largest;
+        let product_reach = T::of(0.5) * most * largest;
         let diagonal = |value: T, one: usize, other: usize| {
-            Interval::shares(value, least, most)
-                .add(mass.times(centre[one].square().add(centre[other].square())))
+            Interval::shares(value, share).add(mass.times(centre[one].square().add(centre[other].square())))
         };
         let product = |value: T, one: usize, other: usize| {
             Interval::around(value, product_reach)
                 .add(mass.times(centre[one]).times(centre[other]).scaled(-T::one()))
         };
         let mut ranges = [Interval::zero(); PARAMETERS_PER_JOINT];
-        let friction_share = |value: T| Interval(T::zero(), value * T::of(most));
+        let friction_share = |value: T| Interval(T::zero(), value * most);
         let values = [
             (Parameter::XX, diagonal(inertia.m11, 1, 2)),
             (Parameter::XY, product(inertia.m12, 0, 1)),
@@ -129,7 +129,7 @@ impl<T: Real> LinkPrior<T> {
             (Parameter::FV, friction_share(self.viscous_friction)),
             (
                 Parameter::OFF,
-                Interval::around(T::zero(), T::of(most) * (real::abs(self.offset) + self.coulomb_friction)),
+                Interval::around(T::zero(), most * (real::abs(self.offset) + self.coulomb_friction)),
             ),
         ];
         for (parameter, range) in values {

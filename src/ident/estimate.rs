@@ -138,7 +138,7 @@ const POWER_ITERATIONS: usize = 40;
 fn spectral_norm<T: Real, const B: usize>(matrix: &[[T; B]; B]) -> T {
     let mut vector = [T::one(); B];
     for (index, element) in vector.iter_mut().enumerate() {
-        *element += T::of(0.1 * index as f64);
+        *element += T::of(0.1) * T::of(index as f64);
     }
     let mut norm = T::zero();
     for _ in 0..POWER_ITERATIONS {

@@ -188,12 +188,19 @@ impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
     pub fn apply(&self, older: &[T], newer: &[T], centre: T) -> (T, T, T) {
         // Differences from the centre: what the weights must cancel is cancelled before it can cost digits.
         let (mut value, mut slope, mut curvature) = (T::zero(), T::zero(), T::zero());
-        let weights = self.low_pass.weights.iter().zip(&self.first_derivative).zip(&self.second_derivative);
-        for (&sample, ((&low, &first), &second)) in older.iter().chain(newer).zip(weights) {
-            let difference = sample - centre;
-            value += low * difference;
-            slope += first * difference;
-            curvature += second * difference;
+        // Piece by piece: a chained iterator asks at every sample which piece it is in.
+        let mut begin = 0;
+        for piece in [older, newer] {
+            let rest = begin.min(TAPS)..;
+            let (low, first) = (&self.low_pass.weights[rest.clone()], &self.first_derivative[rest.clone()]);
+            let weights = low.iter().zip(first).zip(&self.second_derivative[rest]);
+            for (&sample, ((&low, &first), &second)) in piece.iter().zip(weights) {
+                let difference = sample - centre;
+                value += low * difference;
+                slope += first * difference;
+                curvature += second * difference;
+            }
+            begin += piece.len();
         }
         (centre + value, slope, curvature)
     }
@@ -201,9 +208,7 @@ impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
 
 /// The largest whole number not above `length`, at most `limit`.
 fn whole_samples_below<T: Real>(length: T, limit: usize) -> usize {
-    let length = length.to_double();
-    // A float to integer cast saturates: no panic for absurd lengths.
-    (length as usize).min(limit)
+    (length.to_count() as usize).min(limit)
 }
 
 fn signed<T: Real>(index: usize, centre: usize) -> T {

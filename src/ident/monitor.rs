@@ -213,7 +213,7 @@ impl<T: Real, const N: usize> Monitor<T, N> {
             }
         }
         alarm.map(|age| Change {
-            since_s: T::of(f64::from(age) / ROW_RATE_HZ),
+            since_s: T::of(f64::from(age)) / T::of(ROW_RATE_HZ),
             joints: self.charts.map(|chart| chart.sum > self.limit * T::of(0.5)),
             statistic: self.statistic(),
             limit: self.limit,

@@ -33,23 +33,24 @@ pub fn rotate<T: Real>(factor: &mut [T], columns: usize, row: &mut Row<T>) {
         let Some((kept, below)) = rest.split_at_mut_checked(columns - column + 1) else { return };
         rest = below;
         let Some(entering) = row.get_mut(column..=columns) else { return };
-        let (Some(diagonal), Some(first)) = (kept.first().copied(), entering.first().copied()) else {
+        let (Some((diagonal, kept)), Some((first, entering))) =
+            (kept.split_first_mut(), entering.split_first_mut())
+        else {
             return;
         };
+        let first = *first;
         if first == T::zero() {
             continue;
         }
-        let length = real::sqrt(diagonal * diagonal + first * first);
+        let length = real::sqrt(*diagonal * *diagonal + first * first);
         if !(length > T::zero()) {
             continue; // squares that underflow carry no information
         }
-        let (cosine, sine) = (diagonal / length, first / length);
-        for (old, new) in kept.iter_mut().zip(entering.iter_mut()).skip(1) {
+        let (cosine, sine) = (*diagonal / length, first / length);
+        for (old, new) in kept.iter_mut().zip(entering) {
             (*old, *new) = (cosine * *old + sine * *new, cosine * *new - sine * *old);
         }
-        if let Some(diagonal) = kept.first_mut() {
-            *diagonal = length;
-        }
+        *diagonal = length;
     }
     if let (Some(residual), Some(&right)) = (rest.first_mut(), row.get(columns)) {
         *residual += right * right;

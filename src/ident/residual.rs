@@ -197,7 +197,8 @@ impl<T: Real, const N: usize> Residual<T, N> {
             if real::abs(residual) > wild[joint] { missed += 1 } else { expected += 1 }
         }
         self.common = if missed > 0 && expected == 0 { self.common.saturating_add(1) } else { 0 };
-        self.longest_common_s = real::max(self.longest_common_s, T::of(f64::from(self.common) * ROW_S));
+        self.longest_common_s =
+            real::max(self.longest_common_s, T::of(f64::from(self.common)) * T::of(ROW_S));
     }
 }
 

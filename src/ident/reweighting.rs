@@ -85,7 +85,7 @@ pub fn weigh<T: Real, const N: usize, const B: usize, const ROOM: usize>(
         power += packed::cost(part.factor, columns, &[]);
         rows += part.rows;
     }
-    if !(rows * information >= T::of(INDEPENDENT_ROWS_PER_COLUMN * columns as f64)) {
+    if !(rows * information >= T::of(INDEPENDENT_ROWS_PER_COLUMN) * T::of(columns as f64)) {
         return weights;
     }
     let harmless = T::of(HARMLESS_SHARE * HARMLESS_SHARE) * power / rows;
@@ -207,7 +207,7 @@ fn redescend<T: Real>(weights: &mut Weights<T>, blocks: &Residuals<T>, scale: T,
         };
         let beside = lost(place.checked_sub(1)) || lost(place.checked_add(1));
         let (full, nothing) = if beside { LIMITS_BESIDE } else { LIMITS };
-        let fallen = (score(blocks.blocks.get(place)) - T::of(full)) / T::of(nothing - full);
+        let fallen = (score(blocks.blocks.get(place)) - T::of(full)) / (T::of(nothing) - T::of(full));
         let fallen = real::clamp(fallen, T::zero(), T::one());
         let kept = T::one() - fallen * fallen;
         *weight = kept * kept;

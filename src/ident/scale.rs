@@ -99,7 +99,7 @@ pub fn torque_constant_ratio<T: Real, const N: usize, const B: usize>(
     let information = real::max(without.row_information, T::of(1e-3));
     let apart = first.residual() + second.residual();
     let rows = without.rows[joint].saturating_add(with.rows[joint]);
-    let free = T::of(f64::from(rows)) - T::of(2.0 * columns as f64) / information;
+    let free = T::of(f64::from(rows)) - T::of((2 * columns) as f64) / information;
     let floor = T::of(1e-5) * without.torque[joint].root_mean_square;
     let variance = apart / real::max(free, T::one()) / information;
     let noise = real::max(real::sqrt(variance), real::max(floor, T::of(1e-9)));

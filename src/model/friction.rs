@@ -56,6 +56,9 @@ impl<T: Real> Stribeck<T> {
     /// Factor on the Coulomb column at this speed (rad/s). NaN where `velocity` and `qd` are both 0.
     #[must_use]
     pub fn factor(&self, qd: T) -> T {
+        if self.excess == T::zero() {
+            return T::one(); // without the exponential
+        }
         let ratio = abs(qd) / self.velocity;
         T::one() + self.excess * exp(-(ratio * ratio))
     }

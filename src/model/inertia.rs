@@ -94,13 +94,19 @@ pub fn joint<T: Real>(link: &InertialParameters<T>, drive: &[T; 4]) -> JointPara
     [xx, xy, xz, yy, yz, zz, hx, hy, hz, m, ia, fc, fv, off]
 }
 
-/// Inertia tensor about the frame's origin, kg m2.
-pub(super) fn tensor<T: Real>(parameters: &JointParameters<T>) -> Matrix3<T> {
+/// I w: the inertia tensor about the frame's origin times a vector.
+#[inline]
+pub(super) fn angular_momentum<T: Real>(parameters: &JointParameters<T>, w: &Vector3<T>) -> Vector3<T> {
     let [xx, xy, xz, yy, yz, zz, ..] = *parameters;
-    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+    Vector3::new(
+        xx * w.x + xy * w.y + xz * w.z,
+        xy * w.x + yy * w.y + yz * w.z,
+        xz * w.x + yz * w.y + zz * w.z,
+    )
 }
 
 /// First moment of mass, kg m.
+#[inline]
 pub(super) fn first_moment<T: Real>(parameters: &JointParameters<T>) -> Vector3<T> {
     Vector3::new(
         parameters[Parameter::HX.index()],

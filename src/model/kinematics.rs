@@ -22,6 +22,12 @@ use nalgebra::Vector3;
 
 use crate::real::Real;
 
+/// a x b. `nalgebra`'s own asks for its operands' shapes again at every call of a build that is to be small.
+#[inline]
+pub(super) fn cross<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
+    Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+}
+
 /// A joint's frame seen from the frame before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct JointFrame<T> {
@@ -77,13 +83,13 @@ impl<T: Real> LinkMotion<T> {
     }
 
     /// The next link's motion, across a joint that turns with `qd` (rad/s) and `qdd` (rad/s2).
-    #[inline]
+    #[inline(always)]
     pub fn next(&self, frame: JointFrame<T>, qd: T, qdd: T) -> Self {
         let carried = frame.to_child(&self.angular_velocity);
         let turned = frame.to_child(&self.angular_acceleration);
         let at_origin = self.acceleration
-            + self.angular_acceleration.cross(&frame.origin)
-            + self.angular_velocity.cross(&self.angular_velocity.cross(&frame.origin));
+            + cross(&self.angular_acceleration, &frame.origin)
+            + cross(&self.angular_velocity, &cross(&self.angular_velocity, &frame.origin));
         Self {
             angular_velocity: Vector3::new(carried.x, carried.y, carried.z + qd),
             angular_acceleration: Vector3::new(
@@ -120,7 +126,7 @@ impl<T: Real> JointAxis<T> {
     pub fn next(&self, frame: JointFrame<T>) -> Self {
         Self {
             angular: frame.to_child(&self.angular),
-            linear: frame.to_child(&(self.linear + self.angular.cross(&frame.origin))),
+            linear: frame.to_child(&(self.linear + cross(&self.angular, &frame.origin))),
         }
     }
 }

@@ -18,8 +18,8 @@
 use nalgebra::SMatrix;
 
 use super::chain::Chain;
-use super::inertia::{first_moment, tensor};
-use super::kinematics::JointAxis;
+use super::inertia::{angular_momentum, first_moment};
+use super::kinematics::{JointAxis, cross};
 use super::parameter::{LegParameters, Parameter};
 use crate::real::Real;
 
@@ -37,11 +37,11 @@ pub fn mass_matrix<T: Real, const N: usize>(
         for axis in axes.iter_mut().take(link) {
             *axis = axis.next(frames[link]);
         }
-        let (inertia, h) = (tensor(&parameters[link]), first_moment(&parameters[link]));
+        let h = first_moment(&parameters[link]);
         let mass = parameters[link][Parameter::M.index()];
         for (column, axis) in axes.iter().enumerate().take(link + 1) {
-            let momentum = axis.linear * mass + axis.angular.cross(&h);
-            let spin = inertia * axis.angular + h.cross(&axis.linear);
+            let momentum = axis.linear * mass + cross(&axis.angular, &h);
+            let spin = angular_momentum(&parameters[link], &axis.angular) + cross(&h, &axis.linear);
             for (row, other) in axes.iter().enumerate().take(column + 1) {
                 let share = other.angular.dot(&spin) + other.linear.dot(&momentum);
                 matrix[(row, column)] += share;

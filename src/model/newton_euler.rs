@@ -24,8 +24,8 @@ use nalgebra::Vector3;
 
 use super::chain::Chain;
 use super::friction::drive_torque;
-use super::inertia::{first_moment, tensor};
-use super::kinematics::{JointFrame, LinkMotion};
+use super::inertia::{angular_momentum, first_moment};
+use super::kinematics::{JointFrame, LinkMotion, cross};
 use super::parameter::{JointParameters, LegParameters, Parameter};
 use crate::real::Real;
 
@@ -96,13 +96,15 @@ struct Wrench<T> {
 
 impl<T: Real> Wrench<T> {
     /// What the link's own mass needs.
+    #[inline(always)]
     fn of_link(parameters: &JointParameters<T>, motion: &LinkMotion<T>) -> Self {
         let (w, wd, a) = (motion.angular_velocity, motion.angular_acceleration, motion.acceleration);
-        let (inertia, h, mass) =
-            (tensor(parameters), first_moment(parameters), parameters[Parameter::M.index()]);
+        let (h, mass) = (first_moment(parameters), parameters[Parameter::M.index()]);
         Self {
-            force: a * mass + wd.cross(&h) + w.cross(&w.cross(&h)),
-            moment: inertia * wd + w.cross(&(inertia * w)) + h.cross(&a),
+            force: a * mass + cross(&wd, &h) + cross(&w, &cross(&w, &h)),
+            moment: angular_momentum(parameters, &wd)
+                + cross(&w, &angular_momentum(parameters, &w))
+                + cross(&h, &a),
         }
     }
 
@@ -112,7 +114,7 @@ impl<T: Real> Wrench<T> {
 
     fn seen_from_parent(&self, frame: JointFrame<T>) -> Self {
         let force = frame.to_parent(&self.force);
-        Self { force, moment: frame.to_parent(&self.moment) + frame.origin.cross(&force) }
+        Self { force, moment: frame.to_parent(&self.moment) + cross(&frame.origin, &force) }
     }
 }
 

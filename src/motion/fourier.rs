@@ -144,17 +144,19 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
     pub(super) fn shape_at(&self, turn: f32) -> Shape<N> {
         let (sine, cosine) = sin_cos(turn * TURN_RAD);
         let mut shape = Shape { value: self.centre_rad, slope: [0.0; N], curvature: [0.0; N] };
-        let (mut sine_k, mut cosine_k) = (sine, cosine);
-        for harmonic in 0..H {
-            let order = (harmonic + 1) as f32;
-            for joint in 0..N {
-                let (s, c) = (self.sine_rad[joint][harmonic], self.cosine_rad[joint][harmonic]);
+        // Joint by joint, so that its three sums stay in registers.
+        for joint in 0..N {
+            let (mut value, mut slope, mut curvature) = (shape.value[joint], 0.0, 0.0);
+            let (mut sine_k, mut cosine_k, mut order) = (sine, cosine, 1.0);
+            for (s, c) in self.sine_rad[joint].iter().zip(&self.cosine_rad[joint]) {
                 let part = s * sine_k + c * cosine_k;
-                shape.value[joint] += part;
-                shape.slope[joint] += order * (s * cosine_k - c * sine_k);
-                shape.curvature[joint] -= order * order * part;
+                value += part;
+                slope += order * (s * cosine_k - c * sine_k);
+                curvature -= order * order * part;
+                order += 1.0;
+                (sine_k, cosine_k) = (sine_k * cosine + cosine_k * sine, cosine_k * cosine - sine_k * sine);
             }
-            (sine_k, cosine_k) = (sine_k * cosine + cosine_k * sine, cosine_k * cosine - sine_k * sine);
+            (shape.value[joint], shape.slope[joint], shape.curvature[joint]) = (value, slope, curvature);
         }
         shape
     }

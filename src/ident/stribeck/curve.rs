@@ -41,7 +41,8 @@ impl<T: Real> Combination<T> {
 pub fn combination<T: Real>(speed: T) -> Combination<T> {
     const COLUMNS: usize = BANK + 2;
     let half_root_pi = T::of(0.886_226_925_452_758);
-    let bank: [T; BANK] = core::array::from_fn(|index| T::of(SLOWEST_RAD_S * f64::from(1_u32 << index)));
+    let bank: [T; BANK] =
+        core::array::from_fn(|index| T::of(SLOWEST_RAD_S) * T::of(f64::from(1_u32 << index)));
     let product = |one: T, other: T| half_root_pi * one * other / real::sqrt(one * one + other * other);
     // Of a curve of the family with the bank, a constant and a line.
     let row = |speed: T| {

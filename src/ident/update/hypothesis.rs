@@ -88,7 +88,7 @@ impl<T: Real> Hypothesis<T> {
     #[must_use]
     pub fn score(&self) -> T {
         let free = self.determined.iter().filter(|determined| **determined).count();
-        self.chi_square + T::of(2.0 * free as f64)
+        self.chi_square + T::of((2 * free) as f64)
     }
 }
 

@@ -142,10 +142,10 @@ fn negative_direction<T: Real, const N: usize>(matrix: &SMatrix<T, N, N>) -> Opt
 /// Low-discrepancy postures over the whole circle of every joint.
 fn posture<T: Real, const N: usize>(index: usize) -> [T; N] {
     core::array::from_fn(|joint| {
-        // Multiples of the golden ratio's powers (Kronecker sequence).
-        let step = [0.618_033_988_749_895, 0.381_966_011_250_105, 0.236_067_977_499_790][joint % 3];
-        let turn = (index + 1) as f64 * step;
-        T::of((turn - (turn as u32) as f64 - 0.5) * 2.0 * core::f64::consts::PI)
+        // Multiples of the golden ratio's powers in units of 2^-32 turns (Kronecker sequence).
+        let step = [2_654_435_769_u32, 1_640_531_527, 1_013_904_243][joint % 3];
+        let turn = (index as u32).wrapping_add(1).wrapping_mul(step) ^ (1 << 31);
+        T::of(f64::from(turn.cast_signed())) * T::of(core::f64::consts::PI / 2_147_483_648.0)
     })
 }
 

@@ -256,8 +256,11 @@ fn collect<T: Real, const N: usize>(
     mask: &ColumnMask<N>,
 ) {
     let mut random = Xoshiro128PlusPlus::seed_from_u64(1);
-    let mut within =
-        |bound: f64| T::of((f64::from(random.next_u32()) / f64::from(u32::MAX) * 2.0 - 1.0) * bound);
+    // From the middle of all integers, so that single precision does it.
+    let mut within = |bound: f64| {
+        let number = random.next_u32() ^ (1 << 31);
+        T::of(f64::from(number.cast_signed())) * (T::of(bound) / T::of(2_147_483_648.0))
+    };
     for _ in 0..STATES {
         let state = JointState {
             q: core::array::from_fn(|_| within(core::f64::consts::PI)),

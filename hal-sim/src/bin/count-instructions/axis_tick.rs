@@ -9,6 +9,7 @@ use scarab::motor::{
 };
 use scarab::units::{Ampere, Volt};
 
+use crate::account::{Account, percent};
 use crate::axis_parts;
 use crate::counter::{Tally, count, heading};
 use crate::motor::{CONFIGURATION, Motor};
@@ -17,10 +18,7 @@ use crate::motor::{CONFIGURATION, Motor};
 const MOST_INSTRUCTIONS: u32 = 700;
 /// Design: both axes' share of the processor, per cent.
 const MOST_PERCENT: f32 = 35.0;
-const AXES: f32 = 2.0;
-const PROCESSOR_HZ: f32 = 168e6;
-/// Of this processor with its flash accelerator; the board has to confirm it.
-const CYCLES_PER_INSTRUCTION: f32 = 1.34;
+const AXES: u32 = 2;
 
 /// Mechanical speeds and target currents: standstill, a joint's greatest behind 50:1, and near the voltage limit.
 const SPEEDS: [(f32, f32); 4] = [(0.0, 10.0), (225.0, 30.0), (-225.0, 30.0), (820.0, 40.0)];
@@ -33,7 +31,7 @@ fn tick(axis: &mut Axis, sample: &AxisSample, request: AxisRequest) -> AxisComma
 }
 
 /// Prints the tables; whether the bounds are kept.
-pub fn report() -> bool {
+pub fn report(account: &mut Account) -> bool {
     let mut kept = true;
     for (name, sine) in [("exact sine", Sine::Exact), ("micromath's sine", Sine::Fast)] {
         let configuration = AxisConfiguration { sine, ..CONFIGURATION };
@@ -46,19 +44,16 @@ pub fn report() -> bool {
         kept &= share(&all);
         if sine == CONFIGURATION.sine {
             axis_parts::report(&all);
+            account.add("axis tick, both axes", all, MOST_INSTRUCTIONS, AXES * CURRENT_RATE_HZ);
         }
     }
     kept
 }
 
 fn share(all: &Tally) -> bool {
-    let percent = |instructions: u32| {
-        let cycles = AXES * CURRENT_RATE_HZ as f32 * CYCLES_PER_INSTRUCTION * instructions as f32;
-        100.0 * cycles / PROCESSOR_HZ
-    };
-    let (mean, most) = (percent(all.mean()), percent(all.most()));
+    let [mean, most] = [all.mean(), all.most()].map(|one| percent(one, AXES * CURRENT_RATE_HZ));
     let word = if most <= MOST_PERCENT { "kept" } else { "MISSED" };
-    let name = "both axes, % of 168 MHz at 1.34 cycles each";
+    let name = "both axes, % of the processor";
     hprintln!("{:<48} {:>8.1} {:>8.1}   goal {:.0}: {}", name, mean, most, MOST_PERCENT, word);
     most <= MOST_PERCENT
 }

@@ -8,9 +8,10 @@ use scarab::hal::{JointSample, Sample};
 use scarab::leg::{Activity, Control, ControlOutput, ControlRequest, IdentifiedModel, Step};
 use scarab::motion::{Motion, MotionState, Periodic};
 use scarab::safety::PowerRequest;
-use scarab::servo::{JointConfiguration, NoModel, Servo, ServoCommand};
+use scarab::servo::{JointConfiguration, NoModel, SERVO_RATE_HZ, Servo, ServoCommand};
 use scarab::units::Ampere;
 
+use crate::account::Account;
 use crate::counter::{Tally, count, heading};
 use crate::leg::{self, GRAVITY, JOINTS, Model};
 
@@ -43,7 +44,7 @@ fn tick(
 
 /// Prints the table; whether the bound is kept. `None` where the leg cannot be built or does not follow.
 #[inline(never)]
-pub fn report(model: &Model) -> Option<bool> {
+pub fn report(model: &Model, account: &mut Account) -> Option<()> {
     heading("a leg of two joints, 4 kHz");
     let periodic = leg::excitation()?;
     let configuration = leg::configuration(model.clone(), periodic);
@@ -89,10 +90,11 @@ pub fn report(model: &Model) -> Option<bool> {
         return None;
     }
     approach.print("tick on the way to the start, model fading in");
-    let kept = run.print_against("tick with motion, model, monitor and log", MOST_INSTRUCTIONS);
+    run.print("tick with motion, model, monitor and log");
+    account.add("leg tick: motion, servo, monitor, log", run, MOST_INSTRUCTIONS, SERVO_RATE_HZ);
     servo(&configuration.joints, &identified, periodic)?;
     hprintln!("{:<48} {:>8}", "once: proof of a motion's limits", proof);
-    Some(kept)
+    Some(())
 }
 
 /// The servo alone, and what it is given.

@@ -7,6 +7,7 @@
 #![no_std]
 #![no_main]
 
+mod account;
 mod axis_parts;
 mod axis_tick;
 mod counter;
@@ -21,13 +22,15 @@ use cortex_m_semihosting::{debug, hprintln};
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let kept = counter::start() && {
-        let tick = axis_tick::report();
+        let mut account = account::Account::default();
+        let axis = axis_tick::report(&mut account);
         peers::report();
-        let leg = leg::model().and_then(|model| {
-            let tick = leg_tick::report(&model)?;
-            Some(identification::report(&model)? && tick)
+        let search = leg::model().and_then(|model| {
+            leg_tick::report(&model, &mut account)?;
+            identification::report(&model, &mut account)
         });
-        tick && leg == Some(true)
+        let kept = account.report();
+        axis && search == Some(true) && kept
     };
     end(kept)
 }
