@@ -14,8 +14,8 @@
 //! 0.31 electrical degrees per count, uniform to +-0.15: a quadrature current of 1 A reads as 2.7 mA of direct current.
 //!
 //! [`Sine::Exact`] is wrong by up to 1.2e-7, [`Sine::Fast`] by up to 1.1e-3. Because the angle is an integer nothing is left to
-//! reduce, and on a processor that multiplies in one cycle the exact one is the cheaper (a tick turns two vectors: 481
-//! instructions with it, 534 with the other), so it is the default.
+//! reduce, and on a processor that multiplies in one cycle the exact one is the cheaper (a tick turns two vectors: 500
+//! instructions with it, 522 with the other), so it is the default.
 
 use crate::hal::CURRENT_RATE_HZ;
 use crate::real::{fast_sin_cos, sin_cos_of_turns};
