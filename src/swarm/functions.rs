@@ -11,7 +11,7 @@
 //! | Branin | (y - 5.1 / (4 pi^2) x^2 + 5 / pi x - 6)^2 + 10 (1 - 1 / (8 pi)) cos x + 10 | 5 | 0.3978874 |
 //! | Ackley | 20 + e - 20 exp(-0.2 sqrt(mean x_i^2)) - exp(mean cos 2 pi x_i) | 32 | 0 |
 //! | Ackley, shifted, rotated | of y - 2 w (w.y) / (w.w), y = x - c, c_i = 11 + 7 ((37 i mod 11) / 11 - 1/2), w_i = sin(i + 1) | 32 | 0 |
-//! | ellipsoid, shifted | 1e-4 sum 10^(4 i / (n - 1)) (x_i - c_i)^2, c_i = 60 - (29 i mod 31) | 100 | 0 |
+//! | ellipsoid, shifted | 1e-4 sum 10^(k i / (n - 1)) (x_i - c_i)^2, c_i = 60 - (29 i mod 31), k = 4 or 6 | 100 | 0 |
 //! | Rosenbrock | sum 100 (x_(i+1) - x_i^2)^2 + (1 - x_i)^2 | 5 | 0 |
 //! | Griewank, shifted by 123 | 1 + sum y_i^2 / 4000 - prod cos(y_i / sqrt(i + 1)) | 600 | 0 |
 //! | Schwefel 1.2, shifted by 13 | sum_i (sum_(j <= i) y_j)^2 | 65 | 0 |
@@ -44,6 +44,8 @@ pub enum TestFunction {
     ShiftedRotatedAckley,
     /// Unimodal, condition number 1e4.
     ShiftedEllipsoid,
+    /// The same with condition number 1e6.
+    ShiftedSteepEllipsoid,
     /// A narrow curved valley.
     Rosenbrock,
     /// Fine ripples on a bowl.
@@ -89,7 +91,7 @@ impl TestProblem {
     pub const fn half_width(&self) -> f64 {
         use TestFunction as F;
         match self.function {
-            F::Sphere | F::ShiftedEllipsoid => 100.0,
+            F::Sphere | F::ShiftedEllipsoid | F::ShiftedSteepEllipsoid => 100.0,
             F::Ackley | F::ShiftedRotatedAckley | F::AckleyAsPrinted => 32.0,
             F::ShiftedGriewank => 600.0,
             F::ShiftedSchwefel => 65.0,
@@ -128,7 +130,8 @@ impl<T: Real> Objective<T> for TestProblem {
             TestFunction::Branin => branin(position),
             TestFunction::Ackley => ackley(position.iter().copied()),
             TestFunction::ShiftedRotatedAckley => shifted_rotated_ackley(position),
-            TestFunction::ShiftedEllipsoid => shifted_ellipsoid(position),
+            TestFunction::ShiftedEllipsoid => shifted_ellipsoid(position, 4.0),
+            TestFunction::ShiftedSteepEllipsoid => shifted_ellipsoid(position, 6.0),
             TestFunction::Rosenbrock => rosenbrock(position),
             TestFunction::ShiftedGriewank => shifted_griewank(position),
             TestFunction::ShiftedSchwefel => shifted_schwefel(position),
@@ -204,9 +207,9 @@ fn shifted_rotated_ackley<T: Real>(position: &[T]) -> T {
     ackley(position.iter().enumerate().map(shifted).map(|(w, y)| y - factor * w))
 }
 
-fn shifted_ellipsoid<T: Real>(position: &[T]) -> T {
+fn shifted_ellipsoid<T: Real>(position: &[T], decades: f64) -> T {
     let last = T::of(if position.len() > 1 { position.len() as f64 - 1.0 } else { 1.0 });
-    let decades = T::of(4.0 * core::f64::consts::LN_10) / last;
+    let decades = T::of(decades * core::f64::consts::LN_10) / last;
     let sum = position.iter().enumerate().fold(T::zero(), |sum, (i, &x)| {
         let centre = 60.0 - (29 * i % 31) as f64;
         sum + exp(decades * T::of(i as f64)) * square(x - T::of(centre))
@@ -275,7 +278,9 @@ mod tests {
             F::Rosenbrock | F::Levy => std::vec![1.0; n],
             F::ShiftedGriewank => std::vec![123.0; n],
             F::ShiftedSchwefel => std::vec![13.0; n],
-            F::ShiftedEllipsoid => (0..n).map(|i| 60.0 - (29 * i % 31) as f64).collect(),
+            F::ShiftedEllipsoid | F::ShiftedSteepEllipsoid => {
+                (0..n).map(|i| 60.0 - (29 * i % 31) as f64).collect()
+            }
             F::ShiftedRotatedAckley => {
                 (0..n).map(|i| 11.0 + 7.0 * ((37 * i % 11) as f64 / 11.0 - 0.5)).collect()
             }
@@ -283,13 +288,14 @@ mod tests {
         }
     }
 
-    const ALL: [TestFunction; 14] = [
+    const ALL: [TestFunction; 15] = [
         TestFunction::Sphere,
         TestFunction::SixHumpCamel,
         TestFunction::Branin,
         TestFunction::Ackley,
         TestFunction::ShiftedRotatedAckley,
         TestFunction::ShiftedEllipsoid,
+        TestFunction::ShiftedSteepEllipsoid,
         TestFunction::Rosenbrock,
         TestFunction::ShiftedGriewank,
         TestFunction::ShiftedSchwefel,

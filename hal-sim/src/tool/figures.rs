@@ -26,6 +26,7 @@ mod parameters;
 mod residuals;
 mod search;
 mod spread;
+pub mod swarm;
 mod torque;
 mod trajectories;
 

@@ -14,6 +14,7 @@ mod model_predict;
 mod model_urdf;
 mod monitor;
 mod motor;
+mod paper;
 mod paper_chain;
 mod pendulum;
 mod regressor;

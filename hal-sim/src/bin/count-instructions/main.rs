@@ -1,5 +1,5 @@
 //! Counts instructions on the emulated microcontroller: one axis' tick, its parts, the same steps of the crate `foc`, the
-//! 4 kHz tick of a leg and the steps of its identification.
+//! 4 kHz tick of a leg, the steps of its identification and the iterations of the default swarm.
 //!
 //! Why instructions: the emulator executes them exactly and in the same number every time, and models neither flash wait
 //! states nor pipeline. `scripts/count-instructions` builds and runs this image (`qemu-system-arm -M netduinoplus2 -icount
@@ -16,6 +16,7 @@ mod leg;
 mod leg_tick;
 mod motor;
 mod peers;
+mod swarm;
 
 use cortex_m_semihosting::{debug, hprintln};
 
@@ -29,8 +30,9 @@ fn main() -> ! {
             leg_tick::report(&model, &mut account)?;
             identification::report(&model, &mut account)
         });
+        let swarm = swarm::report();
         let kept = account.report();
-        axis && search == Some(true) && kept
+        axis && search == Some(true) && swarm.is_some() && kept
     };
     end(kept)
 }

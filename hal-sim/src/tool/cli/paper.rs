@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
 use super::common::write_json;
 use crate::tool::error::{EXIT_ACCEPTED, ToolError};
 use crate::tool::figures;
+use crate::tool::paper::contenders::Algorithm;
 use crate::tool::paper::{self, PaperOptions, Part, document};
 use crate::tool::tables;
 
@@ -19,6 +21,9 @@ enum TableArgument {
     /// The test functions and their least values.
     #[value(name = "III")]
     Three,
+    /// The searches on the test functions.
+    #[value(name = "IV")]
+    Four,
     /// The chain's parameters one by one; always with VI.
     #[value(name = "V")]
     Five,
@@ -34,6 +39,9 @@ enum TableArgument {
 /// A figure of the paper.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum FigureArgument {
+    /// The swarms' ways on f1 to f4.
+    #[value(name = "5")]
+    Five,
     /// The chain's torque, predicted and real.
     #[value(name = "7")]
     Seven,
@@ -51,6 +59,9 @@ pub struct PaperArguments {
     /// Runs of each row, each with a seed of its own.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     seeds: Option<u64>,
+    /// A search of Table IV; may be repeated. All of them unless given.
+    #[arg(long, value_parser = algorithms())]
+    algorithm: Vec<Algorithm>,
     /// Draw into this directory, as SVG.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -62,6 +73,13 @@ pub struct PaperArguments {
     docs: Option<PathBuf>,
 }
 
+/// Searches by their names in the report.
+fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
+    PossibleValuesParser::new(Algorithm::ALL.map(Algorithm::id)).try_map(|id| {
+        Algorithm::ALL.into_iter().find(|algorithm| algorithm.id() == id).ok_or("is no search of Table IV")
+    })
+}
+
 impl PaperArguments {
     fn parts(&self) -> Vec<Part> {
         if self.table.is_empty() && self.figure.is_empty() {
@@ -69,11 +87,13 @@ impl PaperArguments {
         }
         let tables = self.table.iter().map(|table| match table {
             TableArgument::Three => Part::TableThree,
+            TableArgument::Four => Part::TableFour,
             TableArgument::Five | TableArgument::Six => Part::TablesFiveSix,
             TableArgument::LoadChange => Part::LoadChange,
             TableArgument::Convergence => Part::Convergence,
         });
         let figures = self.figure.iter().map(|figure| match figure {
+            FigureArgument::Five => Part::FigureFive,
             FigureArgument::Seven => Part::FigureSeven,
         });
         let mut parts: Vec<Part> = Vec::new();
@@ -88,7 +108,10 @@ impl PaperArguments {
 
 /// Runs, prints and keeps; the exit code.
 pub fn run(arguments: &PaperArguments) -> Result<u8, ToolError> {
-    let options = PaperOptions { seeds: arguments.seeds };
+    if let Some(path) = &arguments.docs {
+        document::read(path)?;
+    }
+    let options = PaperOptions { seeds: arguments.seeds, algorithms: arguments.algorithm.clone() };
     let sections = paper::run(&arguments.parts(), &options)?;
     if let Some(path) = &arguments.json {
         write_json(path, &paper::report(&sections))?;

@@ -89,6 +89,8 @@ pub fn text(
 pub enum Key {
     /// A curve.
     Curve(ShapeStyle),
+    /// A curve of dashes: their length and gap, pixels.
+    Dashes(ShapeStyle, i32, i32),
     /// A background.
     Field(RGBColor),
 }
@@ -109,6 +111,13 @@ pub fn legend(
         match key {
             Key::Curve(style) => {
                 area.draw(&PathElement::new(vec![(px(x), px(y)), (px(x + 24), px(y))], *style))?;
+            }
+            Key::Dashes(style, length, gap) => {
+                for begin in (0..24).step_by((length + gap).max(1) as usize) {
+                    let end = (begin + length).min(24);
+                    let dash = vec![(px(x + begin), px(y)), (px(x + end), px(y))];
+                    area.draw(&PathElement::new(dash, *style))?;
+                }
             }
             Key::Field(colour) => {
                 area.draw(&Rectangle::new([(px(x), px(y - 5)), (px(x + 24), px(y + 5))], colour.filled()))?;

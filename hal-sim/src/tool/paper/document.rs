@@ -10,8 +10,7 @@ use crate::tool::error::ToolError;
 
 /// Replaces these sections in a document; a section without a place in it is an error.
 pub fn update(path: &Path, sections: &[Section]) -> Result<(), ToolError> {
-    let mut text = std::fs::read_to_string(path)
-        .map_err(|error| ToolError::input(format!("{}: cannot be read: {error}", path.display())))?;
+    let mut text = read(path)?;
     for section in sections {
         text = replaced(&text, section.name, &section.markdown).ok_or_else(|| {
             let name = section.name;
@@ -19,6 +18,12 @@ pub fn update(path: &Path, sections: &[Section]) -> Result<(), ToolError> {
         })?;
     }
     std::fs::write(path, text).map_err(|error| ToolError::cannot_write(path, &error))
+}
+
+/// A document's text.
+pub fn read(path: &Path) -> Result<String, ToolError> {
+    std::fs::read_to_string(path)
+        .map_err(|error| ToolError::input(format!("{}: cannot be read: {error}", path.display())))
 }
 
 fn replaced(text: &str, name: &str, content: &str) -> Option<String> {

@@ -6,21 +6,33 @@
 //! | part | what is made |
 //! | --- | --- |
 //! | [`table_three`] | the test functions as printed and as intended, and their least values |
+//! | [`table_four`] | the searches on them and on further functions: [`searches`], [`contenders`], [`goals`] |
+//! | [`figure_five`] | the searches' ways in the plane |
+//! | [`problems`], [`seeds`], [`recorder`], [`statistics`] | what is searched, from which seeds, what is counted, rows |
 //! | [`tables_five_six`] | parameters of the three-joint chain, by both methods |
 //! | [`figure_seven`] | its torque on the verification motion |
 //! | [`load_change`] | the chain identified before and after its load changes |
 //! | [`convergence`] | iterations of the default swarm on identification problems |
 
 pub mod chain;
+pub mod contenders;
 pub mod convergence;
 pub mod document;
+pub mod figure_five;
 pub mod figure_seven;
+pub mod goals;
 pub mod load_change;
 pub mod markdown;
 pub mod printed;
+pub mod problems;
 pub mod ranks;
 pub mod raw_cost;
+pub mod recorder;
+pub mod searches;
+pub mod seeds;
+pub mod statistics;
 pub mod swarm_bench;
+pub mod table_four;
 pub mod table_three;
 pub mod tables_five_six;
 pub mod verification;
@@ -36,6 +48,10 @@ use super::report::SCHEMA;
 pub enum Part {
     /// The test functions.
     TableThree,
+    /// The searches.
+    TableFour,
+    /// The searches' ways in the plane.
+    FigureFive,
     /// The chain's parameters; both tables come from the same runs.
     TablesFiveSix,
     /// The chain's torque on the verification motion.
@@ -48,14 +64,23 @@ pub enum Part {
 
 impl Part {
     /// Everything, in the paper's order.
-    pub const ALL: [Self; 4] = [Self::TableThree, Self::TablesFiveSix, Self::FigureSeven, Self::LoadChange];
+    pub const ALL: [Self; 6] = [
+        Self::TableThree,
+        Self::TableFour,
+        Self::FigureFive,
+        Self::TablesFiveSix,
+        Self::FigureSeven,
+        Self::LoadChange,
+    ];
 }
 
 /// What holds for all parts.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct PaperOptions {
     /// Runs of each row; every part has a number of its own where it is not given.
     pub seeds: Option<u64>,
+    /// Searches of Table IV; all where none is named.
+    pub algorithms: Vec<contenders::Algorithm>,
 }
 
 /// What one part found.
@@ -79,6 +104,8 @@ pub fn run(parts: &[Part], options: &PaperOptions) -> Result<Vec<Section>, ToolE
 fn section(part: Part, options: &PaperOptions) -> Result<Section, ToolError> {
     match part {
         Part::TableThree => table_three::section(),
+        Part::TableFour => table_four::section(options),
+        Part::FigureFive => figure_five::section(options),
         Part::TablesFiveSix => tables_five_six::section(options),
         Part::FigureSeven => figure_seven::section(options),
         Part::LoadChange => load_change::section(options),

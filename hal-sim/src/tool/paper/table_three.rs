@@ -160,11 +160,8 @@ fn decimals(value: f64, digits: i32) -> String {
 fn find(entry: &Entry) -> Result<Found, ToolError> {
     let problem = TestProblem::new(entry.function, 2);
     let half = problem.half_width();
-    let mut points = grid(&problem, GRID_POINTS);
-    points.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
-    let spacing = 2.0 * half / f64::from(GRID_POINTS - 1);
-    let best = points.iter().take(STARTS).map(|start| compass(&problem, *start, spacing));
-    let (minimum, minimiser) = best
+    let (minimum, minimiser) = descents(&problem)
+        .into_iter()
         .min_by(|one, other| one.0.total_cmp(&other.0))
         .ok_or_else(|| ToolError::input("a grid without points"))?;
     if (minimum - problem.minimum()).abs() > AGREEMENT * (1.0 + minimum.abs()) {
@@ -186,6 +183,30 @@ fn find(entry: &Entry) -> Result<Found, ToolError> {
         minimiser,
         coarse_grid_minimum,
     })
+}
+
+/// Every place that the search finds and where the value is the least.
+#[must_use]
+pub fn minimisers(problem: &TestProblem) -> Vec<[f64; 2]> {
+    let near = |one: &[f64; 2], other: &[f64; 2]| {
+        (one[0] - other[0]).hypot(one[1] - other[1]) < 1e-3 * problem.half_width()
+    };
+    let mut found: Vec<[f64; 2]> = Vec::new();
+    for (value, place) in descents(problem) {
+        let is_least = (value - problem.minimum()).abs() <= AGREEMENT * (1.0 + value.abs());
+        if is_least && !found.iter().any(|known| near(known, &place)) {
+            found.push(place);
+        }
+    }
+    found
+}
+
+/// Ends of the compass searches from the best points of the grid.
+fn descents(problem: &TestProblem) -> Vec<Point> {
+    let mut points = grid(problem, GRID_POINTS);
+    points.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
+    let spacing = 2.0 * problem.half_width() / f64::from(GRID_POINTS - 1);
+    points.iter().take(STARTS).map(|start| compass(problem, *start, spacing)).collect()
 }
 
 /// A value and where it is taken.

@@ -1,0 +1,269 @@
+//! The searches of Table IV: those of the firmware, and those of two other crates as they come.
+//!
+//! | name | search | constants | iterations | evaluations at most |
+//! | --- | --- | --- | --- | --- |
+//! | `pso` | particle swarm, 20 particles | the paper's: w 0.8, c 1.4 | one move of all | E |
+//! | `pso-constriction` | the same | w 0.7298, c 1.496 (Clerc, Kennedy, 2002) | one move of all | E |
+//! | `bas` | beetle antennae search | the paper's | one step | 3,001: the paper's 1,000 iterations |
+//! | `bso-paper` | beetle swarm as printed, (29) corrected, 20 beetles | the paper's | one move of all | 60,020: 1,000 iterations |
+//! | `bso` | the default beetle swarm, 20 beetles | its own | one move of all | E: 1,000 iterations |
+//! | `cma-es` | crate `cmaes`, population 4 + 3 ln D, active | its own | one generation | E |
+//! | `cma-es-20` | the same with a population of 20 | its own | one generation | E |
+//! | `cma-es-restarts` | `cma-es`, begun anew with twice the population where it ends (Auger, Hansen, 2005) | its own | one generation | E |
+//! | `pso-argmin` | crate `argmin`, 20 particles | its own: those of SPSO 2011 | one move of all | E |
+//!
+//! E = 20 + 1,000 (20 + 2 min(20, D)) is what 1,000 iterations of the default swarm evaluate: 24,020 at D = 2, 60,020
+//! from D = 20 on. All start in the same box: swarms scatter uniformly, CMA-ES draws its centre uniformly and begins
+//! with a sigma of 0.3 of the box's width. Outside of the box CMA-ES is given the value at the nearest point of it and
+//! the squared distance to it in the coordinates' unit on top; swarms stay inside by themselves.
+//! A first scattered swarm is iteration 0; CMA-ES has none, its first generation is iteration 1.
+
+use argmin::core::{CostFunction, Error, Executor, PopulationState};
+use argmin::solver::particleswarm::{Particle, ParticleSwarm};
+use cmaes::{CMAESOptions, DVector};
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+use scarab::real::Real;
+use scarab::swarm::{
+    Bas, BasSettings, Bso, BsoSettings, InertiaWeight, Objective, Pso, PsoSettings, Search, SwarmError,
+};
+use serde::{Serialize, Serializer};
+
+use super::problems::MOST_COORDINATES;
+use super::recorder::Recorder;
+use crate::tool::error::ToolError;
+
+/// Beetles and particles of every swarm.
+pub const SWARM: u32 = 20;
+/// Iterations of the default swarm, and of the paper's searches.
+pub const ITERATIONS: u32 = 1_000;
+/// First standard deviation of CMA-ES, share of the box's width.
+const FIRST_SIGMA: f64 = 0.3;
+/// No population grows beyond: more than any budget here.
+const LARGEST_POPULATION: usize = 1 << 16;
+
+/// A search of Table IV.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Algorithm {
+    /// Particle swarm, the paper's constants.
+    Pso,
+    /// Particle swarm, constriction constants.
+    PsoConstriction,
+    /// Particle swarm of another crate.
+    PsoArgmin,
+    /// Beetle antennae search.
+    Bas,
+    /// Beetle swarm as printed.
+    BsoPaper,
+    /// The default beetle swarm.
+    Bso,
+    /// CMA-ES with its default population.
+    CmaEs,
+    /// CMA-ES with a population of 20.
+    CmaEsTwenty,
+    /// CMA-ES with restarts.
+    CmaEsRestarts,
+}
+
+impl Algorithm {
+    /// In the order of the report.
+    pub const ALL: [Self; 9] = [
+        Self::Pso,
+        Self::PsoConstriction,
+        Self::PsoArgmin,
+        Self::Bas,
+        Self::BsoPaper,
+        Self::Bso,
+        Self::CmaEs,
+        Self::CmaEsTwenty,
+        Self::CmaEsRestarts,
+    ];
+
+    /// Name in the report.
+    #[must_use]
+    pub const fn id(self) -> &'static str {
+        match self {
+            Self::Pso => "pso",
+            Self::PsoConstriction => "pso-constriction",
+            Self::PsoArgmin => "pso-argmin",
+            Self::Bas => "bas",
+            Self::BsoPaper => "bso-paper",
+            Self::Bso => "bso",
+            Self::CmaEs => "cma-es",
+            Self::CmaEsTwenty => "cma-es-20",
+            Self::CmaEsRestarts => "cma-es-restarts",
+        }
+    }
+
+    /// Whether it is CMA-ES.
+    #[must_use]
+    pub const fn is_cma_es(self) -> bool {
+        matches!(self, Self::CmaEs | Self::CmaEsTwenty | Self::CmaEsRestarts)
+    }
+
+    /// Whether it is a particle swarm.
+    #[must_use]
+    pub const fn is_pso(self) -> bool {
+        matches!(self, Self::Pso | Self::PsoConstriction | Self::PsoArgmin)
+    }
+}
+
+impl Serialize for Algorithm {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.id())
+    }
+}
+
+/// What 1,000 iterations of the default swarm evaluate.
+#[must_use]
+pub fn budget(dimension: usize) -> u32 {
+    SWARM + ITERATIONS * (SWARM + 2 * SWARM.min(dimension as u32))
+}
+
+/// Runs one of the firmware's searches until the recorder has seen all goals or the budget is spent.
+pub fn run_own<T: Real>(
+    algorithm: Algorithm,
+    recorder: &Recorder<'_, T, impl Objective<T>>,
+    seed: u64,
+) -> Result<(), ToolError> {
+    const D: usize = MOST_COORDINATES;
+    const N: usize = SWARM as usize;
+    let told = |error: SwarmError| ToolError::input(format!("{}: {error:?}", algorithm.id()));
+    let evaluations = budget(recorder.dimension());
+    let constriction = PsoSettings {
+        inertia_weight: InertiaWeight::constant(T::of(0.7298)),
+        individual_learning: T::of(1.496),
+        global_learning: T::of(1.496),
+        ..PsoSettings::default()
+    };
+    match algorithm {
+        Algorithm::PsoConstriction => {
+            let search = Pso::<T, N, D>::new(recorder, constriction, seed).map_err(told)?;
+            follow(search, recorder, SWARM, u32::MAX, evaluations);
+        }
+        Algorithm::Bas => {
+            let search = Bas::<T, D>::new(recorder, BasSettings::default(), seed).map_err(told)?;
+            follow(search, recorder, 1, ITERATIONS, u32::MAX);
+        }
+        Algorithm::BsoPaper => {
+            let search = Bso::<T, N, D>::new(recorder, BsoSettings::paper(), seed).map_err(told)?;
+            follow(search, recorder, SWARM, ITERATIONS, u32::MAX);
+        }
+        Algorithm::Bso => {
+            let search = Bso::<T, N, D>::new(recorder, BsoSettings::default(), seed).map_err(told)?;
+            follow(search, recorder, SWARM, ITERATIONS, u32::MAX);
+        }
+        _ => {
+            let search = Pso::<T, N, D>::new(recorder, PsoSettings::default(), seed).map_err(told)?;
+            follow(search, recorder, SWARM, u32::MAX, evaluations);
+        }
+    }
+    Ok(())
+}
+
+/// Runs any search in double precision.
+pub fn run(
+    algorithm: Algorithm,
+    recorder: &Recorder<'_, f64, impl Objective<f64>>,
+    seed: u64,
+) -> Result<(), ToolError> {
+    let default = 4 + (3.0 * (recorder.dimension() as f64).ln()).floor() as usize;
+    match algorithm {
+        Algorithm::CmaEs => cma_es(recorder, default, false, seed),
+        Algorithm::CmaEsTwenty => cma_es(recorder, SWARM as usize, false, seed),
+        Algorithm::CmaEsRestarts => cma_es(recorder, default, true, seed),
+        Algorithm::PsoArgmin => {
+            argmin_swarm(recorder, seed).map_err(|error| ToolError::input(format!("pso-argmin: {error}")))
+        }
+        own => run_own(own, recorder, seed),
+    }
+}
+
+/// One evaluation at a time; `first` of them belong to iteration 0.
+fn follow<T: Real>(
+    mut search: impl Search<T>,
+    recorder: &Recorder<'_, T, impl Objective<T>>,
+    first: u32,
+    iterations: u32,
+    evaluations: u32,
+) {
+    while !recorder.is_done() && search.iterations() < iterations && recorder.evaluations() < evaluations {
+        recorder.begin(if recorder.evaluations() < first { 0 } else { search.iterations() + 1 });
+        if search.advance(recorder, 1) == 0 {
+            return;
+        }
+    }
+}
+
+/// Generation after generation; where CMA-ES ends by its own criteria, the run is over or begins anew.
+fn cma_es(
+    recorder: &Recorder<'_, f64, impl Objective<f64>>,
+    mut population: usize,
+    has_restarts: bool,
+    seed: u64,
+) -> Result<(), ToolError> {
+    let mut random = StdRng::seed_from_u64(seed);
+    let bounds: Vec<_> = (0..recorder.dimension()).map(|coordinate| recorder.bounds(coordinate)).collect();
+    let width = bounds.iter().map(|(low, high)| high - low).fold(0.0, f64::max);
+    let most = budget(recorder.dimension());
+    let mut generation = 0;
+    loop {
+        let centre: Vec<f64> =
+            bounds.iter().map(|(low, high)| rand::Rng::random_range(&mut random, *low..*high)).collect();
+        let mut state = CMAESOptions::new(centre, FIRST_SIGMA * width)
+            .population_size(population)
+            .seed(rand::Rng::random(&mut random))
+            .build(|position: &DVector<f64>| inside(recorder, &bounds, position.as_slice()))
+            .map_err(|error| ToolError::input(format!("cma-es: {error:?}")))?;
+        loop {
+            if recorder.is_done() || recorder.evaluations() >= most {
+                return Ok(());
+            }
+            generation += 1;
+            recorder.begin(generation);
+            if state.next().is_some() {
+                break;
+            }
+        }
+        if !has_restarts {
+            return Ok(());
+        }
+        population = (2 * population).min(LARGEST_POPULATION);
+    }
+}
+
+/// The value at the nearest point of the box, and the squared distance to it.
+fn inside(objective: &impl Objective<f64>, bounds: &[(f64, f64)], position: &[f64]) -> f64 {
+    let nearest: Vec<f64> =
+        position.iter().zip(bounds).map(|(x, (low, high))| x.clamp(*low, *high)).collect();
+    let distance: f64 = position.iter().zip(&nearest).map(|(x, near)| (x - near) * (x - near)).sum();
+    objective.evaluate(&nearest) + distance
+}
+
+/// What `argmin` minimises.
+struct Cost<'r, 'o, O>(&'r Recorder<'o, f64, O>);
+
+impl<O: Objective<f64>> CostFunction for Cost<'_, '_, O> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, position: &Self::Param) -> Result<f64, Error> {
+        self.0.begin(self.0.evaluations() / SWARM);
+        Ok(self.0.evaluate(position))
+    }
+}
+
+fn argmin_swarm(recorder: &Recorder<'_, f64, impl Objective<f64>>, seed: u64) -> Result<(), Error> {
+    let (low, high) = (0..recorder.dimension()).map(|coordinate| recorder.bounds(coordinate)).unzip();
+    let solver = ParticleSwarm::<Vec<f64>, f64, _>::new((low, high), SWARM as usize)
+        .with_rng_generator(StdRng::seed_from_u64(seed));
+    let iterations = (budget(recorder.dimension()) / SWARM).into();
+    let goal = recorder.last_goal().unwrap_or(f64::NEG_INFINITY);
+    Executor::new(Cost(recorder), solver)
+        .configure(|state: PopulationState<Particle<Vec<f64>, f64>, f64>| {
+            state.max_iters(iterations).target_cost(goal)
+        })
+        .timer(false)
+        .run()?;
+    Ok(())
+}

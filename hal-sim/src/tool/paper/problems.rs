@@ -1,0 +1,223 @@
+//! The test functions by the names of the report, in their readings and dimensions.
+//!
+//! Why beside `scarab::swarm::TestProblem`: the functions are the firmware's, so that the device meets the same; names,
+//! readings and a fresh shift and rotation for every run are matters of the report.
+//!
+//! `f4-shifted-rotated` is f(x) = Ackley(R (x - c)): c uniform within half of the half-box, R uniform over the
+//! orthogonal matrices (Haar), both new for every run, from the run's seed.
+//! Source of R: Gram-Schmidt on rows of normal numbers (Stewart, 1980). Cost: D^2 operations per evaluation.
+
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use scarab::real::Real;
+use scarab::swarm::{Objective, TestFunction, TestProblem};
+use serde::Serialize;
+
+use super::seeds::ReportSeed;
+
+/// Most coordinates of any problem here.
+pub const MOST_COORDINATES: usize = 30;
+
+/// The paper's function, or what it must have meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Reading {
+    /// The standard function.
+    Intended,
+    /// As the paper prints it.
+    Printed,
+}
+
+/// One test function in one dimension.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Case {
+    /// Name in the report.
+    pub id: &'static str,
+    /// Which form.
+    pub reading: Reading,
+    /// Coordinates.
+    pub dimension: usize,
+    function: TestFunction,
+    /// Shifted and rotated anew for every run.
+    is_moved: bool,
+}
+
+const fn case(id: &'static str, function: TestFunction, dimension: usize) -> Case {
+    Case { id, reading: Reading::Intended, dimension, function, is_moved: false }
+}
+
+const fn printed(id: &'static str, function: TestFunction) -> Case {
+    Case { id, reading: Reading::Printed, dimension: 2, function, is_moved: false }
+}
+
+const fn moved(id: &'static str, function: TestFunction, dimension: usize) -> Case {
+    Case { id, reading: Reading::Intended, dimension, function, is_moved: true }
+}
+
+/// All that Table IV is made of: the paper's in the plane, the paper's in thirty dimensions, and further ones.
+pub const CASES: [Case; 20] = [
+    case("f1", TestFunction::Sphere, 2),
+    case("f2", TestFunction::SixHumpCamel, 2),
+    case("f3", TestFunction::Branin, 2),
+    case("f4", TestFunction::Ackley, 2),
+    printed("f1", TestFunction::Sphere),
+    printed("f2", TestFunction::CamelAsPrinted),
+    printed("f3", TestFunction::BraninAsPrinted),
+    printed("f4", TestFunction::AckleyAsPrinted),
+    case("f1", TestFunction::Sphere, 30),
+    case("f4", TestFunction::Ackley, 30),
+    moved("f4-shifted-rotated", TestFunction::Ackley, 2),
+    moved("f4-shifted-rotated", TestFunction::Ackley, 30),
+    case("ellipsoid-1e4", TestFunction::ShiftedEllipsoid, 30),
+    case("ellipsoid-1e6", TestFunction::ShiftedSteepEllipsoid, 30),
+    case("rosenbrock", TestFunction::Rosenbrock, 10),
+    case("griewank", TestFunction::ShiftedGriewank, 30),
+    case("schwefel-1.2", TestFunction::ShiftedSchwefel, 30),
+    case("levy", TestFunction::Levy, 10),
+    case("rastrigin", TestFunction::Rastrigin, 2),
+    case("rastrigin", TestFunction::Rastrigin, 10),
+];
+
+impl Case {
+    /// The least value.
+    #[must_use]
+    pub fn minimum(&self) -> f64 {
+        self.plain().minimum()
+    }
+
+    /// The box is plus and minus this in every coordinate.
+    #[must_use]
+    pub fn half_width(&self) -> f64 {
+        self.plain().half_width()
+    }
+
+    /// As a run meets it.
+    #[must_use]
+    pub fn problem<T: Real>(&self, seed: ReportSeed) -> Problem<T> {
+        let motion =
+            self.is_moved.then(|| Motion::random(self.dimension, self.half_width() / 2.0, seed.problem()));
+        Problem { plain: self.plain(), motion }
+    }
+
+    fn plain(&self) -> TestProblem {
+        TestProblem::new(self.function, self.dimension)
+    }
+}
+
+/// A test function as one run meets it.
+#[derive(Clone, Debug)]
+pub struct Problem<T> {
+    plain: TestProblem,
+    motion: Option<Motion<T>>,
+}
+
+/// A shift and a rotation.
+#[derive(Clone, Debug)]
+struct Motion<T> {
+    centre: Vec<T>,
+    /// Rows of an orthogonal matrix.
+    rows: Vec<Vec<T>>,
+}
+
+impl<T: Real> Motion<T> {
+    fn random(dimension: usize, reach: f64, seed: u64) -> Self {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let uniform = rand_distr::StandardUniform;
+        let centre = (0..dimension)
+            .map(|_| {
+                let share: f64 = uniform.sample(&mut random);
+                T::of(reach * (2.0 * share - 1.0))
+            })
+            .collect();
+        let mut rows: Vec<Vec<f64>> = Vec::with_capacity(dimension);
+        while rows.len() < dimension {
+            let mut row: Vec<f64> = (0..dimension).map(|_| StandardNormal.sample(&mut random)).collect();
+            // Twice: what rounding leaves of the first is removed by the second.
+            for _ in 0..2 {
+                for known in &rows {
+                    let along = dot(known, &row);
+                    row.iter_mut().zip(known).for_each(|(entry, known)| *entry -= along * known);
+                }
+                let length = dot(&row, &row).sqrt();
+                row.iter_mut().for_each(|entry| *entry /= length);
+            }
+            rows.push(row);
+        }
+        let rows = rows.into_iter().map(|row| row.into_iter().map(T::of).collect()).collect();
+        Self { centre, rows }
+    }
+}
+
+fn dot(one: &[f64], other: &[f64]) -> f64 {
+    one.iter().zip(other).map(|(one, other)| one * other).sum()
+}
+
+impl<T: Real> Objective<T> for Problem<T> {
+    fn dimension(&self) -> usize {
+        Objective::<T>::dimension(&self.plain)
+    }
+
+    fn bounds(&self, coordinate: usize) -> (T, T) {
+        self.plain.bounds(coordinate)
+    }
+
+    fn evaluate(&self, position: &[T]) -> T {
+        let Some(motion) = &self.motion else { return self.plain.evaluate(position) };
+        let mut moved = [T::zero(); MOST_COORDINATES];
+        for (entry, row) in moved.iter_mut().zip(&motion.rows) {
+            let terms = row.iter().zip(position).zip(&motion.centre);
+            *entry = terms.fold(T::zero(), |sum, ((&along, &x), &centre)| sum + along * (x - centre));
+        }
+        self.plain.evaluate(moved.get(..position.len()).unwrap_or(&moved))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moved_case() -> Case {
+        CASES.into_iter().find(|case| case.is_moved && case.dimension == 30).expect("a moved case")
+    }
+
+    #[test]
+    fn a_moved_function_keeps_its_minimum_and_its_lengths_and_moves_with_the_run() {
+        let case = moved_case();
+        let plain = TestProblem::new(TestFunction::Ackley, 30);
+        let mut centres = Vec::new();
+        for run in 0..5 {
+            let problem = case.problem::<f64>(ReportSeed::of_run(run));
+            let motion = problem.motion.as_ref().expect("a motion");
+            assert!(motion.centre.iter().all(|entry| entry.abs() <= 16.0));
+            // cancellation of 20 + e - 20 - e: a few units in the last place of 22
+            assert!(problem.evaluate(&motion.centre).abs() < 1e-13);
+            for (i, row) in motion.rows.iter().enumerate() {
+                for (j, other) in motion.rows.iter().enumerate() {
+                    let expected = if i == j { 1.0 } else { 0.0 };
+                    assert!((dot(row, other) - expected).abs() < 1e-14, "rows {i} and {j}");
+                }
+            }
+            // one step along a row is a step along an axis of the plain function
+            let mut along = motion.centre.clone();
+            along.iter_mut().zip(&motion.rows[3]).for_each(|(entry, row)| *entry += 9.0 * row);
+            let mut axis = [0.0; 30];
+            axis[3] = 9.0;
+            let expected: f64 = plain.evaluate(&axis);
+            assert!((problem.evaluate(&along) - expected).abs() < 1e-12);
+            centres.push(motion.centre.clone());
+        }
+        assert!(centres.windows(2).all(|pair| pair[0] != pair[1]), "each run has a shift of its own");
+    }
+
+    #[test]
+    fn both_precisions_meet_the_same_problem() {
+        let (single, double) = (
+            moved_case().problem::<f32>(ReportSeed::of_run(7)),
+            moved_case().problem::<f64>(ReportSeed::of_run(7)),
+        );
+        let difference = single.evaluate(&[3.5; 30]) - double.evaluate(&[3.5; 30]) as f32;
+        // some thirty single-precision roundings of values of 20
+        assert!(difference.abs() < 1e-4, "{difference}");
+    }
+}
