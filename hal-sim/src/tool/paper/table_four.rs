@@ -1,10 +1,10 @@
 //! Table IV: the searches on the test functions, beside what the paper prints.
 
-use comfy_table::{Table, presets};
 use serde_json::Map;
 
 use super::contenders::{Algorithm, ITERATIONS};
 use super::goals::GOALS;
+use super::markdown::Table;
 use super::problems::{CASES, Case, Reading};
 use super::searches::{self, TOLERANCES};
 use super::statistics::Row;
@@ -52,9 +52,8 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
 }
 
 fn headed(header: impl IntoIterator<Item = String>) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN).set_header(header);
-    table
+    let header: Vec<String> = header.into_iter().collect();
+    Table::new(&header.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
 fn find<'r>(
@@ -116,9 +115,9 @@ fn matrix(rows: &[Row], tolerance: f64, title: &str, cell: fn(&Row, Option<u32>)
         let default = row(Algorithm::Bso).and_then(|row| row.evaluations_median);
         let cells =
             run.iter().map(|algorithm| row(*algorithm).map_or_else(String::new, |row| cell(row, default)));
-        table.add_row([name(case)].into_iter().chain(cells));
+        table.row([name(case)].into_iter().chain(cells));
     }
-    table.trim_fmt()
+    table.to_string().trim_end().to_owned()
 }
 
 /// The paper's figures for f1 to f4 above ours in the plane.
@@ -137,11 +136,11 @@ fn beside_the_paper(rows: &[Row]) -> String {
     };
     for (algorithm, printed) in PRINTED {
         let label = format!("paper's {}", algorithm.id().trim_end_matches("-paper").to_uppercase());
-        table.add_row([label].into_iter().chain(printed.map(|count| count.to_string())));
-        table.add_row(ours(algorithm));
+        table.row([label].into_iter().chain(printed.map(|count| count.to_string())));
+        table.row(ours(algorithm));
     }
-    table.add_row(ours(Algorithm::Bso));
-    table.trim_fmt()
+    table.row(ours(Algorithm::Bso));
+    table.to_string().trim_end().to_owned()
 }
 
 /// Where other searches need fewer evaluations than the default swarm although it succeeds.
@@ -190,9 +189,9 @@ fn precisions(rows: &[Row]) -> String {
             find(rows, case, Algorithm::Bso, TOLERANCES[0], precision)
                 .map_or_else(Default::default, |row| [iterations(row, None), format!("{} %", percent(row))])
         });
-        table.add_row([name(case)].into_iter().chain(cells.into_iter().flatten()));
+        table.row([name(case)].into_iter().chain(cells.into_iter().flatten()));
     }
-    table.trim_fmt()
+    table.to_string().trim_end().to_owned()
 }
 
 /// The goals of the default swarm.
@@ -211,7 +210,7 @@ fn goals(rows: &[Row]) -> String {
             format!("{} ({})", goal.function, goal.dimension),
             format!("{} / {}, 100 %", goal.median, goal.p95),
         ];
-        table.add_row(first.into_iter().chain(cells.into_iter().flatten()));
+        table.row(first.into_iter().chain(cells.into_iter().flatten()));
     }
-    table.trim_fmt()
+    table.to_string().trim_end().to_owned()
 }

@@ -8,12 +8,12 @@
 
 use std::fmt::Write;
 
-use comfy_table::{Table, presets};
 use scarab::swarm::{Objective, TestFunction, TestProblem};
 use serde::Serialize;
 use serde_json::Map;
 
 use super::Section;
+use super::markdown::Table;
 use crate::tool::error::ToolError;
 
 /// Points of the grid along each axis.
@@ -33,7 +33,6 @@ struct Entry {
     formula: &'static str,
     /// As the paper's Table III lists it.
     listed: f64,
-    remark: &'static str,
 }
 
 const ENTRIES: [Entry; 7] = [
@@ -43,7 +42,6 @@ const ENTRIES: [Entry; 7] = [
         function: TestFunction::Sphere,
         formula: "x^2 + y^2",
         listed: 0.0,
-        remark: "as printed, but for its D = 30: the sum over D coordinates",
     },
     Entry {
         id: "f2",
@@ -51,7 +49,6 @@ const ENTRIES: [Entry; 7] = [
         function: TestFunction::SixHumpCamel,
         formula: "(4 - 2.1 x^2 + x^4 / 3) x^2 + x y + (4 y^2 - 4) y^2",
         listed: -0.873,
-        remark: "the six-hump camel",
     },
     Entry {
         id: "f2",
@@ -59,7 +56,6 @@ const ENTRIES: [Entry; 7] = [
         function: TestFunction::CamelAsPrinted,
         formula: "(4 - 2 x^2 + x^(4/3)) x^2 + x y + (4 y^2 - 4) y^2",
         listed: -0.873,
-        remark: "least on the edge of the box: below it for a larger one",
     },
     Entry {
         id: "f3",
@@ -67,7 +63,6 @@ const ENTRIES: [Entry; 7] = [
         function: TestFunction::Branin,
         formula: "(y - 5.1 / (4 pi^2) x^2 + 5 / pi x - 6)^2 + 10 (1 - 1 / (8 pi)) cos x + 10",
         listed: 0.415,
-        remark: "Branin's function",
     },
     Entry {
         id: "f3",
@@ -75,7 +70,6 @@ const ENTRIES: [Entry; 7] = [
         function: TestFunction::BraninAsPrinted,
         formula: "x and y exchanged, 5 for 5.1",
         listed: 0.415,
-        remark: "the same least value: it depends on neither",
     },
     Entry {
         id: "f4",
@@ -83,7 +77,6 @@ const ENTRIES: [Entry; 7] = [
         function: TestFunction::Ackley,
         formula: "20 + e - 20 exp(-0.2 sqrt(mean x_i^2)) - exp(mean cos 2 pi x_i)",
         listed: 0.0,
-        remark: "Ackley's function",
     },
     Entry {
         id: "f4",
@@ -91,7 +84,6 @@ const ENTRIES: [Entry; 7] = [
         function: TestFunction::AckleyAsPrinted,
         formula: "the same without + e",
         listed: 0.0,
-        remark: "everything lies lower by e",
     },
 ];
 
@@ -111,37 +103,26 @@ struct Found {
 /// The part: table, words and JSON.
 pub fn section() -> Result<Section, ToolError> {
     let found = ENTRIES.iter().map(find).collect::<Result<Vec<_>, _>>()?;
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN).set_header([
-        "function",
-        "reading",
-        "formula",
-        "box",
-        "listed",
-        "found",
-        "at",
-        "on 51 x 51 points",
-        "remark",
-    ]);
+    let heads = ["function, D = 2", "box", "f_min listed", "found", "at x", "y", "on 51 x 51 points"];
+    let mut table = Table::new(&heads);
     for (entry, found) in ENTRIES.iter().zip(&found) {
-        let [x, y] = found.minimiser.map(|coordinate| decimals(coordinate, 4));
-        table.add_row([
-            entry.id.to_owned(),
-            entry.reading.to_owned(),
-            entry.formula.to_owned(),
+        let reading = if entry.reading == "printed" { " as printed" } else { "" };
+        let [x, y] = found.minimiser;
+        table.row([
+            format!("{}{reading}: {}", entry.id, entry.formula),
             format!("{}", found.half_width),
             format!("{}", entry.listed),
             decimals(found.minimum, 6),
-            format!("{x}, {y}"),
+            decimals(x, 4),
+            decimals(y, 4),
             decimals(found.coarse_grid_minimum, 4),
-            entry.remark.to_owned(),
         ]);
     }
-    let mut markdown = table.trim_fmt();
+    let mut markdown = table.to_string();
     write!(
         markdown,
-        "\n\nLeast values for D = 2, by a grid of {GRID_POINTS} x {GRID_POINTS} points and a compass search from \
-         its best {STARTS}; the box is plus and minus the number given. Listed: f_min of the paper's Table III.\n"
+        "\nLeast values by a grid of {GRID_POINTS} x {GRID_POINTS} points and a compass search from \
+         its best {STARTS}; the box is plus and minus the number given.\n"
     )
     .map_err(|error| ToolError::input(error.to_string()))?;
     let mut json = Map::new();
