@@ -18,15 +18,13 @@ macro_rules! fill {
         };
         let slot: &mut core::mem::MaybeUninit<Self> = $slot;
         let whole = slot.as_mut_ptr();
-        $({
-            // In a block of its own: what one field takes of the stack is free for the next.
-            let value = $value;
+        $(
             #[expect(unsafe_code, reason = "see `place`")]
             // SAFETY: `whole` points to memory for a `Self` that nobody else reaches, so to that of its field.
             unsafe {
-                (&raw mut (*whole).$field).write(value);
+                $crate::place::write(&raw mut (*whole).$field, || $value);
             }
-        })*
+        )*
         $(
             #[expect(unsafe_code, reason = "see `place`")]
             // SAFETY: as above; memory that may hold nothing yet is what a `MaybeUninit` stands for.
@@ -41,6 +39,28 @@ macro_rules! fill {
     }};
 }
 pub(crate) use fill;
+
+/// Writes a field; what making it takes of the stack is free for the next.
+///
+/// # Safety
+/// `field` points to memory for the value that nobody else reaches.
+#[expect(unsafe_code, reason = "see `place`")]
+#[inline(always)]
+pub unsafe fn write<T>(field: *mut T, make: impl FnOnce() -> T) {
+    /// A compiler that optimises for size gives each value of a function that it does not split a place of its own.
+    const SMALL: usize = 128;
+    // SAFETY: as this function's.
+    unsafe {
+        if const { size_of::<T>() > SMALL } { write_apart(field, make) } else { field.write(make()) }
+    }
+}
+
+#[expect(unsafe_code, reason = "see `place`")]
+#[inline(never)]
+unsafe fn write_apart<T>(field: *mut T, make: impl FnOnce() -> T) {
+    // SAFETY: as `write`.
+    unsafe { field.write(make()) }
+}
 
 /// The memory of a field as the place of a value that is not there yet.
 pub const fn slot<T>(field: *mut T) -> *mut MaybeUninit<T> {

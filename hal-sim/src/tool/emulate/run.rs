@@ -13,9 +13,10 @@ use crate::tool::image::build::{firmware_build, target_directory, write_if_chang
 use crate::tool::image::leg_source;
 use crate::tool::leg_file::LegFile;
 
-const ARGUMENTS: [&str; 9] = [
+const ARGUMENTS: [&str; 10] = [
     "--quiet",
-    "--release",
+    "--profile",
+    "image",
     "--package",
     "hal-sim",
     "--bin",
@@ -25,7 +26,7 @@ const ARGUMENTS: [&str; 9] = [
     "emulated",
 ];
 /// Below the target directory.
-const IMAGE: &str = "firmware/thumbv7em-none-eabihf/release/emulated";
+const IMAGE: &str = "firmware/thumbv7em-none-eabihf/image/emulated";
 const EMULATOR: &str = "qemu-system-arm";
 const MACHINE: [&str; 9] =
     ["-M", "netduinoplus2", "-nographic", "-monitor", "none", "-serial", "null", "-icount", "shift=3"];
