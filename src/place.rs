@@ -50,9 +50,7 @@ pub unsafe fn write<T>(field: *mut T, make: impl FnOnce() -> T) {
     /// A compiler that optimises for size gives each value of a function that it does not split a place of its own.
     const SMALL: usize = 128;
     // SAFETY: as this function's.
-    unsafe {
-        if const { size_of::<T>() > SMALL } { write_apart(field, make) } else { field.write(make()) }
-    }
+    unsafe { if const { size_of::<T>() > SMALL } { write_apart(field, make) } else { field.write(make()) } }
 }
 
 #[expect(unsafe_code, reason = "see `place`")]
