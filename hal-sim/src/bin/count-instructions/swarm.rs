@@ -6,7 +6,7 @@
 use core::hint::black_box;
 
 use cortex_m_semihosting::hprintln;
-use scarab::swarm::{Bso, BsoSettings, Search, TestFunction, TestProblem};
+use scarab::swarm::{Bso, BsoSettings, TestFunction, TestProblem};
 
 use crate::counter::{Tally, count, heading};
 

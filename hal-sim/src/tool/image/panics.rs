@@ -15,7 +15,7 @@
 //! `$t` and `$d` (Arm ELF, IHI 0044, 4.5.5).
 //!
 //! Known limits: calls by a pointer are counted and not followed; a division by zero is told and not refused, since the remainders of
-//! queues ([`REMAINDER`]) are as many as the compiler makes of them.
+//! queues (`REMAINDER`) are as many as the compiler makes of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
