@@ -25,6 +25,7 @@ mod control;
 mod description;
 mod identification;
 mod model;
+mod permitted;
 mod results;
 mod stored;
 mod succession;
@@ -38,6 +39,7 @@ pub use description::{
 };
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
+pub use permitted::{axis_code, permitted};
 pub use results::{FoundBase, FoundFit, FoundParameter};
 pub use stored::{RestoreError, StoredModel};
 pub use upkeep::{UPDATE_ROWS, Upkeep};

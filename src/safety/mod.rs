@@ -12,6 +12,7 @@
 //! | [`StepGate`] | encoder steps that no joint can make |
 //! | [`Barrier`] | torque bounds that stop a joint before its range and speed end |
 //! | [`Monitor`] | all of it, once per tick |
+//! | [`Cause`], [`TickWatch`], [`ServoWatch`] | why nothing may be enabled, and what every current tick looks at |
 //!
 //! Safe states: *Off* releases the bridges in the same tick. *Damp* opposes every joint's velocity under its torque
 //! cap for at most 300 ms, then Off. *Limit* stays enabled with less than was asked for. An exoskeleton that goes limp
@@ -19,13 +20,13 @@
 //! Faults are latched until a reset is asked for, the drive is off and the cause is gone; the way back to a moving
 //! leg is shutdown, switch on, enable operation, each asked for by the operator.
 //!
-//! Here now: numbers that are not finite (N1), the range (J1), overspeed (J2), encoder steps (E2), and the torque and
-//! current caps. Not here: faults of supply, temperature, bridge, emergency stop, bus, timing and memory, whose
-//! signals the ports do not carry yet; they join as fault codes and fields of the [`Observation`]. No conformity with
-//! any safety standard is claimed.
+//! The monitor sees numbers that are not finite (N1), the range (J1), overspeed (J2), encoder steps (E2), and holds the torque
+//! and current caps; the axes see their own faults (`motor::Axis`), the interlock the board's. What is not built yet, and what
+//! was measured of the rest: docs/safety.md. No conformity with any safety standard is claimed.
 
 pub mod barrier;
 pub mod fault;
+pub mod interlock;
 pub mod limits;
 pub mod monitor;
 pub mod state;
@@ -33,6 +34,7 @@ pub mod step_gate;
 
 pub use barrier::{Barrier, Limited};
 pub use fault::{Fault, FaultCode, Reaction};
+pub use interlock::{Cause, ServoWatch, TickState, TickWatch};
 pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
 pub use monitor::{Decision, Monitor, Observation, Refusal, RefusalReason, Request};
 pub use state::{DriveState, Event, Permission, PowerRequest};

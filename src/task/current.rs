@@ -19,6 +19,7 @@ use crate::board::odrive_v3_6::settings::{CLOCK_HZ, analog, drives};
 use crate::board::odrive_v3_6::{brake, bridge, contacts, converter, encoder, interrupts};
 use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, JointSample};
 use crate::motor::{Axis, AxisRequest, CalibrationStep, Calibrator, Chopper};
+use crate::safety::{ServoWatch, TickState, TickWatch};
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::Volt;
 
@@ -27,8 +28,6 @@ const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
 /// Processor cycles between two ticks of one axis, and how many make one late.
 const CYCLES: u32 = CLOCK_HZ / CURRENT_RATE_HZ;
 const LATE_CYCLES: u32 = CYCLES + CYCLES / 2;
-/// Late ticks, or unanswered ones of the servo, in a row that are too many.
-const PATIENCE: u8 = 3;
 
 /// A brake resistor is connected: said when the image is built.
 const HAS_BRAKE_RESISTOR: bool = option_env!("SCARAB_BRAKE_RESISTOR").is_some();
@@ -51,16 +50,14 @@ struct AxisLoop {
     ticks: u32,
     /// Cycle counter at the last tick.
     last: Option<u32>,
-    late: u8,
+    watch: TickWatch,
     faulted: bool,
 }
 
 /// What level 0 works on.
 pub struct CurrentLoops {
     axes: [AxisLoop; JOINTS],
-    /// Of the servo, at its last pending, and how often in a row it has not moved since.
-    servo_ticks: u32,
-    unanswered: u8,
+    servo: ServoWatch,
     /// Of the brake resistor, if there is one.
     chopper: Option<Chopper>,
     volt_per_code: Volt,
@@ -83,28 +80,19 @@ impl CurrentLoops {
             samples,
             ticks: 0,
             last: None,
-            late: 0,
+            watch: TickWatch::default(),
             faulted: false,
         });
         let [begin, full] = drives::chopper(divider);
         let chopper = if HAS_BRAKE_RESISTOR { Chopper::new(begin, full) } else { None };
         let volt_per_code = analog::sense(divider).volt_per_code;
-        Self { axes, servo_ticks: 0, unanswered: 0, chopper, volt_per_code }
+        Self { axes, servo: ServoWatch::default(), chopper, volt_per_code }
     }
 
     /// One tick of one axis; `complete` if both of its shunts were converted.
     #[inline(never)]
     fn tick(&mut self, axis: usize, complete: bool) {
         let begun = DWT::cycle_count();
-        if contacts::emergency_stop() {
-            interlock::raise(Cause::EmergencyStop);
-        }
-        if contacts::gate_fault() {
-            interlock::raise(Cause::GateFault);
-        }
-        if !complete {
-            interlock::raise(Cause::Conversion);
-        }
         let bus = converter::bus();
         if axis == 0
             && let Some(chopper) = &self.chopper
@@ -112,7 +100,7 @@ impl CurrentLoops {
             brake::set(chopper.duty(self.volt_per_code * f32::from(bus)));
         }
         let Some(this) = self.axes.get_mut(axis) else { return };
-        this.watch(begun);
+        this.watch(begun, complete);
         let sample = AxisSample {
             shunt_codes: converter::shunts(axis),
             bus_code: bus,
@@ -145,33 +133,30 @@ impl CurrentLoops {
     }
 
     fn call_servo(&mut self) {
-        let ticks = statistics::SERVO_TICKS.get();
-        if ticks == self.servo_ticks {
+        let (missed, forbids) = self.servo.look(statistics::SERVO_TICKS.get());
+        if missed {
             statistics::SERVO_MISSED.add();
-            self.unanswered = self.unanswered.saturating_add(1);
-            if self.unanswered >= PATIENCE {
-                interlock::raise(Cause::ServoTicks);
-            }
-        } else {
-            self.unanswered = 0;
         }
-        self.servo_ticks = ticks;
+        interlock::raise_bits(forbids);
         interrupts::pend_servo();
     }
 }
 
 impl AxisLoop {
-    /// The time since the last tick.
-    fn watch(&mut self, now: u32) {
+    /// What forbids to enable is looked at before anything else: contacts, conversion, the time since the last tick.
+    fn watch(&mut self, now: u32, complete: bool) {
         let late = self.last.is_some_and(|last| now.wrapping_sub(last) > LATE_CYCLES);
         self.last = Some(now);
-        self.late = if late { self.late.saturating_add(1) } else { 0 };
         if late {
             statistics::CURRENT_MISSED.add();
-            if self.late >= PATIENCE {
-                interlock::raise(Cause::CurrentTicks);
-            }
         }
+        let state = TickState {
+            emergency_stop: contacts::emergency_stop(),
+            gate_fault: contacts::gate_fault(),
+            complete,
+            late,
+        };
+        interlock::raise_bits(self.watch.look(&state));
     }
 
     fn step(&mut self, axis: usize, sample: &AxisSample, allowed: bool) -> AxisCommand {

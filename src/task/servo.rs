@@ -11,7 +11,7 @@ use super::leg::{JOINTS, LEG};
 use super::links::{EVENTS, TOLD, Told};
 use super::{interlock, statistics};
 use crate::hal::{DriveCommand, JointSample, Sample};
-use crate::leg::{Activity, Control, ControlOutput, ControlRequest, DriveState, Finding, PowerRequest};
+use crate::leg::{Activity, Control, ControlOutput, ControlRequest, DriveState, Finding, permitted};
 use crate::motor::AxisRequest;
 use crate::trace::{Record, words};
 use crate::units::Ampere;
@@ -128,32 +128,10 @@ impl ServoLoop {
             self.control.receive(finding);
         }
         let request = self.requests.dequeue();
-        let asked = self.permitted(request);
+        let asked = permitted(request, interlock::is_clear(), self.control.state());
         let output = self.control.tick(&Sample { joints: self.sample }, asked, LEG.gravity);
         command(output.servo.drive());
         self.tell(request.as_ref(), asked.as_ref(), &output);
-    }
-
-    /// What of a request may reach the leg: while anything forbids it, only what switches off.
-    fn permitted(&self, request: Option<ControlRequest<JOINTS>>) -> Option<ControlRequest<JOINTS>> {
-        use PowerRequest::{DisableVoltage, ResetFault};
-        if interlock::is_clear() {
-            return request;
-        }
-        match request {
-            Some(ControlRequest::Power(
-                PowerRequest::DisableOperation | PowerRequest::QuickStop | DisableVoltage | ResetFault,
-            )) if self.is_off() => request,
-            _ if self.is_off() => None,
-            _ => Some(ControlRequest::Power(DisableVoltage)),
-        }
-    }
-
-    fn is_off(&self) -> bool {
-        matches!(
-            self.control.state(),
-            DriveState::NotReadyToSwitchOn | DriveState::SwitchOnDisabled | DriveState::Fault { .. }
-        )
     }
 
     /// What changed, and the sample of the log.

@@ -59,12 +59,7 @@ pub const fn segment(segment: Option<Segment>) -> (&'static str, u8) {
 /// A fault of the leg.
 #[must_use]
 pub const fn fault(code: FaultCode) -> &'static str {
-    match code {
-        FaultCode::EncoderStep => "encoder_step",
-        FaultCode::Overspeed => "overspeed",
-        FaultCode::PositionLimit => "position_limit",
-        FaultCode::NotFinite => "not_finite",
-    }
+    code.name()
 }
 
 /// Why the drive was not enabled.

@@ -28,7 +28,7 @@ const HOUSE: [(&str, &[&str]); 16] = [
     ("trace", &["hal", "leg"]),
     ("operator", &["leg"]),
     ("board", &["hal", "motor", "leg", "task"]),
-    ("task", &["hal", "motor", "leg", "operator", "servo", "trace", "board"]),
+    ("task", &["hal", "motor", "leg", "operator", "safety", "servo", "trace", "board"]),
 ];
 
 /// Rooms every other room may use.

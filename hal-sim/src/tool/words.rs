@@ -3,7 +3,7 @@
 use scarab::ident::KernelError;
 use scarab::leg::LegError;
 use scarab::motion::Quantity;
-use scarab::safety::{DriveState, FaultCode, LimitQuantity};
+use scarab::safety::{DriveState, LimitQuantity};
 use scarab::servo::ServoError;
 
 use super::leg_file::LegFile;
@@ -65,12 +65,7 @@ pub fn drive_stop(leg: &LegFile, state: DriveState) -> String {
     let Some(fault) = state.fault() else {
         return "the drive was switched off during identification".into();
     };
-    let cause = match fault.code {
-        FaultCode::EncoderStep => "its encoder jumped",
-        FaultCode::Overspeed => "it was faster than 1.1 times its speed limit",
-        FaultCode::PositionLimit => "it left its range",
-        FaultCode::NotFinite => "a signal was not a number",
-    };
+    let cause = fault.code.words();
     format!(
         "the drive stopped during identification with fault {:#06x}: joint {}, {cause}",
         fault.code as u16,

@@ -1,0 +1,61 @@
+//! What of a request may reach the leg while something forbids to enable.
+
+use super::control::ControlRequest;
+use crate::motor::AxisFault;
+use crate::safety::{DriveState, FaultCode, PowerRequest};
+
+/// Everything while nothing forbids it; else only what switches off. A drive that is not off yet is switched off, asked or not.
+#[must_use]
+pub fn permitted<const N: usize>(
+    request: Option<ControlRequest<N>>,
+    is_clear: bool,
+    state: DriveState,
+) -> Option<ControlRequest<N>> {
+    use PowerRequest::{DisableOperation, DisableVoltage, QuickStop, ResetFault};
+    if is_clear {
+        return request;
+    }
+    let is_off = matches!(
+        state,
+        DriveState::NotReadyToSwitchOn | DriveState::SwitchOnDisabled | DriveState::Fault { .. }
+    );
+    match request {
+        Some(ControlRequest::Power(DisableOperation | QuickStop | DisableVoltage | ResetFault)) if is_off => {
+            request
+        }
+        _ if is_off => None,
+        _ => Some(ControlRequest::Power(DisableVoltage)),
+    }
+}
+
+/// The fault for which an axis released itself.
+#[must_use]
+pub const fn axis_code(fault: AxisFault) -> FaultCode {
+    match fault {
+        AxisFault::CurrentSense => FaultCode::CurrentSense,
+        AxisFault::Overcurrent => FaultCode::Overcurrent,
+        AxisFault::BusVoltage => FaultCode::BusVoltage,
+        AxisFault::Encoder => FaultCode::EncoderPlace,
+        AxisFault::NotANumber => FaultCode::NotFinite,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_enables_while_something_forbids_it() {
+        let enabling = [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation]
+            .map(ControlRequest::<2>::Power);
+        let off = Some(ControlRequest::Power(PowerRequest::DisableVoltage));
+        for request in enabling.into_iter().chain([ControlRequest::Identify]) {
+            assert_eq!(permitted(Some(request), true, DriveState::SwitchedOn), Some(request));
+            assert_eq!(permitted(Some(request), false, DriveState::SwitchOnDisabled), None);
+            for state in [DriveState::ReadyToSwitchOn, DriveState::SwitchedOn, DriveState::OperationEnabled] {
+                assert_eq!(permitted(Some(request), false, state), off);
+                assert_eq!(permitted::<2>(None, false, state), off);
+            }
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! Why nothing may be enabled, and what every current tick looks at before an axis is asked.
+//!
+//! Why here: a board holds the reasons in one word that every level raises into (`task::interlock`), but what raises them is
+//! decided by values only, so the same code is tested against every fault on the host.
+//!
+//! A reason is raised once and stays until the operator resets; one that still holds is raised again in the next tick. While
+//! there is one, both bridges are released in every tick and the servo keeps its drive off.
+//!
+//! | seen by | reason | after |
+//! | --- | --- | --- |
+//! | [`TickWatch`] | emergency stop, gate driver's fault, a shunt without conversion | the tick itself |
+//! | [`TickWatch`] | a tick more than half a period late | three in a row |
+//! | [`ServoWatch`] | a servo that did not tick since it was last called | three calls in a row |
+//!
+//! Cost: some 12 instructions per axis and tick.
+
+use super::fault::FaultCode;
+
+/// Late ticks, or unanswered ones of the servo, in a row that are too many.
+const PATIENCE: u8 = 3;
+
+/// Why the drive is kept off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Cause {
+    /// The emergency stop's contact is open.
+    EmergencyStop,
+    /// A gate driver reports a fault.
+    GateFault,
+    /// A gate driver does not hold its configuration.
+    GateConfiguration,
+    /// The first axis released itself.
+    Axis1,
+    /// The second axis did.
+    Axis2,
+    /// A bridge is too hot.
+    Temperature,
+    /// A thermistor is open or shorted.
+    Thermistor,
+    /// Current ticks came late three times in a row.
+    CurrentTicks,
+    /// The servo did not answer three times in a row.
+    ServoTicks,
+    /// One shunt's conversion ended without the other's.
+    Conversion,
+    /// The image before this one crashed.
+    Crash,
+    /// The watchdog bit.
+    Watchdog,
+    /// The bridges' timers are not in phase.
+    Timers,
+    /// The factory's version does not tell the divider of the bus voltage.
+    BoardVersion,
+    /// The constants of an axis or of the leg make no sense.
+    Configuration,
+}
+
+impl Cause {
+    /// All of them, in the order of their bits.
+    pub const ALL: [Self; 15] = [
+        Self::EmergencyStop,
+        Self::GateFault,
+        Self::GateConfiguration,
+        Self::Axis1,
+        Self::Axis2,
+        Self::Temperature,
+        Self::Thermistor,
+        Self::CurrentTicks,
+        Self::ServoTicks,
+        Self::Conversion,
+        Self::Crash,
+        Self::Watchdog,
+        Self::Timers,
+        Self::BoardVersion,
+        Self::Configuration,
+    ];
+
+    /// The fault behind it; none of an axis, which tells its own.
+    #[must_use]
+    pub const fn code(self) -> Option<FaultCode> {
+        Some(match self {
+            Self::EmergencyStop => FaultCode::EmergencyStop,
+            Self::GateFault => FaultCode::GateFault,
+            Self::GateConfiguration => FaultCode::GateConfiguration,
+            Self::Axis1 | Self::Axis2 => return None,
+            Self::Temperature => FaultCode::Temperature,
+            Self::Thermistor => FaultCode::Thermistor,
+            Self::CurrentTicks => FaultCode::CurrentTicks,
+            Self::ServoTicks => FaultCode::ServoTicks,
+            Self::Conversion => FaultCode::Conversion,
+            Self::Crash => FaultCode::Crash,
+            Self::Watchdog => FaultCode::Watchdog,
+            Self::Timers => FaultCode::Timers,
+            Self::BoardVersion => FaultCode::BoardVersion,
+            Self::Configuration => FaultCode::Configuration,
+        })
+    }
+
+    /// The word in records.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match (self, self.code()) {
+            (Self::Axis1, _) => "axis_1",
+            (Self::Axis2, _) => "axis_2",
+            (_, Some(code)) => code.name(),
+            (_, None) => "-",
+        }
+    }
+
+    /// Its bit.
+    #[must_use]
+    pub const fn bit(self) -> u32 {
+        1 << self as u8
+    }
+
+    /// Nothing the operator does makes this good: only another board, other constants or another start.
+    #[must_use]
+    pub const fn is_for_ever(self) -> bool {
+        matches!(self, Self::Timers | Self::BoardVersion | Self::Configuration)
+    }
+
+    /// Bits of what a reset does not forget.
+    #[must_use]
+    pub const fn for_ever() -> u32 {
+        Self::Timers.bit() | Self::BoardVersion.bit() | Self::Configuration.bit()
+    }
+}
+
+/// What the board shows at one tick of an axis, beside the axis' own sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TickState {
+    /// The emergency stop's contact is open.
+    pub emergency_stop: bool,
+    /// A gate driver reports a fault.
+    pub gate_fault: bool,
+    /// Both of the axis' shunts were converted.
+    pub complete: bool,
+    /// The tick came more than half a period late.
+    pub late: bool,
+}
+
+/// Looks before each tick of one axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TickWatch {
+    late: u8,
+}
+
+impl TickWatch {
+    /// Bits of what forbids to enable from this tick on.
+    #[inline(always)]
+    pub fn look(&mut self, now: &TickState) -> u32 {
+        self.late = if now.late { self.late.saturating_add(1) } else { 0 };
+        let bit = |holds: bool, cause: Cause| if holds { cause.bit() } else { 0 };
+        bit(now.emergency_stop, Cause::EmergencyStop)
+            | bit(now.gate_fault, Cause::GateFault)
+            | bit(!now.complete, Cause::Conversion)
+            | bit(self.late >= PATIENCE, Cause::CurrentTicks)
+    }
+}
+
+/// Looks whether the servo answers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ServoWatch {
+    ticks: u32,
+    unanswered: u8,
+}
+
+impl ServoWatch {
+    /// Before the servo is called: so many ticks it has done so far. Whether it has not answered, and the bit of what then
+    /// forbids to enable.
+    pub fn look(&mut self, ticks: u32) -> (bool, u32) {
+        let missed = ticks == self.ticks;
+        self.unanswered = if missed { self.unanswered.saturating_add(1) } else { 0 };
+        self.ticks = ticks;
+        (missed, if self.unanswered >= PATIENCE { Cause::ServoTicks.bit() } else { 0 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: TickState =
+        TickState { emergency_stop: false, gate_fault: false, complete: true, late: false };
+
+    #[test]
+    fn every_contact_forbids_in_its_own_tick() {
+        let cases = [
+            (TickState { emergency_stop: true, ..GOOD }, Cause::EmergencyStop),
+            (TickState { gate_fault: true, ..GOOD }, Cause::GateFault),
+            (TickState { complete: false, ..GOOD }, Cause::Conversion),
+        ];
+        for (state, cause) in cases {
+            let mut watch = TickWatch::default();
+            assert_eq!((watch.look(&GOOD), watch.look(&state)), (0, cause.bit()));
+        }
+    }
+
+    #[test]
+    fn three_late_ticks_in_a_row_are_too_many_and_sparser_ones_are_not() {
+        let mut watch = TickWatch::default();
+        let late = TickState { late: true, ..GOOD };
+        let seen = [late, late, GOOD, late, late, late].map(|state| watch.look(&state));
+        assert_eq!(seen, [0, 0, 0, 0, 0, Cause::CurrentTicks.bit()]);
+    }
+
+    #[test]
+    fn a_servo_that_does_not_answer_three_times_is_given_up() {
+        let mut watch = ServoWatch::default();
+        let seen = [1, 2, 2, 2, 3, 3, 3, 3].map(|ticks| watch.look(ticks));
+        let given_up = Cause::ServoTicks.bit();
+        let expected = [false, false, true, true, false, true, true, true];
+        assert_eq!(seen.map(|(missed, _)| missed), expected);
+        assert_eq!(seen.map(|(_, bits)| bits), [0, 0, 0, 0, 0, 0, 0, given_up]);
+    }
+
+    #[test]
+    fn every_cause_has_a_bit_and_a_word_of_its_own() {
+        let all = Cause::ALL.iter().fold(0, |bits, cause| bits | cause.bit());
+        assert_eq!(all.count_ones() as usize, Cause::ALL.len());
+        assert!(Cause::ALL.iter().all(|cause| cause.name() != "-"));
+        let for_ever = Cause::ALL.iter().filter(|cause| cause.is_for_ever());
+        assert_eq!(for_ever.fold(0, |bits, cause| bits | cause.bit()), Cause::for_ever());
+    }
+}
