@@ -14,6 +14,7 @@
 //! | [`leg`] | mechanism and friction moved through time |
 //! | [`floor`] | contact under the foot |
 //! | [`drive`] | ideal: a current with lag; complete: motor, bridge, shunts, counter, supply |
+//! | [`faults`] | what crosses a board's ports, spoilt at a tick |
 //! | [`gear`], [`sensors`], [`wearer`] | ratio; encoder and current sensor; pushes |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 //!
@@ -23,6 +24,7 @@
 pub mod conventions;
 pub mod description;
 pub mod drive;
+pub mod faults;
 pub mod floor;
 pub mod friction;
 pub mod gear;

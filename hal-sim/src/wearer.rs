@@ -46,6 +46,11 @@ impl Wearer {
         self.plan(now, joints);
     }
 
+    /// Pushes once, from `now` (s) on, instead of what was planned next.
+    pub fn push(&mut self, joint: usize, peak: f64, now: f64, duration: f64) {
+        self.next = Some(Push { start: now, duration, peak, joint });
+    }
+
     /// Torque on each joint, N m, at a time in s that never decreases from call to call.
     pub fn torque<const N: usize>(&mut self, time: f64) -> [f64; N] {
         let mut torque = [0.0; N];
@@ -62,7 +67,10 @@ impl Wearer {
     }
 
     fn plan(&mut self, now: f64, joints: usize) {
-        let Some(habits) = self.habits else { return };
+        let Some(habits) = self.habits else {
+            self.next = None;
+            return;
+        };
         let pause = -ln(1.0 - self.uniform()) / habits.rate;
         let duration = habits.duration * (0.5 + self.uniform());
         let peak = habits.torque * (2.0 * self.uniform() - 1.0);

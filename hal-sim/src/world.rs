@@ -163,6 +163,11 @@ impl<const N: usize> World<N> {
         self.wearer.change_habits(pushes, self.tick as f64 * TICK_S, N);
     }
 
+    /// The wearer pushes or kicks once, from this instant on: half a sine on one joint, its peak in N m, anatomical.
+    pub fn push(&mut self, joint: usize, peak: f64, duration: f64) {
+        self.wearer.push(joint, peak, self.tick as f64 * TICK_S, duration);
+    }
+
     /// Sets each joint's current noise: standard deviation per logged 500 Hz sample, A.
     pub fn set_current_noise(&mut self, noise: &[f64; N]) {
         for (sensor, noise) in self.current_sensors.iter_mut().zip(noise) {
@@ -258,6 +263,12 @@ impl<const N: usize> World<N> {
     #[must_use]
     pub fn anatomical_position(&self) -> [f64; N] {
         core::array::from_fn(|joint| self.anatomy[joint].to_anatomical_angle(self.state.angles[joint]))
+    }
+
+    /// Joint rates now, rad/s, anatomical; what [`Truth`] holds, at no cost.
+    #[must_use]
+    pub fn velocity(&self) -> [f64; N] {
+        core::array::from_fn(|joint| self.anatomy[joint].flip(self.state.rates[joint]))
     }
 
     /// Joints that friction holds now; what [`Truth`] holds, at no cost.

@@ -8,7 +8,7 @@ use super::succession::Succession;
 use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
-use crate::safety::{DriveState, PowerRequest};
+use crate::safety::{DriveState, Limits, PowerRequest};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
@@ -326,6 +326,12 @@ impl<const N: usize> Control<N> {
     #[must_use]
     pub fn state(&self) -> DriveState {
         self.servo.state()
+    }
+
+    /// What each joint may do.
+    #[must_use]
+    pub fn limits(&self) -> &Limits<N> {
+        self.servo.limits()
     }
 
     /// The verdict of the last identification.

@@ -9,14 +9,14 @@
 //! | seen by | reason | after |
 //! | --- | --- | --- |
 //! | [`TickWatch`] | emergency stop, gate driver's fault, a shunt without conversion | the tick itself |
-//! | [`TickWatch`] | a tick more than half a period late | three in a row |
+//! | [`TickWatch`] | current ticks missed | three, at once or with no tick in time between |
 //! | [`ServoWatch`] | a servo that did not tick since it was last called | three calls in a row |
 //!
 //! Cost: some 12 instructions per axis and tick.
 
 use super::fault::FaultCode;
 
-/// Late ticks, or unanswered ones of the servo, in a row that are too many.
+/// Missed ticks, or unanswered ones of the servo, in a row that are too many.
 const PATIENCE: u8 = 3;
 
 /// Why the drive is kept off.
@@ -37,7 +37,7 @@ pub enum Cause {
     Temperature,
     /// A thermistor is open or shorted.
     Thermistor,
-    /// Current ticks came late three times in a row.
+    /// Current ticks were missed three times, at once or with none in time between.
     CurrentTicks,
     /// The servo did not answer three times in a row.
     ServoTicks,
@@ -135,26 +135,26 @@ pub struct TickState {
     pub gate_fault: bool,
     /// Both of the axis' shunts were converted.
     pub complete: bool,
-    /// The tick came more than half a period late.
-    pub late: bool,
+    /// Ticks of the axis that were missed since its last one.
+    pub missed: u8,
 }
 
 /// Looks before each tick of one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TickWatch {
-    late: u8,
+    missed: u8,
 }
 
 impl TickWatch {
     /// Bits of what forbids to enable from this tick on.
     #[inline(always)]
     pub fn look(&mut self, now: &TickState) -> u32 {
-        self.late = if now.late { self.late.saturating_add(1) } else { 0 };
+        self.missed = if now.missed > 0 { self.missed.saturating_add(now.missed) } else { 0 };
         let bit = |holds: bool, cause: Cause| if holds { cause.bit() } else { 0 };
         bit(now.emergency_stop, Cause::EmergencyStop)
             | bit(now.gate_fault, Cause::GateFault)
             | bit(!now.complete, Cause::Conversion)
-            | bit(self.late >= PATIENCE, Cause::CurrentTicks)
+            | bit(self.missed >= PATIENCE, Cause::CurrentTicks)
     }
 }
 
@@ -180,8 +180,7 @@ impl ServoWatch {
 mod tests {
     use super::*;
 
-    const GOOD: TickState =
-        TickState { emergency_stop: false, gate_fault: false, complete: true, late: false };
+    const GOOD: TickState = TickState { emergency_stop: false, gate_fault: false, complete: true, missed: 0 };
 
     #[test]
     fn every_contact_forbids_in_its_own_tick() {
@@ -197,11 +196,13 @@ mod tests {
     }
 
     #[test]
-    fn three_late_ticks_in_a_row_are_too_many_and_sparser_ones_are_not() {
+    fn three_missed_ticks_are_too_many_and_sparser_ones_are_not() {
         let mut watch = TickWatch::default();
-        let late = TickState { late: true, ..GOOD };
+        let late = TickState { missed: 1, ..GOOD };
         let seen = [late, late, GOOD, late, late, late].map(|state| watch.look(&state));
         assert_eq!(seen, [0, 0, 0, 0, 0, Cause::CurrentTicks.bit()]);
+        let gap = TickState { missed: 3, ..GOOD };
+        assert_eq!(TickWatch::default().look(&gap), Cause::CurrentTicks.bit());
     }
 
     #[test]

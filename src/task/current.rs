@@ -25,9 +25,8 @@ use crate::units::Volt;
 
 /// Current ticks for one of the servo.
 const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
-/// Processor cycles between two ticks of one axis, and how many make one late.
+/// Processor cycles between two ticks of one axis.
 const CYCLES: u32 = CLOCK_HZ / CURRENT_RATE_HZ;
-const LATE_CYCLES: u32 = CYCLES + CYCLES / 2;
 
 /// A brake resistor is connected: said when the image is built.
 const HAS_BRAKE_RESISTOR: bool = option_env!("SCARAB_BRAKE_RESISTOR").is_some();
@@ -145,16 +144,18 @@ impl CurrentLoops {
 impl AxisLoop {
     /// What forbids to enable is looked at before anything else: contacts, conversion, the time since the last tick.
     fn watch(&mut self, now: u32, complete: bool) {
-        let late = self.last.is_some_and(|last| now.wrapping_sub(last) > LATE_CYCLES);
+        // Half a period late is one missed; a gap of three periods two.
+        let periods = self.last.map_or(1, |last| (now.wrapping_sub(last) + CYCLES / 2) / CYCLES);
         self.last = Some(now);
-        if late {
+        let missed = periods.saturating_sub(1).min(255) as u8;
+        if missed > 0 {
             statistics::CURRENT_MISSED.add();
         }
         let state = TickState {
             emergency_stop: contacts::emergency_stop(),
             gate_fault: contacts::gate_fault(),
             complete,
-            late,
+            missed,
         };
         interlock::raise_bits(self.watch.look(&state));
     }

@@ -208,6 +208,12 @@ impl<const N: usize> Board<N> {
         self.fault
     }
 
+    /// Current loops and chopper, for whoever ticks them otherwise.
+    #[must_use]
+    pub fn into_parts(self) -> ([Axis; N], Chopper) {
+        (self.axes, self.chopper)
+    }
+
     /// The current loops.
     #[must_use]
     pub fn axes(&self) -> &[Axis; N] {

@@ -4,6 +4,7 @@ mod common;
 mod emulate;
 mod excite;
 mod export;
+mod faults;
 mod identify;
 mod image;
 mod leg_options;
@@ -49,6 +50,8 @@ enum Command {
     Monitor(monitor::MonitorArguments),
     /// Measure the current loop on a motor's test stand: steps, torque ripple, voltage limit, regeneration.
     Motor(motor::MotorArguments),
+    /// Inject the fault catalogue into the whole firmware while it identifies a leg: what is seen, when, and what follows.
+    Faults(faults::FaultsArguments),
     /// Run the paper's tables and figures again and set them beside what it prints.
     Paper(paper::PaperArguments),
     /// Print torques and regressor of given states: rigid bodies only, CSV.
@@ -78,6 +81,7 @@ pub fn main() -> ExitCode {
     }
     let outcome = match Cli::parse_from(words).command {
         Command::Excite(arguments) => excite::run(&arguments),
+        Command::Faults(arguments) => faults::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),

@@ -21,6 +21,7 @@
 mod canvas;
 pub mod chain;
 mod curve;
+pub mod faults;
 pub mod motor;
 mod parameters;
 mod residuals;

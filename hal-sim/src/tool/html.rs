@@ -8,6 +8,7 @@
 //! What the page does not know by name, a key that a later report has, it shows as a table all the same
 //! (`html/generic.rs`).
 
+pub mod faults;
 mod generic;
 mod head;
 mod limits;

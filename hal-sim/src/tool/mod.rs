@@ -11,6 +11,7 @@
 //! | [`board`] | the firmware's current loops against complete drives |
 //! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
 //! | [`excite`] | an exciting motion designed, and what it will tell |
+//! | [`faults`] | the fault catalogue injected into the whole firmware |
 //! | [`motor`] | the current loop measured on a test stand |
 //! | [`paper`] | the paper's experiments, run again |
 //! | [`monitor`] | an accepted model watched while the leg walks and something changes |
@@ -41,6 +42,7 @@ pub mod disturbances;
 pub mod emulate;
 pub mod error;
 pub mod excite;
+pub mod faults;
 pub mod figures;
 pub mod findings;
 pub mod html;

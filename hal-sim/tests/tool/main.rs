@@ -5,6 +5,7 @@ mod command;
 mod crash;
 mod emulation;
 mod excite;
+mod faults;
 mod figures;
 mod kept;
 mod leg_options;

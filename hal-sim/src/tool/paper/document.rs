@@ -1,7 +1,7 @@
 //! Sections put into a document, each between its markers.
 //!
 //! Why: what a document says was measured cannot go stale while one command writes it. A place begins with a line
-//! `<!-- paper: NAME -->` and ends with `<!-- end of NAME -->`; what stands between is replaced, all else stays.
+//! `<!-- KIND: NAME -->` and ends with `<!-- end of NAME -->`; what stands between is replaced, all else stays.
 
 use std::path::Path;
 
@@ -10,13 +10,17 @@ use crate::tool::error::ToolError;
 
 /// Replaces these sections in a document; a section without a place in it is an error.
 pub fn update(path: &Path, sections: &[Section]) -> Result<(), ToolError> {
-    let mut text = read(path)?;
     for section in sections {
-        text = replaced(&text, section.name, &section.markdown).ok_or_else(|| {
-            let name = section.name;
-            ToolError::input(format!("{}: has no `<!-- paper: {name} -->` with its end", path.display()))
-        })?;
+        replace(path, "paper", section.name, &section.markdown)?;
     }
+    Ok(())
+}
+
+/// Replaces one place of a document; a document without it is an error.
+pub fn replace(path: &Path, kind: &str, name: &str, content: &str) -> Result<(), ToolError> {
+    let text = replaced(&read(path)?, kind, name, content).ok_or_else(|| {
+        ToolError::input(format!("{}: has no `<!-- {kind}: {name} -->` with its end", path.display()))
+    })?;
     std::fs::write(path, text).map_err(|error| ToolError::cannot_write(path, &error))
 }
 
@@ -26,8 +30,8 @@ pub fn read(path: &Path) -> Result<String, ToolError> {
         .map_err(|error| ToolError::input(format!("{}: cannot be read: {error}", path.display())))
 }
 
-fn replaced(text: &str, name: &str, content: &str) -> Option<String> {
-    let (begin, end) = (format!("<!-- paper: {name} -->\n"), format!("<!-- end of {name} -->"));
+fn replaced(text: &str, kind: &str, name: &str, content: &str) -> Option<String> {
+    let (begin, end) = (format!("<!-- {kind}: {name} -->\n"), format!("<!-- end of {name} -->"));
     let (before, rest) = text.split_once(&begin)?;
     let (_, after) = rest.split_once(&end)?;
     Some(format!("{before}{begin}\n{}\n\n{end}{after}", content.trim()))
@@ -40,12 +44,12 @@ mod tests {
     #[test]
     fn only_what_stands_between_the_markers_is_replaced() {
         let text = "a\n<!-- paper: x -->\nold\n<!-- end of x -->\nb\n<!-- paper: y -->\n<!-- end of y -->\n";
-        let once = replaced(text, "x", "new\n").expect("a place");
+        let once = replaced(text, "paper", "x", "new\n").expect("a place");
         assert_eq!(
             once,
             "a\n<!-- paper: x -->\n\nnew\n\n<!-- end of x -->\nb\n<!-- paper: y -->\n<!-- end of y -->\n"
         );
-        assert_eq!(replaced(&once, "x", "new\n").as_ref(), Some(&once));
-        assert_eq!(replaced(text, "z", "new"), None);
+        assert_eq!(replaced(&once, "paper", "x", "new\n").as_ref(), Some(&once));
+        assert_eq!(replaced(text, "paper", "z", "new"), None);
     }
 }

@@ -1,0 +1,176 @@
+//! How a signal goes wrong, and when.
+//!
+//! ```text
+//! off        0                                stuck     as it was when the fault began
+//! garbage    uniform over the channel         rail      a given value
+//! offset     value + o                        scale     middle + s (value - middle)
+//! delayed    as it was n readings ago         slow      y += share (value - y)
+//! ```
+//!
+//! A signal of whole numbers is rounded and wrapped or clamped by its channel afterwards.
+
+use crate::maths::nearest;
+use rand_distr::{Distribution, StandardUniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Readings that are remembered for a delay.
+const HISTORY: usize = 32;
+
+/// How a signal goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// Nothing comes: 0, an open contact, no pulse.
+    Off,
+    /// The last value for ever.
+    Stuck,
+    /// Anything the channel can show.
+    Garbage,
+    /// Always this value; not a number, where the channel can carry that.
+    Rail(f64),
+    /// So much is added.
+    Offset(f64),
+    /// The distance from the channel's middle times this.
+    Scale(f64),
+    /// So many readings late, 31 at most.
+    Delayed(u8),
+    /// A lag of first order: this share of the way per reading.
+    Slow(f64),
+}
+
+/// When: from a tick on, for some ticks, and if intermittent `on` of every `on + off`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// First tick.
+    pub begin: u64,
+    /// Ticks from the first to the last.
+    pub duration: u64,
+    /// Ticks on.
+    pub on: u64,
+    /// Ticks off between; 0 for a fault that stays.
+    pub off: u64,
+}
+
+impl Timing {
+    /// From a tick on, for ever.
+    #[must_use]
+    pub const fn from(begin: u64) -> Self {
+        Self { begin, duration: u64::MAX, on: 1, off: 0 }
+    }
+
+    /// From a tick on, for so many.
+    #[must_use]
+    pub const fn lasting(begin: u64, duration: u64) -> Self {
+        Self { begin, duration, on: 1, off: 0 }
+    }
+
+    /// Whether the fault acts at a tick.
+    #[must_use]
+    pub const fn holds(&self, tick: u64) -> bool {
+        let Some(since) = tick.checked_sub(self.begin) else { return false };
+        since < self.duration && (self.off == 0 || since % (self.on + self.off) < self.on)
+    }
+}
+
+/// What a spoilt channel remembers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Memory {
+    history: [f64; HISTORY],
+    next: usize,
+    lagged: f64,
+    begun: bool,
+}
+
+impl Memory {
+    pub(super) const EMPTY: Self = Self { history: [0.0; HISTORY], next: 0, lagged: 0.0, begun: false };
+
+    /// A reading as it was goes in; as it is seen comes out.
+    pub(super) fn pass(
+        &mut self,
+        form: Form,
+        acts: bool,
+        value: f64,
+        range: [f64; 2],
+        generator: &mut Xoshiro256PlusPlus,
+    ) -> f64 {
+        if !self.begun {
+            *self = Self { history: [value; HISTORY], next: 0, lagged: value, begun: true };
+        }
+        let newest = (self.next + HISTORY - 1) % HISTORY;
+        if let Form::Slow(share) = form {
+            self.lagged += if acts { share } else { 1.0 } * (value - self.lagged);
+        }
+        let stuck = form == Form::Stuck && acts;
+        if !stuck {
+            self.history[self.next] = value;
+            self.next = (self.next + 1) % HISTORY;
+        }
+        if !acts {
+            return value;
+        }
+        let [low, high] = range;
+        let middle = 0.5 * (low + high);
+        match form {
+            Form::Off => 0.0,
+            Form::Stuck => self.history[newest],
+            Form::Garbage => {
+                let share: f64 = StandardUniform.sample(generator);
+                low + share * (high - low)
+            }
+            Form::Rail(rail) => rail,
+            Form::Offset(offset) => value + offset,
+            Form::Scale(scale) => middle + scale * (value - middle),
+            Form::Delayed(readings) => {
+                let back = usize::from(readings).min(HISTORY - 1);
+                self.history[(self.next + 2 * HISTORY - 1 - back) % HISTORY]
+            }
+            Form::Slow(_) => self.lagged,
+        }
+    }
+}
+
+/// The nearest whole number, wrapped to 16 bits.
+pub(super) fn wrapped(value: f64) -> u16 {
+    nearest(value) as u16
+}
+
+/// The nearest code of a 12-bit converter.
+pub(super) fn code(value: f64) -> u16 {
+    nearest(value).clamp(0, 4095) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_core::SeedableRng;
+
+    fn seen(form: Form, timing: Timing) -> [f64; 8] {
+        let mut memory = Memory::EMPTY;
+        let mut generator = Xoshiro256PlusPlus::seed_from_u64(1);
+        core::array::from_fn(|tick| {
+            let acts = timing.holds(tick as u64);
+            memory.pass(form, acts, 10.0 + tick as f64, [0.0, 20.0], &mut generator)
+        })
+    }
+
+    #[test]
+    fn every_form_spoils_from_its_tick_on_and_nothing_before() {
+        let from = |form| seen(form, Timing::from(3));
+        assert_eq!(from(Form::Off), [10.0, 11.0, 12.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(from(Form::Stuck), [10.0, 11.0, 12.0, 12.0, 12.0, 12.0, 12.0, 12.0]);
+        assert_eq!(from(Form::Rail(4.0))[2..5], [12.0, 4.0, 4.0]);
+        assert_eq!(from(Form::Offset(-5.0))[2..5], [12.0, 8.0, 9.0]);
+        assert_eq!(from(Form::Scale(2.0))[2..5], [12.0, 16.0, 18.0]);
+        assert_eq!(from(Form::Delayed(2))[2..6], [12.0, 11.0, 12.0, 13.0]);
+        assert_eq!(from(Form::Slow(0.5))[2..5], [12.0, 12.5, 13.25]);
+        assert!(from(Form::Rail(f64::NAN))[3].is_nan());
+        let garbage = from(Form::Garbage);
+        assert!(garbage[3..].iter().all(|value| (0.0..20.0).contains(value)) && garbage[3] != garbage[4]);
+    }
+
+    #[test]
+    fn a_fault_ends_and_an_intermittent_one_comes_and_goes() {
+        let twice = seen(Form::Rail(0.0), Timing { begin: 1, duration: 5, on: 1, off: 2 });
+        assert_eq!(twice, [10.0, 0.0, 12.0, 13.0, 0.0, 15.0, 16.0, 17.0]);
+        assert_eq!(seen(Form::Off, Timing::lasting(6, 1))[5..], [15.0, 0.0, 17.0]);
+    }
+}

@@ -1,0 +1,189 @@
+//! The ports of one board with what spoils them.
+
+use super::form::{Form, Memory, Timing, code, wrapped};
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use scarab::hal::{AxisSample, JointSample};
+use scarab::units::Ampere;
+
+/// Injections at once.
+pub const MOST: usize = 4;
+
+/// What is spoilt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// Counter of the motor's encoder, 16 bits.
+    Counter,
+    /// Index pulse: `Off` hides it, anything else moves what was captured; `Garbage` makes pulses.
+    Index,
+    /// Shunt code of phase B.
+    ShuntB,
+    /// Shunt code of phase C.
+    ShuntC,
+    /// Code of the bus voltage.
+    Bus,
+    /// Counts between axis and servo.
+    JointCounts,
+    /// Current between axis and servo, A.
+    JointCurrent,
+    /// Target between servo and axis, A.
+    Target,
+    /// Duty of the brake resistor.
+    Brake,
+    /// The emergency stop's contact is open.
+    EmergencyStop,
+    /// A gate driver reports a fault.
+    GateFault,
+    /// A shunt's conversion does not end.
+    Conversion,
+    /// An axis' tick does not come.
+    Tick,
+    /// The servo does not come to its tick.
+    Servo,
+}
+
+/// One fault of one channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Injection {
+    /// What.
+    pub channel: Channel,
+    /// Of which joint; meaningless for what the board has once.
+    pub joint: usize,
+    /// How; of a contact or of time every form means that it happens.
+    pub form: Form,
+    /// When, in PWM periods.
+    pub timing: Timing,
+}
+
+/// Everything that is spoilt.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Injector {
+    slots: [Option<(Injection, Memory)>; MOST],
+    generator: Xoshiro256PlusPlus,
+}
+
+const CODES: [f64; 2] = [0.0, 4095.0];
+const COUNTER: [f64; 2] = [0.0, 65_535.0];
+const COUNTS: [f64; 2] = [-2_147_483_648.0, 2_147_483_647.0];
+const AMPERES: [f64; 2] = [-100.0, 100.0];
+const DUTY: [f64; 2] = [0.0, 1.0];
+
+impl Injector {
+    /// Nothing is spoilt.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        Self { slots: [None; MOST], generator: Xoshiro256PlusPlus::seed_from_u64(seed) }
+    }
+
+    /// Adds a fault; `false` where there are [`MOST`] already.
+    pub fn add(&mut self, injection: Injection) -> bool {
+        let free = self.slots.iter_mut().find(|slot| slot.is_none());
+        free.map(|slot| *slot = Some((injection, Memory::EMPTY))).is_some()
+    }
+
+    fn pass(&mut self, channel: Channel, joint: usize, tick: u64, mut value: f64, range: [f64; 2]) -> f64 {
+        for (injection, memory) in self.slots.iter_mut().flatten() {
+            if injection.channel == channel && injection.joint == joint {
+                let acts = injection.timing.holds(tick);
+                value = memory.pass(injection.form, acts, value, range, &mut self.generator);
+            }
+        }
+        value
+    }
+
+    /// Whether a contact, or time, is spoilt at this tick.
+    #[must_use]
+    pub fn happens(&self, channel: Channel, joint: usize, tick: u64) -> bool {
+        self.slots.iter().flatten().any(|(injection, _)| {
+            injection.channel == channel && injection.joint == joint && injection.timing.holds(tick)
+        })
+    }
+
+    /// An axis' sample on its way to the axis.
+    pub fn sample(&mut self, joint: usize, tick: u64, sample: &mut AxisSample) {
+        let counter = self.pass(Channel::Counter, joint, tick, f64::from(sample.encoder_count), COUNTER);
+        // A counter that lost counts is captured with them lost: what is added to the one is added to the other.
+        let moved = wrapped(counter).wrapping_sub(sample.encoder_count);
+        sample.encoder_count = wrapped(counter);
+        sample.index_count = sample.index_count.map(|at| at.wrapping_add(moved));
+        for (slot, injection) in self.slots.iter().flatten().map(|(injection, _)| injection).enumerate() {
+            let spoilt = injection.channel == Channel::Index
+                && injection.joint == joint
+                && injection.timing.holds(tick);
+            sample.index_count = match (spoilt, injection.form) {
+                (false, _) => sample.index_count,
+                (true, Form::Off) => None,
+                (true, Form::Offset(offset)) => sample.index_count.map(|at| wrapped(f64::from(at) + offset)),
+                // A pulse out of nowhere.
+                (true, _) => Some(sample.encoder_count.wrapping_sub(slot as u16)),
+            };
+        }
+        for (channel, shunt) in [Channel::ShuntB, Channel::ShuntC].into_iter().zip(&mut sample.shunt_codes) {
+            *shunt = code(self.pass(channel, joint, tick, f64::from(*shunt), CODES));
+        }
+        sample.bus_code = code(self.pass(Channel::Bus, 0, tick, f64::from(sample.bus_code), CODES));
+    }
+
+    /// A joint's sample on its way to the servo.
+    pub fn joint(&mut self, joint: usize, tick: u64, sample: &mut JointSample) {
+        let counts = self.pass(Channel::JointCounts, joint, tick, f64::from(sample.encoder_counts), COUNTS);
+        sample.encoder_counts = counts as i32;
+        let current = self.pass(Channel::JointCurrent, joint, tick, f64::from(sample.current.0), AMPERES);
+        sample.current = Ampere(current as f32);
+    }
+
+    /// A target on its way to its axis.
+    pub fn target(&mut self, joint: usize, tick: u64, target: Ampere) -> Ampere {
+        Ampere(self.pass(Channel::Target, joint, tick, f64::from(target.0), AMPERES) as f32)
+    }
+
+    /// The brake resistor's duty on its way to the resistor.
+    pub fn brake(&mut self, tick: u64, duty: f32) -> f64 {
+        self.pass(Channel::Brake, 0, tick, f64::from(duty), DUTY)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SAMPLE: AxisSample =
+        AxisSample { shunt_codes: [2048, 2048], bus_code: 3136, encoder_count: 10, index_count: Some(8) };
+
+    fn spoilt(channel: Channel, form: Form) -> [AxisSample; 2] {
+        let mut injector = Injector::new(1);
+        assert!(injector.add(Injection { channel, joint: 1, form, timing: Timing::from(5) }));
+        let mut samples = [SAMPLE; 2];
+        for (joint, sample) in samples.iter_mut().enumerate() {
+            injector.sample(joint, 4, sample);
+            assert_eq!(*sample, SAMPLE);
+            injector.sample(joint, 5, sample);
+        }
+        samples
+    }
+
+    #[test]
+    fn only_the_channel_and_the_joint_named_are_spoilt() {
+        let lost = spoilt(Channel::Counter, Form::Offset(-12.0));
+        let moved = AxisSample { encoder_count: 65_534, index_count: Some(65_532), ..SAMPLE };
+        assert_eq!(lost, [SAMPLE, moved]);
+        let railed = spoilt(Channel::ShuntC, Form::Rail(4095.0));
+        assert_eq!(railed, [SAMPLE, AxisSample { shunt_codes: [2048, 4095], ..SAMPLE }]);
+        let unseen = spoilt(Channel::Index, Form::Off);
+        assert_eq!(unseen, [SAMPLE, AxisSample { index_count: None, ..SAMPLE }]);
+    }
+
+    #[test]
+    fn there_is_room_for_so_many_and_no_more() {
+        let mut injector = Injector::new(1);
+        let open = |tick| Injection {
+            channel: Channel::EmergencyStop,
+            joint: 0,
+            form: Form::Off,
+            timing: Timing::from(tick),
+        };
+        assert!((0..MOST).all(|tick| injector.add(open(tick as u64))));
+        assert!(!injector.add(open(9)));
+        assert!(injector.happens(Channel::EmergencyStop, 0, 0));
+    }
+}

@@ -1,0 +1,242 @@
+//! Many runs: identifications driven by the operator's contacts, forked where the runs' dice say.
+//!
+//! Forks share the way to them: a base is driven once, and every run is a clone of it at its period. The base of a run follows
+//! from the run's seed alone, so that one run can be repeated without the others.
+
+use rayon::prelude::*;
+use scarab::leg::{Activity, ControlRequest};
+use scarab::safety::DriveState;
+
+use super::catalogue::{Bounds, Event, Expected, JOINTS, Onset, Row, Scenario};
+use super::dice::Dice;
+use super::rig::{Hand, PERIODS_PER_S, Rig};
+use super::run::{Manner, Outcome, run};
+use crate::faults::{Channel, Form, Injection, Timing};
+use crate::tool::board::{BUS, axis_configuration};
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::LegFile;
+use crate::tool::pair::{Context, Pair};
+use crate::tool::setup::SetupError;
+use crate::tool::simulate::{DriveModel, SimulationOptions};
+use crate::world::TICK_S;
+use crate::world::periods::PERIODS_PER_TICK;
+
+/// Room for base parameters of the legs that a campaign runs.
+const BASE: usize = 13;
+/// Runs of a row that share a base.
+const RUNS_PER_BASE: u64 = 256;
+/// Forks that wait for each other; some 100 KB each.
+const BATCH: usize = 128;
+/// No identification takes longer, s.
+const LONGEST_S: f64 = 300.0;
+/// Until the operator's contacts are believed, and until the drive has to be enabled.
+const OPEN: u64 = PERIODS_PER_S / 5;
+const ENABLED: u64 = PERIODS_PER_S;
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub struct CampaignOptions {
+    /// Rows.
+    pub rows: Vec<&'static Row>,
+    /// Seeds of the runs.
+    pub seeds: Vec<u64>,
+    /// The emergency stop also at every servo tick, and at every current tick of one second.
+    pub every_tick: bool,
+    /// Each row's detectors are switched off, curves are kept.
+    pub manner: Manner,
+    /// Only so much of each identification, s.
+    pub seconds: Option<f64>,
+}
+
+/// What came of it.
+#[derive(Clone, Debug)]
+pub struct Campaign {
+    /// Runs, by row and seed.
+    pub outcomes: Vec<Outcome>,
+    /// Motion that was run without a fault meanwhile, s.
+    pub undisturbed_s: f64,
+}
+
+struct Job {
+    row: &'static Row,
+    scenario: Scenario,
+    seed: u64,
+}
+
+struct Setting<'a> {
+    leg: &'a LegFile,
+    bounds: Bounds,
+    manner: Manner,
+    /// Periods of a whole identification.
+    length: u64,
+}
+
+/// Runs them all.
+pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, ToolError> {
+    let bounds = bounds(leg)?;
+    let mut bases: Vec<u64> = options.seeds.iter().map(|seed| base_of(*seed)).collect();
+    bases.dedup();
+    let mut campaign = Campaign { outcomes: Vec::new(), undisturbed_s: 0.0 };
+    for base in bases {
+        let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
+        let context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
+        let mut length = length(leg, &context, base)?;
+        if let Some(seconds) = options.seconds {
+            length = length.min((seconds * PERIODS_PER_S as f64) as u64).max(1);
+        }
+        let setting = Setting { leg, bounds, manner: options.manner, length };
+        let mut jobs = setting.jobs(options, base);
+        let mut rig = Rig::new(leg, &context, base)?;
+        begin(leg, &mut rig)?;
+        jobs.sort_by_key(|(period, job)| (*period, job.row.id, job.seed));
+        let last = jobs.last().map_or(0, |(period, _)| *period);
+        let from = rig.period;
+        let mut jobs = jobs.into_iter().peekable();
+        let mut batch: Vec<(Rig<JOINTS, BASE>, Job)> = Vec::with_capacity(BATCH);
+        let every = options.every_tick && base == base_of(1);
+        while rig.period - from <= last || every && rig.period - from <= length {
+            while let Some((_, job)) = jobs.next_if(|(period, _)| from + period <= rig.period) {
+                batch.push((rig.clone(), job));
+            }
+            if every && is_stopped_at(rig.period - from) {
+                batch.push((rig.clone(), setting.stop(rig.period)));
+            }
+            if batch.len() >= BATCH {
+                setting.flush(&mut batch, &mut campaign.outcomes);
+            }
+            rig.advance();
+            if let Some(code) = rig.alarm() {
+                let words = format!("base {base}: a false alarm at period {}: {}", rig.period, code.words());
+                return Err(ToolError::Refused(words));
+            }
+        }
+        setting.flush(&mut batch, &mut campaign.outcomes);
+        campaign.undisturbed_s += (rig.period - from) as f64 / PERIODS_PER_S as f64;
+    }
+    campaign.outcomes.sort_by_key(|outcome| {
+        let row = options.rows.iter().position(|row| row.id == outcome.fault);
+        (row, outcome.seed)
+    });
+    Ok(campaign)
+}
+
+/// Every servo tick, and every period of the second second.
+fn is_stopped_at(period: u64) -> bool {
+    period.is_multiple_of(u64::from(PERIODS_PER_TICK)) || (PERIODS_PER_S..2 * PERIODS_PER_S).contains(&period)
+}
+
+fn base_of(seed: u64) -> u64 {
+    1 + seed.saturating_sub(1) / RUNS_PER_BASE
+}
+
+impl Setting<'_> {
+    fn jobs(&self, options: &CampaignOptions, base: u64) -> Vec<(u64, Job)> {
+        let mut jobs = Vec::new();
+        for row in &options.rows {
+            for seed in options.seeds.iter().copied().filter(|seed| base_of(*seed) == base) {
+                let mut dice = Dice::new(row.id, seed);
+                let period = dice.below(self.length);
+                let scenario = (row.draw)(&mut dice, &self.bounds);
+                jobs.push((period, Job { row, scenario, seed }));
+            }
+        }
+        jobs
+    }
+
+    /// The emergency stop at this very period.
+    fn stop(&self, period: u64) -> Job {
+        let row = super::catalogue::row("X1").unwrap_or(&super::catalogue::ROWS[0]);
+        let open = Injection {
+            channel: Channel::EmergencyStop,
+            joint: 0,
+            form: Form::Off,
+            timing: Timing::lasting(0, 1),
+        };
+        let scenario = Scenario {
+            injections: [Some(open), None],
+            event: Event::None,
+            onset: Onset::Injection,
+            expected: Expected::Off,
+            magnitude: None,
+            by_design: false,
+            patience: 4,
+        };
+        Job { row, scenario, seed: period }
+    }
+
+    fn flush(&self, batch: &mut Vec<(Rig<JOINTS, BASE>, Job)>, outcomes: &mut Vec<Outcome>) {
+        let of = |(rig, job): &(Rig<JOINTS, BASE>, Job)| {
+            run(self.leg, job.row, &job.scenario, job.seed, self.manner, rig)
+        };
+        outcomes.par_extend(batch.par_iter().map(of));
+        batch.clear();
+    }
+}
+
+/// As an operator does it: contacts open, the switch held until the drive is enabled, the button.
+fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), ToolError> {
+    for _ in 0..OPEN {
+        rig.advance();
+    }
+    rig.hand.enabling = true;
+    rig.edges.closed = Some(rig.period);
+    for _ in 0..ENABLED {
+        rig.advance();
+        if rig.state() == DriveState::OperationEnabled {
+            break;
+        }
+    }
+    rig.hand = Hand { enabling: true, start: true };
+    for _ in 0..ENABLED {
+        rig.advance();
+        if matches!(rig.leg.control().activity(), Activity::Identify(_)) {
+            rig.hand.start = false;
+            return Ok(());
+        }
+    }
+    Err(SetupError::new(leg, "the operator's contacts do not begin an identification").into())
+}
+
+/// Periods of an identification from its request to its verdict; of ideal drives, whose motions are the same.
+fn length(leg: &LegFile, context: &Context<JOINTS, BASE>, seed: u64) -> Result<u64, ToolError> {
+    let ideal = Context { complete: None, ..context.clone() };
+    let mut pair = Pair::new(leg, &ideal, seed)?;
+    let refused = || SetupError::new(leg, "its identification does not come to an end");
+    if !pair.enable(context.gravity) {
+        return Err(refused().into());
+    }
+    let mut request = Some(ControlRequest::Identify);
+    for tick in 0..(LONGEST_S / TICK_S) as u64 {
+        pair.tick(request.take(), context.gravity);
+        if tick > 0 && !matches!(pair.leg.control().activity(), Activity::Identify(_)) {
+            return Ok(tick * u64::from(PERIODS_PER_TICK));
+        }
+    }
+    Err(refused().into())
+}
+
+fn bounds(leg: &LegFile) -> Result<Bounds, ToolError> {
+    if leg.joints.len() != JOINTS {
+        return Err(SetupError::new(leg, "faults are injected into legs of two joints").into());
+    }
+    let mut steps = [0; JOINTS];
+    let mut bounds =
+        Bounds { greatest_step: steps, counts_per_turn: u32::MAX, overcurrent_a: 0.0, bus_v: [0.0; 2] };
+    for (joint, step) in leg.joints.iter().zip(&mut steps) {
+        let motor = joint.motor.as_ref().ok_or_else(|| {
+            SetupError::new(
+                leg,
+                format!("joint `{}` has no [joint.motor]: faults need complete drives", joint.name),
+            )
+        })?;
+        let configuration = axis_configuration(joint, motor);
+        let turns = configuration.greatest_speed.0 / (core::f32::consts::TAU * PERIODS_PER_S as f32);
+        // As `AxisConfiguration` rounds it.
+        *step = (turns * configuration.counts_per_turn as f32) as i32 + 2;
+        bounds.counts_per_turn = bounds.counts_per_turn.min(configuration.counts_per_turn);
+        bounds.overcurrent_a = f64::from(configuration.overcurrent.0);
+    }
+    bounds.bus_v = BUS.map(|volts| f64::from(volts.0));
+    bounds.greatest_step = [steps[0].min(steps[1]), steps[0].max(steps[1])];
+    Ok(bounds)
+}

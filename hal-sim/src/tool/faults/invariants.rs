@@ -1,0 +1,134 @@
+//! What holds in every period of every run, whatever is broken.
+
+use scarab::hal::AxisCommand;
+use scarab::safety::{FaultCode, Limits};
+
+use super::rig::{PERIODS_PER_S, Rig};
+use crate::tool::leg_file::LegFile;
+
+/// Damping lasts 300 ms at most, and one servo tick in which it is seen to be over.
+const LONGEST_DAMPING: u64 = PERIODS_PER_S * 3 / 10 + 12;
+/// Beyond its range a joint is never driven by more than this, rad (0.5 degrees).
+const MARGIN_RAD: f64 = 0.008_727;
+/// Torque of a servo tick, beyond the cap: ripple, and a step of the current that is under way.
+const TORQUE_MARGIN: f64 = 1.1;
+
+/// What of the world's own can be held against the firmware in a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Scope {
+    /// The currents that are measured are those that flow.
+    pub torque: bool,
+    /// No wearer is stronger than the drive.
+    pub range: bool,
+}
+
+/// Watches one run.
+#[derive(Clone, Debug)]
+pub struct Invariants<const N: usize> {
+    scope: Scope,
+    /// Anatomical, rad.
+    range: [[f64; 2]; N],
+    cap_nm: [f64; N],
+    /// The bridges were released for a fault in this period.
+    released: Option<u64>,
+    damped: u64,
+    /// Last period in which the emergency stop was open.
+    stop_open: Option<u64>,
+    broken: Vec<String>,
+}
+
+impl<const N: usize> Invariants<N> {
+    /// Of a run of this leg.
+    #[must_use]
+    pub fn new<const B: usize>(leg: &LegFile, limits: &Limits<N>, scope: Scope) -> Self {
+        Self {
+            scope,
+            range: core::array::from_fn(|joint| leg.joints[joint].range_deg.map(f64::to_radians)),
+            cap_nm: limits.joints().map(|joint| f64::from(joint.torque_cap().0)),
+            released: None,
+            damped: 0,
+            stop_open: None,
+            broken: Vec::new(),
+        }
+    }
+
+    /// Looks at a period that is over; `stop` tells that the emergency stop was open in it.
+    pub fn see<const B: usize>(&mut self, rig: &Rig<N, B>, stop: bool) {
+        if stop {
+            self.stop_open = Some(rig.period);
+        }
+        let switching = rig.is_switching();
+        self.commands(rig, &rig.commands);
+        if let Some(output) = &rig.output {
+            let torque = output.servo.decision.torque;
+            let over = |joint: usize| f64::from(torque[joint].abs().0) > self.cap_nm[joint] * 1.000_001;
+            if (0..N).any(over) {
+                self.note(rig, "more torque was asked for than the cap");
+            }
+        }
+        let damping = switching && rig.state().fault().is_some();
+        self.damped = if damping { self.damped + 1 } else { 0 };
+        if self.damped == LONGEST_DAMPING + 1 {
+            self.note(rig, "damped for more than 300 ms");
+        }
+        if switching && self.scope.torque {
+            let torque = rig.world.motor_torque();
+            if (0..N).any(|joint| torque[joint].abs() > TORQUE_MARGIN * self.cap_nm[joint]) {
+                self.note(rig, "the motors made more torque than the cap");
+            }
+        }
+        if switching && self.scope.range {
+            let position = rig.world.anatomical_position();
+            let beyond = |joint: usize| {
+                let [low, high] = self.range[joint];
+                position[joint] < low - MARGIN_RAD || position[joint] > high + MARGIN_RAD
+            };
+            if (0..N).any(beyond) {
+                self.note(rig, "driven beyond a joint's range");
+            }
+        }
+        match (self.released, switching) {
+            (None, false) if rig.alarm().is_some() => self.released = Some(rig.period),
+            (Some(since), true) => {
+                if !self.was_asked(rig, since) {
+                    self.note(rig, "enabled again without a reset and an operator's edge after it");
+                }
+                self.released = None;
+            }
+            _ => {}
+        }
+    }
+
+    fn was_asked<const B: usize>(&self, rig: &Rig<N, B>, since: u64) -> bool {
+        let after = self.stop_open.map_or(since, |stop| stop.max(since));
+        match (rig.edges.reset, rig.edges.closed) {
+            (Some(reset), Some(closed)) => reset >= after && closed > reset,
+            _ => false,
+        }
+    }
+
+    fn commands<const B: usize>(&mut self, rig: &Rig<N, B>, commands: &[AxisCommand; N]) {
+        let sensible = |command: &AxisCommand| {
+            command.duty.iter().all(|duty| duty.is_finite() && (0.0..=1.0).contains(duty))
+        };
+        if !commands.iter().all(sensible) {
+            self.note(rig, "a duty that is none");
+        }
+        if commands.iter().any(|command| command.enabled) && !commands.iter().all(|command| command.enabled) {
+            self.note(rig, "one axis switches, the other does not");
+        }
+    }
+
+    fn note<const B: usize>(&mut self, rig: &Rig<N, B>, what: &str) {
+        if self.broken.len() < 4 {
+            let alarm = rig.alarm().map_or("none", FaultCode::name);
+            self.broken.push(format!("period {}: {what} (alarm: {alarm})", rig.period));
+        }
+    }
+
+    /// What was broken, in words.
+    #[must_use]
+    pub fn into_broken(self) -> Vec<String> {
+        self.broken
+    }
+}

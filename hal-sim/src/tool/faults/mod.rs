@@ -1,0 +1,22 @@
+//! `cargo sim faults`: every fault of the catalogue injected into the whole firmware while it identifies a leg.
+//!
+//! | part | what it is |
+//! | --- | --- |
+//! | [`rig`] | firmware and plant, one PWM period at a time, faults on the ports between |
+//! | [`catalogue`], [`draw`] | what is done to the machine, and what has to follow |
+//! | [`run`], [`invariants`] | one run, and what holds in each of its periods |
+//! | [`campaign`] | many runs, forked from identifications |
+//! | [`recording`] | a run's curves |
+//! | [`report`] | table, JSON, document |
+//!
+//! Everything follows from seeds: a run is repeated to the bit by its row and its seed.
+
+pub mod campaign;
+pub mod catalogue;
+pub mod dice;
+pub mod draw;
+pub mod invariants;
+pub mod recording;
+pub mod report;
+pub mod rig;
+pub mod run;

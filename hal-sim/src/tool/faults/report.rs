@@ -1,0 +1,236 @@
+//! A campaign as table, JSON and lines for a document.
+
+use scarab::safety::FaultCode;
+use serde::Serialize;
+
+use super::campaign::Campaign;
+use super::catalogue::Row;
+use super::run::Outcome;
+use crate::tool::report::Number;
+use crate::tool::tables::headed;
+
+/// Failures that are written out.
+const MOST_FAILURES: usize = 100;
+
+/// One row of the catalogue as it was run. The names are an interface.
+#[derive(Clone, Debug, Serialize)]
+pub struct RowReport {
+    /// The catalogue's id.
+    pub fault: &'static str,
+    /// Seeded runs.
+    pub runs: usize,
+    /// Seen in time, and made safe.
+    pub detected: usize,
+    /// Neither that nor undetectable by design.
+    pub missed: usize,
+    /// Runs in which something was raised although nothing was wrong.
+    pub false_alarms: usize,
+    /// Longest time from the fault to the safe state's first command, ms.
+    pub worst_ms: Number,
+    /// What it may take, ms.
+    pub deadline_ms: Number,
+    /// Where it leads: the catalogue's last column.
+    pub state: &'static str,
+    /// Runs in which that state was reached.
+    pub state_reached: usize,
+    /// Runs in which there was nothing that could be seen.
+    pub undetectable_by_design: usize,
+    /// What goes wrong.
+    pub what: &'static str,
+    /// What sees it.
+    pub detector: &'static str,
+    /// Codes that the firmware raised.
+    pub codes: Vec<&'static str>,
+    /// Smallest magnitude that was seen, and the largest that was not.
+    pub smallest_seen: Number,
+    /// The same that was not seen.
+    pub largest_unseen: Number,
+    /// Of both.
+    pub unit: &'static str,
+    /// What the detector does not see yet.
+    pub lacking: Option<&'static str>,
+}
+
+/// A campaign. The names are an interface.
+#[derive(Clone, Debug, Serialize)]
+pub struct CampaignReport {
+    /// Version of the JSON.
+    pub schema: u32,
+    /// Rows that were run.
+    pub rows: Vec<RowReport>,
+    /// Invariants that did not hold, over all runs.
+    pub invariants_broken: usize,
+    /// Runs that were missed, broke an invariant, or raised a false alarm; a hundred at most.
+    pub failures: Vec<Outcome>,
+    /// Motion without a fault, s; an alarm in it ends the campaign.
+    pub undisturbed_s: f64,
+    /// Of all runs, in their order.
+    pub trace_hash: String,
+}
+
+impl CampaignReport {
+    /// Of what was run.
+    #[must_use]
+    pub fn new(rows: &[&'static Row], campaign: &Campaign) -> Self {
+        let outcomes = &campaign.outcomes;
+        let failed = |outcome: &&Outcome| {
+            !outcome.detected && !outcome.undetectable || outcome.false_alarm || !outcome.broken.is_empty()
+        };
+        let hash = outcomes.iter().flat_map(|outcome| outcome.hash.bytes()).fold(0_u64, |hash, byte| {
+            hash.rotate_left(5).wrapping_mul(0x0000_0100_0000_01b3) ^ u64::from(byte)
+        });
+        Self {
+            schema: crate::tool::report::SCHEMA,
+            rows: rows.iter().map(|row| row_report(row, outcomes)).collect(),
+            invariants_broken: outcomes.iter().map(|outcome| outcome.broken.len()).sum(),
+            failures: outcomes.iter().filter(failed).take(MOST_FAILURES).cloned().collect(),
+            undisturbed_s: campaign.undisturbed_s,
+            trace_hash: format!("{hash:016x}"),
+        }
+    }
+
+    /// Nothing was missed, no invariant broken, nothing raised for nothing.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        self.invariants_broken == 0 && self.rows.iter().all(|row| row.missed == 0 && row.false_alarms == 0)
+    }
+
+    /// Names of the table's columns.
+    #[must_use]
+    pub const fn head(&self) -> [&'static str; 10] {
+        HEAD
+    }
+
+    /// As a table for a terminal.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut table = headed(&HEAD);
+        for row in &self.rows {
+            table.add_row(row.cells().to_vec());
+        }
+        format!("{table}\n")
+    }
+
+    /// As a table for a document.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let mut text = format!("| {} |\n|{}\n", HEAD.join(" | "), " --- |".repeat(HEAD.len()));
+        for row in &self.rows {
+            text.push_str(&format!("| {} |\n", row.cells().join(" | ")));
+        }
+        text
+    }
+}
+
+const HEAD: [&str; 10] = [
+    "fault",
+    "what",
+    "runs",
+    "seen",
+    "worst / deadline, ms",
+    "state (reached)",
+    "missed",
+    "not to be seen",
+    "smallest seen",
+    "false alarms",
+];
+
+fn number(value: Number, digits: usize) -> String {
+    value.known().map_or_else(|| "-".into(), |value| format!("{value:.digits$}"))
+}
+
+impl RowReport {
+    /// Its line of the table.
+    #[must_use]
+    pub fn cells(&self) -> [String; 10] {
+        let smallest = match self.smallest_seen.known() {
+            Some(value) if !self.unit.is_empty() => format!("{value:.1} {}", self.unit),
+            _ => "-".into(),
+        };
+        [
+            self.fault.into(),
+            self.what.into(),
+            self.runs.to_string(),
+            self.detected.to_string(),
+            format!("{} / {}", number(self.worst_ms, 3), number(self.deadline_ms, 3)),
+            format!("{} ({})", self.state, self.state_reached),
+            self.missed.to_string(),
+            self.undetectable_by_design.to_string(),
+            smallest,
+            self.false_alarms.to_string(),
+        ]
+    }
+}
+
+fn row_report(row: &'static Row, outcomes: &[Outcome]) -> RowReport {
+    let of: Vec<&Outcome> = outcomes.iter().filter(|outcome| outcome.fault == row.id).collect();
+    let count = |holds: &dyn Fn(&Outcome) -> bool| of.iter().filter(|outcome| holds(outcome)).count();
+    let magnitudes = |seen: bool| {
+        of.iter().filter(move |outcome| outcome.detected == seen).filter_map(|outcome| outcome.magnitude)
+    };
+    let worst = of.iter().filter_map(|outcome| outcome.after_ms).fold(f64::NEG_INFINITY, f64::max);
+    let codes = FaultCode::ALL.iter().map(|code| code.name());
+    let raised = |name: &&str| of.iter().any(|outcome| outcome.alarm == Some(*name));
+    RowReport {
+        fault: row.id,
+        runs: of.len(),
+        detected: count(&|outcome| outcome.detected),
+        missed: count(&|outcome| !outcome.detected && !outcome.undetectable),
+        false_alarms: count(&|outcome| outcome.false_alarm),
+        worst_ms: worst.into(),
+        deadline_ms: row.deadline_ms.into(),
+        state: row.state,
+        state_reached: count(&|outcome| outcome.state.is_some_and(|state| row.state.contains(state))),
+        undetectable_by_design: count(&|outcome| outcome.undetectable),
+        what: row.fault,
+        detector: row.detector,
+        codes: codes.filter(raised).collect(),
+        smallest_seen: magnitudes(true).fold(f64::INFINITY, f64::min).into(),
+        largest_unseen: magnitudes(false).fold(f64::NEG_INFINITY, f64::max).into(),
+        unit: row.unit,
+        lacking: row.lacking,
+    }
+}
+
+impl CampaignReport {
+    /// What stands below the table: what is lacking, what failed, and the hash.
+    #[must_use]
+    pub fn notes(&self) -> String {
+        let mut text = String::new();
+        for row in &self.rows {
+            if let Some(lacking) = row.lacking {
+                text.push_str(&format!("{}: not built yet: {lacking}\n", row.fault));
+            }
+        }
+        text.push_str(&format!(
+            "invariants broken: {}; undisturbed motion without an alarm: {:.0} s; trace hash {}\n",
+            self.invariants_broken, self.undisturbed_s, self.trace_hash
+        ));
+        for failure in self.failures.iter().take(10) {
+            text.push_str(&format!("failed: {}\n", told(failure)));
+        }
+        text
+    }
+}
+
+/// A run in a line.
+#[must_use]
+pub fn told(outcome: &Outcome) -> String {
+    let verdict = match outcome {
+        Outcome { detected: true, .. } => "seen",
+        Outcome { undetectable: true, .. } => "not to be seen",
+        _ => "MISSED",
+    };
+    let after = outcome.after_ms.map_or_else(|| "-".into(), |after| format!("{after:.3} ms"));
+    format!(
+        "{} seed {}: {verdict}, after {after}, state {}, code {}, magnitude {}, injected at period {}, trace hash {}{}",
+        outcome.fault,
+        outcome.seed,
+        outcome.state.unwrap_or("-"),
+        outcome.alarm.unwrap_or("-"),
+        outcome.magnitude.map_or_else(|| "-".into(), |magnitude| format!("{magnitude:.2}")),
+        outcome.period,
+        outcome.hash,
+        outcome.broken.iter().map(|broken| format!("; {broken}")).collect::<String>(),
+    )
+}

@@ -1,0 +1,306 @@
+//! The whole firmware against the whole plant, one PWM period at a time, with faults on the ports between.
+//!
+//! What runs is the board's: operator, leg, current loops, and what looks after them (`scarab::safety`), put together as the
+//! board's tasks do it (`scarab::task`, which only the microcontroller builds). Level by level in one period:
+//!
+//! ```text
+//! every 48th period   operator's contacts -> requests; a reset forgets what no longer holds
+//! every 6th           servo: sample, request -> leg -> target currents
+//! every period        plant -> samples -> faults -> interlock -> axis -> command; anything that forbids releases all
+//! ```
+//!
+//! Not here: gate drivers, temperatures and watchdog (the housekeeping's), which need the board or the emulator.
+
+use scarab::hal::{AxisCommand, DriveCommand, JointSample, Sample};
+use scarab::leg::{ControlOutput, ControlRequest, DriveState, axis_code, permitted};
+use scarab::motor::{Axis, AxisRequest, Chopper, SenseScale};
+use scarab::operator::{Ask, Operator, RATE_HZ, Situation};
+use scarab::safety::{Cause, FaultCode, PowerRequest, ServoWatch, TickState, TickWatch};
+
+use crate::faults::{Channel, Injector};
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::LegFile;
+use crate::tool::pair::{Context, DeviceLeg, EVALUATIONS_PER_TICK, Pair};
+use crate::world::World;
+use crate::world::periods::PERIODS_PER_TICK;
+
+/// PWM periods per second.
+pub const PERIODS_PER_S: u64 = scarab::hal::CURRENT_RATE_HZ as u64;
+/// One of them, ms.
+pub const PERIOD_MS: f64 = 1e3 / PERIODS_PER_S as f64;
+const PERIODS_PER_ROUND: u64 = PERIODS_PER_S / RATE_HZ as u64;
+
+/// What the operator's hand does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Hand {
+    /// Holds the enabling switch.
+    pub enabling: bool,
+    /// Presses the start button.
+    pub start: bool,
+}
+
+/// What an operator did that may lead to an enabled drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Edges {
+    /// Period of the last reset that was asked for.
+    pub reset: Option<u64>,
+    /// Period of the last closing of the enabling switch.
+    pub closed: Option<u64>,
+}
+
+/// Firmware, plant and what is spoilt between them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig<const N: usize, const B: usize> {
+    /// The firmware above the current loops.
+    pub leg: Box<DeviceLeg<N, B>>,
+    /// The plant.
+    pub world: World<N>,
+    /// What is spoilt.
+    pub injector: Injector,
+    /// The operator's.
+    pub hand: Hand,
+    /// The same, as far as enabling goes.
+    pub edges: Edges,
+    /// Commands of the period that is over.
+    pub commands: [AxisCommand; N],
+    /// What the last servo tick gave.
+    pub output: Option<ControlOutput<N>>,
+    /// PWM periods since the beginning.
+    pub period: u64,
+    /// Of everything that crossed the ports so far.
+    pub hash: u64,
+    /// What the firmware must not see: its detectors are switched off, for the test of the tests.
+    pub blind: &'static [FaultCode],
+    axes: [Axis; N],
+    missed: [u8; N],
+    watches: [TickWatch; N],
+    servo: ServoWatch,
+    servo_ticks: u32,
+    targets: DriveCommand<N>,
+    chopper: Chopper,
+    brake: f32,
+    causes: u32,
+    axis_fault: Option<FaultCode>,
+    operator: Operator,
+    request: Option<ControlRequest<N>>,
+    sample: Sample<N>,
+    gravity: [f32; 3],
+}
+
+impl<const N: usize, const B: usize> Rig<N, B> {
+    /// A board that is ready, its leg at rest, drive off, nobody at the contacts.
+    pub fn new(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
+        let pair = Pair::new(leg, context, seed)?;
+        let board = pair.board.ok_or_else(|| ToolError::input("faults need complete drives"))?;
+        let (axes, chopper) = board.into_parts();
+        Ok(Self {
+            leg: pair.leg,
+            world: pair.world,
+            injector: Injector::new(seed),
+            hand: Hand::default(),
+            edges: Edges::default(),
+            commands: [AxisCommand::RELEASED; N],
+            output: None,
+            period: 0,
+            hash: FNV_BASIS,
+            blind: &[],
+            axes,
+            missed: [0; N],
+            watches: [TickWatch::default(); N],
+            servo: ServoWatch::default(),
+            servo_ticks: 0,
+            targets: DriveCommand::RELEASED,
+            chopper,
+            brake: 0.0,
+            causes: 0,
+            axis_fault: None,
+            operator: Operator::default(),
+            request: None,
+            sample: pair.sample,
+            gravity: context.gravity,
+        })
+    }
+
+    /// One PWM period.
+    pub fn advance(&mut self) {
+        if self.period.is_multiple_of(PERIODS_PER_ROUND) {
+            self.round();
+        }
+        if self.period.is_multiple_of(u64::from(PERIODS_PER_TICK)) {
+            self.servo();
+        }
+        self.current();
+        self.period += 1;
+        if self.period.is_multiple_of(u64::from(PERIODS_PER_TICK)) {
+            let mut joints = [JointSample::default(); N];
+            for (joint, (sample, axis)) in joints.iter_mut().zip(&mut self.axes).enumerate() {
+                *sample = axis.joint_sample();
+                self.injector.joint(joint, self.period, sample);
+            }
+            let measured = Sample { joints };
+            self.sample = self.world.observe(&measured);
+            let (_, forbids) = self.servo.look(self.servo_ticks);
+            self.causes |= forbids & !self.blind_bits();
+        }
+    }
+
+    /// The operator's contacts.
+    fn round(&mut self) {
+        let drive = self.leg.control().state();
+        let situation = Situation {
+            enabling: self.hand.enabling,
+            start: self.hand.start,
+            blocked: self.causes != 0 || matches!(drive, DriveState::Fault { .. }),
+            calibrated: true,
+            calibrating: false,
+            referenced: true,
+            drive: self.output.is_some().then_some(drive),
+        };
+        match self.operator.tick(&situation) {
+            Some(Ask::Power(power)) => self.request = Some(ControlRequest::Power(power)),
+            Some(Ask::Identify) => self.request = Some(ControlRequest::Identify),
+            Some(Ask::Reset) => self.reset(),
+            Some(Ask::Calibrate | Ask::EndCalibration | Ask::Reference) | None => {}
+        }
+    }
+
+    fn reset(&mut self) {
+        self.causes &= Cause::for_ever();
+        self.axis_fault = None;
+        for (joint, axis) in self.axes.iter_mut().enumerate() {
+            if !axis.clear_fault() {
+                self.causes |= axis_cause(joint).bit();
+            }
+        }
+        self.edges.reset = Some(self.period);
+        self.request = Some(ControlRequest::Power(PowerRequest::ResetFault));
+    }
+
+    fn servo(&mut self) {
+        if self.injector.happens(Channel::Servo, 0, self.period) {
+            return;
+        }
+        self.servo_ticks = self.servo_ticks.wrapping_add(1);
+        let state = self.leg.control().state();
+        let request = permitted(self.request.take(), self.causes == 0, state);
+        let seeing = (!self.blind.is_empty()).then(|| self.leg.clone());
+        let output = self.leg.tick(&self.sample, request, self.gravity, EVALUATIONS_PER_TICK);
+        if let Some(before) = seeing
+            && self.is_blind(self.leg.control().state().fault().map(|fault| fault.code))
+        {
+            // As if it had not been seen: the leg goes on with what it was told before.
+            self.leg = before;
+            return;
+        }
+        self.targets = *output.servo.drive();
+        for (joint, target) in self.targets.currents.iter_mut().enumerate() {
+            *target = self.injector.target(joint, self.period, *target);
+        }
+        self.output = Some(output);
+    }
+
+    /// Level 0, both axes.
+    fn current(&mut self) {
+        let now = self.period;
+        let brake = self.injector.brake(now, self.brake);
+        let mut samples = self.world.period(&self.commands, brake);
+        let emergency_stop = self.injector.happens(Channel::EmergencyStop, 0, now);
+        let gate_fault = self.injector.happens(Channel::GateFault, 0, now);
+        for (joint, sample) in samples.iter_mut().enumerate() {
+            self.injector.sample(joint, now, sample);
+            if self.injector.happens(Channel::Tick, joint, now) {
+                self.missed[joint] = self.missed[joint].saturating_add(1);
+                continue;
+            }
+            let complete = !self.injector.happens(Channel::Conversion, joint, now);
+            let missed = core::mem::take(&mut self.missed[joint]);
+            let state = TickState { emergency_stop, gate_fault, complete, missed };
+            self.causes |= self.watches[joint].look(&state) & !self.blind_bits();
+            let allowed = self.causes == 0 && self.targets.enabled;
+            let request = AxisRequest { enabled: allowed, current: self.targets.currents[joint] };
+            let before = self.axes[joint];
+            let command =
+                self.axes[joint].tick(sample, if allowed { request } else { AxisRequest::RELEASED });
+            if self.is_blind(self.axes[joint].fault().map(axis_code)) {
+                self.axes[joint] = before;
+                continue;
+            }
+            self.commands[joint] = command;
+            let axis = &self.axes[joint];
+            if let Some(fault) = axis.fault() {
+                self.causes |= axis_cause(joint).bit();
+                self.axis_fault = self.axis_fault.or(Some(axis_code(fault)));
+            }
+            // What one axis finds takes the other in the same period, as the bridges are released together.
+            if self.causes != 0 {
+                self.commands = [AxisCommand::RELEASED; N];
+            }
+        }
+        let bus = samples.first().map_or(0, |sample| sample.bus_code);
+        self.brake = self.chopper.duty(SenseScale::ODRIVE_3_6.bus(bus));
+        self.hash = samples.iter().zip(&self.commands).fold(self.hash, |hash, (sample, command)| {
+            let [b, c] = sample.shunt_codes.map(u64::from);
+            let seen = u64::from(sample.encoder_count) << 48 | b << 32 | c << 16 | u64::from(sample.bus_code);
+            let duties = command
+                .duty
+                .iter()
+                .fold(mixed(hash, seen), |hash, duty| mixed(hash, u64::from(duty.to_bits())));
+            mixed(duties, u64::from(command.enabled))
+        });
+        self.hash = mixed(self.hash, u64::from(self.causes));
+    }
+
+    fn is_blind(&self, code: Option<FaultCode>) -> bool {
+        code.is_some_and(|code| self.blind.contains(&code))
+    }
+
+    fn blind_bits(&self) -> u32 {
+        let blind = |cause: &Cause| self.is_blind(cause.code());
+        Cause::ALL.into_iter().filter(blind).fold(0, |bits, cause| bits | cause.bit())
+    }
+
+    /// What forbids to enable, as the interlock's bits.
+    #[must_use]
+    pub fn causes(&self) -> u32 {
+        self.causes
+    }
+
+    /// The brake resistor's duty.
+    #[must_use]
+    pub fn brake(&self) -> f32 {
+        self.brake
+    }
+
+    /// Where the drive stands.
+    #[must_use]
+    pub fn state(&self) -> DriveState {
+        self.leg.control().state()
+    }
+
+    /// What the firmware says is wrong: an axis' fault, another cause, or the leg's fault.
+    #[must_use]
+    pub fn alarm(&self) -> Option<FaultCode> {
+        let cause = || Cause::ALL.into_iter().find(|cause| self.causes & cause.bit() != 0);
+        self.axis_fault
+            .or_else(|| cause().and_then(Cause::code))
+            .or_else(|| self.state().fault().map(|fault| fault.code))
+    }
+
+    /// Any bridge switches.
+    #[must_use]
+    pub fn is_switching(&self) -> bool {
+        self.commands.iter().any(|command| command.enabled)
+    }
+}
+
+const fn axis_cause(joint: usize) -> Cause {
+    if joint == 0 { Cause::Axis1 } else { Cause::Axis2 }
+}
+
+const fn mixed(hash: u64, word: u64) -> u64 {
+    (hash ^ word).wrapping_mul(FNV_PRIME)
+}
+
+/// Fowler, Noll and Vo's hash 1a, on words.
+const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;

@@ -1,0 +1,313 @@
+//! One run: a machine forked at a period of its motion, spoilt, and watched until it is safe.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use scarab::safety::{DriveState, FaultCode};
+use serde::Serialize;
+
+use super::catalogue::{Event, Expected, JOINTS, Onset, Row, Scenario};
+use super::dice::Dice;
+use super::invariants::{Invariants, Scope};
+use super::recording::Recording;
+use super::rig::{Hand, PERIOD_MS, PERIODS_PER_S, Rig};
+use crate::faults::{Channel, Injector};
+use crate::tool::leg_file::LegFile;
+use crate::world::periods::PERIODS_PER_TICK;
+
+/// A released machine is watched for so long: nothing may come back.
+const AFTERWARDS: u64 = PERIODS_PER_S / 50;
+/// Hands at the contacts go on for so long.
+const HANDS: u64 = 6 * PERIODS_PER_S;
+
+/// What came of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outcome {
+    /// The row.
+    pub fault: &'static str,
+    /// The run's.
+    pub seed: u64,
+    /// Period of the injection.
+    pub period: u64,
+    /// It was seen, in time, and made safe.
+    pub detected: bool,
+    /// There was nothing that could have been seen.
+    pub undetectable: bool,
+    /// Something was raised although nothing was wrong.
+    pub false_alarm: bool,
+    /// From the fault to the safe state's first command, ms.
+    pub after_ms: Option<f64>,
+    /// `Off`, `Damp`, `Limit`; nothing where the motion simply went on.
+    pub state: Option<&'static str>,
+    /// What the firmware says is wrong.
+    pub alarm: Option<&'static str>,
+    /// How large the fault was, in the row's unit.
+    pub magnitude: Option<f64>,
+    /// Invariants that did not hold.
+    pub broken: Vec<String>,
+    /// Of everything that crossed the ports.
+    pub hash: String,
+    /// Its curves, where they were asked for.
+    #[serde(skip)]
+    pub recording: Option<Recording>,
+}
+
+/// How a run is done.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Manner {
+    /// The row's detectors are switched off.
+    pub blind: bool,
+    /// Its curves are kept.
+    pub recorded: bool,
+}
+
+/// A fork of `base`, spoilt as the row's dice say.
+#[must_use]
+pub fn run<const B: usize>(
+    leg: &LegFile,
+    row: &'static Row,
+    scenario: &Scenario,
+    seed: u64,
+    manner: Manner,
+    base: &Rig<JOINTS, B>,
+) -> Outcome {
+    catch_unwind(AssertUnwindSafe(|| Watched::new(leg, row, scenario, seed, manner, base).finish()))
+        .unwrap_or_else(|_| Outcome {
+            fault: row.id,
+            seed,
+            period: base.period,
+            detected: false,
+            undetectable: false,
+            false_alarm: false,
+            after_ms: None,
+            state: None,
+            alarm: None,
+            magnitude: scenario.magnitude,
+            broken: vec!["a panic".into()],
+            hash: String::new(),
+            recording: None,
+        })
+}
+
+/// The servo's sample is read before its tick, its target after it.
+fn next_servo_tick(scenario: &Scenario, begun: u64) -> u64 {
+    let target = scenario.injections[0].is_some_and(|injection| injection.channel == Channel::Target);
+    let periods = u64::from(PERIODS_PER_TICK);
+    (if target { begun } else { begun + 1 }).next_multiple_of(periods)
+}
+
+struct Watched<'a, const B: usize> {
+    row: &'static Row,
+    scenario: &'a Scenario,
+    seed: u64,
+    rig: Rig<JOINTS, B>,
+    invariants: Invariants<JOINTS>,
+    dice: Dice,
+    begun: u64,
+    onset: Option<u64>,
+    /// Counts of the joints at the injection, and the widest way from there.
+    counts: [f64; JOINTS],
+    hold: Hold,
+    recording: Option<Recording>,
+}
+
+/// What an operator's hand does now, and until when.
+#[derive(Default)]
+struct Hold {
+    until: u64,
+}
+
+impl<'a, const B: usize> Watched<'a, B> {
+    fn new(
+        leg: &LegFile,
+        row: &'static Row,
+        scenario: &'a Scenario,
+        seed: u64,
+        manner: Manner,
+        base: &Rig<JOINTS, B>,
+    ) -> Self {
+        let mut rig = base.clone();
+        let begun = rig.period;
+        rig.injector = Injector::new(seed);
+        if manner.blind {
+            rig.blind = row.codes;
+        }
+        for injection in scenario.injections.into_iter().flatten() {
+            let mut injection = injection;
+            injection.timing.begin = injection.timing.begin.saturating_add(begun);
+            rig.injector.add(injection);
+        }
+        match scenario.event {
+            Event::Supply(volts) => {
+                if let Some(drives) = rig.world.complete_drives_mut() {
+                    drives.supply_mut().set_source(volts);
+                }
+            }
+            Event::Kick(joint, peak, duration) => rig.world.push(joint, peak, duration),
+            Event::None | Event::Hands => {}
+        }
+        let lies = |channel| matches!(channel, Channel::ShuntB | Channel::ShuntC);
+        let scope = Scope {
+            torque: !scenario.injections.iter().flatten().any(|injection| lies(injection.channel)),
+            range: !matches!(scenario.event, Event::Kick(..)),
+        };
+        let limits = *rig.leg.control().limits();
+        let onset = match scenario.onset {
+            Onset::Injection => Some(begun),
+            Onset::ServoTick => Some(next_servo_tick(scenario, begun)),
+            _ => None,
+        };
+        Self {
+            row,
+            scenario,
+            seed,
+            invariants: Invariants::new::<B>(leg, &limits, scope),
+            dice: Dice::new(row.id, !seed),
+            begun,
+            onset,
+            counts: rig.world.anatomical_position(),
+            hold: Hold::default(),
+            recording: manner.recorded.then(Recording::default),
+            rig,
+        }
+    }
+
+    fn step(&mut self) {
+        if self.scenario.event == Event::Hands {
+            self.hands();
+        }
+        let stop = self.rig.injector.happens(Channel::EmergencyStop, 0, self.rig.period);
+        self.rig.advance();
+        self.invariants.see(&self.rig, stop);
+        if let Some(recording) = &mut self.recording {
+            recording.see(&self.rig, self.begun);
+        }
+        if self.onset.is_none() && self.has_begun() {
+            self.onset = Some(self.rig.period);
+        }
+    }
+
+    fn has_begun(&self) -> bool {
+        let bus = || self.rig.world.complete_drives().map_or(0.0, |drives| drives.supply().voltage());
+        match self.scenario.onset {
+            Onset::Injection | Onset::ServoTick => true,
+            Onset::BusAbove(volts) => bus() > volts,
+            Onset::BusBelow(volts) => bus() < volts,
+            Onset::Speed(factor) => {
+                let truth = self.rig.world.velocity();
+                let limits = self.rig.leg.control().limits().joints();
+                (0..JOINTS).any(|joint| truth[joint].abs() > factor * f64::from(limits[joint].speed.0))
+            }
+        }
+    }
+
+    /// Somebody at the contacts who does as he likes, and now and then resets as he should.
+    fn hands(&mut self) {
+        let now = self.rig.period;
+        if now < self.hold.until {
+            return;
+        }
+        let choice = self.dice.below(6);
+        let hand = match choice {
+            0 | 1 => Hand { enabling: true, start: false },
+            2 => Hand { enabling: true, start: true },
+            3 => Hand { enabling: false, start: true },
+            _ => Hand::default(),
+        };
+        // Long enough for a reset now and then.
+        let longest = if choice == 3 { 3 * PERIODS_PER_S } else { PERIODS_PER_S / 2 };
+        self.hold.until = now + 1 + self.dice.below(longest);
+        if hand.enabling && !self.rig.hand.enabling {
+            self.rig.edges.closed = Some(now);
+        }
+        self.rig.hand = hand;
+    }
+
+    fn finish(mut self) -> Outcome {
+        let before = self.rig.commands;
+        let limit = self.begun + self.scenario.patience;
+        let mut seen = None;
+        let mut false_alarm = false;
+        while seen.is_none() && (self.rig.period < limit) {
+            self.step();
+            if self.scenario.expected == Expected::Rejected && self.rig.period == self.begun + 1 {
+                let joint = self.scenario.injections[0].map_or(0, |injection| injection.joint);
+                let kept = self.rig.commands[joint] == before[joint];
+                let rejected = kept && self.rig.alarm().is_none();
+                seen = rejected.then_some("Limit");
+                if !rejected {
+                    break;
+                }
+            } else if self.rig.alarm().is_some() {
+                seen = self.safe_state();
+            }
+            if self.onset.is_some_and(|onset| self.is_too_late(onset)) {
+                break;
+            }
+        }
+        let safe = self.rig.period;
+        let alarm = self.rig.alarm().map(FaultCode::name);
+        self.watch_on(seen);
+        if self.scenario.expected == Expected::Rejected {
+            // One wrong reading stops nobody.
+            false_alarm = self.rig.alarm().is_some();
+        }
+        let onset = self.onset.map_or(safe, |onset| onset.min(safe));
+        let after_ms = seen.map(|_| (safe - onset) as f64 * PERIOD_MS);
+        let in_time = after_ms.is_some_and(|after| after <= self.row.deadline_ms + 1e-9);
+        let nothing_came = self.onset.is_none() && seen.is_none();
+        let stood = self.row.deadline_ms.is_infinite() && !self.has_turned();
+        let undetectable = !in_time && (self.scenario.by_design || nothing_came || stood);
+        Outcome {
+            fault: self.row.id,
+            seed: self.seed,
+            period: self.begun,
+            detected: in_time,
+            undetectable,
+            false_alarm,
+            after_ms,
+            state: seen,
+            alarm,
+            magnitude: self.scenario.magnitude,
+            broken: self.invariants.into_broken(),
+            hash: format!("{:016x}", self.rig.hash),
+            recording: self.recording,
+        }
+    }
+
+    fn is_too_late(&self, onset: u64) -> bool {
+        let since = self.rig.period.saturating_sub(onset) as f64 * PERIOD_MS;
+        if self.row.deadline_ms.is_infinite() {
+            return self.has_turned();
+        }
+        since > 2.0 * self.row.deadline_ms + 1.0
+    }
+
+    /// Some rotor made a whole turn, and a tenth, since the injection.
+    fn has_turned(&self) -> bool {
+        let position = self.rig.world.anatomical_position();
+        let drives = self.rig.world.complete_drives();
+        let joint = self.scenario.injections[0].map_or(0, |injection| injection.joint);
+        let ratio = drives.map_or(1.0, |drives| drives.axes()[joint].description().ratio);
+        (position[joint] - self.counts[joint]).abs() * ratio > 1.1 * core::f64::consts::TAU
+    }
+
+    fn safe_state(&self) -> Option<&'static str> {
+        match (self.rig.is_switching(), self.rig.state()) {
+            (false, _) => Some("Off"),
+            (true, DriveState::FaultReactionActive { .. }) => Some("Damp"),
+            (true, _) => None,
+        }
+    }
+
+    /// What follows the safe state: nothing comes back, damping ends.
+    fn watch_on(&mut self, seen: Option<&'static str>) {
+        let periods = match (self.scenario.event, seen) {
+            (Event::Hands, _) => HANDS,
+            (_, Some("Damp")) => PERIODS_PER_S * 3 / 10 + AFTERWARDS,
+            _ => AFTERWARDS,
+        };
+        for _ in 0..periods {
+            self.step();
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! A campaign as one page: the table, what failed, and runs that were repeated, drawn.
+
+use maud::{DOCTYPE, html};
+
+use super::super::faults::report::CampaignReport;
+use super::super::figures::Figure;
+use super::{Circumstances, drawing, page_head};
+
+/// The whole page; `told` are lines about single runs.
+#[must_use]
+pub fn page(
+    circumstances: &Circumstances,
+    report: &CampaignReport,
+    told: &[String],
+    figures: &[Figure],
+) -> String {
+    let verdict = if report.is_good() { "nothing missed" } else { "failures" };
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            (page_head(&format!("Faults injected: {verdict}")))
+            body {
+                main {
+                    header {
+                        p.over { "Scarab \u{b7} fault campaign" }
+                        h1 { (circumstances.leg.name) ": " (verdict) }
+                        p.when { (circumstances.time_utc) " (UTC)" }
+                    }
+                    section {
+                        h2 { "What was run" }
+                        p { code { (circumstances.command) } }
+                        table {
+                            thead { tr { @for name in report.head() { th { (name) } } } }
+                            tbody {
+                                @for row in &report.rows {
+                                    tr { @for cell in row.cells() { td { (cell) } } }
+                                }
+                            }
+                        }
+                    }
+                    section {
+                        h2 { "Notes" }
+                        @for line in report.notes().lines() { p { (line) } }
+                    }
+                    @if !told.is_empty() {
+                        section {
+                            h2 { "Runs" }
+                            @for line in told { p { (line) } }
+                            @for figure in figures { (drawing(figure)) }
+                        }
+                    }
+                }
+            }
+        }
+    };
+    page.into_string()
+}
