@@ -126,6 +126,22 @@ fn restarts_leave_local_minima() {
 }
 
 #[test]
+fn leaps_leave_the_ripples_that_scattering_anew_does_not() {
+    // Known: 320 to 390 / 500 to 720 iterations, 97 to 100 %; without leaps none of 200.
+    let problem = TestProblem::new(TestFunction::Rastrigin, 10);
+    let scattered =
+        BsoSettings::Adaptive(AdaptiveSettings { leaps: 0, patience: 25, ..AdaptiveSettings::default() });
+    assert_eq!(bso::<f64>(problem, 0.1, 10, scattered).success(), 0.0);
+    for tally in [
+        bso::<f64>(problem, 0.1, 25, BsoSettings::default()),
+        bso::<f32>(problem, 0.1, 25, BsoSettings::default()),
+    ] {
+        assert!(tally.success() >= 0.8, "success {}", tally.success());
+        assert!(tally.quantile(0.5) <= 550, "{}", tally.quantile(0.5));
+    }
+}
+
+#[test]
 fn double_precision_goes_on_to_a_millionth() {
     // Known medians: sphere 31, Ackley 61, Rosenbrock 105 iterations. Single precision cannot represent the last
     // on Ackley's function, whose terms are about 20.

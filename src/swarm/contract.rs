@@ -326,6 +326,6 @@ fn one_dimension_and_two_beetles_are_enough() {
 
 #[test]
 fn memory_is_what_the_documentation_says() {
-    assert_eq!(size_of::<Bso<f32, 20, 13>>(), 7_712);
-    assert_eq!(size_of::<Bso<f32, 20, 28>>(), 18_872);
+    assert_eq!(size_of::<Bso<f32, 20, 13>>(), 8_768);
+    assert_eq!(size_of::<Bso<f32, 20, 28>>(), 21_136);
 }

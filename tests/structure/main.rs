@@ -79,6 +79,19 @@ fn every_room_uses_only_the_rooms_the_design_allows() {
 }
 
 #[test]
+fn the_swarm_needs_the_maths_door_and_nothing_else_of_the_crate() {
+    let mut offences = Vec::new();
+    for file in source_files("src/swarm") {
+        for used in rooms_used(&file.text, module_depth(&file.path)) {
+            if !["swarm", "real"].contains(&used.text) {
+                offences.push(format!("{}:{}: `swarm` may not use `{}`", file.path, used.line, used.text));
+            }
+        }
+    }
+    assert_none(&offences);
+}
+
+#[test]
 fn the_plant_sees_only_the_ports_and_the_units_of_the_firmware() {
     let mut offences = Vec::new();
     for file in source_files("hal-sim/src") {

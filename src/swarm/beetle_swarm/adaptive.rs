@@ -1,27 +1,27 @@
 //! The adaptive beetle swarm: whiskers that share a frame, learn a metric and retreat from bad moves.
 //!
 //! What does the work, said openly: the whiskers of the best beetles together make a Newton step in the subspace
-//! of their frame, in a metric they learn. The velocity of Eq. (19) is not the engine, without it the medians are
+//! of their frame, in a metric they learn. The velocity of Eq. (19) is not the engine: without it most medians are
 //! the same; it trims the tails. In order of weight:
 //! 1. Shared scent: every beetle steps along all directions of the frame, not along its own only.
 //! 2. Learned metric: measured curvature stretches it; off where readings are not convex (ripples).
 //! 3. Retreat: a move that is worse than before and worse than the personal best is taken back.
 //!
-//! Move of beetle i at metric coordinates y_i = A^-1 x_i (frame.rs has s_j, z_j, d_j):
-//!   q_ij  = clip(s_j - z_j.(y_i - y_j)) om_i for j != i, q_ii = s_i
+//! Move of beetle i at x_i (frame.rs has s_j, d_j, w_j):
+//!   q_ij  = clip(s_j - w_j.(x_i - x_j)) om_i for j != i, q_ii = s_i
 //!   psi_i = sum_j q_ij d_j
 //!   x_i   = x_i + lambda v_i + (1 - lambda) psi_i            (Eq. 29 with this psi), at most 2 % outside the box
 //! om_i, the trust in the others' whiskers, is 1.6 om for every second beetle and om / 1.6 for the others; pairs are
 //! compared after the move and om follows the better. Whisker length follows sqrt(D) times the median |s|.
-//! Without progress for `patience` iterations the swarm is scattered anew and forgets all but its best.
+//! Without progress for `patience` iterations the swarm leaps (leap.rs); where leaps lead nowhere it is scattered anew.
+//! `docs/bso.md` has the whole algorithm as pseudocode, with what each part is worth.
 //!
 //! Source: own experiments on test functions and identification problems; kept of the beetle swarm: x, v, P, G,
 //! Eq. (19), two whiskers, the weighted move.
-//! Cost: N + 2 min(N, D) evaluations per iteration and, without them, 1 kflop (D = 2), 174 (21), 285 (28);
+//! Cost: N + 2 min(N, D) evaluations per iteration; the rest is counted in `docs/bso.md`;
 //! up to five square roots per direction are the only calls into `libm`.
-//! Known limits: a fast exploiter. Global search is the restart only: it fails on Rastrigin's function in 10
-//! dimensions, and needs more evaluations there than a particle swarm in 2. On a quadratic cost least squares is
-//! exact and instant. Noise in the cost of 1e-4 of its value spoils the last digits: meant for fixed data.
+//! Known limits: a fast exploiter. Global search are the leaps and the restart: it fails on Rastrigin's function rotated
+//! in 10 dimensions and as it stands in 30. On a quadratic cost least squares is exact and instant. Noise in the cost of 1e-4 of its value spoils the last digits: meant for fixed data.
 
 use crate::real::{Real, abs, clamp, max, min};
 
@@ -29,9 +29,10 @@ use super::super::particles::{Particles, VelocityRule};
 use super::super::random::Random;
 use super::super::rows::{add_scaled, dot, live, live_mut};
 use super::frame::{Frame, Reach};
+use super::leap::{LEAP_SPREAD, Leap, leap_whisker};
 use super::metric::Metric;
 use super::rules::{Opening, Rules, Side};
-use super::settings::AdaptiveSettings;
+use super::settings::{AdaptiveSettings, Part};
 
 /// Whisker length of a scattered swarm, metric coordinates.
 const FIRST_WHISKER: f64 = 0.1;
@@ -45,7 +46,7 @@ const PROGRESS: f64 = 1e-7;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct AdaptiveRules<T, const N: usize, const D: usize> {
-    settings: AdaptiveSettings<T>,
+    pub(super) settings: AdaptiveSettings<T>,
     pub(super) frame: Frame<T, N, D>,
     pub(super) metric: Metric<T, D>,
     /// Gradient of the latest frame, box coordinates; `None` before the first.
@@ -57,7 +58,8 @@ pub(super) struct AdaptiveRules<T, const N: usize, const D: usize> {
     /// Smoothed share of convex readings; `None` before the first.
     pub(super) convex_share: Option<T>,
     /// Iterations since the swarm was scattered, the running one included.
-    iteration: u32,
+    pub(super) iteration: u32,
+    pub(super) leap: Leap<T>,
     /// The best value that counted as progress, and the iterations since.
     progress: T,
     waited: u32,
@@ -73,6 +75,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
             whisker: T::of(FIRST_WHISKER),
             trust: T::of(FIRST_TRUST),
             convex_share: None,
+            leap: Leap::none(),
             iteration: 0,
             progress: T::LARGEST,
             waited: 0,
@@ -84,11 +87,12 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.settings = settings;
         self.frame.restart(dimension);
         self.metric.restart(dimension);
+        self.leap = Leap::none();
         self.forget();
     }
 
-    /// Everything learned, when the swarm is scattered anew.
-    fn forget(&mut self) {
+    /// Everything learned, when the swarm is scattered anew or has leapt.
+    pub(super) fn forget(&mut self) {
         self.metric.forget();
         self.gradient = None;
         self.whisker = T::of(FIRST_WHISKER);
@@ -103,8 +107,11 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     /// (such differences point into narrow valleys), the others anywhere.
     fn wish(&self, beetle: usize, beetles: &Particles<T, N, D>, random: &mut Random) -> Option<[T; D]> {
         match beetle {
-            0 => self.gradient.map(|gradient| self.metric.gradient_to_metric(&gradient)),
-            _ if beetle <= self.settings.pair_directions => {
+            _ if self.leap.under_way => Some(self.axis(beetle, beetles.dimension())),
+            0 if self.has(Part::GradientDirection) => {
+                self.gradient.map(|gradient| self.metric.gradient_to_metric(&gradient))
+            }
+            1.. if beetle <= self.settings.pair_directions => {
                 let one = &beetles.personal_best[random.below(N).min(N - 1)];
                 let other = &beetles.personal_best[random.below(N).min(N - 1)];
                 let mut difference = *one;
@@ -117,11 +124,23 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     }
 
     fn reach(&self) -> Reach<T> {
-        Reach { whisker: self.whisker, limit: self.settings.step_limit }
+        Reach {
+            whisker: self.whisker,
+            limit: self.settings.step_limit,
+            parabola: self.has(Part::Parabola),
+            long: None,
+        }
+    }
+
+    pub(super) fn has(&self, part: Part) -> bool {
+        self.settings.without != Some(part)
     }
 
     /// om_i: beetles take turns in trusting more and less.
     fn trust_of(&self, beetle: usize) -> T {
+        if !self.has(Part::TrustAdaptation) || self.leap.under_way {
+            return T::one();
+        }
         let levels = T::of(TRUST_LEVELS);
         let trust = if self.trusts_more(beetle) { self.trust * levels } else { self.trust / levels };
         min(trust, T::one())
@@ -134,18 +153,19 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     /// psi_i, box coordinates.
     fn scent(&self, beetle: usize, position: &[T; D], dimension: usize) -> [T; D] {
         let mut psi = [T::zero(); D];
-        let metric_position = self.metric.to_metric(position);
         let trust = self.trust_of(beetle);
         let count = self.frame.count();
-        let directions = self.frame.direction.iter().zip(&self.frame.displacement);
-        for (index, ((direction, displacement), whisker)) in
+        let directions = self.frame.covector.iter().zip(&self.frame.displacement);
+        for (index, ((covector, displacement), whisker)) in
             directions.zip(&self.frame.whisker).take(count).enumerate()
         {
             let Some(reading) = whisker.reading else { continue };
             let step = if index == beetle {
                 reading.step
+            } else if !self.has(Part::Sharing) {
+                continue;
             } else {
-                let at = dot(live(direction, dimension), live(&metric_position, dimension));
+                let at = dot(live(covector, dimension), live(position, dimension));
                 let longest = self.settings.step_limit / whisker.box_length;
                 clamp(reading.step - (at - whisker.coordinate), -longest, longest) * trust
             };
@@ -157,14 +177,16 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
 
 impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T, N, D> {
     fn open(&mut self, beetles: &mut Particles<T, N, D>) -> Opening {
-        beetles.sort();
-        let best = beetles.personal_best_value[0];
+        if self.has(Part::Ranking) {
+            beetles.sort();
+        }
+        let best = beetles.personal_best_value[beetles.leader().min(N - 1)];
         if self.progress - best > T::of(PROGRESS) * abs(best) {
             self.progress = best;
             self.waited = 0;
         } else {
             self.waited += 1;
-            if self.waited >= self.settings.patience {
+            if self.waited >= self.settings.patience && !self.leaps_from(best) {
                 self.forget();
                 return Opening::Scatter;
             }
@@ -178,9 +200,13 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
     }
 
     fn aim(&mut self, beetle: usize, beetles: &Particles<T, N, D>, random: &mut Random) {
+        let mut reach = self.reach();
+        if self.leap.under_way {
+            reach.long = Some(leap_whisker(random));
+        }
         let wish = self.wish(beetle, beetles, random);
         let position = &beetles.position[beetle.min(N - 1)];
-        self.frame.aim(beetle, wish, position, &self.metric, self.reach(), random);
+        self.frame.aim(beetle, wish, position, &self.metric, reach, random);
     }
 
     fn tip(&self, beetle: usize, side: Side, beetles: &Particles<T, N, D>) -> [T; D] {
@@ -214,17 +240,24 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
         add_scaled(position, share, live(&beetles.velocity[beetle], dimension));
         add_scaled(position, T::one() - share, live(&psi, dimension));
         for entry in position {
+            if self.leap.under_way {
+                *entry += T::of(LEAP_SPREAD) * random.signed::<T>();
+            }
             *entry = clamp(*entry, T::of(-MARGIN), T::of(1.0 + MARGIN));
         }
     }
 
     fn close(&mut self, beetles: &mut Particles<T, N, D>, found: &[T; N]) {
         let dimension = beetles.dimension();
+        if self.leap.under_way {
+            self.land(beetles, found);
+            return;
+        }
         self.learn_trust(&beetles.value, found);
         for (beetle, &value) in found.iter().enumerate() {
             let worse = value > max(beetles.value[beetle], beetles.personal_best_value[beetle]);
             beetles.record(beetle, value);
-            if worse {
+            if worse && self.has(Part::Retreat) {
                 beetles.retreat(beetle);
             }
         }

@@ -7,12 +7,13 @@
 //! Along direction j, with f_0 at beetle j and f_r, f_l at its whiskers l away (l in metric coordinates):
 //!   g = (f_r - f_l) / (2 l),   h = (f_r - 2 f_0 + f_l) / l^2
 //!   s = -g / h where h > 0, else -sgn(g) times the usual whisker;   |s| <= step limit / |A z_j|
-//! For beetle i at metric coordinates y_i the food is q_ij = s_j - z_j.(y_i - y_j) away along z_j.
-//! Symbols: z_j unit vector, d_j = A z_j its image in box coordinates, y_j metric coordinates of beetle j.
+//! For beetle i at x_i the food is q_ij = s_j - w_j.(x_i - x_j) away along z_j.
+//! Symbols: z_j unit vector in metric coordinates y = A^-1 x; d_j = A z_j its image in box coordinates; w_j = A^-T z_j, so
+//! that w_j.x = z_j.y without y: one product with the metric per direction, none per beetle.
 //!
 //! Source: own experiments; one parabola per direction is Newton's step in the subspace of the frame.
-//! Cost: per direction one or two products with the metric (2 D^2 each) and 4 D j operations of Gram-Schmidt,
-//! repeated per draw, at most 8 draws; memory N (2 D + 6) scalars.
+//! Cost: per direction two or three products with the metric (2 D^2 each) and 4 D j operations of Gram-Schmidt,
+//! repeated per draw, at most 8 draws; memory N (3 D + 6) scalars.
 
 use crate::real::{Real, abs, clamp, is_finite, min, sign, sqrt};
 
@@ -37,6 +38,10 @@ pub(super) struct Reach<T> {
     pub whisker: T,
     /// Longest whisker and step, box coordinates.
     pub limit: T,
+    /// Whether a step is the parabola's, where that has a minimum.
+    pub parabola: bool,
+    /// Whisker length in box coordinates, instead of the usual one.
+    pub long: Option<T>,
 }
 
 /// One direction of the frame and what its beetle smelled.
@@ -46,7 +51,7 @@ pub(super) struct Whisker<T> {
     pub box_length: T,
     /// l, metric coordinates.
     pub length: T,
-    /// z_j . y_j.
+    /// w_j . x_j.
     pub coordinate: T,
     /// `None` until both whiskers were read, and where a value was not finite.
     pub reading: Option<Reading<T>>,
@@ -79,6 +84,8 @@ pub(super) struct Frame<T, const N: usize, const D: usize> {
     pub direction: [[T; D]; N],
     /// d_j = A z_j, box coordinates.
     pub displacement: [[T; D]; N],
+    /// w_j = A^-T z_j: w_j.x is the metric coordinate along z_j of a point x in box coordinates.
+    pub covector: [[T; D]; N],
     pub whisker: [Whisker<T>; N],
 }
 
@@ -88,6 +95,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
             dimension,
             direction: [[T::zero(); D]; N],
             displacement: [[T::zero(); D]; N],
+            covector: [[T::zero(); D]; N],
             whisker: [Whisker::unaimed(); N],
         }
     }
@@ -97,6 +105,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         self.dimension = dimension;
         self.direction.fill([T::zero(); D]);
         self.displacement.fill([T::zero(); D]);
+        self.covector.fill([T::zero(); D]);
         self.whisker.fill(Whisker::unaimed());
     }
 
@@ -122,13 +131,14 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         let direction = self.new_direction(index, wish, random);
         let displacement = metric.to_box(&direction);
         let box_length = sqrt(dot(live(&displacement, self.dimension), live(&displacement, self.dimension)));
-        let coordinate =
-            dot(live(&direction, self.dimension), live(&metric.to_metric(beetle), self.dimension));
+        let covector = metric.gradient_to_box(&direction);
+        let coordinate = dot(live(&covector, self.dimension), live(beetle, self.dimension));
         self.direction[index] = direction;
         self.displacement[index] = displacement;
+        self.covector[index] = covector;
         self.whisker[index] = Whisker {
             box_length,
-            length: min(reach.whisker, reach.limit / box_length),
+            length: min(reach.long.map_or(reach.whisker, |long| long / box_length), reach.limit / box_length),
             coordinate,
             reading: None,
         };
@@ -191,7 +201,11 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         if !(is_finite(slope) && is_finite(curvature)) {
             return;
         }
-        let step = if curvature > T::zero() { -slope / curvature } else { -sign(slope) * reach.whisker };
+        let step = if reach.parabola && curvature > T::zero() {
+            -slope / curvature
+        } else {
+            -sign(slope) * reach.whisker
+        };
         let longest = reach.limit / whisker.box_length;
         whisker.reading = Some(Reading {
             slope,
@@ -218,14 +232,14 @@ mod tests {
 
     const N: usize = 6;
     const D: usize = 9;
-    const REACH: Reach<f64> = Reach { whisker: 0.1, limit: 0.5 };
+    const REACH: Reach<f64> = Reach { whisker: 0.1, limit: 0.5, parabola: true, long: None };
 
     fn frame_of(dimension: usize, wish: Option<[f64; D]>) -> (Frame<f64, N, D>, Metric<f64, D>) {
         let mut random = Random::new(4);
         let mut metric = Metric::identity(dimension);
         let mut frame = Frame::new(dimension);
         frame.aim(0, None, &[0.5; D], &metric, REACH, &mut random);
-        metric.stretch(&frame.direction[0], &frame.displacement[0], 4.0);
+        metric.stretch(&frame.direction[0], &frame.displacement[0], &frame.covector[0], 4.0);
         for index in 0..frame.count() {
             frame.aim(index, wish, &[0.5; D], &metric, REACH, &mut random);
         }

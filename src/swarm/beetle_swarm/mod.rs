@@ -7,18 +7,19 @@
 //! ```text
 //! Place 0..N --> [ Right 0, Left 0, Right 1, Left 1, ... --> Move 0..N ] --> next iteration
 //!     ^                                                                         |
-//!     +------------------------- no progress: scatter anew ---------------------+
+//!     +------------------- leaps led nowhere: scatter anew ---------------------+
 //! ```
 //!
-//! Memory: 3 N D swarm, 2 D^2 metric, 2 N D frame (its first min(N, D) rows are in use), 4 D gradient, best and
-//! box, 11 N values and readings, in scalars; `size_of` is 7,712 bytes for `Bso<f32, 20, 13>` and 18,872 for
+//! Memory: 3 N D swarm, 2 D^2 metric, 3 N D frame (its first min(N, D) rows are in use), 4 D gradient, best and
+//! box, 11 N values and readings, in scalars; `size_of` is 8,768 bytes for `Bso<f32, 20, 13>` and 21,136 for
 //! `Bso<f32, 20, 28>`. Stack, Cortex-M4F, D = 28: `advance` about 1.5 kB; [`Bso::new`] builds the value there
 //! before it is moved (7 kB at opt-level 3, about 45 kB at "s"); [`Bso::restart`] begins anew in place, 1 kB.
 //! Cost: adaptive.rs, paper.rs. The longest piece of work between two evaluations is the end of an adaptive
-//! iteration, 6 D^2 min(N, D) operations (94,000 at D = 28).
+//! iteration, 4 D^2 min(N, D) operations (63,000 at D = 28).
 
 mod adaptive;
 mod frame;
+mod leap;
 mod learning;
 mod metric;
 mod paper;
@@ -34,7 +35,7 @@ use super::search::{Best, Ledger, Search};
 use adaptive::AdaptiveRules;
 use paper::PaperRules;
 use rules::{Opening, Rules, Side};
-pub use settings::{AdaptiveSettings, BsoSettings, PaperSettings};
+pub use settings::{AdaptiveSettings, BsoSettings, PaperSettings, Part};
 
 /// Beetle swarm of `N` beetles (at least 2) with room for `D` coordinates.
 ///

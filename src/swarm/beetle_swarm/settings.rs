@@ -55,8 +55,35 @@ pub struct AdaptiveSettings<T> {
     pub step_limit: T,
     /// Directions of the frame (after the gradient's) that join two personal bests; default 12.
     pub pair_directions: usize,
-    /// Iterations without progress after which the swarm is scattered anew; default 25, at least 1.
+    /// Iterations without progress after which the swarm leaps or, at last, is scattered anew; default 8, at least 1.
     pub patience: u32,
+    /// Leaps in a row that may lead nowhere before the swarm is scattered anew; default 8.
+    pub leaps: u32,
+    /// A part that is left out, to measure what it is worth; default none.
+    pub without: Option<Part>,
+}
+
+/// What the adaptive mode can be measured without; the other parts are left out by their settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Steps along the directions of the other beetles' whiskers.
+    Sharing,
+    /// The learned metric.
+    Metric,
+    /// The metric's rest where readings are not convex.
+    ConvexityGate,
+    /// The frame's first direction along the gradient.
+    GradientDirection,
+    /// The way back from a bad move.
+    Retreat,
+    /// Trust in the others' whiskers that follows success: it is 1.
+    TrustAdaptation,
+    /// Whiskers for the best beetles: it is always the same ones.
+    Ranking,
+    /// Whisker length that follows the steps: it falls by 5 % per iteration.
+    WhiskerAdaptation,
+    /// Newton's step along a direction: it is one whisker downhill.
+    Parabola,
 }
 
 impl<T: Real> Default for AdaptiveSettings<T> {
@@ -69,7 +96,9 @@ impl<T: Real> Default for AdaptiveSettings<T> {
             velocity_share: T::of(0.2),
             step_limit: T::of(0.5),
             pair_directions: 12,
-            patience: 25,
+            patience: 8,
+            leaps: 8,
+            without: None,
         }
     }
 }

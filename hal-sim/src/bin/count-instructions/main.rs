@@ -15,6 +15,9 @@ mod identification;
 mod leg;
 mod leg_tick;
 mod motor;
+#[path = "../../../../examples/damped_oscillation/objective.rs"]
+mod objective;
+mod own_objective;
 mod peers;
 mod swarm;
 
@@ -30,7 +33,7 @@ fn main() -> ! {
             leg_tick::report(&model, &mut account)?;
             identification::report(&model, &mut account)
         });
-        let swarm = swarm::report();
+        let swarm = swarm::report().and_then(|()| own_objective::report());
         let kept = account.report();
         axis && search == Some(true) && swarm.is_some() && kept
     };

@@ -1,0 +1,246 @@
+//! What each part of the default beetle swarm is worth: one part left out at a time, the tables of `docs/bso.md`.
+//!
+//! `cargo run --release --example swarm_ablation -- [runs] [first seed]`
+//!
+//! Cells are iterations to f - f* <= 0.1, median/95 % of all runs, failed ones endless ("-", with the share that
+//! succeeds), at most 1,000. The seeds are those of no test and of no figure of `docs/paper.md`, and nothing was chosen
+//! with them.
+
+use std::sync::Mutex;
+use std::thread;
+
+use scarab::real::Real;
+use scarab::swarm::{
+    AdaptiveSettings, Bso, BsoSettings, Objective, Part, Random, Search, SwarmError, TestFunction,
+    TestProblem,
+};
+
+const BEETLES: usize = 20;
+const CAPACITY: usize = 30;
+const TOLERANCE: f64 = 0.1;
+const ITERATIONS: u32 = 1_000;
+const FIRST_SEED: u64 = 300_000_001;
+const THREADS: usize = 2;
+
+const PROBLEMS: [(TestFunction, usize); 9] = [
+    (TestFunction::SixHumpCamel, 2),
+    (TestFunction::Ackley, 2),
+    (TestFunction::Ackley, 30),
+    (TestFunction::ShiftedRotatedAckley, 30),
+    (TestFunction::ShiftedEllipsoid, 30),
+    (TestFunction::Rosenbrock, 10),
+    (TestFunction::Levy, 10),
+    (TestFunction::Rastrigin, 2),
+    (TestFunction::Rastrigin, 10),
+];
+
+fn main() -> Result<(), SwarmError> {
+    let mut arguments = std::env::args().skip(1).map(|argument| argument.parse::<u64>().ok());
+    let runs = arguments.next().flatten().unwrap_or(40).max(1);
+    let first_seed = arguments.next().flatten().unwrap_or(FIRST_SEED);
+    println!("{runs} runs from seed {first_seed}\n");
+    let names = PROBLEMS.map(|(function, dimension)| format!("{function:?} {dimension}"));
+    println!("| without | {} |\n|{}", names.join(" | "), " --- |".repeat(PROBLEMS.len() + 1));
+    let variants = variants::<f64>();
+    let lines = Mutex::new(vec![String::new(); variants.len()]);
+    let next = Mutex::new(0..variants.len());
+    thread::scope(|scope| {
+        for _ in 0..THREADS {
+            scope.spawn(|| {
+                loop {
+                    let Some(index) = next.lock().ok().and_then(|mut next| next.next()) else { break };
+                    let (name, settings) = &variants[index];
+                    if let (Ok(line), Ok(mut lines)) = (line(name, *settings, runs, first_seed), lines.lock())
+                    {
+                        lines[index] = line;
+                    }
+                }
+            });
+        }
+    });
+    for line in lines.into_inner().unwrap_or_default() {
+        println!("{line}");
+    }
+    println!("{}", line::<f32>("nothing, single precision", AdaptiveSettings::default(), runs, first_seed)?);
+    noise(runs, first_seed)?;
+    rugged(runs, first_seed)
+}
+
+/// The whole and everything that can be left out of it.
+fn variants<T: Real>() -> Vec<(&'static str, AdaptiveSettings<T>)> {
+    let whole = AdaptiveSettings::default();
+    let without = |part| AdaptiveSettings { without: Some(part), ..whole };
+    let still = AdaptiveSettings {
+        inertia_weight: T::zero(),
+        individual_learning: T::zero(),
+        global_learning: T::zero(),
+        ..whole
+    };
+    vec![
+        ("nothing", whole),
+        ("parabola: one whisker downhill", without(Part::Parabola)),
+        ("sharing: own direction only", without(Part::Sharing)),
+        ("learned metric", without(Part::Metric)),
+        ("convexity gate", without(Part::ConvexityGate)),
+        ("retreat", without(Part::Retreat)),
+        ("whisker adaptation: 5 % shorter each time", without(Part::WhiskerAdaptation)),
+        ("pair directions", AdaptiveSettings { pair_directions: 0, ..whole }),
+        ("gradient direction", without(Part::GradientDirection)),
+        ("trust adaptation: full trust", without(Part::TrustAdaptation)),
+        ("ranking: always the same readers", without(Part::Ranking)),
+        ("velocity", still),
+        ("leaps: scattered after 25 iterations", AdaptiveSettings { leaps: 0, patience: 25, ..whole }),
+        ("leaps and scattering", AdaptiveSettings { patience: u32::MAX, ..whole }),
+    ]
+}
+
+fn line<T: Real>(
+    name: &str,
+    settings: AdaptiveSettings<T>,
+    runs: u64,
+    first_seed: u64,
+) -> Result<String, SwarmError> {
+    let mut line = format!("| {name} |");
+    for (function, dimension) in PROBLEMS {
+        let problem = TestProblem::new(function, dimension);
+        let goal = T::of(problem.minimum() + TOLERANCE);
+        let mut reached = Vec::new();
+        for seed in first_seed..first_seed + runs {
+            let settings = BsoSettings::Adaptive(settings);
+            let mut swarm = Bso::<T, BEETLES, CAPACITY>::new(&problem, settings, seed)?;
+            if swarm.reach(&problem, goal, ITERATIONS) {
+                reached.push(swarm.iterations());
+            }
+        }
+        line += &format!(" {} |", cell(reached, runs));
+    }
+    Ok(line)
+}
+
+fn cell(mut reached: Vec<u32>, runs: u64) -> String {
+    reached.sort_unstable();
+    let quantile = |share: f64| {
+        let rank = (share * runs as f64).ceil() as usize;
+        reached.get(rank.max(1) - 1).map_or_else(|| "-".to_owned(), u32::to_string)
+    };
+    let share = 100.0 * reached.len() as f64 / runs as f64;
+    let success = if share < 100.0 { format!(" ({share:.1} %)") } else { String::new() };
+    format!("{}/{}{success}", quantile(0.5), quantile(0.95))
+}
+
+/// A test function whose every call is wrong by something else.
+struct Noisy {
+    problem: TestProblem,
+    size: f64,
+    random: std::cell::RefCell<Random>,
+}
+
+impl Objective<f64> for Noisy {
+    fn dimension(&self) -> usize {
+        Objective::<f64>::dimension(&self.problem)
+    }
+    fn bounds(&self, coordinate: usize) -> (f64, f64) {
+        self.problem.bounds(coordinate)
+    }
+    fn evaluate(&self, position: &[f64]) -> f64 {
+        // variance 1/3
+        let bell: f64 = self.random.borrow_mut().bell();
+        let value: f64 = self.problem.evaluate(position);
+        value + self.size * 3_f64.sqrt() * bell
+    }
+}
+
+/// How far the true value at the reported best is above the minimum after 150 iterations, median.
+fn noise(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
+    const SIZES: [f64; 4] = [0.0, 0.01, 0.1, 1.0];
+    println!("\n| standard deviation of the noise | 0 | 0.01 | 0.1 | 1 |\n| --- | --- | --- | --- | --- |");
+    for (function, dimension) in [
+        (TestFunction::Sphere, 30),
+        (TestFunction::Ackley, 30),
+        (TestFunction::ShiftedEllipsoid, 30),
+        (TestFunction::Rosenbrock, 10),
+    ] {
+        let problem = TestProblem::new(function, dimension);
+        let mut line = format!("| {function:?} {dimension} |");
+        for size in SIZES {
+            let mut values = Vec::new();
+            for seed in first_seed..first_seed + runs {
+                let noisy = Noisy { problem, size, random: Random::new(!seed).into() };
+                let settings = BsoSettings::default();
+                let mut swarm = Bso::<f64, BEETLES, CAPACITY>::new(&noisy, settings, seed)?;
+                swarm.reach(&noisy, f64::MIN, 150);
+                let found = swarm.best().map_or(f64::INFINITY, |best| problem.evaluate(best.position));
+                values.push(found - problem.minimum());
+            }
+            values.sort_by(f64::total_cmp);
+            line += &format!(" {:.1e} |", values[values.len() / 2]);
+        }
+        println!("{line}");
+    }
+    Ok(())
+}
+
+/// Rastrigin's function moved by up to half a unit, with coordinates multiplied, and reflected where `slanted`.
+struct Rugged {
+    problem: TestProblem,
+    scale: f64,
+    slanted: bool,
+}
+
+impl Objective<f64> for Rugged {
+    fn dimension(&self) -> usize {
+        Objective::<f64>::dimension(&self.problem)
+    }
+    fn bounds(&self, coordinate: usize) -> (f64, f64) {
+        self.problem.bounds(coordinate)
+    }
+    fn evaluate(&self, position: &[f64]) -> f64 {
+        let mut moved: Vec<f64> = position
+            .iter()
+            .enumerate()
+            .map(|(index, x)| self.scale * (x - ((37 * index + 5) % 11) as f64 / 11.0 + 0.5))
+            .collect();
+        if self.slanted {
+            // a reflection: y - 2 w (w.y) / (w.w)
+            let mirror: Vec<f64> = (0..moved.len()).map(|index| (index as f64 + 1.0).sin()).collect();
+            let along: f64 = mirror.iter().zip(&moved).map(|(w, y)| w * y).sum();
+            let length: f64 = mirror.iter().map(|w| w * w).sum();
+            for (y, w) in moved.iter_mut().zip(&mirror) {
+                *y -= 2.0 * w * along / length;
+            }
+        }
+        self.problem.evaluate(&moved)
+    }
+}
+
+/// How far the leaps reach.
+fn rugged(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
+    println!("\n| Rastrigin, shifted | iterations | evaluations, median |\n| --- | --- | --- |");
+    for (name, dimension, scale, slanted) in [
+        ("5 dimensions", 5, 1.0, false),
+        ("10 dimensions", 10, 1.0, false),
+        ("10, ripples twice as wide", 10, 0.5, false),
+        ("10, ripples half as wide", 10, 2.0, false),
+        ("10, ripples a third as wide", 10, 3.0, false),
+        ("10, rotated", 10, 1.0, true),
+        ("20 dimensions", 20, 1.0, false),
+        ("30 dimensions", 30, 1.0, false),
+    ] {
+        let problem = TestProblem::new(TestFunction::Rastrigin, dimension);
+        let rugged = Rugged { problem, scale, slanted };
+        let (mut reached, mut evaluations) = (Vec::new(), Vec::new());
+        for seed in first_seed..first_seed + runs {
+            let settings = BsoSettings::default();
+            let mut swarm = Bso::<f64, BEETLES, CAPACITY>::new(&rugged, settings, seed)?;
+            if swarm.reach(&rugged, TOLERANCE, ITERATIONS) {
+                reached.push(swarm.iterations());
+                evaluations.push(swarm.evaluations());
+            }
+        }
+        evaluations.sort_unstable();
+        let median = evaluations.get((runs as usize).div_ceil(2) - 1);
+        let median = median.map_or_else(|| "-".to_owned(), u32::to_string);
+        println!("| {name} | {} | {median} |", cell(reached, runs));
+    }
+    Ok(())
+}
