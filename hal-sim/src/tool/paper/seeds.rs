@@ -3,16 +3,18 @@
 //! Why a type: a table made of the seeds on which constants were tuned flatters them. A [`ReportSeed`] cannot be made of
 //! a number of one's choice, and [`CHOOSING`] holds whatever was used while the swarm was designed: the tests'
 //! first seeds (90,001 in `tests/swarm_tables.rs`), the examples' (1), and those of the experiments behind the
-//! constants (31, 55, 31337, 31338).
+//! constants (31, 55, 31337, 31338); [`LEAPS`] those behind the leaps' constants.
 
 use std::ops::Range;
 
 /// Seeds for experiments, choices and tests.
 pub const CHOOSING: Range<u64> = 0..1_000_000;
+/// Seeds with which the constants of the leaps were chosen.
+pub const LEAPS: Range<u64> = 40_000_001..40_000_101;
 /// Seeds of published tables and figures, one for each run.
 pub const REPORT: Range<u64> = 6_020_000_000..6_021_000_000;
 
-const _: () = assert!(CHOOSING.end <= REPORT.start);
+const _: () = assert!(CHOOSING.end <= REPORT.start && LEAPS.end <= REPORT.start);
 
 /// Seed of one run of a published table or figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
