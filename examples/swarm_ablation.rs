@@ -9,7 +9,7 @@
 use std::sync::Mutex;
 use std::thread;
 
-use scarab::real::Real;
+use scarab::real::{Real, sin_cos, sqrt};
 use scarab::swarm::{
     AdaptiveSettings, Bso, BsoSettings, Objective, Part, Random, Search, SwarmError, TestFunction,
     TestProblem,
@@ -47,8 +47,7 @@ fn main() -> Result<(), SwarmError> {
     thread::scope(|scope| {
         for _ in 0..THREADS {
             scope.spawn(|| {
-                loop {
-                    let Some(index) = next.lock().ok().and_then(|mut next| next.next()) else { break };
+                while let Some(index) = next.lock().ok().and_then(|mut next| next.next()) {
                     let (name, settings) = &variants[index];
                     if let (Ok(line), Ok(mut lines)) = (line(name, *settings, runs, first_seed), lines.lock())
                     {
@@ -146,7 +145,7 @@ impl Objective<f64> for Noisy {
         // variance 1/3
         let bell: f64 = self.random.borrow_mut().bell();
         let value: f64 = self.problem.evaluate(position);
-        value + self.size * 3_f64.sqrt() * bell
+        value + self.size * sqrt(3.0) * bell
     }
 }
 
@@ -202,7 +201,7 @@ impl Objective<f64> for Rugged {
             .collect();
         if self.slanted {
             // a reflection: y - 2 w (w.y) / (w.w)
-            let mirror: Vec<f64> = (0..moved.len()).map(|index| (index as f64 + 1.0).sin()).collect();
+            let mirror: Vec<f64> = (0..moved.len()).map(|index| sin_cos(index as f64 + 1.0).0).collect();
             let along: f64 = mirror.iter().zip(&moved).map(|(w, y)| w * y).sum();
             let length: f64 = mirror.iter().map(|w| w * w).sum();
             for (y, w) in moved.iter_mut().zip(&mirror) {
