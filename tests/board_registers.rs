@@ -40,10 +40,11 @@ impl Registers {
 /// All that the start writes, in its order.
 fn started() -> Registers {
     let mut registers = Registers::default();
-    for list in [&CACHES[..], &CLOCK_SECURITY, &CLOCKS, &DEBUG_FREEZE] {
+    registers.apply(&CLOCKS);
+    GATES_OFF.iter().for_each(|pin| registers.apply(&pin.writes()));
+    for list in [&CACHES[..], &CLOCK_SECURITY, &DEBUG_FREEZE] {
         registers.apply(list);
     }
-    GATES_OFF.iter().for_each(|pin| registers.apply(&pin.writes()));
     (0..2).for_each(|axis| registers.apply(&timers::bridge(axis)));
     registers.apply(&chopper::CHOPPER);
     encoders::ENCODERS.iter().for_each(|list| registers.apply(list));
@@ -92,7 +93,11 @@ fn both_bridges_switch_at_24_khz_with_119_ns_of_dead_time_and_no_output_on() {
         assert_eq!(registers.bits(base + 0x44, 15, 1), 0, "main output off");
         assert_eq!(registers.bits(base + 0x44, 14, 1), 0, "never switched on by hardware");
         assert_eq!(registers.bits(base + 0x44, 10, 2), 0b11, "idle levels are driven");
-        assert_eq!(registers.bits(base + 0x44, 12, 1), 0, "no break input: its pins are taken");
+        assert_eq!(
+            registers.bits(base + 0x44, 12, 1),
+            0,
+            "no break circuit: its pins are taken, so a failed crystal releases by the interrupt"
+        );
         for channel in 0..3 {
             let shift = 8 * (channel % 2);
             let mode = registers.bits(base + 0x18 + 4 * (channel / 2), shift, 8);

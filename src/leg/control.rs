@@ -113,6 +113,18 @@ impl<const N: usize> Control<N> {
         })
     }
 
+    /// Drive off, nothing read, nothing under way, as after the start: for joints that were not ticked meanwhile, or whose
+    /// zeros are others now. The model in use is kept.
+    pub fn restart(&mut self) {
+        self.servo.restart();
+        self.averager = LogAverager::EMPTY;
+        self.activity = Activity::Idle;
+        self.segment = None;
+        (self.motion, self.motion_tick) = (Motion::Hold([0.0; N]), 0);
+        self.tracked = None;
+        self.models.interrupt();
+    }
+
     /// One tick.
     pub fn tick(
         &mut self,

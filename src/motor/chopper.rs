@@ -14,6 +14,7 @@
 //! Source: the ramp of ODrive v0.5.6 (`dc_bus_overvoltage_ramp`). Cost: 4 operations.
 
 use super::SenseScale;
+use crate::hal::CURRENT_RATE_HZ;
 use crate::real::{clamp, is_finite};
 use crate::units::Volt;
 
@@ -47,9 +48,60 @@ impl Chopper {
     }
 }
 
+/// What a brake resistor that is not watched by a thermometer of its own may take: half a second of full duty, given back at a
+/// fiftieth of the time.
+///
+/// Why: a supply above `begin`, or a voltage that reads too high, keeps the resistor on without end, at over a kilowatt with
+/// 2 ohm. A stop of the leg takes some tens of milliseconds. Once used up the resistor stays off until half of it is there
+/// again (12 s); what the leg gives back meanwhile raises the bus until the axes release.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BrakeBudget {
+    /// Seconds of full duty.
+    left_s: f32,
+    used_up: bool,
+}
+
+impl BrakeBudget {
+    const WHOLE_S: f32 = 0.5;
+    const GIVEN_BACK: f32 = 0.02;
+    const TICK_S: f32 = 1.0 / CURRENT_RATE_HZ as f32;
+
+    /// All of it.
+    pub const FULL: Self = Self { left_s: Self::WHOLE_S, used_up: false };
+
+    /// Of a wanted duty what the resistor may do in a current tick.
+    #[must_use]
+    pub fn spend(&mut self, wanted: f32) -> f32 {
+        let duty = if self.used_up { 0.0 } else { wanted };
+        self.left_s = clamp(self.left_s + (Self::GIVEN_BACK - duty) * Self::TICK_S, 0.0, Self::WHOLE_S);
+        self.used_up = !(self.left_s > if self.used_up { 0.5 * Self::WHOLE_S } else { 0.0 });
+        duty
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Seconds until a duty that is always wanted is no longer given, at most ten.
+    fn time_on(duty: f32) -> f32 {
+        let mut budget = BrakeBudget::FULL;
+        let ticks = (0..10 * CURRENT_RATE_HZ).take_while(|_| budget.spend(duty) == duty).count();
+        ticks as f32 / CURRENT_RATE_HZ as f32
+    }
+
+    #[test]
+    fn a_resistor_that_is_always_wanted_is_off_after_half_a_second_and_for_twelve() {
+        assert!((time_on(0.95) - 0.54).abs() < 0.01, "{}", time_on(0.95));
+        assert!(time_on(0.01) >= 9.99, "a mean of two per cent is for ever");
+        let mut budget = BrakeBudget::FULL;
+        let given: f32 = (0..60 * CURRENT_RATE_HZ).map(|_| budget.spend(0.95)).sum();
+        // In a minute: the whole of it, and a fiftieth of the rest.
+        assert!((1.0..1.8).contains(&(given / CURRENT_RATE_HZ as f32)), "{given}");
+        let mut budget = BrakeBudget::FULL;
+        assert!((0..CURRENT_RATE_HZ).all(|_| budget.spend(f32::NAN).is_nan() || budget.used_up));
+        assert_eq!(budget.spend(0.5), 0.0, "what is no number uses it up");
+    }
 
     #[test]
     fn the_resistor_is_off_below_the_ramp_and_never_on_all_the_time() {

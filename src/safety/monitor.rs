@@ -131,6 +131,11 @@ impl<const N: usize> Monitor<N> {
         &self.limits
     }
 
+    /// Drive off and no reading rejected, as after the start.
+    pub const fn restart(&mut self) {
+        (self.state, self.glitches) = (DriveState::NotReadyToSwitchOn, [0; N]);
+    }
+
     /// Decides one tick.
     #[must_use]
     pub fn decide(&mut self, observation: &Observation<N>, request: &Request<N>) -> Decision<N> {

@@ -32,6 +32,11 @@ impl StepGate {
         Self { largest_step, last: None, rejected: 0 }
     }
 
+    /// Nothing was read yet.
+    pub const fn restart(&mut self) {
+        (self.last, self.rejected) = (None, 0);
+    }
+
     /// Judges one reading; the first is good.
     #[must_use]
     pub fn judge(&mut self, counts: i32) -> Reading {

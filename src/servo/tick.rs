@@ -117,6 +117,14 @@ impl<const N: usize> Servo<N> {
         })
     }
 
+    /// Drive off, nothing read yet: for joints whose counts mean something else from now on.
+    pub fn restart(&mut self) {
+        self.gates.iter_mut().for_each(StepGate::restart);
+        self.observers = [Observer::default(); N];
+        self.controllers.iter_mut().for_each(Controller::reset);
+        self.monitor.restart();
+    }
+
     /// Where the drive stands.
     #[must_use]
     pub fn state(&self) -> DriveState {

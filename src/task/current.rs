@@ -18,7 +18,7 @@ use super::statistics;
 use crate::board::odrive_v3_6::settings::{CLOCK_HZ, analog, drives};
 use crate::board::odrive_v3_6::{brake, bridge, contacts, converter, encoder, interrupts};
 use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, JointSample};
-use crate::motor::{Axis, AxisRequest, CalibrationStep, Calibrator, Chopper};
+use crate::motor::{Axis, AxisRequest, BrakeBudget, CalibrationStep, Calibrator, Chopper};
 use crate::safety::{ServoWatch, TickState, TickWatch};
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::Volt;
@@ -27,6 +27,9 @@ use crate::units::Volt;
 const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
 /// Processor cycles between two ticks of one axis.
 const CYCLES: u32 = CLOCK_HZ / CURRENT_RATE_HZ;
+
+/// So long after its last tick an axis is seen to have stopped, by the ticks of the other.
+const LATE_CYCLES: u32 = 3 * CYCLES;
 
 /// A brake resistor is connected: said when the image is built.
 const HAS_BRAKE_RESISTOR: bool = option_env!("SCARAB_BRAKE_RESISTOR").is_some();
@@ -59,6 +62,7 @@ pub struct CurrentLoops {
     servo: ServoWatch,
     /// Of the brake resistor, if there is one.
     chopper: Option<Chopper>,
+    budget: BrakeBudget,
     volt_per_code: Volt,
 }
 
@@ -85,7 +89,7 @@ impl CurrentLoops {
         let [begin, full] = drives::chopper(divider);
         let chopper = if HAS_BRAKE_RESISTOR { Chopper::new(begin, full) } else { None };
         let volt_per_code = analog::sense(divider).volt_per_code;
-        Self { axes, servo: ServoWatch::default(), chopper, volt_per_code }
+        Self { axes, servo: ServoWatch::default(), chopper, budget: BrakeBudget::FULL, volt_per_code }
     }
 
     /// One tick of one axis; `complete` if both of its shunts were converted.
@@ -96,8 +100,10 @@ impl CurrentLoops {
         if axis == 0
             && let Some(chopper) = &self.chopper
         {
-            brake::set(chopper.duty(self.volt_per_code * f32::from(bus)));
+            let wanted = chopper.duty(self.volt_per_code * f32::from(bus));
+            brake::set(self.budget.spend(wanted));
         }
+        self.look_at_the_others(axis, begun);
         let Some(this) = self.axes.get_mut(axis) else { return };
         this.watch(begun, complete);
         let sample = AxisSample {
@@ -127,8 +133,20 @@ impl CurrentLoops {
         now.set(bus.into());
         low.lower(bus.into());
         high.raise(bus.into());
-        statistics::CURRENT_TICKS.add();
+        if let Some(ticks) = statistics::CURRENT_TICKS.get(axis) {
+            ticks.add();
+        }
         statistics::CURRENT_WORST.raise(DWT::cycle_count().wrapping_sub(begun));
+    }
+
+    /// An axis whose ticks no longer come cannot say so itself, and its bridge does what it was told last.
+    #[inline(always)]
+    fn look_at_the_others(&self, axis: usize, now: u32) {
+        for (other, that) in self.axes.iter().enumerate() {
+            if other != axis && that.last.is_some_and(|last| now.wrapping_sub(last) > LATE_CYCLES) {
+                interlock::raise(Cause::CurrentTicks);
+            }
+        }
     }
 
     fn call_servo(&mut self) {

@@ -69,7 +69,8 @@ struct State {
 #[embassy_executor::task]
 pub async fn watch() -> ! {
     let mut ticker = Ticker::every(Duration::from_millis(4));
-    let seen = || [&statistics::CURRENT_TICKS, &statistics::SERVO_TICKS, &ROUNDS].map(Count::get);
+    let [first, second] = &statistics::CURRENT_TICKS;
+    let seen = || [first, second, &statistics::SERVO_TICKS, &ROUNDS].map(Count::get);
     let mut before = seen();
     loop {
         ticker.next().await;

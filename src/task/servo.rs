@@ -70,6 +70,8 @@ pub struct ServoLoop {
     told: Producer<'static, Told>,
     /// The newest of each joint.
     sample: [JointSample; JOINTS],
+    /// It was ticked in the tick before.
+    ticking: bool,
     /// What was told of last.
     state: Option<DriveState>,
     /// The same.
@@ -103,6 +105,7 @@ impl ServoLoop {
             drive,
             told,
             sample: [JointSample::default(); JOINTS],
+            ticking: false,
             state: None,
             activity: Activity::Idle,
             tick: 0,
@@ -121,7 +124,16 @@ impl ServoLoop {
         }
         if !has_begun() {
             release();
+            // What is asked meanwhile is asked of a leg that has no zeros.
+            let _ = self.requests.dequeue();
+            self.ticking = false;
             return;
+        }
+        if !self.ticking {
+            // Whatever state it was left in, the drive begins off.
+            self.ticking = true;
+            self.control.restart();
+            self.state = None;
         }
         self.tick = self.tick.wrapping_add(1);
         if let Some(finding) = self.findings.dequeue() {

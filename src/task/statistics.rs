@@ -58,8 +58,8 @@ impl Count {
 pub static CURRENT_WORST: Count = Count::of(0);
 /// Current ticks that came late.
 pub static CURRENT_MISSED: Count = Count::of(0);
-/// Current ticks of both axes.
-pub static CURRENT_TICKS: Count = Count::of(0);
+/// Current ticks of each axis.
+pub static CURRENT_TICKS: [Count; 2] = [const { Count::of(0) }; 2];
 /// Longest servo tick, processor cycles, current ticks in it included.
 pub static SERVO_WORST: Count = Count::of(0);
 /// Servo ticks that came late.

@@ -4,11 +4,14 @@
 //! handler. Switching on is the current loop's alone.
 
 use super::registers::store;
-use super::settings::timers::{BASES, BDTR, CCR1, MOE, bridge, compare};
+use super::settings::timers::{BASES, BDTR, CCR1, MOE, TOP, bridge, compare};
 use crate::hal::AxisCommand;
 
 /// Register with the main output as the start wrote it: output off.
 const RELEASED: u32 = bridge(0)[0].value;
+
+/// All three outputs half of the time.
+const NO_VOLTAGE: u32 = TOP as u32 / 2;
 
 /// Both bridges off, now.
 #[inline]
@@ -29,5 +32,10 @@ pub fn set(axis: usize, command: &AxisCommand) {
         store(base + BDTR, RELEASED | MOE);
     } else {
         store(base + BDTR, RELEASED);
+        // Compare values are taken over once a period, the main output at once: the first period after the bridge is let
+        // through would have the duties of the last one before it was released. Half and half is no voltage.
+        for channel in [CCR1, CCR1 + 4, CCR1 + 8] {
+            store(base + channel, NO_VOLTAGE);
+        }
     }
 }

@@ -10,7 +10,9 @@ const ADC3: u32 = BASES[2];
 /// Which axes' conversions have ended since the last call, for each whether both shunts' did; clears what it saw.
 #[inline(always)]
 pub fn finished() -> [Option<bool>; 2] {
-    let (other, status) = (load(ADC2 + SR), load(ADC3 + SR));
+    // The one that is waited for first: a conversion that ends between the two loads is then seen as a whole at the next call.
+    let status = load(ADC3 + SR);
+    let other = load(ADC2 + SR);
     let seen = status & (JEOC | EOC);
     store(ADC3 + SR, cleared(seen));
     store(ADC2 + SR, cleared(seen));

@@ -16,7 +16,7 @@ extern "C" fn scarab_release() -> u32 {
     DWT::cycle_count()
 }
 
-/// The crystal failed: the hardware has switched both bridges' outputs off and runs on its own oscillator.
+/// The crystal failed: the processor runs on its own oscillator, and so do the bridges' timers until they are released here.
 #[exception]
 unsafe fn NonMaskableInt() {
     bridge::release_all();

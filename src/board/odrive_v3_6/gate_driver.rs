@@ -66,8 +66,12 @@ impl GateDrivers {
         [self.holds(0), self.holds(1)]
     }
 
-    /// Whether a driver still holds what it was told.
+    /// Whether a driver still holds what it was told; one disturbed frame is read again.
     pub fn holds(&mut self, axis: usize) -> bool {
+        self.reads_back(axis) || self.reads_back(axis)
+    }
+
+    fn reads_back(&mut self, axis: usize) -> bool {
         let first = self.register(axis, Register::Control1);
         let second = self.register(axis, Register::Control2);
         first == Some(CONTROL_1) && second == Some(CONTROL_2)

@@ -40,18 +40,19 @@ const PATIENCE: u32 = 100_000;
 /// Starts everything but the interrupts of the current loops; to be called once, first of all.
 pub fn start() -> Board {
     stack::prepare();
+    apply(&CLOCKS);
+    for pin in &pins::GATES_OFF {
+        apply(&pin.writes());
+    }
     watchdog::start();
     interrupts::set_levels();
     let peripherals = embassy_stm32::init(configuration());
-    for list in [&CACHES[..], &CLOCK_SECURITY, &CLOCKS, &DEBUG_FREEZE] {
+    for list in [&CACHES[..], &CLOCK_SECURITY, &DEBUG_FREEZE] {
         apply(list);
     }
     let identity = Identity::read();
     let crash = crash::take();
 
-    for pin in &pins::GATES_OFF {
-        apply(&pin.writes());
-    }
     for axis in 0..2 {
         apply(&timers::bridge(axis));
     }

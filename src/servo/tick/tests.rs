@@ -287,6 +287,21 @@ fn a_single_wild_reading_does_not_move_the_torque() {
 }
 
 #[test]
+fn a_servo_that_is_begun_anew_is_off_and_takes_counts_from_another_zero_for_good_ones() {
+    let mut bench = Bench::enabled(JOINTS, Plant::KNEE);
+    let here = bench.pose();
+    bench.tick(MotionState::at_rest(here), None::<&NoModel>, None);
+    bench.servo.restart();
+    bench.plants.iter_mut().for_each(|plant| plant.angle += 1.0);
+    for _ in 0..100 {
+        let here = bench.pose();
+        let output = bench.tick(MotionState::at_rest(here), None::<&NoModel>, None);
+        assert!(!output.drive().enabled && output.decision.fault.is_none(), "{output:?}");
+    }
+    assert_eq!(bench.servo.state(), DriveState::SwitchOnDisabled);
+}
+
+#[test]
 fn the_same_ticks_give_the_same_bits() {
     let run = || {
         let mut bench = Bench::enabled(JOINTS, Plant { gravity: 20.0, ..Plant::KNEE });

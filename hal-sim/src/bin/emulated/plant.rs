@@ -98,7 +98,7 @@ impl Plant {
         if let Some(samples) = self.ahead.get(place as usize) {
             let begun = clock::instructions();
             self.axes.tick(samples, [servo::target(0), servo::target(1)]);
-            statistics::CURRENT_TICKS.add();
+            statistics::CURRENT_TICKS.iter().for_each(statistics::Count::add);
             statistics::CURRENT_WORST.raise(clock::instructions().wrapping_sub(begun));
         }
     }

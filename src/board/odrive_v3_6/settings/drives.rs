@@ -13,7 +13,7 @@ pub const DEAD_TIME_BAND: Ampere = Ampere(2.0);
 /// Length of the current vector at which the bridges are released: what the shunts can tell, less their zeros.
 pub const OVERCURRENT: Ampere = Ampere(61.0);
 /// Within which the bridges may switch, on a board of 56 V and on one of 24 V.
-pub const BUS: [[Volt; 2]; 2] = [[Volt(20.0), Volt(58.0)], [Volt(12.0), Volt(26.0)]];
+pub const BUS: [[Volt; 2]; 2] = [[Volt(20.0), Volt(58.0)], [Volt(12.0), Volt(25.7)]];
 /// Where a brake resistor begins to conduct, and where it does all the time it may; the same boards.
 pub const CHOPPER: [[Volt; 2]; 2] = [[Volt(50.0), Volt(54.0)], [Volt(25.0), Volt(25.5)]];
 /// Faster than the joint's limit by this a counter is not believed.

@@ -82,7 +82,8 @@ pub const DEBUG_FREEZE: [Write; 2] = [
     Write::bits("DBGMCU_APB2_FZ", DEBUG + 0x0C, 0b11, 0b11),
 ];
 
-/// Clock security: a crystal that fails stops TIM1 and TIM8 in hardware and raises the non-maskable interrupt (RCC_CR CSSON).
+/// Clock security: a crystal that fails raises the non-maskable interrupt (RCC_CR CSSON), which releases the bridges; the timers run
+/// on, three times slower. Their break circuit, which would do it in hardware, needs BKE, and its pins are taken.
 pub const CLOCK_SECURITY: [Write; 1] = [Write::bits("RCC_CR", RCC, 1 << 19, 1 << 19)];
 
 /// Clears the interrupt of clock security (RCC_CIR CSSC).
