@@ -1,7 +1,7 @@
 //! Large values built where they stay.
 //!
 //! Why: a value that is returned lives on the stack until it has been moved to its place, often more than once on the way. An
-//! identification has 77 KB, the microcontroller's stack 40: it has to be written field by field into a static.
+//! identification has 77 KB, and a stack has room for other things.
 //!
 //! [`fill`] writes every field of a struct into memory that holds nothing yet, and does not compile when one is missing; a field
 //! that is large itself is handed its own place. The unsafe code that this takes is written in this file only.
