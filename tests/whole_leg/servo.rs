@@ -60,3 +60,21 @@ fn feedback_alone_follows_a_sine_of_four_hertz_by_more_than_half_its_power() {
         assert!(ratio > 0.707 && ratio < 1.3, "joint {joint}: {ratio}");
     }
 }
+
+/// A board stops ticking when a place is lost, in whatever state the drive is, and begins again with other zeros.
+#[test]
+fn control_that_is_begun_anew_in_the_middle_of_a_motion_is_off_wherever_the_joints_are() {
+    let mut pair = enabled(&default_leg(), 1);
+    tick(&mut pair, Some(ControlRequest::Identify));
+    assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(IdentifyPhase::Excite)));
+    let (mut control, mut sample) = (pair.leg.control().clone(), pair.sample);
+    assert!(control.tick(&sample, None, context().gravity).servo.drive().enabled);
+    control.restart();
+    sample.joints.iter_mut().for_each(|joint| joint.encoder_counts = 0);
+    for _ in 0..100 {
+        let output = control.tick(&sample, None, context().gravity);
+        assert!(!output.servo.drive().enabled && output.servo.decision.fault.is_none(), "{output:?}");
+        assert_eq!(control.activity(), Activity::Idle);
+    }
+    assert_eq!(control.state(), DriveState::SwitchOnDisabled);
+}
