@@ -1,6 +1,6 @@
 //! The constant that an image holds of a leg, and the size of an image.
 
-use hal_sim::tool::board::{CHOPPER, axis_configuration, calibration_settings};
+use hal_sim::tool::board::{BRAKE, axis_configuration, calibration_settings};
 use hal_sim::tool::image::leg_source::{describe, source};
 use hal_sim::tool::image::size::{ImageSize, Section};
 use hal_sim::tool::leg_file::{DEFAULT_LEG, LegFile};
@@ -52,7 +52,7 @@ fn the_board_s_axes_are_those_of_the_simulated_drive() {
         axis.check().expect("sensible");
         assert_eq!(drives::CALIBRATION, calibration_settings(&axis, motor));
     }
-    assert_eq!(drives::chopper(19.0), CHOPPER);
+    assert_eq!(drives::chopper(19.0), BRAKE);
     // On a board of 24 V too.
     drives::axes(&description, 11.0).iter().for_each(|axis| axis.check().expect("sensible"));
     assert!(scarab::motor::Chopper::new(drives::chopper(11.0)[0], drives::chopper(11.0)[1]).is_some());

@@ -14,12 +14,14 @@ pub mod words;
 
 use core::f64::consts::TAU;
 
+use scarab::board::odrive_v3_6::settings::drives;
 use scarab::hal::{AxisCommand, DriveCommand, JointSample, LegDrives, Sample};
+use scarab::leg::MotorDescription;
 use scarab::motor::{
-    Axis, AxisConfiguration, AxisFault, AxisRequest, BridgeTiming, Calibration, CalibrationSettings,
-    CalibrationStep, Calibrator, Chopper, DeadTime, Direction, SenseScale, Sine,
+    Axis, AxisConfiguration, AxisFault, AxisRequest, Calibration, CalibrationSettings, CalibrationStep,
+    Calibrator, Chopper, SenseScale,
 };
-use scarab::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
+use scarab::units::{Ampere, RadianPerSecond, Volt, Weber};
 
 use super::error::ToolError;
 use super::leg_file::{JointFile, LegFile, MotorFile};
@@ -28,25 +30,18 @@ use crate::drive::stand::{Load, Stand};
 use crate::world::World;
 use crate::world::periods::PERIODS_PER_TICK;
 
-/// Of the current loops.
-pub const BANDWIDTH: Hertz = Hertz(1000.0);
-/// Within it the dead time is given back smoothly: the ripple at half duty is about as large, and the sign of a smaller current is not
-/// known.
-const DEAD_TIME_BAND: Ampere = Ampere(2.0);
-/// Shunts are trusted up to here: 3,723 codes less 150 of zero.
-const OVERCURRENT: Ampere = Ampere(61.0);
-/// Within which the bridges may switch.
-pub const BUS: [Volt; 2] = [Volt(20.0), Volt(58.0)];
-/// Where the brake resistor begins to conduct, and where it does all the time it may.
-pub const CHOPPER: [Volt; 2] = [Volt(50.0), Volt(54.0)];
-/// Faster than the joint's limit by this the counter is not believed.
-const SPEED_MARGIN: f64 = 2.0;
+/// Of the bus voltage, on the board of 56 V.
+const DIVIDER: f32 = 19.0;
+/// Within which its bridges may switch.
+pub const BUS: [Volt; 2] = drives::bus(DIVIDER);
+/// Where its brake resistor conducts.
+pub const BRAKE: [Volt; 2] = drives::chopper(DIVIDER);
 
 /// Most that a motor is calibrated with on its stand.
-const CALIBRATION_CURRENT_A: f64 = 15.0;
+const CALIBRATION_CURRENT_A: f64 = drives::CALIBRATION.current.0 as f64;
 /// Voltage vectors of a calibration: what is enough for motors of the default leg, and less than half of the lowest bus.
 const CALIBRATION_VOLTAGE_V: [f64; 2] = [3.0, 9.5];
-const CALIBRATION_TURNS_PER_S: f32 = 10.0;
+const CALIBRATION_TURNS_PER_S: f32 = drives::CALIBRATION.turns_per_s;
 /// Half of a wave with which the firmware measures inductances, s, and the share of the current that it aims at.
 const HALF_WAVE_S: f64 = 2.0 / 24_000.0;
 const WAVE_SHARE: f64 = 0.3;
@@ -57,28 +52,16 @@ const REST_PERIODS: u32 = 12_000;
 /// A calibration takes some seconds.
 const LONGEST_CALIBRATION: u32 = 24_000 * 60;
 
-/// The configuration of a joint's axis, as a leg file states it.
+/// The configuration of a joint's axis, as the board's settings make it of what a leg file states.
 pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfiguration {
-    let speed = SPEED_MARGIN * joint.speed_limit_deg_s.to_radians() * joint.encoder.ratio;
-    AxisConfiguration {
-        sense: SenseScale::ODRIVE_3_6,
-        timing: BridgeTiming::ODRIVE_3_6,
-        dead_time: DeadTime::Compensated { band: DEAD_TIME_BAND },
+    let motor = MotorDescription {
         pole_pairs: motor.pole_pairs as u8,
         flux: Weber(motor.flux(joint) as f32),
         counts_per_turn: joint.encoder.counts,
-        index: true,
-        counter: Direction::Up,
-        // A mirrored drive is the servo's affair (`servo::JointScale`).
-        flexion: Direction::Up,
-        bandwidth: BANDWIDTH,
-        feedforward: true,
-        sine: Sine::default(),
-        current_limit: Ampere(joint.current_limit() as f32),
-        overcurrent: OVERCURRENT,
-        bus: BUS,
-        greatest_speed: RadianPerSecond(speed as f32),
-    }
+        ratio: joint.encoder.ratio as f32,
+    };
+    let speed = RadianPerSecond(joint.speed_limit_deg_s.to_radians() as f32);
+    drives::axis(&motor, Ampere(joint.current_limit() as f32), speed, DIVIDER)
 }
 
 /// How a motor is calibrated on its stand: no more than its axis' current and what its resistance lets through at the voltage
@@ -169,7 +152,7 @@ impl<const N: usize> Board<N> {
             axis.set_counts(counts);
             axes.push(axis);
         }
-        let chopper = Chopper::new(CHOPPER[0], CHOPPER[1])
+        let chopper = Chopper::new(BRAKE[0], BRAKE[1])
             .ok_or_else(|| ToolError::input("the firmware refuses the chopper's voltages"))?;
         let axes = axes.try_into().map_err(|_| ToolError::input("a motor for every joint is needed"))?;
         // The first period was that of the reference; the rest of its servo tick passes released.

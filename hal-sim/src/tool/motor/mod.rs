@@ -21,7 +21,9 @@ use scarab::units::{Ampere, Volt};
 use serde::Serialize;
 
 use super::board::words;
-use super::board::{BANDWIDTH, CHOPPER, axis_configuration, calibration_settings, commission};
+use scarab::board::odrive_v3_6::settings::drives::BANDWIDTH;
+
+use super::board::{BRAKE, axis_configuration, calibration_settings, commission};
 use super::error::ToolError;
 use super::leg_file::{LegFile, MotorFile};
 use super::report::SCHEMA;
@@ -125,7 +127,7 @@ impl Rig {
     /// With the board's brake chopper.
     #[must_use]
     pub fn with_chopper(mut self) -> Self {
-        self.chopper = Chopper::new(CHOPPER[0], CHOPPER[1]);
+        self.chopper = Chopper::new(BRAKE[0], BRAKE[1]);
         self
     }
 

@@ -2,7 +2,7 @@
 //! another machine (docs/board.md). What can be measured is measured by the calibration, and refused where it contradicts.
 
 use super::analog;
-use crate::leg::LegDescription;
+use crate::leg::{LegDescription, MotorDescription};
 use crate::motor::{AxisConfiguration, BridgeTiming, CalibrationSettings, DeadTime, Direction, Sine};
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt};
 
@@ -33,29 +33,43 @@ pub const fn chopper(divider: f32) -> [Volt; 2] {
     CHOPPER[is_low(divider)]
 }
 
-/// The configuration of every axis on a board with this divider of the bus voltage.
+/// Within which the bridges may switch on a board with this divider of the bus voltage.
+#[must_use]
+pub const fn bus(divider: f32) -> [Volt; 2] {
+    BUS[is_low(divider)]
+}
+
+/// The configuration of an axis that drives this motor, up to a joint's current and speed, on a board with this divider of the bus
+/// voltage. A mirrored drive is the servo's affair (`servo::JointScale`).
+#[must_use]
+pub fn axis(
+    motor: &MotorDescription,
+    current: Ampere,
+    speed: RadianPerSecond,
+    divider: f32,
+) -> AxisConfiguration {
+    AxisConfiguration {
+        sense: analog::sense(divider),
+        timing: BridgeTiming::ODRIVE_3_6,
+        dead_time: DeadTime::Compensated { band: DEAD_TIME_BAND },
+        pole_pairs: motor.pole_pairs,
+        flux: motor.flux,
+        counts_per_turn: motor.counts_per_turn,
+        index: true,
+        counter: Direction::Up,
+        flexion: Direction::Up,
+        bandwidth: BANDWIDTH,
+        feedforward: true,
+        sine: Sine::default(),
+        current_limit: current,
+        overcurrent: OVERCURRENT,
+        bus: bus(divider),
+        greatest_speed: RadianPerSecond(SPEED_MARGIN * motor.ratio * speed.0),
+    }
+}
+
+/// The configuration of every axis of a leg.
 #[must_use]
 pub fn axes<const N: usize>(leg: &LegDescription<N>, divider: f32) -> [AxisConfiguration; N] {
-    let sense = analog::sense(divider);
-    leg.joints.map(|joint| {
-        let motor = joint.motor;
-        AxisConfiguration {
-            sense,
-            timing: BridgeTiming::ODRIVE_3_6,
-            dead_time: DeadTime::Compensated { band: DEAD_TIME_BAND },
-            pole_pairs: motor.pole_pairs,
-            flux: motor.flux,
-            counts_per_turn: motor.counts_per_turn,
-            index: true,
-            counter: Direction::Up,
-            flexion: Direction::Up,
-            bandwidth: BANDWIDTH,
-            feedforward: true,
-            sine: Sine::default(),
-            current_limit: joint.current,
-            overcurrent: OVERCURRENT,
-            bus: BUS[is_low(divider)],
-            greatest_speed: RadianPerSecond(SPEED_MARGIN * motor.ratio * joint.speed.0),
-        }
-    })
+    leg.joints.map(|joint| axis(&joint.motor, joint.current, joint.speed, divider))
 }
