@@ -48,6 +48,8 @@ pub struct JointSample {
     pub encoder_counts: i32,
     /// Measured motor current that makes torque (quadrature axis).
     pub current: Ampere,
+    /// A reading since the last sample was not believed; the position is that of the others.
+    pub doubtful: bool,
 }
 
 /// What all sensors of a leg say at one servo tick, proximal joint first.

@@ -230,6 +230,7 @@ impl<const N: usize> World<N> {
             self.newest.joints[joint] = JointSample {
                 encoder_counts: self.encoders[joint].read(self.mounting * angle),
                 current: Ampere(current as f32),
+                doubtful: false,
             };
         }
     }

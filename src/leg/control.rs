@@ -8,7 +8,7 @@ use super::succession::Succession;
 use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
-use crate::safety::{DriveState, Limits, PowerRequest};
+use crate::safety::{DriveState, Fault, Limits, PowerRequest};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
@@ -338,6 +338,11 @@ impl<const N: usize> Control<N> {
     #[must_use]
     pub fn state(&self) -> DriveState {
         self.servo.state()
+    }
+
+    /// A fault that the board saw and the servo has to react to, from the next tick on.
+    pub fn report(&mut self, fault: Fault) {
+        self.servo.report(fault);
     }
 
     /// What each joint may do.

@@ -115,6 +115,11 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         adopted
     }
 
+    /// A fault that the board saw, see [`Control::report`].
+    pub fn report(&mut self, fault: Fault) {
+        self.control.report(fault);
+    }
+
     /// The half that moves.
     #[must_use]
     pub fn control(&self) -> &Control<N> {

@@ -12,7 +12,8 @@
 //!
 //! **Borders.** A target that is not a number, a voltage that is none, a current beyond the bound release the bridge in the
 //! same tick. A saturated amplifier, a bus voltage out of range and an encoder step that no motor makes have one tick of
-//! patience, in which the duties of the tick before are kept; the second in a row releases. Released stays released until
+//! patience, in which the duties of the tick before are kept; the second in a row releases. A single step that was not believed is
+//! told with the joint's sample, and three of them in 10 ms are the servo's fault (`safety::Monitor`). Released stays released until
 //! [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases at once, whether or
 //! not anything switches: counts were lost, and with them the angle.
 //!
@@ -82,6 +83,8 @@ pub struct Axis {
     window: Window,
     last: AxisCommand,
     doubtful: bool,
+    /// A count since the last joint sample was not believed.
+    disbelieved: bool,
     fault: Option<AxisFault>,
 }
 
@@ -109,6 +112,7 @@ impl Axis {
             window: Window::EMPTY,
             last: AxisCommand::RELEASED,
             doubtful: false,
+            disbelieved: false,
             fault: None,
         })
     }
@@ -166,6 +170,7 @@ impl Axis {
             None
         };
         if let Some(fault) = doubt {
+            self.disbelieved |= !plausible;
             if self.doubtful {
                 return Err(fault);
             }
@@ -220,9 +225,10 @@ impl Axis {
         let sample = self.window.mean().unwrap_or(JointSample {
             encoder_counts: self.counts,
             current: self.measured.q * self.constants.current_sign,
+            doubtful: false,
         });
         self.window = Window::EMPTY;
-        sample
+        JointSample { doubtful: core::mem::take(&mut self.disbelieved), ..sample }
     }
 
     /// Currents of the last tick, in the electrical sense.
@@ -281,6 +287,7 @@ impl Window {
         (self.ticks > 0).then(|| JointSample {
             encoder_counts: self.first.wrapping_add(self.counts.div_euclid(self.ticks)),
             current: Ampere(self.current_a / self.ticks as f32),
+            doubtful: false,
         })
     }
 }

@@ -103,7 +103,7 @@ faults! {
     /// The emergency stop's contact is open (9000: external error).
     EmergencyStop = 0x9000, "X1", "emergency_stop", Off, "the emergency stop was pressed";
     /// Current ticks were missed three times, at once or with none in time between.
-    CurrentTicks = 0xFF05, "K1", "current_ticks", Off, "its current ticks came late";
+    CurrentTicks = 0xFF05, "K1", "current_ticks", Damp, "its current ticks came late";
     /// The servo did not answer three times in a row.
     ServoTicks = 0xFF06, "K1", "servo_ticks", Off, "the servo did not answer";
     /// The watchdog bit (6010: software reset).

@@ -9,7 +9,7 @@
 //! | seen by | reason | after |
 //! | --- | --- | --- |
 //! | [`TickWatch`] | emergency stop, gate driver's fault, a shunt without conversion | the tick itself |
-//! | [`TickWatch`] | current ticks missed | three, at once or with no tick in time between |
+//! | [`TickWatch`] | current ticks missed, at once or with none in time between | three: the servo is told and damps; 24 (1 ms): Off |
 //! | [`ServoWatch`] | a servo that did not tick since it was last called | three calls in a row |
 //!
 //! Cost: some 12 instructions per axis and tick.
@@ -18,6 +18,8 @@ use super::fault::FaultCode;
 
 /// Missed ticks, or unanswered ones of the servo, in a row that are too many.
 const PATIENCE: u8 = 3;
+/// Missed ticks after which there is no damping any more either: a millisecond.
+const HOPELESS: u8 = 24;
 
 /// Why the drive is kept off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +39,7 @@ pub enum Cause {
     Temperature,
     /// A thermistor is open or shorted.
     Thermistor,
-    /// Current ticks were missed three times, at once or with none in time between.
+    /// Current ticks went on being missed: 24 with none in time between.
     CurrentTicks,
     /// The servo did not answer three times in a row.
     ServoTicks,
@@ -146,15 +148,17 @@ pub struct TickWatch {
 }
 
 impl TickWatch {
-    /// Bits of what forbids to enable from this tick on.
+    /// Bits of what forbids to enable from this tick on, and whether so many ticks are missing now that the servo has to damp.
     #[inline(always)]
-    pub fn look(&mut self, now: &TickState) -> u32 {
+    pub fn look(&mut self, now: &TickState) -> (u32, bool) {
+        let before = self.missed;
         self.missed = if now.missed > 0 { self.missed.saturating_add(now.missed) } else { 0 };
         let bit = |holds: bool, cause: Cause| if holds { cause.bit() } else { 0 };
-        bit(now.emergency_stop, Cause::EmergencyStop)
+        let forbids = bit(now.emergency_stop, Cause::EmergencyStop)
             | bit(now.gate_fault, Cause::GateFault)
             | bit(!now.complete, Cause::Conversion)
-            | bit(self.missed >= PATIENCE, Cause::CurrentTicks)
+            | bit(self.missed >= HOPELESS, Cause::CurrentTicks);
+        (forbids, before < PATIENCE && self.missed >= PATIENCE)
     }
 }
 
@@ -191,7 +195,7 @@ mod tests {
         ];
         for (state, cause) in cases {
             let mut watch = TickWatch::default();
-            assert_eq!((watch.look(&GOOD), watch.look(&state)), (0, cause.bit()));
+            assert_eq!((watch.look(&GOOD), watch.look(&state)), ((0, false), (cause.bit(), false)));
         }
     }
 
@@ -200,9 +204,16 @@ mod tests {
         let mut watch = TickWatch::default();
         let late = TickState { missed: 1, ..GOOD };
         let seen = [late, late, GOOD, late, late, late].map(|state| watch.look(&state));
-        assert_eq!(seen, [0, 0, 0, 0, 0, Cause::CurrentTicks.bit()]);
-        let gap = TickState { missed: 3, ..GOOD };
-        assert_eq!(TickWatch::default().look(&gap), Cause::CurrentTicks.bit());
+        assert_eq!(seen.map(|(_, damp)| damp), [false, false, false, false, false, true]);
+        assert!(seen.iter().all(|(forbids, _)| *forbids == 0));
+        let gap = |missed| TickWatch::default().look(&TickState { missed, ..GOOD });
+        assert_eq!([gap(2), gap(3)], [(0, false), (0, true)]);
+        // Told once, and given up where it goes on.
+        assert_eq!(
+            [1, 17, 1].map(|missed| watch.look(&TickState { missed, ..GOOD })).map(|(_, damp)| damp),
+            [false; 3]
+        );
+        assert_eq!(gap(24), (Cause::CurrentTicks.bit(), true));
     }
 
     #[test]

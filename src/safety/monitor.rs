@@ -3,7 +3,7 @@
 //! Why last: whatever a controller, a model or a bus produces, only what leaves [`Monitor::decide`] reaches the
 //! bridge. One tick runs detectors, state, bounds, in this order:
 //!
-//! 1. Detect. Anything measured or wanted that is not finite; encoder readings rejected three times in 10 ms; while
+//! 1. Detect, or hear of ([`Monitor::report`]). Anything measured or wanted that is not finite; encoder readings rejected three times in 10 ms; while
 //!    the drive is on, more than 1.1 times the speed limit or 0.5 degrees beyond the range.
 //! 2. Move the state ([`DriveState::after`]): a fault, or the tick and then the operator's request. To enable, the
 //!    joints must stand within range and speed, or the request is refused with its reason.
@@ -98,6 +98,8 @@ pub struct Monitor<const N: usize> {
     damp_ticks: u32,
     glitch_window: u64,
     glitches: [u64; N],
+    /// Seen elsewhere, for the next tick.
+    reported: Option<Fault>,
     state: DriveState,
 }
 
@@ -115,8 +117,14 @@ impl<const N: usize> Monitor<N> {
             damp_ticks: rate_hz * DAMP_MS / 1000,
             glitch_window: u64::MAX.checked_shr(64 - window_ticks).unwrap_or(0),
             glitches: [0; N],
+            reported: None,
             state: DriveState::NotReadyToSwitchOn,
         }
+    }
+
+    /// Something else saw a fault: it is decided upon at the next tick, like those of the monitor's own detectors.
+    pub fn report(&mut self, fault: Fault) {
+        self.reported = Some(fault);
     }
 
     /// Where the drive stands.
@@ -204,7 +212,7 @@ impl<const N: usize> Monitor<N> {
                 return fault(FaultCode::NotFinite, joint);
             }
         }
-        let mut found = None;
+        let mut found = self.reported.take();
         for joint in 0..N {
             let rejected = observation.rejected[joint];
             self.glitches[joint] = (self.glitches[joint] << 1 | u64::from(rejected)) & self.glitch_window;

@@ -82,7 +82,11 @@ mod tests {
 
     fn sample(counts: [i32; 2], current: f32) -> Sample<2> {
         Sample {
-            joints: counts.map(|encoder_counts| JointSample { encoder_counts, current: Ampere(current) }),
+            joints: counts.map(|encoder_counts| JointSample {
+                encoder_counts,
+                current: Ampere(current),
+                doubtful: false,
+            }),
         }
     }
 

@@ -24,7 +24,8 @@ use crate::hal::{DriveCommand, Sample};
 use crate::motion::MotionState;
 use crate::real::{clamp, is_finite};
 use crate::safety::{
-    Decision, DriveState, Limits, Monitor, Observation, Permission, PowerRequest, Reading, Request, StepGate,
+    Decision, DriveState, Fault, Limits, Monitor, Observation, Permission, PowerRequest, Reading, Request,
+    StepGate,
 };
 use crate::units::{NewtonMetre, Radian, RadianPerSecond};
 
@@ -131,6 +132,11 @@ impl<const N: usize> Servo<N> {
         self.monitor.state()
     }
 
+    /// Something else saw a fault, of which the monitor has to hear: at the next tick.
+    pub fn report(&mut self, fault: Fault) {
+        self.monitor.report(fault);
+    }
+
     /// What each joint may do.
     #[must_use]
     pub fn limits(&self) -> &Limits<N> {
@@ -175,6 +181,8 @@ impl<const N: usize> Servo<N> {
                 + self.controllers[joint].torque(gains, tracking_error[joint], velocity_error)
         });
 
+        // What the axis did not believe is gone from the sample, but it is told and counts as well.
+        let rejected = core::array::from_fn(|joint| rejected[joint] || sample.joints[joint].doubtful);
         let observation =
             Observation { position, velocity, current: sample.joints.map(|joint| joint.current), rejected };
         let request = Request { torque: wanted_torque, power: command.power };

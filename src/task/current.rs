@@ -13,7 +13,7 @@ use heapless::spsc::{Consumer, Producer};
 use super::interlock::{self, Cause};
 use super::leg::JOINTS;
 use super::links::{Order, Outcome};
-use super::servo::target;
+use super::servo::{self, target};
 use super::statistics;
 use crate::board::odrive_v3_6::settings::{CLOCK_HZ, analog, drives};
 use crate::board::odrive_v3_6::{brake, bridge, contacts, converter, encoder, interrupts};
@@ -175,7 +175,11 @@ impl AxisLoop {
             complete,
             missed,
         };
-        interlock::raise_bits(self.watch.look(&state));
+        let (forbids, damp) = self.watch.look(&state);
+        interlock::raise_bits(forbids);
+        if damp {
+            servo::ticks_are_missing();
+        }
     }
 
     fn step(&mut self, axis: usize, sample: &AxisSample, allowed: bool) -> AxisCommand {

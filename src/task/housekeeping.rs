@@ -21,7 +21,7 @@ use crate::motor::reference::{ReferenceStep, StatedPose};
 use crate::motor::{Axis, AxisConfiguration, Calibrator};
 use crate::operator::{Ask, Operator, RATE_HZ, Situation};
 use crate::trace::{Record, words};
-use crate::units::{Ampere, Hertz};
+use crate::units::Hertz;
 
 /// Ticks between two readings of the gate drivers' registers: 8 ms.
 const GATE_TICKS: u32 = RATE_HZ / 125;
@@ -290,7 +290,7 @@ impl Housekeeping {
         let Some(mut poses) = state.reference else { return };
         let mut standing = true;
         for ((pose, found), count) in poses.iter_mut().zip(&statistics::COUNTS) {
-            let sample = JointSample { encoder_counts: count.get().cast_signed(), current: Ampere::ZERO };
+            let sample = JointSample { encoder_counts: count.get().cast_signed(), ..JointSample::default() };
             match pose.tick(&sample) {
                 ReferenceStep::Running(_) => {}
                 ReferenceStep::Found(_) => *found = true,

@@ -13,6 +13,7 @@ use super::{interlock, statistics};
 use crate::hal::{DriveCommand, JointSample, Sample};
 use crate::leg::{Activity, Control, ControlOutput, ControlRequest, DriveState, Finding, permitted};
 use crate::motor::AxisRequest;
+use crate::safety::{Fault, FaultCode};
 use crate::trace::{Record, words};
 use crate::units::Ampere;
 
@@ -22,6 +23,14 @@ static TARGETS: [AtomicU32; JOINTS] = [const { AtomicU32::new(RELEASED) }; JOINT
 const RELEASED: u32 = u32::MAX;
 /// The joints' zeros are known, so samples mean something.
 static READY: AtomicBool = AtomicBool::new(false);
+
+/// Current ticks are missing, which the servo has to react to.
+static TICKS_MISSING: AtomicBool = AtomicBool::new(false);
+
+/// The servo damps from its next tick on.
+pub fn ticks_are_missing() {
+    TICKS_MISSING.store(true, Ordering::Relaxed);
+}
 
 /// What an axis is asked for.
 #[inline(always)]
@@ -138,6 +147,9 @@ impl ServoLoop {
         self.tick = self.tick.wrapping_add(1);
         if let Some(finding) = self.findings.dequeue() {
             self.control.receive(finding);
+        }
+        if TICKS_MISSING.swap(false, Ordering::Relaxed) {
+            self.control.report(Fault { code: FaultCode::CurrentTicks, joint: 0 });
         }
         let request = self.requests.dequeue();
         let asked = permitted(request, interlock::is_clear(), self.control.state());

@@ -264,3 +264,46 @@ fn an_axis_of_absurd_numbers_is_refused_by_part() {
     assert_eq!(refused(|c| c.greatest_speed.0 = 1700.0), AxisError::BackEmf);
     assert_eq!(CONFIGURATION.check(), Ok(()));
 }
+
+#[test]
+fn every_one_of_the_65536_offsets_of_the_counter_gives_the_same_bits() {
+    for speed in [180.0, -180.0] {
+        let mut bench = Bench::at(speed, &CONFIGURATION);
+        bench.run(ask(12.0), 240);
+        // 48 ticks are 470 counts: each offset from which the counter wraps on the way is among all of them.
+        let begin = bench.axis;
+        let samples: [AxisSample; 48] = core::array::from_fn(|_| {
+            let sample = bench.sample;
+            bench.tick(ask(12.0));
+            sample
+        });
+        let mut reference = begin;
+        let commands = samples.map(|sample| reference.tick(&sample, ask(12.0)));
+        let joint = reference.joint_sample();
+        for offset in 0..=u16::MAX {
+            let mut axis = begin;
+            axis.counter = axis.counter.wrapping_add(offset);
+            for (sample, command) in samples.iter().zip(&commands) {
+                let shifted = AxisSample {
+                    encoder_count: sample.encoder_count.wrapping_add(offset),
+                    index_count: sample.index_count.map(|count| count.wrapping_add(offset)),
+                    ..*sample
+                };
+                assert_eq!(axis.tick(&shifted, ask(12.0)), *command, "{offset}");
+            }
+            assert_eq!((axis.joint_sample(), axis.fault()), (joint, None), "{offset}");
+        }
+    }
+}
+
+#[test]
+fn a_reading_that_was_not_believed_is_told_once() {
+    let mut bench = Bench::at(60.0, &CONFIGURATION);
+    bench.run(ask(5.0), 240);
+    assert!(!bench.axis.joint_sample().doubtful);
+    bench.run(ask(5.0), 3);
+    bench.sample.encoder_count = bench.sample.encoder_count.wrapping_add(5000);
+    bench.run(ask(5.0), 3);
+    assert_eq!([bench.axis.joint_sample().doubtful, bench.axis.joint_sample().doubtful], [true, false]);
+    assert_eq!(bench.axis.fault(), None);
+}

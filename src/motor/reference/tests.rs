@@ -36,7 +36,11 @@ impl Joint {
         if self.place < wall {
             (self.place, self.speed) = (wall, 0.0);
         }
-        JointSample { encoder_counts: 77_000 + self.place.floor() as i32, current: Ampere(current as f32) }
+        JointSample {
+            encoder_counts: 77_000 + self.place.floor() as i32,
+            current: Ampere(current as f32),
+            doubtful: false,
+        }
     }
 }
 
@@ -88,7 +92,7 @@ fn a_way_without_a_stop_a_joint_that_sticks_and_an_obstacle_are_refused() {
 
 #[test]
 fn a_stated_pose_wants_a_joint_that_stands() {
-    let sample = |count| JointSample { encoder_counts: count, current: Ampere::ZERO };
+    let sample = |count| JointSample { encoder_counts: count, ..JointSample::default() };
     let mut pose = StatedPose::new(Hertz(4000.0)).expect("usual");
     let mut ticks = 1;
     while pose.tick(&sample(-5)) == ReferenceStep::Running(Ampere::ZERO) {

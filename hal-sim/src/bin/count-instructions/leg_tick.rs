@@ -29,6 +29,7 @@ fn follow(motion: &MotionState<JOINTS>, currents: [Ampere; JOINTS]) -> Sample<JO
         joints: core::array::from_fn(|joint| JointSample {
             encoder_counts: (motion.position_rad[joint] / scales[joint].signed_radian_per_count()) as i32,
             current: currents[joint],
+            doubtful: false,
         }),
     }
 }

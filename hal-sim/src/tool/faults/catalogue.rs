@@ -26,6 +26,8 @@ pub enum Expected {
 pub enum Onset {
     /// At the injection.
     Injection,
+    /// So many periods after the injection.
+    After(u64),
     /// When the servo next reads the channel that is spoilt.
     ServoTick,
     /// When the bus has risen above this, V.
@@ -111,13 +113,14 @@ pub const JOINTS: usize = 2;
 pub static ROWS: [Row; 12] = [
     Row {
         id: "E2",
-        fault: "single wrong reading of an encoder",
-        detector: "greatest step per tick: the duties of the tick before are kept",
+        fault: "wrong reading of an encoder, one or three in 10 ms",
+        detector: "greatest step per tick: the duties of the tick before are kept; three in 10 ms in the servo",
         state: "Limit, Damp",
         codes: &[FaultCode::EncoderStep],
-        deadline_ms: PERIOD_MS,
+        // The servo's next tick.
+        deadline_ms: 7.0 * PERIOD_MS,
         unit: "counts",
-        lacking: Some("three in 10 ms in one axis are rejected one by one, and no fault"),
+        lacking: None,
         draw: draw::glitch,
     },
     Row {
@@ -171,7 +174,7 @@ pub static ROWS: [Row; 12] = [
         state: "Limit, Off",
         codes: &[FaultCode::BusVoltage],
         deadline_ms: 2.0 * PERIOD_MS,
-        unit: "V",
+        unit: "V beyond",
         lacking: None,
         draw: draw::overvoltage,
     },
@@ -182,7 +185,7 @@ pub static ROWS: [Row; 12] = [
         state: "Damp if there is energy, else Off",
         codes: &[FaultCode::BusVoltage],
         deadline_ms: 1.0,
-        unit: "V",
+        unit: "V beyond",
         lacking: Some("the slope: at the lower border there is no energy left to damp with"),
         draw: draw::undervoltage,
     },
@@ -227,7 +230,7 @@ pub static ROWS: [Row; 12] = [
         codes: &[FaultCode::CurrentTicks, FaultCode::ServoTicks],
         deadline_ms: 1.0,
         unit: "",
-        lacking: Some("released instead of damped: damping needs ticks in time"),
+        lacking: Some("a servo that does not answer cannot damp: Off"),
         draw: draw::late_ticks,
     },
     Row {

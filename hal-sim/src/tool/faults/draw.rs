@@ -29,7 +29,7 @@ const fn one(injection: Injection, expected: Expected) -> Scenario {
     }
 }
 
-/// E2: one wrong reading of a counter.
+/// E2: one wrong reading of a counter, or three in 10 ms.
 #[must_use]
 pub fn glitch(dice: &mut Dice, bounds: &Bounds) -> Scenario {
     let joint = dice.below(JOINTS as u64) as usize;
@@ -38,7 +38,19 @@ pub fn glitch(dice: &mut Dice, bounds: &Bounds) -> Scenario {
     let offset = at(Channel::Counter, joint, Form::Offset(sign * size), Timing::lasting(0, 1));
     // A joint at its limit makes half of the greatest step by itself, so a glitch may be that much nearer.
     let by_design = size <= 1.5 * f64::from(bounds.greatest_step[1]);
-    Scenario { magnitude: Some(size), by_design, ..one(offset, Expected::Rejected) }
+    if dice.coin() {
+        return Scenario { magnitude: Some(size), by_design, ..one(offset, Expected::Rejected) };
+    }
+    // Three within 10 ms, each in another servo tick.
+    let apart = 6 + dice.below(112);
+    let timing = Timing { begin: 0, duration: 2 * apart + 1, on: 1, off: apart - 1 };
+    Scenario {
+        injections: [Some(Injection { timing, ..offset }), None],
+        onset: Onset::After(2 * apart),
+        magnitude: Some(size),
+        by_design,
+        ..one(offset, Expected::Damp)
+    }
 }
 
 /// E4: a counter that lost counts, or won some.
@@ -107,7 +119,7 @@ pub fn overvoltage(dice: &mut Dice, bounds: &Bounds) -> Scenario {
         let volts = dice.uniform(high + 0.2, 62.0);
         let code = volts / VOLT_PER_CODE;
         let bus = at(Channel::Bus, 0, Form::Rail(code), Timing::from(0));
-        return Scenario { magnitude: Some(volts), ..one(bus, Expected::Off) };
+        return Scenario { magnitude: Some(volts - high), ..one(bus, Expected::Off) };
     }
     // What the leg gives back finds a resistor that is not there, and a supply that pushes.
     let volts = dice.uniform(high + 2.0, 75.0);
@@ -115,7 +127,7 @@ pub fn overvoltage(dice: &mut Dice, bounds: &Bounds) -> Scenario {
     Scenario {
         event: Event::Supply(volts),
         onset: Onset::BusAbove(high + 0.1),
-        magnitude: Some(volts),
+        magnitude: Some(volts - high),
         ..one(absent, Expected::Off)
     }
 }
@@ -128,13 +140,13 @@ pub fn undervoltage(dice: &mut Dice, bounds: &Bounds) -> Scenario {
     if dice.below(2) == 0 {
         let code = volts / VOLT_PER_CODE;
         let bus = at(Channel::Bus, 0, Form::Rail(code), Timing::from(0));
-        return Scenario { magnitude: Some(volts), ..one(bus, Expected::Off) };
+        return Scenario { magnitude: Some(low - volts), ..one(bus, Expected::Off) };
     }
     Scenario {
         injections: [None; 2],
         event: Event::Supply(volts),
         onset: Onset::BusBelow(low - 0.1),
-        magnitude: Some(volts),
+        magnitude: Some(low - volts),
         patience: 20 * PERIODS_PER_S,
         ..one(at(Channel::Bus, 0, Form::Off, Timing::from(u64::MAX)), Expected::Off)
     }
@@ -175,12 +187,12 @@ pub fn late_ticks(dice: &mut Dice, _: &Bounds) -> Scenario {
         // Every other tick; the third that is missed is one too many.
         0 => {
             let timing = Timing { begin: 0, duration: u64::MAX, on: 1, off: 1 };
-            one(at(Channel::Tick, joint, Form::Off, timing), Expected::Off)
+            one(at(Channel::Tick, joint, Form::Off, timing), Expected::Damp)
         }
         // Time stolen at once.
         1 => {
             let gap = Timing::lasting(0, 3 + dice.below(10));
-            one(at(Channel::Tick, joint, Form::Off, gap), Expected::Off)
+            one(at(Channel::Tick, joint, Form::Off, gap), Expected::Damp)
         }
         _ => one(at(Channel::Servo, 0, Form::Off, Timing::from(0)), Expected::Off),
     }

@@ -15,7 +15,7 @@ use scarab::hal::{AxisCommand, DriveCommand, JointSample, Sample};
 use scarab::leg::{ControlOutput, ControlRequest, DriveState, axis_code, permitted};
 use scarab::motor::{Axis, AxisRequest, Chopper, SenseScale};
 use scarab::operator::{Ask, Operator, RATE_HZ, Situation};
-use scarab::safety::{Cause, FaultCode, PowerRequest, ServoWatch, TickState, TickWatch};
+use scarab::safety::{Cause, Fault, FaultCode, PowerRequest, ServoWatch, TickState, TickWatch};
 
 use crate::faults::{Channel, Injector};
 use crate::tool::error::ToolError;
@@ -215,7 +215,11 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             let complete = !self.injector.happens(Channel::Conversion, joint, now);
             let missed = core::mem::take(&mut self.missed[joint]);
             let state = TickState { emergency_stop, gate_fault, complete, missed };
-            self.causes |= self.watches[joint].look(&state) & !self.blind_bits();
+            let (forbids, damp) = self.watches[joint].look(&state);
+            self.causes |= forbids & !self.blind_bits();
+            if damp && !self.is_blind(Some(FaultCode::CurrentTicks)) {
+                self.leg.report(Fault { code: FaultCode::CurrentTicks, joint: joint as u8 });
+            }
             let allowed = self.causes == 0 && self.targets.enabled;
             let request = AxisRequest { enabled: allowed, current: self.targets.currents[joint] };
             let before = self.axes[joint];

@@ -154,6 +154,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         let onset = match scenario.onset {
             Onset::Injection => Some(begun),
             Onset::ServoTick => Some(next_servo_tick(scenario, begun)),
+            Onset::After(periods) => Some(begun + periods),
             _ => None,
         };
         Self {
@@ -189,7 +190,7 @@ impl<'a, const B: usize> Watched<'a, B> {
     fn has_begun(&self) -> bool {
         let bus = || self.rig.world.complete_drives().map_or(0.0, |drives| drives.supply().voltage());
         match self.scenario.onset {
-            Onset::Injection | Onset::ServoTick => true,
+            Onset::Injection | Onset::ServoTick | Onset::After(_) => true,
             Onset::BusAbove(volts) => bus() > volts,
             Onset::BusBelow(volts) => bus() < volts,
             Onset::Speed(factor) => {

@@ -60,7 +60,7 @@ impl Plant {
 
     pub(super) fn sample(&self) -> JointSample {
         let counts = (self.angle * 409_600.0 / TAU).floor() as i32;
-        JointSample { encoder_counts: counts, current: Ampere((self.torque / 1.5) as f32) }
+        JointSample { encoder_counts: counts, current: Ampere((self.torque / 1.5) as f32), doubtful: false }
     }
 }
 
