@@ -8,7 +8,7 @@ use super::common::write_json;
 use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::faults::campaign::{CampaignOptions, campaign};
-use crate::tool::faults::catalogue::{ROWS, Row, row};
+use crate::tool::faults::catalogue::{self, Row, row};
 use crate::tool::faults::report::{CampaignReport, told};
 use crate::tool::faults::run::{Manner, Outcome};
 use crate::tool::html::{self, Circumstances};
@@ -55,12 +55,12 @@ pub struct FaultsArguments {
 
 fn rows(names: &[String]) -> Result<Vec<&'static Row>, ToolError> {
     if names.is_empty() {
-        return Ok(ROWS.iter().collect());
+        return Ok(catalogue::rows().collect());
     }
     let mut rows: Vec<&'static Row> = Vec::new();
     for name in names {
         let found = row(name).ok_or_else(|| {
-            let known: Vec<_> = ROWS.iter().map(|row| row.id).collect();
+            let known: Vec<_> = catalogue::rows().map(|row| row.id).collect();
             ToolError::input(format!("--fault {name}: is none of {}", known.join(", ")))
         })?;
         if !rows.iter().any(|row| row.id == found.id) {

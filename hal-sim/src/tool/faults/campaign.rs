@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use scarab::leg::{Activity, ControlRequest};
 use scarab::safety::DriveState;
 
+use super::catalogue::stop::ROWS as STOP;
 use super::catalogue::{Bounds, Event, Expected, JOINTS, Onset, Row, Scenario};
 use super::dice::Dice;
 use super::rig::{Hand, PERIODS_PER_S, Rig};
@@ -145,7 +146,7 @@ impl Setting<'_> {
 
     /// The emergency stop at this very period.
     fn stop(&self, period: u64) -> Job {
-        let row = super::catalogue::row("X1").unwrap_or(&super::catalogue::ROWS[0]);
+        let row = &STOP[0];
         let open = Injection {
             channel: Channel::EmergencyStop,
             joint: 0,

@@ -2,12 +2,20 @@
 //!
 //! A row is in this table once its detector exists; what is missing of it stands in [`Row::lacking`], and docs/safety.md lists the
 //! rows that are not here. Magnitudes are drawn over all that a fault can be, so that the smallest one that is seen is a result.
+//! What lies below a detector's threshold is told apart beforehand, from the numbers the firmware is set to ([`Bounds`]), never
+//! from the outcome.
+
+pub mod current;
+pub mod encoder;
+pub mod joint;
+pub mod number;
+pub mod stop;
+pub mod supply;
+pub mod timing;
 
 use scarab::safety::FaultCode;
 
 use super::dice::Dice;
-use super::draw;
-use super::rig::PERIOD_MS;
 use crate::faults::Injection;
 
 /// What becomes of the drive.
@@ -110,144 +118,21 @@ pub struct Bounds {
 pub const JOINTS: usize = 2;
 
 /// All rows, in the catalogue's order.
-pub static ROWS: [Row; 12] = [
-    Row {
-        id: "E2",
-        fault: "wrong reading of an encoder, one or three in 10 ms",
-        detector: "greatest step per tick: the duties of the tick before are kept; three in 10 ms in the servo",
-        state: "Limit, Damp",
-        codes: &[FaultCode::EncoderStep],
-        // The servo's next tick.
-        deadline_ms: 7.0 * PERIOD_MS,
-        unit: "counts",
-        lacking: None,
-        draw: draw::glitch,
-    },
-    Row {
-        id: "E4",
-        fault: "lost counts",
-        detector: "index against counts; greatest step",
-        state: "Damp",
-        codes: &[FaultCode::EncoderPlace],
-        deadline_ms: f64::INFINITY,
-        unit: "counts",
-        lacking: Some("released instead of damped, since the rotor's angle is lost with the counts"),
-        draw: draw::lost_counts,
-    },
-    Row {
-        id: "C2",
-        fault: "shunt amplifier or converter at its rail",
-        detector: "code near the rails twice",
-        state: "Off",
-        codes: &[FaultCode::CurrentSense],
-        deadline_ms: 2.0 * PERIOD_MS,
-        unit: "",
-        lacking: None,
-        draw: draw::rail,
-    },
-    Row {
-        id: "C3",
-        fault: "conversion missing",
-        detector: "end of conversion",
-        state: "Off",
-        codes: &[FaultCode::Conversion],
-        deadline_ms: PERIOD_MS,
-        unit: "",
-        lacking: Some("a conversion that is stuck at a code within the range"),
-        draw: draw::conversion,
-    },
-    Row {
-        id: "C4",
-        fault: "overcurrent, gate driver's fault",
-        detector: "length of the current vector; pin",
-        state: "Off",
-        codes: &[FaultCode::Overcurrent, FaultCode::GateFault],
-        deadline_ms: PERIOD_MS,
-        unit: "A",
-        lacking: None,
-        draw: draw::overcurrent,
-    },
-    Row {
-        id: "V1",
-        fault: "overvoltage: reading, or a pushing supply without brake resistor",
-        detector: "bus voltage in each tick, twice",
-        state: "Limit, Off",
-        codes: &[FaultCode::BusVoltage],
-        deadline_ms: 2.0 * PERIOD_MS,
-        unit: "V beyond",
-        lacking: None,
-        draw: draw::overvoltage,
-    },
-    Row {
-        id: "V2",
-        fault: "undervoltage: reading, or the supply cut",
-        detector: "bus voltage in each tick, twice",
-        state: "Damp if there is energy, else Off",
-        codes: &[FaultCode::BusVoltage],
-        deadline_ms: 1.0,
-        unit: "V beyond",
-        lacking: Some("the slope: at the lower border there is no energy left to damp with"),
-        draw: draw::undervoltage,
-    },
-    Row {
-        id: "N1",
-        fault: "NaN or infinity in a sample or a target",
-        detector: "borders of the servo and of the axis",
-        state: "Off",
-        codes: &[FaultCode::NotFinite],
-        deadline_ms: PERIOD_MS,
-        unit: "",
-        lacking: Some("modulation and fitness, which no port reaches"),
-        draw: draw::not_finite,
-    },
-    Row {
-        id: "X1",
-        fault: "emergency stop",
-        detector: "sense pin in each tick",
-        state: "Off",
-        codes: &[FaultCode::EmergencyStop],
-        deadline_ms: PERIOD_MS,
-        unit: "",
-        lacking: None,
-        draw: draw::emergency_stop,
-    },
-    Row {
-        id: "X2",
-        fault: "bouncing emergency stop, released, hands at the contacts",
-        detector: "latch; operator's edges",
-        state: "Off",
-        codes: &[FaultCode::EmergencyStop],
-        deadline_ms: PERIOD_MS,
-        unit: "",
-        lacking: None,
-        draw: draw::bouncing_stop,
-    },
-    Row {
-        id: "K1",
-        fault: "current ticks or the servo late or missed",
-        detector: "time between ticks; the servo's counter",
-        state: "Damp",
-        codes: &[FaultCode::CurrentTicks, FaultCode::ServoTicks],
-        deadline_ms: 1.0,
-        unit: "",
-        lacking: Some("a servo that does not answer cannot damp: Off"),
-        draw: draw::late_ticks,
-    },
-    Row {
-        id: "J2",
-        fault: "overspeed by a kick",
-        detector: "estimated speed above 1.1 times the limit",
-        state: "Damp",
-        codes: &[FaultCode::Overspeed],
-        deadline_ms: 6.0,
-        unit: "N m",
-        lacking: None,
-        draw: draw::overspeed,
-    },
-];
+pub fn rows() -> impl Iterator<Item = &'static Row> {
+    let groups: [&'static [Row]; 7] = [
+        &encoder::ROWS,
+        &current::ROWS,
+        &supply::ROWS,
+        &number::ROWS,
+        &stop::ROWS,
+        &timing::ROWS,
+        &joint::ROWS,
+    ];
+    groups.into_iter().flatten()
+}
 
 /// The row with this id.
 #[must_use]
 pub fn row(id: &str) -> Option<&'static Row> {
-    ROWS.iter().find(|row| row.id == id)
+    rows().find(|row| row.id == id)
 }

@@ -3,7 +3,7 @@
 //! | part | what it is |
 //! | --- | --- |
 //! | [`rig`] | firmware and plant, one PWM period at a time, faults on the ports between |
-//! | [`catalogue`], [`draw`] | what is done to the machine, and what has to follow |
+//! | [`catalogue`], [`draw`] | what is done to the machine, and what has to follow; rows by group |
 //! | [`run`], [`invariants`] | one run, and what holds in each of its periods |
 //! | [`campaign`] | many runs, forked from identifications |
 //! | [`recording`] | a run's curves |

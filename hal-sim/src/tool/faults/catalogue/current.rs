@@ -1,0 +1,83 @@
+//! Shunts, their conversions, gate drivers, phases.
+
+use scarab::safety::FaultCode;
+
+use super::super::dice::Dice;
+use super::super::draw::{AMPERE_PER_CODE, at, one};
+use super::super::rig::PERIOD_MS;
+use super::{Bounds, Expected, JOINTS, Row, Scenario};
+use crate::faults::{Channel, Form, Timing};
+
+/// Rows of this group.
+pub static ROWS: [Row; 3] = [
+    Row {
+        id: "C2",
+        fault: "shunt amplifier or converter at its rail",
+        detector: "code near the rails twice",
+        state: "Off",
+        codes: &[FaultCode::CurrentSense],
+        deadline_ms: 2.0 * PERIOD_MS,
+        unit: "",
+        lacking: None,
+        draw: rail,
+    },
+    Row {
+        id: "C3",
+        fault: "conversion missing",
+        detector: "end of conversion",
+        state: "Off",
+        codes: &[FaultCode::Conversion],
+        deadline_ms: PERIOD_MS,
+        unit: "",
+        lacking: Some("a conversion that is stuck at a code within the range"),
+        draw: conversion,
+    },
+    Row {
+        id: "C4",
+        fault: "overcurrent, gate driver's fault",
+        detector: "length of the current vector; pin",
+        state: "Off",
+        codes: &[FaultCode::Overcurrent, FaultCode::GateFault],
+        deadline_ms: PERIOD_MS,
+        unit: "A",
+        lacking: None,
+        draw: overcurrent,
+    },
+];
+
+/// C2: a code at a rail of amplifier or converter.
+fn rail(dice: &mut Dice, _: &Bounds) -> Scenario {
+    let joint = dice.below(JOINTS as u64) as usize;
+    let channel = if dice.coin() { Channel::ShuntB } else { Channel::ShuntC };
+    // Of the amplifier or of the converter, low or high.
+    let value = [0.0, 186.0, 3910.0, 4095.0][dice.below(4) as usize];
+    one(at(channel, joint, Form::Rail(value), Timing::from(0)), Expected::Off)
+}
+
+/// C3: conversions that do not end.
+fn conversion(dice: &mut Dice, _: &Bounds) -> Scenario {
+    let joint = dice.below(JOINTS as u64) as usize;
+    let lasting = 1 + dice.below(4);
+    one(at(Channel::Conversion, joint, Form::Off, Timing::lasting(0, lasting)), Expected::Off)
+}
+
+/// C4: more current than the bound, or the gate driver's pin.
+fn overcurrent(dice: &mut Dice, bounds: &Bounds) -> Scenario {
+    if dice.below(2) == 0 {
+        return one(at(Channel::GateFault, 0, Form::Off, Timing::from(0)), Expected::Off);
+    }
+    let joint = dice.below(JOINTS as u64) as usize;
+    // All of it in one phase, which leaves half of it to each of the others: a vector of that length.
+    let current = bounds.overcurrent_a * dice.uniform(0.9, 1.08);
+    let codes = dice.sign() * current / AMPERE_PER_CODE;
+    let shares = if dice.coin() { [1.0, -0.5] } else { [-0.5, 1.0] };
+    let shunt = |channel, share| at(channel, joint, Form::Rail(2048.0 + codes * share), Timing::from(0));
+    let [b, c] = shares;
+    Scenario {
+        injections: [Some(shunt(Channel::ShuntB, b)), Some(shunt(Channel::ShuntC, c))],
+        magnitude: Some(current),
+        // The shunts' zeros lie up to 12 codes off, half an ampere.
+        by_design: current < bounds.overcurrent_a + 0.6,
+        ..one(shunt(Channel::ShuntB, b), Expected::Off)
+    }
+}

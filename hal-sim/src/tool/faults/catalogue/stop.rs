@@ -1,0 +1,50 @@
+//! The emergency stop.
+
+use scarab::safety::FaultCode;
+
+use super::super::dice::Dice;
+use super::super::draw::{at, one};
+use super::super::rig::{PERIOD_MS, PERIODS_PER_S};
+use super::{Bounds, Event, Expected, Row, Scenario};
+use crate::faults::{Channel, Form, Timing};
+
+/// Rows of this group.
+pub static ROWS: [Row; 2] = [
+    Row {
+        id: "X1",
+        fault: "emergency stop",
+        detector: "sense pin in each tick",
+        state: "Off",
+        codes: &[FaultCode::EmergencyStop],
+        deadline_ms: PERIOD_MS,
+        unit: "",
+        lacking: None,
+        draw: emergency_stop,
+    },
+    Row {
+        id: "X2",
+        fault: "bouncing emergency stop, released, hands at the contacts",
+        detector: "latch; operator's edges",
+        state: "Off",
+        codes: &[FaultCode::EmergencyStop],
+        deadline_ms: PERIOD_MS,
+        unit: "",
+        lacking: None,
+        draw: bouncing_stop,
+    },
+];
+
+/// X1: pressed, for 10 ms at most.
+fn emergency_stop(dice: &mut Dice, _: &Bounds) -> Scenario {
+    let lasting = 1 + dice.below(PERIODS_PER_S / 100);
+    one(at(Channel::EmergencyStop, 0, Form::Off, Timing::lasting(0, lasting)), Expected::Off)
+}
+
+/// X2: a contact that bounces for up to a second, with hands at the other contacts.
+fn bouncing_stop(dice: &mut Dice, _: &Bounds) -> Scenario {
+    let lasting = 1 + dice.below(PERIODS_PER_S);
+    let (on, off) = (1 + dice.below(200), 1 + dice.below(200));
+    let timing = Timing { begin: 0, duration: lasting, on, off };
+    let bounce = at(Channel::EmergencyStop, 0, Form::Off, timing);
+    Scenario { event: Event::Hands, ..one(bounce, Expected::Off) }
+}
