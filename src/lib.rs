@@ -17,6 +17,7 @@
 //! | [`operator`] | two contacts in the operator's hand, and what they ask for |
 //! | `place` | large values built where they stay |
 //! | [`trace`] | what leaves the board: records, one line each |
+//! | [`store`] | what outlives the power: configuration, calibrations, the accepted model |
 //! | [`board`], `task` | one board's registers and interrupts; what runs at which priority (microcontroller only) |
 #![no_std]
 
@@ -32,6 +33,7 @@ mod place;
 pub mod real;
 pub mod safety;
 pub mod servo;
+pub mod store;
 pub mod swarm;
 #[cfg(all(feature = "tasks", target_os = "none"))]
 pub mod task;

@@ -55,6 +55,10 @@ unit! {
     NewtonMetrePerAmpere,
     /// Moment of inertia, kg m^2.
     KilogramMetreSquared,
+    /// Length, m.
+    Metre,
+    /// Temperature, degrees Celsius.
+    Celsius,
     /// Frequency, Hz.
     Hertz,
     /// Voltage, V.

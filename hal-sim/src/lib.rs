@@ -15,6 +15,7 @@
 //! | [`floor`] | contact under the foot |
 //! | [`drive`] | ideal: a current with lag; complete: motor, bridge, shunts, counter, supply |
 //! | [`faults`] | what crosses a board's ports, spoilt at a tick |
+//! | [`flash`] | a flash memory whose power fails at any byte |
 //! | [`gear`], [`sensors`], [`wearer`] | ratio; encoder and current sensor; pushes |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 //!
@@ -25,6 +26,7 @@ pub mod conventions;
 pub mod description;
 pub mod drive;
 pub mod faults;
+pub mod flash;
 pub mod floor;
 pub mod friction;
 pub mod gear;

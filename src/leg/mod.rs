@@ -46,12 +46,18 @@ pub use upkeep::{UPDATE_ROWS, Upkeep};
 
 // What crosses the leg's border: rooms that tell or keep it look no deeper.
 pub use crate::ident::{
-    Cause, Change, Estimate, Evidence, Filters, MotionWindow, Plan, Reason, SearchState, Status, StribeckFit,
-    Test, Verdict,
+    Cause, Change, Constant, Estimate, Evidence, Filters, MotionWindow, Plan, Reason, SearchState, Status,
+    StribeckFit, Test, Verdict,
 };
-pub use crate::model::Parameter;
-pub use crate::motor::{AxisFault, Calibration, Phase, Refusal as CalibrationRefusal};
-pub use crate::safety::{DriveState, Event as DriveEvent, Fault, FaultCode, PowerRequest, RefusalReason};
+pub use crate::model::friction::Stribeck;
+pub use crate::model::{Fingerprint, PARAMETERS_PER_JOINT, Parameter};
+pub use crate::motor::{
+    AxisFault, Calibration, Direction as CounterDirection, ElectricalAngle, EncoderSetting, Phase,
+    Refusal as CalibrationRefusal, StoredCalibration,
+};
+pub use crate::safety::{
+    DriveState, Event as DriveEvent, Fault, FaultCode, Permission, PowerRequest, RefusalReason,
+};
 
 use crate::hal::Sample;
 

@@ -98,12 +98,12 @@ impl ElectricalAngle {
     }
 
     /// Units of 2^-32 turns, from half a turn back to half a turn on.
-    pub(super) const fn units(self) -> i32 {
+    pub const fn units(self) -> i32 {
         self.0.cast_signed()
     }
 
     /// From units of 2^-32 turns.
-    pub(super) const fn from_units(units: i32) -> Self {
+    pub const fn from_units(units: i32) -> Self {
         Self(units.cast_unsigned())
     }
 

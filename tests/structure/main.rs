@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use tokens::{Token, tokens};
 
 /// Each room and the rooms it may use beside itself and the open ones.
-const HOUSE: [(&str, &[&str]); 16] = [
+const HOUSE: [(&str, &[&str]); 17] = [
     ("units", &[]),
     ("real", &[]),
     ("place", &[]),
@@ -26,6 +26,7 @@ const HOUSE: [(&str, &[&str]); 16] = [
     ("servo", &["hal", "model", "motion", "motor", "safety"]),
     ("leg", &["hal", "model", "motion", "swarm", "ident", "motor", "safety", "servo"]),
     ("trace", &["hal", "leg"]),
+    ("store", &["hal", "leg"]),
     ("operator", &["leg"]),
     ("board", &["hal", "motor", "leg", "task"]),
     ("task", &["hal", "motor", "leg", "operator", "safety", "servo", "trace", "board"]),

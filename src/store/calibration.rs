@@ -1,0 +1,80 @@
+//! A calibration as it is kept: what a motor and its encoder were found to be, with the setting it holds for.
+//!
+//! It is not believed: before current flows the axis compares it at the motor (`motor::Calibration`, verification), and refuses
+//! one that was found with another setting.
+
+use zerocopy::little_endian::{F32, I32, U32};
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
+
+use super::record::{Kept, RecordError};
+use crate::leg::{CounterDirection, ElectricalAngle, EncoderSetting, StoredCalibration};
+use crate::real::is_finite;
+use crate::units::{Henry, Ohm};
+
+/// A calibration of one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeptCalibration(pub StoredCalibration);
+
+/// In the flash; 24 bytes.
+#[derive(Clone, Copy, Debug, Default, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
+#[repr(C)]
+pub struct CalibrationLayout {
+    resistance_ohm: F32,
+    direct_henry: F32,
+    quadrature_henry: F32,
+    /// Units of 2^-32 electrical turns.
+    offset: I32,
+    counts_per_turn: U32,
+    pole_pairs: u8,
+    /// 0 up, 1 down.
+    counter: u8,
+    _reserved: [u8; 2],
+}
+
+impl Kept for KeptCalibration {
+    type Layout = CalibrationLayout;
+    const LENGTHS: &'static [usize] = &[{
+        assert!(size_of::<CalibrationLayout>() == 24);
+        24
+    }];
+
+    fn to_layout(&self) -> CalibrationLayout {
+        let StoredCalibration { resistance, direct_inductance, quadrature_inductance, offset, encoder } =
+            self.0;
+        CalibrationLayout {
+            resistance_ohm: F32::new(resistance.0),
+            direct_henry: F32::new(direct_inductance.0),
+            quadrature_henry: F32::new(quadrature_inductance.0),
+            offset: I32::new(offset.units()),
+            counts_per_turn: U32::new(encoder.counts_per_turn),
+            pole_pairs: encoder.pole_pairs,
+            counter: u8::from(encoder.counter == CounterDirection::Down),
+            _reserved: [0; 2],
+        }
+    }
+
+    fn from_layout(layout: &CalibrationLayout) -> Result<Self, RecordError> {
+        let [resistance, direct, quadrature] =
+            [layout.resistance_ohm, layout.direct_henry, layout.quadrature_henry].map(F32::get);
+        let is_size = |value: f32| is_finite(value) && value > 0.0;
+        let counter = match layout.counter {
+            0 => CounterDirection::Up,
+            1 => CounterDirection::Down,
+            _ => return Err(RecordError::Range),
+        };
+        let counts_per_turn = layout.counts_per_turn.get();
+        let makes_sense = [resistance, direct, quadrature].into_iter().all(is_size)
+            && counts_per_turn > 0
+            && layout.pole_pairs > 0;
+        if !makes_sense {
+            return Err(RecordError::Range);
+        }
+        Ok(Self(StoredCalibration {
+            resistance: Ohm(resistance),
+            direct_inductance: Henry(direct),
+            quadrature_inductance: Henry(quadrature),
+            offset: ElectricalAngle::from_units(layout.offset.get()),
+            encoder: EncoderSetting { counter, pole_pairs: layout.pole_pairs, counts_per_turn },
+        }))
+    }
+}

@@ -1,0 +1,174 @@
+//! A record's bytes: two of its schema, then a fixed layout that only ever grows at its end.
+//!
+//! Migration follows from that rule and needs no code per version: a record of an older schema is the beginning of a newer
+//! one, and what it lacks takes the layout's default. One of a newer schema is refused, because nobody knows what it says.
+//! Its bits are guarded by the flash log's CRCs; its meaning by [`Kept::from_layout`], which refuses what is out of range.
+
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
+
+/// Bytes before a layout.
+pub(super) const HEAD: usize = 2;
+
+/// The longest layout there is room for.
+pub(super) const LONGEST: usize = 400;
+
+/// Why a record is not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RecordError {
+    /// Shorter or longer than its schema is.
+    Length,
+    /// Of a schema that this firmware does not know.
+    Newer {
+        /// Of the record.
+        schema: u16,
+    },
+    /// A value in it is not finite, not positive where it must be, or no member of its list.
+    Range,
+}
+
+/// A value that can be kept.
+pub trait Kept: Sized {
+    /// As it lies in the flash: plain bytes, little-endian, without gaps. Its default stands for what older schemas lack.
+    type Layout: FromBytes + IntoBytes + Immutable + KnownLayout + Unaligned + Default;
+    /// Bytes of each schema's layout, from schema 1 on; the last is `Layout`'s.
+    const LENGTHS: &'static [usize];
+
+    /// The value in bytes.
+    fn to_layout(&self) -> Self::Layout;
+
+    /// The value.
+    ///
+    /// # Errors
+    /// [`RecordError::Range`].
+    fn from_layout(layout: &Self::Layout) -> Result<Self, RecordError>;
+}
+
+/// Writes a record of the newest schema; how long it is.
+pub(super) fn encode<R: Kept>(kept: &R, out: &mut [u8]) -> Result<usize, RecordError> {
+    let layout = kept.to_layout();
+    // What would not be taken back is not kept.
+    R::from_layout(&layout)?;
+    let bytes = layout.as_bytes();
+    let (head, rest) = out.split_at_mut_checked(HEAD).ok_or(RecordError::Length)?;
+    head.copy_from_slice(&(R::LENGTHS.len() as u16).to_le_bytes());
+    rest.get_mut(..bytes.len()).ok_or(RecordError::Length)?.copy_from_slice(bytes);
+    Ok(HEAD + bytes.len())
+}
+
+/// Reads a record of any schema so far.
+pub(super) fn decode<R: Kept>(bytes: &[u8]) -> Result<R, RecordError> {
+    let Some((&[low, high], rest)) = bytes.split_first_chunk::<HEAD>() else {
+        return Err(RecordError::Length);
+    };
+    let schema = u16::from_le_bytes([low, high]);
+    let newer = RecordError::Newer { schema };
+    let length = *R::LENGTHS.get(usize::from(schema.checked_sub(1).ok_or(newer)?)).ok_or(newer)?;
+    let mut layout = R::Layout::default();
+    match layout.as_mut_bytes().get_mut(..length) {
+        Some(into) if rest.len() == length => into.copy_from_slice(rest),
+        _ => return Err(RecordError::Length),
+    }
+    R::from_layout(&layout)
+}
+
+#[cfg(test)]
+mod tests {
+    use zerocopy::little_endian::{F32, U16};
+
+    use super::*;
+
+    #[derive(FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
+    #[repr(C)]
+    struct Layout {
+        number: U16,
+        /// Since schema 2.
+        share: F32,
+        /// Since schema 3.
+        word: [u8; 3],
+    }
+
+    impl Default for Layout {
+        fn default() -> Self {
+            Self { number: U16::new(0), share: F32::new(0.5), word: *b"new" }
+        }
+    }
+
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Value {
+        number: u16,
+        share: f32,
+        word: [u8; 3],
+    }
+
+    impl Kept for Value {
+        type Layout = Layout;
+        const LENGTHS: &'static [usize] = &[2, 6, 9];
+
+        fn to_layout(&self) -> Layout {
+            Layout { number: U16::new(self.number), share: F32::new(self.share), word: self.word }
+        }
+
+        fn from_layout(layout: &Layout) -> Result<Self, RecordError> {
+            let share = layout.share.get();
+            if !(0.0..=1.0).contains(&share) {
+                return Err(RecordError::Range);
+            }
+            Ok(Self { number: layout.number.get(), share, word: layout.word })
+        }
+    }
+
+    const VALUE: Value = Value { number: 0x1234, share: 0.25, word: *b"abc" };
+
+    #[test]
+    fn a_record_comes_back_as_it_was() {
+        let mut bytes = [0; 16];
+        let length = encode(&VALUE, &mut bytes).unwrap();
+        assert_eq!(&bytes[..length], &[3, 0, 0x34, 0x12, 0, 0, 0x80, 0x3E, b'a', b'b', b'c']);
+        assert_eq!(decode::<Value>(&bytes[..length]), Ok(VALUE));
+    }
+
+    #[test]
+    fn an_older_record_takes_the_defaults_of_what_it_lacks() {
+        assert_eq!(decode::<Value>(&[1, 0, 7, 0]), Ok(Value { number: 7, share: 0.5, word: *b"new" }));
+        let second = [2, 0, 7, 0, 0, 0, 0x80, 0x3E];
+        assert_eq!(decode::<Value>(&second), Ok(Value { number: 7, share: 0.25, word: *b"new" }));
+    }
+
+    #[test]
+    fn newer_cut_long_and_senseless_records_are_refused_by_name() {
+        let newer = |schema| Err(RecordError::Newer { schema });
+        assert_eq!(decode::<Value>(&[4, 0, 7, 0]), newer(4));
+        assert_eq!(decode::<Value>(&[0, 0, 7, 0]), newer(0));
+        assert_eq!(decode::<Value>(&[0xFF; 11]), newer(0xFFFF));
+        for bytes in [&[][..], &[1], &[1, 0], &[1, 0, 7], &[1, 0, 7, 0, 0], &[3, 0, 7, 0]] {
+            assert_eq!(decode::<Value>(bytes), Err(RecordError::Length), "{bytes:?}");
+        }
+        let nan = [2, 0, 7, 0, 0, 0, 0xC0, 0x7F];
+        assert_eq!(decode::<Value>(&nan), Err(RecordError::Range));
+    }
+
+    #[test]
+    fn what_would_not_be_taken_back_is_not_kept() {
+        let wrong = Value { share: f32::INFINITY, ..VALUE };
+        assert_eq!(encode(&wrong, &mut [0; 16]), Err(RecordError::Range));
+        assert_eq!(encode(&VALUE, &mut [0; 10]), Err(RecordError::Length));
+        assert_eq!(encode(&VALUE, &mut [0; 1]), Err(RecordError::Length));
+    }
+
+    #[test]
+    fn no_byte_string_makes_the_reader_panic() {
+        let mut state = 1_u32;
+        for length in 0..40 {
+            for _ in 0..200 {
+                let mut bytes = [0; 40];
+                for byte in &mut bytes {
+                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    *byte = (state >> 24) as u8;
+                }
+                bytes[1] = 0;
+                bytes[0] %= 5;
+                let _ = decode::<Value>(&bytes[..length]);
+            }
+        }
+    }
+}

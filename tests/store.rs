@@ -1,0 +1,330 @@
+//! What is remembered over the power, against a flash whose power fails at any byte.
+
+use embassy_futures::block_on;
+use hal_sim::flash::{Flash, FlashError};
+use scarab::leg::{
+    Constant, CounterDirection, DriveState, ElectricalAngle, EncoderSetting, Fault, FaultCode, Fingerprint,
+    StoredCalibration, StoredModel, Stribeck,
+};
+use scarab::store::{
+    JointProvenance, KeptCalibration, KeptModel, Key, LoadError, Permit, Provenance, RecordError, SaveError,
+    Saved, Store, UnfitRange,
+};
+use scarab::units::{Celsius, Henry, Metre, NewtonMetre, NewtonMetrePerAmpere, Ohm};
+
+/// Short sectors, so that every byte of every operation can be the last one.
+const SECTOR: usize = 2048;
+type Small = Flash<SECTOR, 2>;
+/// As on the board: two sectors of 128 KB.
+type Board = Flash<{ 128 * 1024 }, 2>;
+
+fn permit() -> Permit {
+    Permit::of(DriveState::SwitchOnDisabled).expect("the drive is off")
+}
+
+fn calibration(number: u32) -> KeptCalibration {
+    KeptCalibration(StoredCalibration {
+        resistance: Ohm(0.05 + number as f32 * 1e-4),
+        direct_inductance: Henry(2.5e-5),
+        quadrature_inductance: Henry(3.1e-5),
+        offset: ElectricalAngle::from_units(number.wrapping_mul(0x9E37_79B9).cast_signed()),
+        encoder: EncoderSetting { counter: CounterDirection::Down, pole_pairs: 7, counts_per_turn: 8192 },
+    })
+}
+
+fn model(number: u32) -> KeptModel<2> {
+    let value = |joint: usize, index: usize| number as f32 + joint as f32 * 0.5 - index as f32 * 0.125;
+    KeptModel {
+        model: StoredModel {
+            fingerprint: Fingerprint(0x0123_4567_89AB_CDEF ^ u64::from(number)),
+            parameters: [0, 1].map(|joint| core::array::from_fn(|index| value(joint, index))),
+            stribeck: [Stribeck { excess: 0.3, velocity: 0.05 }; 2],
+            constant: [Constant::Offset, Constant::Asymmetry],
+        },
+        provenance: Provenance {
+            firmware: [0, 1, 0],
+            generation: number,
+            swarm_seed: 0xFEDC_BA98_7654_3210,
+            bridge: Some(Celsius(41.5)),
+            worn: Some(number.is_multiple_of(2)),
+            joints: [0.44, 0.42].map(|length| JointProvenance {
+                length: Metre(length),
+                torque_per_ampere: NewtonMetrePerAmpere(3.2),
+                rms: NewtonMetre(0.4),
+                mean_absolute: NewtonMetre(11.9),
+            }),
+        },
+    }
+}
+
+fn store<const BYTES: usize>(flash: Flash<BYTES, 2>) -> Store<Flash<BYTES, 2>> {
+    Store::new(flash, 0..2 * BYTES as u32).expect("two sectors")
+}
+
+/// All that is kept in a flash, read by a firmware that has just started.
+#[derive(Clone, Debug, PartialEq)]
+struct Content {
+    calibrations: [Option<KeptCalibration>; 2],
+    model: Option<KeptModel<2>>,
+    objects: [Option<Vec<u8>>; 2],
+}
+
+fn content<const BYTES: usize>(flash: Flash<BYTES, 2>) -> Result<(Content, Flash<BYTES, 2>), LoadError> {
+    let mut store = store(flash);
+    let mut bytes = [0; 512];
+    let calibrations = [block_on(store.load(Key::Calibration1))?, block_on(store.load(Key::Calibration2))?];
+    let model = block_on(store.load(Key::Model))?;
+    let mut objects = [None, None];
+    for (object, key) in objects.iter_mut().zip([Key::Objects1, Key::Objects2]) {
+        *object = block_on(store.load_bytes(key, &mut bytes))?.map(|length| bytes[..length].to_vec());
+    }
+    Ok((Content { calibrations, model, objects }, store.into_flash()))
+}
+
+/// The `number`th thing an operator has kept.
+fn keep<const BYTES: usize>(store: &mut Store<Flash<BYTES, 2>>, number: u32) -> Result<Saved, SaveError> {
+    let permit = permit();
+    match number % 5 {
+        0 => block_on(store.save(&permit, Key::Calibration1, &calibration(number))),
+        1 => block_on(store.save(&permit, Key::Calibration2, &calibration(number))),
+        2 | 3 => block_on(store.save(&permit, Key::Model, &model(number))),
+        _ => block_on(store.save_bytes(
+            &permit,
+            Key::Objects1,
+            &number.to_le_bytes().repeat(number as usize % 90 + 1),
+        )),
+    }
+}
+
+#[test]
+fn what_is_kept_is_there_after_a_start() {
+    let mut first = store(Small::new(1));
+    for number in 0..5 {
+        assert_eq!(keep(&mut first, number), Ok(Saved::Written), "{number}");
+    }
+    let (found, _) = content(first.into_flash()).unwrap();
+    assert_eq!(found.calibrations, [Some(calibration(0)), Some(calibration(1))]);
+    assert_eq!(found.model, Some(model(3)));
+    assert_eq!(found.objects, [Some(4_u32.to_le_bytes().repeat(5)), None]);
+}
+
+#[test]
+fn nothing_is_there_in_an_empty_flash() {
+    let (found, _) = content(Small::new(1)).unwrap();
+    assert_eq!(found, Content { calibrations: [None; 2], model: None, objects: [None, None] });
+}
+
+#[test]
+fn only_a_drive_that_is_off_may_be_written_to() {
+    let fault = Fault { code: FaultCode::Overspeed, joint: 0 };
+    for state in [
+        DriveState::NotReadyToSwitchOn,
+        DriveState::SwitchOnDisabled,
+        DriveState::ReadyToSwitchOn,
+        DriveState::SwitchedOn,
+        DriveState::Fault { fault },
+    ] {
+        assert!(Permit::of(state).is_some(), "{state:?}");
+    }
+    for state in [
+        DriveState::OperationEnabled,
+        DriveState::QuickStopActive { remaining_ticks: 1 },
+        DriveState::FaultReactionActive { fault, remaining_ticks: 1 },
+    ] {
+        assert!(Permit::of(state).is_none(), "{state:?}");
+    }
+}
+
+/// Every operation of a history that turns both sectors over, cut at every byte it programs or erases.
+#[test]
+fn a_power_cut_at_any_byte_leaves_the_old_or_the_new() {
+    let mut flash = Small::new(7);
+    let mut cuts = 0_u32;
+    let mut torn = [0_u32; 2];
+    for number in 0..40 {
+        let (before, clean) = content(flash.clone()).unwrap();
+        let mut whole = store(clean.clone());
+        keep(&mut whole, number).unwrap();
+        let done = whole.into_flash();
+        let (after, _) = content(done.clone()).unwrap();
+        assert_ne!(before, after, "{number}: nothing was written");
+        for cut in 1..=done.worked() - clean.worked() {
+            let mut dying = clean.clone();
+            dying.fail_after(Some(cut));
+            let mut store = store(dying);
+            let told = keep(&mut store, number);
+            let mut dead = store.into_flash();
+            assert!(dead.is_dead() && told == Err(SaveError::Flash), "{number}, byte {cut}: {told:?}");
+            dead.fail_after(None);
+            let (found, next) =
+                content(dead).unwrap_or_else(|error| panic!("{number}, byte {cut}: {error:?}"));
+            let new = found == after;
+            assert!(new || found == before, "{number}, byte {cut}: neither old nor new:\n{found:?}");
+            torn[usize::from(new)] += 1;
+            // And what is kept after it is kept.
+            let mut again = self::store(next);
+            keep(&mut again, number + 1).unwrap_or_else(|error| panic!("{number}, byte {cut}: {error:?}"));
+            let (last, _) = content(again.into_flash()).unwrap();
+            let (expected, _) = {
+                let mut straight = self::store(if new { done.clone() } else { clean.clone() });
+                keep(&mut straight, number + 1).unwrap();
+                content(straight.into_flash()).unwrap()
+            };
+            assert_eq!(last, expected, "{number}, byte {cut}: after the cut");
+            cuts += 1;
+        }
+        flash = done;
+    }
+    println!("{cuts} cuts: {} left the old, {} the new; erasures {:?}", torn[0], torn[1], flash.erasures());
+    assert!(flash.erasures().iter().all(|erased| *erased >= 1), "{:?}", flash.erasures());
+}
+
+/// A second cut while what the first one left is being repaired.
+#[test]
+fn a_cut_during_the_repair_of_a_cut_leaves_the_old_or_the_new() {
+    let mut flash = Small::new(11);
+    let mut state = 1_u64;
+    let mut draw = |below: u64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) % below
+    };
+    for number in 0..400 {
+        let (before, clean) = content(flash).unwrap();
+        let mut whole = store(clean.clone());
+        keep(&mut whole, number).unwrap();
+        let done = whole.into_flash();
+        let (after, _) = content(done.clone()).unwrap();
+        let mut dying = clean.clone();
+        dying.fail_after(Some(1 + draw((done.worked() - clean.worked()).max(1))));
+        let mut first = store(dying);
+        let _ = keep(&mut first, number);
+        let mut dead = first.into_flash();
+        // Twice more, within what a repair may need: a sector erased and records copied.
+        for _ in 0..2 {
+            dead.fail_after(Some(1 + draw(3 * SECTOR as u64)));
+            let mut again = store(dead);
+            let _ = keep(&mut again, number);
+            dead = again.into_flash();
+        }
+        dead.fail_after(None);
+        let (found, next) = content(dead).unwrap_or_else(|error| panic!("{number}: {error:?}"));
+        assert!(found == before || found == after, "{number}: {found:?}");
+        flash = next;
+    }
+}
+
+/// Corrupt, foreign, older, newer: refused by name or read rightly, never something in between, never a panic.
+#[test]
+fn spoilt_flash_gives_what_was_kept_or_an_error() {
+    let mut kept = store(Small::new(3));
+    for number in 0..5 {
+        keep(&mut kept, number).unwrap();
+    }
+    let flash = kept.into_flash();
+    let (whole, _) = content(flash.clone()).unwrap();
+    let (mut whole_count, mut partly, mut refused) = (0, 0, 0);
+    for bit in 0..8 * 1200 {
+        let mut spoilt = flash.clone();
+        spoilt.bytes_mut()[bit / 8] ^= 1 << (bit % 8);
+        match content(spoilt) {
+            Ok((found, _)) if found == whole => whole_count += 1,
+            Ok((found, _)) => {
+                // What is still there is what was kept once.
+                assert!(found.calibrations[0].is_none() || found.calibrations[0] == whole.calibrations[0]);
+                assert!(found.calibrations[1].is_none() || found.calibrations[1] == whole.calibrations[1]);
+                assert!(found.model.is_none() || found.model == Some(model(2)) || found.model == whole.model);
+                assert!(found.objects[0].is_none() || found.objects[0] == whole.objects[0]);
+                partly += 1;
+            }
+            Err(_) => refused += 1,
+        }
+    }
+    println!(
+        "one bit flipped, of {}: {whole_count} read whole, {partly} in part, {refused} refused",
+        8 * 1200
+    );
+    let mut state = 5_u32;
+    for _ in 0..300 {
+        let mut foreign = Small::new(1);
+        for byte in foreign.bytes_mut() {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *byte = (state >> 24) as u8;
+        }
+        if let Ok((found, _)) = content(foreign) {
+            assert_eq!(found, Content { calibrations: [None; 2], model: None, objects: [None, None] });
+        }
+    }
+}
+
+#[test]
+fn a_foreign_flash_is_usable_once_it_was_erased() {
+    let mut foreign = Small::new(1);
+    foreign.bytes_mut().fill(0x5A);
+    let mut store = store(foreign);
+    block_on(store.forget_all(&permit())).unwrap();
+    assert_eq!(keep(&mut store, 0), Ok(Saved::Written));
+    assert_eq!(block_on(store.load(Key::Calibration1)), Ok(Some(calibration(0))));
+}
+
+#[test]
+fn records_without_sense_are_neither_kept_nor_believed() {
+    let mut store = store(Small::new(1));
+    let mut wrong = calibration(1);
+    wrong.0.resistance = Ohm(f32::NAN);
+    let refused = block_on(store.save(&permit(), Key::Calibration1, &wrong));
+    assert_eq!(refused, Err(SaveError::Record(RecordError::Range)));
+    // A record of another kind under this key, and one of a later firmware.
+    block_on(store.save_bytes(&permit(), Key::Calibration1, &[1, 0, 3])).unwrap();
+    let found = block_on(store.load::<KeptCalibration>(Key::Calibration1));
+    assert_eq!(found, Err(LoadError::Record(RecordError::Length)));
+    block_on(store.save_bytes(&permit(), Key::Calibration1, &[9, 0, 3])).unwrap();
+    let found = block_on(store.load::<KeptCalibration>(Key::Calibration1));
+    assert_eq!(found, Err(LoadError::Record(RecordError::Newer { schema: 9 })));
+    assert_eq!(block_on(store.save_bytes(&permit(), Key::Objects1, &[0; 500])), Err(SaveError::TooLong));
+}
+
+#[test]
+fn a_value_that_is_there_is_not_written_again() {
+    let mut store = store(Small::new(1));
+    keep(&mut store, 2).unwrap();
+    let before = store.into_flash();
+    let mut store = self::store(before.clone());
+    assert_eq!(keep(&mut store, 2), Ok(Saved::Unchanged));
+    assert_eq!(store.into_flash(), before);
+}
+
+#[test]
+fn ranges_that_hold_no_store_are_refused() {
+    for range in [0..SECTOR as u32, 0..3 * SECTOR as u32, 4..2 * SECTOR as u32 + 4, 2 * SECTOR as u32..0] {
+        assert_eq!(Store::new(Small::new(1), range.clone()).err(), Some(UnfitRange), "{range:?}");
+    }
+    assert_eq!(Store::new(Flash::<256, 2>::new(1), 0..512).err(), Some(UnfitRange));
+}
+
+#[test]
+fn a_flash_without_power_is_an_error_of_the_flash() {
+    let mut dead = Small::new(1);
+    dead.fail_after(Some(0));
+    let mut store = store(dead);
+    assert_eq!(block_on(store.load::<KeptModel<2>>(Key::Model)), Err(LoadError::Flash));
+    assert_eq!(keep(&mut store, 0), Err(SaveError::Flash));
+    let _: FlashError = FlashError::NoPower;
+}
+
+/// 10,000 accepted models on the board's sectors.
+#[test]
+fn ten_thousand_models_wear_a_sector_little() {
+    let mut store = store(*Box::new(Board::new(1)));
+    for number in 0..10_000 {
+        assert_eq!(block_on(store.save(&permit(), Key::Model, &model(number))), Ok(Saved::Written));
+    }
+    let flash = store.into_flash();
+    let worked =
+        flash.worked() - flash.erasures().iter().map(|&erased| u64::from(erased)).sum::<u64>() * 128 * 1024;
+    println!(
+        "10,000 models: {worked} bytes programmed, erasures {:?} of 10,000 that a sector stands",
+        flash.erasures()
+    );
+    // 204 bytes a record with its log's: some 640 in a sector.
+    assert!(flash.erasures().iter().all(|&erased| erased <= 15), "{:?}", flash.erasures());
+}
