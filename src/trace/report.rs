@@ -63,8 +63,9 @@ impl Report {
         identification: &Identification<N, B, TAPS, PENDING, W>,
     ) -> Option<Record<N>> {
         let estimate = identification.estimate()?;
+        let source = Source { identification, estimate: &estimate };
         while self.part != Part::Told {
-            if let Some(record) = self.record(identification, &estimate) {
+            if let Some(record) = source.record(self) {
                 self.index += 1;
                 if let Some(record) = record {
                     self.records += 1;
@@ -88,66 +89,57 @@ impl Report {
         }
         None
     }
+}
 
+/// What is told, and the estimate that its records share.
+struct Source<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W> {
+    identification: &'a Identification<N, B, TAPS, PENDING, W>,
+    estimate: &'a Estimate<f32, B>,
+}
+
+impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>
+    Source<'_, N, B, TAPS, PENDING, W>
+where
+    W: BorrowMut<MotionWindow<f32, N, B>>,
+{
     /// The record at `index` of this part: `None` where the part ends, `Some(None)` where there is none at this place.
-    fn record<
-        const N: usize,
-        const B: usize,
-        const TAPS: usize,
-        const PENDING: usize,
-        W: BorrowMut<MotionWindow<f32, N, B>>,
-    >(
-        &mut self,
-        identification: &Identification<N, B, TAPS, PENDING, W>,
-        estimate: &Estimate<f32, B>,
-    ) -> Option<Option<Record<N>>> {
-        let index = self.index;
-        match self.part {
-            Part::Solver => (index == 0).then(|| solver(identification)),
-            Part::Parameters => (index < N * PARAMETERS).then(|| parameter(identification, estimate, index)),
-            Part::Base => base(identification, estimate, index).map(Some),
-            Part::Covariance => (index < B * B).then(|| covariance(estimate, index)),
-            Part::Stribeck => (index < N).then(|| stribeck(identification, estimate, index)),
-            Part::Motions => {
-                (index < (VALIDATION_MOTIONS + 1) * (N + 1)).then(|| motion(identification, estimate, index))
-            }
-            Part::Findings => self.finding(identification).map(Some),
+    fn record(&self, report: &mut Report) -> Option<Option<Record<N>>> {
+        let index = report.index;
+        match report.part {
+            Part::Solver => (index == 0).then(|| self.solver()),
+            Part::Parameters => (index < N * PARAMETERS).then(|| self.parameter(index)),
+            Part::Base => self.base(index).map(Some),
+            Part::Covariance => (index < B * B).then(|| self.covariance(index)),
+            Part::Stribeck => (index < N).then(|| self.stribeck(index)),
+            Part::Motions => (index < (VALIDATION_MOTIONS + 1) * (N + 1)).then(|| self.motion(index)),
+            Part::Findings => self.finding(report).map(Some),
             Part::Reasons => {
-                let name = identification.verdict()?.reasons().nth(index)?.name();
+                let name = self.identification.verdict()?.reasons().nth(index)?.name();
                 Some(Some(Record::Reason { reason: name }))
             }
             Part::Verdict => (index == 0).then(|| {
-                let verdict = identification.verdict()?;
+                let verdict = self.identification.verdict()?;
                 let reasons = verdict.reasons().count() as u8;
                 Some(Record::Verdict { verdict: judged(verdict.is_accepted()), reasons })
             }),
-            Part::End => (index == 0).then_some(Some(Record::End { records: self.records })),
+            Part::End => (index == 0).then_some(Some(Record::End { records: report.records })),
             Part::Told => None,
         }
     }
 
-    fn finding<
-        const N: usize,
-        const B: usize,
-        const TAPS: usize,
-        const PENDING: usize,
-        W: BorrowMut<MotionWindow<f32, N, B>>,
-    >(
-        &mut self,
-        identification: &Identification<N, B, TAPS, PENDING, W>,
-    ) -> Option<Record<N>> {
-        let place = self.index % CHUNK;
+    fn finding(&self, report: &mut Report) -> Option<Record<N>> {
+        let place = report.index % CHUNK;
         if place == 0 {
-            self.findings = [None; CHUNK];
-            let (first, slots, mut seen) = (self.index, &mut self.findings, 0_usize);
-            identification.judge_with(&mut |evidence| {
+            report.findings = [None; CHUNK];
+            let (first, slots, mut seen) = (report.index, &mut report.findings, 0_usize);
+            self.identification.judge_with(&mut |evidence| {
                 if let Some(slot) = seen.checked_sub(first).and_then(|place| slots.get_mut(place)) {
                     *slot = Some(*evidence);
                 }
                 seen += 1;
             });
         }
-        let evidence = (*self.findings.get(place)?)?;
+        let evidence = (*report.findings.get(place)?)?;
         Some(Record::Finding {
             reason: evidence.reason.name(),
             test: evidence.test.name(),
@@ -156,6 +148,108 @@ impl Report {
             value: evidence.value,
             limit: evidence.limit,
             passed: evidence.passed,
+        })
+    }
+
+    fn solver(&self) -> Option<Record<N>> {
+        let solver = self.identification.solver()?;
+        let search = solver.search();
+        Some(Record::Solver {
+            plan: match solver.plan() {
+                Plan::OneTime => "one-time",
+                Plan::Sequential => "sequential",
+            },
+            swarm_seed: search.seed(),
+            state: match search.state() {
+                SearchState::Running => "running",
+                SearchState::Done => "done",
+                SearchState::Failed(_) => "failed",
+            },
+            iterations: search.iterations(),
+            evaluations: search.evaluations(),
+            steps: solver.completion().steps(),
+            rank: solver.least_squares().rank() as u8,
+            base: self.identification.model().base.rank() as u8,
+            dropped: solver.record().selection.dropped_count() as u8,
+            condition: known(solver.condition()),
+            consistency_chi2: known(solver.consistency().map(|consistency| consistency.excess)),
+        })
+    }
+
+    fn parameter(&self, index: usize) -> Option<Record<N>> {
+        let joint = index / PARAMETERS;
+        let parameter = *Parameter::ALL.get(index % PARAMETERS)?;
+        let found = self.identification.parameter(self.estimate, joint, parameter)?;
+        Some(Record::Parameter {
+            joint: from_one(Some(joint)),
+            symbol: parameter.symbol(),
+            value: known(found.value),
+            unit: words::unit(parameter),
+            sigma: known(found.sigma),
+            status: found.status.name(),
+        })
+    }
+
+    fn base(&self, index: usize) -> Option<Record<N>> {
+        let found = self.identification.base_parameter(self.estimate, index)?;
+        let (joint, parameter) = found.carrier;
+        Some(Record::Base {
+            index: index as u8,
+            joint: from_one(Some(joint)),
+            symbol: parameter.symbol(),
+            grouped: found.grouped,
+            dropped: found.dropped,
+            value: known(found.value),
+            unit: words::unit(parameter),
+            sigma: known(found.sigma),
+            least_squares: found.least_squares,
+        })
+    }
+
+    fn covariance(&self, index: usize) -> Option<Record<N>> {
+        let (row, column) = (index / B, index % B);
+        let both = *self.estimate.determined.get(row)? && *self.estimate.determined.get(column)?;
+        let value = *self.estimate.covariance.get(row)?.get(column)?;
+        (both && column <= row).then_some(Record::Covariance { row: row as u8, column: column as u8, value })
+    }
+
+    fn stribeck(&self, joint: usize) -> Option<Record<N>> {
+        let fit = self.identification.solver()?.record().stribeck.get(joint)?.as_ref()?;
+        Some(Record::Stribeck {
+            joint: from_one(Some(joint)),
+            surplus_nm: fit.surplus(&self.estimate.values),
+            surplus_sigma_nm: fit.sigma,
+            speed_rad_s: fit.speed,
+            speed_sigma_rad_s: fit.speed_sigma,
+            gain_chi2: fit.gain,
+        })
+    }
+
+    /// Of each motion its own record, then one for each joint.
+    fn motion(&self, index: usize) -> Option<Record<N>> {
+        let (motion, place) = (index / (N + 1), index % (N + 1));
+        let Some(joint) = place.checked_sub(1) else {
+            let record = self.identification.motion(motion)?;
+            return Some(Record::Motion {
+                motion: motion as u8,
+                samples: record.outliers.samples,
+                rejected: record.rejected,
+                longest_common_s: record.outliers.longest_common_s,
+                row_information: record.row_information,
+            });
+        };
+        let fit = self.identification.fit(self.estimate, motion, joint)?;
+        Some(Record::Fit {
+            motion: motion as u8,
+            joint: from_one(Some(joint)),
+            rows: fit.rows,
+            rms_nm: known(fit.rms_nm),
+            mean_abs_nm: fit.mean_absolute_nm,
+            torque_rms_nm: fit.torque_rms_nm,
+            speed_rms_rad_s: fit.speed_rms,
+            disturbed_share: fit.disturbed_share,
+            disturbed_longest_s: fit.disturbed_longest_s,
+            replaced: fit.replaced,
         })
     }
 }
@@ -172,157 +266,4 @@ fn from_one(index: Option<usize>) -> u8 {
 
 fn known(value: Option<f32>) -> f32 {
     value.unwrap_or(f32::NAN)
-}
-
-fn solver<
-    const N: usize,
-    const B: usize,
-    const TAPS: usize,
-    const PENDING: usize,
-    W: BorrowMut<MotionWindow<f32, N, B>>,
->(
-    identification: &Identification<N, B, TAPS, PENDING, W>,
-) -> Option<Record<N>> {
-    let solver = identification.solver()?;
-    let search = solver.search();
-    Some(Record::Solver {
-        plan: match solver.plan() {
-            Plan::OneTime => "one-time",
-            Plan::Sequential => "sequential",
-        },
-        swarm_seed: search.seed(),
-        state: match search.state() {
-            SearchState::Running => "running",
-            SearchState::Done => "done",
-            SearchState::Failed(_) => "failed",
-        },
-        iterations: search.iterations(),
-        evaluations: search.evaluations(),
-        steps: solver.completion().steps(),
-        rank: solver.least_squares().rank() as u8,
-        base: identification.model().base.rank() as u8,
-        dropped: solver.record().selection.dropped_count() as u8,
-        condition: known(solver.condition()),
-        consistency_chi2: known(solver.consistency().map(|consistency| consistency.excess)),
-    })
-}
-
-fn parameter<
-    const N: usize,
-    const B: usize,
-    const TAPS: usize,
-    const PENDING: usize,
-    W: BorrowMut<MotionWindow<f32, N, B>>,
->(
-    identification: &Identification<N, B, TAPS, PENDING, W>,
-    estimate: &Estimate<f32, B>,
-    index: usize,
-) -> Option<Record<N>> {
-    let joint = index / PARAMETERS;
-    let parameter = *Parameter::ALL.get(index % PARAMETERS)?;
-    let found = identification.parameter(estimate, joint, parameter)?;
-    Some(Record::Parameter {
-        joint: from_one(Some(joint)),
-        symbol: parameter.symbol(),
-        value: known(found.value),
-        unit: words::unit(parameter),
-        sigma: known(found.sigma),
-        status: found.status.name(),
-    })
-}
-
-fn base<
-    const N: usize,
-    const B: usize,
-    const TAPS: usize,
-    const PENDING: usize,
-    W: BorrowMut<MotionWindow<f32, N, B>>,
->(
-    identification: &Identification<N, B, TAPS, PENDING, W>,
-    estimate: &Estimate<f32, B>,
-    index: usize,
-) -> Option<Record<N>> {
-    let found = identification.base_parameter(estimate, index)?;
-    let (joint, parameter) = found.carrier;
-    Some(Record::Base {
-        index: index as u8,
-        joint: from_one(Some(joint)),
-        symbol: parameter.symbol(),
-        grouped: found.grouped,
-        dropped: found.dropped,
-        value: known(found.value),
-        unit: words::unit(parameter),
-        sigma: known(found.sigma),
-        least_squares: found.least_squares,
-    })
-}
-
-fn covariance<const N: usize, const B: usize>(
-    estimate: &Estimate<f32, B>,
-    index: usize,
-) -> Option<Record<N>> {
-    let (row, column) = (index / B, index % B);
-    let both = *estimate.determined.get(row)? && *estimate.determined.get(column)?;
-    let value = *estimate.covariance.get(row)?.get(column)?;
-    (both && column <= row).then_some(Record::Covariance { row: row as u8, column: column as u8, value })
-}
-
-fn stribeck<
-    const N: usize,
-    const B: usize,
-    const TAPS: usize,
-    const PENDING: usize,
-    W: BorrowMut<MotionWindow<f32, N, B>>,
->(
-    identification: &Identification<N, B, TAPS, PENDING, W>,
-    estimate: &Estimate<f32, B>,
-    joint: usize,
-) -> Option<Record<N>> {
-    let fit = identification.solver()?.record().stribeck.get(joint)?.as_ref()?;
-    Some(Record::Stribeck {
-        joint: from_one(Some(joint)),
-        surplus_nm: fit.surplus(&estimate.values),
-        surplus_sigma_nm: fit.sigma,
-        speed_rad_s: fit.speed,
-        speed_sigma_rad_s: fit.speed_sigma,
-        gain_chi2: fit.gain,
-    })
-}
-
-/// Of each motion its own record, then one for each joint.
-fn motion<
-    const N: usize,
-    const B: usize,
-    const TAPS: usize,
-    const PENDING: usize,
-    W: BorrowMut<MotionWindow<f32, N, B>>,
->(
-    identification: &Identification<N, B, TAPS, PENDING, W>,
-    estimate: &Estimate<f32, B>,
-    index: usize,
-) -> Option<Record<N>> {
-    let (motion, place) = (index / (N + 1), index % (N + 1));
-    let Some(joint) = place.checked_sub(1) else {
-        let record = identification.motion(motion)?;
-        return Some(Record::Motion {
-            motion: motion as u8,
-            samples: record.outliers.samples,
-            rejected: record.rejected,
-            longest_common_s: record.outliers.longest_common_s,
-            row_information: record.row_information,
-        });
-    };
-    let fit = identification.fit(estimate, motion, joint)?;
-    Some(Record::Fit {
-        motion: motion as u8,
-        joint: from_one(Some(joint)),
-        rows: fit.rows,
-        rms_nm: known(fit.rms_nm),
-        mean_abs_nm: fit.mean_absolute_nm,
-        torque_rms_nm: fit.torque_rms_nm,
-        speed_rms_rad_s: fit.speed_rms,
-        disturbed_share: fit.disturbed_share,
-        disturbed_longest_s: fit.disturbed_longest_s,
-        replaced: fit.replaced,
-    })
 }
