@@ -39,6 +39,9 @@ pub struct AxisCommand {
 impl AxisCommand {
     /// Bridge released.
     pub const RELEASED: Self = Self { enabled: false, duty: [0.5; 3] };
+
+    /// Low sides on all the time: the motor brakes itself through its own resistance.
+    pub const BRAKE: Self = Self { enabled: true, duty: [0.0; 3] };
 }
 
 /// What one joint's sensors say at a servo tick.

@@ -37,6 +37,10 @@ pub const fn axis_code(fault: AxisFault) -> FaultCode {
         AxisFault::BusVoltage => FaultCode::BusVoltage,
         AxisFault::Encoder => FaultCode::EncoderPlace,
         AxisFault::NotANumber => FaultCode::NotFinite,
+        AxisFault::EncoderFrozen => FaultCode::EncoderFrozen,
+        AxisFault::OpenPhase => FaultCode::OpenPhase,
+        AxisFault::CurrentZero => FaultCode::CurrentZero,
+        AxisFault::StuckConversion => FaultCode::StuckConversion,
     }
 }
 

@@ -13,13 +13,17 @@
 //! **Borders.** A target that is not a number, a voltage that is none, a current beyond the bound release the bridge in the
 //! same tick. A saturated amplifier, a bus voltage out of range and an encoder step that no motor makes have one tick of
 //! patience, in which the duties of the tick before are kept; the second in a row releases. A single step that was not believed is
-//! told with the joint's sample, and three of them in 10 ms are the servo's fault (`safety::Monitor`). Released stays released until
-//! [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases at once, whether or
+//! told with the joint's sample, and three of them in 10 ms are the servo's fault (`safety::Monitor`). A code that stays while its
+//! phase is asked for something else, and shunts that do not begin at zero, release as well ([`ShuntWatch`]). Released stays released
+//! until [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases at once, whether or
 //! not anything switches: counts were lost, and with them the angle.
 //!
-//! **Known limit.** A counter that stops while current flows looks like a rotor that is held: the current keeps its direction,
-//! the torque falls with the cosine of what is missed and the rotor comes to rest a quarter of an electrical turn further. The servo's
-//! following error is what sees it; so does the index, where counts come back too few. Without an index lost counts are not seen.
+//! Once per joint sample the voltages are held against currents and speed ([`ModelWatch`]): an open phase and a drifted zero
+//! release, a frozen counter makes the motor a passive brake ([`Axis::brake`]), since a leg whose encoder is gone should not drop.
+//!
+//! **Known limit.** Below the speed that [`ModelWatch`] derives a counter that stops looks like a rotor that is held: the current keeps
+//! its direction, the torque falls with the cosine of what is missed and the rotor comes to rest a quarter of an electrical turn
+//! further. The index sees it where counts come back too few. Without an index lost counts are not seen.
 //!
 //! **Signs.** Inside, positive current makes torque towards growing electrical angle. Outside, counts and current both grow
 //! with the joint's flexion: [`AxisConfiguration::flexion`] says which way the counter runs then.
@@ -29,7 +33,8 @@
 use super::calibration::INDEX_WIDTH;
 use super::configuration::{AxisConfiguration, AxisError, Constants};
 use super::current_loop::DELAY_PERIODS;
-use super::{Calibration, CurrentLoop, Rotating, SpeedTracker};
+use super::model_watch::Shown;
+use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, ShuntWatch, SpeedTracker};
 use crate::hal::{AxisCommand, AxisSample, JointSample};
 use crate::real::{clamp, is_finite};
 use crate::units::{Ampere, RadianPerSecond};
@@ -65,6 +70,22 @@ pub enum AxisFault {
     Encoder,
     /// Target or voltage not a number.
     NotANumber,
+    /// The counter stands still while the motor turns. The motor is a brake until the fault is cleared; the place is lost.
+    EncoderFrozen,
+    /// The voltage is not that of the current: a phase does not conduct.
+    OpenPhase,
+    /// The shunts' zeros drifted.
+    CurrentZero,
+    /// A shunt's code stays while its phase is asked for another current.
+    StuckConversion,
+}
+
+/// What the bridge is to do in a tick.
+#[derive(Clone, Copy, PartialEq)]
+enum Wish {
+    Released,
+    Follow(Ampere),
+    Brake,
 }
 
 /// One axis; see the module.
@@ -81,6 +102,8 @@ pub struct Axis {
     counts: i32,
     measured: Rotating<Ampere>,
     window: Window,
+    model_watch: ModelWatch,
+    shunt_watch: ShuntWatch,
     last: AxisCommand,
     doubtful: bool,
     /// A count since the last joint sample was not believed.
@@ -110,6 +133,8 @@ impl Axis {
             counts: 0,
             measured: Rotating::default(),
             window: Window::EMPTY,
+            model_watch: ModelWatch::EMPTY,
+            shunt_watch: ShuntWatch::EMPTY,
             last: AxisCommand::RELEASED,
             doubtful: false,
             disbelieved: false,
@@ -125,7 +150,24 @@ impl Axis {
 
     /// One PWM period: what the bridge does in the next one.
     pub fn tick(&mut self, sample: &AxisSample, request: AxisRequest) -> AxisCommand {
-        self.last = self.step(sample, request).unwrap_or_else(|fault| {
+        let wish = match (request.enabled, self.fault) {
+            (true, Some(AxisFault::EncoderFrozen)) => Wish::Brake,
+            (true, None) => Wish::Follow(request.current),
+            _ => Wish::Released,
+        };
+        self.obey(sample, wish)
+    }
+
+    /// One PWM period in which the motor is a passive brake, below the overcurrent bound; an axis with another fault than a frozen
+    /// counter stays released.
+    pub fn brake(&mut self, sample: &AxisSample) -> AxisCommand {
+        let brakes = matches!(self.fault, None | Some(AxisFault::EncoderFrozen));
+        self.obey(sample, if brakes { Wish::Brake } else { Wish::Released })
+    }
+
+    #[inline(always)]
+    fn obey(&mut self, sample: &AxisSample, wish: Wish) -> AxisCommand {
+        self.last = self.step(sample, wish).unwrap_or_else(|fault| {
             self.fault = Some(fault);
             self.current_loop.reset();
             AxisCommand::RELEASED
@@ -133,7 +175,7 @@ impl Axis {
         self.last
     }
 
-    fn step(&mut self, sample: &AxisSample, request: AxisRequest) -> Result<AxisCommand, AxisFault> {
+    fn step(&mut self, sample: &AxisSample, wish: Wish) -> Result<AxisCommand, AxisFault> {
         let constants = &self.constants;
         let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
         let plausible = step.abs() <= constants.greatest_step;
@@ -143,15 +185,16 @@ impl Axis {
             self.place = constants.scale.moved(self.place, constants.counter_sign * step);
             if let Some(at) = sample.index_count
                 && constants.indexed
+                && wish != Wish::Brake
                 && self.index_distance(at) > INDEX_WIDTH + step.abs() / INDEX_LATENCY
             {
                 return Err(AxisFault::Encoder);
             }
         }
-        let angle = constants.scale.angle(self.place).plus(constants.offset);
+        let angle = self.angle();
         self.speed.track(angle);
         let currents = constants.sense.currents(sample.shunt_codes, constants.zeros);
-        let switching = request.enabled && self.fault.is_none();
+        let switching = wish != Wish::Released;
         self.measured = match currents {
             Some(currents) => currents.to_rotating(angle.rotation(constants.sine)),
             None if switching => self.measured,
@@ -160,11 +203,12 @@ impl Axis {
         self.window.push(self.counts, self.measured.q.0 * constants.current_sign);
 
         let [low, high] = constants.bus_codes;
-        let doubt = if !plausible {
+        // A motor that brakes needs neither place nor bus.
+        let doubt = if !plausible && wish != Wish::Brake {
             Some(AxisFault::Encoder)
         } else if switching && currents.is_none() {
             Some(AxisFault::CurrentSense)
-        } else if switching && !(low..=high).contains(&sample.bus_code) {
+        } else if switching && wish != Wish::Brake && !(low..=high).contains(&sample.bus_code) {
             Some(AxisFault::BusVoltage)
         } else {
             None
@@ -179,19 +223,32 @@ impl Axis {
         }
         self.doubtful = false;
         if !switching {
+            if let Some(currents) = currents {
+                self.shunt_watch.released(currents);
+            }
             self.current_loop.reset();
             return Ok(AxisCommand::RELEASED);
-        }
-        if !is_finite(request.current.0) {
-            return Err(AxisFault::NotANumber);
         }
         let (d, q) = (self.measured.d.0, self.measured.q.0);
         if d * d + q * q > constants.overcurrent_square {
             return Err(AxisFault::Overcurrent);
         }
+        let Wish::Follow(wanted) = wish else {
+            self.current_loop.reset();
+            return Ok(AxisCommand::BRAKE);
+        };
+        if !is_finite(wanted.0) {
+            return Err(AxisFault::NotANumber);
+        }
+        if !self.last.enabled {
+            self.model_watch = ModelWatch::EMPTY;
+            if !self.shunt_watch.begins_at_zero() {
+                return Err(AxisFault::CurrentZero);
+            }
+        }
         let bus = constants.sense.bus(sample.bus_code);
         let limit = constants.current_limit;
-        let target = Ampere(clamp(request.current.0 * constants.current_sign, -limit, limit));
+        let target = Ampere(clamp(wanted.0 * constants.current_sign, -limit, limit));
         let voltage = self.current_loop.voltage(
             &constants.gains,
             target,
@@ -204,8 +261,17 @@ impl Axis {
         }
         let acting = self.speed.ahead(angle, DELAY_PERIODS).rotation(constants.sine);
         let target = Rotating { d: Ampere::ZERO, q: target }.to_stationary(acting);
+        if self.shunt_watch.is_stuck(sample.shunt_codes, target) {
+            return Err(AxisFault::StuckConversion);
+        }
         let duty = constants.modulator.duties(voltage.to_stationary(acting), 1.0 / bus.0, target);
         Ok(AxisCommand { enabled: true, duty })
+    }
+
+    /// Of the place.
+    #[inline(always)]
+    fn angle(&self) -> ElectricalAngle {
+        self.constants.scale.angle(self.place).plus(self.constants.offset)
     }
 
     /// From the place where the index came to where it belongs, counts. Once per turn of the motor: kept out of the way of the
@@ -221,7 +287,22 @@ impl Axis {
 
     /// Means of count and current since the last call, in the joint's sense; both of the same ticks, so that they belong to one
     /// instant, 2.5 ticks (104 us) before the last of six. Without a tick since then the newest values.
+    ///
+    /// Holds the voltages against currents and speed meanwhile, once per call: what is found is a fault from here on, and acts from
+    /// the next tick on.
     pub fn joint_sample(&mut self) -> JointSample {
+        if self.last.enabled && self.fault.is_none() && self.window.ticks > 0 {
+            let angle = self.angle();
+            let shown = Shown {
+                current_loop: &self.current_loop,
+                current: self.measured,
+                speed_rad_per_s: self.speed.rad_per_s(),
+                place: self.place,
+                angle,
+                sine: self.constants.sine,
+            };
+            self.fault = self.model_watch.look(&self.constants.model, &shown);
+        }
         let sample = self.window.mean().unwrap_or(JointSample {
             encoder_counts: self.counts,
             current: self.measured.q * self.constants.current_sign,
@@ -251,7 +332,7 @@ impl Axis {
 
     /// Forgets a fault, so that a request may enable again; `false` where the place was lost.
     pub fn clear_fault(&mut self) -> bool {
-        let lost = self.fault == Some(AxisFault::Encoder);
+        let lost = matches!(self.fault, Some(AxisFault::Encoder | AxisFault::EncoderFrozen));
         if !lost {
             self.fault = None;
         }

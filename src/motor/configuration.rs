@@ -2,7 +2,7 @@
 
 use super::{
     BridgeTiming, Calibration, CountScale, CurrentGains, DeadTime, ElectricalAngle, EncoderSetting,
-    Modulator, MotorConstants, SenseScale, Sine,
+    ModelLimits, Modulator, MotorConstants, SenseScale, Sine,
 };
 use crate::hal::CURRENT_RATE_HZ;
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
@@ -157,6 +157,7 @@ pub(super) struct Constants {
     pub sine: Sine,
     pub gains: CurrentGains,
     pub modulator: Modulator,
+    pub model: ModelLimits,
     pub current_limit: f32,
     pub overcurrent_square: f32,
 }
@@ -178,12 +179,13 @@ impl Constants {
         };
         let gains = CurrentGains::new(&motor, configuration.bandwidth, configuration.feedforward)
             .ok_or(AxisError::Motor)?;
+        let scale = configuration.scale()?;
         let signs = [configuration.counter.sign(), configuration.flexion.sign()];
         Ok(Self {
             sense: configuration.sense,
             zeros: calibration.zeros(),
             bus_codes: configuration.bus_codes(),
-            scale: configuration.scale()?,
+            scale,
             offset: calibration.offset(),
             indexed: calibration.indexed(),
             counter_sign: signs[0],
@@ -193,6 +195,7 @@ impl Constants {
             sine: configuration.sine,
             gains,
             modulator: configuration.modulator()?,
+            model: ModelLimits::new(configuration, &motor, scale),
             current_limit: configuration.current_limit.0,
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
         })

@@ -139,6 +139,12 @@ impl CurrentLoop {
         Rotating { d: Volt(given.d), q: Volt(given.q) }
     }
 
+    /// The integrals: what the voltages given so far, less what is fed forward, make of the current, times the resistance.
+    #[must_use]
+    pub(super) fn integral_v(&self) -> Rotating<f32> {
+        self.integral_v
+    }
+
     /// Empties the integrals.
     pub fn reset(&mut self) {
         *self = Self::default();

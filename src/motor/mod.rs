@@ -13,6 +13,7 @@
 //! | [`CurrentLoop`] | PI in d and q, feedforward, voltage limit, anti-windup |
 //! | [`Modulator`] | space vectors, room for the sample, dead time |
 //! | [`Axis`] | all of it in one tick, with the borders that release |
+//! | [`ModelWatch`], [`ShuntWatch`] | what voltages, currents and codes say about each other |
 //! | [`calibration`] | measures and refuses; the only source of a [`Calibration`] |
 //! | [`Chopper`] | what the supply does not take back, into the brake resistor |
 //! | [`mod@reference`] | the joint's zero: an end stop or a stated pose |
@@ -27,9 +28,11 @@ pub mod chopper;
 pub mod configuration;
 pub mod current_loop;
 pub mod frames;
+pub mod model_watch;
 pub mod modulation;
 pub mod reference;
 pub mod sense;
+pub mod shunt_watch;
 pub mod transmission;
 
 pub use angle::{CountScale, ElectricalAngle, Rotation, Sine, SpeedTracker};
@@ -42,8 +45,10 @@ pub use chopper::{BrakeBudget, Chopper, GREATEST_BRAKE_DUTY};
 pub use configuration::{AxisConfiguration, AxisError, Direction};
 pub use current_loop::{CurrentGains, CurrentLoop, MotorConstants};
 pub use frames::{Phases, Quantity, Rotating, Stationary};
+pub use model_watch::{ModelLimits, ModelWatch};
 pub use modulation::{BridgeTiming, DeadTime, Modulator};
 pub use sense::SenseScale;
+pub use shunt_watch::ShuntWatch;
 pub use transmission::{Transmission, TransmissionConfiguration};
 
 #[cfg(test)]

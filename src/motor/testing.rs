@@ -51,6 +51,8 @@ pub(super) struct TestMotor {
     pub encoder_zero: f64,
     pub encoder_sign: f64,
     pub encoder_dead: bool,
+    /// The wire of phase A is broken.
+    pub open: bool,
     /// Width of the index pulse, counts: its other end is seen on the way back.
     pub index_width: i64,
     /// What the converter makes of the currents of B and C.
@@ -85,6 +87,7 @@ impl Default for TestMotor {
             encoder_zero: 0.137,
             encoder_sign: 1.0,
             encoder_dead: false,
+            open: false,
             index_width: 0,
             shunts: |currents| currents,
             current: [0.0; 2],
@@ -174,6 +177,11 @@ impl TestMotor {
             self.current[0] += STEP_S * (vd - self.resistance * id + electrical_speed * lq * iq) / ld;
             self.current[1] +=
                 STEP_S * (vq - self.resistance * iq - electrical_speed * (ld * id + self.flux)) / lq;
+            if self.open {
+                // What flows in at B flows out at C.
+                let across = sine * self.current[0] + cosine * self.current[1];
+                self.current = [sine * across, cosine * across];
+            }
         } else {
             self.current = [0.0; 2];
         }

@@ -82,6 +82,14 @@ faults! {
     EncoderStep = 0x7305, "E2", "encoder_step", Damp, "its encoder jumped";
     /// Counts were lost, and with them the rotor's angle: only a new calibration helps.
     EncoderPlace = 0xFF02, "E4", "encoder_place", Off, "its counts jumped or the index came at another place";
+    /// The counter stands still while the motor's voltage says that it turns.
+    EncoderFrozen = 0xFF09, "E1", "encoder_frozen", Short, "its encoder stopped while the motor turned";
+    /// A phase takes voltage and no current.
+    OpenPhase = 0xFF0A, "P1", "open_phase", Off, "a phase does not conduct";
+    /// A shunt shows a current that does not flow.
+    CurrentZero = 0xFF0B, "C1", "current_zero", Off, "the zero of its current drifted";
+    /// A shunt's code stays while its phase is asked for another current.
+    StuckConversion = 0xFF0C, "C3", "stuck_conversion", Off, "a conversion is stuck";
     /// A shunt amplifier at its rail, two ticks in a row (5210: measuring circuits).
     CurrentSense = 0x5210, "C2", "current_sense", Off, "a shunt amplifier stayed at its rail";
     /// One shunt's conversion ended without the other's.
@@ -149,6 +157,10 @@ mod tests {
         let numbers = [
             (FaultCode::EncoderStep, 0x7305),
             (FaultCode::EncoderPlace, 0xFF02),
+            (FaultCode::EncoderFrozen, 0xFF09),
+            (FaultCode::OpenPhase, 0xFF0A),
+            (FaultCode::CurrentZero, 0xFF0B),
+            (FaultCode::StuckConversion, 0xFF0C),
             (FaultCode::CurrentSense, 0x5210),
             (FaultCode::Conversion, 0xFF03),
             (FaultCode::Overcurrent, 0x2310),

@@ -35,6 +35,8 @@ pub enum Cause {
     Axis1,
     /// The second axis did.
     Axis2,
+    /// An axis found its counter frozen: both brake.
+    EncoderFrozen,
     /// A bridge is too hot.
     Temperature,
     /// A thermistor is open or shorted.
@@ -59,12 +61,13 @@ pub enum Cause {
 
 impl Cause {
     /// All of them, in the order of their bits.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::EmergencyStop,
         Self::GateFault,
         Self::GateConfiguration,
         Self::Axis1,
         Self::Axis2,
+        Self::EncoderFrozen,
         Self::Temperature,
         Self::Thermistor,
         Self::CurrentTicks,
@@ -85,6 +88,7 @@ impl Cause {
             Self::GateFault => FaultCode::GateFault,
             Self::GateConfiguration => FaultCode::GateConfiguration,
             Self::Axis1 | Self::Axis2 => return None,
+            Self::EncoderFrozen => FaultCode::EncoderFrozen,
             Self::Temperature => FaultCode::Temperature,
             Self::Thermistor => FaultCode::Thermistor,
             Self::CurrentTicks => FaultCode::CurrentTicks,
@@ -115,6 +119,16 @@ impl Cause {
         1 << self as u8
     }
 
+    /// What an axis (from 0) that found a fault of its own raises.
+    #[must_use]
+    pub const fn of_axis(axis: usize, code: FaultCode) -> Self {
+        match (code, axis) {
+            (FaultCode::EncoderFrozen, _) => Self::EncoderFrozen,
+            (_, 0) => Self::Axis1,
+            _ => Self::Axis2,
+        }
+    }
+
     /// Nothing the operator does makes this good: only another board, other constants or another start.
     #[must_use]
     pub const fn is_for_ever(self) -> bool {
@@ -125,6 +139,32 @@ impl Cause {
     #[must_use]
     pub const fn for_ever() -> u32 {
         Self::Timers.bit() | Self::BoardVersion.bit() | Self::Configuration.bit()
+    }
+}
+
+/// What both bridges do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bridges {
+    /// What the servo asks for.
+    Follow,
+    /// Low sides on: the motors brake themselves. Needs a healthy gate driver, and an axis that keeps its currents below the
+    /// bound, or releases.
+    Brake,
+    /// Nothing.
+    Release,
+}
+
+impl Bridges {
+    /// What follows from the bits of all causes: to brake where nothing speaks against it but what led there.
+    #[inline(always)]
+    #[must_use]
+    pub const fn of(causes: u32) -> Self {
+        const BRAKE: u32 = Cause::EncoderFrozen.bit();
+        match causes {
+            0 => Self::Follow,
+            BRAKE => Self::Brake,
+            _ => Self::Release,
+        }
     }
 }
 
@@ -224,6 +264,19 @@ mod tests {
         let expected = [false, false, true, true, false, true, true, true];
         assert_eq!(seen.map(|(missed, _)| missed), expected);
         assert_eq!(seen.map(|(_, bits)| bits), [0, 0, 0, 0, 0, 0, 0, given_up]);
+    }
+
+    #[test]
+    fn bridges_brake_only_while_nothing_else_speaks_against_it() {
+        let frozen = Cause::EncoderFrozen.bit();
+        assert_eq!((Bridges::of(0), Bridges::of(frozen)), (Bridges::Follow, Bridges::Brake));
+        for cause in Cause::ALL.into_iter().filter(|cause| *cause != Cause::EncoderFrozen) {
+            assert_eq!(
+                [cause.bit(), cause.bit() | frozen].map(Bridges::of),
+                [Bridges::Release; 2],
+                "{cause:?}"
+            );
+        }
     }
 
     #[test]

@@ -34,7 +34,7 @@ pub mod step_gate;
 
 pub use barrier::{Barrier, Limited};
 pub use fault::{Fault, FaultCode, Reaction};
-pub use interlock::{Cause, ServoWatch, TickState, TickWatch};
+pub use interlock::{Bridges, Cause, ServoWatch, TickState, TickWatch};
 pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
 pub use monitor::{Decision, Monitor, Observation, Refusal, RefusalReason, Request};
 pub use state::{DriveState, Event, Permission, PowerRequest};

@@ -18,8 +18,9 @@ use super::statistics;
 use crate::board::odrive_v3_6::settings::{CLOCK_HZ, analog, drives};
 use crate::board::odrive_v3_6::{brake, bridge, contacts, converter, encoder, interrupts};
 use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, JointSample};
-use crate::motor::{Axis, AxisRequest, BrakeBudget, CalibrationStep, Calibrator, Chopper};
-use crate::safety::{ServoWatch, TickState, TickWatch};
+use crate::leg::axis_code;
+use crate::motor::{Axis, AxisFault, AxisRequest, BrakeBudget, CalibrationStep, Calibrator, Chopper};
+use crate::safety::{Bridges, ServoWatch, TickState, TickWatch};
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::Volt;
 
@@ -53,7 +54,8 @@ struct AxisLoop {
     /// Cycle counter at the last tick.
     last: Option<u32>,
     watch: TickWatch,
-    faulted: bool,
+    /// What was told of.
+    faulted: Option<AxisFault>,
 }
 
 /// What level 0 works on.
@@ -84,7 +86,7 @@ impl CurrentLoops {
             ticks: 0,
             last: None,
             watch: TickWatch::default(),
-            faulted: false,
+            faulted: None,
         });
         let [begin, full] = drives::chopper(divider);
         let chopper = if HAS_BRAKE_RESISTOR { Chopper::new(begin, full) } else { None };
@@ -112,11 +114,11 @@ impl CurrentLoops {
             encoder_count: encoder::count(axis),
             index_count: encoder::index(axis),
         };
-        let allowed = interlock::is_clear();
-        if !allowed {
+        let bridges = Bridges::of(interlock::causes());
+        if bridges == Bridges::Release {
             bridge::release_all();
         }
-        let command = this.step(axis, &sample, allowed);
+        let command = this.step(axis, &sample, bridges);
         bridge::set(axis, &command);
         this.ticks += 1;
         if this.ticks >= TICKS_PER_SERVO {
@@ -182,13 +184,13 @@ impl AxisLoop {
         }
     }
 
-    fn step(&mut self, axis: usize, sample: &AxisSample, allowed: bool) -> AxisCommand {
+    fn step(&mut self, axis: usize, sample: &AxisSample, bridges: Bridges) -> AxisCommand {
         if self.orders.ready() {
             self.obey();
         }
         match &mut self.stage {
             Stage::Off => AxisCommand::RELEASED,
-            Stage::Calibrating(_) if !allowed => {
+            Stage::Calibrating(_) if bridges != Bridges::Follow => {
                 self.end_calibration(Outcome::Interrupted);
                 AxisCommand::RELEASED
             }
@@ -204,13 +206,19 @@ impl AxisLoop {
                 }
             },
             Stage::Running(running) => {
-                let request = if allowed { target(axis) } else { AxisRequest::RELEASED };
-                let command = running.tick(sample, request);
-                if let Some(fault) = running.fault().filter(|_| !self.faulted) {
-                    self.faulted = true;
-                    interlock::raise(if axis == 0 { Cause::Axis1 } else { Cause::Axis2 });
-                    // A fault of one axis takes the other.
-                    bridge::release_all();
+                let command = match bridges {
+                    Bridges::Follow => running.tick(sample, target(axis)),
+                    Bridges::Brake => running.brake(sample),
+                    Bridges::Release => running.tick(sample, AxisRequest::RELEASED),
+                };
+                if let Some(fault) = running.fault().filter(|fault| self.faulted != Some(*fault)) {
+                    self.faulted = Some(fault);
+                    let cause = Cause::of_axis(axis, axis_code(fault));
+                    interlock::raise(cause);
+                    // A fault of one axis takes the other: at once, or in its own next tick where both brake.
+                    if cause != Cause::EncoderFrozen {
+                        bridge::release_all();
+                    }
                     let _ = self.outcomes.enqueue(Outcome::Fault(fault));
                 }
                 command
@@ -234,7 +242,7 @@ impl AxisLoop {
             Order::Off => self.stage = Stage::Off,
             Order::Calibrate(calibrator) => self.stage = Stage::Calibrating(calibrator),
             Order::Run(axis) => {
-                self.faulted = false;
+                self.faulted = None;
                 self.stage = Stage::Running(axis);
             }
             Order::Place(counts) => {
@@ -244,9 +252,14 @@ impl AxisLoop {
             }
             Order::ClearFault => {
                 if let Stage::Running(axis) = &mut self.stage {
-                    // A place that was lost stays lost: only a new calibration helps, and the fault is told again.
+                    // A place that was lost stays lost: only a new calibration helps, and the fault is told again. A motor
+                    // that brakes is let go, and to be calibrated as well.
+                    let frozen = axis.fault() == Some(AxisFault::EncoderFrozen);
                     let _ = axis.clear_fault();
-                    self.faulted = false;
+                    self.faulted = None;
+                    if frozen {
+                        self.stage = Stage::Off;
+                    }
                 }
             }
         }

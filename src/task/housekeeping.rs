@@ -181,14 +181,17 @@ impl Housekeeping {
             }
             Outcome::Fault(fault) => {
                 self.say(Record::AxisFault { tick: state.tick, joint, name: words::axis_fault(*fault) });
-                if *fault == AxisFault::Encoder {
+                if matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen) {
                     // The place is lost, and with it the joint's zero.
                     servo::end();
                     state.drive = None;
                     if let Some(calibrated) = state.calibrated.get_mut(axis) {
                         *calibrated = false;
                     }
-                    self.order(axis, Order::Off);
+                    // A motor that brakes does so until a reset.
+                    if *fault == AxisFault::Encoder {
+                        self.order(axis, Order::Off);
+                    }
                 }
             }
         }

@@ -81,6 +81,10 @@ pub const fn axis_fault(fault: AxisFault) -> &'static str {
         AxisFault::BusVoltage => "bus_voltage",
         AxisFault::Encoder => "encoder",
         AxisFault::NotANumber => "not_a_number",
+        AxisFault::EncoderFrozen => "encoder_frozen",
+        AxisFault::OpenPhase => "open_phase",
+        AxisFault::CurrentZero => "current_zero",
+        AxisFault::StuckConversion => "stuck_conversion",
     }
 }
 

@@ -4,6 +4,8 @@ use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::motor::{AxisConfiguration, DeadTime, Direction, Sine};
 use crate::units::{Volt, Weber};
 
+mod watches;
+
 const fn ask(current: f32) -> AxisRequest {
     AxisRequest { enabled: true, current: Ampere(current) }
 }

@@ -88,5 +88,9 @@ pub const fn axis_fault(fault: AxisFault) -> &'static str {
             "its counts jumped or the index came at another place: the rotor's angle is lost"
         }
         AxisFault::NotANumber => "a current or voltage was not a number",
+        AxisFault::EncoderFrozen => "the counter stands still although the motor turns",
+        AxisFault::OpenPhase => "a phase takes voltage and no current",
+        AxisFault::CurrentZero => "a shunt's zero drifted",
+        AxisFault::StuckConversion => "a shunt's code does not change with its current",
     }
 }

@@ -15,7 +15,7 @@ use scarab::hal::{AxisCommand, DriveCommand, JointSample, Sample};
 use scarab::leg::{ControlOutput, ControlRequest, DriveState, axis_code, permitted};
 use scarab::motor::{Axis, AxisRequest, Chopper, SenseScale};
 use scarab::operator::{Ask, Operator, RATE_HZ, Situation};
-use scarab::safety::{Cause, Fault, FaultCode, PowerRequest, ServoWatch, TickState, TickWatch};
+use scarab::safety::{Bridges, Cause, Fault, FaultCode, PowerRequest, ServoWatch, TickState, TickWatch};
 
 use crate::faults::{Channel, Injector};
 use crate::tool::error::ToolError;
@@ -134,7 +134,11 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         if self.period.is_multiple_of(u64::from(PERIODS_PER_TICK)) {
             let mut joints = [JointSample::default(); N];
             for (joint, (sample, axis)) in joints.iter_mut().zip(&mut self.axes).enumerate() {
+                let before = *axis;
                 *sample = axis.joint_sample();
+                if axis.fault().map(axis_code).is_some_and(|code| self.blind.contains(&code)) {
+                    *axis = before;
+                }
                 self.injector.joint(joint, self.period, sample);
             }
             let measured = Sample { joints };
@@ -169,7 +173,8 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         self.axis_fault = None;
         for (joint, axis) in self.axes.iter_mut().enumerate() {
             if !axis.clear_fault() {
-                self.causes |= axis_cause(joint).bit();
+                // Off, and to be calibrated; a motor that braked is let go.
+                self.causes |= Cause::of_axis(joint, FaultCode::EncoderPlace).bit();
             }
         }
         self.edges.reset = Some(self.period);
@@ -220,11 +225,15 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             if damp && !self.is_blind(Some(FaultCode::CurrentTicks)) {
                 self.leg.report(Fault { code: FaultCode::CurrentTicks, joint: joint as u8 });
             }
-            let allowed = self.causes == 0 && self.targets.enabled;
-            let request = AxisRequest { enabled: allowed, current: self.targets.currents[joint] };
             let before = self.axes[joint];
-            let command =
-                self.axes[joint].tick(sample, if allowed { request } else { AxisRequest::RELEASED });
+            let current = self.targets.currents[joint];
+            let command = match Bridges::of(self.causes) {
+                Bridges::Follow if self.targets.enabled => {
+                    self.axes[joint].tick(sample, AxisRequest { enabled: true, current })
+                }
+                Bridges::Brake => self.axes[joint].brake(sample),
+                _ => self.axes[joint].tick(sample, AxisRequest::RELEASED),
+            };
             if self.is_blind(self.axes[joint].fault().map(axis_code)) {
                 self.axes[joint] = before;
                 continue;
@@ -232,12 +241,14 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             self.commands[joint] = command;
             let axis = &self.axes[joint];
             if let Some(fault) = axis.fault() {
-                self.causes |= axis_cause(joint).bit();
+                self.causes |= Cause::of_axis(joint, axis_code(fault)).bit();
                 self.axis_fault = self.axis_fault.or(Some(axis_code(fault)));
             }
-            // What one axis finds takes the other in the same period, as the bridges are released together.
-            if self.causes != 0 {
-                self.commands = [AxisCommand::RELEASED; N];
+            // What one axis finds takes the other in the same period.
+            match Bridges::of(self.causes) {
+                Bridges::Follow => {}
+                Bridges::Brake => self.commands = [AxisCommand::BRAKE; N],
+                Bridges::Release => self.commands = [AxisCommand::RELEASED; N],
             }
         }
         let bus = samples.first().map_or(0, |sample| sample.bus_code);
@@ -290,15 +301,17 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             .or_else(|| self.state().fault().map(|fault| fault.code))
     }
 
+    /// Both motors brake themselves.
+    #[must_use]
+    pub fn is_braking(&self) -> bool {
+        self.commands.iter().all(|command| *command == AxisCommand::BRAKE)
+    }
+
     /// Any bridge switches.
     #[must_use]
     pub fn is_switching(&self) -> bool {
         self.commands.iter().any(|command| command.enabled)
     }
-}
-
-const fn axis_cause(joint: usize) -> Cause {
-    if joint == 0 { Cause::Axis1 } else { Cause::Axis2 }
 }
 
 const fn mixed(hash: u64, word: u64) -> u64 {

@@ -1,0 +1,184 @@
+//! What an axis notices by holding voltages, currents, counts and codes against each other.
+
+use super::*;
+
+/// Servo periods in 20 ms and in 50 ms.
+const TWENTY_MS: usize = 80;
+const FIFTY_MS: usize = 200;
+
+impl Bench {
+    /// Servo periods until a fault acts, each sample spoilt before its tick; `None` without one.
+    fn until_fault(
+        &mut self,
+        request: AxisRequest,
+        periods: usize,
+        mut spoil: impl FnMut(&mut AxisSample),
+    ) -> Option<(usize, AxisFault)> {
+        for period in 1..=periods {
+            for _ in 0..6 {
+                spoil(&mut self.sample);
+                self.tick(request);
+            }
+            let _ = self.axis.joint_sample();
+            if let Some(fault) = self.axis.fault() {
+                return Some((period, fault));
+            }
+        }
+        None
+    }
+
+    /// The same with a counter that stands still from now on.
+    fn frozen(&mut self, request: AxisRequest, periods: usize) -> Option<(usize, AxisFault)> {
+        let count = self.sample.encoder_count;
+        self.until_fault(request, periods, |sample| {
+            (sample.encoder_count, sample.index_count) = (count, None);
+        })
+    }
+
+    fn settled(speed: f64, current: f32) -> Self {
+        let mut bench = Self::at(speed, &CONFIGURATION);
+        assert_eq!(bench.until_fault(ask(current), 100, |_| {}), None, "{speed} rad/s, {current} A");
+        bench
+    }
+}
+
+#[test]
+fn a_counter_that_freezes_above_the_derived_speed_is_seen_within_20_ms_and_brakes_the_motor() {
+    for current in [0.0_f32, 15.0, -40.0] {
+        let limits = Bench::at(0.0, &CONFIGURATION).axis.constants.model;
+        let speed = f64::from(limits.frozen_speed(Ampere(current.abs()))) / 7.0;
+        for sign in [1.0, -1.0] {
+            let mut bench = Bench::settled(1.2 * sign * speed, current);
+            let found = bench.frozen(ask(current), FIFTY_MS);
+            let Some((periods, AxisFault::EncoderFrozen)) = found else { panic!("{current} A, {found:?}") };
+            assert!(periods <= TWENTY_MS, "{current} A: {periods} periods");
+            assert_eq!(bench.tick(ask(current)), AxisCommand::BRAKE);
+            assert!(!bench.axis.clear_fault(), "the place is lost");
+            // Half of it is not seen, as it is said.
+            assert_eq!(Bench::settled(0.4 * sign * speed, current).frozen(ask(current), FIFTY_MS), None);
+        }
+    }
+}
+
+#[test]
+fn a_motor_that_brakes_is_released_when_it_is_told_or_when_its_current_passes_the_bound() {
+    let mut bench = Bench::settled(60.0, 10.0);
+    assert!(bench.frozen(ask(10.0), TWENTY_MS).is_some());
+    for _ in 0..100 {
+        assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::BRAKE);
+        bench.sample = bench.motor.period(AxisCommand::BRAKE);
+    }
+    // 60 rad/s make 1.2 V at 0.05 ohm: the motor brakes, whatever is measured.
+    let torque = bench.motor.current[1];
+    assert!(torque < -15.0, "{torque} A");
+    assert_eq!(bench.tick(AxisRequest::RELEASED), AxisCommand::RELEASED);
+    bench.sample.shunt_codes = [3700, 2048];
+    assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::RELEASED);
+    assert_eq!(bench.axis.fault(), Some(AxisFault::Overcurrent));
+    assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::RELEASED);
+}
+
+#[test]
+fn an_open_phase_is_seen_within_50_ms() {
+    // Joint speeds of 0.4 rad/s and more, and a motor that stands where the phase has to carry current.
+    for (speed, current) in [(20.0, 10.0), (60.0, -5.0), (-200.0, 30.0), (0.0, 10.0)] {
+        let mut bench = Bench::settled(speed, current);
+        bench.motor.open = true;
+        let found = bench.until_fault(ask(current), FIFTY_MS, |_| {});
+        let Some((_, fault)) = found else { panic!("{speed} rad/s, {current} A") };
+        // Of a rotor at rest the counter may be held for frozen: then the motor brakes, with two phases.
+        use AxisFault::{CurrentZero, EncoderFrozen, OpenPhase, Overcurrent};
+        assert!(matches!(fault, OpenPhase | CurrentZero | Overcurrent | EncoderFrozen));
+        let brakes = fault == EncoderFrozen;
+        assert!(speed == 0.0 || !brakes, "{speed} rad/s, {current} A: {fault:?}");
+        assert_eq!(bench.tick(ask(current)), if brakes { AxisCommand::BRAKE } else { AxisCommand::RELEASED });
+    }
+}
+
+#[test]
+fn a_zero_that_drifts_by_six_amperes_is_seen_within_50_ms_of_motion() {
+    for (speed, current) in [(60.0, 0.0), (60.0, 20.0), (-100.0, 30.0), (220.0, -10.0)] {
+        for (shunt, codes) in [(0, 150.0), (1, -150.0)] {
+            let mut bench = Bench::settled(speed, current);
+            bench.motor.zeros[shunt] += codes;
+            let found = bench.until_fault(ask(current), FIFTY_MS, |_| {});
+            assert!(
+                matches!(found, Some((_, AxisFault::CurrentZero))),
+                "{speed} rad/s, {current} A: {found:?}"
+            );
+            // 1 A is none.
+            let mut bench = Bench::settled(speed, current);
+            bench.motor.zeros[shunt] += codes / 6.0;
+            assert_eq!(bench.until_fault(ask(current), 400, |_| {}), None, "{speed} rad/s, {current} A");
+        }
+    }
+}
+
+#[test]
+fn zeros_that_drifted_while_released_are_refused_at_enabling() {
+    for (codes, refused) in [(25.0, false), (-60.0, true), (100.0, true)] {
+        let mut bench = Bench::at(50.0, &CONFIGURATION);
+        bench.motor.zeros[1] += codes;
+        // 10 ms.
+        bench.run(AxisRequest::RELEASED, 240);
+        assert_eq!(bench.tick(ask(0.0)).enabled, !refused, "{codes} codes");
+        assert_eq!(bench.axis.fault(), refused.then_some(AxisFault::CurrentZero), "{codes} codes");
+    }
+}
+
+#[test]
+fn a_warm_motor_that_is_reversed_again_and_again_raises_nothing() {
+    for (resistance, flux, inductance) in [(1.3, 0.85, 0.8), (0.85, 1.1, 1.1), (1.0, 1.0, 1.0)] {
+        let mut bench = Bench::settled(0.0, 0.0);
+        bench.motor.resistance *= resistance;
+        bench.motor.flux *= flux;
+        bench.motor.inductance = bench.motor.inductance.map(|henry| henry * inductance);
+        for step in 0..24_000 {
+            // Up to the joint's greatest speed, at 3 Hz; currents at 7 Hz, and a step in each of them.
+            let time = f64::from(step) / 24_000.0;
+            bench.motor.speed = 220.0 * crate::real::sin_cos(time * 18.8).0;
+            let current = 38.0 * crate::real::sin_cos(time * 44.0).0 as f32;
+            bench.tick(ask(if step % 3000 < 1500 { current } else { -0.5 * current }));
+            if step % 6 == 5 {
+                let _ = bench.axis.joint_sample();
+            }
+            assert_eq!(bench.axis.fault(), None, "{resistance} {flux} {inductance} at {time} s");
+        }
+    }
+}
+
+#[test]
+fn a_code_that_stays_while_its_phase_is_asked_for_more_is_seen_in_the_fourth_tick() {
+    for shunt in [0, 1] {
+        let mut bench = Bench::settled(100.0, 20.0);
+        let stuck = bench.sample.shunt_codes[shunt];
+        let mut ticks = 0;
+        while bench.axis.fault().is_none() {
+            bench.sample.shunt_codes[shunt] = stuck;
+            bench.tick(ask(20.0));
+            ticks += 1;
+            assert!(ticks <= 24, "a turn of the current's phase is 34 ticks");
+        }
+        assert_eq!(bench.axis.fault(), Some(AxisFault::StuckConversion));
+        // A step: the fourth tick after it.
+        let mut bench = Bench::settled(0.0, 0.0);
+        let stuck = bench.sample.shunt_codes[shunt];
+        for tick in 0..100 {
+            bench.sample.shunt_codes[shunt] = stuck;
+            let current = if tick < 90 { 0.0 } else { 10.0 };
+            bench.tick(ask(current));
+            assert_eq!(bench.axis.fault().is_some(), tick >= 93, "tick {tick}");
+        }
+    }
+}
+
+#[test]
+fn codes_without_noise_that_stay_are_no_fault_while_nothing_is_asked_to_change() {
+    let mut bench = Bench::at(0.0, &CONFIGURATION);
+    bench.motor.noise_codes = 0.0;
+    bench.motor.zeros = [12.0, -21.0];
+    assert_eq!(bench.until_fault(ask(0.0), 200, |_| {}), None);
+    for current in [0.9, 5.0, -5.0, 35.0, 0.0] {
+        assert_eq!(bench.until_fault(ask(current), 200, |_| {}), None, "{current} A");
+    }
+}
