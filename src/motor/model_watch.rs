@@ -24,7 +24,8 @@
 //! nothing is asked and nothing is seen. At rest it may be taken for a frozen counter: two phases brake as well. **Drifted zero** (C1): an offset o of one shunt leaves 2/sqrt(3) |R + j w L| o, at rest in the
 //! stator, while all that is wrong with resistance, flux and dead time turns with the rotor and is gone from the mean of a
 //! turn: 6.7 A on the default leg, 12 N m at most. Below 3 A, which dead time alone
-//! looks like while nothing is asked of the phases, none is seen. Turns that take longer than 25 ms, or turn back, are not judged.
+//! looks like while nothing is asked of the phases, none is seen. Turns that take longer than 25 ms or less than
+//! 3 ms, or turn back, are not judged.
 //!
 //! False alarms: on the default leg the mean stays below a third of its limit (docs/safety.md). Source: parity equation of a linear model,
 //! Isermann, Fault-Diagnosis Systems (2006), chapter 10. Cost: `scripts/count-instructions`, joint sample; 24 bytes.
@@ -40,6 +41,8 @@ use crate::units::Ampere;
 const PATIENCE: u8 = 32;
 /// Longest electrical turn that is judged, servo periods: 25 ms.
 const LONGEST_TURN: u8 = 100;
+/// Fewer servo periods than this are no circle: from 2,094 rad/s on, 6 rad/s of a joint of the default leg.
+const SHORTEST_TURN: u8 = 12;
 /// Counts within which a counter stands still: an edge that a sensor sits on.
 const STANDSTILL: i32 = 2;
 /// Both halves of the vector that dead time makes, and as much again.
@@ -201,9 +204,10 @@ impl ModelWatch {
         }
         let (alpha, beta) = (add(self.sum.alpha, seen.alpha, left), add(self.sum.beta, seen.beta, left));
         self.way = if step < 0.0 { left - way } else { way - left };
+        let is_circle = self.periods >= SHORTEST_TURN;
         self.periods = 0;
         self.sum = Stationary { alpha: seen.alpha * (way - left), beta: seen.beta * (way - left) };
-        alpha * alpha + beta * beta > limits.mean_square
+        is_circle && alpha * alpha + beta * beta > limits.mean_square
     }
 }
 

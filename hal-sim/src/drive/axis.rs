@@ -101,6 +101,17 @@ impl Axis {
         self.slopes = [0.0; 3];
     }
 
+    /// The wire of an output breaks.
+    pub fn break_wire(&mut self, output: usize) {
+        self.description.wiring.open = Some(output);
+    }
+
+    /// Electrical angle of the rotor, rad.
+    #[must_use]
+    pub fn electrical_angle(&self) -> f64 {
+        f64::from(self.description.motor.pole_pairs) * self.angle + self.description.motor.electrical_zero
+    }
+
     /// Currents into the motor's phases, A.
     #[must_use]
     pub fn currents(&self) -> [f64; 3] {

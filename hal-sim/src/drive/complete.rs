@@ -95,6 +95,13 @@ impl<const N: usize> CompleteDrives<N> {
         &self.axes
     }
 
+    /// The wire of an axis' output (A, B, C from 0) breaks.
+    pub fn break_wire(&mut self, axis: usize, output: usize) {
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.break_wire(output);
+        }
+    }
+
     /// What feeds them.
     #[must_use]
     pub fn supply(&self) -> &Supply {

@@ -8,6 +8,7 @@
 pub mod current;
 pub mod encoder;
 pub mod joint;
+pub mod model;
 pub mod number;
 pub mod stop;
 pub mod supply;
@@ -25,6 +26,8 @@ pub enum Expected {
     Off,
     /// Velocity damped, then released.
     Damp,
+    /// Low sides on: the motors brake themselves.
+    Brake,
     /// The reading is not believed, the motion goes on.
     Rejected,
 }
@@ -44,6 +47,18 @@ pub enum Onset {
     BusBelow(f64),
     /// When a joint turns faster than this multiple of its limit.
     Speed(f64),
+    /// While the joint of the first injection turns faster than this, rad/s, and is asked for more current, A: only as long as it
+    /// does, and so from the last time at which it began to.
+    Driven {
+        /// rad/s.
+        speed: f64,
+        /// And so much more for each ampere that is asked for, rad/s.
+        per_ampere: f64,
+        /// A.
+        current: f64,
+    },
+    /// While the current that is asked of the phase whose shunt is spoilt differs from that at the injection by more, A.
+    Asked(f64),
 }
 
 /// What is done beside what is injected, at the same period.
@@ -55,6 +70,8 @@ pub enum Event {
     Supply(f64),
     /// The wearer kicks: joint, peak in N m, seconds.
     Kick(usize, f64, f64),
+    /// The wire of a joint's output (A, B, C from 0) breaks.
+    OpenPhase(usize, usize),
     /// The operator's hands go on as they like after the emergency stop: see [`super::run`].
     Hands,
 }
@@ -76,6 +93,8 @@ pub struct Scenario {
     pub by_design: bool,
     /// Longest that is waited for the onset, periods.
     pub patience: u64,
+    /// Instead of the row's deadline, ms.
+    pub within_ms: Option<f64>,
 }
 
 /// A row of the catalogue.
@@ -112,6 +131,12 @@ pub struct Bounds {
     pub overcurrent_a: f64,
     /// Of the axes, V.
     pub bus_v: [f64; 2],
+    /// Of a joint, rad/s, and rad/s for each ampere: above, back-EMF is more than dead time and warm copper; the higher of both joints.
+    pub frozen_speed: [f64; 2],
+    /// Of a joint, rad/s: an electrical turn takes 25 ms.
+    pub judged_speed: f64,
+    /// Offset of a shunt whose voltage is more than that of dead time and of what changes within a turn, A.
+    pub smallest_offset_a: f64,
 }
 
 /// Joints of the legs that a campaign runs.
@@ -119,9 +144,10 @@ pub const JOINTS: usize = 2;
 
 /// All rows, in the catalogue's order.
 pub fn rows() -> impl Iterator<Item = &'static Row> {
-    let groups: [&'static [Row]; 7] = [
+    let groups: [&'static [Row]; 8] = [
         &encoder::ROWS,
         &current::ROWS,
+        &model::ROWS,
         &supply::ROWS,
         &number::ROWS,
         &stop::ROWS,

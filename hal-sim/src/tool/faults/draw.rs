@@ -26,5 +26,6 @@ pub const fn one(injection: Injection, expected: Expected) -> Scenario {
         magnitude: None,
         by_design: false,
         patience: PERIODS_PER_S / 10,
+        within_ms: None,
     }
 }

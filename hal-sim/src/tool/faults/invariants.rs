@@ -77,7 +77,8 @@ impl<const N: usize> Invariants<N> {
                 self.note(rig, "the motors made more torque than the cap");
             }
         }
-        if switching && self.scope.range {
+        // A motor that brakes is not driven: what its leg weighs may lower it.
+        if switching && self.scope.range && !rig.is_braking() {
             let position = rig.world.anatomical_position();
             let beyond = |joint: usize| {
                 let [low, high] = self.range[joint];

@@ -301,6 +301,12 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             .or_else(|| self.state().fault().map(|fault| fault.code))
     }
 
+    /// Current that is asked of a joint, A; nothing while the drive is off.
+    #[must_use]
+    pub fn asked(&self, joint: usize) -> f64 {
+        if self.targets.enabled { f64::from(self.targets.currents[joint].0) } else { 0.0 }
+    }
+
     /// Both motors brake themselves.
     #[must_use]
     pub fn is_braking(&self) -> bool {

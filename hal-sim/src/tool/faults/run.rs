@@ -106,8 +106,17 @@ struct Watched<'a, const B: usize> {
     onset: Option<u64>,
     /// Counts of the joints at the injection, and the widest way from there.
     counts: [f64; JOINTS],
+    /// What was asked of the phases with shunts at the injection, A.
+    asked: [f64; 2],
     hold: Hold,
     recording: Option<Recording>,
+}
+
+/// What the servo asks of a joint's phases B and C, A, where the rotor stands now.
+fn asked<const B: usize>(rig: &Rig<JOINTS, B>, joint: usize) -> [f64; 2] {
+    let current = rig.asked(joint);
+    let angle = rig.world.complete_drives().map_or(0.0, |drives| drives.axes()[joint].electrical_angle());
+    [1.0, 2.0].map(|phase| -current * (angle - phase * core::f64::consts::TAU / 3.0).sin())
 }
 
 /// What an operator's hand does now, and until when.
@@ -142,6 +151,11 @@ impl<'a, const B: usize> Watched<'a, B> {
                     drives.supply_mut().set_source(volts);
                 }
             }
+            Event::OpenPhase(joint, output) => {
+                if let Some(drives) = rig.world.complete_drives_mut() {
+                    drives.break_wire(joint, output);
+                }
+            }
             Event::Kick(joint, peak, duration) => rig.world.push(joint, peak, duration),
             Event::None | Event::Hands => {}
         }
@@ -166,6 +180,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             begun,
             onset,
             counts: rig.world.anatomical_position(),
+            asked: asked(&rig, scenario.injections[0].map_or(0, |injection| injection.joint)),
             hold: Hold::default(),
             recording: manner.recorded.then(Recording::default),
             rig,
@@ -182,23 +197,57 @@ impl<'a, const B: usize> Watched<'a, B> {
         if let Some(recording) = &mut self.recording {
             recording.see(&self.rig, self.begun);
         }
-        if self.onset.is_none() && self.has_begun() {
-            self.onset = Some(self.rig.period);
+        match (self.onset, self.has_begun()) {
+            (None, true) => self.onset = Some(self.rig.period),
+            // What is only a fault while something holds, and it does no more.
+            (Some(_), false) if self.rig.alarm().is_none() => self.onset = None,
+            _ => {}
         }
     }
 
     fn has_begun(&self) -> bool {
+        let lasts = matches!(self.scenario.onset, Onset::Driven { .. } | Onset::Asked(_));
+        if self.onset.is_some() && !lasts {
+            return true;
+        }
+        let joint = self.joint();
         let bus = || self.rig.world.complete_drives().map_or(0.0, |drives| drives.supply().voltage());
         match self.scenario.onset {
             Onset::Injection | Onset::ServoTick | Onset::After(_) => true,
             Onset::BusAbove(volts) => bus() > volts,
             Onset::BusBelow(volts) => bus() < volts,
+            Onset::Driven { speed, per_ampere, current } => {
+                let asked = self.rig.asked(joint).abs();
+                self.rig.world.velocity()[joint].abs() > speed + per_ampere * asked && asked > current
+            }
+            Onset::Asked(amperes) => (0..2)
+                .any(|shunt| (self.asked()[shunt] - self.asked[shunt]).abs() > amperes && self.spoils(shunt)),
             Onset::Speed(factor) => {
                 let truth = self.rig.world.velocity();
                 let limits = self.rig.leg.control().limits().joints();
                 (0..JOINTS).any(|joint| truth[joint].abs() > factor * f64::from(limits[joint].speed.0))
             }
         }
+    }
+
+    /// Of the first injection.
+    fn joint(&self) -> usize {
+        self.scenario.injections[0].map_or(0, |injection| injection.joint)
+    }
+
+    fn spoils(&self, shunt: usize) -> bool {
+        let channel = [Channel::ShuntB, Channel::ShuntC][shunt];
+        self.scenario.injections.iter().flatten().any(|injection| injection.channel == channel)
+    }
+
+    /// What is asked of the phases with shunts, A.
+    fn asked(&self) -> [f64; 2] {
+        asked(&self.rig, self.joint())
+    }
+
+    /// Longest that this run may take, ms.
+    fn deadline_ms(&self) -> f64 {
+        self.scenario.within_ms.unwrap_or(self.row.deadline_ms)
     }
 
     /// Somebody at the contacts who does as he likes, and now and then resets as he should.
@@ -254,7 +303,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         }
         let onset = self.onset.map_or(safe, |onset| onset.min(safe));
         let after_ms = seen.map(|_| (safe - onset) as f64 * PERIOD_MS);
-        let in_time = after_ms.is_some_and(|after| after <= self.row.deadline_ms + 1e-9);
+        let in_time = after_ms.is_some_and(|after| after <= self.deadline_ms() + 1e-9);
         let nothing_came = self.onset.is_none() && seen.is_none();
         let stood = self.row.deadline_ms.is_infinite() && !self.has_turned();
         let undetectable = !in_time && (self.scenario.by_design || nothing_came || stood);
@@ -280,7 +329,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         if self.row.deadline_ms.is_infinite() {
             return self.has_turned();
         }
-        since > 2.0 * self.row.deadline_ms + 1.0
+        since > 2.0 * self.deadline_ms() + 1.0
     }
 
     /// Some rotor made a whole turn, and a tenth, since the injection.
@@ -295,6 +344,7 @@ impl<'a, const B: usize> Watched<'a, B> {
     fn safe_state(&self) -> Option<&'static str> {
         match (self.rig.is_switching(), self.rig.state()) {
             (false, _) => Some("Off"),
+            (true, _) if self.rig.is_braking() => Some("Short"),
             (true, DriveState::FaultReactionActive { .. }) => Some("Damp"),
             (true, _) => None,
         }

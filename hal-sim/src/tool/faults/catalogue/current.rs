@@ -4,8 +4,8 @@ use scarab::safety::FaultCode;
 
 use super::super::dice::Dice;
 use super::super::draw::{AMPERE_PER_CODE, at, one};
-use super::super::rig::PERIOD_MS;
-use super::{Bounds, Expected, JOINTS, Row, Scenario};
+use super::super::rig::{PERIOD_MS, PERIODS_PER_S};
+use super::{Bounds, Expected, JOINTS, Onset, Row, Scenario};
 use crate::faults::{Channel, Form, Timing};
 
 /// Rows of this group.
@@ -23,13 +23,14 @@ pub static ROWS: [Row; 3] = [
     },
     Row {
         id: "C3",
-        fault: "conversion missing",
-        detector: "end of conversion",
+        fault: "conversion stuck or missing",
+        detector: "same code while another current is asked for; end of conversion",
         state: "Off",
-        codes: &[FaultCode::Conversion],
-        deadline_ms: PERIOD_MS,
+        codes: &[FaultCode::Conversion, FaultCode::StuckConversion, FaultCode::CurrentZero],
+        // Of one that is stuck; a missing one is seen in its own tick.
+        deadline_ms: 4.0 * PERIOD_MS,
         unit: "",
-        lacking: Some("a conversion that is stuck at a code within the range"),
+        lacking: None,
         draw: conversion,
     },
     Row {
@@ -54,11 +55,22 @@ fn rail(dice: &mut Dice, _: &Bounds) -> Scenario {
     one(at(channel, joint, Form::Rail(value), Timing::from(0)), Expected::Off)
 }
 
-/// C3: conversions that do not end.
+/// C3: conversions that do not end, or say the same for ever.
 fn conversion(dice: &mut Dice, _: &Bounds) -> Scenario {
     let joint = dice.below(JOINTS as u64) as usize;
+    if dice.coin() {
+        let channel = if dice.coin() { Channel::ShuntB } else { Channel::ShuntC };
+        let stuck = at(channel, joint, Form::Stuck, Timing::from(0));
+        return Scenario {
+            // 1 A, and the tenth that rotor and estimate may be apart.
+            onset: Onset::Asked(1.1),
+            patience: PERIODS_PER_S / 2,
+            ..one(stuck, Expected::Off)
+        };
+    }
     let lasting = 1 + dice.below(4);
-    one(at(Channel::Conversion, joint, Form::Off, Timing::lasting(0, lasting)), Expected::Off)
+    let missing = at(Channel::Conversion, joint, Form::Off, Timing::lasting(0, lasting));
+    Scenario { within_ms: Some(PERIOD_MS), ..one(missing, Expected::Off) }
 }
 
 /// C4: more current than the bound, or the gate driver's pin.
