@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use tokens::{Token, tokens};
 
 /// Each room and the rooms it may use beside itself and the open ones.
-const HOUSE: [(&str, &[&str]); 17] = [
+const HOUSE: [(&str, &[&str]); 18] = [
     ("units", &[]),
     ("real", &[]),
     ("place", &[]),
@@ -27,6 +27,7 @@ const HOUSE: [(&str, &[&str]); 17] = [
     ("leg", &["hal", "model", "motion", "swarm", "ident", "motor", "safety", "servo"]),
     ("trace", &["hal", "leg"]),
     ("store", &["hal", "leg"]),
+    ("bus", &["hal", "leg"]),
     ("operator", &["leg"]),
     ("board", &["hal", "motor", "leg", "task"]),
     ("task", &["hal", "motor", "leg", "operator", "safety", "servo", "trace", "board"]),

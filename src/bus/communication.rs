@@ -1,0 +1,179 @@
+//! The objects 1000 to 1FFF: what the node itself knows.
+
+use super::abort::Abort;
+use super::dictionary::{Mapping, Object};
+use super::emergency::Emergency;
+use super::frame::NodeId;
+use super::heartbeat::{Clock, Consumer, WATCHED};
+use super::nmt::NmtState;
+use super::pdo::receive::Receive;
+use super::pdo::transmit::Transmit;
+use super::pdo::{PDOS, Parameters};
+
+/// Who this is (1018, 1008 to 100A).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// Given out by CiA; 0 where there is none.
+    pub vendor: u32,
+    /// The maker's number of the product.
+    pub product: u32,
+    /// Of the behaviour on the bus, major number in the upper half.
+    pub revision: u32,
+    /// Of the board.
+    pub serial: u32,
+    /// Name, version of the hardware, version of the software.
+    pub texts: [&'static str; 3],
+}
+
+/// All of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Communication {
+    pub(super) node: NodeId,
+    pub(super) identity: Identity,
+    pub(super) state: NmtState,
+    pub(super) emergency: Emergency,
+    pub(super) consumers: [Consumer; WATCHED],
+    /// 1017, ms.
+    pub(super) heartbeat_ms: u16,
+    pub(super) heartbeat: Clock,
+    /// 1005.
+    pub(super) sync: u32,
+    /// 1019.
+    pub(super) sync_overflow: u8,
+    /// 1029:1.
+    pub(super) on_error: u8,
+    pub(super) receive: [Receive; PDOS],
+    pub(super) transmit: [Transmit; PDOS],
+}
+
+impl Communication {
+    /// As after the start.
+    #[must_use]
+    pub fn new(node: NodeId, identity: Identity) -> Self {
+        let receive =
+            |base, mapped| Receive::new(Parameters::new(Mapping::Receive, node.on(base), 255, 0, &[mapped]));
+        let transmit = |base, kind, mapped: &[u32]| {
+            Transmit::new(Parameters::new(Mapping::Transmit, node.on(base), kind, 10, mapped))
+        };
+        Self {
+            node,
+            identity,
+            state: NmtState::Initialising,
+            emergency: Emergency::new(u32::from(node.on(0x80))),
+            consumers: [Consumer::default(); WATCHED],
+            heartbeat_ms: 0,
+            heartbeat: Clock::NEW,
+            sync: 0x80,
+            sync_overflow: 0,
+            on_error: 0,
+            receive: [
+                receive(0x200, 0x6040_0010),
+                receive(0x300, 0x607A_0020),
+                receive(0x400, 0x60FF_0020),
+                receive(0x500, 0x6071_0010),
+            ],
+            transmit: [
+                transmit(0x180, 255, &[0x6041_0010]),
+                transmit(0x280, 1, &[0x6064_0020, 0x606C_0020]),
+                transmit(0x380, 1, &[0x6077_0010]),
+                transmit(0x480, 1, &[0x60FD_0020]),
+            ],
+        }
+    }
+
+    /// A number.
+    ///
+    /// # Errors
+    /// Those of the object.
+    pub fn read(&self, object: Object) -> Result<u32, Abort> {
+        let Object { index, sub } = object;
+        let pdo = usize::from(index & 0xFF);
+        Ok(match (index, sub) {
+            (0x1001, _) => u32::from(self.emergency.register()),
+            (0x1003, _) => return self.emergency.history(sub),
+            (0x1005, _) => self.sync,
+            // Stored on command only.
+            (0x1010 | 0x1011, _) => 1,
+            (0x1014, _) => self.emergency.identifier,
+            (0x1015, _) => u32::from(self.emergency.inhibit),
+            (0x1016, 1..) => self.consumers.get(usize::from(sub) - 1).ok_or(Abort::NoSubindex)?.setting(),
+            (0x1017, _) => u32::from(self.heartbeat_ms),
+            (0x1018, 1) => self.identity.vendor,
+            (0x1018, 2) => self.identity.product,
+            (0x1018, 3) => self.identity.revision,
+            (0x1018, 4) => self.identity.serial,
+            (0x1019, _) => u32::from(self.sync_overflow),
+            (0x1029, _) => u32::from(self.on_error),
+            (0x1200, 1) => u32::from(self.node.on(0x600)),
+            (0x1200, 2) => u32::from(self.node.on(0x580)),
+            (0x1400..=0x14FF, _) => return self.received(pdo)?.communication(sub),
+            (0x1600..=0x16FF, _) => return self.received(pdo)?.mapping(sub),
+            (0x1800..=0x18FF, _) => return self.transmitted(pdo)?.communication(sub),
+            (0x1A00..=0x1AFF, _) => return self.transmitted(pdo)?.mapping(sub),
+            _ => return Err(Abort::NoObject),
+        })
+    }
+
+    /// Gives one a number.
+    ///
+    /// # Errors
+    /// Those of the object.
+    pub fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
+        let Object { index, sub } = object;
+        let pdo = usize::from(index & 0xFF);
+        match (index, sub) {
+            (0x1003, _) => return self.emergency.forget(value),
+            // Bit 30 would make this node the one that sends it.
+            (0x1005, _) if value & !0x7FF == 0 && value != 0 => self.sync = value,
+            (0x1014, _) if value & 0x7FFF_F800 == 0 => self.emergency.identifier = value,
+            (0x1015, _) => self.emergency.inhibit = value as u16,
+            (0x1016, 1..) => {
+                return self.consumers.get_mut(usize::from(sub) - 1).ok_or(Abort::NoSubindex)?.set(value);
+            }
+            (0x1017, _) => (self.heartbeat_ms, self.heartbeat) = (value as u16, Clock::NEW),
+            (0x1019, _) if matches!(value, 0 | 2..=240) => self.sync_overflow = value as u8,
+            (0x1029, _) if value <= 2 => self.on_error = value as u8,
+            (0x1005 | 0x1014 | 0x1019 | 0x1029, _) => return Err(Abort::Range),
+            (0x1400..=0x16FF, _) => {
+                let receive = self.receive.get_mut(pdo).ok_or(Abort::NoObject)?;
+                receive.stop();
+                let parameters = &mut receive.parameters;
+                return if index < 0x1600 {
+                    parameters.set_communication(sub, value)
+                } else {
+                    parameters.set_mapping(sub, value)
+                };
+            }
+            (0x1800..=0x1AFF, _) => {
+                let transmit = self.transmit.get_mut(pdo).ok_or(Abort::NoObject)?;
+                transmit.restart();
+                let parameters = &mut transmit.parameters;
+                return if index < 0x1A00 {
+                    parameters.set_communication(sub, value)
+                } else {
+                    parameters.set_mapping(sub, value)
+                };
+            }
+            _ => return Err(Abort::NoObject),
+        }
+        Ok(())
+    }
+
+    /// The bytes of a text; see [`Objects::bytes`](super::Objects::bytes).
+    pub(super) fn text(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
+        let place = usize::from(object.index.wrapping_sub(0x1008));
+        let text = self.identity.texts.get(place).ok_or(Abort::NoObject)?.as_bytes();
+        for (to, from) in into.iter_mut().zip(text.iter().skip(offset as usize)) {
+            *to = *from;
+        }
+        Ok(text.len() as u32)
+    }
+
+    fn received(&self, pdo: usize) -> Result<&Parameters, Abort> {
+        self.receive.get(pdo).map(|receive| &receive.parameters).ok_or(Abort::NoObject)
+    }
+
+    fn transmitted(&self, pdo: usize) -> Result<&Parameters, Abort> {
+        self.transmit.get(pdo).map(|transmit| &transmit.parameters).ok_or(Abort::NoObject)
+    }
+}

@@ -1,0 +1,297 @@
+//! One joint as its node sees it: the controlword (6040) and what is made of it.
+//!
+//! Why a state of its own beside the leg's: a host enables its nodes one after the other and waits for each, while a leg is
+//! enabled as a whole or not at all (`safety`). So each joint follows CiA 402's machine for itself, and
+//! [`Coupling`](super::Coupling) enables the leg once all have asked. Until then bit 15 of the statusword says that
+//! nothing is powered, and no target is taken.
+//!
+//! ```text
+//! bits 7 3210   0 x110 shutdown   0 0111 switch on, disable operation   0 1111 (switch on and) enable operation
+//!               0 xx0x disable voltage   0 x01x quick stop   rising 7: reset
+//! bit 4 rising  profile position: new set-point, 5 immediately, 6 relative; homing: start          bit 8  halt
+//! ```
+//! Source: CiA 402, controlword.
+
+use super::status::{AxisStatus, state_bits};
+use super::{AxisCommand, Mode, SetPoint, Target};
+use crate::bus::objects::Lost;
+use crate::leg::{DriveEvent, DriveState, PowerRequest};
+use crate::units::{Ampere, NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
+
+const RESET: u16 = 1 << 7;
+const NEW: u16 = 1 << 4;
+const IMMEDIATELY: u16 = 1 << 5;
+const RELATIVE: u16 = 1 << 6;
+const HALT: u16 = 1 << 8;
+
+/// What does not change about a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisConstants {
+    /// A thousand of the torque objects' units.
+    pub rated_torque: NewtonMetre,
+    /// Of the motor.
+    pub rated_current: Ampere,
+    /// Modes the leg follows, bits of [`Mode::bit`].
+    pub modes: u32,
+}
+
+/// What a host writes and reads again; the numbers are the objects'.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Settings {
+    pub connection_option: i16,
+    pub quick_stop_option: i16,
+    pub mode: i8,
+    pub following_window: u32,
+    pub following_time_ms: u16,
+    pub position_window: u32,
+    pub position_time_ms: u16,
+    pub target_torque: i16,
+    pub largest_torque: u16,
+    pub target_position: i32,
+    pub home_offset: i32,
+    pub range: [i32; 2],
+    pub profile_velocity: u32,
+    pub profile_acceleration: u32,
+    pub profile_deceleration: u32,
+    pub torque_slope: u32,
+    pub homing_method: i8,
+    pub velocity_offset: i32,
+    pub torque_offset: i16,
+    pub interpolation_data: i32,
+    pub period: u8,
+    pub period_index: i8,
+    pub outputs: u32,
+    pub target_velocity: i32,
+}
+
+impl Settings {
+    /// As after the start.
+    pub const NEW: Self = Self {
+        connection_option: 3,
+        quick_stop_option: 2,
+        mode: 0,
+        following_window: 87_266,
+        following_time_ms: 10,
+        position_window: 17_453,
+        position_time_ms: 10,
+        target_torque: 0,
+        largest_torque: 1000,
+        target_position: 0,
+        home_offset: 0,
+        range: [i32::MIN, i32::MAX],
+        profile_velocity: 500_000,
+        profile_acceleration: 2_000_000,
+        profile_deceleration: 2_000_000,
+        torque_slope: 1000,
+        homing_method: 0,
+        velocity_offset: 0,
+        torque_offset: 0,
+        interpolation_data: 0,
+        period: 2,
+        period_index: -3,
+        outputs: 0,
+        target_velocity: 0,
+    };
+}
+
+/// See the module.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    pub(super) constants: AxisConstants,
+    pub(super) settings: Settings,
+    pub(super) status: AxisStatus,
+    pub(super) controlword: u16,
+    /// Where this joint stands for itself.
+    pub(super) own: DriveState,
+    /// A reset was asked for and not passed on yet.
+    pub(super) resets: bool,
+    set_point: SetPoint,
+    /// The set-point or start of the present bit 4 was taken.
+    taken: bool,
+    starts: u8,
+}
+
+const fn radian(micro: i32) -> Radian {
+    Radian(micro as f32 * 1e-6)
+}
+
+const fn radian_per_second(micro: i32) -> RadianPerSecond {
+    RadianPerSecond(micro as f32 * 1e-6)
+}
+
+impl Axis {
+    /// As after the start.
+    #[must_use]
+    pub const fn new(constants: AxisConstants) -> Self {
+        Self {
+            constants,
+            settings: Settings::NEW,
+            status: AxisStatus::NONE,
+            controlword: 0,
+            own: DriveState::NotReadyToSwitchOn,
+            resets: false,
+            set_point: SetPoint { number: 0, position: Radian::ZERO, relative: false, immediately: false },
+            taken: false,
+            starts: 0,
+        }
+    }
+
+    /// What the leg tells; then [`Coupling::power`](super::Coupling::power).
+    pub fn update(&mut self, status: &AxisStatus) {
+        self.status = *status;
+    }
+
+    /// This joint is enabled, and so is the leg.
+    pub(super) fn is_powered(&self) -> bool {
+        self.own == DriveState::OperationEnabled && self.status.drive == DriveState::OperationEnabled
+    }
+
+    /// A controlword came.
+    pub(super) fn control(&mut self, word: u16) {
+        let rising = word & !self.controlword;
+        self.controlword = word;
+        if rising & RESET != 0 {
+            self.resets = self.own.fault().is_some();
+        }
+        if word & RESET == 0 {
+            self.ask(word);
+        }
+        self.taken &= word & NEW != 0;
+        if rising & NEW == 0 || !self.is_powered() {
+            return;
+        }
+        match Mode::of(self.settings.mode) {
+            Some(Mode::ProfilePosition) => {
+                self.set_point = SetPoint {
+                    number: self.set_point.number.wrapping_add(1),
+                    position: radian(self.settings.target_position),
+                    relative: word & RELATIVE != 0,
+                    immediately: word & IMMEDIATELY != 0,
+                };
+                self.taken = true;
+            }
+            Some(Mode::Homing) => {
+                self.starts = self.starts.wrapping_add(1);
+                self.taken = true;
+            }
+            _ => {}
+        }
+    }
+
+    fn ask(&mut self, word: u16) {
+        use PowerRequest::{DisableOperation, DisableVoltage, EnableOperation, Shutdown, SwitchOn};
+        let mut go = |request| self.own = self.own.after(DriveEvent::Asked(request), 1);
+        match word & 0xF {
+            low if low & 0b0010 == 0 => go(DisableVoltage),
+            low if low & 0b0100 == 0 => self.stop(),
+            low if low & 0b0001 == 0 => go(Shutdown),
+            0b0111 => {
+                go(DisableOperation);
+                go(SwitchOn);
+            }
+            _ => {
+                go(SwitchOn);
+                go(EnableOperation);
+            }
+        }
+    }
+
+    /// Quick stop as its option says.
+    fn stop(&mut self) {
+        use PowerRequest::{DisableVoltage, QuickStop};
+        let request = if self.settings.quick_stop_option == 0 { DisableVoltage } else { QuickStop };
+        self.own = self.own.after(DriveEvent::Asked(request), 1);
+    }
+
+    /// The host is lost: as 6007 says.
+    pub(super) fn lose(&mut self, _why: Lost) {
+        match self.settings.connection_option {
+            2 => self.own = self.own.after(DriveEvent::Asked(PowerRequest::DisableVoltage), 1),
+            3 => self.stop(),
+            _ => {}
+        }
+        // What was held down is let go: the next word is a new one.
+        self.controlword = 0;
+        self.taken = false;
+    }
+
+    /// Object 6041.
+    #[must_use]
+    pub fn statusword(&self) -> u16 {
+        let status = &self.status;
+        let bit = |is_set: bool, place: u16| u16::from(is_set) << place;
+        let is_ready = self.own != DriveState::NotReadyToSwitchOn;
+        let (twelve, thirteen) = match Mode::of(status.mode) {
+            Some(Mode::ProfilePosition) => (self.taken, status.deviates),
+            Some(Mode::Homing) => (status.homed, status.deviates),
+            Some(Mode::CyclicPosition) => (self.is_powered(), status.deviates),
+            Some(Mode::CyclicVelocity | Mode::CyclicTorque) => (self.is_powered(), false),
+            _ => (false, false),
+        };
+        let waits = self.own == DriveState::OperationEnabled && !self.is_powered();
+        state_bits(self.own)
+            | bit(is_ready, 4)
+            | bit(is_ready, 9)
+            | bit(status.reached, 10)
+            | bit(status.limited, 11)
+            | bit(twelve, 12)
+            | bit(thirteen, 13)
+            | bit(waits, 15)
+    }
+
+    fn torque(&self, thousandths: i32) -> NewtonMetre {
+        self.constants.rated_torque * (thousandths as f32 * 1e-3)
+    }
+
+    /// What the leg is told.
+    #[must_use]
+    pub fn command(&self) -> AxisCommand {
+        let settings = &self.settings;
+        let torque_offset = self.torque(i32::from(settings.torque_offset));
+        let target_torque = self.torque(i32::from(settings.target_torque));
+        let velocity_offset = radian_per_second(settings.velocity_offset);
+        let velocity = radian_per_second(settings.target_velocity);
+        let target = match Mode::of(settings.mode).filter(|_| self.is_powered()) {
+            None => Target::Hold,
+            Some(Mode::ProfilePosition) => Target::ProfilePosition(self.set_point),
+            Some(Mode::ProfileVelocity) => Target::ProfileVelocity(velocity),
+            Some(Mode::ProfileTorque) => Target::ProfileTorque(target_torque),
+            Some(Mode::Homing) if settings.homing_method == 0 => Target::Hold,
+            Some(Mode::Homing) => Target::Homing { start: self.starts, offset: radian(settings.home_offset) },
+            Some(Mode::CyclicPosition) => Target::CyclicPosition {
+                position: radian(settings.target_position),
+                velocity_offset,
+                torque_offset,
+            },
+            Some(Mode::CyclicVelocity) => {
+                Target::CyclicVelocity { velocity: velocity + velocity_offset, torque_offset }
+            }
+            Some(Mode::CyclicTorque) => Target::CyclicTorque(target_torque + torque_offset),
+        };
+        let acceleration = |micro: u32| RadianPerSecondSquared(micro as f32 * 1e-6);
+        AxisCommand {
+            target,
+            halt: self.controlword & HALT != 0,
+            velocity: RadianPerSecond(settings.profile_velocity as f32 * 1e-6),
+            acceleration: acceleration(settings.profile_acceleration),
+            deceleration: acceleration(settings.profile_deceleration),
+            torque_slope_nm_per_s: self.constants.rated_torque.0 * (settings.torque_slope as f32 * 1e-3),
+            range: settings.range.map(radian),
+            largest_torque: self.torque(i32::from(settings.largest_torque)),
+            following_window: Radian(settings.following_window as f32 * 1e-6),
+            following_time: Second(f32::from(settings.following_time_ms) * 1e-3),
+            position_window: Radian(settings.position_window as f32 * 1e-6),
+            position_time: Second(f32::from(settings.position_time_ms) * 1e-3),
+            period: self.period(),
+        }
+    }
+
+    /// 60C2: a number of 10^index seconds.
+    fn period(&self) -> Second {
+        let mut unit = 1.0;
+        for _ in self.settings.period_index..0 {
+            unit *= 0.1;
+        }
+        Second(f32::from(self.settings.period) * unit)
+    }
+}

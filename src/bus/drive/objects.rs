@@ -1,0 +1,138 @@
+//! The objects of the drive profile, each at its one place.
+
+use super::Mode;
+use super::control::{Axis, Settings};
+use crate::bus::abort::Abort;
+use crate::bus::dictionary::Object;
+use crate::bus::emergency::ErrorReport;
+use crate::bus::objects::{Lost, Objects};
+
+/// The low bytes of a signed number.
+macro_rules! bits {
+    ($value:expr) => {
+        i32::from($value) as u32
+    };
+}
+
+/// In millionths, held to what fits.
+fn micro(value: f32) -> u32 {
+    ((value * 1e6) as i32) as u32
+}
+
+impl Objects for Axis {
+    fn read(&self, object: Object) -> Result<u32, Abort> {
+        let (settings, status) = (&self.settings, &self.status);
+        let thousandths = |torque: f32| bits!((torque / self.constants.rated_torque.0 * 1e3) as i16);
+        Ok(match (object.index, object.sub) {
+            // A hundredth of a degree per second and more fits: 0.001 rad/s up to 32 rad/s.
+            (0x2010, _) => bits!((status.velocity.0 * 1e3) as i16),
+            (0x219A | 0x60FD, _) => status.inputs,
+            (0x6007, _) => bits!(settings.connection_option),
+            (0x603F, _) => self.own.fault().map_or(0, |fault| u32::from(fault.code.number())),
+            (0x6040, _) => u32::from(self.controlword),
+            (0x6041, _) => u32::from(self.statusword()),
+            (0x605A, _) => bits!(settings.quick_stop_option),
+            (0x605D, _) => 1,
+            (0x605E, _) => 2,
+            (0x6060, _) => bits!(settings.mode),
+            (0x6061, _) => bits!(status.mode),
+            (0x6062, _) => micro(status.position_demand.0),
+            (0x6064, _) => micro(status.position.0),
+            (0x6065, _) => settings.following_window,
+            (0x6066, _) => u32::from(settings.following_time_ms),
+            (0x6067, _) => settings.position_window,
+            (0x6068, _) => u32::from(settings.position_time_ms),
+            (0x606B, _) => micro(status.velocity_demand.0),
+            (0x606C, _) => micro(status.velocity.0),
+            (0x6071, _) => bits!(settings.target_torque),
+            (0x6072, _) => u32::from(settings.largest_torque),
+            (0x6074, _) => thousandths(status.torque_demand.0),
+            (0x6075, _) => (self.constants.rated_current.0 * 1e3) as u32,
+            (0x6076, _) => (self.constants.rated_torque.0 * 1e3) as u32,
+            (0x6077, _) => thousandths(status.torque.0),
+            (0x607A, _) => settings.target_position as u32,
+            (0x607C, _) => settings.home_offset as u32,
+            (0x607D, 1) => settings.range[0] as u32,
+            (0x607D, 2) => settings.range[1] as u32,
+            (0x6081, _) => settings.profile_velocity,
+            (0x6083, _) => settings.profile_acceleration,
+            (0x6084, _) => settings.profile_deceleration,
+            (0x6086, _) => 0,
+            (0x6087, _) => settings.torque_slope,
+            (0x6098, _) => bits!(settings.homing_method),
+            (0x60B1, _) => settings.velocity_offset as u32,
+            (0x60B2, _) => bits!(settings.torque_offset),
+            (0x60C1, 1) => settings.interpolation_data as u32,
+            (0x60C2, 1) => u32::from(settings.period),
+            (0x60C2, 2) => bits!(settings.period_index),
+            (0x60F4, _) => micro((status.position_demand - status.position).0),
+            (0x60FE, 1) => settings.outputs,
+            (0x60FF, _) => settings.target_velocity as u32,
+            (0x6502, _) => self.constants.modes,
+            _ => return Err(Abort::NoObject),
+        })
+    }
+
+    fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
+        let settings = &mut self.settings;
+        let is = |allowed: &[i32]| allowed.contains(&i32::from(value as i16));
+        match (object.index, object.sub) {
+            (0x6007, _) if is(&[0, 2, 3]) => settings.connection_option = value as i16,
+            (0x6040, _) => self.control(value as u16),
+            // What a fault does is chosen per fault, and a halt slows down along the profile.
+            (0x605A, _) if is(&[0, 2]) => settings.quick_stop_option = value as i16,
+            (0x605D, _) if is(&[1]) => {}
+            (0x605E, _) if is(&[2]) => {}
+            (0x6060, _) => {
+                let is_offered = Mode::of(value as i8)
+                    .map_or(value as i8 == 0, |mode| self.constants.modes & mode.bit() != 0);
+                if !is_offered {
+                    return Err(Abort::Range);
+                }
+                settings.mode = value as i8;
+            }
+            (0x6065, _) => settings.following_window = value,
+            (0x6066, _) => settings.following_time_ms = value as u16,
+            (0x6067, _) => settings.position_window = value,
+            (0x6068, _) => settings.position_time_ms = value as u16,
+            (0x6071, _) => settings.target_torque = value as i16,
+            (0x6072, _) => settings.largest_torque = value as u16,
+            (0x607A, _) => settings.target_position = value as i32,
+            (0x607C, _) => settings.home_offset = value as i32,
+            (0x607D, 1) => settings.range[0] = value as i32,
+            (0x607D, 2) => settings.range[1] = value as i32,
+            (0x6081, _) => settings.profile_velocity = value,
+            (0x6083, _) if value > 0 => settings.profile_acceleration = value,
+            (0x6084, _) if value > 0 => settings.profile_deceleration = value,
+            (0x6086, _) if value as i16 == 0 => {}
+            (0x6087, _) => settings.torque_slope = value,
+            // Where it stands is the zero, or no homing.
+            (0x6098, _) if matches!(value as i8, 0 | 35 | 37) => settings.homing_method = value as i8,
+            (0x60B1, _) => settings.velocity_offset = value as i32,
+            (0x60B2, _) => settings.torque_offset = value as i16,
+            (0x60C1, 1) => settings.interpolation_data = value as i32,
+            (0x60C2, 1) if value > 0 => settings.period = value as u8,
+            (0x60C2, 2) if matches!(value as i8, -6..=0) => settings.period_index = value as i8,
+            (0x60FE, 1) => settings.outputs = value,
+            (0x60FF, _) => settings.target_velocity = value as i32,
+            (0x6007 | 0x605A..=0x605E | 0x6083 | 0x6084 | 0x6086 | 0x6098 | 0x60C2, _) => {
+                return Err(Abort::Range);
+            }
+            _ => return Err(Abort::NoObject),
+        }
+        Ok(())
+    }
+
+    fn error(&self) -> Option<ErrorReport> {
+        let fault = self.own.fault()?;
+        Some(ErrorReport { code: fault.code.number(), information: [fault.joint + 1, 0, 0, 0, 0] })
+    }
+
+    fn lost(&mut self, why: Lost) {
+        self.lose(why);
+    }
+
+    fn reset(&mut self) {
+        self.settings = Settings::NEW;
+    }
+}

@@ -1,0 +1,229 @@
+extern crate std;
+
+use super::super::tests::{Board, axis};
+use super::super::{Lost, NmtState, Objects, dictionary::Object};
+use super::*;
+use crate::leg::{DriveEvent, DriveState, Fault, FaultCode};
+
+const CONTROLWORD: Object = Object::at(0x6040, 0);
+
+impl Board {
+    /// Both controlwords at one tick.
+    fn control(&mut self, words: [u16; 2]) -> [u16; 2] {
+        for (axis, word) in self.axes.iter_mut().zip(words) {
+            assert_eq!(axis.write(CONTROLWORD, u32::from(word)), Ok(()));
+        }
+        self.run(4);
+        self.states()
+    }
+
+    /// State bits and bit 15.
+    fn states(&self) -> [u16; 2] {
+        self.axes.map(|axis| axis.statusword() & 0x806F)
+    }
+
+    fn enabled() -> Self {
+        let mut board = Self::started(1);
+        board.control([6; 2]);
+        assert_eq!(board.control([15; 2]), [0x27; 2]);
+        board
+    }
+}
+
+#[test]
+fn six_seven_fifteen_enable_and_fifteen_goes_through_switched_on() {
+    let mut board = Board::started(1);
+    board.run(1);
+    assert_eq!(board.states(), [0x40; 2]);
+    assert_eq!(board.control([7; 2]), [0x40; 2]);
+    assert_eq!(board.control([15; 2]), [0x40; 2]);
+    assert_eq!(board.control([6; 2]), [0x21; 2]);
+    assert_eq!(board.control([7; 2]), [0x23; 2]);
+    assert_eq!(board.control([15; 2]), [0x27; 2]);
+    assert_eq!(board.drive, DriveState::OperationEnabled);
+    assert_eq!(board.control([7; 2]), [0x23; 2]);
+    assert_eq!(board.control([15; 2]), [0x27; 2]);
+    assert_eq!(board.control([6; 2]), [0x21; 2]);
+    assert_eq!(board.control([0; 2]), [0x40; 2]);
+    assert_eq!(board.control([6; 2]), [0x21; 2]);
+    assert_eq!(board.control([15; 2]), [0x27; 2]);
+}
+
+#[test]
+fn nothing_is_powered_until_both_joints_have_asked_and_no_target_is_taken() {
+    let mut board = Board::started(1);
+    board.axes[0].write(Object::at(0x6060, 0), 8).expect("a mode");
+    board.axes[0].write(Object::at(0x607A, 0), 500_000).expect("a target");
+    board.control([6, 0]);
+    assert_eq!(board.control([15, 0]), [0x8027, 0x40]);
+    assert_eq!((board.drive, board.axes[0].command().target), (DriveState::SwitchOnDisabled, Target::Hold));
+    board.control([15, 6]);
+    assert_eq!(board.drive, DriveState::ReadyToSwitchOn);
+    assert_eq!(board.control([15, 15]), [0x27; 2]);
+    let Target::CyclicPosition { position, .. } = board.axes[0].command().target else {
+        panic!("{:?}", board.axes[0].command())
+    };
+    // 500,000 micro-radian; f32 has 24 bits.
+    assert!((position.0 - 0.5).abs() < 1e-6);
+}
+
+#[test]
+fn one_joint_stops_both_and_neither_comes_back_by_the_word_that_was_there() {
+    for word in [0, 6, 7] {
+        let mut board = Board::enabled();
+        board.control([15, word]);
+        assert_ne!(board.drive, DriveState::OperationEnabled);
+        // The host goes on sending what it sent to the other one.
+        board.axes[1].write(CONTROLWORD, 15).expect("a word");
+        let drive = board.drive;
+        board.run(4);
+        let may_go_on = word != 0;
+        assert_eq!(board.drive, drive);
+        // Both have to ask again.
+        assert_eq!(board.control([15, 15])[1] == 0x27, may_go_on, "{word}");
+    }
+    let mut board = Board::enabled();
+    board.axes[0].write(CONTROLWORD, 2).expect("a word");
+    board.tick();
+    assert!(matches!(board.drive, DriveState::QuickStopActive { .. }));
+    board.tick();
+    assert_eq!(board.states(), [0x07; 2]);
+    board.run(10);
+    assert_eq!(board.states(), [0x40; 2]);
+    assert_eq!(board.control([15; 2]), [0x40; 2]);
+}
+
+#[test]
+fn the_quick_stop_option_chooses_between_damping_and_off() {
+    let mut board = Board::enabled();
+    board.axes[0].write(Object::at(0x605A, 0), 0).expect("off");
+    board.axes[0].write(CONTROLWORD, 2).expect("a word");
+    board.tick();
+    assert_eq!(board.drive, DriveState::SwitchOnDisabled);
+    for (object, value) in [(0x605A, 1), (0x605D, 2), (0x605E, 1), (0x6007, 1), (0x6086, 1), (0x6098, 1)] {
+        let refused = board.axes[0].write(Object::at(object, 0), value);
+        assert_eq!(refused, Err(crate::bus::Abort::Range), "{object:x}");
+    }
+}
+
+#[test]
+fn a_fault_of_the_leg_is_told_by_both_nodes_and_reset_by_a_rising_edge() {
+    let mut board = Board::enabled();
+    let fault = Fault { code: FaultCode::Overspeed, joint: 1 };
+    board.drive = board.drive.after(DriveEvent::Failed(fault), 2);
+    let frames = board.run(2);
+    let told: std::vec::Vec<_> = frames.iter().map(|frame| (frame.id(), frame.data().to_vec())).collect();
+    let data = [0x00, 0x84, 0b10_0001, 2, 0, 0, 0, 0].to_vec();
+    assert_eq!(told, [(0x81, data.clone()), (0x82, data)]);
+    assert_eq!(board.axes[0].read(Object::at(0x603F, 0)), Ok(0x8400));
+    board.run(5);
+    assert_eq!(board.states(), [0x08; 2]);
+    assert_eq!(board.control([15, 15]), [0x08; 2]);
+    assert_eq!(board.control([0x80, 15]), [0x40; 2]);
+    // Held down it resets nothing else.
+    let later = Fault { code: FaultCode::PositionLimit, joint: 0 };
+    board.drive = board.drive.after(DriveEvent::Failed(later), 2);
+    assert_eq!(board.control([0x80, 15]), [0x08; 2]);
+    board.axes[0].write(CONTROLWORD, 0).expect("a word");
+    assert_eq!(board.control([0x80, 15]), [0x40; 2]);
+    assert_eq!(board.read(0x1003, 1), Ok(0x0001_8500));
+}
+
+#[test]
+fn a_leg_that_refuses_is_not_said_to_be_enabled() {
+    let mut board = Board::started(1);
+    board.control([6; 2]);
+    board.refuses = true;
+    assert_eq!(board.control([15; 2]), [0x21; 2]);
+}
+
+#[test]
+fn a_lost_host_stops_as_its_option_says() {
+    let cases = [
+        (0, 0x27, NmtState::PreOperational),
+        (2, 0x40, NmtState::PreOperational),
+        (3, 0x07, NmtState::PreOperational),
+    ];
+    for (option, state, nmt) in cases {
+        let mut board = Board::enabled();
+        board.hear(0, &[1, 0]);
+        assert_eq!(board.write(0x6007, 0, option, 2), Ok(()));
+        assert_eq!(board.write(0x1016, 1, 80 << 16 | 20, 4), Ok(()));
+        board.hear(0x750, &[5]);
+        board.frames();
+        let frames = board.run(80);
+        assert!(frames.iter().all(|frame| frame.id() != 0x81), "{frames:?}");
+        let frames = board.run(2);
+        let emergency = frames.iter().find(|frame| frame.id() == 0x81).expect("an emergency");
+        assert_eq!(emergency.data(), [0x30, 0x81, 0b1_0001, 0, 0, 0, 0, 0]);
+        assert_eq!((board.states()[0], board.nodes[0].state()), (state, nmt), "{option}");
+        // The host is back: told, and nothing starts by itself.
+        board.run(10);
+        board.hear(0x750, &[5]);
+        let frames = board.run(2);
+        let back = frames.iter().find(|frame| frame.id() == 0x81).expect("the end of it");
+        assert_eq!(back.data(), [0; 8]);
+        assert_eq!(board.drive == DriveState::OperationEnabled, option == 0);
+    }
+}
+
+#[test]
+fn a_set_point_is_taken_once_for_each_rising_edge() {
+    let mut board = Board::enabled();
+    let mode = AxisStatus { mode: 1, drive: board.drive, ..AxisStatus::NONE };
+    let axis = &mut board.axes[0];
+    axis.write(Object::at(0x6060, 0), 1).expect("a mode");
+    let number = |axis: &Axis| match axis.command().target {
+        Target::ProfilePosition(point) => point,
+        other => panic!("{other:?}"),
+    };
+    axis.update(&mode);
+    for (count, position) in [(1, 100_000), (2, 200_000)] {
+        axis.write(Object::at(0x607A, 0), position).expect("a target");
+        axis.write(CONTROLWORD, 0x3F).expect("a word");
+        assert!(axis.statusword() & 1 << 12 != 0);
+        axis.write(CONTROLWORD, 0x3F).expect("a word");
+        let point = number(axis);
+        assert_eq!((point.number, point.immediately, point.relative), (count, true, false));
+        assert!((point.position.0 - position as f32 * 1e-6).abs() < 1e-7);
+        // A target alone moves nothing.
+        axis.write(Object::at(0x607A, 0), 900_000).expect("a target");
+        assert_eq!(number(axis), point);
+        axis.write(CONTROLWORD, 0x2F).expect("a word");
+        assert!(axis.statusword() & 1 << 12 == 0);
+    }
+    axis.write(CONTROLWORD, 0x14F).expect("a word");
+    assert!(axis.command().halt);
+}
+
+#[test]
+fn units_are_micro_radians_and_thousandths_of_the_rated_torque() {
+    let mut axis = axis();
+    axis.update(&AxisStatus {
+        position: Radian(-0.25),
+        velocity: RadianPerSecond(1.5),
+        torque: NewtonMetre(-10.0),
+        position_demand: Radian(0.25),
+        ..AxisStatus::NONE
+    });
+    let read = |index| axis.read(Object::at(index, 0)).expect("a value") as i32;
+    // Powers of two times 1e6: exact in f32.
+    assert_eq!((read(0x6064), read(0x606C), read(0x60F4)), (-250_000, 1_500_000, 500_000));
+    assert_eq!((read(0x6077), read(0x2010), read(0x6076)), (-250, 1500, 40_000));
+    let command = axis.command();
+    assert!((command.period.0 - 0.002).abs() < 1e-9 && (command.following_window.0 - 0.087_266).abs() < 1e-8);
+    assert_eq!(command.largest_torque, NewtonMetre(40.0));
+}
+
+#[test]
+fn a_mode_that_the_leg_does_not_follow_is_refused() {
+    let constants = AxisConstants { modes: Mode::CyclicPosition.bit(), ..axis().constants };
+    let mut axis = Axis::new(constants);
+    for mode in -128..=127_i8 {
+        let expected = if [0, 8].contains(&mode) { Ok(()) } else { Err(crate::bus::Abort::Range) };
+        assert_eq!(axis.write(Object::at(0x6060, 0), mode as u8 as u32), expected, "{mode}");
+    }
+    axis.lost(Lost::Reset);
+    axis.reset();
+    assert_eq!(axis.read(Object::at(0x6060, 0)), Ok(0));
+}

@@ -1,0 +1,211 @@
+//! Emergency messages, the error register (1001) and the history (1003).
+//!
+//! Why by source: an error that ends must be told to have ended without hiding one that goes on. Each source has at most
+//! one error; a message leaves when it begins, when it becomes another one, and when it ends (code 0, with the register of
+//! what is left).
+//!
+//! ```text
+//! message = error code, 2 bytes | error register, 1 byte | information, 5 bytes          identifier: 1014
+//! ```
+//!
+//! Source: CiA 301, emergency object. Four messages wait at most; further ones are in the history only.
+
+use super::abort::Abort;
+use super::frame::Frame;
+
+/// Entries of the history.
+pub const HISTORY: usize = 8;
+const WAITING: usize = 4;
+
+/// Who has an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The drive, see [`ErrorReport`].
+    Drive,
+    /// The first or second heartbeat that is watched.
+    Heartbeat(u8),
+    /// What is received as PDO.
+    Receive,
+    /// The controller of the bus.
+    Controller,
+}
+
+const SOURCES: usize = 5;
+
+impl Source {
+    const fn place(self) -> usize {
+        match self {
+            Self::Drive => 0,
+            Self::Heartbeat(0) => 1,
+            Self::Heartbeat(_) => 2,
+            Self::Receive => 3,
+            Self::Controller => 4,
+        }
+    }
+}
+
+/// An error as it is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ErrorReport {
+    /// CiA 301's and CiA 402's code.
+    pub code: u16,
+    /// The maker's own.
+    pub information: [u8; 5],
+}
+
+impl ErrorReport {
+    /// A code alone.
+    #[must_use]
+    pub const fn code(code: u16) -> Self {
+        Self { code, information: [0; 5] }
+    }
+
+    /// Bits of the error register: bit 0 always; 1 current, 2 voltage, 3 temperature, 4 communication, 5 device
+    /// profile, 7 the maker's.
+    #[must_use]
+    pub const fn register(&self) -> u8 {
+        1 | match self.code >> 8 {
+            0x20..=0x2F => 1 << 1,
+            0x30..=0x3F => 1 << 2,
+            0x40..=0x4F => 1 << 3,
+            0x81 | 0x82 => 1 << 4,
+            0x50..=0x5F | 0x70..=0x7F | 0x83..=0x8F => 1 << 5,
+            0xFF => 1 << 7,
+            _ => 0,
+        }
+    }
+}
+
+/// What is wrong, what was, and what is still to be told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emergency {
+    active: [Option<ErrorReport>; SOURCES],
+    waiting: [Option<[u8; 8]>; WAITING],
+    history: [u32; HISTORY],
+    recorded: u8,
+    /// 1014.
+    pub(super) identifier: u32,
+    /// 1015, 100 us.
+    pub(super) inhibit: u16,
+    next_us: u64,
+}
+
+impl Emergency {
+    /// Nothing wrong; messages with this identifier.
+    #[must_use]
+    pub const fn new(identifier: u32) -> Self {
+        Self {
+            active: [None; SOURCES],
+            waiting: [None; WAITING],
+            history: [0; HISTORY],
+            recorded: 0,
+            identifier,
+            inhibit: 0,
+            next_us: 0,
+        }
+    }
+
+    /// What a source has; a message follows where that is new.
+    pub fn set(&mut self, source: Source, error: Option<ErrorReport>) {
+        let Some(place) = self.active.get_mut(source.place()) else { return };
+        if *place == error {
+            return;
+        }
+        *place = error;
+        let register = self.register();
+        let ErrorReport { code, information } = error.unwrap_or(ErrorReport::code(0));
+        let [low, high] = code.to_le_bytes();
+        let [a, b, c, d, e] = information;
+        if let Some(free) = self.waiting.iter_mut().find(|message| message.is_none()) {
+            *free = Some([low, high, register, a, b, c, d, e]);
+        }
+        if error.is_some() {
+            self.history.rotate_right(1);
+            // The upper half is the maker's: the first two bytes of the information.
+            self.history[0] = u32::from_le_bytes([low, high, a, b]);
+            self.recorded = (self.recorded + 1).min(HISTORY as u8);
+        }
+    }
+
+    /// Object 1001.
+    #[must_use]
+    pub fn register(&self) -> u8 {
+        self.active.iter().flatten().fold(0, |register, error| register | error.register())
+    }
+
+    /// Object 1003.
+    pub(super) fn history(&self, sub: u8) -> Result<u32, Abort> {
+        match sub.checked_sub(1) {
+            None => Ok(u32::from(self.recorded)),
+            Some(place) if place < self.recorded => {
+                self.history.get(usize::from(place)).copied().ok_or(Abort::NoData)
+            }
+            Some(_) => Err(Abort::NoData),
+        }
+    }
+
+    /// Writing 0 to 1003:0.
+    pub(super) fn forget(&mut self, value: u32) -> Result<(), Abort> {
+        if value != 0 {
+            return Err(Abort::Range);
+        }
+        self.recorded = 0;
+        Ok(())
+    }
+
+    /// The next message.
+    pub(super) fn poll(&mut self, now_us: u64) -> Option<Frame> {
+        if now_us < self.next_us {
+            return None;
+        }
+        let message = self.waiting[0].take()?;
+        self.waiting.rotate_left(1);
+        self.next_us = now_us + 100 * u64::from(self.inhibit);
+        (self.identifier >> 31 == 0).then(|| Frame::new(self.identifier as u16, &message))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HOST_LOST: ErrorReport = ErrorReport::code(0x8130);
+    const OVERCURRENT: ErrorReport = ErrorReport::code(0x2310);
+
+    #[test]
+    fn an_error_is_told_once_when_it_begins_and_once_when_it_ends() {
+        let mut emergency = Emergency::new(0x85);
+        emergency.set(Source::Heartbeat(0), Some(HOST_LOST));
+        emergency.set(Source::Heartbeat(0), Some(HOST_LOST));
+        emergency.set(Source::Drive, Some(OVERCURRENT));
+        emergency.set(Source::Heartbeat(0), None);
+        let told: [Option<Frame>; 4] = core::array::from_fn(|_| emergency.poll(0));
+        let frame = |data: [u8; 8]| Some(Frame::new(0x85, &data));
+        assert_eq!(
+            told,
+            [
+                frame([0x30, 0x81, 0b01_0001, 0, 0, 0, 0, 0]),
+                frame([0x10, 0x23, 0b01_0011, 0, 0, 0, 0, 0]),
+                frame([0, 0, 0b00_0011, 0, 0, 0, 0, 0]),
+                None
+            ]
+        );
+        assert_eq!(emergency.register(), 0b11);
+        assert_eq!((emergency.history(0), emergency.history(1)), (Ok(2), Ok(0x2310)));
+        assert_eq!((emergency.history(2), emergency.history(3)), (Ok(0x8130), Err(Abort::NoData)));
+        assert_eq!((emergency.forget(1), emergency.forget(0)), (Err(Abort::Range), Ok(())));
+        assert_eq!(emergency.history(1), Err(Abort::NoData));
+    }
+
+    #[test]
+    fn the_inhibit_time_keeps_messages_apart_and_a_flood_ends_in_the_history() {
+        let mut emergency = Emergency::new(0x81);
+        emergency.inhibit = 10;
+        for code in 1..=20 {
+            emergency.set(Source::Drive, Some(ErrorReport::code(code)));
+        }
+        let sent = (0..10_000).filter(|&now_us| emergency.poll(now_us).is_some()).count();
+        assert_eq!(sent, WAITING);
+        assert_eq!((emergency.history(0), emergency.history(1)), (Ok(8), Ok(20)));
+    }
+}

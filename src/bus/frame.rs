@@ -1,0 +1,94 @@
+//! A frame of classic CAN with an 11-bit identifier: all that a node sees of the bus.
+
+/// Identifier and up to eight bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame {
+    id: u16,
+    length: u8,
+    data: [u8; 8],
+}
+
+impl Frame {
+    /// A data frame; of `data` the first eight bytes, of `id` the lowest eleven bits.
+    #[must_use]
+    pub fn new(id: u16, data: &[u8]) -> Self {
+        let mut bytes = [0; 8];
+        let mut length = 0;
+        for (place, byte) in bytes.iter_mut().zip(data) {
+            *place = *byte;
+            length += 1;
+        }
+        Self { id: id & 0x7FF, length, data: bytes }
+    }
+
+    /// The identifier.
+    #[must_use]
+    pub const fn id(&self) -> u16 {
+        self.id
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub fn data(&self) -> &[u8] {
+        self.data.get(..usize::from(self.length)).unwrap_or(&self.data)
+    }
+
+    /// The bytes of a frame that has all eight.
+    #[must_use]
+    pub fn full(&self) -> Option<[u8; 8]> {
+        (self.length == 8).then_some(self.data)
+    }
+
+    /// Bits on the wire without stuffing, the three of the intermission included: 47 and 8 for each byte.
+    #[must_use]
+    pub const fn bits(&self) -> u32 {
+        47 + 8 * self.length as u32
+    }
+}
+
+/// A node's number on the bus, 1 to 127.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeId(u8);
+
+impl NodeId {
+    /// The number, if it is one.
+    #[must_use]
+    pub const fn new(number: u8) -> Option<Self> {
+        if matches!(number, 1..=127) { Some(Self(number)) } else { None }
+    }
+
+    /// The number.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        self.0
+    }
+
+    /// An identifier of the predefined connection set: its function's base and the number.
+    #[must_use]
+    pub const fn on(self, base: u16) -> u16 {
+        base + self.0 as u16
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_keeps_what_fits_and_says_how_long_it_is() {
+        let frame = Frame::new(0xF81, &[1, 2, 3]);
+        assert_eq!((frame.id(), frame.data(), frame.full()), (0x781, &[1, 2, 3][..], None));
+        assert_eq!(Frame::new(1, &[7; 12]).full(), Some([7; 8]));
+        // 1 + 11 + 1 + 1 + 1 + 4 + 15 + 1 + 1 + 1 + 7 + 3: start, id, RTR, IDE, r0, DLC, CRC, its delimiter, ACK, its
+        // delimiter, end, intermission.
+        assert_eq!((Frame::new(0, &[]).bits(), Frame::new(0, &[0; 8]).bits()), (47, 111));
+    }
+
+    #[test]
+    fn node_numbers_are_one_to_127() {
+        for number in 0..=255 {
+            assert_eq!(NodeId::new(number).is_some(), (1..=127).contains(&number));
+        }
+        assert_eq!(NodeId::new(5).map(|node| node.on(0x600)), Some(0x605));
+    }
+}

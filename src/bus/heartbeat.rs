@@ -1,0 +1,128 @@
+//! Heartbeats: the node's own (1017), and those of others that it cannot do without (1016).
+//!
+//! Why consumed: a host application that dies leaves its last targets behind; the drive has to notice by itself. Watching
+//! begins with the first heartbeat that is seen, so a host that never sends one is not missed (CiA 301).
+//!
+//! ```text
+//! 1016:i = node << 16 | milliseconds       0 milliseconds or node 0: not watched
+//! ```
+
+use super::abort::Abort;
+
+/// Others that can be watched.
+pub const WATCHED: usize = 2;
+
+/// What became of one that is watched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// Its time is over.
+    Lost,
+    /// It is there again.
+    Back,
+}
+
+/// One other node.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Consumer {
+    setting: u32,
+    /// When it will be missed; `None` before the first heartbeat and while it is lost.
+    due_us: Option<u64>,
+    lost: bool,
+}
+
+impl Consumer {
+    const fn node(self) -> u8 {
+        (self.setting >> 16) as u8
+    }
+
+    const fn time_us(self) -> u64 {
+        (self.setting & 0xFFFF) as u64 * 1000
+    }
+
+    /// Object 1016.
+    #[must_use]
+    pub const fn setting(self) -> u32 {
+        self.setting
+    }
+
+    /// Writes 1016; watching begins anew.
+    ///
+    /// # Errors
+    /// [`Abort::Range`] for a node beyond 127 or bits that are reserved.
+    pub fn set(&mut self, setting: u32) -> Result<(), Abort> {
+        if setting >> 16 > 127 {
+            return Err(Abort::Range);
+        }
+        *self = Self { setting, due_us: None, lost: false };
+        Ok(())
+    }
+
+    /// A heartbeat or a boot-up message of a node.
+    pub fn heard(&mut self, node: u8, now_us: u64) -> Option<Change> {
+        if self.time_us() == 0 || node == 0 || node != self.node() {
+            return None;
+        }
+        self.due_us = Some(now_us + self.time_us());
+        core::mem::take(&mut self.lost).then_some(Change::Back)
+    }
+
+    /// Time goes on.
+    pub fn poll(&mut self, now_us: u64) -> Option<Change> {
+        self.due_us.take_if(|due| now_us > *due).map(|_| {
+            self.lost = true;
+            Change::Lost
+        })
+    }
+}
+
+/// A thing that is done every so many microseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Clock {
+    next_us: Option<u64>,
+}
+
+impl Clock {
+    /// Not begun.
+    pub const NEW: Self = Self { next_us: None };
+
+    /// Whether it is time; a period of 0 never is. What was late is done once, not several times.
+    pub fn is_due(&mut self, period_us: u64, now_us: u64) -> bool {
+        if period_us == 0 {
+            self.next_us = None;
+            return false;
+        }
+        let phase_us = match self.next_us {
+            // A period that was shortened does not wait for the longer one.
+            Some(next) if now_us < next && next - now_us <= period_us => return false,
+            Some(next) if now_us >= next && now_us - next < period_us => next,
+            _ => now_us,
+        };
+        self.next_us = Some(phase_us + period_us);
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_heartbeat_is_missed_after_its_time_and_not_before_the_first() {
+        let mut consumer = Consumer::default();
+        assert_eq!(consumer.set(80 << 16 | 100), Ok(()));
+        assert_eq!(consumer.poll(10_000_000), None);
+        assert_eq!((consumer.heard(80, 0), consumer.heard(81, 90_000)), (None, None));
+        assert_eq!((consumer.poll(100_000), consumer.poll(100_001)), (None, Some(Change::Lost)));
+        assert_eq!(consumer.poll(200_000), None);
+        assert_eq!(consumer.heard(80, 300_000), Some(Change::Back));
+        assert_eq!(consumer.set(128 << 16 | 100), Err(Abort::Range));
+    }
+
+    #[test]
+    fn a_clock_keeps_its_period_and_does_not_make_up_for_what_it_missed() {
+        let mut clock = Clock::default();
+        let times = [0, 400, 1000, 1001, 2100, 3000, 9500, 9600, 10_500].map(|now| clock.is_due(1000, now));
+        assert_eq!(times, [true, false, true, false, true, true, true, false, true]);
+        assert!(!clock.is_due(0, 20_000));
+    }
+}

@@ -1,0 +1,40 @@
+//! The bus: one CANopen node per joint, without I/O; frames and time in, frames out.
+//!
+//! Why CANopen: the software that drives exoskeletons and robots speaks it, and a joint drive that speaks CiA 402 is driven
+//! by it unchanged. Why an own node: docs/bus.md.
+//!
+//! | part | what it is |
+//! | --- | --- |
+//! | [`Frame`], [`NodeId`] | classic CAN as far as a node sees it |
+//! | [`table`], [`dictionary`] | every object once: index, type, access, mapping, default, name |
+//! | [`Objects`] | the seam to whoever has the values |
+//! | [`Node`] | network management, heartbeat, emergency, SYNC, SDO, PDO |
+//! | [`drive`] | CiA 402 for one joint, and how several joints share one leg's drive |
+//!
+//! No frame makes it panic, loop or allocate: every frame costs at most what is written at [`Node`].
+
+mod abort;
+mod access;
+mod communication;
+pub mod dictionary;
+pub mod drive;
+mod emergency;
+mod frame;
+mod heartbeat;
+mod nmt;
+mod node;
+mod objects;
+mod pdo;
+mod sdo;
+pub mod table;
+
+pub use abort::Abort;
+pub use communication::Identity;
+pub use emergency::ErrorReport;
+pub use frame::{Frame, NodeId};
+pub use nmt::NmtState;
+pub use node::{Controller, Node};
+pub use objects::{Lost, Objects};
+
+#[cfg(test)]
+mod tests;

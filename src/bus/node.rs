@@ -1,0 +1,286 @@
+//! One node: frames and time in, frames out; no clock and no hardware.
+//!
+//! ```text
+//! on_frame(frame, now_us)  -> network management, SYNC, SDO, heartbeats of others, received PDOs; nothing leaves here
+//! poll(now_us)             -> the next frame to be sent, until there is none
+//!                             boot-up, emergency, heartbeat, PDO, SDO: the first that has one
+//! ```
+//!
+//! Two nodes stand on one board and share nothing but the frames. Cost of one call: one SDO request searches the table
+//! once; one received PDO writes at most eight objects; a poll reads at most those of the PDOs that are due. No loop
+//! depends on what a frame says. Memory: docs/bus.md.
+//!
+//! Source: CiA 301 version 4.2. Not built: RTR, node guarding, TIME, LSS, the node as a master or SYNC producer.
+
+use super::access::Dictionary;
+use super::communication::{Communication, Identity};
+use super::emergency::{ErrorReport, Source};
+use super::frame::{Frame, NodeId};
+use super::heartbeat::Change;
+use super::nmt::{self, Command, NmtState};
+use super::objects::{Lost, Objects};
+use super::pdo::PDOS;
+use super::pdo::receive::Received;
+use super::sdo::Server;
+
+/// What the controller of the bus tells of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Controller {
+    /// Takes part.
+    Active,
+    /// Too many errors to disturb others.
+    Passive,
+    /// Left the bus.
+    Off,
+    /// Frames came faster than they were taken.
+    Overrun,
+}
+
+/// A node of the bus.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Node {
+    communication: Communication,
+    server: Server,
+    /// The PDO that is looked at next, so that none has to wait for ever.
+    next_pdo: usize,
+}
+
+impl Node {
+    /// Before its boot-up message.
+    #[must_use]
+    pub fn new(node: NodeId, identity: Identity) -> Self {
+        Self { communication: Communication::new(node, identity), server: Server::IDLE, next_pdo: 0 }
+    }
+
+    /// Its number.
+    #[must_use]
+    pub const fn id(&self) -> NodeId {
+        self.communication.node
+    }
+
+    /// What it takes part in.
+    #[must_use]
+    pub const fn state(&self) -> NmtState {
+        self.communication.state
+    }
+
+    /// A frame came.
+    pub fn on_frame<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) {
+        let node = self.communication.node;
+        match frame.id() {
+            nmt::COMMAND => {
+                if let Some(command) = nmt::command(frame.data(), node.number()) {
+                    self.obey(command, objects);
+                }
+            }
+            id if u32::from(id) == self.communication.sync => self.synchronise(frame, objects),
+            id if id == node.on(0x600) => {
+                if let (true, Some(request)) = (self.communication.state.serves(), frame.full()) {
+                    let mut dictionary = Dictionary { communication: &mut self.communication, objects };
+                    self.server.request(request, now_us, &mut dictionary);
+                }
+            }
+            id @ 0x701..=0x77F => {
+                for place in 0..self.communication.consumers.len() {
+                    let consumer = self.communication.consumers.get_mut(place);
+                    let change = consumer.and_then(|consumer| consumer.heard((id & 0x7F) as u8, now_us));
+                    self.watch(place as u8, change, objects);
+                }
+            }
+            id => self.receive(id, frame, now_us, objects),
+        }
+    }
+
+    /// The next frame to be sent; again until there is none.
+    pub fn poll<O: Objects>(&mut self, now_us: u64, objects: &mut O) -> Option<Frame> {
+        let node = self.communication.node;
+        if self.communication.state == NmtState::Initialising {
+            self.communication.state = NmtState::PreOperational;
+            return Some(Frame::new(node.on(nmt::HEARTBEAT), &[0]));
+        }
+        self.look_around(now_us, objects);
+        let communication = &mut self.communication;
+        communication.emergency.set(Source::Drive, objects.error());
+        // A stopped node keeps its emergency messages until it may speak again.
+        let emergency =
+            if communication.state.serves() { communication.emergency.poll(now_us) } else { None };
+        if emergency.is_some() {
+            return emergency;
+        }
+        if communication.heartbeat.is_due(1000 * u64::from(communication.heartbeat_ms), now_us) {
+            return Some(Frame::new(node.on(nmt::HEARTBEAT), &[communication.state as u8]));
+        }
+        let pdo = self.transmit(now_us, objects);
+        if pdo.is_some() {
+            return pdo;
+        }
+        let mut dictionary = Dictionary { communication: &mut self.communication, objects };
+        let answer = self.server.poll(now_us, &mut dictionary)?;
+        Some(Frame::new(node.on(0x580), &answer))
+    }
+
+    /// What the controller tells: once on every change.
+    pub fn on_controller<O: Objects>(&mut self, told: Controller, objects: &mut O) {
+        let code = match told {
+            Controller::Active => None,
+            Controller::Overrun => Some(0x8110),
+            Controller::Passive => Some(0x8120),
+            Controller::Off => {
+                objects.lost(Lost::BusOff);
+                Some(0x8140)
+            }
+        };
+        self.communication.emergency.set(Source::Controller, code.map(ErrorReport::code));
+    }
+
+    fn obey<O: Objects>(&mut self, command: Command, objects: &mut O) {
+        let Communication { node, identity, state, .. } = self.communication;
+        match command {
+            Command::Go(next) if next == state || state == NmtState::Initialising => {}
+            Command::Go(next) => {
+                self.communication.state = next;
+                if next == NmtState::Stopped {
+                    objects.lost(Lost::Stopped);
+                    self.server = Server::IDLE;
+                }
+                for receive in &mut self.communication.receive {
+                    receive.stop();
+                }
+                for transmit in &mut self.communication.transmit {
+                    transmit.restart();
+                }
+            }
+            Command::ResetNode | Command::ResetCommunication => {
+                objects.lost(Lost::Reset);
+                if command == Command::ResetNode {
+                    objects.reset();
+                }
+                *self = Self::new(node, identity);
+            }
+        }
+    }
+
+    fn synchronise<O: Objects>(&mut self, frame: &Frame, objects: &mut O) {
+        if self.communication.state != NmtState::Operational {
+            return;
+        }
+        let counter = match (self.communication.sync_overflow, frame.data()) {
+            (0, _) => None,
+            (overflow, &[counter]) if (1..=overflow).contains(&counter) => Some(counter),
+            _ => return,
+        };
+        for place in 0..PDOS {
+            if self.communication.receive.get_mut(place).is_some_and(|receive| receive.at_sync()) {
+                self.write_received(place, objects);
+            }
+        }
+        objects.synchronise();
+        // The statusword first.
+        self.next_pdo = 0;
+        for transmit in &mut self.communication.transmit {
+            transmit.at_sync(counter);
+        }
+    }
+
+    fn receive<O: Objects>(&mut self, id: u16, frame: &Frame, now_us: u64, objects: &mut O) {
+        if self.communication.state != NmtState::Operational {
+            return;
+        }
+        let mut found = self.communication.receive.iter_mut().enumerate();
+        let Some((place, receive)) = found.find(|(_, pdo)| pdo.parameters.identifier() == Some(id)) else {
+            return;
+        };
+        let received = receive.take(frame, now_us);
+        // 8210: PDO not processed, too short.
+        let error = (received == Received::TooShort).then_some(ErrorReport::code(0x8210));
+        self.communication.emergency.set(Source::Receive, error);
+        if received == Received::Now {
+            self.write_received(place, objects);
+        }
+    }
+
+    /// Gives the objects of a received PDO their values; what is refused keeps the one it had.
+    fn write_received<O: Objects>(&mut self, place: usize, objects: &mut O) {
+        let Some(receive) = self.communication.receive.get(place) else { return };
+        let (parameters, data) = (receive.parameters, receive.data());
+        let mut bytes = data.into_iter();
+        let mut dictionary = Dictionary { communication: &mut self.communication, objects };
+        for mapped in parameters.mapped() {
+            let mut value = [0; 4];
+            for (place, byte) in value.iter_mut().zip(bytes.by_ref().take(usize::from(mapped.size))) {
+                *place = byte;
+            }
+            if !mapped.is_dummy() {
+                let _ = dictionary.write(mapped.object, u32::from_le_bytes(value));
+            }
+        }
+    }
+
+    fn transmit<O: Objects>(&mut self, now_us: u64, objects: &mut O) -> Option<Frame> {
+        if self.communication.state != NmtState::Operational {
+            return None;
+        }
+        for _ in 0..PDOS {
+            let place = self.next_pdo;
+            self.next_pdo = (place + 1) % PDOS;
+            let transmit = self.communication.transmit.get_mut(place)?;
+            if !transmit.is_wanted(now_us) {
+                continue;
+            }
+            let parameters = transmit.parameters;
+            let dictionary = Dictionary { communication: &mut self.communication, objects: &mut *objects };
+            let mut data = [0; 8];
+            let mut places = data.iter_mut();
+            for mapped in parameters.mapped() {
+                let bytes = dictionary.value(mapped.object).unwrap_or(0).to_le_bytes();
+                for (to, from) in places.by_ref().take(usize::from(mapped.size)).zip(bytes) {
+                    *to = from;
+                }
+            }
+            let transmit = self.communication.transmit.get_mut(place)?;
+            if let Some(frame) = transmit.frame(data, now_us) {
+                return Some(frame);
+            }
+        }
+        None
+    }
+
+    /// Whether somebody is missed.
+    fn look_around<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
+        for place in 0..self.communication.consumers.len() {
+            let consumer = self.communication.consumers.get_mut(place);
+            let change = consumer.and_then(|consumer| consumer.poll(now_us));
+            self.watch(place as u8, change, objects);
+        }
+        for place in 0..PDOS {
+            if self.communication.receive.get_mut(place).is_some_and(|pdo| pdo.is_missed(now_us)) {
+                // 8250: RPDO timeout.
+                self.communication.emergency.set(Source::Receive, Some(ErrorReport::code(0x8250)));
+                self.fail(Lost::ReceivedPdo, objects);
+            }
+        }
+    }
+
+    fn watch<O: Objects>(&mut self, consumer: u8, change: Option<Change>, objects: &mut O) {
+        let Some(change) = change else { return };
+        // 8130: heartbeat error.
+        let error = (change == Change::Lost).then_some(ErrorReport::code(0x8130));
+        self.communication.emergency.set(Source::Heartbeat(consumer), error);
+        if change == Change::Lost {
+            self.fail(Lost::Heartbeat, objects);
+        }
+    }
+
+    /// The drive stops as its option says, the node goes where 1029:1 says.
+    fn fail<O: Objects>(&mut self, why: Lost, objects: &mut O) {
+        objects.lost(why);
+        match (self.communication.on_error, self.communication.state) {
+            (0, NmtState::Operational) => self.obey(Command::Go(NmtState::PreOperational), objects),
+            (2, _) => self.obey(Command::Go(NmtState::Stopped), objects),
+            _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,146 @@
+extern crate std;
+
+use super::super::Frame;
+use super::super::tests::{Board, axis};
+use super::*;
+
+fn started() -> Board {
+    let mut board = Board::started(1);
+    board.hear(0, &[1, 0]);
+    board.tick();
+    board
+}
+
+#[test]
+fn a_node_boots_once_and_again_after_each_reset() {
+    let mut board = Board::new(3);
+    let boot = [Frame::new(0x703, &[0]), Frame::new(0x704, &[0])];
+    assert_eq!(board.frames(), boot);
+    assert_eq!(board.frames(), []);
+    assert_eq!(board.nodes[0].state(), NmtState::PreOperational);
+    for reset in [129, 130] {
+        assert_eq!(board.write(0x6065, 0, 5, 4), Ok(()));
+        assert_eq!(board.write(0x1005, 0, 0x81, 4), Ok(()));
+        board.hear(0, &[reset, 3]);
+        assert_eq!(board.frames(), [boot[0]]);
+        // The reset of the communication leaves what is not the communication's.
+        let kept = if reset == 130 { 5 } else { 87_266 };
+        assert_eq!((board.read(0x6065, 0), board.read(0x1005, 0)), (Ok(kept), Ok(0x80)));
+    }
+}
+
+#[test]
+fn a_stopped_node_tells_its_heartbeat_and_nothing_else() {
+    let mut board = started();
+    assert_eq!(board.write(0x1017, 0, 1, 2), Ok(()));
+    board.frames();
+    board.hear(0, &[2, 1]);
+    assert_eq!(board.nodes[0].state(), NmtState::Stopped);
+    board.hear(0x601, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]);
+    board.hear(0x080, &[]);
+    board.hear(0x201, &[6, 0]);
+    let frames = board.run(8);
+    let own: std::vec::Vec<_> = frames.iter().filter(|frame| frame.id() & 0x7F == 1).collect();
+    assert_eq!(own, [&Frame::new(0x701, &[4]); 2]);
+}
+
+#[test]
+fn the_heartbeat_tells_the_state_at_its_period() {
+    let mut board = Board::started(1);
+    assert_eq!(board.write(0x1017, 0, 5, 2), Ok(()));
+    board.hear(0, &[1, 1]);
+    let frames = board.run(400);
+    let count = frames.iter().filter(|frame| **frame == Frame::new(0x701, &[5])).count();
+    assert_eq!(count, 20);
+}
+
+#[test]
+fn received_values_wait_for_the_sync_where_the_type_says_so() {
+    let mut board = started();
+    assert_eq!(board.write(0x1401, 2, 1, 1), Ok(()));
+    board.hear(0x301, &[1, 2, 3, 0]);
+    assert_eq!(board.read(0x607A, 0), Ok(0));
+    board.hear(0x080, &[]);
+    board.frames();
+    assert_eq!(board.read(0x607A, 0), Ok(0x30201));
+    assert_eq!(board.write(0x1401, 2, 255, 1), Ok(()));
+    board.hear(0x301, &[4, 0, 0, 0]);
+    assert_eq!(board.read(0x607A, 0), Ok(4));
+    // Pre-operational nothing is received.
+    board.hear(0, &[128, 0]);
+    board.hear(0x301, &[5, 0, 0, 0]);
+    assert_eq!(board.read(0x607A, 0), Ok(4));
+}
+
+#[test]
+fn a_pdo_is_set_up_anew_while_operational_as_host_software_does_it() {
+    let mut board = started();
+    for (index, sub, value, size) in [
+        (0x1801, 1, 0x8000_0281, 4),
+        (0x1A01, 0, 0, 1),
+        (0x1801, 2, 2, 1),
+        (0x1A01, 1, 0x6041_0010, 4),
+        (0x1A01, 2, 0x6064_0020, 4),
+        (0x1A01, 3, 0x2010_0010, 4),
+        (0x1A01, 0, 3, 1),
+        (0x1801, 1, 0x281, 4),
+    ] {
+        assert_eq!(board.write(index, sub, value, size), Ok(()), "{index:x} {sub}");
+        assert_eq!(board.nodes[0].state(), NmtState::Operational);
+    }
+    let lengths = |board: &mut Board| -> std::vec::Vec<usize> {
+        board.hear(0x080, &[]);
+        let frames = board.frames();
+        frames.iter().filter(|frame| frame.id() == 0x281).map(|frame| frame.data().len()).collect()
+    };
+    assert_eq!(
+        [lengths(&mut board), lengths(&mut board), lengths(&mut board)],
+        [[].to_vec(), [8].to_vec(), [].to_vec()]
+    );
+}
+
+#[test]
+fn a_pdo_too_short_is_told_and_not_taken_and_one_too_late_stops_the_drive() {
+    let mut board = started();
+    board.hear(0x301, &[1, 2, 3]);
+    let told = board.tick();
+    assert_eq!(told[0], Frame::new(0x81, &[0x10, 0x82, 0b1_0001, 0, 0, 0, 0, 0]));
+    assert_eq!(board.read(0x607A, 0), Ok(0));
+    board.hear(0x301, &[1, 0, 0, 0]);
+    assert_eq!(board.tick()[0], Frame::new(0x81, &[0; 8]));
+    assert_eq!(board.write(0x1401, 5, 10, 2), Ok(()));
+    board.hear(0x301, &[1, 0, 0, 0]);
+    assert_eq!(board.run(40), []);
+    let told = board.run(2);
+    assert_eq!(told[0], Frame::new(0x81, &[0x50, 0x82, 0b1_0001, 0, 0, 0, 0, 0]));
+    assert_eq!(board.nodes[0].state(), NmtState::PreOperational);
+}
+
+#[test]
+fn a_counted_sync_has_its_counter_or_is_not_one() {
+    let mut board = started();
+    assert_eq!(board.write(0x1019, 0, 4, 1), Ok(()));
+    let sent = |board: &mut Board, data: &[u8]| {
+        board.hear(0x080, data);
+        board.frames().iter().filter(|frame| frame.id() == 0x281).count()
+    };
+    assert_eq!([sent(&mut board, &[]), sent(&mut board, &[5]), sent(&mut board, &[0])], [0; 3]);
+    assert_eq!([sent(&mut board, &[1]), sent(&mut board, &[4])], [1; 2]);
+}
+
+#[test]
+fn what_the_controller_tells_becomes_an_emergency_message() {
+    let mut node = Node::new(NodeId::new(9).expect("a number"), super::super::tests::IDENTITY);
+    let mut axis = axis();
+    node.poll(0, &mut axis);
+    for (told, code) in [
+        (Controller::Overrun, 0x8110_u16),
+        (Controller::Passive, 0x8120),
+        (Controller::Off, 0x8140),
+        (Controller::Active, 0),
+    ] {
+        node.on_controller(told, &mut axis);
+        let frame = node.poll(0, &mut axis).expect("a message");
+        assert_eq!((frame.id(), &frame.data()[..2]), (0x89, &code.to_le_bytes()[..]), "{told:?}");
+    }
+}

@@ -1,0 +1,206 @@
+//! Process data: what a PDO is set to (1400.., 1600.., 1800.., 1A00..), the same for both directions.
+//!
+//! Why remappable while Operational: CiA 301 lets a device refuse that, but the host software for exoskeletons starts the node
+//! first and sets its PDOs up afterwards. A PDO is changed in the order that software and standard share:
+//!
+//! ```text
+//! comm:1 = 0x80000000 | COB    the PDO does not exist
+//! map:0 = 0                    its mapping may be written
+//! map:i = index << 16 | sub << 8 | bits
+//! map:0 = n
+//! comm:1 = COB                 it exists again
+//! ```
+//!
+//! Transmission types: 0 at the next SYNC where something changed, 1 to 240 every so many SYNC, 254 and 255 at once on a change.
+//! Received ones of types 0 to 240 wait for the SYNC. Source: CiA 301, PDO. Limits: whole bytes; no RTR (252, 253).
+
+pub(super) mod receive;
+pub(super) mod transmit;
+
+use super::abort::Abort;
+use super::dictionary::{Mapping, Object, Type, find};
+
+/// PDOs of each direction.
+pub const PDOS: usize = 4;
+/// Objects in one PDO.
+pub const MAPPED: usize = 8;
+
+const ABSENT: u32 = 1 << 31;
+const EXTENDED: u32 = 1 << 29;
+
+/// One object in a PDO, and its bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mapped {
+    /// Which.
+    pub object: Object,
+    /// Bytes.
+    pub size: u8,
+}
+
+impl Mapped {
+    const fn of(entry: u32) -> Self {
+        Self { object: Object::at((entry >> 16) as u16, (entry >> 8) as u8), size: entry as u8 / 8 }
+    }
+
+    /// Stands for bytes that mean nothing here: index 2 to 7, the standard's types.
+    #[must_use]
+    pub const fn is_dummy(self) -> bool {
+        self.object.index <= Type::U32 as u16
+    }
+}
+
+/// What a PDO is set to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parameters {
+    direction: Mapping,
+    identifier: u32,
+    kind: u8,
+    inhibit: u16,
+    event_ms: u16,
+    sync_start: u8,
+    count: u8,
+    map: [u32; MAPPED],
+}
+
+impl Parameters {
+    /// With an identifier, a type, and what is mapped.
+    #[must_use]
+    pub fn new(direction: Mapping, identifier: u16, kind: u8, inhibit: u16, mapped: &[u32]) -> Self {
+        let mut map = [0; MAPPED];
+        for (place, entry) in map.iter_mut().zip(mapped) {
+            *place = *entry;
+        }
+        let count = mapped.len().min(MAPPED) as u8;
+        let identifier = u32::from(identifier);
+        Self { direction, identifier, kind, inhibit, event_ms: 0, sync_start: 0, count, map }
+    }
+
+    /// The identifier, of a PDO that exists.
+    #[must_use]
+    pub fn identifier(&self) -> Option<u16> {
+        (self.identifier & ABSENT == 0).then_some((self.identifier & 0x7FF) as u16)
+    }
+
+    /// It waits for a SYNC.
+    #[must_use]
+    pub const fn is_synchronous(&self) -> bool {
+        self.kind <= 240
+    }
+
+    /// What is in it, in order.
+    pub fn mapped(&self) -> impl Iterator<Item = Mapped> + use<> {
+        self.map.into_iter().take(usize::from(self.count)).map(Mapped::of)
+    }
+
+    /// Bytes of its frame.
+    #[must_use]
+    pub fn length(&self) -> usize {
+        self.mapped().map(|mapped| usize::from(mapped.size)).sum()
+    }
+
+    /// Reads 1400 and 1800.
+    pub(super) fn communication(&self, sub: u8) -> Result<u32, Abort> {
+        match sub {
+            1 => Ok(self.identifier),
+            2 => Ok(u32::from(self.kind)),
+            3 => Ok(u32::from(self.inhibit)),
+            4 => Ok(0),
+            5 => Ok(u32::from(self.event_ms)),
+            6 => Ok(u32::from(self.sync_start)),
+            _ => Err(Abort::NoSubindex),
+        }
+    }
+
+    /// Writes 1400 and 1800.
+    pub(super) fn set_communication(&mut self, sub: u8, value: u32) -> Result<(), Abort> {
+        match sub {
+            1 => return self.set_identifier(value),
+            2 if matches!(value, 0..=240 | 254 | 255) => self.kind = value as u8,
+            3 => self.inhibit = value as u16,
+            4 if value == 0 => {}
+            5 => self.event_ms = value as u16,
+            6 if value <= 240 => self.sync_start = value as u8,
+            2 | 4 | 6 => return Err(Abort::Range),
+            _ => return Err(Abort::NoSubindex),
+        }
+        Ok(())
+    }
+
+    /// A PDO that exists keeps its identifier; the ones that network management, SDO and heartbeat need are nobody's.
+    fn set_identifier(&mut self, value: u32) -> Result<(), Abort> {
+        let number = value & 0x7FF;
+        let exists = value & ABSENT == 0;
+        let is_free = matches!(number, 0x181..=0x57F | 0x681..=0x6DF);
+        let changes = self.identifier().is_some_and(|own| u32::from(own) != number);
+        if value & EXTENDED != 0 || exists && (!is_free || changes) {
+            return Err(Abort::Range);
+        }
+        self.identifier = value;
+        Ok(())
+    }
+
+    /// Reads 1600 and 1A00.
+    pub(super) fn mapping(&self, sub: u8) -> Result<u32, Abort> {
+        match usize::from(sub).checked_sub(1) {
+            None => Ok(u32::from(self.count)),
+            Some(place) => self.map.get(place).copied().ok_or(Abort::NoSubindex),
+        }
+    }
+
+    /// Writes 1600 and 1A00.
+    pub(super) fn set_mapping(&mut self, sub: u8, value: u32) -> Result<(), Abort> {
+        if self.identifier().is_some() {
+            return Err(Abort::Access);
+        }
+        let Some(place) = usize::from(sub).checked_sub(1) else { return self.set_count(value) };
+        if self.count != 0 {
+            return Err(Abort::Access);
+        }
+        if value != 0 {
+            self.check(value)?;
+        }
+        *self.map.get_mut(place).ok_or(Abort::NoSubindex)? = value;
+        Ok(())
+    }
+
+    fn set_count(&mut self, value: u32) -> Result<(), Abort> {
+        if value as usize > MAPPED {
+            return Err(Abort::PdoLength);
+        }
+        let mut bytes = 0;
+        for entry in self.map.iter().take(value as usize) {
+            self.check(*entry)?;
+            bytes += Mapped::of(*entry).size;
+        }
+        if bytes > 8 {
+            return Err(Abort::PdoLength);
+        }
+        self.count = value as u8;
+        Ok(())
+    }
+
+    fn check(&self, entry: u32) -> Result<(), Abort> {
+        let Mapped { object, size } = Mapped::of(entry);
+        let bits = entry as u8;
+        if Mapped::of(entry).is_dummy() {
+            let fits = match object.index {
+                2 | 5 => bits == 8,
+                3 | 6 => bits == 16,
+                4 | 7 => bits == 32,
+                _ => false,
+            };
+            let is_dummy = fits && object.sub == 0 && self.direction == Mapping::Receive;
+            return if is_dummy { Ok(()) } else { Err(Abort::NotMappable) };
+        }
+        let row = find(object)?;
+        let is_allowed = row.mapping == Mapping::Any || row.mapping == self.direction;
+        if is_allowed && bits == 8 * size && row.kind.size() == Some(size) {
+            Ok(())
+        } else {
+            Err(Abort::NotMappable)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

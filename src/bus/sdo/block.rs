@@ -1,0 +1,236 @@
+//! Transfers in blocks of up to 127 segments with one answer each, and a check sum over all of them.
+//!
+//! ```text
+//! upload    10100c00 object, block size, threshold   answer 11000c1s object, size
+//!           10100011                                 then c0nnnnnn and 7 bytes, numbered from 1, the last marked c
+//!           10100010 last number taken, next block size            from there on again
+//!           10100001                                 after      110nnn01 check sum: n bytes of the last are not used
+//! download  11000cs0 object, size                    answer 10100c00 object, block size
+//!           c0nnnnnn and 7 bytes                     10100010 last number in order, block size
+//!           110nnn01 check sum                       10100001
+//! ```
+//!
+//! Check sum: x^16 + x^12 + x^5 + 1 from 0 (the catalogue's CRC-16/XMODEM), by the crate `crc` without its table.
+//! Cost: 7 bytes of it per segment; where the client lost segments, up to 889 bytes are read and summed again at once.
+
+use crc::{CRC_16_XMODEM, Crc, NoTable};
+
+use super::super::abort::Abort;
+use super::super::access::Dictionary;
+use super::super::dictionary::Object;
+use super::super::objects::Objects;
+use super::{Gathered, SEGMENT, Step, Transfer, answer, named, segment, upload};
+
+const CODE: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_XMODEM);
+/// Segments of a block that is downloaded.
+const BLOCK: u8 = 127;
+const WITH_CHECKSUM: u8 = 1 << 2;
+const WITH_SIZE: u8 = 1 << 1;
+
+fn sum(before: u16, bytes: &[u8]) -> u16 {
+    let mut digest = CODE.digest_with_initial(before);
+    digest.update(bytes);
+    digest.finalize()
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    /// The client has not said that it is ready.
+    Begin,
+    /// Segments leave.
+    Sending,
+    /// The block has left.
+    Sent,
+    /// The end has been told.
+    Ended,
+}
+
+/// From the object to the client.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct BlockUpload {
+    phase: Phase,
+    size: u32,
+    /// Where the block begins: all before has been taken.
+    start: u32,
+    /// Segments of the block that have left.
+    sent: u8,
+    block: u8,
+    checked: bool,
+    /// Of what lies before the block, and before the next segment.
+    sums: [u16; 2],
+}
+
+impl BlockUpload {
+    pub(super) fn begin<O: Objects>(
+        object: Object,
+        request: [u8; 8],
+        dictionary: &Dictionary<'_, O>,
+    ) -> Result<Step, Abort> {
+        let (_, [block, threshold, _, _]) = named(request);
+        let size = dictionary.bytes(object, 0, &mut [])?;
+        if size == 0 {
+            return Err(Abort::NoData);
+        }
+        if !(1..=BLOCK).contains(&block) {
+            return Err(Abort::BlockSize);
+        }
+        // The client would rather have it in segments.
+        if size <= u32::from(threshold) {
+            return upload(object, dictionary);
+        }
+        let checked = request[0] & WITH_CHECKSUM != 0;
+        let this = Self { phase: Phase::Begin, size, start: 0, sent: 0, block, checked, sums: [0; 2] };
+        let reply = answer(0xC0 | WITH_CHECKSUM | WITH_SIZE, object, size);
+        Ok(Step::Go(Transfer::BlockUpload(this), Some(reply)))
+    }
+
+    pub(super) fn request<O: Objects>(
+        mut self,
+        request: [u8; 8],
+        object: Object,
+        dictionary: &Dictionary<'_, O>,
+    ) -> Result<Step, Abort> {
+        let [command, taken, block, ..] = request;
+        match (command & 3, self.phase) {
+            (3, Phase::Begin) => self.phase = Phase::Sending,
+            (2, Phase::Sending | Phase::Sent) => {
+                if taken > self.sent {
+                    return Err(Abort::Sequence);
+                }
+                if !(1..=BLOCK).contains(&block) {
+                    return Err(Abort::BlockSize);
+                }
+                self.go_on_after(taken, object, dictionary)?;
+                self.block = block;
+            }
+            (1, Phase::Ended) => return Ok(Step::Over),
+            _ => return Err(Abort::Command),
+        }
+        if self.phase == Phase::Ended {
+            let unused = (SEGMENT - 1 - (self.size - 1) % SEGMENT) as u8;
+            let [low, high] = if self.checked { self.sums[0].to_le_bytes() } else { [0; 2] };
+            let end = [0xC1 | unused << 2, low, high, 0, 0, 0, 0, 0];
+            return Ok(Step::Go(Transfer::BlockUpload(self), Some(end)));
+        }
+        Ok(Step::Go(Transfer::BlockUpload(self), None))
+    }
+
+    /// So many segments of the block were taken; the others leave again.
+    fn go_on_after<O: Objects>(
+        &mut self,
+        taken: u8,
+        object: Object,
+        dictionary: &Dictionary<'_, O>,
+    ) -> Result<(), Abort> {
+        if taken != self.sent {
+            self.sums[1] = self.sums[0];
+            for number in 0..u32::from(taken) {
+                let (bytes, count, _) =
+                    segment(object, self.start + SEGMENT * number, self.size, dictionary)?;
+                self.sums[1] = sum(self.sums[1], bytes.get(..count as usize).unwrap_or(&bytes));
+            }
+        }
+        self.start = (self.start + SEGMENT * u32::from(taken)).min(self.size);
+        self.sums[0] = self.sums[1];
+        self.sent = 0;
+        self.phase = if self.start == self.size { Phase::Ended } else { Phase::Sending };
+        Ok(())
+    }
+
+    /// The next segment of the block.
+    pub(super) fn poll<O: Objects>(
+        &mut self,
+        object: Object,
+        dictionary: &Dictionary<'_, O>,
+    ) -> Result<Option<[u8; 8]>, Abort> {
+        if self.phase != Phase::Sending {
+            return Ok(None);
+        }
+        let offset = self.start + SEGMENT * u32::from(self.sent);
+        let (bytes, count, is_last) = segment(object, offset, self.size, dictionary)?;
+        self.sums[1] = sum(self.sums[1], bytes.get(..count as usize).unwrap_or(&bytes));
+        self.sent += 1;
+        if is_last || self.sent == self.block {
+            self.phase = Phase::Sent;
+        }
+        let [a, b, c, d, e, f, g] = bytes;
+        Ok(Some([self.sent | u8::from(is_last) << 7, a, b, c, d, e, f, g]))
+    }
+}
+
+/// From the client to the object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct BlockDownload {
+    gathered: Gathered,
+    /// The last number in order.
+    taken: u8,
+    /// Of the newest segment it is known at the end only how many bytes count.
+    held: Option<[u8; 7]>,
+    is_last: bool,
+    checked: bool,
+    sum: u16,
+}
+
+impl BlockDownload {
+    pub(super) fn begin<O: Objects>(
+        object: Object,
+        request: [u8; 8],
+        dictionary: &Dictionary<'_, O>,
+    ) -> Result<Step, Abort> {
+        let row = dictionary.writable(object)?;
+        let size = u32::from_le_bytes(named(request).1);
+        let gathered = Gathered::new(row, (request[0] & WITH_SIZE != 0).then_some(size))?;
+        let checked = request[0] & WITH_CHECKSUM != 0;
+        let this = Self { gathered, taken: 0, held: None, is_last: false, checked, sum: 0 };
+        let reply = answer(0xA0 | WITH_CHECKSUM, object, u32::from(BLOCK));
+        Ok(Step::Go(Transfer::BlockDownload(this), Some(reply)))
+    }
+
+    pub(super) fn request<O: Objects>(
+        mut self,
+        object: Object,
+        request: [u8; 8],
+        dictionary: &mut Dictionary<'_, O>,
+    ) -> Result<Step, Abort> {
+        let [command, bytes @ ..] = request;
+        if self.is_last {
+            return self.end(object, request, dictionary);
+        }
+        let (number, is_last) = (command & 0x7F, command & 0x80 != 0);
+        if number == self.taken + 1 {
+            self.let_go(7)?;
+            (self.held, self.taken, self.is_last) = (Some(bytes), number, is_last);
+        }
+        if !is_last && number != BLOCK {
+            return Ok(Step::Go(Transfer::BlockDownload(self), None));
+        }
+        let reply = [0xA2, self.taken, BLOCK, 0, 0, 0, 0, 0];
+        self.taken = 0;
+        Ok(Step::Go(Transfer::BlockDownload(self), Some(reply)))
+    }
+
+    /// So many bytes of the held segment count.
+    fn let_go(&mut self, count: usize) -> Result<(), Abort> {
+        let Some(bytes) = self.held.take() else { return Ok(()) };
+        self.sum = sum(self.sum, bytes.get(..count).unwrap_or(&bytes));
+        self.gathered.put(bytes.into_iter().take(count))
+    }
+
+    fn end<O: Objects>(
+        mut self,
+        object: Object,
+        request: [u8; 8],
+        dictionary: &mut Dictionary<'_, O>,
+    ) -> Result<Step, Abort> {
+        let [command, low, high, ..] = request;
+        if command & 0b1110_0011 != 0xC1 {
+            return Err(Abort::Command);
+        }
+        self.let_go(7 - usize::from(command >> 2 & 7).min(7))?;
+        if self.checked && self.sum != u16::from_le_bytes([low, high]) {
+            return Err(Abort::Checksum);
+        }
+        dictionary.write(object, self.gathered.value()?)?;
+        Ok(Step::Done([0xA1, 0, 0, 0, 0, 0, 0, 0]))
+    }
+}

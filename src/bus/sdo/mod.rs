@@ -1,0 +1,243 @@
+//! SDO server: any object read or written by a client, expedited, in segments or in blocks.
+//!
+//! Why three ways: four bytes fit into one exchange; more need segments, each of them answered; a log of hundreds of
+//! kilobytes needs blocks of up to 127 segments with one answer each. Nothing is buffered: an upload asks the object for
+//! seven bytes at a time, a download gathers one number.
+//!
+//! One transfer at a time; a new request ends an old one. A client that does not go on for a second is told so
+//! (0504 0000). Answers wait for [`Server::poll`]. Source: CiA 301, SDO.
+
+mod block;
+mod segment;
+
+use super::abort::Abort;
+use super::access::Dictionary;
+use super::dictionary::{Object, Row};
+use super::objects::Objects;
+use block::{BlockDownload, BlockUpload};
+use segment::{SegmentDownload, SegmentUpload};
+
+/// A client that waits longer than this has gone.
+pub const TIMEOUT_US: u64 = 1_000_000;
+
+/// Bytes of a segment.
+const SEGMENT: u32 = 7;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Transfer {
+    Upload(SegmentUpload),
+    Download(SegmentDownload),
+    BlockUpload(BlockUpload),
+    BlockDownload(BlockDownload),
+}
+
+/// What happens after a frame of a transfer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Step {
+    /// It goes on, with an answer where there is one.
+    Go(Transfer, Option<[u8; 8]>),
+    /// It is over, with this answer.
+    Done([u8; 8]),
+    /// It is over, and the client does not wait for anything.
+    Over,
+}
+
+/// The server of one node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Server {
+    object: Object,
+    transfer: Option<Transfer>,
+    due_us: u64,
+    answer: Option<[u8; 8]>,
+}
+
+/// The first four bytes of most answers.
+const fn head(command: u8, object: Object) -> [u8; 4] {
+    let [low, high] = object.index.to_le_bytes();
+    [command, low, high, object.sub]
+}
+
+/// A whole answer from its halves.
+const fn answer(command: u8, object: Object, value: u32) -> [u8; 8] {
+    let [a, b, c, d] = head(command, object);
+    let [e, f, g, h] = value.to_le_bytes();
+    [a, b, c, d, e, f, g, h]
+}
+
+const fn aborted(object: Object, abort: Abort) -> [u8; 8] {
+    answer(0x80, object, abort.code())
+}
+
+/// The object that a request names, and its last four bytes.
+const fn named(request: [u8; 8]) -> (Object, [u8; 4]) {
+    let [_, low, high, sub, a, b, c, d] = request;
+    (Object::at(u16::from_le_bytes([low, high]), sub), [a, b, c, d])
+}
+
+/// Seven bytes of an object, and whether there are more; `None` beyond the end.
+fn segment<O: Objects>(
+    object: Object,
+    offset: u32,
+    size: u32,
+    dictionary: &Dictionary<'_, O>,
+) -> Result<([u8; 7], u32, bool), Abort> {
+    let mut bytes = [0; 7];
+    let now = dictionary.bytes(object, offset, &mut bytes)?;
+    // Somebody else has written it meanwhile.
+    if now != size || offset >= size {
+        return Err(Abort::State);
+    }
+    let count = (size - offset).min(SEGMENT);
+    Ok((bytes, count, offset + count == size))
+}
+
+/// A number as it comes in, piece by piece.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Gathered {
+    bytes: [u8; 4],
+    count: u8,
+    size: u8,
+}
+
+impl Gathered {
+    /// Room for the number of a row; `declared` is what the client says it has.
+    fn new(row: &Row, declared: Option<u32>) -> Result<Self, Abort> {
+        let size = row.kind.size().ok_or(Abort::ReadOnly)?;
+        match declared {
+            Some(declared) if declared > u32::from(size) => Err(Abort::TooLong),
+            Some(declared) if declared < u32::from(size) => Err(Abort::TooShort),
+            _ => Ok(Self { bytes: [0; 4], count: 0, size }),
+        }
+    }
+
+    fn put(&mut self, bytes: impl Iterator<Item = u8>) -> Result<(), Abort> {
+        for byte in bytes {
+            if self.count >= self.size {
+                return Err(Abort::TooLong);
+            }
+            *self.bytes.get_mut(usize::from(self.count)).ok_or(Abort::TooLong)? = byte;
+            self.count += 1;
+        }
+        Ok(())
+    }
+
+    fn value(&self) -> Result<u32, Abort> {
+        if self.count == self.size { Ok(u32::from_le_bytes(self.bytes)) } else { Err(Abort::TooShort) }
+    }
+}
+
+impl Server {
+    /// Nothing under way.
+    pub const IDLE: Self = Self { object: Object::at(0, 0), transfer: None, due_us: 0, answer: None };
+
+    /// A request of the client.
+    pub fn request<O: Objects>(&mut self, request: [u8; 8], now_us: u64, dictionary: &mut Dictionary<'_, O>) {
+        self.due_us = now_us + TIMEOUT_US;
+        // In a block that is downloaded every first byte is a number, but for 0x80.
+        if request[0] == 0x80 {
+            (self.transfer, self.answer) = (None, None);
+            return;
+        }
+        let transfer = self.transfer.take();
+        let step = match (transfer, request[0] >> 5) {
+            (Some(Transfer::BlockDownload(block)), _) => block.request(self.object, request, dictionary),
+            (_, 1) => self.download(request, dictionary),
+            (_, 2) => self.upload(request, dictionary),
+            (_, 6) if request[0] & 1 == 0 => {
+                self.object = named(request).0;
+                BlockDownload::begin(self.object, request, dictionary)
+            }
+            (_, 5) if request[0] & 3 == 0 => {
+                self.object = named(request).0;
+                BlockUpload::begin(self.object, request, dictionary)
+            }
+            (Some(Transfer::Download(segments)), 0) => segments.request(self.object, request, dictionary),
+            (Some(Transfer::Upload(segments)), 3) => segments.request(self.object, request, dictionary),
+            (Some(Transfer::BlockUpload(block)), 5) => block.request(request, self.object, dictionary),
+            _ => Err(Abort::Command),
+        };
+        match step {
+            Ok(Step::Go(next, answer)) => (self.transfer, self.answer) = (Some(next), answer),
+            Ok(Step::Done(answer)) => self.answer = Some(answer),
+            Ok(Step::Over) => self.answer = None,
+            Err(abort) => self.answer = Some(aborted(self.object, abort)),
+        }
+    }
+
+    /// The next answer: one that waits, the next segment of a block, or that the client has gone.
+    pub fn poll<O: Objects>(&mut self, now_us: u64, dictionary: &mut Dictionary<'_, O>) -> Option<[u8; 8]> {
+        let waiting = self.answer.take();
+        if waiting.is_some() {
+            return waiting;
+        }
+        let transfer = self.transfer.as_mut()?;
+        if let Transfer::BlockUpload(block) = transfer {
+            match block.poll(self.object, dictionary) {
+                Ok(None) => {}
+                Ok(answer) => {
+                    self.due_us = now_us + TIMEOUT_US;
+                    return answer;
+                }
+                Err(abort) => {
+                    self.transfer = None;
+                    return Some(aborted(self.object, abort));
+                }
+            }
+        }
+        if now_us < self.due_us {
+            return None;
+        }
+        self.transfer = None;
+        Some(aborted(self.object, Abort::Timeout))
+    }
+
+    fn download<O: Objects>(
+        &mut self,
+        request: [u8; 8],
+        dictionary: &mut Dictionary<'_, O>,
+    ) -> Result<Step, Abort> {
+        let (object, bytes) = named(request);
+        self.object = object;
+        let row = dictionary.writable(object)?;
+        let (is_expedited, has_size) = (request[0] & 2 != 0, request[0] & 1 != 0);
+        if !is_expedited {
+            let size = has_size.then_some(u32::from_le_bytes(bytes));
+            let segments = SegmentDownload::new(Gathered::new(row, size)?);
+            return Ok(Step::Go(Transfer::Download(segments), Some(answer(0x60, object, 0))));
+        }
+        let own = u32::from(row.kind.size().ok_or(Abort::ReadOnly)?);
+        let count = if has_size { u32::from(4 - (request[0] >> 2 & 3)) } else { own };
+        let mut gathered = Gathered::new(row, Some(count))?;
+        gathered.put(bytes.into_iter().take(count as usize))?;
+        dictionary.write(object, gathered.value()?)?;
+        Ok(Step::Done(answer(0x60, object, 0)))
+    }
+
+    fn upload<O: Objects>(
+        &mut self,
+        request: [u8; 8],
+        dictionary: &mut Dictionary<'_, O>,
+    ) -> Result<Step, Abort> {
+        self.object = named(request).0;
+        upload(self.object, dictionary)
+    }
+}
+
+/// Begins an upload: expedited where it fits.
+fn upload<O: Objects>(object: Object, dictionary: &Dictionary<'_, O>) -> Result<Step, Abort> {
+    let mut bytes = [0; 4];
+    match dictionary.bytes(object, 0, &mut bytes)? {
+        0 => Err(Abort::NoData),
+        size @ 1..=4 => {
+            let command = 0x43 | ((4 - size as u8) << 2);
+            Ok(Step::Done(answer(command, object, u32::from_le_bytes(bytes))))
+        }
+        size => {
+            let segments = SegmentUpload::new(size);
+            Ok(Step::Go(Transfer::Upload(segments), Some(answer(0x41, object, size))))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,80 @@
+//! Transfers in segments of seven bytes, each of them answered.
+//!
+//! ```text
+//! upload    request 011t----                      answer 000tnnnc, 7 bytes
+//! download  request 000tnnnc, 7 bytes             answer 001t----
+//! ```
+//! t alternates from 0 on, n bytes of the seven are not used, c marks the last.
+
+use super::super::abort::Abort;
+use super::super::access::Dictionary;
+use super::super::dictionary::Object;
+use super::super::objects::Objects;
+use super::{Gathered, SEGMENT, Step, Transfer, segment};
+
+const TOGGLE: u8 = 1 << 4;
+
+/// From the object to the client.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SegmentUpload {
+    size: u32,
+    offset: u32,
+    toggle: u8,
+}
+
+impl SegmentUpload {
+    pub(super) const fn new(size: u32) -> Self {
+        Self { size, offset: 0, toggle: 0 }
+    }
+
+    pub(super) fn request<O: Objects>(
+        mut self,
+        object: Object,
+        request: [u8; 8],
+        dictionary: &Dictionary<'_, O>,
+    ) -> Result<Step, Abort> {
+        if request[0] & TOGGLE != self.toggle {
+            return Err(Abort::Toggle);
+        }
+        let (bytes, count, is_last) = segment(object, self.offset, self.size, dictionary)?;
+        let command = self.toggle | ((SEGMENT - count) as u8) << 1 | u8::from(is_last);
+        let [a, b, c, d, e, f, g] = bytes;
+        let answer = [command, a, b, c, d, e, f, g];
+        self.offset += count;
+        self.toggle ^= TOGGLE;
+        Ok(if is_last { Step::Done(answer) } else { Step::Go(Transfer::Upload(self), Some(answer)) })
+    }
+}
+
+/// From the client to the object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SegmentDownload {
+    gathered: Gathered,
+    toggle: u8,
+}
+
+impl SegmentDownload {
+    pub(super) const fn new(gathered: Gathered) -> Self {
+        Self { gathered, toggle: 0 }
+    }
+
+    pub(super) fn request<O: Objects>(
+        mut self,
+        object: Object,
+        request: [u8; 8],
+        dictionary: &mut Dictionary<'_, O>,
+    ) -> Result<Step, Abort> {
+        if request[0] & TOGGLE != self.toggle {
+            return Err(Abort::Toggle);
+        }
+        let count = 7 - usize::from(request[0] >> 1 & 7);
+        self.gathered.put(request.into_iter().skip(1).take(count))?;
+        let answer = [0x20 | self.toggle, 0, 0, 0, 0, 0, 0, 0];
+        if request[0] & 1 == 0 {
+            self.toggle ^= TOGGLE;
+            return Ok(Step::Go(Transfer::Download(self), Some(answer)));
+        }
+        dictionary.write(object, self.gathered.value()?)?;
+        Ok(Step::Done(answer))
+    }
+}

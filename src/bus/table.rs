@@ -1,0 +1,158 @@
+//! The object dictionary: every object a node has, once.
+//!
+//! The device reads the rows, the writer of electronic data sheets the rows and the names.
+//!
+//! ```text
+//! index [x indices], subindex [xN subindices], type, access, PDO, default [+ node], name
+//! ```
+//!
+//! The order of a PDO's subindices is CiA 301's, the drive's objects are CiA 402's; 219A is the one object of another
+//! maker that recorded host software maps (docs/bus.md).
+
+use super::dictionary::{Access, Mapping, Row, Type};
+
+macro_rules! rows {
+    (@count) => { 1 };
+    (@count $count:literal) => { $count };
+    (@node) => { false };
+    (@node node) => { true };
+    ($( $index:literal $(x $indices:literal)?, $sub:literal $(x $subs:literal)?, $kind:ident, $access:ident, $mapping:ident,
+        $default:literal $(+ $node:ident)?, $name:literal; )*) => {
+        /// What each object is.
+        pub static ROWS: &[Row] = &[$( Row {
+            index: $index,
+            indices: rows!(@count $($indices)?),
+            sub: $sub,
+            subs: rows!(@count $($subs)?),
+            kind: Type::$kind,
+            access: Access::$access,
+            mapping: Mapping::$mapping,
+            plus_node: rows!(@node $($node)?),
+            default: $default,
+        }, )*];
+
+        /// What each row is called, in the same order.
+        pub static NAMES: &[&str] = &[$($name),*];
+    };
+}
+
+rows! {
+    0x1000, 0, U32, Const, No, 0x0002_0192, "Device type";
+    0x1001, 0, U8, Read, Transmit, 0, "Error register";
+    0x1003, 0, U8, Both, No, 0, "Number of errors";
+    0x1003, 1 x 8, U32, Read, No, 0, "Standard error field";
+    0x1005, 0, U32, Both, No, 0x80, "COB-ID SYNC message";
+    0x1008, 0, Text, Read, No, 0, "Manufacturer device name";
+    0x1009, 0, Text, Read, No, 0, "Manufacturer hardware version";
+    0x100A, 0, Text, Read, No, 0, "Manufacturer software version";
+    0x1010, 0, U8, Const, No, 1, "Number of entries";
+    0x1010, 1, U32, Both, No, 0, "Store all parameters";
+    0x1011, 0, U8, Const, No, 1, "Number of entries";
+    0x1011, 1, U32, Both, No, 0, "Restore all default parameters";
+    0x1014, 0, U32, Both, No, 0x80 + node, "COB-ID emergency message";
+    0x1015, 0, U16, Both, No, 0, "Inhibit time emergency message";
+    0x1016, 0, U8, Const, No, 2, "Number of entries";
+    0x1016, 1 x 2, U32, Both, No, 0, "Consumer heartbeat time";
+    0x1017, 0, U16, Both, No, 0, "Producer heartbeat time";
+    0x1018, 0, U8, Const, No, 4, "Number of entries";
+    0x1018, 1, U32, Read, No, 0, "Vendor-ID";
+    0x1018, 2, U32, Read, No, 0, "Product code";
+    0x1018, 3, U32, Read, No, 0, "Revision number";
+    0x1018, 4, U32, Read, No, 0, "Serial number";
+    0x1019, 0, U8, Both, No, 0, "Synchronous counter overflow value";
+    0x1029, 0, U8, Const, No, 1, "Number of entries";
+    0x1029, 1, U8, Both, No, 0, "Communication error";
+    0x1200, 0, U8, Const, No, 2, "Number of entries";
+    0x1200, 1, U32, Read, No, 0x600 + node, "COB-ID client to server";
+    0x1200, 2, U32, Read, No, 0x580 + node, "COB-ID server to client";
+    0x1400 x 4, 0, U8, Const, No, 5, "Number of entries";
+    0x1400, 1, U32, Both, No, 0x200 + node, "COB-ID used by RPDO 1";
+    0x1401, 1, U32, Both, No, 0x300 + node, "COB-ID used by RPDO 2";
+    0x1402, 1, U32, Both, No, 0x400 + node, "COB-ID used by RPDO 3";
+    0x1403, 1, U32, Both, No, 0x500 + node, "COB-ID used by RPDO 4";
+    0x1400 x 4, 2, U8, Both, No, 255, "Transmission type";
+    0x1400 x 4, 3, U16, Both, No, 0, "Inhibit time";
+    0x1400 x 4, 4, U8, Both, No, 0, "Reserved";
+    0x1400 x 4, 5, U16, Both, No, 0, "Event timer";
+    0x1600 x 4, 0, U8, Both, No, 1, "Number of mapped objects";
+    0x1600, 1, U32, Both, No, 0x6040_0010, "Mapped object";
+    0x1601, 1, U32, Both, No, 0x607A_0020, "Mapped object";
+    0x1602, 1, U32, Both, No, 0x60FF_0020, "Mapped object";
+    0x1603, 1, U32, Both, No, 0x6071_0010, "Mapped object";
+    0x1600 x 4, 2 x 7, U32, Both, No, 0, "Mapped object";
+    0x1800 x 4, 0, U8, Const, No, 6, "Number of entries";
+    0x1800, 1, U32, Both, No, 0x180 + node, "COB-ID used by TPDO 1";
+    0x1801, 1, U32, Both, No, 0x280 + node, "COB-ID used by TPDO 2";
+    0x1802, 1, U32, Both, No, 0x380 + node, "COB-ID used by TPDO 3";
+    0x1803, 1, U32, Both, No, 0x480 + node, "COB-ID used by TPDO 4";
+    0x1800, 2, U8, Both, No, 255, "Transmission type";
+    0x1801 x 3, 2, U8, Both, No, 1, "Transmission type";
+    0x1800 x 4, 3, U16, Both, No, 10, "Inhibit time";
+    0x1800 x 4, 4, U8, Both, No, 0, "Reserved";
+    0x1800 x 4, 5, U16, Both, No, 0, "Event timer";
+    0x1800 x 4, 6, U8, Both, No, 0, "SYNC start value";
+    0x1A00, 0, U8, Both, No, 1, "Number of mapped objects";
+    0x1A01, 0, U8, Both, No, 2, "Number of mapped objects";
+    0x1A02 x 2, 0, U8, Both, No, 1, "Number of mapped objects";
+    0x1A00, 1, U32, Both, No, 0x6041_0010, "Mapped object";
+    0x1A01, 1, U32, Both, No, 0x6064_0020, "Mapped object";
+    0x1A02, 1, U32, Both, No, 0x6077_0010, "Mapped object";
+    0x1A03, 1, U32, Both, No, 0x60FD_0020, "Mapped object";
+    0x1A00, 2, U32, Both, No, 0, "Mapped object";
+    0x1A01, 2, U32, Both, No, 0x606C_0020, "Mapped object";
+    0x1A02 x 2, 2, U32, Both, No, 0, "Mapped object";
+    0x1A00 x 4, 3 x 6, U32, Both, No, 0, "Mapped object";
+
+    0x2010, 0, I16, Read, Transmit, 0, "Velocity actual value, short";
+    0x219A, 0, U32, Read, Transmit, 0, "Digital inputs, raw";
+    0x6007, 0, I16, Both, No, 3, "Abort connection option code";
+    0x603F, 0, U16, Read, Transmit, 0, "Error code";
+    0x6040, 0, U16, Both, Any, 0, "Controlword";
+    0x6041, 0, U16, Read, Transmit, 0, "Statusword";
+    0x605A, 0, I16, Both, No, 2, "Quick stop option code";
+    0x605D, 0, I16, Both, No, 1, "Halt option code";
+    0x605E, 0, I16, Both, No, 2, "Fault reaction option code";
+    0x6060, 0, I8, Both, Any, 0, "Modes of operation";
+    0x6061, 0, I8, Read, Transmit, 0, "Modes of operation display";
+    0x6062, 0, I32, Read, Transmit, 0, "Position demand value";
+    0x6064, 0, I32, Read, Transmit, 0, "Position actual value";
+    0x6065, 0, U32, Both, No, 87266, "Following error window";
+    0x6066, 0, U16, Both, No, 10, "Following error time out";
+    0x6067, 0, U32, Both, No, 17453, "Position window";
+    0x6068, 0, U16, Both, No, 10, "Position window time";
+    0x606B, 0, I32, Read, Transmit, 0, "Velocity demand value";
+    0x606C, 0, I32, Read, Transmit, 0, "Velocity actual value";
+    0x6071, 0, I16, Both, Any, 0, "Target torque";
+    0x6072, 0, U16, Both, Any, 1000, "Max torque";
+    0x6074, 0, I16, Read, Transmit, 0, "Torque demand";
+    0x6075, 0, U32, Read, No, 0, "Motor rated current";
+    0x6076, 0, U32, Read, No, 0, "Motor rated torque";
+    0x6077, 0, I16, Read, Transmit, 0, "Torque actual value";
+    0x607A, 0, I32, Both, Any, 0, "Target position";
+    0x607C, 0, I32, Both, No, 0, "Home offset";
+    0x607D, 0, U8, Const, No, 2, "Number of entries";
+    0x607D, 1, I32, Both, No, 0x8000_0000, "Min position limit";
+    0x607D, 2, I32, Both, No, 0x7FFF_FFFF, "Max position limit";
+    0x6081, 0, U32, Both, Any, 500_000, "Profile velocity";
+    0x6083, 0, U32, Both, Any, 2_000_000, "Profile acceleration";
+    0x6084, 0, U32, Both, Any, 2_000_000, "Profile deceleration";
+    0x6086, 0, I16, Both, No, 0, "Motion profile type";
+    0x6087, 0, U32, Both, Any, 1000, "Torque slope";
+    0x6098, 0, I8, Both, No, 0, "Homing method";
+    0x60A8, 0, U32, Const, No, 0xFA10_0000, "SI unit position";
+    0x60A9, 0, U32, Const, No, 0xFA10_0300, "SI unit velocity";
+    0x60AA, 0, U32, Const, No, 0xFA10_5700, "SI unit acceleration";
+    0x60B1, 0, I32, Both, Any, 0, "Velocity offset";
+    0x60B2, 0, I16, Both, Any, 0, "Torque offset";
+    0x60C1, 0, U8, Const, No, 1, "Number of entries";
+    0x60C1, 1, I32, Both, Any, 0, "Interpolation data record, first parameter";
+    0x60C2, 0, U8, Const, No, 2, "Number of entries";
+    0x60C2, 1, U8, Both, No, 2, "Interpolation time period";
+    0x60C2, 2, I8, Both, No, 0xFD, "Interpolation time index";
+    0x60F4, 0, I32, Read, Transmit, 0, "Following error actual value";
+    0x60FD, 0, U32, Read, Transmit, 0, "Digital inputs";
+    0x60FE, 0, U8, Const, No, 1, "Number of entries";
+    0x60FE, 1, U32, Both, Any, 0, "Physical outputs";
+    0x60FF, 0, I32, Both, Any, 0, "Target velocity";
+    0x6502, 0, U32, Read, No, 0, "Supported drive modes";
+}

@@ -1,0 +1,113 @@
+//! Random frames: every identifier, every length, cut transfers, two clients at once.
+
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::*;
+
+/// Legal steps of the drive as a host sees it: what a statusword may become after one frame and one tick.
+fn is_state(word: u16) -> bool {
+    matches!(word & 0x6F, 0x00 | 0x40 | 0x21 | 0x23 | 0x27 | 0x07 | 0x0F | 0x08)
+}
+
+/// A frame that is likely to mean something.
+fn frame(random: &mut impl Rng) -> (u16, Vec<u8>) {
+    let [kind, a, b, c] = random.next_u32().to_le_bytes();
+    let mut data = [random.next_u32().to_le_bytes(), random.next_u32().to_le_bytes()].concat();
+    let id = match kind % 8 {
+        // Requests with an object that exists, in a command that exists.
+        0..=3 => {
+            let row = table::ROWS[usize::from(a) % table::ROWS.len()];
+            let is_named = c & 0xC0 != 0;
+            let index = row.index + u16::from(b) % u16::from(row.indices);
+            let [low, high] = if is_named { index.to_le_bytes() } else { [0x0A, 0x10] };
+            data[0] = [
+                0x40, 0x40, 0x40, 0x23, 0x2F, 0x2B, 0x21, 0xA4, 0xA3, 0xC6, 0xA2, 0xC1, 0x60, 0x70, 0x00,
+                0x80,
+            ][usize::from(c % 16)];
+            (data[1], data[2], data[3]) = (low, high, if is_named { row.sub + b % row.subs } else { 0 });
+            match data[0] {
+                0xA4 => (data[4], data[5]) = (data[4] & 0x7F, 0),
+                0xA2 => (data[1], data[2]) = (data[1] & 7, data[2] | 1),
+                _ => {}
+            }
+            0x601 + u16::from(b & 1)
+        }
+        4 => [0x000, 0x080, 0x750, 0x701][usize::from(a % 4)],
+        5 => 0x200 + 0x100 * u16::from(a % 4) + u16::from(b % 3),
+        _ => u16::from_le_bytes([a, b]) & 0x7FF,
+    };
+    let length = if c % 4 == 0 { usize::from(a % 9) } else { 8 };
+    data.truncate(if id == 0 { 2 } else { length });
+    if id == 0 && c % 4 != 0 {
+        data[0] = [1, 128, 2, 130][usize::from(a % 4)];
+        data[1] &= 3;
+    }
+    (id, data)
+}
+
+fn play(seed: u64, frames: u32) -> (u32, [u32; 4]) {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut board = Board::started(1);
+    let (mut most, mut seen) = (0, [0; 4]);
+    for number in 0..frames {
+        let (id, data) = frame(&mut random);
+        board.hear(id, &data);
+        if random.next_u32() % 64 == 0 {
+            board.now_us += 2_000_000;
+        }
+        // A host that knows what it does, now and then.
+        if random.next_u32() % 512 == 0 {
+            for (id, data) in [
+                (0, [130, 0]),
+                (0, [1, 0]),
+                (0x201, [6, 0]),
+                (0x202, [6, 0]),
+                (0x201, [15, 0]),
+                (0x202, [15, 0]),
+            ] {
+                board.hear(id, &data);
+                board.tick();
+            }
+        }
+        if random.next_u32() % 4096 == 0 {
+            let fault = crate::leg::Fault { code: crate::leg::FaultCode::Overspeed, joint: 1 };
+            board.drive = board.drive.after(DriveEvent::Failed(fault), 4);
+        }
+        // What a node says of the leg is what it was told at the beginning of the tick.
+        let drive = board.drive;
+        let answers = board.tick();
+        most = most.max(answers.len() as u32);
+        for answer in &answers {
+            // Of what was configured, and of the right length.
+            assert!(answer.data().len() <= 8 && answer.id() != 0, "{number}: {answer:x?}");
+        }
+        for axis in &board.axes {
+            let word = axis.statusword();
+            assert!(is_state(word), "{number}: {word:x}");
+            assert!(word & 0x806F != 0x27 || drive == DriveState::OperationEnabled, "{number}: {word:x}");
+            // The leg is not where a joint has not asked.
+            assert!(board.drive != DriveState::OperationEnabled || word & 0x6F == 0x27, "{number}: {word:x}");
+        }
+        seen[0] += u32::from(board.drive == DriveState::OperationEnabled);
+        seen[1] += u32::from(board.nodes[0].state() == NmtState::Operational);
+        seen[2] +=
+            answers.iter().filter(|frame| frame.id() == 0x581 && frame.data()[0] == 0x80).count() as u32;
+        seen[3] +=
+            answers.iter().filter(|frame| frame.id() == 0x581 && frame.data()[0] != 0x80).count() as u32;
+    }
+    (most, seen)
+}
+
+#[test]
+fn no_frame_makes_a_node_panic_answer_without_end_or_power_one_joint_alone() {
+    let frames = std::env::var("SCARAB_FRAMES").ok().and_then(|text| text.parse().ok()).unwrap_or(50_000);
+    let (most, seen) = play(1, frames);
+    std::println!(
+        "{frames} frames: at most {most} frames in one tick, enabled/operational/aborts/answers {seen:?}"
+    );
+    // A block is 127 segments, of two nodes at once; with it all else that a tick may bring.
+    assert!(most < 2 * (127 + 16), "{most}");
+    // It was not all refused at the door.
+    assert!(seen.iter().all(|&count| count > frames / 200), "{seen:?}");
+}

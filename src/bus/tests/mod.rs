@@ -1,0 +1,147 @@
+//! A board of two nodes with a leg behind them that does what it is told, and what has to hold for all of it.
+
+extern crate std;
+
+mod fuzz;
+mod session;
+mod values;
+
+use std::vec::Vec;
+
+use super::drive::{Axis, AxisConstants, AxisStatus, Coupling, Mode};
+use super::*;
+use crate::leg::{DriveEvent, DriveState, PowerRequest};
+use crate::units::{Ampere, NewtonMetre};
+
+/// Five thousand bytes, into which no block and no segment fits a whole number of times.
+pub const LONG: usize = 5003;
+const BYTES: [u8; LONG] = {
+    let mut bytes = [0; LONG];
+    let mut place = 0;
+    while place < LONG {
+        bytes[place] = b'!' + (place * 7 % 89) as u8;
+        place += 1;
+    }
+    bytes
+};
+pub const LONG_TEXT: &str = match core::str::from_utf8(&BYTES) {
+    Ok(text) => text,
+    Err(_) => "",
+};
+
+pub const IDENTITY: Identity =
+    Identity { vendor: 0, product: 0x5CA2, revision: 1, serial: 7, texts: ["Scarab", "3.6", LONG_TEXT] };
+
+pub fn axis() -> Axis {
+    Axis::new(AxisConstants {
+        rated_torque: NewtonMetre(40.0),
+        rated_current: Ampere(20.0),
+        modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+    })
+}
+
+/// Two nodes, two joints, one drive.
+pub struct Board {
+    pub nodes: [Node; 2],
+    pub axes: [Axis; 2],
+    pub drive: DriveState,
+    pub now_us: u64,
+    coupling: Coupling,
+    /// The leg refuses whatever enables.
+    pub refuses: bool,
+}
+
+impl Board {
+    pub fn new(first: u8) -> Self {
+        let node = |number| Node::new(NodeId::new(number).expect("a node's number"), IDENTITY);
+        Self {
+            nodes: [node(first), node(first + 1)],
+            axes: [axis(); 2],
+            drive: DriveState::NotReadyToSwitchOn,
+            now_us: 0,
+            coupling: Coupling::default(),
+            refuses: false,
+        }
+    }
+
+    /// Both nodes have told that they are there, the leg has ticked.
+    pub fn started(first: u8) -> Self {
+        let mut board = Self::new(first);
+        assert_eq!(board.tick().len(), 2);
+        board
+    }
+
+    /// A frame on the bus.
+    pub fn hear(&mut self, id: u16, data: &[u8]) {
+        for (node, axis) in self.nodes.iter_mut().zip(&mut self.axes) {
+            node.on_frame(&Frame::new(id, data), self.now_us, axis);
+        }
+    }
+
+    /// 250 us: one tick of the leg, everything that the nodes have to say.
+    pub fn tick(&mut self) -> Vec<Frame> {
+        self.now_us += 250;
+        self.drive = self.drive.after(DriveEvent::Tick, 4);
+        let status = AxisStatus { drive: self.drive, mode: 0, ..AxisStatus::NONE };
+        for axis in &mut self.axes {
+            axis.update(&status);
+        }
+        let [hip, knee] = &mut self.axes;
+        if let Some(request) = self.coupling.power([hip, knee], self.drive, self.refuses) {
+            let enables = matches!(
+                request,
+                PowerRequest::Shutdown | PowerRequest::SwitchOn | PowerRequest::EnableOperation
+            );
+            if !(self.refuses && enables) {
+                self.drive = self.drive.after(DriveEvent::Asked(request), 4);
+            }
+        }
+        self.frames()
+    }
+
+    pub fn frames(&mut self) -> Vec<Frame> {
+        let mut frames = Vec::new();
+        for (node, axis) in self.nodes.iter_mut().zip(&mut self.axes) {
+            while let Some(frame) = node.poll(self.now_us, axis) {
+                frames.push(frame);
+                assert!(frames.len() < 1000, "a node that never ends");
+            }
+        }
+        frames
+    }
+
+    pub fn run(&mut self, ticks: u32) -> Vec<Frame> {
+        (0..ticks).flat_map(|_| self.tick()).collect()
+    }
+
+    /// One SDO request to the first node and its answer.
+    pub fn ask(&mut self, request: [u8; 8]) -> Option<[u8; 8]> {
+        let id = self.nodes[0].id();
+        self.hear(id.on(0x600), &request);
+        let [node, _] = &mut self.nodes;
+        // What else it has to say is not asked for here.
+        while let Some(frame) = node.poll(self.now_us, &mut self.axes[0]) {
+            if frame.id() == id.on(0x580) {
+                return frame.full();
+            }
+        }
+        None
+    }
+
+    pub fn read(&mut self, index: u16, sub: u8) -> Result<u32, u32> {
+        let [low, high] = index.to_le_bytes();
+        let answer = self.ask([0x40, low, high, sub, 0, 0, 0, 0]).expect("an answer");
+        let value = u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
+        assert_eq!(answer[1..4], [low, high, sub]);
+        if answer[0] == 0x80 { Err(value) } else { Ok(value) }
+    }
+
+    /// Writes with the size that is given.
+    pub fn write(&mut self, index: u16, sub: u8, value: u32, size: u8) -> Result<(), u32> {
+        let [low, high] = index.to_le_bytes();
+        let [a, b, c, d] = value.to_le_bytes();
+        let answer = self.ask([0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]).expect("an answer");
+        let code = u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
+        if answer[0] == 0x80 { Err(code) } else { Ok(()) }
+    }
+}
