@@ -39,10 +39,12 @@ impl Frame {
         (self.length == 8).then_some(self.data)
     }
 
-    /// Bits on the wire without stuffing, the three of the intermission included: 47 and 8 for each byte.
+    /// Fewest and most bits on the wire, the three of the intermission included: 47 and 8 for each byte, and a stuffed one
+    /// after at most every four of the 34 and 8 for each byte between start and check sum.
     #[must_use]
-    pub const fn bits(&self) -> u32 {
-        47 + 8 * self.length as u32
+    pub const fn bits(&self) -> [u32; 2] {
+        let data = 8 * self.length as u32;
+        [47 + data, 47 + data + (33 + data) / 4]
     }
 }
 
@@ -81,7 +83,7 @@ mod tests {
         assert_eq!(Frame::new(1, &[7; 12]).full(), Some([7; 8]));
         // 1 + 11 + 1 + 1 + 1 + 4 + 15 + 1 + 1 + 1 + 7 + 3: start, id, RTR, IDE, r0, DLC, CRC, its delimiter, ACK, its
         // delimiter, end, intermission.
-        assert_eq!((Frame::new(0, &[]).bits(), Frame::new(0, &[0; 8]).bits()), (47, 111));
+        assert_eq!((Frame::new(0, &[]).bits(), Frame::new(0, &[0; 8]).bits()), ([47, 55], [111, 135]));
     }
 
     #[test]

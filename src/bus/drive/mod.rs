@@ -69,7 +69,7 @@ impl Mode {
 /// A position that was asked for in [`Mode::ProfilePosition`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SetPoint {
-    /// Grows with every new one, wrapping: another number is another set-point.
+    /// Grows with every new one, wrapping: another number than before, or than when the leg was enabled, is a new set-point.
     pub number: u8,
     /// Where to.
     pub position: Radian,

@@ -197,6 +197,32 @@ fn a_set_point_is_taken_once_for_each_rising_edge() {
 }
 
 #[test]
+fn a_set_point_before_the_leg_is_powered_is_not_taken_afterwards() {
+    let mut board = Board::started(1);
+    board.axes[0].write(Object::at(0x6060, 0), 1).expect("a mode");
+    board.axes[0].write(Object::at(0x607A, 0), 500_000).expect("a target");
+    board.control([6, 6]);
+    assert_eq!(board.control([0x0F, 7])[0], 0x8027);
+    board.control([0x1F, 7]);
+    board.control([0x1F, 15]);
+    assert_eq!(board.drive, DriveState::OperationEnabled);
+    assert_eq!(board.axes[0].command().target, Target::ProfilePosition(SetPoint::default()));
+    board.control([0x0F, 15]);
+    board.control([0x1F, 15]);
+    assert_ne!(board.axes[0].command().target, Target::ProfilePosition(SetPoint::default()));
+}
+
+#[test]
+fn a_reset_that_was_asked_before_the_fault_does_not_reset_it() {
+    let mut board = Board::enabled();
+    board.axes[0].write(CONTROLWORD, 0x8F).expect("a word");
+    let fault = Fault { code: FaultCode::NotFinite, joint: 0 };
+    board.drive = board.drive.after(DriveEvent::Failed(fault), 2);
+    board.run(2);
+    assert_eq!(board.states(), [0x08; 2]);
+}
+
+#[test]
 fn units_are_micro_radians_and_thousandths_of_the_rated_torque() {
     let mut axis = axis();
     axis.update(&AxisStatus {

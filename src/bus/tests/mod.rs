@@ -3,6 +3,7 @@
 extern crate std;
 
 mod fuzz;
+mod mapping;
 mod session;
 mod values;
 
