@@ -10,6 +10,10 @@ use super::pdo::receive::Receive;
 use super::pdo::transmit::Transmit;
 use super::pdo::{PDOS, Parameters};
 
+/// What is mapped after the start: as host software for exoskeletons has it.
+const RECEIVED: [u32; PDOS] = [0x6040_0010, 0x607A_0020, 0x60FF_0020, 0x6071_0010];
+const SENT: [&[u32]; PDOS] = [&[0x6041_0010], &[0x6064_0020, 0x606C_0020], &[0x6077_0010], &[0x60FD_0020]];
+
 /// Who this is (1018, 1008 to 100A).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity {
@@ -23,6 +27,20 @@ pub struct Identity {
     pub serial: u32,
     /// Name, version of the hardware, version of the software.
     pub texts: [&'static str; 3],
+}
+
+impl Identity {
+    /// Of this firmware on a board; the vendor's number is 0: CiA has given out none.
+    #[must_use]
+    pub const fn scarab(serial: u32, hardware: &'static str) -> Self {
+        Self {
+            vendor: 0,
+            product: 1,
+            revision: 1 << 16,
+            serial,
+            texts: ["Scarab joint drive", hardware, env!("CARGO_PKG_VERSION")],
+        }
+    }
 }
 
 /// All of them.
@@ -50,10 +68,15 @@ impl Communication {
     /// As after the start.
     #[must_use]
     pub fn new(node: NodeId, identity: Identity) -> Self {
-        let receive =
-            |base, mapped| Receive::new(Parameters::new(Mapping::Receive, node.on(base), 255, 0, &[mapped]));
-        let transmit = |base, kind, mapped: &[u32]| {
-            Transmit::new(Parameters::new(Mapping::Transmit, node.on(base), kind, 10, mapped))
+        let base = |first: u16, place: usize| node.on(first + 0x100 * place as u16);
+        let receive = |place: usize| {
+            let mapped = RECEIVED.get(place).copied().unwrap_or(0);
+            Receive::new(Parameters::new(Mapping::Receive, base(0x200, place), 255, 0, &[mapped]))
+        };
+        let transmit = |place: usize| {
+            let mapped: &[u32] = SENT.get(place).copied().unwrap_or(&[]);
+            let kind = if place == 0 { 255 } else { 1 };
+            Transmit::new(Parameters::new(Mapping::Transmit, base(0x180, place), kind, 10, mapped))
         };
         Self {
             node,
@@ -66,18 +89,8 @@ impl Communication {
             sync: 0x80,
             sync_overflow: 0,
             on_error: 0,
-            receive: [
-                receive(0x200, 0x6040_0010),
-                receive(0x300, 0x607A_0020),
-                receive(0x400, 0x60FF_0020),
-                receive(0x500, 0x6071_0010),
-            ],
-            transmit: [
-                transmit(0x180, 255, &[0x6041_0010]),
-                transmit(0x280, 1, &[0x6064_0020, 0x606C_0020]),
-                transmit(0x380, 1, &[0x6077_0010]),
-                transmit(0x480, 1, &[0x60FD_0020]),
-            ],
+            receive: core::array::from_fn(receive),
+            transmit: core::array::from_fn(transmit),
         }
     }
 

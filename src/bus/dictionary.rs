@@ -130,7 +130,7 @@ pub fn find(object: Object) -> Result<&'static Row, Abort> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::table::NAMES;
+    use super::super::table::{GROUPS, NAMES};
     use super::*;
 
     /// All objects of a row.
@@ -165,6 +165,18 @@ mod tests {
                 if head.access == Access::Const {
                     assert_eq!(Some(head.default), last, "{index:x}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn every_index_with_several_parts_has_a_name_of_its_own() {
+        for row in ROWS {
+            for index in row.index..row.index + u16::from(row.indices) {
+                let groups =
+                    GROUPS.iter().filter(|(first, count, ..)| index.wrapping_sub(*first) < *count).count();
+                let has_parts = find(Object::at(index, 1)).is_ok();
+                assert_eq!(groups, usize::from(has_parts), "{index:x}");
             }
         }
     }

@@ -125,11 +125,11 @@ impl Node {
             Controller::Active => None,
             Controller::Overrun => Some(0x8110),
             Controller::Passive => Some(0x8120),
-            Controller::Off => {
-                objects.lost(Lost::BusOff);
-                Some(0x8140)
-            }
+            Controller::Off => Some(0x8140),
         };
+        if matches!(told, Controller::Passive | Controller::Off) {
+            objects.lost(Lost::Bus);
+        }
         self.communication.emergency.set(Source::Controller, code.map(ErrorReport::code));
     }
 
@@ -139,8 +139,10 @@ impl Node {
             Command::Go(next) if next == state || state == NmtState::Initialising => {}
             Command::Go(next) => {
                 self.communication.state = next;
-                if next == NmtState::Stopped {
+                if state == NmtState::Operational || next == NmtState::Stopped {
                     objects.lost(Lost::Stopped);
+                }
+                if next == NmtState::Stopped {
                     self.server = Server::IDLE;
                 }
                 for receive in &mut self.communication.receive {

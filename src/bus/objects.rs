@@ -13,9 +13,9 @@ pub enum Lost {
     Heartbeat,
     /// A PDO that has an event timer.
     ReceivedPdo,
-    /// The controller left the bus.
-    BusOff,
-    /// The master stopped the node.
+    /// The controller left the bus, or is near it.
+    Bus,
+    /// The master took the node out of Operational.
     Stopped,
     /// The master had the node, or its communication, begin anew.
     Reset,

@@ -11,6 +11,25 @@
 
 use super::dictionary::{Access, Mapping, Row, Type};
 
+/// What an index with several subindices is called, how many indices are called so, and whether its parts are all of one kind.
+pub static GROUPS: &[(u16, u16, &str, bool)] = &[
+    (0x1003, 1, "Pre-defined error field", true),
+    (0x1010, 1, "Store parameters", true),
+    (0x1011, 1, "Restore default parameters", true),
+    (0x1016, 1, "Consumer heartbeat time", true),
+    (0x1018, 1, "Identity object", false),
+    (0x1029, 1, "Error behaviour", true),
+    (0x1200, 1, "SDO server parameter", false),
+    (0x1400, 4, "RPDO communication parameter", false),
+    (0x1600, 4, "RPDO mapping parameter", false),
+    (0x1800, 4, "TPDO communication parameter", false),
+    (0x1A00, 4, "TPDO mapping parameter", false),
+    (0x607D, 1, "Software position limit", true),
+    (0x60C1, 1, "Interpolation data record", false),
+    (0x60C2, 1, "Interpolation time period", false),
+    (0x60FE, 1, "Digital outputs", false),
+];
+
 macro_rules! rows {
     (@count) => { 1 };
     (@count $count:literal) => { $count };
@@ -46,9 +65,9 @@ rows! {
     0x1009, 0, Text, Read, No, 0, "Manufacturer hardware version";
     0x100A, 0, Text, Read, No, 0, "Manufacturer software version";
     0x1010, 0, U8, Const, No, 1, "Number of entries";
-    0x1010, 1, U32, Both, No, 0, "Store all parameters";
+    0x1010, 1, U32, Both, No, 1, "Store all parameters";
     0x1011, 0, U8, Const, No, 1, "Number of entries";
-    0x1011, 1, U32, Both, No, 0, "Restore all default parameters";
+    0x1011, 1, U32, Both, No, 1, "Restore all default parameters";
     0x1014, 0, U32, Both, No, 0x80 + node, "COB-ID emergency message";
     0x1015, 0, U16, Both, No, 0, "Inhibit time emergency message";
     0x1016, 0, U8, Const, No, 2, "Number of entries";

@@ -168,6 +168,31 @@ fn a_lost_host_stops_as_its_option_says() {
 }
 
 #[test]
+fn a_bus_that_is_lost_and_a_master_that_takes_its_node_back_stop_a_drive_that_stays_off() {
+    use super::super::Controller;
+    let lose: [fn(&mut Board); 6] = [
+        |board| board.hear(0, &[2, 1]),
+        |board| board.hear(0, &[128, 1]),
+        |board| board.hear(0, &[129, 2]),
+        |board| board.hear(0, &[130, 0]),
+        |board| board.nodes[1].on_controller(Controller::Passive, &mut board.axes[1]),
+        |board| board.nodes[1].on_controller(Controller::Off, &mut board.axes[1]),
+    ];
+    for (number, lose) in lose.into_iter().enumerate() {
+        let mut board = Board::enabled();
+        board.hear(0, &[1, 0]);
+        board.tick();
+        lose(&mut board);
+        board.tick();
+        assert!(matches!(board.drive, DriveState::QuickStopActive { .. }), "{number}: {:?}", board.drive);
+        board.nodes[1].on_controller(Controller::Active, &mut board.axes[1]);
+        board.hear(0, &[1, 0]);
+        board.run(10);
+        assert_eq!(board.control([15; 2]), [0x40; 2], "{number}");
+    }
+}
+
+#[test]
 fn a_set_point_is_taken_once_for_each_rising_edge() {
     let mut board = Board::enabled();
     let mode = AxisStatus { mode: 1, drive: board.drive, ..AxisStatus::NONE };

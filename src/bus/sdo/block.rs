@@ -81,13 +81,13 @@ impl BlockUpload {
         let checked = request[0] & WITH_CHECKSUM != 0;
         let this = Self { phase: Phase::Begin, size, start: 0, sent: 0, block, checked, sums: [0; 2] };
         let reply = answer(0xC0 | WITH_CHECKSUM | WITH_SIZE, object, size);
-        Ok(Step::Go(Transfer::BlockUpload(this), Some(reply)))
+        Ok(Step::Begin(Transfer::BlockUpload(this), reply))
     }
 
     pub(super) fn request<O: Objects>(
-        mut self,
-        request: [u8; 8],
+        &mut self,
         object: Object,
+        request: [u8; 8],
         dictionary: &Dictionary<'_, O>,
     ) -> Result<Step, Abort> {
         let [command, taken, block, ..] = request;
@@ -103,16 +103,16 @@ impl BlockUpload {
                 self.go_on_after(taken, object, dictionary)?;
                 self.block = block;
             }
-            (1, Phase::Ended) => return Ok(Step::Over),
+            (1, Phase::Ended) => return Ok(Step::End(None)),
             _ => return Err(Abort::Command),
         }
         if self.phase == Phase::Ended {
             let unused = (SEGMENT - 1 - (self.size - 1) % SEGMENT) as u8;
             let [low, high] = if self.checked { self.sums[0].to_le_bytes() } else { [0; 2] };
             let end = [0xC1 | unused << 2, low, high, 0, 0, 0, 0, 0];
-            return Ok(Step::Go(Transfer::BlockUpload(self), Some(end)));
+            return Ok(Step::Stay(Some(end)));
         }
-        Ok(Step::Go(Transfer::BlockUpload(self), None))
+        Ok(Step::Stay(None))
     }
 
     /// So many segments of the block were taken; the others leave again.
@@ -183,11 +183,11 @@ impl BlockDownload {
         let checked = request[0] & WITH_CHECKSUM != 0;
         let this = Self { gathered, taken: 0, held: None, is_last: false, checked, sum: 0 };
         let reply = answer(0xA0 | WITH_CHECKSUM, object, u32::from(BLOCK));
-        Ok(Step::Go(Transfer::BlockDownload(this), Some(reply)))
+        Ok(Step::Begin(Transfer::BlockDownload(this), reply))
     }
 
     pub(super) fn request<O: Objects>(
-        mut self,
+        &mut self,
         object: Object,
         request: [u8; 8],
         dictionary: &mut Dictionary<'_, O>,
@@ -202,11 +202,11 @@ impl BlockDownload {
             (self.held, self.taken, self.is_last) = (Some(bytes), number, is_last);
         }
         if !is_last && number != BLOCK {
-            return Ok(Step::Go(Transfer::BlockDownload(self), None));
+            return Ok(Step::Stay(None));
         }
         let reply = [0xA2, self.taken, BLOCK, 0, 0, 0, 0, 0];
         self.taken = 0;
-        Ok(Step::Go(Transfer::BlockDownload(self), Some(reply)))
+        Ok(Step::Stay(Some(reply)))
     }
 
     /// So many bytes of the held segment count.
@@ -217,7 +217,7 @@ impl BlockDownload {
     }
 
     fn end<O: Objects>(
-        mut self,
+        &mut self,
         object: Object,
         request: [u8; 8],
         dictionary: &mut Dictionary<'_, O>,
@@ -231,6 +231,6 @@ impl BlockDownload {
             return Err(Abort::Checksum);
         }
         dictionary.write(object, self.gathered.value()?)?;
-        Ok(Step::Done([0xA1, 0, 0, 0, 0, 0, 0, 0]))
+        Ok(Step::End(Some([0xA1, 0, 0, 0, 0, 0, 0, 0])))
     }
 }

@@ -31,15 +31,15 @@ enum Transfer {
     BlockDownload(BlockDownload),
 }
 
-/// What happens after a frame of a transfer.
+/// What happens after a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Step {
-    /// It goes on, with an answer where there is one.
-    Go(Transfer, Option<[u8; 8]>),
-    /// It is over, with this answer.
-    Done([u8; 8]),
-    /// It is over, and the client does not wait for anything.
-    Over,
+    /// A transfer begins.
+    Begin(Transfer, [u8; 8]),
+    /// The one that is under way goes on, with an answer where there is one.
+    Stay(Option<[u8; 8]>),
+    /// Nothing is under way any more; the last answer, where the client waits for one.
+    End(Option<[u8; 8]>),
 }
 
 /// The server of one node.
@@ -138,30 +138,49 @@ impl Server {
             (self.transfer, self.answer) = (None, None);
             return;
         }
-        let transfer = self.transfer.take();
-        let step = match (transfer, request[0] >> 5) {
+        let command = request[0] >> 5;
+        let step = match (self.transfer.as_mut(), command) {
             (Some(Transfer::BlockDownload(block)), _) => block.request(self.object, request, dictionary),
-            (_, 1) => self.download(request, dictionary),
-            (_, 2) => self.upload(request, dictionary),
-            (_, 6) if request[0] & 1 == 0 => {
-                self.object = named(request).0;
-                BlockDownload::begin(self.object, request, dictionary)
-            }
-            (_, 5) if request[0] & 3 == 0 => {
-                self.object = named(request).0;
-                BlockUpload::begin(self.object, request, dictionary)
-            }
             (Some(Transfer::Download(segments)), 0) => segments.request(self.object, request, dictionary),
             (Some(Transfer::Upload(segments)), 3) => segments.request(self.object, request, dictionary),
-            (Some(Transfer::BlockUpload(block)), 5) => block.request(request, self.object, dictionary),
-            _ => Err(Abort::Command),
+            (Some(Transfer::BlockUpload(block)), 5) if request[0] & 3 != 0 => {
+                block.request(self.object, request, dictionary)
+            }
+            _ => {
+                let begins = match command {
+                    1 | 2 => true,
+                    6 => request[0] & 1 == 0,
+                    5 => request[0] & 3 == 0,
+                    _ => false,
+                };
+                // Anything else does not name an object: what is told is the one before.
+                if begins {
+                    self.object = named(request).0;
+                }
+                match (command, request[0] & 3) {
+                    (1, _) => download(self.object, request, dictionary),
+                    (2, _) => upload(self.object, dictionary),
+                    (6, 0 | 2) => BlockDownload::begin(self.object, request, dictionary),
+                    (5, 0) => BlockUpload::begin(self.object, request, dictionary),
+                    _ => Err(Abort::Command),
+                }
+            }
         };
-        match step {
-            Ok(Step::Go(next, answer)) => (self.transfer, self.answer) = (Some(next), answer),
-            Ok(Step::Done(answer)) => self.answer = Some(answer),
-            Ok(Step::Over) => self.answer = None,
-            Err(abort) => self.answer = Some(aborted(self.object, abort)),
-        }
+        self.answer = match step {
+            Ok(Step::Begin(transfer, answer)) => {
+                self.transfer = Some(transfer);
+                Some(answer)
+            }
+            Ok(Step::Stay(answer)) => answer,
+            Ok(Step::End(answer)) => {
+                self.transfer = None;
+                answer
+            }
+            Err(abort) => {
+                self.transfer = None;
+                Some(aborted(self.object, abort))
+            }
+        };
     }
 
     /// The next answer: one that waits, the next segment of a block, or that the client has gone.
@@ -190,37 +209,27 @@ impl Server {
         self.transfer = None;
         Some(aborted(self.object, Abort::Timeout))
     }
+}
 
-    fn download<O: Objects>(
-        &mut self,
-        request: [u8; 8],
-        dictionary: &mut Dictionary<'_, O>,
-    ) -> Result<Step, Abort> {
-        let (object, bytes) = named(request);
-        self.object = object;
-        let row = dictionary.writable(object)?;
-        let (is_expedited, has_size) = (request[0] & 2 != 0, request[0] & 1 != 0);
-        if !is_expedited {
-            let size = has_size.then_some(u32::from_le_bytes(bytes));
-            let segments = SegmentDownload::new(Gathered::new(row, size)?);
-            return Ok(Step::Go(Transfer::Download(segments), Some(answer(0x60, object, 0))));
-        }
-        let own = u32::from(row.kind.size().ok_or(Abort::ReadOnly)?);
-        let count = if has_size { u32::from(4 - (request[0] >> 2 & 3)) } else { own };
-        let mut gathered = Gathered::new(row, Some(count))?;
-        gathered.put(bytes.into_iter().take(count as usize))?;
-        dictionary.write(object, gathered.value()?)?;
-        Ok(Step::Done(answer(0x60, object, 0)))
+/// A download: done where it is expedited.
+fn download<O: Objects>(
+    object: Object,
+    request: [u8; 8],
+    dictionary: &mut Dictionary<'_, O>,
+) -> Result<Step, Abort> {
+    let (_, bytes) = named(request);
+    let row = dictionary.writable(object)?;
+    let (is_expedited, has_size) = (request[0] & 2 != 0, request[0] & 1 != 0);
+    if !is_expedited {
+        let size = has_size.then_some(u32::from_le_bytes(bytes));
+        let segments = SegmentDownload::new(Gathered::new(row, size)?);
+        return Ok(Step::Begin(Transfer::Download(segments), answer(0x60, object, 0)));
     }
-
-    fn upload<O: Objects>(
-        &mut self,
-        request: [u8; 8],
-        dictionary: &mut Dictionary<'_, O>,
-    ) -> Result<Step, Abort> {
-        self.object = named(request).0;
-        upload(self.object, dictionary)
-    }
+    let count = has_size.then_some(u32::from(4 - (request[0] >> 2 & 3)));
+    let mut gathered = Gathered::new(row, count)?;
+    gathered.put(bytes.into_iter().take(usize::from(gathered.size)))?;
+    dictionary.write(object, gathered.value()?)?;
+    Ok(Step::End(Some(answer(0x60, object, 0))))
 }
 
 /// Begins an upload: expedited where it fits.
@@ -230,11 +239,11 @@ fn upload<O: Objects>(object: Object, dictionary: &Dictionary<'_, O>) -> Result<
         0 => Err(Abort::NoData),
         size @ 1..=4 => {
             let command = 0x43 | ((4 - size as u8) << 2);
-            Ok(Step::Done(answer(command, object, u32::from_le_bytes(bytes))))
+            Ok(Step::End(Some(answer(command, object, u32::from_le_bytes(bytes)))))
         }
         size => {
             let segments = SegmentUpload::new(size);
-            Ok(Step::Go(Transfer::Upload(segments), Some(answer(0x41, object, size))))
+            Ok(Step::Begin(Transfer::Upload(segments), answer(0x41, object, size)))
         }
     }
 }

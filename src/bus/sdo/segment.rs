@@ -10,7 +10,7 @@ use super::super::abort::Abort;
 use super::super::access::Dictionary;
 use super::super::dictionary::Object;
 use super::super::objects::Objects;
-use super::{Gathered, SEGMENT, Step, Transfer, segment};
+use super::{Gathered, SEGMENT, Step, segment};
 
 const TOGGLE: u8 = 1 << 4;
 
@@ -28,7 +28,7 @@ impl SegmentUpload {
     }
 
     pub(super) fn request<O: Objects>(
-        mut self,
+        &mut self,
         object: Object,
         request: [u8; 8],
         dictionary: &Dictionary<'_, O>,
@@ -42,7 +42,7 @@ impl SegmentUpload {
         let answer = [command, a, b, c, d, e, f, g];
         self.offset += count;
         self.toggle ^= TOGGLE;
-        Ok(if is_last { Step::Done(answer) } else { Step::Go(Transfer::Upload(self), Some(answer)) })
+        Ok(if is_last { Step::End(Some(answer)) } else { Step::Stay(Some(answer)) })
     }
 }
 
@@ -59,7 +59,7 @@ impl SegmentDownload {
     }
 
     pub(super) fn request<O: Objects>(
-        mut self,
+        &mut self,
         object: Object,
         request: [u8; 8],
         dictionary: &mut Dictionary<'_, O>,
@@ -72,9 +72,9 @@ impl SegmentDownload {
         let answer = [0x20 | self.toggle, 0, 0, 0, 0, 0, 0, 0];
         if request[0] & 1 == 0 {
             self.toggle ^= TOGGLE;
-            return Ok(Step::Go(Transfer::Download(self), Some(answer)));
+            return Ok(Step::Stay(Some(answer)));
         }
         dictionary.write(object, self.gathered.value()?)?;
-        Ok(Step::Done(answer))
+        Ok(Step::End(Some(answer)))
     }
 }

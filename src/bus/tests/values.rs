@@ -13,7 +13,7 @@ fn objects() -> impl Iterator<Item = (Object, &'static dictionary::Row)> {
 
 /// Given by identity, constants, or the leg, and no default of the table's.
 fn is_live(object: Object) -> bool {
-    matches!(object.index, 0x1008..=0x1011 | 0x1018 | 0x6075 | 0x6076 | 0x6502)
+    matches!(object.index, 0x1008..=0x100A | 0x1018 | 0x6075 | 0x6076 | 0x6502)
         // Where a drive stands before anything.
         || matches!(object.index, 0x6041)
         || object.index == 0x1003 && object.sub > 0
