@@ -1,6 +1,7 @@
 //! The command line: one file for each command.
 
 mod common;
+mod eds;
 mod emulate;
 mod excite;
 mod export;
@@ -46,6 +47,8 @@ enum Command {
     Predict(predict::PredictArguments),
     /// Write a model that was kept as a robot description.
     Export(export::ExportArguments),
+    /// Write the electronic data sheets of the bus' nodes, one per joint.
+    Eds(eds::EdsArguments),
     /// Change the load or the friction of a leg that walks: time to notice, what was found, false alarms.
     Monitor(monitor::MonitorArguments),
     /// Measure the current loop on a motor's test stand: steps, torque ripple, voltage limit, regeneration.
@@ -86,6 +89,7 @@ pub fn main() -> ExitCode {
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
+        Command::Eds(arguments) => eds::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Motor(arguments) => motor::run(&arguments),
         Command::Paper(arguments) => paper::run(&arguments),

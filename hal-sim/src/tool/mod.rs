@@ -20,6 +20,7 @@
 //! | [`findings`] | what the verdict saw, in words |
 //! | [`perturb`] | what can be made wrong on purpose |
 //! | [`placed_mass`], [`scale`] | known masses: torque constants and loads |
+//! | [`eds`] | the electronic data sheet of a node of the bus |
 //! | [`model_file`], [`predict`], [`urdf`] | what was found, kept; its torque; the same for other programs |
 //! | [`regressor`] | torques and regressor of given states |
 //! | [`consistent`], [`consistent_runs`] | legs that can exist: both searches and their optimum |
@@ -39,6 +40,7 @@ pub mod cli;
 pub mod consistent;
 pub mod consistent_runs;
 pub mod disturbances;
+pub mod eds;
 pub mod emulate;
 pub mod error;
 pub mod excite;

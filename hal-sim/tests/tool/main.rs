@@ -3,6 +3,7 @@
 
 mod command;
 mod crash;
+mod eds;
 mod emulation;
 mod excite;
 mod faults;

@@ -1,0 +1,32 @@
+//! `eds`: what host software of the bus wants to know of a node before it sees one.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::tool::eds;
+use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::tables;
+
+/// A node for each: hip and knee of a board.
+const JOINTS: [&str; 2] = ["hip", "knee"];
+
+/// Where to.
+#[derive(Args, Debug)]
+pub struct EdsArguments {
+    /// Folder for the sheets, one per joint; it is made where there is none.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Writes the files; the exit code.
+pub fn run(arguments: &EdsArguments) -> Result<u8, ToolError> {
+    let folder = &arguments.out;
+    std::fs::create_dir_all(folder).map_err(|error| ToolError::cannot_write(folder, &error))?;
+    for joint in JOINTS {
+        let path = folder.join(format!("scarab-{joint}.eds"));
+        std::fs::write(&path, eds::text(joint)).map_err(|error| ToolError::cannot_write(&path, &error))?;
+        tables::print(&format!("electronic data sheet: {}\n", path.display()))?;
+    }
+    Ok(EXIT_ACCEPTED)
+}
