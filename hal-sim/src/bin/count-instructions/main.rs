@@ -1,5 +1,5 @@
 //! Counts instructions on the emulated microcontroller: one axis' tick, its parts, the same steps of the crate `foc`, the
-//! 4 kHz tick of a leg, the steps of its identification and the iterations of the default swarm.
+//! 4 kHz tick of a leg, the steps of its identification, the iterations of the default swarm and the frames of the bus.
 //!
 //! Why instructions: the emulator executes them exactly and in the same number every time, and models neither flash wait
 //! states nor pipeline. `scripts/count-instructions` builds and runs this image (`qemu-system-arm -M netduinoplus2 -icount
@@ -10,6 +10,7 @@
 mod account;
 mod axis_parts;
 mod axis_tick;
+mod bus;
 mod counter;
 mod identification;
 mod leg;
@@ -33,7 +34,7 @@ fn main() -> ! {
             leg_tick::report(&model, &mut account)?;
             identification::report(&model, &mut account)
         });
-        let swarm = swarm::report().and_then(|()| own_objective::report());
+        let swarm = swarm::report().and_then(|()| own_objective::report()).and_then(|()| bus::report());
         let kept = account.report();
         axis && search == Some(true) && swarm.is_some() && kept
     };
