@@ -30,6 +30,7 @@ pub mod flash;
 pub mod floor;
 pub mod friction;
 pub mod gear;
+pub mod grip;
 pub mod leg;
 mod maths;
 pub mod mechanism;

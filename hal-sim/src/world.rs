@@ -15,6 +15,7 @@ use crate::conventions::{Anatomy, links_at_reference};
 use crate::description::{LegDescription, PushDescription};
 use crate::drive::Drive;
 use crate::floor::Floor;
+use crate::grip::Grip;
 use crate::leg::{Leg, LegState};
 use crate::sensors::{CurrentSensor, Encoder};
 use crate::wearer::Wearer;
@@ -66,6 +67,7 @@ pub struct World<const N: usize> {
     wearer: Wearer,
     blocked: [bool; N],
     floor: Option<Floor>,
+    grip: Option<Grip>,
     sensor_noise: Xoshiro256PlusPlus,
     sensor_faults: Xoshiro256PlusPlus,
     tick: u64,
@@ -95,6 +97,7 @@ impl<const N: usize> World<N> {
             wearer: Wearer::new(description.pushes, N, pushes),
             blocked: [false; N],
             floor: None,
+            grip: None,
             sensor_noise,
             sensor_faults,
             tick: 0,
@@ -168,6 +171,17 @@ impl<const N: usize> World<N> {
         self.wearer.push(joint, peak, self.tick as f64 * TICK_S, duration);
     }
 
+    /// A hand holds a joint where it is ([`Grip`]), from this instant on for `duration` s, with `strength` N m at most.
+    pub fn hold(&mut self, joint: usize, strength: f64, duration: f64) {
+        self.grip = Some(Grip::new(joint, strength, self.tick as f64 * TICK_S, duration));
+    }
+
+    /// What the hand gives at `time`, N m, anatomical.
+    fn gripped(&mut self, time: f64) -> [f64; N] {
+        let (position, velocity) = (self.anatomical_position(), self.velocity());
+        self.grip.as_mut().map_or([0.0; N], |grip| grip.torque(&position, &velocity, time))
+    }
+
     /// Sets each joint's current noise: standard deviation per logged 500 Hz sample, A.
     pub fn set_current_noise(&mut self, noise: &[f64; N]) {
         for (sensor, noise) in self.current_sensors.iter_mut().zip(noise) {
@@ -190,7 +204,9 @@ impl<const N: usize> World<N> {
             }
             return self.read_sensors();
         }
-        let pushed: [f64; N] = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
+        let gripped = self.gripped(self.tick as f64 * TICK_S);
+        let pushes: [f64; N] = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
+        let pushed: [f64; N] = core::array::from_fn(|joint| pushes[joint] + gripped[joint]);
         let stood: [f64; N] = match &mut self.floor {
             Some(floor) => floor.torque(self.leg.mechanism(), &self.state, self.tick as f64 * TICK_S),
             None => [0.0; N],

@@ -13,6 +13,7 @@
 //! | [`Barrier`] | torque bounds that stop a joint before its range and speed end |
 //! | [`Monitor`] | all of it, once per tick |
 //! | [`Cause`], [`TickWatch`], [`ServoWatch`] | why nothing may be enabled, and what every current tick looks at |
+//! | [`UpkeepClock`] | what is looked at every few milliseconds: gate drivers' registers, temperatures |
 //!
 //! Safe states: *Off* releases the bridges in the same tick. *Damp* opposes every joint's velocity under its torque
 //! cap for at most 300 ms, then Off. *Limit* stays enabled with less than was asked for. An exoskeleton that goes limp
@@ -31,6 +32,7 @@ pub mod limits;
 pub mod monitor;
 pub mod state;
 pub mod step_gate;
+pub mod upkeep;
 
 pub use barrier::{Barrier, Limited};
 pub use fault::{Fault, FaultCode, Reaction};
@@ -39,3 +41,4 @@ pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
 pub use monitor::{Decision, Monitor, Observation, Refusal, RefusalReason, Request};
 pub use state::{DriveState, Event, Permission, PowerRequest};
 pub use step_gate::{Reading, StepGate};
+pub use upkeep::{UpkeepClock, of_gate_driver, of_temperature};

@@ -20,13 +20,9 @@ use crate::leg::{AxisFault, Calibration, ControlRequest, DriveState};
 use crate::motor::reference::{ReferenceStep, StatedPose};
 use crate::motor::{Axis, AxisConfiguration, Calibrator};
 use crate::operator::{Ask, Operator, RATE_HZ, Situation};
+use crate::safety::{UpkeepClock, of_gate_driver, of_temperature};
 use crate::trace::{Record, words};
 use crate::units::Hertz;
-
-/// Ticks between two readings of the gate drivers' registers: 8 ms.
-const GATE_TICKS: u32 = RATE_HZ / 125;
-/// Ticks between two looks at the temperatures: 100 ms.
-const TEMPERATURE_TICKS: u32 = RATE_HZ / 10;
 
 /// Rounds of the housekeeping, for the watchdog.
 static ROUNDS: Count = Count::zero();
@@ -50,8 +46,8 @@ pub struct Housekeeping {
 }
 
 /// What changes.
-#[derive(Default)]
 struct State {
+    clock: UpkeepClock,
     operator: Operator,
     calibrated: [bool; JOINTS],
     /// The axis that is being calibrated.
@@ -85,7 +81,7 @@ pub async fn watch() -> ! {
 /// Everything else at this level.
 #[embassy_executor::task]
 pub async fn run(mut keeping: Housekeeping) -> ! {
-    let mut state = State::default();
+    let mut state = State::new();
     let mut ticker = Ticker::every(Duration::from_hz(u64::from(RATE_HZ)));
     loop {
         ticker.next().await;
@@ -100,6 +96,20 @@ pub async fn run(mut keeping: Housekeeping) -> ! {
 }
 
 impl State {
+    fn new() -> Self {
+        Self {
+            clock: UpkeepClock::new(RATE_HZ),
+            operator: Operator::default(),
+            calibrated: [false; JOINTS],
+            calibrating: None,
+            reference: None,
+            placed: false,
+            drive: None,
+            tick: 0,
+            causes: 0,
+        }
+    }
+
     fn situation(&self) -> Situation {
         Situation {
             enabling: contacts::enabling(),
@@ -124,19 +134,18 @@ impl Housekeeping {
         while let Some(drive) = self.drive.dequeue() {
             state.drive = Some(drive);
         }
-        if state.tick.is_multiple_of(GATE_TICKS) {
+        let due = state.clock.next();
+        if due.gates {
             for axis in 0..JOINTS {
-                if !self.gate_drivers.holds(axis) {
-                    interlock::raise(Cause::GateConfiguration);
+                if let Some(cause) = of_gate_driver(self.gate_drivers.holds(axis)) {
+                    interlock::raise(cause);
                 }
             }
         }
-        if state.tick.is_multiple_of(TEMPERATURE_TICKS) {
+        if due.temperatures {
             for code in converter::thermistors().into_iter().take(JOINTS) {
-                match temperature_c(code) {
-                    None => interlock::raise(Cause::Thermistor),
-                    Some(degrees) if !(degrees < HOTTEST_C) => interlock::raise(Cause::Temperature),
-                    Some(_) => {}
+                if let Some(cause) = of_temperature(temperature_c(code), HOTTEST_C) {
+                    interlock::raise(cause);
                 }
             }
         }

@@ -34,6 +34,10 @@ pub enum Channel {
     EmergencyStop,
     /// A gate driver reports a fault.
     GateFault,
+    /// A gate driver's registers are not what was written.
+    GateRegisters,
+    /// Code of a bridge's thermistor.
+    Thermistor,
     /// A shunt's conversion does not end.
     Conversion,
     /// An axis' tick does not come.
@@ -135,6 +139,11 @@ impl Injector {
     /// A target on its way to its axis.
     pub fn target(&mut self, joint: usize, tick: u64, target: Ampere) -> Ampere {
         Ampere(self.pass(Channel::Target, joint, tick, f64::from(target.0), AMPERES) as f32)
+    }
+
+    /// A thermistor's code on its way to the housekeeping.
+    pub fn thermistor(&mut self, joint: usize, tick: u64, value: u16) -> u16 {
+        code(self.pass(Channel::Thermistor, joint, tick, f64::from(value), CODES))
     }
 
     /// The brake resistor's duty on its way to the resistor.

@@ -85,12 +85,16 @@ impl<const N: usize> World<N> {
     /// One PWM period: each axis takes its command and gives its sample where it begins. `brake` is the share of time for
     /// which the brake resistor is on. A world with ideal drives stands still and says nothing.
     pub fn period(&mut self, commands: &[AxisCommand; N], brake: f64) -> [AxisSample; N] {
+        let Some(period) = self.electric.as_ref().map(|electric| electric.period) else {
+            return [AxisSample::default(); N];
+        };
+        let now = self.tick as f64 * TICK_S + f64::from(period) * PERIOD_S;
+        let gripped = self.gripped(now);
         let Some(electric) = &mut self.electric else { return [AxisSample::default(); N] };
         if electric.period == 0 {
             electric.pushed = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
         }
         let (anatomy, state, mounting) = (&self.anatomy, &mut self.state, self.mounting);
-        let now = self.tick as f64 * TICK_S + f64::from(electric.period) * PERIOD_S;
         let stood = match &mut self.floor {
             Some(floor) => floor.torque(self.leg.mechanism(), state, now),
             None => [0.0; N],
@@ -106,7 +110,7 @@ impl<const N: usize> World<N> {
         let acting = core::array::from_fn(|joint| {
             let motor = electric.ratio[joint] * torque[joint];
             electric.sum[joint] += motor / f64::from(PERIODS_PER_TICK);
-            anatomy[joint].flip(mounting * motor + electric.pushed[joint]) + stood[joint]
+            anatomy[joint].flip(mounting * motor + electric.pushed[joint] + gripped[joint]) + stood[joint]
         });
         self.leg.advance(state, &acting, &acting, PERIOD_S);
         electric.period += 1;

@@ -14,23 +14,32 @@ fn report(arguments: &str, code: i32) -> Value {
 
 #[test]
 fn the_json_is_that_of_the_interface_and_its_numbers_add_up() {
-    let report = report("--seeds 4", 0);
+    let report = report("--seeds 4 --sweep 20 --pairs 20", 0);
     assert_eq!((report["schema"].as_u64(), report["invariants_broken"].as_u64()), (Some(1), Some(0)));
     assert_eq!(report["failures"], Value::Array(vec![]));
     let rows = report["rows"].as_array().expect("a list");
-    assert!(rows.len() >= 12, "{}", rows.len());
+    assert!(rows.len() >= 22, "{}", rows.len());
     for row in rows {
         let count = |name: &str| row[name].as_u64().unwrap_or_else(|| panic!("{name}: {row}"));
         assert_eq!(count("runs"), 4);
         assert_eq!(count("runs"), count("detected") + count("missed") + count("undetectable_by_design"));
         assert!(count("state_reached") <= count("runs") && count("false_alarms") == 0, "{row}");
         let (worst, deadline) = (&row["worst_ms"], &row["deadline_ms"]);
-        // One turn of a rotor is no time.
-        assert_eq!(deadline.is_null(), row["fault"] == "E4", "{row}");
+        // One turn of a rotor, or the end of an identification, is no time.
+        let timeless = ["E4", "E5", "V3", "J1", "H1", "H2", "H3", "H4", "I1"];
+        assert_eq!(deadline.is_null(), timeless.iter().any(|fault| row["fault"] == *fault), "{row}");
         if let (Some(worst), Some(deadline)) = (worst.as_f64(), deadline.as_f64()) {
             assert!(worst <= deadline + 1e-9, "{row}");
         }
         assert!(row["state"].is_string());
+    }
+    let ids: Vec<_> = rows.iter().map(|row| row["fault"].as_str().expect("a word")).collect();
+    assert!(ids.iter().all(|id| ids.iter().filter(|other| *other == id).count() == 1), "{ids:?}");
+    assert_eq!(report["diagnostic_coverage"].as_f64(), Some(1.0));
+    for (trials, kind) in report["trials"].as_array().expect("a list").iter().zip(["sweep", "pairs"]) {
+        assert_eq!((&trials["kind"], &trials["runs"]), (&kind.into(), &20.into()));
+        assert_eq!(trials["invariants_broken"], 0);
+        assert!(trials["raised"].as_u64() > Some(0), "{trials}");
     }
 }
 
@@ -60,10 +69,27 @@ fn a_detector_that_is_switched_off_is_noticed() {
 }
 
 #[test]
+fn normal_motion_with_a_pushing_wearer_raises_nothing() {
+    let report = report("--fault C2 --seeds 1 --hours 0.002", 0);
+    let hours = &report["hours"];
+    assert_eq!(hours["false_alarms"], Value::Array(vec![]));
+    assert!((hours["hours"].as_f64().expect("a number") - 0.002).abs() < 1e-6, "{hours}");
+}
+
+#[test]
+fn the_emergency_stop_is_tried_at_every_tick() {
+    let report = report("--fault X1 --seeds 1 --every-tick", 0);
+    // A second of servo ticks, the first and the last among them.
+    assert_eq!((report["every_tick"].as_u64(), report["rows"][0]["missed"].as_u64()), (Some(4001), Some(0)));
+}
+
+#[test]
 fn bad_input_names_the_option() {
     for (arguments, words) in [
-        ("--fault Z9", "--fault Z9: is none of E2"),
+        ("--fault Z9", "--fault Z9: is none of E"),
         ("--seconds 0", "--seconds: 0"),
+        ("--hours -1", "unexpected argument"),
+        ("--hours=-1", "--hours: -1 is not from 0 to 1000"),
         ("--fault C2 --every-tick", "--every-tick: is about the emergency stop"),
         ("--leg mujoco-leg", "has no [joint.motor]"),
     ] {

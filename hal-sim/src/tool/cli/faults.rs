@@ -1,6 +1,7 @@
 //! `faults`: the fault catalogue injected into the whole firmware, and what it makes of each.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use clap::Args;
 
@@ -8,7 +9,8 @@ use super::common::write_json;
 use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::faults::campaign::{CampaignOptions, campaign};
-use crate::tool::faults::catalogue::{self, Row, row};
+use crate::tool::faults::entry::{Entry, entries};
+use crate::tool::faults::hours::hours;
 use crate::tool::faults::report::{CampaignReport, told};
 use crate::tool::faults::run::{Manner, Outcome};
 use crate::tool::html::{self, Circumstances};
@@ -28,11 +30,23 @@ pub struct FaultsArguments {
     #[arg(long, value_name = "ID")]
     fault: Vec<String>,
     /// Runs of each fault.
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
-    seeds: u64,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
+    seeds: Option<u64>,
     /// The emergency stop also at every servo tick of a whole identification, and at every current tick of one second of it.
     #[arg(long)]
     every_tick: bool,
+    /// Runs of the sweep: each channel of a sensor spoilt in each way; nothing may be broken.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MOST_SEEDS))]
+    sweep: u64,
+    /// Runs of two random faults within 50 ms; nothing may be broken.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MOST_SEEDS))]
+    pairs: u64,
+    /// Simulated hours of normal motion with noise and a pushing wearer; nothing may be raised.
+    #[arg(long, value_name = "H", default_value_t = 0.0)]
+    hours: f64,
+    /// The full campaign: 1,000 runs of each fault, every tick, a sweep of 8,000, 10,000 pairs, 10 hours; what is given beside counts instead.
+    #[arg(long, conflicts_with_all = ["blind", "replay"])]
+    full: bool,
     /// Switch the detectors of each fault off: every run has to be missed, or nothing would notice a broken one. Exit code 0 if so.
     #[arg(long, conflicts_with = "every_tick")]
     blind: bool,
@@ -53,21 +67,17 @@ pub struct FaultsArguments {
     docs: Option<PathBuf>,
 }
 
-fn rows(names: &[String]) -> Result<Vec<&'static Row>, ToolError> {
-    if names.is_empty() {
-        return Ok(catalogue::rows().collect());
-    }
-    let mut rows: Vec<&'static Row> = Vec::new();
+fn rows(names: &[String]) -> Result<Vec<Entry>, ToolError> {
+    let all = entries();
     for name in names {
-        let found = row(name).ok_or_else(|| {
-            let known: Vec<_> = catalogue::rows().map(|row| row.id).collect();
-            ToolError::input(format!("--fault {name}: is none of {}", known.join(", ")))
-        })?;
-        if !rows.iter().any(|row| row.id == found.id) {
-            rows.push(found);
+        if !all.iter().any(|entry| entry.head().id == name) {
+            let mut known: Vec<_> = all.iter().map(|entry| entry.head().id).collect();
+            known.dedup();
+            return Err(ToolError::input(format!("--fault {name}: is none of {}", known.join(", "))));
         }
     }
-    Ok(rows)
+    let is_asked = |entry: &Entry| names.is_empty() || names.iter().any(|name| name == entry.head().id);
+    Ok(all.into_iter().filter(is_asked).collect())
 }
 
 fn page(leg: &LegFile, report: &CampaignReport, outcomes: &[Outcome]) -> Result<String, ToolError> {
@@ -82,28 +92,57 @@ fn page(leg: &LegFile, report: &CampaignReport, outcomes: &[Outcome]) -> Result<
     Ok(html::faults::page(&Circumstances::now(leg), report, &lines, &figures))
 }
 
+/// Of the full campaign.
+const FULL_SEEDS: u64 = 1000;
+const FULL_SWEEP: u64 = 8000;
+const FULL_PAIRS: u64 = 10_000;
+const FULL_HOURS: f64 = 10.0;
+/// Without it.
+const SEEDS: u64 = 20;
+
+impl FaultsArguments {
+    fn options(&self) -> Result<CampaignOptions, ToolError> {
+        let mut rows = rows(&self.fault)?;
+        if self.blind {
+            rows.retain(Entry::can_be_blind);
+        }
+        if self.every_tick && !rows.iter().any(|entry| entry.head().id == "X1") {
+            return Err(ToolError::input(
+                "--every-tick: is about the emergency stop, and --fault leaves X1 out",
+            ));
+        }
+        if let Some(seconds) = self.seconds
+            && !(0.01..=300.0).contains(&seconds)
+        {
+            return Err(ToolError::input(format!("--seconds: {seconds} is not from 0.01 to 300")));
+        }
+        if !(0.0..=1000.0).contains(&self.hours) {
+            return Err(ToolError::input(format!("--hours: {} is not from 0 to 1000", self.hours)));
+        }
+        let of_full = |given: u64, full: u64| if self.full && given == 0 { full } else { given };
+        let seeds = self.seeds.unwrap_or(if self.full { FULL_SEEDS } else { SEEDS });
+        Ok(CampaignOptions {
+            rows,
+            seeds: self.replay.map_or_else(|| (1..=seeds).collect(), |seed| vec![seed]),
+            every_tick: self.every_tick || self.full && self.fault.is_empty(),
+            sweep: of_full(self.sweep, FULL_SWEEP),
+            pairs: of_full(self.pairs, FULL_PAIRS),
+            manner: Manner { blind: self.blind, recorded: self.replay.is_some(), brief: false },
+            seconds: self.seconds,
+        })
+    }
+}
+
 /// Injects and reports; exit code 3 where anything was missed.
 pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
-    let rows = rows(&arguments.fault)?;
-    if arguments.every_tick && !rows.iter().any(|row| row.id == "X1") {
-        return Err(ToolError::input("--every-tick: is about the emergency stop, and --fault leaves X1 out"));
-    }
-    if let Some(seconds) = arguments.seconds
-        && !(0.01..=300.0).contains(&seconds)
-    {
-        return Err(ToolError::input(format!("--seconds: {seconds} is not from 0.01 to 300")));
-    }
+    let options = arguments.options()?;
     let leg = arguments.leg.load()?;
-    let seeds = arguments.replay.map_or_else(|| (1..=arguments.seeds).collect(), |seed| vec![seed]);
-    let options = CampaignOptions {
-        rows: rows.clone(),
-        seeds,
-        every_tick: arguments.every_tick,
-        manner: Manner { blind: arguments.blind, recorded: arguments.replay.is_some() },
-        seconds: arguments.seconds,
-    };
-    let campaign = campaign(&leg, &options)?;
-    let report = CampaignReport::new(&rows, &campaign);
+    let started = Instant::now();
+    let found = campaign(&leg, &options)?;
+    let injected_s = started.elapsed().as_secs_f64();
+    let simulated = if arguments.full && arguments.hours == 0.0 { FULL_HOURS } else { arguments.hours };
+    let hours = if simulated > 0.0 { Some(hours(&leg, simulated)?) } else { None };
+    let report = CampaignReport::new(&options.rows, &found, hours);
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;
     }
@@ -112,13 +151,18 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     }
     tables::print(&report.table())?;
     tables::print(&report.notes())?;
+    let whole_s = started.elapsed().as_secs_f64();
+    tables::print(&format!(
+        "time needed: {whole_s:.0} s, of which faults {injected_s:.0} s, normal motion {:.0} s\n",
+        whole_s - injected_s
+    ))?;
     if arguments.replay.is_some() {
-        for outcome in &campaign.outcomes {
+        for outcome in &found.outcomes {
             tables::print(&format!("{}\n", told(outcome)))?;
         }
     }
     if let Some(path) = &arguments.report {
-        let page = page(&leg, &report, &campaign.outcomes)?;
+        let page = page(&leg, &report, &found.outcomes)?;
         std::fs::write(path, page).map_err(|error| ToolError::cannot_write(path, &error))?;
         tables::print(&format!("report: {}\n", path.display()))?;
     }

@@ -1,7 +1,8 @@
 //! Many runs: identifications driven by the operator's contacts, forked where the runs' dice say.
 //!
 //! Forks share the way to them: a base is driven once, and every run is a clone of it at its period. The base of a run follows
-//! from the run's seed alone, so that one run can be repeated without the others.
+//! from the run's seed alone, so that one run can be repeated without the others. A row that is run in two ways has its odd seeds
+//! forked and its even ones on its bench.
 
 use core::f64::consts::TAU;
 
@@ -13,8 +14,10 @@ use scarab::safety::DriveState;
 use super::catalogue::stop::ROWS as STOP;
 use super::catalogue::{Bounds, Event, Expected, JOINTS, Onset, Row, Scenario};
 use super::dice::Dice;
+use super::entry::Entry;
 use super::rig::{Hand, PERIODS_PER_S, Rig};
 use super::run::{Manner, Outcome, run};
+use super::trial::Trial;
 use crate::drive::description::BridgeDescription;
 use crate::faults::{Channel, Form, Injection, Timing};
 use crate::tool::board::{BUS, axis_configuration};
@@ -27,7 +30,7 @@ use crate::world::TICK_S;
 use crate::world::periods::PERIODS_PER_TICK;
 
 /// Room for base parameters of the legs that a campaign runs.
-const BASE: usize = 13;
+pub(super) const BASE: usize = 13;
 /// Runs of a row that share a base.
 const RUNS_PER_BASE: u64 = 256;
 /// Forks that wait for each other; some 100 KB each.
@@ -42,30 +45,47 @@ const ENABLED: u64 = PERIODS_PER_S;
 #[derive(Clone, Debug)]
 pub struct CampaignOptions {
     /// Rows.
-    pub rows: Vec<&'static Row>,
+    pub rows: Vec<Entry>,
     /// Seeds of the runs.
     pub seeds: Vec<u64>,
     /// The emergency stop also at every servo tick, and at every current tick of one second.
     pub every_tick: bool,
     /// Each row's detectors are switched off, curves are kept.
     pub manner: Manner,
+    /// Runs of the sweep.
+    pub sweep: u64,
+    /// Runs of two faults at once.
+    pub pairs: u64,
     /// Only so much of each identification, s.
     pub seconds: Option<f64>,
 }
 
 /// What came of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Campaign {
     /// Runs, by row and seed.
     pub outcomes: Vec<Outcome>,
+    /// Runs of the sweep and of two faults at once.
+    pub trials: Vec<Outcome>,
+    /// Of those, runs with the emergency stop at every tick.
+    pub every_tick: usize,
     /// Motion that was run without a fault meanwhile, s.
     pub undisturbed_s: f64,
 }
 
-struct Job {
-    row: &'static Row,
-    scenario: Scenario,
-    seed: u64,
+/// What is done with a fork.
+enum Job {
+    Row { row: &'static Row, scenario: Scenario, seed: u64, brief: bool },
+    Trial { trial: Box<Trial>, seed: u64 },
+}
+
+impl Job {
+    fn order(&self) -> (&'static str, u64) {
+        match self {
+            Self::Row { row, seed, .. } => (row.id, *seed),
+            Self::Trial { seed, .. } => ("-", *seed),
+        }
+    }
 }
 
 struct Setting<'a> {
@@ -79,49 +99,84 @@ struct Setting<'a> {
 /// Runs them all.
 pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, ToolError> {
     let bounds = bounds(leg)?;
+    let ids: Vec<&str> = options.rows.iter().map(|entry| entry.head().id).collect();
+    let twice = |id: &str| ids.iter().filter(|other| **other == id).count() > 1;
     let mut bases: Vec<u64> = options.seeds.iter().map(|seed| base_of(*seed)).collect();
-    bases.dedup();
-    let mut campaign = Campaign { outcomes: Vec::new(), undisturbed_s: 0.0 };
-    for base in bases {
-        let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
-        let context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
-        let mut length = length(leg, &context, base)?;
-        if let Some(seconds) = options.seconds {
-            length = length.min((seconds * PERIODS_PER_S as f64) as u64).max(1);
-        }
-        let setting = Setting { leg, bounds, manner: options.manner, length };
-        let mut jobs = setting.jobs(options, base);
-        let mut rig = Rig::new(leg, &context, base)?;
-        begin(leg, &mut rig)?;
-        jobs.sort_by_key(|(period, job)| (*period, job.row.id, job.seed));
-        let last = jobs.last().map_or(0, |(period, _)| *period);
-        let from = rig.period;
-        let mut jobs = jobs.into_iter().peekable();
-        let mut batch: Vec<(Rig<JOINTS, BASE>, Job)> = Vec::with_capacity(BATCH);
-        let every = options.every_tick && base == base_of(1);
-        while rig.period - from <= last || every && rig.period - from <= length {
-            while let Some((_, job)) = jobs.next_if(|(period, _)| from + period <= rig.period) {
-                batch.push((rig.clone(), job));
-            }
-            if every && is_stopped_at(rig.period - from) {
-                batch.push((rig.clone(), setting.stop(rig.period)));
-            }
-            if batch.len() >= BATCH {
-                setting.flush(&mut batch, &mut campaign.outcomes);
-            }
-            rig.advance();
-            if let Some(code) = rig.alarm() {
-                let words = format!("base {base}: a false alarm at period {}: {}", rig.period, code.words());
-                return Err(ToolError::Refused(words));
-            }
-        }
-        setting.flush(&mut batch, &mut campaign.outcomes);
-        campaign.undisturbed_s += (rig.period - from) as f64 / PERIODS_PER_S as f64;
+    bases.extend((1..=options.sweep.max(options.pairs)).step_by(RUNS_PER_BASE as usize).map(base_of));
+    if options.every_tick {
+        bases.push(base_of(1));
     }
-    campaign.outcomes.sort_by_key(|outcome| {
-        let row = options.rows.iter().position(|row| row.id == outcome.fault);
-        (row, outcome.seed)
-    });
+    bases.sort_unstable();
+    bases.dedup();
+    let found: Vec<Campaign> =
+        bases.par_iter().map(|base| based(leg, options, bounds, &twice, *base)).collect::<Result<_, _>>()?;
+    let mut campaign = Campaign::default();
+    for found in found {
+        campaign.outcomes.extend(found.outcomes);
+        campaign.trials.extend(found.trials);
+        campaign.every_tick += found.every_tick;
+        campaign.undisturbed_s += found.undisturbed_s;
+    }
+    for entry in &options.rows {
+        if let Entry::Bench(bench) = entry {
+            let halved = twice(bench.head.id);
+            let seeds: Vec<u64> =
+                options.seeds.iter().copied().filter(|seed| !halved || seed.is_multiple_of(2)).collect();
+            campaign.outcomes.extend((bench.run)(&bench.head, leg, &seeds)?);
+        }
+    }
+    campaign.outcomes.sort_by_key(|outcome| (ids.iter().position(|id| *id == outcome.fault), outcome.seed));
+    campaign.trials.sort_by_key(|outcome| (outcome.fault, outcome.seed));
+    Ok(campaign)
+}
+
+/// All forks of one base.
+fn based(
+    leg: &LegFile,
+    options: &CampaignOptions,
+    bounds: Bounds,
+    twice: &(dyn Fn(&str) -> bool + Sync),
+    base: u64,
+) -> Result<Campaign, ToolError> {
+    let mut campaign = Campaign::default();
+    let every = options.every_tick && base == base_of(1);
+    let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
+    let context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
+    let mut length = length(leg, &context, base)?;
+    if let Some(seconds) = options.seconds {
+        length = length.min((seconds * PERIODS_PER_S as f64) as u64).max(1);
+    }
+    let setting = Setting { leg, bounds, manner: options.manner, length };
+    let mut jobs = setting.jobs(options, twice, base);
+    if jobs.is_empty() && !every {
+        return Ok(campaign);
+    }
+    let mut rig = Rig::new(leg, &context, base)?;
+    begin(leg, &mut rig)?;
+    jobs.sort_by_key(|(period, job)| (*period, job.order()));
+    let last = jobs.last().map_or(0, |(period, _)| *period);
+    let from = rig.period;
+    let mut jobs = jobs.into_iter().peekable();
+    let mut batch: Vec<(Rig<JOINTS, BASE>, Job)> = Vec::with_capacity(BATCH);
+    while rig.period - from <= last || every && rig.period - from <= length {
+        while let Some((_, job)) = jobs.next_if(|(period, _)| from + period <= rig.period) {
+            batch.push((rig.clone(), job));
+        }
+        if every && is_stopped_at(rig.period - from) {
+            batch.push((rig.clone(), setting.stop(rig.period)));
+            campaign.every_tick += 1;
+        }
+        if batch.len() >= BATCH {
+            setting.flush(&mut batch, &mut campaign);
+        }
+        rig.advance();
+        if let Some(code) = rig.alarm() {
+            let words = format!("base {base}: a false alarm at period {}: {}", rig.period, code.words());
+            return Err(ToolError::Refused(words));
+        }
+    }
+    setting.flush(&mut batch, &mut campaign);
+    campaign.undisturbed_s += (rig.period - from) as f64 / PERIODS_PER_S as f64;
     Ok(campaign)
 }
 
@@ -135,16 +190,33 @@ fn base_of(seed: u64) -> u64 {
 }
 
 impl Setting<'_> {
-    fn jobs(&self, options: &CampaignOptions, base: u64) -> Vec<(u64, Job)> {
+    fn jobs(
+        &self,
+        options: &CampaignOptions,
+        twice: &(dyn Fn(&str) -> bool + Sync),
+        base: u64,
+    ) -> Vec<(u64, Job)> {
         let mut jobs = Vec::new();
-        for row in &options.rows {
+        for entry in &options.rows {
+            let Entry::Forked(row) = entry else { continue };
             for seed in options.seeds.iter().copied().filter(|seed| base_of(*seed) == base) {
+                if twice(row.id) && seed.is_multiple_of(2) {
+                    continue;
+                }
                 let mut dice = Dice::new(row.id, seed);
                 let period = dice.below(self.length);
                 let scenario = (row.draw)(&mut dice, &self.bounds);
-                jobs.push((period, Job { row, scenario, seed }));
+                jobs.push((period, Job::Row { row, scenario, seed, brief: false }));
             }
         }
+        let mut trials = |most: u64, kind: &str, trial: &dyn Fn(u64) -> Trial| {
+            for seed in (1..=most).filter(|seed| base_of(*seed) == base) {
+                let period = Dice::new(kind, seed).below(self.length);
+                jobs.push((period, Job::Trial { trial: Box::new(trial(seed)), seed }));
+            }
+        };
+        trials(options.sweep, "sweep", &Trial::sweep);
+        trials(options.pairs, "pairs", &|seed| Trial::pair(seed, &self.bounds));
         jobs
     }
 
@@ -167,20 +239,27 @@ impl Setting<'_> {
             patience: 4,
             within_ms: None,
         };
-        Job { row, scenario, seed: period }
+        Job::Row { row, scenario, seed: period, brief: true }
     }
 
-    fn flush(&self, batch: &mut Vec<(Rig<JOINTS, BASE>, Job)>, outcomes: &mut Vec<Outcome>) {
-        let of = |(rig, job): &(Rig<JOINTS, BASE>, Job)| {
-            run(self.leg, job.row, &job.scenario, job.seed, self.manner, rig)
+    fn flush(&self, batch: &mut Vec<(Rig<JOINTS, BASE>, Job)>, campaign: &mut Campaign) {
+        let of = |(rig, job): &(Rig<JOINTS, BASE>, Job)| match job {
+            Job::Row { row, scenario, seed, brief } => {
+                let manner = Manner { brief: *brief, ..self.manner };
+                (false, run(self.leg, row, scenario, *seed, manner, rig))
+            }
+            Job::Trial { trial, seed } => (true, trial.run(self.leg, *seed, rig)),
         };
-        outcomes.par_extend(batch.par_iter().map(of));
+        let (trials, rows): (Vec<_>, Vec<_>) =
+            batch.par_iter().map(of).collect::<Vec<_>>().into_iter().partition(|(trial, _)| *trial);
+        campaign.outcomes.extend(rows.into_iter().map(|(_, outcome)| outcome));
+        campaign.trials.extend(trials.into_iter().map(|(_, outcome)| outcome));
         batch.clear();
     }
 }
 
 /// As an operator does it: contacts open, the switch held until the drive is enabled, the button.
-fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), ToolError> {
+pub(super) fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), ToolError> {
     for _ in 0..OPEN {
         rig.advance();
     }

@@ -5,6 +5,7 @@
 //! What lies below a detector's threshold is told apart beforehand, from the numbers the firmware is set to ([`Bounds`]), never
 //! from the outcome.
 
+pub mod board;
 pub mod current;
 pub mod encoder;
 pub mod joint;
@@ -13,6 +14,7 @@ pub mod number;
 pub mod stop;
 pub mod supply;
 pub mod timing;
+pub mod wearer;
 
 use scarab::safety::FaultCode;
 
@@ -30,6 +32,8 @@ pub enum Expected {
     Brake,
     /// The reading is not believed, the motion goes on.
     Rejected,
+    /// The motion goes on within its limits, or is damped.
+    Kept,
 }
 
 /// When the fault begins to be one.
@@ -72,6 +76,12 @@ pub enum Event {
     Kick(usize, f64, f64),
     /// The wire of a joint's output (A, B, C from 0) breaks.
     OpenPhase(usize, usize),
+    /// The wearer pushes, no harder than the drive holds: joint, peak in N m, seconds.
+    Push(usize, f64, f64),
+    /// A hand holds a joint where it is: joint, strength in N m, seconds.
+    Hold(usize, f64, f64),
+    /// The foot stands on the floor: seconds.
+    Touch(f64),
     /// The operator's hands go on as they like after the emergency stop: see [`super::run`].
     Hands,
 }
@@ -144,15 +154,17 @@ pub const JOINTS: usize = 2;
 
 /// All rows, in the catalogue's order.
 pub fn rows() -> impl Iterator<Item = &'static Row> {
-    let groups: [&'static [Row]; 8] = [
+    let groups: [&'static [Row]; 10] = [
         &encoder::ROWS,
         &current::ROWS,
         &model::ROWS,
+        &board::ROWS,
         &supply::ROWS,
         &number::ROWS,
         &stop::ROWS,
         &timing::ROWS,
         &joint::ROWS,
+        &wearer::ROWS,
     ];
     groups.into_iter().flatten()
 }

@@ -29,3 +29,10 @@ pub const fn one(injection: Injection, expected: Expected) -> Scenario {
         within_ms: None,
     }
 }
+
+/// A run in which something happens beside the ports.
+#[must_use]
+pub const fn beside(event: Event, expected: Expected) -> Scenario {
+    let nothing = at(Channel::Bus, 0, Form::Off, Timing::from(u64::MAX));
+    Scenario { injections: [None; 2], event, ..one(nothing, expected) }
+}

@@ -1,15 +1,18 @@
 //! What holds in every period of every run, whatever is broken.
 
 use scarab::hal::AxisCommand;
-use scarab::safety::{FaultCode, Limits};
+use scarab::leg::{Activity, IdentifiedModel, IdentifyPhase};
+use scarab::safety::FaultCode;
 
+use super::catalogue::Event;
 use super::rig::{PERIODS_PER_S, Rig};
-use crate::tool::leg_file::LegFile;
+use crate::faults::{Channel, Injection};
+use crate::tool::leg_file::{JointFile, LegFile};
 
 /// Damping lasts 300 ms at most, and one servo tick in which it is seen to be over.
 const LONGEST_DAMPING: u64 = PERIODS_PER_S * 3 / 10 + 12;
 /// Beyond its range a joint is never driven by more than this, rad (0.5 degrees).
-const MARGIN_RAD: f64 = 0.008_727;
+pub const MARGIN_RAD: f64 = 0.008_727;
 /// Torque of a servo tick, beyond the cap: ripple, and a step of the current that is under way.
 const TORQUE_MARGIN: f64 = 1.1;
 
@@ -20,6 +23,22 @@ pub struct Scope {
     pub torque: bool,
     /// No wearer is stronger than the drive.
     pub range: bool,
+}
+
+impl Scope {
+    /// Of a run in which this is injected, and this happens.
+    pub fn of<'a>(mut injections: impl Iterator<Item = &'a Injection> + Clone, events: &[Event]) -> Self {
+        use Channel::{Counter, Index, JointCounts, ShuntB, ShuntC, Target};
+        let lies = |injection: &Injection| matches!(injection.channel, ShuntB | ShuntC);
+        // Who does not know where the joint is, or is not heard, cannot keep it anywhere.
+        let lost =
+            |injection: &Injection| matches!(injection.channel, Counter | Index | JointCounts | Target);
+        Self {
+            torque: !injections.clone().any(lies),
+            range: !injections.any(lost)
+                && !events.iter().any(|event| matches!(event, Event::Kick(..) | Event::Touch(_))),
+        }
+    }
 }
 
 /// Watches one run.
@@ -34,20 +53,25 @@ pub struct Invariants<const N: usize> {
     damped: u64,
     /// Last period in which the emergency stop was open.
     stop_open: Option<u64>,
+    /// The model in use, and what the leg was doing when it was looked at.
+    model: Option<IdentifiedModel<N>>,
+    judging: bool,
     broken: Vec<String>,
 }
 
 impl<const N: usize> Invariants<N> {
     /// Of a run of this leg.
     #[must_use]
-    pub fn new<const B: usize>(leg: &LegFile, limits: &Limits<N>, scope: Scope) -> Self {
+    pub fn new<const B: usize>(leg: &LegFile, scope: Scope, rig: &Rig<N, B>) -> Self {
         Self {
             scope,
             range: core::array::from_fn(|joint| leg.joints[joint].range_deg.map(f64::to_radians)),
-            cap_nm: limits.joints().map(|joint| f64::from(joint.torque_cap().0)),
+            cap_nm: core::array::from_fn(|joint| cap_nm(&leg.joints[joint])),
             released: None,
             damped: 0,
             stop_open: None,
+            model: rig.leg.control().model().copied(),
+            judging: is_judging(rig),
             broken: Vec::new(),
         }
     }
@@ -59,6 +83,7 @@ impl<const N: usize> Invariants<N> {
         }
         let switching = rig.is_switching();
         self.commands(rig, &rig.commands);
+        self.parameters(rig);
         if let Some(output) = &rig.output {
             let torque = output.servo.decision.torque;
             let over = |joint: usize| f64::from(torque[joint].abs().0) > self.cap_nm[joint] * 1.000_001;
@@ -100,6 +125,19 @@ impl<const N: usize> Invariants<N> {
         }
     }
 
+    /// The parameters in use change with a verdict that accepts others, and never else.
+    fn parameters<const B: usize>(&mut self, rig: &Rig<N, B>) {
+        let model = rig.leg.control().model();
+        if model != self.model.as_ref() {
+            let accepted = rig.leg.control().verdict().is_some_and(|verdict| verdict.is_accepted());
+            if !(self.judging && accepted && rig.alarm().is_none()) {
+                self.note(rig, "other parameters without a verdict that accepts them");
+            }
+            self.model = model.copied();
+        }
+        self.judging = is_judging(rig);
+    }
+
     fn was_asked<const B: usize>(&self, rig: &Rig<N, B>, since: u64) -> bool {
         let after = self.stop_open.map_or(since, |stop| stop.max(since));
         match (rig.edges.reset, rig.edges.closed) {
@@ -132,4 +170,14 @@ impl<const N: usize> Invariants<N> {
     pub fn into_broken(self) -> Vec<String> {
         self.broken
     }
+}
+
+fn is_judging<const N: usize, const B: usize>(rig: &Rig<N, B>) -> bool {
+    use IdentifyPhase::{Judge, Settle, Solve};
+    matches!(rig.leg.control().activity(), Activity::Identify(Settle | Solve | Judge))
+}
+
+/// Torque that a joint may be driven with, of its file alone, N m.
+fn cap_nm(joint: &JointFile) -> f64 {
+    joint.torque_limit_nm.min(joint.current_limit() * joint.torque_per_ampere.abs())
 }

@@ -6,17 +6,25 @@
 //! | [`catalogue`], [`draw`] | what is done to the machine, and what has to follow; rows by group |
 //! | [`run`], [`invariants`] | one run, and what holds in each of its periods |
 //! | [`campaign`] | many runs, forked from identifications |
+//! | [`bench`] | rows that are no forks: parts, calibrations, identifications of ideal drives |
+//! | [`trial`] | every channel spoilt in every way, and two faults at once: nothing may be broken |
+//! | [`hours`] | normal motion, in which nothing may be raised |
 //! | [`recording`] | a run's curves |
 //! | [`report`] | table, JSON, document |
 //!
 //! Everything follows from seeds: a run is repeated to the bit by its row and its seed.
 
+pub mod bench;
 pub mod campaign;
 pub mod catalogue;
 pub mod dice;
 pub mod draw;
+pub mod entry;
+pub mod event;
+pub mod hours;
 pub mod invariants;
 pub mod recording;
 pub mod report;
 pub mod rig;
 pub mod run;
+pub mod trial;

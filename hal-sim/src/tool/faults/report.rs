@@ -4,8 +4,10 @@ use scarab::safety::FaultCode;
 use serde::Serialize;
 
 use super::campaign::Campaign;
-use super::catalogue::Row;
+use super::entry::{Entry, Head};
+use super::hours::HoursReport;
 use super::run::Outcome;
+use super::trial::KINDS;
 use crate::tool::report::Number;
 use crate::tool::tables::headed;
 
@@ -49,6 +51,21 @@ pub struct RowReport {
     pub unit: &'static str,
     /// What the detector does not see yet.
     pub lacking: Option<&'static str>,
+    /// Seen over seen and missed, as the diagnostic coverage of ISO 13849-1; unknown where nothing was dangerous.
+    pub coverage: Number,
+}
+
+/// Runs in which nothing has to be seen and nothing may be broken. The names are an interface.
+#[derive(Clone, Debug, Serialize)]
+pub struct TrialsReport {
+    /// `sweep` or `pairs`.
+    pub kind: &'static str,
+    /// Seeded runs.
+    pub runs: usize,
+    /// Runs in which something was raised.
+    pub raised: usize,
+    /// Invariants that did not hold.
+    pub invariants_broken: usize,
 }
 
 /// A campaign. The names are an interface.
@@ -62,6 +79,14 @@ pub struct CampaignReport {
     pub invariants_broken: usize,
     /// Runs that were missed, broke an invariant, or raised a false alarm; a hundred at most.
     pub failures: Vec<Outcome>,
+    /// Seen over seen and missed, over all rows.
+    pub diagnostic_coverage: Number,
+    /// Runs with the emergency stop at every tick, which are among those of X1.
+    pub every_tick: usize,
+    /// The sweep, and two faults at once.
+    pub trials: Vec<TrialsReport>,
+    /// Hours of normal motion, where they were asked for.
+    pub hours: Option<HoursReport>,
     /// Motion without a fault, s; an alarm in it ends the campaign.
     pub undisturbed_s: f64,
     /// Of all runs, in their order.
@@ -71,19 +96,30 @@ pub struct CampaignReport {
 impl CampaignReport {
     /// Of what was run.
     #[must_use]
-    pub fn new(rows: &[&'static Row], campaign: &Campaign) -> Self {
+    pub fn new(entries: &[Entry], campaign: &Campaign, hours: Option<HoursReport>) -> Self {
+        let mut heads: Vec<Head> = entries.iter().map(Entry::head).collect();
+        // One that is run in two ways is told as its forks are.
+        heads.dedup_by_key(|head| head.id);
         let outcomes = &campaign.outcomes;
         let failed = |outcome: &&Outcome| {
             !outcome.detected && !outcome.undetectable || outcome.false_alarm || !outcome.broken.is_empty()
         };
-        let hash = outcomes.iter().flat_map(|outcome| outcome.hash.bytes()).fold(0_u64, |hash, byte| {
+        let all = || outcomes.iter().chain(&campaign.trials);
+        let hash = all().flat_map(|outcome| outcome.hash.bytes()).fold(0_u64, |hash, byte| {
             hash.rotate_left(5).wrapping_mul(0x0000_0100_0000_01b3) ^ u64::from(byte)
         });
         Self {
             schema: crate::tool::report::SCHEMA,
-            rows: rows.iter().map(|row| row_report(row, outcomes)).collect(),
-            invariants_broken: outcomes.iter().map(|outcome| outcome.broken.len()).sum(),
-            failures: outcomes.iter().filter(failed).take(MOST_FAILURES).cloned().collect(),
+            diagnostic_coverage: coverage(
+                outcomes.iter().filter(|outcome| outcome.detected).count(),
+                outcomes.iter().filter(|outcome| !outcome.detected && !outcome.undetectable).count(),
+            ),
+            rows: heads.iter().map(|head| row_report(head, outcomes)).collect(),
+            invariants_broken: all().map(|outcome| outcome.broken.len()).sum(),
+            failures: all().filter(failed).take(MOST_FAILURES).cloned().collect(),
+            every_tick: campaign.every_tick,
+            trials: KINDS.iter().filter_map(|kind| trials_report(kind, &campaign.trials)).collect(),
+            hours,
             undisturbed_s: campaign.undisturbed_s,
             trace_hash: format!("{hash:016x}"),
         }
@@ -92,12 +128,14 @@ impl CampaignReport {
     /// Nothing was missed, no invariant broken, nothing raised for nothing.
     #[must_use]
     pub fn is_good(&self) -> bool {
-        self.invariants_broken == 0 && self.rows.iter().all(|row| row.missed == 0 && row.false_alarms == 0)
+        let calm = self.hours.as_ref().is_none_or(|hours| hours.false_alarms.is_empty());
+        calm && self.invariants_broken == 0
+            && self.rows.iter().all(|row| row.missed == 0 && row.false_alarms == 0)
     }
 
     /// Names of the table's columns.
     #[must_use]
-    pub const fn head(&self) -> [&'static str; 10] {
+    pub const fn head(&self) -> [&'static str; 11] {
         HEAD
     }
 
@@ -122,7 +160,7 @@ impl CampaignReport {
     }
 }
 
-const HEAD: [&str; 10] = [
+const HEAD: [&str; 11] = [
     "fault",
     "what",
     "runs",
@@ -133,6 +171,7 @@ const HEAD: [&str; 10] = [
     "not to be seen",
     "smallest seen",
     "false alarms",
+    "coverage",
 ];
 
 fn number(value: Number, digits: usize) -> String {
@@ -142,7 +181,7 @@ fn number(value: Number, digits: usize) -> String {
 impl RowReport {
     /// Its line of the table.
     #[must_use]
-    pub fn cells(&self) -> [String; 10] {
+    pub fn cells(&self) -> [String; 11] {
         let smallest = match self.smallest_seen.known() {
             Some(value) if !self.unit.is_empty() => format!("{value:.1} {}", self.unit),
             _ => "-".into(),
@@ -158,11 +197,32 @@ impl RowReport {
             self.undetectable_by_design.to_string(),
             smallest,
             self.false_alarms.to_string(),
+            percent(self.coverage),
         ]
     }
 }
 
-fn row_report(row: &'static Row, outcomes: &[Outcome]) -> RowReport {
+fn percent(share: Number) -> String {
+    // Down, so that no miss is rounded away.
+    let digits = |share: f64| format!("{:.2} %", (1e4 * share).floor() / 1e2);
+    share.known().map_or_else(|| "-".into(), digits)
+}
+
+fn coverage(detected: usize, missed: usize) -> Number {
+    (detected as f64 / (detected + missed) as f64).into()
+}
+
+fn trials_report(kind: &'static str, trials: &[Outcome]) -> Option<TrialsReport> {
+    let of = || trials.iter().filter(|outcome| outcome.fault == kind);
+    (of().count() > 0).then(|| TrialsReport {
+        kind,
+        runs: of().count(),
+        raised: of().filter(|outcome| outcome.detected).count(),
+        invariants_broken: of().map(|outcome| outcome.broken.len()).sum(),
+    })
+}
+
+fn row_report(row: &Head, outcomes: &[Outcome]) -> RowReport {
     let of: Vec<&Outcome> = outcomes.iter().filter(|outcome| outcome.fault == row.id).collect();
     let count = |holds: &dyn Fn(&Outcome) -> bool| of.iter().filter(|outcome| holds(outcome)).count();
     let magnitudes = |seen: bool| {
@@ -189,6 +249,10 @@ fn row_report(row: &'static Row, outcomes: &[Outcome]) -> RowReport {
         largest_unseen: magnitudes(false).fold(f64::NEG_INFINITY, f64::max).into(),
         unit: row.unit,
         lacking: row.lacking,
+        coverage: coverage(
+            count(&|outcome| outcome.detected),
+            count(&|outcome| !outcome.detected && !outcome.undetectable),
+        ),
     }
 }
 
@@ -199,9 +263,25 @@ impl CampaignReport {
         let mut text = String::new();
         for row in &self.rows {
             if let Some(lacking) = row.lacking {
-                text.push_str(&format!("{}: not built yet: {lacking}\n", row.fault));
+                text.push_str(&format!("{}: not seen: {lacking}\n", row.fault));
             }
         }
+        if self.every_tick > 0 {
+            text.push_str(&format!(
+                "emergency stop at every tick: {} forks, among X1's runs\n",
+                self.every_tick
+            ));
+        }
+        for trials in &self.trials {
+            let TrialsReport { kind, runs, raised, invariants_broken } = trials;
+            text.push_str(&format!(
+                "{kind}: {runs} runs, something raised in {raised}, invariants broken: {invariants_broken}\n"
+            ));
+        }
+        if let Some(hours) = &self.hours {
+            text.push_str(&hours.lines());
+        }
+        text.push_str(&format!("diagnostic coverage: {}\n", percent(self.diagnostic_coverage)));
         text.push_str(&format!(
             "invariants broken: {}; undisturbed motion without an alarm: {:.0} s; trace hash {}\n",
             self.invariants_broken, self.undisturbed_s, self.trace_hash

@@ -4,18 +4,22 @@
 //! board's tasks do it (`scarab::task`, which only the microcontroller builds). Level by level in one period:
 //!
 //! ```text
-//! every 48th period   operator's contacts -> requests; a reset forgets what no longer holds
+//! every 48th period   operator's contacts -> requests; a reset forgets what no longer holds; registers and temperatures when due
 //! every 6th           servo: sample, request -> leg -> target currents
 //! every period        plant -> samples -> faults -> interlock -> axis -> command; anything that forbids releases all
 //! ```
 //!
-//! Not here: gate drivers, temperatures and watchdog (the housekeeping's), which need the board or the emulator.
+//! Not here: the watchdog, which needs the board or the emulator.
 
+use scarab::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use scarab::hal::{AxisCommand, DriveCommand, JointSample, Sample};
 use scarab::leg::{ControlOutput, ControlRequest, DriveState, axis_code, permitted};
 use scarab::motor::{Axis, AxisRequest, Chopper, SenseScale};
 use scarab::operator::{Ask, Operator, RATE_HZ, Situation};
-use scarab::safety::{Bridges, Cause, Fault, FaultCode, PowerRequest, ServoWatch, TickState, TickWatch};
+use scarab::safety::{
+    Bridges, Cause, Fault, FaultCode, PowerRequest, ServoWatch, TickState, TickWatch, UpkeepClock,
+    of_gate_driver, of_temperature,
+};
 
 use crate::faults::{Channel, Injector};
 use crate::tool::error::ToolError;
@@ -29,6 +33,9 @@ pub const PERIODS_PER_S: u64 = scarab::hal::CURRENT_RATE_HZ as u64;
 /// One of them, ms.
 pub const PERIOD_MS: f64 = 1e3 / PERIODS_PER_S as f64;
 const PERIODS_PER_ROUND: u64 = PERIODS_PER_S / RATE_HZ as u64;
+
+/// Of the thermistor of a bridge at 41 degrees Celsius.
+const WARM_CODE: u16 = 1500;
 
 /// What the operator's hand does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,6 +89,7 @@ pub struct Rig<const N: usize, const B: usize> {
     causes: u32,
     axis_fault: Option<FaultCode>,
     operator: Operator,
+    clock: UpkeepClock,
     request: Option<ControlRequest<N>>,
     sample: Sample<N>,
     gravity: [f32; 3],
@@ -115,6 +123,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             causes: 0,
             axis_fault: None,
             operator: Operator::default(),
+            clock: UpkeepClock::new(RATE_HZ),
             request: None,
             sample: pair.sample,
             gravity: context.gravity,
@@ -150,6 +159,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// The operator's contacts.
     fn round(&mut self) {
+        self.upkeep();
         let drive = self.leg.control().state();
         let situation = Situation {
             enabling: self.hand.enabling,
@@ -165,6 +175,21 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             Some(Ask::Identify) => self.request = Some(ControlRequest::Identify),
             Some(Ask::Reset) => self.reset(),
             Some(Ask::Calibrate | Ask::EndCalibration | Ask::Reference) | None => {}
+        }
+    }
+
+    /// Gate drivers' registers and temperatures, as the housekeeping looks at them.
+    fn upkeep(&mut self) {
+        let due = self.clock.next();
+        for joint in 0..N {
+            let holds = !self.injector.happens(Channel::GateRegisters, joint, self.period);
+            let code = self.injector.thermistor(joint, self.period, WARM_CODE);
+            let causes = [
+                due.gates.then(|| of_gate_driver(holds)).flatten(),
+                due.temperatures.then(|| of_temperature(temperature_c(code), HOTTEST_C)).flatten(),
+            ];
+            let bits = causes.into_iter().flatten().fold(0, |bits, cause| bits | cause.bit());
+            self.causes |= bits & !self.blind_bits();
         }
     }
 
@@ -272,6 +297,17 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     fn blind_bits(&self) -> u32 {
         let blind = |cause: &Cause| self.is_blind(cause.code());
         Cause::ALL.into_iter().filter(blind).fold(0, |bits, cause| bits | cause.bit())
+    }
+
+    /// Asks for something that the operator's contacts do not, at the next servo tick.
+    pub fn ask(&mut self, request: ControlRequest<N>) {
+        self.request = Some(request);
+    }
+
+    /// A request waits for the servo's next tick.
+    #[must_use]
+    pub fn is_asked(&self) -> bool {
+        self.request.is_some()
     }
 
     /// What forbids to enable, as the interlock's bits.

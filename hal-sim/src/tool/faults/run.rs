@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::catalogue::{Event, Expected, JOINTS, Onset, Row, Scenario};
 use super::dice::Dice;
+use super::event::apply;
 use super::invariants::{Invariants, Scope};
 use super::recording::Recording;
 use super::rig::{Hand, PERIOD_MS, PERIODS_PER_S, Rig};
@@ -58,6 +59,8 @@ pub struct Manner {
     pub blind: bool,
     /// Its curves are kept.
     pub recorded: bool,
+    /// A machine that is safe is watched for a tenth of the usual time only: 2 ms.
+    pub brief: bool,
 }
 
 /// A fork of `base`, spoilt as the row's dice say.
@@ -110,6 +113,7 @@ struct Watched<'a, const B: usize> {
     asked: [f64; 2],
     hold: Hold,
     recording: Option<Recording>,
+    brief: bool,
 }
 
 /// What the servo asks of a joint's phases B and C, A, where the rotor stands now.
@@ -145,26 +149,8 @@ impl<'a, const B: usize> Watched<'a, B> {
             injection.timing.begin = injection.timing.begin.saturating_add(begun);
             rig.injector.add(injection);
         }
-        match scenario.event {
-            Event::Supply(volts) => {
-                if let Some(drives) = rig.world.complete_drives_mut() {
-                    drives.supply_mut().set_source(volts);
-                }
-            }
-            Event::OpenPhase(joint, output) => {
-                if let Some(drives) = rig.world.complete_drives_mut() {
-                    drives.break_wire(joint, output);
-                }
-            }
-            Event::Kick(joint, peak, duration) => rig.world.push(joint, peak, duration),
-            Event::None | Event::Hands => {}
-        }
-        let lies = |channel| matches!(channel, Channel::ShuntB | Channel::ShuntC);
-        let scope = Scope {
-            torque: !scenario.injections.iter().flatten().any(|injection| lies(injection.channel)),
-            range: !matches!(scenario.event, Event::Kick(..)),
-        };
-        let limits = *rig.leg.control().limits();
+        apply(scenario.event, leg, &mut rig);
+        let scope = Scope::of(scenario.injections.iter().flatten(), &[scenario.event]);
         let onset = match scenario.onset {
             Onset::Injection => Some(begun),
             Onset::ServoTick => Some(next_servo_tick(scenario, begun)),
@@ -175,7 +161,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             row,
             scenario,
             seed,
-            invariants: Invariants::new::<B>(leg, &limits, scope),
+            invariants: Invariants::new(leg, scope, &rig),
             dice: Dice::new(row.id, !seed),
             begun,
             onset,
@@ -183,6 +169,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             asked: asked(&rig, scenario.injections[0].map_or(0, |injection| injection.joint)),
             hold: Hold::default(),
             recording: manner.recorded.then(Recording::default),
+            brief: manner.brief,
             rig,
         }
     }
@@ -273,6 +260,9 @@ impl<'a, const B: usize> Watched<'a, B> {
     }
 
     fn finish(mut self) -> Outcome {
+        if self.scenario.expected == Expected::Kept {
+            return self.keep();
+        }
         let before = self.rig.commands;
         let limit = self.begun + self.scenario.patience;
         let mut seen = None;
@@ -324,6 +314,43 @@ impl<'a, const B: usize> Watched<'a, B> {
         }
     }
 
+    /// A run in which nothing is broken: the limits are held to the end.
+    fn keep(mut self) -> Outcome {
+        let limit = self.begun + self.scenario.patience;
+        let (mut limited, mut damped) = (None, None);
+        while self.rig.period < limit {
+            self.step();
+            let output = self.rig.output.as_ref();
+            if output.is_some_and(|output| output.servo.decision.limited.iter().any(|limited| limited.any()))
+            {
+                limited = limited.or(Some(self.rig.period));
+            }
+            if self.rig.alarm().is_some() {
+                damped = damped.or(Some(self.rig.period));
+            }
+        }
+        let alarm = self.rig.alarm();
+        let known = alarm.is_none_or(|code| self.row.codes.contains(&code));
+        let state = if damped.is_some() { Some("Damp") } else { limited.map(|_| "Limit") };
+        let broken = self.invariants.into_broken();
+        Outcome {
+            fault: self.row.id,
+            seed: self.seed,
+            period: self.begun,
+            detected: state.is_some() && broken.is_empty() && known,
+            // The limits were not come to.
+            undetectable: state.is_none() && broken.is_empty(),
+            false_alarm: !known,
+            after_ms: None,
+            state,
+            alarm: alarm.map(FaultCode::name),
+            magnitude: self.scenario.magnitude,
+            broken,
+            hash: format!("{:016x}", self.rig.hash),
+            recording: self.recording,
+        }
+    }
+
     fn is_too_late(&self, onset: u64) -> bool {
         let since = self.rig.period.saturating_sub(onset) as f64 * PERIOD_MS;
         if self.row.deadline_ms.is_infinite() {
@@ -355,6 +382,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         let periods = match (self.scenario.event, seen) {
             (Event::Hands, _) => HANDS,
             (_, Some("Damp")) => PERIODS_PER_S * 3 / 10 + AFTERWARDS,
+            _ if self.brief => AFTERWARDS / 10,
             _ => AFTERWARDS,
         };
         for _ in 0..periods {

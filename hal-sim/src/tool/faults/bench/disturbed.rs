@@ -1,0 +1,180 @@
+//! H2, H3, H4: identifications of a leg that the wearer pushes, whose foot stands on the floor, or that is another one than the
+//! firmware believes. Ideal drives: what is asked is what becomes of the result.
+//!
+//! A run is dangerous where a model is accepted that predicts an unseen motion's torque worse than [`HARMFUL_PERCENT`] of its mean: that
+//! is missed. A refusal is what has to follow; rows that are set aside are, where the model that is left is good; and a model
+//! that is good although nothing was noticed is a disturbance too small to matter.
+
+use rayon::prelude::*;
+use scarab::leg::IdentifiedModel;
+use scarab::servo::TorqueModel;
+
+use super::super::catalogue::JOINTS;
+use super::super::dice::Dice;
+use super::super::entry::Head;
+use super::super::run::Outcome;
+use super::{Bench, outcome};
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::{LegFile, PushesFile};
+use crate::tool::pair::Context;
+use crate::tool::perturb::{self, Perturbation};
+use crate::tool::simulate::{SimulationOptions, drive};
+use crate::world::World;
+
+const BASE: usize = 13;
+/// Twice what an undisturbed identification has to reach.
+const HARMFUL_PERCENT: f64 = 3.0;
+/// Below this speed a row is not counted.
+const SLOW_RAD_PER_S: f32 = 0.05;
+/// Share of rows set aside above which a motion counts as disturbed; an undisturbed one has less.
+const NOTICED_SHARE: f32 = 0.005;
+
+pub(super) const WEARER: Bench = Bench {
+    head: Head {
+        id: "H2",
+        fault: "wearer pushes during identification",
+        detector: "weights of the residuals; held-out motions",
+        state: "Limit",
+        deadline_ms: f64::INFINITY,
+        unit: "N m",
+        lacking: None,
+    },
+    run: |head, leg, seeds| all(head, leg, seeds, pushed),
+};
+
+pub(super) const CONTACT: Bench = Bench {
+    head: Head {
+        id: "H4",
+        fault: "foot touches the ground during identification",
+        detector: "residual against the open chain",
+        state: "refused: contact",
+        deadline_ms: f64::INFINITY,
+        unit: "s",
+        lacking: None,
+    },
+    run: |head, leg, seeds| all(head, leg, seeds, touching),
+};
+
+pub(super) const OTHER_LEG: Bench = Bench {
+    head: Head {
+        id: "H3",
+        fault: "other leg, other load, other wiring",
+        detector: "residual of the model, bounds, held-out motions",
+        state: "result refused, never applied",
+        deadline_ms: f64::INFINITY,
+        unit: "",
+        lacking: None,
+    },
+    run: |head, leg, seeds| all(head, leg, seeds, other),
+};
+
+/// Leg, what is wrong, how large.
+type Drawn = (LegFile, Vec<Perturbation>, Option<f64>);
+
+fn all(
+    head: &Head,
+    leg: &LegFile,
+    seeds: &[u64],
+    draw: fn(&mut Dice, &LegFile) -> Drawn,
+) -> Result<Vec<Outcome>, ToolError> {
+    let one = |seed: &u64| {
+        let (leg, perturbations, magnitude) = draw(&mut Dice::new(head.id, *seed), leg);
+        judge(head, &leg, perturbations, magnitude, *seed)
+    };
+    seeds.par_iter().map(one).collect()
+}
+
+fn judge(
+    head: &Head,
+    leg: &LegFile,
+    perturbations: Vec<Perturbation>,
+    magnitude: Option<f64>,
+    seed: u64,
+) -> Result<Outcome, ToolError> {
+    let options = SimulationOptions { perturbations, ..SimulationOptions::of_seed(seed) };
+    let wrong = options.perturbations.as_slice();
+    let (believed, simulated) = (perturb::believed(leg, wrong)?, perturb::simulated(leg, wrong)?);
+    let mut context = Context::<JOINTS, BASE>::new(&believed, &options)?;
+    perturb::configure(&mut context, wrong)?;
+    let pair = drive(leg, &simulated, &context, &options)?.pair;
+    let error =
+        pair.leg.control().model().map(|model| error_percent(&believed, &context, &pair.world, model));
+    let shares = pair.leg.identification().solver().map(|solver| solver.record().outliers.disturbed_share);
+    let noticed = shares.is_some_and(|shares| shares.iter().any(|share| *share > NOTICED_SHARE));
+    let harmless = error.is_some_and(|error| error <= HARMFUL_PERCENT);
+    let said = match head.id {
+        "H2" => "Limit",
+        _ => "refused",
+    };
+    // Rows that are set aside are what a push leads to; a leg that is another one has to be refused.
+    let seen = error.is_none() || harmless && noticed && head.id != "H3";
+    let mut found = outcome(head, seed, seen.then_some(said));
+    found.undetectable = harmless && !seen;
+    found.magnitude = magnitude;
+    found.hash = format!("{:016x}", error.unwrap_or(-1.0).to_bits());
+    Ok(found)
+}
+
+/// Of a model's torque on the motions that were predicted, against the leg as it is now, in percent of the mean; of the worse
+/// joint. Rows at which a joint hardly moves are left out: dry friction is undetermined there.
+fn error_percent(
+    believed: &LegFile,
+    context: &Context<JOINTS, BASE>,
+    world: &World<JOINTS>,
+    model: &IdentifiedModel<JOINTS>,
+) -> f64 {
+    let (mut error, mut mean) = ([0.0; JOINTS], [0.0; JOINTS]);
+    let sign = |joint: usize| if believed.joints[joint].direction < 0 { -1.0 } else { 1.0 };
+    let zero = |joint: usize| believed.joints[joint].zero_offset_deg.to_radians();
+    for motion in context.motions.validation {
+        for tick in (0..motion.duration_ticks()).step_by(40) {
+            let state = motion.state_at(tick);
+            let (q, qd, qdd) = (state.position_rad, state.velocity_rad_per_s, state.acceleration_rad_per_s2);
+            if qd.iter().any(|speed| speed.abs() < SLOW_RAD_PER_S) {
+                continue;
+            }
+            let truth = world.inverse_dynamics(
+                &core::array::from_fn(|joint| sign(joint) * (f64::from(q[joint]) - zero(joint))),
+                &core::array::from_fn(|joint| sign(joint) * f64::from(qd[joint])),
+                &core::array::from_fn(|joint| sign(joint) * f64::from(qdd[joint])),
+            );
+            let told = model.torques(&q, &qd, &qdd, context.gravity);
+            for joint in 0..JOINTS {
+                error[joint] += (sign(joint) * f64::from(told[joint]) - truth[joint]).abs();
+                mean[joint] += truth[joint].abs();
+            }
+        }
+    }
+    (0..JOINTS).map(|joint| 100.0 * error[joint] / mean[joint]).fold(0.0, f64::max)
+}
+
+fn pushed(dice: &mut Dice, leg: &LegFile) -> Drawn {
+    let mut leg = leg.clone();
+    let torque = dice.logarithmic(0.5, 40.0);
+    leg.pushes = Some(PushesFile {
+        per_minute: dice.logarithmic(2.0, 60.0),
+        torque_nm: torque,
+        duration_s: dice.uniform(0.1, 1.5),
+    });
+    (leg, Vec::new(), Some(torque))
+}
+
+fn touching(dice: &mut Dice, leg: &LegFile) -> Drawn {
+    let seconds = dice.logarithmic(0.1, 10.0);
+    (leg.clone(), vec![Perturbation::Contact(seconds)], Some(seconds))
+}
+
+fn other(dice: &mut Dice, leg: &LegFile) -> Drawn {
+    let joint = || (1 + usize::from(leg.joints.len() > 1)).to_string();
+    let first = dice.coin();
+    let named = if first { "1".to_owned() } else { joint() };
+    let wrong = match dice.below(6) {
+        0 => Perturbation::Swap,
+        1 => Perturbation::Sign(named),
+        2 => Perturbation::Stuck(named),
+        3 => Perturbation::AddedMass(dice.logarithmic(0.1, 10.0)),
+        4 => Perturbation::Length(dice.uniform(0.7, 1.4)),
+        _ => Perturbation::Zero(dice.sign() * dice.uniform(2.0, 20.0), Some(named)),
+    };
+    (leg.clone(), vec![wrong], None)
+}

@@ -1,0 +1,56 @@
+//! Rows that are not forks of an identification with complete drives: parts alone, motors on their stand, identifications of ideal
+//! drives.
+//!
+//! A run is judged by what became of it, and repeated by its row and its seed like any other.
+
+mod calibration;
+mod command;
+mod disturbed;
+mod parts;
+mod search;
+
+use scarab::safety::FaultCode;
+
+use super::entry::Head;
+use super::run::Outcome;
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::LegFile;
+
+/// A row with a bench of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Bench {
+    /// What is told of it.
+    pub head: Head,
+    /// Runs it for these seeds.
+    pub run: fn(&Head, &LegFile, &[u64]) -> Result<Vec<Outcome>, ToolError>,
+}
+
+/// All of them.
+pub static BENCHES: [Bench; 7] = [
+    calibration::BENCH,
+    parts::BENCH,
+    command::BENCH,
+    disturbed::WEARER,
+    disturbed::CONTACT,
+    disturbed::OTHER_LEG,
+    search::BENCH,
+];
+
+/// What came of a run: `state` where it was made safe, and nothing where it was not.
+fn outcome(head: &Head, seed: u64, state: Option<&'static str>) -> Outcome {
+    Outcome {
+        fault: head.id,
+        seed,
+        period: 0,
+        detected: state.is_some(),
+        undetectable: false,
+        false_alarm: false,
+        after_ms: None,
+        state,
+        alarm: None::<FaultCode>.map(FaultCode::name),
+        magnitude: None,
+        broken: Vec::new(),
+        hash: String::new(),
+        recording: None,
+    }
+}

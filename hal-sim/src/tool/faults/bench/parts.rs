@@ -1,0 +1,57 @@
+//! V3: a brake chopper that makes no sense is refused, and no voltage makes a duty that is none.
+
+use scarab::motor::{Chopper, GREATEST_BRAKE_DUTY};
+use scarab::units::Volt;
+
+use super::super::dice::Dice;
+use super::super::entry::Head;
+use super::super::run::Outcome;
+use super::{Bench, outcome};
+use crate::tool::board::BRAKE;
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::LegFile;
+
+pub(super) const BENCH: Bench = Bench {
+    head: Head {
+        id: "V3",
+        fault: "brake chopper set to nonsense, or shown a voltage that is none",
+        detector: "check when it is made; bounds of the duty",
+        state: "Refuse",
+        deadline_ms: f64::INFINITY,
+        unit: "",
+        lacking: Some("a resistor that is absent: the bus rises until the axes release (V1)"),
+    },
+    run: chop,
+};
+
+fn chop(head: &Head, _: &LegFile, seeds: &[u64]) -> Result<Vec<Outcome>, ToolError> {
+    Ok(seeds.iter().map(|seed| one(head, *seed)).collect())
+}
+
+/// What no voltage is.
+const NONE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+
+fn one(head: &Head, seed: u64) -> Outcome {
+    let mut dice = Dice::new(head.id, seed);
+    let [begin, full] = BRAKE;
+    let none = NONE[dice.below(3) as usize];
+    if dice.coin() {
+        let absurd = match dice.below(5) {
+            // The wrong way round, or no ramp between.
+            0 => [full.0, full.0 - dice.uniform(0.0, 50.0) as f32],
+            1 => [begin.0, begin.0 + dice.uniform(0.0, 0.49) as f32],
+            // Beyond what the divider can tell, and a resistor that is always on.
+            2 => [begin.0, dice.uniform(59.7, 1e3) as f32],
+            3 => [dice.uniform(-100.0, 4.9) as f32, full.0],
+            _ => [none, full.0],
+        };
+        let made = Chopper::new(Volt(absurd[0]), Volt(absurd[1]));
+        return outcome(head, seed, made.is_none().then_some("Refuse"));
+    }
+    let volts = if dice.coin() { none } else { dice.uniform(-1e3, 1e3) as f32 };
+    let duty = Chopper::new(begin, full).map(|chopper| chopper.duty(Volt(volts)));
+    let sensible = duty.is_some_and(|duty| (0.0..=GREATEST_BRAKE_DUTY).contains(&duty));
+    // A voltage that is none gives no duty, and is for the axes to refuse.
+    let refused = sensible && (volts.is_finite() || duty == Some(0.0));
+    outcome(head, seed, refused.then_some("Refuse"))
+}

@@ -1,0 +1,164 @@
+//! I1: a search that is cancelled at any of its steps, meets a fault or the emergency stop, or gives nonsense. The parameters
+//! that were there before stay, all of them.
+//!
+//! One leg identifies itself twice; where the second search begins it is forked, once for each run. Ideal drives.
+
+use rayon::prelude::*;
+use scarab::leg::{Activity, ControlRequest, IdentifiedModel, IdentifyPhase, Step};
+use scarab::safety::PowerRequest;
+use scarab::units::Ampere;
+
+use super::super::catalogue::JOINTS;
+use super::super::dice::Dice;
+use super::super::entry::Head;
+use super::super::run::Outcome;
+use super::{Bench, outcome};
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::LegFile;
+use crate::tool::pair::{Context, Pair};
+use crate::tool::setup::SetupError;
+use crate::tool::simulate::SimulationOptions;
+
+const BASE: usize = 13;
+/// No identification takes longer, servo ticks.
+const LONGEST: u64 = 300 * 4000;
+/// A leg is watched for so long after its search ended: half a second.
+const AFTERWARDS: u64 = 2000;
+
+pub(super) const BENCH: Bench = Bench {
+    head: Head {
+        id: "I1",
+        fault: "search cancelled, stopped by a fault or the emergency stop, or its result is nonsense",
+        detector: "cancelled between two candidates; verdict",
+        state: "old parameters stay",
+        deadline_ms: f64::INFINITY,
+        unit: "ticks of search",
+        lacking: None,
+    },
+    run: interrupt,
+};
+
+/// A leg with an accepted model at the first tick of another search, and how many ticks that takes.
+struct Searching {
+    pair: Pair<JOINTS, BASE>,
+    old: IdentifiedModel<JOINTS>,
+    ticks: u64,
+    gravity: [f32; 3],
+}
+
+fn phase(pair: &Pair<JOINTS, BASE>) -> Option<IdentifyPhase> {
+    match pair.leg.control().activity() {
+        Activity::Identify(phase) => Some(phase),
+        _ => None,
+    }
+}
+
+/// The search begins while the leg settles.
+fn is_searching(pair: &Pair<JOINTS, BASE>) -> bool {
+    matches!(phase(pair), Some(IdentifyPhase::Settle | IdentifyPhase::Solve))
+        && pair.leg.identification().solver().is_some()
+}
+
+impl Searching {
+    fn new(leg: &LegFile) -> Result<Self, ToolError> {
+        let refused = |words: &str| ToolError::from(SetupError::new(leg, words.to_owned()));
+        let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(1))?;
+        let mut pair = Pair::new(leg, &context, 1)?;
+        let gravity = context.gravity;
+        if !pair.enable(gravity) {
+            return Err(refused("the drive refuses to be enabled"));
+        }
+        go(&mut pair, gravity, |pair| phase(pair).is_none());
+        let old = *pair.leg.control().model().ok_or_else(|| refused("its identification is refused"))?;
+        go(&mut pair, gravity, is_searching);
+        let mut ahead = pair.clone();
+        let mut ticks = 0;
+        while is_searching(&ahead) && ticks < LONGEST {
+            ahead.tick(None, gravity);
+            ticks += 1;
+        }
+        if phase(&ahead).is_none() {
+            return Err(refused("its second identification does not come to a search"));
+        }
+        Ok(Self { pair, old, ticks, gravity })
+    }
+}
+
+/// Identifies until it is as it should be.
+fn go(pair: &mut Pair<JOINTS, BASE>, gravity: [f32; 3], there: fn(&Pair<JOINTS, BASE>) -> bool) {
+    let mut request = Some(ControlRequest::Identify);
+    for _ in 0..LONGEST {
+        pair.tick(request.take(), gravity);
+        if there(pair) {
+            break;
+        }
+    }
+}
+
+fn interrupt(head: &Head, leg: &LegFile, seeds: &[u64]) -> Result<Vec<Outcome>, ToolError> {
+    let searching = Searching::new(leg)?;
+    Ok(seeds.par_iter().map(|seed| one(head, &searching, *seed)).collect())
+}
+
+fn one(head: &Head, searching: &Searching, seed: u64) -> Outcome {
+    let mut dice = Dice::new(head.id, seed);
+    let gravity = searching.gravity;
+    let mut pair = searching.pair.clone();
+    let way = dice.below(10);
+    let at = dice.below(searching.ticks);
+    if way == 9 {
+        nonsense(&mut pair, gravity, &mut dice);
+    } else {
+        for _ in 0..at {
+            pair.tick(None, gravity);
+        }
+        let request = match way {
+            0 | 1 => Some(ControlRequest::Power(PowerRequest::QuickStop)),
+            2 | 3 => Some(ControlRequest::Power(PowerRequest::DisableVoltage)),
+            4 | 5 => Some(ControlRequest::Power(PowerRequest::DisableOperation)),
+            6 => Some(ControlRequest::Identify),
+            _ => {
+                // A fault: what is no number in the servo's sample.
+                pair.sample.joints[0].current = Ampere(f32::NAN);
+                None
+            }
+        };
+        pair.tick(request, gravity);
+        for _ in 0..AFTERWARDS {
+            pair.tick(None, gravity);
+        }
+    }
+    let kept = pair.leg.control().model() == Some(&searching.old);
+    let mut found = outcome(head, seed, kept.then_some("old parameters stay"));
+    found.magnitude = Some(at as f64);
+    if !kept {
+        found.broken.push("parameters changed without a verdict that accepts them".into());
+    }
+    found
+}
+
+/// What a search that diverged might give is put in the place of its result.
+fn nonsense(pair: &mut Pair<JOINTS, BASE>, gravity: [f32; 3], dice: &mut Dice) {
+    let first = IdentifyPhase::Validate { motion: 0, step: Step::Approach };
+    for _ in 0..LONGEST {
+        pair.tick(None, gravity);
+        if phase(pair) == Some(first) {
+            break;
+        }
+    }
+    if let Some(values) = pair.leg.identification().solver().map(|solver| solver.estimate().values) {
+        let wrong = match dice.below(4) {
+            0 => values.map(|_| f32::NAN),
+            1 => values.map(|value| value * 1e30),
+            2 => values.map(|value| -value),
+            _ => values.map(|_| 0.0),
+        };
+        pair.leg.examine(&wrong);
+    }
+    for _ in 0..LONGEST {
+        pair.tick(None, gravity);
+        if phase(pair).is_none() {
+            break;
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! A row of the table, whichever way it is run.
+
+use super::bench::{BENCHES, Bench};
+use super::catalogue::{Row, rows};
+
+/// What is told of a row.
+#[derive(Clone, Copy, Debug)]
+pub struct Head {
+    /// The catalogue's id.
+    pub id: &'static str,
+    /// What goes wrong.
+    pub fault: &'static str,
+    /// What sees it.
+    pub detector: &'static str,
+    /// Where it leads: the catalogue's last column.
+    pub state: &'static str,
+    /// From the fault to the safe state's first command, ms; infinite where it is no time.
+    pub deadline_ms: f64,
+    /// Unit of the magnitude.
+    pub unit: &'static str,
+    /// What is not seen yet.
+    pub lacking: Option<&'static str>,
+}
+
+/// One way to run a row.
+#[derive(Clone, Copy, Debug)]
+pub enum Entry {
+    /// Forks of an identification with complete drives.
+    Forked(&'static Row),
+    /// A bench of its own.
+    Bench(&'static Bench),
+}
+
+/// The catalogue's order; what is not here comes last.
+const ORDER: [&str; 27] = [
+    "E1", "E2", "E3", "E4", "E5", "C1", "C2", "C3", "C4", "P1", "P2", "V1", "V2", "V3", "T1", "N1", "X1",
+    "X2", "K1", "M2", "J1", "J2", "H1", "H2", "H4", "H3", "I1",
+];
+
+impl Entry {
+    /// What is told of it.
+    #[must_use]
+    pub fn head(&self) -> Head {
+        match self {
+            Self::Forked(row) => Head {
+                id: row.id,
+                fault: row.fault,
+                detector: row.detector,
+                state: row.state,
+                deadline_ms: row.deadline_ms,
+                unit: row.unit,
+                lacking: row.lacking,
+            },
+            Self::Bench(bench) => bench.head,
+        }
+    }
+}
+
+impl Entry {
+    /// Whether what sees it can be switched off in the rig: codes of a fork. Bounds that hold (J1, H1) and benches have tests of
+    /// their own that fail without them.
+    #[must_use]
+    pub fn can_be_blind(&self) -> bool {
+        matches!(self, Self::Forked(row) if !["J1", "H1"].contains(&row.id))
+    }
+}
+
+/// All rows, in the catalogue's order.
+#[must_use]
+pub fn entries() -> Vec<Entry> {
+    let mut all: Vec<Entry> = rows().map(Entry::Forked).chain(BENCHES.iter().map(Entry::Bench)).collect();
+    let place = |entry: &Entry| ORDER.iter().position(|id| *id == entry.head().id).unwrap_or(ORDER.len());
+    all.sort_by_key(place);
+    all
+}

@@ -1,0 +1,32 @@
+//! What happens to a machine beside its ports.
+
+use super::catalogue::{Event, JOINTS};
+use super::rig::Rig;
+use crate::tool::leg_file::LegFile;
+
+/// Makes it happen now.
+pub fn apply<const B: usize>(event: Event, leg: &LegFile, rig: &mut Rig<JOINTS, B>) {
+    match event {
+        Event::Supply(volts) => {
+            if let Some(drives) = rig.world.complete_drives_mut() {
+                drives.supply_mut().set_source(volts);
+            }
+        }
+        Event::Kick(joint, peak, seconds) | Event::Push(joint, peak, seconds) => {
+            rig.world.push(joint, peak, seconds);
+        }
+        Event::Hold(joint, strength, seconds) => rig.world.hold(joint, strength, seconds),
+        Event::Touch(seconds) => {
+            let truth = leg.joints.last().and_then(|joint| joint.truth.as_ref());
+            let com = truth.map_or([0.0; 3], |truth| truth.com);
+            // The foot is about twice as far from the knee as the centre of mass of shank and foot.
+            rig.world.touch(com.map(|element| 2.0 * element), 0.0, seconds);
+        }
+        Event::OpenPhase(joint, output) => {
+            if let Some(drives) = rig.world.complete_drives_mut() {
+                drives.break_wire(joint, output);
+            }
+        }
+        Event::None | Event::Hands => {}
+    }
+}
