@@ -13,6 +13,8 @@ fn is_state(word: u16) -> bool {
 /// A frame that is likely to mean something.
 fn frame(random: &mut impl Rng) -> (u16, Vec<u8>) {
     let [kind, a, b, c] = random.next_u32().to_le_bytes();
+    // Of their own, or one choice would decide another.
+    let [cut, short, command, _] = random.next_u32().to_le_bytes();
     let mut data = [random.next_u32().to_le_bytes(), random.next_u32().to_le_bytes()].concat();
     let id = match kind % 8 {
         // Requests with an object that exists, in a command that exists.
@@ -37,10 +39,10 @@ fn frame(random: &mut impl Rng) -> (u16, Vec<u8>) {
         5 => 0x200 + 0x100 * u16::from(a % 4) + u16::from(b % 3),
         _ => u16::from_le_bytes([a, b]) & 0x7FF,
     };
-    let length = if c % 4 == 0 { usize::from(a % 9) } else { 8 };
+    let length = if cut % 4 == 0 { usize::from(short % 9) } else { 8 };
     data.truncate(if id == 0 { 2 } else { length });
-    if id == 0 && c % 4 != 0 {
-        data[0] = [1, 128, 2, 130][usize::from(a % 4)];
+    if id == 0 && cut % 4 != 0 {
+        data[0] = [1, 128, 2, 130][usize::from(command % 4)];
         data[1] &= 3;
     }
     (id, data)
