@@ -61,6 +61,7 @@ fn main() -> Result<(), SwarmError> {
         println!("{line}");
     }
     println!("{}", line::<f32>("nothing, single precision", AdaptiveSettings::default(), runs, first_seed)?);
+    plane(runs, first_seed)?;
     noise(runs, first_seed)?;
     rugged(runs, first_seed)
 }
@@ -87,6 +88,7 @@ fn variants<T: Real>() -> Vec<(&'static str, AdaptiveSettings<T>)> {
         ("gradient direction", without(Part::GradientDirection)),
         ("trust adaptation: full trust", without(Part::TrustAdaptation)),
         ("ranking: always the same readers", without(Part::Ranking)),
+        ("moves for the best: all move in every round", without(Part::BestMove)),
         ("velocity", still),
         ("leaps: scattered after 25 iterations", AdaptiveSettings { leaps: 0, patience: 25, ..whole }),
         ("leaps and scattering", AdaptiveSettings { patience: u32::MAX, ..whole }),
@@ -125,6 +127,44 @@ fn cell(mut reached: Vec<u32>, runs: u64) -> String {
     let share = 100.0 * reached.len() as f64 / runs as f64;
     let success = if share < 100.0 { format!(" ({share:.1} %)") } else { String::new() };
     format!("{}/{}{success}", quantile(0.5), quantile(0.95))
+}
+
+/// Evaluations in the plane, where a round moves few of the beetles: to f - f* <= 0.1, median.
+fn plane(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
+    const PLANE: [TestFunction; 7] = [
+        TestFunction::Sphere,
+        TestFunction::SixHumpCamel,
+        TestFunction::Branin,
+        TestFunction::Ackley,
+        TestFunction::ShiftedRotatedAckley,
+        TestFunction::CamelAsPrinted,
+        TestFunction::Rastrigin,
+    ];
+    let names = PLANE.map(|function| format!("{function:?}"));
+    println!("\n| evaluations, D = 2 | {} |\n|{}", names.join(" | "), " --- |".repeat(PLANE.len() + 1));
+    for (name, without) in [("the best move", None), ("all move", Some(Part::BestMove))] {
+        let mut line = format!("| {name} |");
+        for function in PLANE {
+            let problem = TestProblem::new(function, 2);
+            let goal = problem.minimum() + TOLERANCE;
+            let mut evaluations = Vec::new();
+            for seed in first_seed..first_seed + runs {
+                let settings =
+                    BsoSettings::Adaptive(AdaptiveSettings { without, ..AdaptiveSettings::default() });
+                let mut swarm = Bso::<f64, BEETLES, CAPACITY>::new(&problem, settings, seed)?;
+                let has_arrived =
+                    |swarm: &Bso<f64, BEETLES, CAPACITY>| swarm.best().is_some_and(|best| best.value <= goal);
+                while !has_arrived(&swarm) && swarm.iterations() < ITERATIONS {
+                    swarm.advance(&problem, 1);
+                }
+                evaluations.push(if has_arrived(&swarm) { swarm.evaluations() } else { u32::MAX });
+            }
+            evaluations.sort_unstable();
+            line += &format!(" {} |", evaluations[(runs as usize).div_ceil(2) - 1]);
+        }
+        println!("{line}");
+    }
+    Ok(())
 }
 
 /// A test function whose every call is wrong by something else.

@@ -47,7 +47,7 @@ fn constants() -> BTreeMap<String, f64> {
             let Some((_, rest)) = line.split_once("const ") else { continue };
             let Some((name, rest)) = rest.split_once(": ") else { continue };
             let Some((kind, value)) = rest.split_once(" = ") else { continue };
-            if !["f64", "u32"].contains(&kind) || NOT_OF_THE_DEFAULT.contains(&name) {
+            if !["f64", "u32", "usize"].contains(&kind) || NOT_OF_THE_DEFAULT.contains(&name) {
                 continue;
             }
             let value = value.trim_end_matches(';').parse().unwrap_or_else(|_| panic!("{file}: {line}"));
@@ -89,7 +89,7 @@ fn settings() -> BTreeMap<String, f64> {
 #[test]
 fn the_document_names_every_constant_of_the_default_swarm_with_its_value() {
     let mut code = constants();
-    assert_eq!(code.len(), 24, "{:?}", code.keys());
+    assert_eq!(code.len(), 25, "{:?}", code.keys());
     code.extend(settings());
     assert_eq!(documented(), code);
 }

@@ -176,8 +176,8 @@ fn costs_that_are_not_finite_do_not_poison_the_adaptive_search() {
     fn run<T: Real>() {
         for seed in 0..20 {
             let mut swarm = Bso::<T, 20, CAPACITY>::new(&Holes, BsoSettings::default(), seed).unwrap();
-            // half as many iterations again as the slowest of these seeds needs; a lost metric never gets there
-            assert!(swarm.reach(&Holes, T::of(1e-3), 60), "seed {seed}: {:?}", swarm.best());
+            // half as many iterations again as the slowest of these seeds needs, 97; a lost metric never gets there
+            assert!(swarm.reach(&Holes, T::of(1e-3), 150), "seed {seed}: {:?}", swarm.best());
             assert!(swarm.best().is_some_and(|best| best.value >= T::zero()), "minus infinity is no best");
         }
     }

@@ -16,7 +16,7 @@
 //! Every body carries a ball of the smallest extent beside: shear could make it thinner than its numbers can say.
 //!
 //! Cost: an evaluation 1,200 multiplications and 11 exponentials (two joints). Memory: a `Bso` of 14 N dimensions,
-//! 18.9 kB for two joints.
+//! 21.1 kB for two joints.
 
 use super::cost::LegCost;
 use super::limits::Limits;

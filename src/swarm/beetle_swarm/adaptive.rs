@@ -12,13 +12,14 @@
 //!   psi_i = sum_j q_ij d_j
 //!   x_i   = x_i + lambda v_i + (1 - lambda) psi_i            (Eq. 29 with this psi), at most 2 % outside the box
 //! om_i, the trust in the others' whiskers, is 1.6 om for every second beetle and om / 1.6 for the others; pairs are
-//! compared after the move and om follows the better. Whisker length follows sqrt(D) times the median |s|.
-//! Without progress for `patience` iterations the swarm leaps (leap.rs); where leaps lead nowhere it is scattered anew.
+//! compared after the move and om follows the better. Of the beetles the min(2 n, N) best move, n = min(N, D) being those
+//! with whiskers: in few dimensions most evaluations would go into moving bad beetles. Whisker length follows sqrt(D) times the median |s|.
+//! Without progress for `patience` rounds the swarm leaps (leap.rs); where leaps lead nowhere it is scattered anew.
 //! `docs/bso.md` has the whole algorithm as pseudocode, with what each part is worth.
 //!
 //! Source: own experiments on test functions and identification problems; kept of the beetle swarm: x, v, P, G,
 //! Eq. (19), two whiskers, the weighted move.
-//! Cost: N + 2 min(N, D) evaluations per iteration; the rest is counted in `docs/bso.md`;
+//! Cost: 2 n + min(2 n, N) evaluations per round, which is an iteration where 4 n >= N; the rest is counted in `docs/bso.md`;
 //! up to five square roots per direction are the only calls into `libm`.
 //! Known limits: a fast exploiter. Global search are the leaps and the restart: it fails on Rastrigin's function rotated
 //! in 10 dimensions and as it stands in 30. On a quadratic cost least squares is exact and instant. Noise in the cost of 1e-4 of its value spoils the last digits: meant for fixed data.
@@ -41,6 +42,8 @@ const FIRST_TRUST: f64 = 0.3;
 const TRUST_LEVELS: f64 = 1.6;
 /// How far a beetle may stand outside the box (it is evaluated at the nearest point inside).
 const MARGIN: f64 = 0.02;
+/// Beetles that move per beetle with whiskers: a round reads as much as it moves.
+const MOVES_PER_READER: usize = 2;
 /// Progress below this share of the best value does not count.
 const PROGRESS: f64 = 1e-7;
 
@@ -57,10 +60,10 @@ pub(super) struct AdaptiveRules<T, const N: usize, const D: usize> {
     pub(super) trust: T,
     /// Smoothed share of convex readings; `None` before the first.
     pub(super) convex_share: Option<T>,
-    /// Iterations since the swarm was scattered, the running one included.
-    pub(super) iteration: u32,
+    /// Rounds since the swarm was scattered, the running one included.
+    pub(super) round: u32,
     pub(super) leap: Leap<T>,
-    /// The best value that counted as progress, and the iterations since.
+    /// The best value that counted as progress, and the rounds since.
     progress: T,
     waited: u32,
 }
@@ -76,7 +79,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
             trust: T::of(FIRST_TRUST),
             convex_share: None,
             leap: Leap::none(),
-            iteration: 0,
+            round: 0,
             progress: T::LARGEST,
             waited: 0,
         }
@@ -98,7 +101,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.whisker = T::of(FIRST_WHISKER);
         self.trust = T::of(FIRST_TRUST);
         self.convex_share = None;
-        self.iteration = 0;
+        self.round = 0;
         self.progress = T::LARGEST;
         self.waited = 0;
     }
@@ -132,6 +135,11 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
     }
 
+    /// m: beetles that move in a round that is no leap.
+    fn movers(&self) -> usize {
+        if self.has(Part::BestMove) { N.min(MOVES_PER_READER * self.frame.count()) } else { N }
+    }
+
     pub(super) fn has(&self, part: Part) -> bool {
         self.settings.without != Some(part)
     }
@@ -147,7 +155,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     }
 
     pub(super) fn trusts_more(&self, beetle: usize) -> bool {
-        (beetle as u32 ^ self.iteration) & 1 == 0
+        (beetle as u32 ^ self.round) & 1 == 0
     }
 
     /// psi_i, box coordinates.
@@ -191,12 +199,16 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
                 return Opening::Scatter;
             }
         }
-        self.iteration = self.iteration.wrapping_add(1);
+        self.round = self.round.wrapping_add(1);
         Opening::Search
     }
 
     fn whiskered(&self) -> usize {
         self.frame.count()
+    }
+
+    fn moved(&self) -> usize {
+        if self.leap.under_way { N } else { self.movers() }
     }
 
     fn aim(&mut self, beetle: usize, beetles: &Particles<T, N, D>, random: &mut Random) {
@@ -247,7 +259,7 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
         }
     }
 
-    fn close(&mut self, beetles: &mut Particles<T, N, D>, found: &[T; N]) {
+    fn close(&mut self, beetles: &mut Particles<T, N, D>, found: &[T]) {
         let dimension = beetles.dimension();
         if self.leap.under_way {
             self.land(beetles, found);
@@ -264,6 +276,12 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
         self.learn_gradient(dimension);
         self.learn_metric();
         self.learn_whisker(dimension);
+    }
+
+    /// After so many rounds as evaluate N times, and after a leap, which has made the rounds begin anew.
+    fn closes_iteration(&self) -> bool {
+        let evaluations = 2 * self.frame.count() + self.movers();
+        self.round.is_multiple_of(N.div_ceil(evaluations.max(1)) as u32)
     }
 }
 

@@ -5,14 +5,14 @@
 //! and what is left is the slope of the funnel. They do not cancel in the curvature, which comes out too large, so that a
 //! leap is too short rather than too long; several leaps get there.
 //!
-//! One iteration, otherwise like any other (frame.rs, adaptive.rs):
-//!   z_j   along coordinate (j + iteration) mod D, each whisker L long with L uniform in 0.15..0.4 of the box
+//! One round, otherwise like any other (frame.rs, adaptive.rs):
+//!   z_j   along coordinate (j + round) mod D, each whisker L long with L uniform in 0.15..0.4 of the box
 //!   x_i   = the usual move with full trust, and up to 2 % of the box at random
 //! Nobody retreats, personal bests begin anew where the beetles land, everything learned is forgotten. A leap led somewhere
 //! if the next standstill is better by 1e-3 of its value; after `leaps` in a row that did not, the swarm is scattered.
 //!
 //! Source: own experiments; hopping between minima is Wales, Doye (1997), reading a funnel at a coarse scale is homotopy's.
-//! Cost: nothing until progress has stopped, then no evaluation beyond those of an iteration.
+//! Cost: nothing until progress has stopped, then 2 min(N, D) + N evaluations: all beetles leap.
 //! Known limits: axes. Along other directions ripples of several coordinates add up in the curvature, and a leap comes out
 //! too short: rotated ripples in 10 dimensions are not left. Directions of unlike ripples (not symmetric about their
 //! minima) do not cancel.
@@ -34,7 +34,7 @@ const LEAP_PROGRESS: f64 = 1e-3;
 /// Leaps since the swarm was scattered.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Leap<T> {
-    /// The running iteration is one.
+    /// The running round is one.
     pub under_way: bool,
     /// Best standstill so far.
     best: T,
@@ -69,7 +69,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     /// What a beetle's whisker is to lie along, metric coordinates: another axis in every leap.
     pub(super) fn axis(&self, beetle: usize, dimension: usize) -> [T; D] {
         let mut axis = [T::zero(); D];
-        let turn = beetle.wrapping_add(self.iteration as usize) % dimension.max(1);
+        let turn = beetle.wrapping_add(self.round as usize) % dimension.max(1);
         if let Some(entry) = axis.get_mut(turn) {
             *entry = T::one();
         }
@@ -77,7 +77,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     }
 
     /// The beetles have leapt: where they are is all they know.
-    pub(super) fn land(&mut self, beetles: &mut Particles<T, N, D>, found: &[T; N]) {
+    pub(super) fn land(&mut self, beetles: &mut Particles<T, N, D>, found: &[T]) {
         self.forget();
         self.leap.under_way = false;
         beetles.personal_best_value = [T::LARGEST; N];

@@ -39,13 +39,14 @@ const LONGEST_AXIS: f64 = 100.0;
 
 impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     /// om follows the level whose beetles gained more, pair by pair.
-    pub(super) fn learn_trust(&mut self, before: &[T; N], found: &[T; N]) {
+    pub(super) fn learn_trust(&mut self, before: &[T; N], found: &[T]) {
         let mut vote = T::zero();
-        for pair in 0..N / 2 {
-            let (even, odd) = (2 * pair, 2 * pair + 1);
-            let (even_gain, odd_gain) = (before[even] - found[even], before[odd] - found[odd]);
+        let pairs = before.chunks_exact(2).zip(found.chunks_exact(2));
+        for (before, found) in pairs {
+            let ([even, odd], [even_found, odd_found]) = (before, found) else { continue };
+            let (even_gain, odd_gain) = (*even - *even_found, *odd - *odd_found);
             let (more, less) =
-                if self.trusts_more(even) { (even_gain, odd_gain) } else { (odd_gain, even_gain) };
+                if self.trusts_more(0) { (even_gain, odd_gain) } else { (odd_gain, even_gain) };
             if more > less {
                 vote += T::of(TRUST_CHANGE);
             } else if more < less {

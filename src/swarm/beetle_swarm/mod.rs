@@ -5,10 +5,14 @@
 //! run can be cut or cancelled anywhere, inside an iteration too:
 //!
 //! ```text
-//! Place 0..N --> [ Right 0, Left 0, Right 1, Left 1, ... --> Move 0..N ] --> next iteration
+//! Place 0..N --> [ Right 0, Left 0, Right 1, Left 1, ... --> Move 0, 1, ... ] --> next round
 //!     ^                                                                         |
 //!     +------------------- leaps led nowhere: scatter anew ---------------------+
 //! ```
+//!
+//! A mode decides how many beetles put out whiskers and how many move in a round. An iteration is as many rounds as it
+//! takes to spend N evaluations, what one move of all costs: one round in the paper's mode, and in the other from five
+//! coordinates on.
 //!
 //! Memory: 3 N D swarm, 2 D^2 metric, 3 N D frame (its first min(N, D) rows are in use), 4 D gradient, best and
 //! box, 11 N values and readings, in scalars; `size_of` is 8,768 bytes for `Bso<f32, 20, 13>` and 21,136 for
@@ -171,7 +175,7 @@ struct Swarm<T, const N: usize, const D: usize> {
     ledger: Ledger<T, D>,
     random: Random,
     beetles: Particles<T, N, D>,
-    /// Values found by the moves of the running iteration.
+    /// Values found by the moves of the running round.
     found: [T; N],
     stage: Stage<T>,
 }
@@ -227,18 +231,21 @@ impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
                 let beetle = beetle.min(N - 1);
                 rules.displace(beetle, &mut self.beetles, &mut self.random);
                 self.found[beetle] = self.ledger.evaluate(objective, &self.beetles.position[beetle]);
-                if beetle + 1 < N {
+                let moved = rules.moved().min(N);
+                if beetle + 1 < moved {
                     Stage::Move { beetle: beetle + 1 }
                 } else {
-                    rules.close(&mut self.beetles, &self.found);
-                    self.ledger.close_iteration();
+                    rules.close(&mut self.beetles, &self.found[..moved]);
+                    if rules.closes_iteration() {
+                        self.ledger.close_iteration();
+                    }
                     self.open(rules)
                 }
             }
         };
     }
 
-    /// Begins an iteration, or scatters the swarm where the rules have given up.
+    /// Begins a round, or scatters the swarm where the rules have given up.
     fn open(&mut self, rules: &mut impl Rules<T, N, D>) -> Stage<T> {
         match rules.open(&mut self.beetles) {
             Opening::Search => Stage::Right { beetle: 0 },

@@ -47,6 +47,10 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for PaperRules<T, N
         N
     }
 
+    fn moved(&self) -> usize {
+        N
+    }
+
     fn aim(&mut self, _beetle: usize, _beetles: &Particles<T, N, D>, _random: &mut Random) {}
 
     fn tip(&self, beetle: usize, side: Side, beetles: &Particles<T, N, D>) -> [T; D] {
@@ -84,12 +88,16 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for PaperRules<T, N
         }
     }
 
-    fn close(&mut self, beetles: &mut Particles<T, N, D>, found: &[T; N]) {
+    fn close(&mut self, beetles: &mut Particles<T, N, D>, found: &[T]) {
         for (beetle, &value) in found.iter().enumerate() {
             beetles.record(beetle, value);
         }
         self.step = self.settings.step_decay * self.step + self.settings.step_offset;
         self.iteration = self.iteration.saturating_add(1);
+    }
+
+    fn closes_iteration(&self) -> bool {
+        true
     }
 }
 

@@ -55,7 +55,7 @@ pub struct AdaptiveSettings<T> {
     pub step_limit: T,
     /// Directions of the frame (after the gradient's) that join two personal bests; default 12.
     pub pair_directions: usize,
-    /// Iterations without progress after which the swarm leaps or, at last, is scattered anew; default 8, at least 1.
+    /// Rounds without progress after which the swarm leaps or, at last, is scattered anew; default 8, at least 1.
     pub patience: u32,
     /// Leaps in a row that may lead nowhere before the swarm is scattered anew; default 8.
     pub leaps: u32,
@@ -80,7 +80,9 @@ pub enum Part {
     TrustAdaptation,
     /// Whiskers for the best beetles: it is always the same ones.
     Ranking,
-    /// Whisker length that follows the steps: it falls by 5 % per iteration.
+    /// Moves for the best beetles: all move in every round.
+    BestMove,
+    /// Whisker length that follows the steps: it falls by 5 % per round.
     WhiskerAdaptation,
     /// Newton's step along a direction: it is one whisker downhill.
     Parabola,

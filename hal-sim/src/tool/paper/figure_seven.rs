@@ -9,14 +9,13 @@
 
 use scarab::ident::Plan;
 use serde::Serialize;
-use serde_json::Map;
 
 use super::chain::{
     self, ChainOptions, ChainRun, Fit, JOINTS, LEG, NOISE_PERCENT, PLANS, median, predicted, run_all,
 };
 use super::markdown::{Table, number, percent};
 use super::printed::FIGURE_SEVEN;
-use super::tables_five_six::FIRST_SEED;
+use super::seeds::ReportSeed;
 use super::verification::{self, ROTATION_DEG};
 use super::{PaperOptions, Section};
 use crate::tool::analysis::plan_name;
@@ -92,7 +91,7 @@ pub struct PaperFit {
 pub struct VerificationReport {
     /// Name of the leg file.
     pub leg: &'static str,
-    /// Of each method at each level; seeds from 1.
+    /// Of each method at each level.
     pub runs: u64,
     /// Mean absolute torque of the links alone on (31) and (32) with joint 1 held still, N m.
     pub links_alone_nm: [f64; JOINTS],
@@ -107,16 +106,18 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let report = report(options.seeds.unwrap_or(RUNS), &LEVELS)?;
     let leg = chain::leg()?;
     let shown = |plan| {
-        chain::run(&leg, &leg, &ChainOptions { with_series: true, ..ChainOptions::new(FIRST_SEED, plan) })
+        chain::run(
+            &leg,
+            &leg,
+            &ChainOptions { with_series: true, ..ChainOptions::new(ReportSeed::of_run(0).search(), plan) },
+        )
     };
     let names: Vec<_> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
     let curves = curves(&names, &shown(Plan::OneTime)?, &shown(Plan::Sequential)?);
     let levels: Vec<_> = report.lines.iter().filter_map(level).collect();
     let paper = report.paper.map(|paper| paper.percent);
     let figure = drawn(&curves, &levels, &paper)?;
-    let mut json = Map::new();
-    json.insert("verification".into(), super::to_json(&report)?);
-    Ok(Section { name: "figure-7", markdown: words(&report), figures: vec![figure], json })
+    Section::of("figure-7", "verification", &report, words(&report), vec![figure])
 }
 
 /// The runs and what they say.
@@ -130,7 +131,7 @@ pub fn report(runs: u64, levels: &[f64]) -> Result<VerificationReport, ToolError
         cases.push(Case { method: UNWEIGHTED, ..Case::of(Plan::OneTime) });
         cases.push(Case { method: LONG, cycles: LONG_CYCLES, ..Case::of(Plan::Sequential) });
     }
-    let seeds = FIRST_SEED..FIRST_SEED + runs;
+    let seeds = ReportSeed::searches(runs);
     let all: Vec<_> = cases.iter().flat_map(|case| seeds.clone().map(move |seed| (*case, seed))).collect();
     let fits = run_all("Figure 7", &all, |(case, seed)| {
         let options = ChainOptions {

@@ -16,12 +16,11 @@ use nalgebra::Vector3;
 use scarab::ident::Plan;
 use scarab::model::{INERTIAL_PARAMETERS, Payload, RigidBody};
 use serde::Serialize;
-use serde_json::Map;
 
 use super::chain::{self, ChainOptions, ChainRun, JOINTS, NOISE_PERCENT, ROOM, median, run_all};
 use super::markdown::{Table, number, percent};
 use super::printed::TABLE_FIVE;
-use super::tables_five_six::FIRST_SEED;
+use super::seeds::ReportSeed;
 use super::{PaperOptions, Section};
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::{LegFile, LinkParameters};
@@ -97,9 +96,7 @@ pub struct LoadReport {
 /// Runs everything and tells it.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let report = report(options.seeds.unwrap_or(RUNS))?;
-    let mut json = Map::new();
-    json.insert("load_change".into(), super::to_json(&report)?);
-    Ok(Section { name: "load-change", markdown: words(&report), figures: Vec::new(), json })
+    Section::of("load-change", "load_change", &report, words(&report), Vec::new())
 }
 
 /// One chain before and after.
@@ -113,7 +110,7 @@ pub fn report(runs: u64) -> Result<LoadReport, ToolError> {
     let leg = chain::leg()?;
     let load = load();
     let heavier = loaded(&leg, &load)?;
-    let seeds: Vec<_> = (FIRST_SEED..FIRST_SEED + runs).collect();
+    let seeds: Vec<_> = ReportSeed::searches(runs).collect();
     let pairs = run_all("load change", &seeds, |&seed| {
         let options = |seed| ChainOptions::new(seed, Plan::OneTime);
         Ok(Pair {

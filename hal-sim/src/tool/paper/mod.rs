@@ -30,6 +30,7 @@ pub mod raw_cost;
 pub mod recorder;
 pub mod searches;
 pub mod seeds;
+pub mod seen_links;
 pub mod statistics;
 pub mod swarm_bench;
 pub mod table_four;
@@ -96,6 +97,21 @@ pub struct Section {
     pub json: Map<String, Value>,
 }
 
+impl Section {
+    /// A report in words, with its entry of the JSON report and what was drawn.
+    fn of(
+        name: &'static str,
+        entry: &str,
+        report: &impl serde::Serialize,
+        markdown: String,
+        figures: Vec<Figure>,
+    ) -> Result<Self, ToolError> {
+        let value =
+            serde_json::to_value(report).map_err(|error| ToolError::input(format!("no JSON: {error}")))?;
+        Ok(Self { name, markdown, figures, json: Map::from_iter([(entry.to_owned(), value)]) })
+    }
+}
+
 /// Makes these parts, one after the other.
 pub fn run(parts: &[Part], options: &PaperOptions) -> Result<Vec<Section>, ToolError> {
     parts.iter().map(|part| section(*part, options)).collect()
@@ -111,11 +127,6 @@ fn section(part: Part, options: &PaperOptions) -> Result<Section, ToolError> {
         Part::LoadChange => load_change::section(options),
         Part::Convergence => convergence::section(options),
     }
-}
-
-/// A part of the report as JSON.
-fn to_json(part: &impl serde::Serialize) -> Result<Value, ToolError> {
-    serde_json::to_value(part).map_err(|error| ToolError::input(format!("no JSON: {error}")))
 }
 
 /// The JSON report: the schema, the rows of Table IV and whatever else was made.

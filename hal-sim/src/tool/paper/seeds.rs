@@ -27,6 +27,11 @@ impl ReportSeed {
         Self(REPORT.start.saturating_add(run).min(REPORT.end - 1))
     }
 
+    /// Seeds of so many runs, for a search or a whole experiment.
+    pub fn searches(runs: u64) -> impl Iterator<Item = u64> + Clone {
+        (0..runs).map(|run| Self::of_run(run).search())
+    }
+
     /// For a search.
     #[must_use]
     pub fn search(self) -> u64 {

@@ -1,4 +1,4 @@
-//! One record, and what the default swarm makes of it: three sets of unknowns, each against its optimum.
+//! One record, and what the default swarm makes of it: sets of unknowns, each against its optimum.
 //!
 //! The swarm sees the device's cost in single precision; how far it got is told in double precision. See
 //! [`super::convergence`] for the unknowns and what is meant by reached.
@@ -11,6 +11,7 @@ use scarab::model::{LegParameters, PARAMETERS_PER_JOINT};
 use scarab::swarm::{Bso, BsoSettings, Objective};
 
 use super::raw_cost::RawCost;
+use super::seen_links::SeenLinks;
 use crate::tool::consistent;
 use crate::tool::error::ToolError;
 use crate::tool::pair::Context;
@@ -108,20 +109,30 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         let problem = Problem::new(self.solver.record(), model);
         let objective = RawCost::new(model, problem.whole(), prior);
         let above = self.raw_optimum(&objective);
+        self.searched(&objective, above, |position| objective.base(position))
+    }
+
+    /// The swarm alone, until `values` of its best are at the optimum.
+    fn searched(
+        &self,
+        objective: &impl Objective<f32>,
+        above: f64,
+        values: impl Fn(&[f32]) -> [f32; B],
+    ) -> Trial {
         let mut trial = Trial::of(objective.dimension());
-        let Ok(mut swarm) = Bso::<f32, 20, DIMENSIONS>::new(&objective, BsoSettings::default(), self.seed)
+        let Ok(mut swarm) = Bso::<f32, 20, DIMENSIONS>::new(objective, BsoSettings::default(), self.seed)
         else {
             return trial;
         };
         while swarm.iterations() < MOST_ITERATIONS {
             let before = swarm.iterations();
             while swarm.iterations() == before {
-                if swarm.advance(&objective, 1) == 0 {
+                if swarm.advance(objective, 1) == 0 {
                     return trial;
                 }
             }
             let spent = (swarm.iterations(), swarm.evaluations());
-            let values = swarm.best().map(|best| objective.base(best.position));
+            let values = swarm.best().map(|best| values(best.position));
             if values.is_some_and(|values| self.note(&mut trial, &values, above, spent)) {
                 break;
             }
@@ -159,8 +170,8 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         self.exact.excess(&base.project(&parameters))
     }
 
-    /// The swarm over log-Cholesky coordinates.
-    pub fn whole_legs(&self) -> Trial {
+    /// The swarm over log-Cholesky coordinates: all, and without those of links that torque sees by one number.
+    pub fn whole_legs(&self) -> (Trial, Option<Trial>) {
         let background = &self.context.background;
         let (above, _) = consistent::optimum(background, &self.solver);
         let model = &background.device;
@@ -170,18 +181,26 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         let mut cost = LegCost::new(&limits);
         cost.fill(model, &problem.whole(), &values, Effort::device(true).pull);
         let objective = FullObjective::new(&limits, &cost);
+        let seen = SeenLinks::new(&objective, &background.model.base).map(|seen| {
+            self.searched(&seen, above, |position| model.base.project(&seen.parameters(position)))
+        });
+        (self.whole_leg(&objective, above), seen)
+    }
+
+    fn whole_leg(&self, objective: &FullObjective<'_, f32, N>, above: f64) -> Trial {
+        let model = &self.context.background.device;
         let mut trial = Trial::of(objective.dimension());
         let settings = BsoSettings::default();
-        let Ok(mut search) = FullSearch::<f32, DIMENSIONS>::new(&objective, settings, self.seed) else {
+        let Ok(mut search) = FullSearch::<f32, DIMENSIONS>::new(objective, settings, self.seed) else {
             return trial;
         };
         loop {
             let before = search.iterations();
             let mut ended = false;
             while search.iterations() == before && !ended {
-                ended = search.advance(&objective, 1);
+                ended = search.advance(objective, 1);
             }
-            let found: Option<LegParameters<f32, N>> = search.parameters(&objective);
+            let found: Option<LegParameters<f32, N>> = search.parameters(objective);
             let spent = (search.iterations(), search.evaluations());
             let all =
                 found.is_some_and(|found| self.note(&mut trial, &model.base.project(&found), above, spent));

@@ -11,12 +11,12 @@
 
 use scarab::ident::Plan;
 use serde::Serialize;
-use serde_json::Map;
 
 use super::chain::{self, ChainOptions, LEG, NOISE_PERCENT, PLANS, median, run_all};
 use super::markdown::{Table, number, percent};
 use super::printed::{Printed, TABLE_FIVE, TABLE_SIX};
 use super::ranks::Ranks;
+use super::seeds::ReportSeed;
 use super::{PaperOptions, Section};
 use crate::tool::analysis::plan_name;
 use crate::tool::error::ToolError;
@@ -24,8 +24,6 @@ use crate::tool::report::{Number, RunReport};
 
 /// Runs of each method unless asked for otherwise.
 const RUNS: u64 = 20;
-/// First seed of noise and swarm.
-pub const FIRST_SEED: u64 = 1;
 
 /// One value as one method finds it, over all runs.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -141,7 +139,7 @@ pub struct TablesReport {
     pub leg: &'static str,
     /// Per logged 500 Hz sample, of each joint's mean absolute torque on the exciting motion.
     pub noise_percent: f64,
-    /// Of each method; seeds from 1.
+    /// Of each method.
     pub runs: u64,
     /// Accepted by the verdict, one-time and sequential.
     pub accepted: [usize; 2],
@@ -158,9 +156,7 @@ pub struct TablesReport {
 /// Runs everything and tells it.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let report = report(options.seeds.unwrap_or(RUNS))?;
-    let mut json = Map::new();
-    json.insert("tables_v_vi".into(), super::to_json(&report)?);
-    Ok(Section { name: "tables-v-vi", markdown: words(&report), figures: Vec::new(), json })
+    Section::of("tables-v-vi", "tables_v_vi", &report, words(&report), Vec::new())
 }
 
 /// The runs and what they say.
@@ -168,7 +164,7 @@ pub fn report(runs: u64) -> Result<TablesReport, ToolError> {
     let leg = chain::leg()?;
     let options: Vec<_> = PLANS
         .iter()
-        .flat_map(|&plan| (FIRST_SEED..FIRST_SEED + runs).map(move |seed| ChainOptions::new(seed, plan)))
+        .flat_map(|&plan| ReportSeed::searches(runs).map(move |seed| ChainOptions::new(seed, plan)))
         .collect();
     let reports =
         run_all("Tables V and VI", &options, |options| Ok(chain::run(&leg, &leg, options)?.report))?;
