@@ -24,6 +24,7 @@
 
 pub mod board;
 pub mod bus;
+pub mod checksum;
 pub mod hal;
 pub mod ident;
 pub mod leg;

@@ -5,10 +5,11 @@ use super::configuration::{LegConfiguration, LegError, ProvedMotion};
 use super::identification::Finding;
 use super::model::IdentifiedModel;
 use super::succession::Succession;
+use crate::checksum::Checksum;
 use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
-use crate::safety::{DriveState, Fault, Limits, PowerRequest};
+use crate::safety::{Derating, DriveState, Fault, LimitCodes, Limits, PowerRequest};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
@@ -211,10 +212,8 @@ impl<const N: usize> Control<N> {
             Some(duration) => self.motion_tick >= duration,
             None => self.motion_tick >= SETTLE_TICKS,
         };
-        if !ended {
-            return;
-        }
         match self.activity {
+            _ if !ended => {}
             Activity::Identify(IdentifyPhase::Approach) => {
                 self.run(Activity::Identify(IdentifyPhase::Excite), self.excitation);
             }
@@ -340,9 +339,26 @@ impl<const N: usize> Control<N> {
         self.servo.state()
     }
 
-    /// A fault that the board saw and the servo has to react to, from the next tick on.
+    /// Over gains, scales and limits, which do not change.
+    #[must_use]
+    pub fn checksum(&self) -> Checksum {
+        self.servo.checksum()
+    }
+
+    /// A fault that the board saw, for the next tick.
     pub fn report(&mut self, fault: Fault) {
         self.servo.report(fault);
+    }
+
+    /// What temperature and bus voltage leave of the torque caps from the next tick on.
+    pub fn derate(&mut self, derating: &Derating) {
+        self.servo.derate(derating);
+    }
+
+    /// Codes of what was taken from each joint at a tick.
+    #[must_use]
+    pub fn limit_codes(&self, output: &ControlOutput<N>) -> [LimitCodes; N] {
+        self.servo.limit_codes(&output.servo.decision)
     }
 
     /// What each joint may do.

@@ -56,10 +56,12 @@ pub use crate::motor::{
     Refusal as CalibrationRefusal, StoredCalibration,
 };
 pub use crate::safety::{
-    DriveState, Event as DriveEvent, Fault, FaultCode, Permission, PowerRequest, RefusalReason,
+    DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, Permission, PowerRequest,
+    RefusalReason,
 };
 
 use crate::hal::Sample;
+use crate::safety::Derating;
 
 /// Both halves of a leg in one value.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,6 +126,11 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
     /// A fault that the board saw, see [`Control::report`].
     pub fn report(&mut self, fault: Fault) {
         self.control.report(fault);
+    }
+
+    /// What temperature and bus voltage leave of the torque caps, see [`Control::derate`].
+    pub fn derate(&mut self, derating: &Derating) {
+        self.control.derate(derating);
     }
 
     /// The half that moves.

@@ -41,6 +41,7 @@ pub const fn axis_code(fault: AxisFault) -> FaultCode {
         AxisFault::OpenPhase => FaultCode::OpenPhase,
         AxisFault::CurrentZero => FaultCode::CurrentZero,
         AxisFault::StuckConversion => FaultCode::StuckConversion,
+        AxisFault::Parameters => FaultCode::Parameters,
     }
 }
 

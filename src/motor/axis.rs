@@ -35,9 +35,14 @@ use super::configuration::{AxisConfiguration, AxisError, Constants};
 use super::current_loop::DELAY_PERIODS;
 use super::model_watch::Shown;
 use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, ShuntWatch, SpeedTracker};
+use crate::checksum::Checksum;
 use crate::hal::{AxisCommand, AxisSample, JointSample};
 use crate::real::{clamp, is_finite};
 use crate::units::{Ampere, RadianPerSecond};
+
+mod window;
+
+use window::Window;
 
 /// A count that is taken by an interrupt at the index may be late by one part in so many of a period: 10 us.
 const INDEX_LATENCY: i32 = 4;
@@ -78,14 +83,25 @@ pub enum AxisFault {
     CurrentZero,
     /// A shunt's code stays while its phase is asked for another current.
     StuckConversion,
+    /// Gains or limits are not what they were.
+    Parameters,
 }
 
 /// What the bridge is to do in a tick.
-#[derive(Clone, Copy, PartialEq)]
-enum Wish {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Wish {
+    /// Nothing.
     Released,
+    /// Quadrature current in the joint's sense.
     Follow(Ampere),
+    /// Low sides on: a passive brake.
     Brake,
+}
+
+impl From<AxisRequest> for Wish {
+    fn from(request: AxisRequest) -> Self {
+        if request.enabled { Self::Follow(request.current) } else { Self::Released }
+    }
 }
 
 /// One axis; see the module.
@@ -104,6 +120,10 @@ pub struct Axis {
     window: Window,
     model_watch: ModelWatch,
     shunt_watch: ShuntWatch,
+    /// Of the constants as they were made.
+    checksum: Checksum,
+    /// Joint samples until they are looked at.
+    unchecked: u8,
     last: AxisCommand,
     doubtful: bool,
     /// A count since the last joint sample was not believed.
@@ -135,6 +155,8 @@ impl Axis {
             window: Window::EMPTY,
             model_watch: ModelWatch::EMPTY,
             shunt_watch: ShuntWatch::EMPTY,
+            checksum: constants.checksum(),
+            unchecked: 0,
             last: AxisCommand::RELEASED,
             doubtful: false,
             disbelieved: false,
@@ -150,23 +172,23 @@ impl Axis {
 
     /// One PWM period: what the bridge does in the next one.
     pub fn tick(&mut self, sample: &AxisSample, request: AxisRequest) -> AxisCommand {
-        let wish = match (request.enabled, self.fault) {
-            (true, Some(AxisFault::EncoderFrozen)) => Wish::Brake,
-            (true, None) => Wish::Follow(request.current),
+        self.act(sample, request.into())
+    }
+
+    /// One PWM period in which the motor is a passive brake, below the overcurrent bound.
+    pub fn brake(&mut self, sample: &AxisSample) -> AxisCommand {
+        self.act(sample, Wish::Brake)
+    }
+
+    /// Either; with a fault released, but for a frozen counter, with which a motor that is to do anything brakes.
+    #[inline(always)]
+    pub fn act(&mut self, sample: &AxisSample, wish: Wish) -> AxisCommand {
+        let wish = match (wish, self.fault) {
+            (Wish::Released, _) => Wish::Released,
+            (wish, None) => wish,
+            (_, Some(AxisFault::EncoderFrozen)) => Wish::Brake,
             _ => Wish::Released,
         };
-        self.obey(sample, wish)
-    }
-
-    /// One PWM period in which the motor is a passive brake, below the overcurrent bound; an axis with another fault than a frozen
-    /// counter stays released.
-    pub fn brake(&mut self, sample: &AxisSample) -> AxisCommand {
-        let brakes = matches!(self.fault, None | Some(AxisFault::EncoderFrozen));
-        self.obey(sample, if brakes { Wish::Brake } else { Wish::Released })
-    }
-
-    #[inline(always)]
-    fn obey(&mut self, sample: &AxisSample, wish: Wish) -> AxisCommand {
         self.last = self.step(sample, wish).unwrap_or_else(|fault| {
             self.fault = Some(fault);
             self.current_loop.reset();
@@ -291,6 +313,11 @@ impl Axis {
     /// Holds the voltages against currents and speed meanwhile, once per call: what is found is a fault from here on, and acts from
     /// the next tick on.
     pub fn joint_sample(&mut self) -> JointSample {
+        // Every 64 ms.
+        self.unchecked = self.unchecked.wrapping_add(1);
+        if self.unchecked == 0 && self.constants.checksum() != self.checksum {
+            self.fault = Some(AxisFault::Parameters);
+        }
         if self.last.enabled && self.fault.is_none() && self.window.ticks > 0 {
             let angle = self.angle();
             let shown = Shown {
@@ -332,44 +359,12 @@ impl Axis {
 
     /// Forgets a fault, so that a request may enable again; `false` where the place was lost.
     pub fn clear_fault(&mut self) -> bool {
-        let lost = matches!(self.fault, Some(AxisFault::Encoder | AxisFault::EncoderFrozen));
+        let lost =
+            matches!(self.fault, Some(AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters));
         if !lost {
             self.fault = None;
         }
         !lost
-    }
-}
-
-/// Sums since the last joint sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Window {
-    first: i32,
-    /// Of counts minus `first`.
-    counts: i32,
-    current_a: f32,
-    ticks: i32,
-}
-
-impl Window {
-    const EMPTY: Self = Self { first: 0, counts: 0, current_a: 0.0, ticks: 0 };
-    /// Of a joint sample that nobody fetches the window starts over.
-    const MOST: i32 = 48;
-
-    fn push(&mut self, counts: i32, current_a: f32) {
-        if self.ticks == 0 || self.ticks == Self::MOST {
-            *self = Self { first: counts, ..Self::EMPTY };
-        }
-        self.counts += counts.wrapping_sub(self.first);
-        self.current_a += current_a;
-        self.ticks += 1;
-    }
-
-    fn mean(&self) -> Option<JointSample> {
-        (self.ticks > 0).then(|| JointSample {
-            encoder_counts: self.first.wrapping_add(self.counts.div_euclid(self.ticks)),
-            current: Ampere(self.current_a / self.ticks as f32),
-            doubtful: false,
-        })
     }
 }
 

@@ -4,6 +4,7 @@ use super::{
     BridgeTiming, Calibration, CountScale, CurrentGains, DeadTime, ElectricalAngle, EncoderSetting,
     ModelLimits, Modulator, MotorConstants, SenseScale, Sine,
 };
+use crate::checksum::Checksum;
 use crate::hal::CURRENT_RATE_HZ;
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
 
@@ -163,6 +164,18 @@ pub(super) struct Constants {
 }
 
 impl Constants {
+    /// Over gains, limits, zeros and the place of the flux.
+    pub(super) fn checksum(&self) -> Checksum {
+        let words = [
+            self.offset.units().cast_unsigned(),
+            u32::from(self.bus_codes[0]) | u32::from(self.bus_codes[1]) << 16,
+            self.greatest_step.cast_unsigned(),
+        ];
+        let limits =
+            [self.zeros[0], self.zeros[1], self.current_sign, self.current_limit, self.overcurrent_square];
+        words.into_iter().fold(self.gains.add_to(Checksum::EMPTY), Checksum::word).numbers(limits)
+    }
+
     pub(super) fn new(
         configuration: &AxisConfiguration,
         calibration: &Calibration,

@@ -34,6 +34,7 @@
 //! Cross-coupling from the measured currents: they lag the motor's by 1.5 periods, the targets would lead by 1/(2 pi f).
 
 use super::Rotating;
+use crate::checksum::Checksum;
 use crate::hal::CURRENT_RATE_HZ;
 use crate::real::{clamp, exp, sqrt};
 use crate::units::{Ampere, Henry, Hertz, Ohm, Volt, Weber};
@@ -93,6 +94,15 @@ impl CurrentGains {
             flux_vs: forward * motor.flux.0,
             bandwidth,
         })
+    }
+
+    /// With what the tick computes with.
+    #[must_use]
+    pub(super) fn add_to(&self, sum: Checksum) -> Checksum {
+        let Self { proportional_ohm, renewal, inductance_h, flux_vs, bandwidth: _ } = *self;
+        sum.numbers([proportional_ohm, renewal, inductance_h].map(|pair| pair.d))
+            .numbers([proportional_ohm, renewal, inductance_h].map(|pair| pair.q))
+            .number(flux_vs)
     }
 
     /// Phase margin of the open loop, degrees.

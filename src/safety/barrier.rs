@@ -20,6 +20,7 @@
 //! on the default hip). Cost: two square roots, some 20 multiplications and comparisons per joint.
 
 use super::limits::JointLimits;
+use crate::checksum::Checksum;
 use crate::real::{max, min, sqrt};
 use crate::units::{NewtonMetre, Radian, RadianPerSecond};
 
@@ -39,13 +40,15 @@ pub struct Limited {
     pub speed: bool,
     /// The torque or its current was above the cap.
     pub torque: bool,
+    /// It was above what temperature and bus voltage leave of the cap.
+    pub derated: bool,
 }
 
 impl Limited {
     /// Whether anything was taken.
     #[must_use]
     pub const fn any(self) -> bool {
-        self.range || self.speed || self.torque
+        self.range || self.speed || self.torque || self.derated
     }
 }
 
@@ -74,16 +77,23 @@ impl Barrier {
         }
     }
 
-    /// The torque nearest to the wanted one that still lets the joint stop in its range, and what was taken.
+    /// The torque nearest to the wanted one that still lets the joint stop in its range, and what was taken; of what is wanted no
+    /// more than a share of the cap, one where it drives the joint and one where the joint drives it.
     #[must_use]
     pub fn bound(
         &self,
         position: Radian,
         velocity: RadianPerSecond,
         wanted: NewtonMetre,
+        shares: [f32; 2],
     ) -> (NewtonMetre, Limited) {
         let mut limited = Limited::default();
-        let mut torque = wanted.0;
+        let share = if wanted.0 * velocity.0 < 0.0 { shares[1] } else { shares[0] };
+        let cap = share * self.cap_nm;
+        let mut torque = wanted.limited(NewtonMetre(cap)).0;
+        // Asked for too much, rather than braked too hard.
+        let over = wanted.abs().0 > cap;
+        (limited.torque, limited.derated) = (over && share >= 1.0, over && share < 1.0);
         let (up, up_is_range) = self.approach_speed(self.high_rad - position.0);
         let highest = self.damping_nm_s_per_rad * (up - velocity.0);
         if torque > highest {
@@ -96,9 +106,15 @@ impl Barrier {
             torque = lowest;
             (limited.range, limited.speed) = (down_is_range, !down_is_range);
         }
-        // Asked for too much, rather than braked too hard.
-        limited.torque = wanted.abs().0 > self.cap_nm;
         (NewtonMetre(torque).limited(NewtonMetre(self.cap_nm)), limited)
+    }
+
+    /// With everything of it.
+    #[must_use]
+    pub fn add_to(&self, sum: Checksum) -> Checksum {
+        let Self { low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad, braking_rad_per_s2, cap_nm } =
+            *self;
+        sum.numbers([low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad, braking_rad_per_s2, cap_nm])
     }
 
     /// The torque that opposes the joint's velocity, under the cap.
@@ -126,6 +142,8 @@ mod tests {
     use std::collections::VecDeque;
     extern crate std;
 
+    const ALL: [f32; 2] = [1.0; 2];
+
     /// An inertia with gravity, pushed by a wanted torque through the barrier, whose velocity is sensed late and whose
     /// drive is late as well; semi-implicit Euler at 16 kHz, double precision. Returns the farthest excursion beyond
     /// either end (negative inside), the greatest speed, and the greatest speed in the last of four seconds.
@@ -136,6 +154,8 @@ mod tests {
         wanted_nm: f32,
         start: (f64, f64),
     ) -> (f64, f64, f64) {
+        // A joint that is pushed with all there is, or with what is left, stops all the same.
+        let shares = if wanted_nm == 30.0 { [0.5, 0.0] } else { ALL };
         let barrier = Barrier::new(limits);
         let (mut position, mut velocity) = start;
         let mut drive_torque = 0.0;
@@ -145,8 +165,12 @@ mod tests {
         for tick in 0..16_000 {
             sensed.push_back(velocity);
             let late = sensed.pop_front().expect("fourteen stay");
-            let (torque, _) =
-                barrier.bound(Radian(position as f32), RadianPerSecond(late as f32), NewtonMetre(wanted_nm));
+            let (torque, _) = barrier.bound(
+                Radian(position as f32),
+                RadianPerSecond(late as f32),
+                NewtonMetre(wanted_nm),
+                shares,
+            );
             assert!(torque.abs() <= limits.torque_cap());
             for _ in 0..4 {
                 let dt = 1.0 / 16_000.0;
@@ -229,7 +253,7 @@ mod tests {
             let distance = speed * speed / braking + margin;
             let torque = NewtonMetre(-0.5 * braking * HIP.inertia.0);
             let position = Radian(HIP.high.0 - distance);
-            let (bounded, limited) = barrier.bound(position, RadianPerSecond(speed), torque);
+            let (bounded, limited) = barrier.bound(position, RadianPerSecond(speed), torque, ALL);
             assert_eq!((bounded, limited), (torque, Limited::default()), "speed {speed}");
         }
     }
@@ -238,14 +262,30 @@ mod tests {
     fn what_was_taken_is_told_apart() {
         let barrier = Barrier::new(&HIP);
         let (middle, still) = (Radian(0.45), RadianPerSecond::ZERO);
-        let (torque, limited) = barrier.bound(middle, still, NewtonMetre(500.0));
+        let (torque, limited) = barrier.bound(middle, still, NewtonMetre(500.0), ALL);
         assert_eq!((torque, limited), (NewtonMetre(100.0), Limited { torque: true, ..Limited::default() }));
-        let (torque, limited) = barrier.bound(Radian(0.7), RadianPerSecond(2.5), NewtonMetre(10.0));
+        let (torque, limited) = barrier.bound(Radian(0.7), RadianPerSecond(2.5), NewtonMetre(10.0), ALL);
         assert!(torque.0 < 0.0 && limited.range, "{torque:?}");
         let wide = JointLimits { high: Radian(6.0), low: Radian(-6.0), ..HIP };
         let (torque, limited) =
-            Barrier::new(&wide).bound(Radian::ZERO, RadianPerSecond(3.3), NewtonMetre(10.0));
+            Barrier::new(&wide).bound(Radian::ZERO, RadianPerSecond(3.3), NewtonMetre(10.0), ALL);
         assert!(torque.0 < 0.0 && limited.speed && !limited.range, "{torque:?}");
+    }
+
+    #[test]
+    fn what_is_derated_is_what_is_asked_and_not_what_stops_a_joint() {
+        let barrier = Barrier::new(&HIP);
+        let at = |velocity, wanted| {
+            let (torque, limited) =
+                barrier.bound(Radian(0.45), RadianPerSecond(velocity), NewtonMetre(wanted), [0.5, 0.2]);
+            (torque.0, limited.derated, limited.torque)
+        };
+        assert_eq!(at(0.0, 80.0), (50.0, true, false));
+        assert_eq!(at(-0.1, 40.0), (20.0, true, false));
+        assert_eq!(at(0.1, 40.0), (40.0, false, false));
+        let (torque, limited) =
+            barrier.bound(Radian(0.87), RadianPerSecond(1.0), NewtonMetre(40.0), [0.0; 2]);
+        assert!(torque.0 < -90.0 && limited.range, "{torque:?}");
     }
 
     #[test]

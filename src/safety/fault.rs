@@ -102,10 +102,12 @@ faults! {
     GateConfiguration = 0x5400, "P2", "gate_configuration", Off, "a gate driver lost its configuration";
     /// Bus voltage out of its range, two ticks in a row (3200: voltage inside the device).
     BusVoltage = 0x3200, "V1", "bus_voltage", Off, "the bus voltage left its range";
+    /// The supply dies while there is still energy (3220: DC link undervoltage).
+    SupplyLost = 0x3220, "V2", "supply_lost", Damp, "its supply went away";
     /// A bridge is too hot (4210: excess temperature of the device).
-    Temperature = 0x4210, "T1", "temperature", Off, "a bridge is too hot";
+    Temperature = 0x4210, "T1", "temperature", Damp, "a bridge is too hot";
     /// A thermistor is open or shorted.
-    Thermistor = 0xFF04, "T1", "thermistor", Off, "a thermistor is open or shorted";
+    Thermistor = 0xFF04, "T1", "thermistor", Damp, "a thermistor is open or shorted";
     /// Something measured or wanted is NaN or infinite.
     NotFinite = 0xFF01, "N1", "not_finite", Off, "a signal was not a number";
     /// The emergency stop's contact is open (9000: external error).
@@ -122,6 +124,8 @@ faults! {
     PositionLimit = 0x8500, "J1", "position_limit", Damp, "it left its range";
     /// Faster than 1.1 times the speed limit while enabled (8400: speed controller).
     Overspeed = 0x8400, "J2", "overspeed", Damp, "it was faster than 1.1 times its speed limit";
+    /// Gains or limits are not what they were (6310: loss of parameters).
+    Parameters = 0x6310, "M2", "parameters", Damp, "its gains or limits changed in memory";
     /// The bridges' timers are not in phase.
     Timers = 0xFF07, "-", "timers", Refuse, "the bridges' timers are not in phase";
     /// The factory's version does not tell the divider of the bus voltage.
@@ -167,6 +171,7 @@ mod tests {
             (FaultCode::GateFault, 0x5410),
             (FaultCode::GateConfiguration, 0x5400),
             (FaultCode::BusVoltage, 0x3200),
+            (FaultCode::SupplyLost, 0x3220),
             (FaultCode::Temperature, 0x4210),
             (FaultCode::Thermistor, 0xFF04),
             (FaultCode::NotFinite, 0xFF01),
@@ -177,6 +182,7 @@ mod tests {
             (FaultCode::Crash, 0x6100),
             (FaultCode::PositionLimit, 0x8500),
             (FaultCode::Overspeed, 0x8400),
+            (FaultCode::Parameters, 0x6310),
             (FaultCode::Timers, 0xFF07),
             (FaultCode::BoardVersion, 0xFF08),
             (FaultCode::Configuration, 0x6320),

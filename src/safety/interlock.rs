@@ -37,10 +37,6 @@ pub enum Cause {
     Axis2,
     /// An axis found its counter frozen: both brake.
     EncoderFrozen,
-    /// A bridge is too hot.
-    Temperature,
-    /// A thermistor is open or shorted.
-    Thermistor,
     /// Current ticks went on being missed: 24 with none in time between.
     CurrentTicks,
     /// The servo did not answer three times in a row.
@@ -61,15 +57,13 @@ pub enum Cause {
 
 impl Cause {
     /// All of them, in the order of their bits.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 14] = [
         Self::EmergencyStop,
         Self::GateFault,
         Self::GateConfiguration,
         Self::Axis1,
         Self::Axis2,
         Self::EncoderFrozen,
-        Self::Temperature,
-        Self::Thermistor,
         Self::CurrentTicks,
         Self::ServoTicks,
         Self::Conversion,
@@ -89,8 +83,6 @@ impl Cause {
             Self::GateConfiguration => FaultCode::GateConfiguration,
             Self::Axis1 | Self::Axis2 => return None,
             Self::EncoderFrozen => FaultCode::EncoderFrozen,
-            Self::Temperature => FaultCode::Temperature,
-            Self::Thermistor => FaultCode::Thermistor,
             Self::CurrentTicks => FaultCode::CurrentTicks,
             Self::ServoTicks => FaultCode::ServoTicks,
             Self::Conversion => FaultCode::Conversion,

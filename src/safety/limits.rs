@@ -1,5 +1,6 @@
 //! What each joint may do, and the refusal of limits that make no sense.
 
+use crate::checksum::Checksum;
 use crate::real::{abs, is_finite, min};
 use crate::units::{
     Ampere, KilogramMetreSquared, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond,
@@ -73,6 +74,13 @@ impl JointLimits {
     #[must_use]
     pub fn braking_acceleration(&self) -> RadianPerSecondSquared {
         RadianPerSecondSquared(BRAKING_SHARE * self.torque_cap().0 / self.inertia.0)
+    }
+
+    /// With everything of it.
+    #[must_use]
+    pub fn add_to(&self, sum: Checksum) -> Checksum {
+        let Self { low, high, speed, torque, current, torque_per_ampere, inertia } = *self;
+        sum.numbers([low.0, high.0, speed.0, torque.0, current.0, torque_per_ampere.0, inertia.0])
     }
 
     fn absurd(&self) -> Option<LimitQuantity> {

@@ -11,6 +11,8 @@
 //! | [`FaultCode`], [`Fault`] | what can go wrong, with fixed numbers and the safe state each leads to |
 //! | [`StepGate`] | encoder steps that no joint can make |
 //! | [`Barrier`] | torque bounds that stop a joint before its range and speed end |
+//! | [`DeratingRamps`], [`LimitCode`] | less before nothing, by temperature and bus voltage; codes that are no faults |
+//! | [`SupplyWatch`] | a supply that dies |
 //! | [`Monitor`] | all of it, once per tick |
 //! | [`Cause`], [`TickWatch`], [`ServoWatch`] | why nothing may be enabled, and what every current tick looks at |
 //! | [`UpkeepClock`] | what is looked at every few milliseconds: gate drivers' registers, temperatures |
@@ -26,6 +28,7 @@
 //! was measured of the rest: docs/safety.md. No conformity with any safety standard is claimed.
 
 pub mod barrier;
+pub mod derating;
 pub mod fault;
 pub mod interlock;
 pub mod limits;
@@ -35,6 +38,7 @@ pub mod step_gate;
 pub mod upkeep;
 
 pub use barrier::{Barrier, Limited};
+pub use derating::{Derating, DeratingRamps, LimitCode, LimitCodes, Ramp, SupplyWatch};
 pub use fault::{Fault, FaultCode, Reaction};
 pub use interlock::{Bridges, Cause, ServoWatch, TickState, TickWatch};
 pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};

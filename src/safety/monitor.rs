@@ -13,9 +13,11 @@
 //! Cost: about 60 operations and two square roots per joint.
 
 use super::barrier::{Barrier, Limited};
+use super::derating::{Derating, LimitCodes};
 use super::fault::{Fault, FaultCode};
 use super::limits::Limits;
 use super::state::{DriveState, Event, Permission, PowerRequest};
+use crate::checksum::Checksum;
 use crate::hal::DriveCommand;
 use crate::units::{Ampere, NewtonMetre, Radian, RadianPerSecond};
 
@@ -95,6 +97,8 @@ pub struct Monitor<const N: usize> {
     limits: Limits<N>,
     barriers: [Barrier; N],
     ampere_per_nm: [f32; N],
+    derating: Derating,
+    shares: [f32; 2],
     damp_ticks: u32,
     glitch_window: u64,
     glitches: [u64; N],
@@ -114,6 +118,8 @@ impl<const N: usize> Monitor<N> {
             limits,
             barriers: limits.joints().map(|joint| Barrier::new(&joint)),
             ampere_per_nm: limits.joints().map(|joint| 1.0 / joint.torque_per_ampere.0),
+            derating: Derating::NONE,
+            shares: Derating::NONE.shares(),
             damp_ticks: rate_hz * DAMP_MS / 1000,
             glitch_window: u64::MAX.checked_shr(64 - window_ticks).unwrap_or(0),
             glitches: [0; N],
@@ -122,9 +128,30 @@ impl<const N: usize> Monitor<N> {
         }
     }
 
+    /// Over everything that does not change: limits, what follows from them, times.
+    #[must_use]
+    pub fn checksum(&self) -> Checksum {
+        let limits = self.limits.joints().iter().fold(Checksum::EMPTY, |sum, joint| joint.add_to(sum));
+        let barriers = self.barriers.iter().fold(limits, |sum, barrier| barrier.add_to(sum));
+        barriers.numbers(self.ampere_per_nm).word(self.damp_ticks).word(self.glitch_window as u32)
+    }
+
     /// Something else saw a fault: it is decided upon at the next tick, like those of the monitor's own detectors.
     pub fn report(&mut self, fault: Fault) {
         self.reported = Some(fault);
+    }
+
+    /// What temperature and bus voltage leave of the torque cap from the next tick on.
+    pub fn derate(&mut self, derating: &Derating) {
+        (self.derating, self.shares) = (*derating, derating.shares());
+    }
+
+    /// Codes of what a decision took from each joint.
+    #[must_use]
+    pub fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
+        core::array::from_fn(|joint| {
+            LimitCodes::of(&decision.limited[joint], &self.limits.joints()[joint], &self.derating)
+        })
     }
 
     /// Where the drive stands.
@@ -185,6 +212,7 @@ impl<const N: usize> Monitor<N> {
                         observation.position[joint],
                         observation.velocity[joint],
                         request.torque[joint],
+                        self.shares,
                     );
                 }
             }

@@ -1,17 +1,18 @@
 //! What is looked at every few milliseconds: gate drivers' registers and temperatures.
 //!
 //! Why here: registers are read over a bus and thermistors by a converter that only a board has; when they are looked at and what
-//! then forbids to enable is decided by values only, so the same code is tested against every fault on the host.
+//! then follows is decided by values only, so the same code is tested against every fault on the host.
 //!
-//! | what | looked at every | worst | forbidden by |
+//! | what | looked at every | worst | leads to |
 //! | --- | --- | --- | --- |
-//! | a gate driver that does not hold its registers, read twice | 8 ms | 8 ms and a current tick | [`Cause::GateConfiguration`] |
-//! | a thermistor that is open or shorted | 50 ms | 50 ms and a current tick | [`Cause::Thermistor`] |
-//! | a bridge that is not cooler than the bound | 50 ms | the same | [`Cause::Temperature`] |
+//! | a gate driver that does not hold its registers, read twice | 8 ms | 8 ms and a current tick | [`Cause::GateConfiguration`], released |
+//! | a thermistor that is open or shorted | 50 ms | 50 ms and a servo tick | [`FaultCode::Thermistor`], damped |
+//! | a bridge that is not cooler than the bound | 50 ms | the same | [`FaultCode::Temperature`], damped |
 //!
 //! A register that is upset and right again between two looks is not seen; a thermistor that is stuck within its range is not seen
 //! at all. Cost: some ten instructions.
 
+use super::fault::FaultCode;
 use super::interlock::Cause;
 
 /// When to look; counts rounds of the housekeeping.
@@ -54,14 +55,14 @@ pub const fn of_gate_driver(holds: bool) -> Option<Cause> {
     if holds { None } else { Some(Cause::GateConfiguration) }
 }
 
-/// Why the drive is kept off because of a bridge's temperature, degrees Celsius; none is that of a thermistor that is open or
+/// What the servo has to hear of because of a bridge's temperature, degrees Celsius; none is that of a thermistor that is open or
 /// shorted.
 #[must_use]
-pub fn of_temperature(degrees: Option<f32>, hottest: f32) -> Option<Cause> {
+pub fn of_temperature(degrees: Option<f32>, hottest: f32) -> Option<FaultCode> {
     match degrees {
-        None => Some(Cause::Thermistor),
+        None => Some(FaultCode::Thermistor),
         Some(degrees) if degrees < hottest => None,
-        Some(_) => Some(Cause::Temperature),
+        Some(_) => Some(FaultCode::Temperature),
     }
 }
 
@@ -88,9 +89,9 @@ mod tests {
     #[test]
     fn what_is_hot_what_is_none_and_what_is_no_number_keeps_the_drive_off() {
         assert_eq!(of_temperature(Some(99.9), 100.0), None);
-        assert_eq!(of_temperature(Some(100.0), 100.0), Some(Cause::Temperature));
-        assert_eq!(of_temperature(Some(f32::NAN), 100.0), Some(Cause::Temperature));
-        assert_eq!(of_temperature(None, 100.0), Some(Cause::Thermistor));
+        assert_eq!(of_temperature(Some(100.0), 100.0), Some(FaultCode::Temperature));
+        assert_eq!(of_temperature(Some(f32::NAN), 100.0), Some(FaultCode::Temperature));
+        assert_eq!(of_temperature(None, 100.0), Some(FaultCode::Thermistor));
         assert_eq!((of_gate_driver(true), of_gate_driver(false)), (None, Some(Cause::GateConfiguration)));
     }
 }

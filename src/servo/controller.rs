@@ -22,6 +22,7 @@
 //! exceeds the torque cap, and is empty whenever the drive does not follow. Cost: about 15 operations per joint.
 
 use super::TICK_S;
+use crate::checksum::Checksum;
 use crate::real::clamp;
 use crate::units::{Hertz, KilogramMetreSquared, NewtonMetre, Radian, RadianPerSecond};
 
@@ -54,6 +55,13 @@ impl ControllerGains {
             integral_nm_per_rad_s: damping_nm_s_per_rad * position_per_s * integral_per_s,
             cap_nm: cap.0,
         }
+    }
+
+    /// With everything of it.
+    #[must_use]
+    pub fn add_to(&self, sum: Checksum) -> Checksum {
+        let Self { position_per_s, damping_nm_s_per_rad, integral_nm_per_rad_s, cap_nm } = *self;
+        sum.numbers([position_per_s, damping_nm_s_per_rad, integral_nm_per_rad_s, cap_nm])
     }
 
     /// Torque per velocity error, N m s/rad.

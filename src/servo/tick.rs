@@ -20,12 +20,13 @@ use super::feedforward::{TorqueModel, feedforward_nm};
 use super::observer::{OBSERVER_BANDWIDTH, Observer, ObserverGains};
 use super::scale::JointScale;
 use super::{SERVO_RATE_HZ, TICK_S};
+use crate::checksum::Checksum;
 use crate::hal::{DriveCommand, Sample};
 use crate::motion::MotionState;
 use crate::real::{clamp, is_finite};
 use crate::safety::{
-    Decision, DriveState, Fault, Limits, Monitor, Observation, Permission, PowerRequest, Reading, Request,
-    StepGate,
+    Decision, Derating, DriveState, Fault, LimitCodes, Limits, Monitor, Observation, Permission,
+    PowerRequest, Reading, Request, StepGate,
 };
 use crate::units::{NewtonMetre, Radian, RadianPerSecond};
 
@@ -132,9 +133,33 @@ impl<const N: usize> Servo<N> {
         self.monitor.state()
     }
 
+    /// Over gains, scales and limits, which do not change.
+    #[must_use]
+    pub fn checksum(&self) -> Checksum {
+        self.joints.iter().fold(self.monitor.checksum(), |sum, joint| {
+            let Joint { scale, count_per_radian, controller, largest_acceleration_rad_per_s2 } = joint;
+            let signed = [scale.signed_radian_per_count(), scale.signed_torque_per_ampere().0];
+            controller
+                .add_to(sum)
+                .numbers(signed)
+                .numbers([*count_per_radian, *largest_acceleration_rad_per_s2])
+        })
+    }
+
     /// Something else saw a fault, of which the monitor has to hear: at the next tick.
     pub fn report(&mut self, fault: Fault) {
         self.monitor.report(fault);
+    }
+
+    /// What temperature and bus voltage leave of the torque caps from the next tick on.
+    pub fn derate(&mut self, derating: &Derating) {
+        self.monitor.derate(derating);
+    }
+
+    /// Codes of what a decision took from each joint.
+    #[must_use]
+    pub fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
+        self.monitor.limit_codes(decision)
     }
 
     /// What each joint may do.

@@ -71,6 +71,7 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, housekeeping::Housekeepi
                 findings.1,
                 drive.0,
                 told.0,
+                divider,
                 surroundings.clock,
             ));
             place(&servo::SERVO, servo);

@@ -19,8 +19,8 @@ use crate::board::odrive_v3_6::settings::{CLOCK_HZ, analog, drives};
 use crate::board::odrive_v3_6::{brake, bridge, contacts, converter, encoder, interrupts};
 use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, JointSample};
 use crate::leg::axis_code;
-use crate::motor::{Axis, AxisFault, AxisRequest, BrakeBudget, CalibrationStep, Calibrator, Chopper};
-use crate::safety::{Bridges, ServoWatch, TickState, TickWatch};
+use crate::motor::{Axis, AxisFault, BrakeBudget, CalibrationStep, Calibrator, Chopper, Wish};
+use crate::safety::{Bridges, FaultCode, ServoWatch, TickState, TickWatch};
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::Volt;
 
@@ -180,7 +180,7 @@ impl AxisLoop {
         let (forbids, damp) = self.watch.look(&state);
         interlock::raise_bits(forbids);
         if damp {
-            servo::ticks_are_missing();
+            servo::report(FaultCode::CurrentTicks);
         }
     }
 
@@ -206,11 +206,12 @@ impl AxisLoop {
                 }
             },
             Stage::Running(running) => {
-                let command = match bridges {
-                    Bridges::Follow => running.tick(sample, target(axis)),
-                    Bridges::Brake => running.brake(sample),
-                    Bridges::Release => running.tick(sample, AxisRequest::RELEASED),
+                let wish = match bridges {
+                    Bridges::Follow => target(axis).into(),
+                    Bridges::Brake => Wish::Brake,
+                    Bridges::Release => Wish::Released,
                 };
+                let command = running.act(sample, wish);
                 if let Some(fault) = running.fault().filter(|fault| self.faulted != Some(*fault)) {
                     self.faulted = Some(fault);
                     let cause = Cause::of_axis(axis, axis_code(fault));

@@ -20,6 +20,7 @@ use crate::leg::{AxisFault, Calibration, ControlRequest, DriveState};
 use crate::motor::reference::{ReferenceStep, StatedPose};
 use crate::motor::{Axis, AxisConfiguration, Calibrator};
 use crate::operator::{Ask, Operator, RATE_HZ, Situation};
+use crate::real::max;
 use crate::safety::{UpkeepClock, of_gate_driver, of_temperature};
 use crate::trace::{Record, words};
 use crate::units::Hertz;
@@ -143,11 +144,16 @@ impl Housekeeping {
             }
         }
         if due.temperatures {
+            // Both are damped by the servo, which gives less torque from 20 degrees below on.
+            let mut hottest_c = f32::MIN;
             for code in converter::thermistors().into_iter().take(JOINTS) {
-                if let Some(cause) = of_temperature(temperature_c(code), HOTTEST_C) {
-                    interlock::raise(cause);
+                let degrees = temperature_c(code);
+                hottest_c = max(hottest_c, degrees.unwrap_or(HOTTEST_C));
+                if let Some(code) = of_temperature(degrees, HOTTEST_C) {
+                    servo::report(code);
                 }
             }
+            servo::set_temperature(hottest_c);
         }
         for axis in 0..JOINTS {
             if let Some(outcome) = self.outcomes.get_mut(axis).and_then(Consumer::dequeue) {
@@ -190,7 +196,7 @@ impl Housekeeping {
             }
             Outcome::Fault(fault) => {
                 self.say(Record::AxisFault { tick: state.tick, joint, name: words::axis_fault(*fault) });
-                if matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen) {
+                if matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters) {
                     // The place is lost, and with it the joint's zero.
                     servo::end();
                     state.drive = None;
@@ -198,7 +204,7 @@ impl Housekeeping {
                         *calibrated = false;
                     }
                     // A motor that brakes does so until a reset.
-                    if *fault == AxisFault::Encoder {
+                    if *fault != AxisFault::EncoderFrozen {
                         self.order(axis, Order::Off);
                     }
                 }

@@ -10,12 +10,17 @@ use heapless::spsc::{Consumer, Producer};
 use super::leg::{JOINTS, LEG};
 use super::links::{EVENTS, TOLD, Told};
 use super::{interlock, statistics};
+use crate::board::odrive_v3_6::settings::{analog, drives};
+use crate::checksum::Checksum;
 use crate::hal::{DriveCommand, JointSample, Sample};
-use crate::leg::{Activity, Control, ControlOutput, ControlRequest, DriveState, Finding, permitted};
+use crate::leg::{
+    Activity, Control, ControlOutput, ControlRequest, DriveState, Finding, LimitCodes, permitted,
+};
 use crate::motor::AxisRequest;
-use crate::safety::{Fault, FaultCode};
+use crate::safety::{DeratingRamps, Fault, FaultCode, SupplyWatch};
+use crate::servo::SERVO_RATE_HZ;
 use crate::trace::{Record, words};
-use crate::units::Ampere;
+use crate::units::{Ampere, Volt};
 
 /// Current target of each axis as bits, or [`RELEASED`].
 static TARGETS: [AtomicU32; JOINTS] = [const { AtomicU32::new(RELEASED) }; JOINTS];
@@ -24,12 +29,23 @@ const RELEASED: u32 = u32::MAX;
 /// The joints' zeros are known, so samples mean something.
 static READY: AtomicBool = AtomicBool::new(false);
 
-/// Current ticks are missing, which the servo has to react to.
-static TICKS_MISSING: AtomicBool = AtomicBool::new(false);
+/// What others saw and the servo has to react to, by damping: a bit each.
+static REPORTED: AtomicU32 = AtomicU32::new(0);
+/// In the order of their bits.
+const REPORTABLE: [FaultCode; 3] = [FaultCode::CurrentTicks, FaultCode::Temperature, FaultCode::Thermistor];
 
-/// The servo damps from its next tick on.
-pub fn ticks_are_missing() {
-    TICKS_MISSING.store(true, Ordering::Relaxed);
+/// The servo reacts from its next tick on, to the codes of its list.
+pub fn report(code: FaultCode) {
+    let bit = REPORTABLE.iter().position(|one| *one == code).unwrap_or(0);
+    REPORTED.fetch_or(1 << bit, Ordering::Relaxed);
+}
+
+/// Of the hottest bridge, degrees Celsius; what is no number leaves no torque.
+static HOTTEST_C: AtomicU32 = AtomicU32::new(0);
+
+/// The servo gives less torque from there on.
+pub fn set_temperature(degrees_c: f32) {
+    HOTTEST_C.store(degrees_c.to_bits(), Ordering::Relaxed);
 }
 
 /// What an axis is asked for.
@@ -87,6 +103,13 @@ pub struct ServoLoop {
     activity: Activity,
     /// Ticks of the leg.
     tick: u32,
+    /// Told of in this second.
+    limits: [LimitCodes; JOINTS],
+    /// Of gains and limits as they were made.
+    checksum: Checksum,
+    supply: SupplyWatch,
+    ramps: DeratingRamps,
+    volt_per_code: Volt,
     /// Processor cycles; wraps.
     clock: fn() -> u32,
 }
@@ -104,9 +127,11 @@ impl ServoLoop {
         findings: Consumer<'static, Finding<JOINTS>>,
         drive: Producer<'static, DriveState>,
         told: Producer<'static, Told>,
+        divider: f32,
         clock: fn() -> u32,
     ) -> Self {
         Self {
+            checksum: control.checksum(),
             control,
             samples,
             requests,
@@ -118,6 +143,10 @@ impl ServoLoop {
             state: None,
             activity: Activity::Idle,
             tick: 0,
+            limits: Default::default(),
+            supply: SupplyWatch::default(),
+            ramps: drives::derating(divider),
+            volt_per_code: analog::sense(divider).volt_per_code,
             clock,
         }
     }
@@ -148,14 +177,52 @@ impl ServoLoop {
         if let Some(finding) = self.findings.dequeue() {
             self.control.receive(finding);
         }
-        if TICKS_MISSING.swap(false, Ordering::Relaxed) {
-            self.control.report(Fault { code: FaultCode::CurrentTicks, joint: 0 });
-        }
+        self.look_around();
         let request = self.requests.dequeue();
         let asked = permitted(request, interlock::is_clear(), self.control.state());
         let output = self.control.tick(&Sample { joints: self.sample }, asked, LEG.gravity);
         command(output.servo.drive());
+        self.tell_limits(&output);
         self.tell(request.as_ref(), asked.as_ref(), &output);
+    }
+
+    /// What the rest of the board saw: faults, bus voltage, temperature.
+    fn look_around(&mut self) {
+        let reported = REPORTED.swap(0, Ordering::Relaxed);
+        for (bit, code) in REPORTABLE.into_iter().enumerate() {
+            if reported & 1 << bit != 0 {
+                self.control.report(Fault { code, joint: 0 });
+            }
+        }
+        // Every 64 ms.
+        if self.tick & 0xFF == 0 && self.control.checksum() != self.checksum {
+            self.control.report(Fault { code: FaultCode::Parameters, joint: 0 });
+        }
+        let bus = self.volt_per_code * statistics::BUS[0].get() as f32;
+        if self.supply.look(bus) {
+            self.control.report(Fault { code: FaultCode::SupplyLost, joint: 0 });
+        }
+        let hottest_c = f32::from_bits(HOTTEST_C.load(Ordering::Relaxed));
+        self.control.derate(&self.ramps.at(hottest_c, bus));
+    }
+
+    /// Limits that act and were not told of in this second.
+    fn tell_limits(&mut self, output: &ControlOutput<JOINTS>) {
+        if self.tick.is_multiple_of(SERVO_RATE_HZ) {
+            self.limits = Default::default();
+        }
+        let codes = self.control.limit_codes(output);
+        // One in a tick is enough: the others follow.
+        let new =
+            codes.iter().zip(&self.limits).position(|(codes, told)| codes.without(*told).first().is_some());
+        if let Some(joint) = new
+            && let (Some(codes), Some(told)) = (codes.get(joint), self.limits.get_mut(joint))
+            && let Some(code) = codes.without(*told).first()
+        {
+            *told = told.with(true, code);
+            let (tick, joint) = (self.tick, joint as u8 + 1);
+            self.say(Record::Limit { tick, code: code as u8, name: code.name(), joint });
+        }
     }
 
     /// What changed, and the sample of the log.

@@ -124,6 +124,17 @@ records! {
         /// [`super::words::axis_fault`], or the board's word.
         name: &'static str,
     }
+    /// Something takes from the torque that is asked of a joint: no fault; told once a second at most.
+    Limit "limit n={=u32} tick={=u32} code={=u8} name={=str} joint={=u8}" {
+        /// Servo tick.
+        tick: u32,
+        /// [`crate::leg::LimitCode`].
+        code: u8,
+        /// Its word.
+        name: &'static str,
+        /// From 1.
+        joint: u8,
+    }
     /// How a calibration ended.
     Calibration "calibration n={=u32} joint={=u8} result={=str} number={=u32} resistance_ohm={=f32} direct_h={=f32} quadrature_h={=f32} offset_turns={=f32} zero_b={=f32} zero_c={=f32}" {
         /// From 1.

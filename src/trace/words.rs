@@ -85,6 +85,7 @@ pub const fn axis_fault(fault: AxisFault) -> &'static str {
         AxisFault::OpenPhase => "open_phase",
         AxisFault::CurrentZero => "current_zero",
         AxisFault::StuckConversion => "stuck_conversion",
+        AxisFault::Parameters => "parameters",
     }
 }
 

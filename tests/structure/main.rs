@@ -16,6 +16,7 @@ const HOUSE: [(&str, &[&str]); 18] = [
     ("units", &[]),
     ("real", &[]),
     ("place", &[]),
+    ("checksum", &[]),
     ("hal", &[]),
     ("model", &[]),
     ("motion", &["model"]),
@@ -34,7 +35,7 @@ const HOUSE: [(&str, &[&str]); 18] = [
 ];
 
 /// Rooms every other room may use.
-const OPEN: [&str; 3] = ["units", "real", "place"];
+const OPEN: [&str; 4] = ["units", "real", "place", "checksum"];
 
 /// What the simulated hardware may see of the firmware. The tool and the programs may see everything.
 const PLANT: [&str; 2] = ["hal", "units"];

@@ -7,7 +7,7 @@ use super::*;
 use crate::hal::JointSample;
 use crate::motion::{Motion, Ramp};
 use crate::real::{atan2, sin_cos, sqrt};
-use crate::safety::{Fault, FaultCode};
+use crate::safety::{Derating, Fault, FaultCode};
 use crate::servo::NoModel;
 use crate::servo::scale::tests::{HIP, KNEE};
 use crate::units::{Ampere, Hertz, KilogramMetreSquared, RadianPerSecondSquared};
@@ -55,6 +55,23 @@ fn bandwidth(with_velocity: bool) -> f64 {
         }
     }
     low
+}
+
+#[test]
+fn the_checksum_stays_in_motion_and_tells_other_gains_and_limits() {
+    let joints = JOINTS;
+    let servo = Servo::new(joints).expect("sensible");
+    let sum = servo.checksum();
+    let mut derated = servo;
+    derated.derate(&Derating::NONE);
+    derated.restart();
+    assert_eq!(derated.checksum(), sum);
+    let mut changed = joints;
+    changed[1].torque.0 += 1e-5;
+    assert_ne!(Servo::new(changed).expect("sensible").checksum(), sum);
+    let mut changed = joints;
+    changed[0].bandwidth.0 *= 1.000_001;
+    assert_ne!(Servo::new(changed).expect("sensible").checksum(), sum);
 }
 
 #[test]

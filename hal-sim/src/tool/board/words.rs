@@ -91,6 +91,7 @@ pub const fn axis_fault(fault: AxisFault) -> &'static str {
         AxisFault::EncoderFrozen => "the counter stands still although the motor turns",
         AxisFault::OpenPhase => "a phase takes voltage and no current",
         AxisFault::CurrentZero => "a shunt's zero drifted",
+        AxisFault::Parameters => "its gains or limits changed in memory",
         AxisFault::StuckConversion => "a shunt's code does not change with its current",
     }
 }

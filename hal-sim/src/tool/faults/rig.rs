@@ -12,13 +12,14 @@
 //! Not here: the watchdog, which needs the board or the emulator.
 
 use scarab::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
+use scarab::board::odrive_v3_6::settings::drives;
 use scarab::hal::{AxisCommand, DriveCommand, JointSample, Sample};
 use scarab::leg::{ControlOutput, ControlRequest, DriveState, axis_code, permitted};
 use scarab::motor::{Axis, AxisRequest, Chopper, SenseScale};
 use scarab::operator::{Ask, Operator, RATE_HZ, Situation};
 use scarab::safety::{
-    Bridges, Cause, Fault, FaultCode, PowerRequest, ServoWatch, TickState, TickWatch, UpkeepClock,
-    of_gate_driver, of_temperature,
+    Bridges, Cause, DeratingRamps, Fault, FaultCode, PowerRequest, ServoWatch, SupplyWatch, TickState,
+    TickWatch, UpkeepClock, of_gate_driver, of_temperature,
 };
 
 use crate::faults::{Channel, Injector};
@@ -85,6 +86,10 @@ pub struct Rig<const N: usize, const B: usize> {
     servo_ticks: u32,
     targets: DriveCommand<N>,
     chopper: Chopper,
+    supply: SupplyWatch,
+    ramps: DeratingRamps,
+    bus_code: u16,
+    hottest_c: f32,
     brake: f32,
     causes: u32,
     axis_fault: Option<FaultCode>,
@@ -119,6 +124,11 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             servo_ticks: 0,
             targets: DriveCommand::RELEASED,
             chopper,
+            supply: SupplyWatch::default(),
+            ramps: drives::derating(19.0),
+            // 48 V, until it is read.
+            bus_code: 3136,
+            hottest_c: 0.0,
             brake: 0.0,
             causes: 0,
             axis_fault: None,
@@ -181,15 +191,23 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     /// Gate drivers' registers and temperatures, as the housekeeping looks at them.
     fn upkeep(&mut self) {
         let due = self.clock.next();
+        let mut hottest_c = f32::MIN;
         for joint in 0..N {
             let holds = !self.injector.happens(Channel::GateRegisters, joint, self.period);
             let code = self.injector.thermistor(joint, self.period, WARM_CODE);
-            let causes = [
-                due.gates.then(|| of_gate_driver(holds)).flatten(),
-                due.temperatures.then(|| of_temperature(temperature_c(code), HOTTEST_C)).flatten(),
-            ];
-            let bits = causes.into_iter().flatten().fold(0, |bits, cause| bits | cause.bit());
-            self.causes |= bits & !self.blind_bits();
+            if let Some(cause) = of_gate_driver(holds).filter(|_| due.gates) {
+                self.causes |= cause.bit() & !self.blind_bits();
+            }
+            let degrees = temperature_c(code);
+            hottest_c = hottest_c.max(degrees.unwrap_or(HOTTEST_C));
+            if let Some(code) = of_temperature(degrees, HOTTEST_C).filter(|_| due.temperatures)
+                && !self.is_blind(Some(code))
+            {
+                self.leg.report(Fault { code, joint: joint as u8 });
+            }
+        }
+        if due.temperatures {
+            self.hottest_c = hottest_c;
         }
     }
 
@@ -213,6 +231,11 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         self.servo_ticks = self.servo_ticks.wrapping_add(1);
         let state = self.leg.control().state();
         let request = permitted(self.request.take(), self.causes == 0, state);
+        let bus = SenseScale::ODRIVE_3_6.bus(self.bus_code);
+        if self.supply.look(bus) && !self.is_blind(Some(FaultCode::SupplyLost)) {
+            self.leg.report(Fault { code: FaultCode::SupplyLost, joint: 0 });
+        }
+        self.leg.derate(&self.ramps.at(self.hottest_c, bus));
         let seeing = (!self.blind.is_empty()).then(|| self.leg.clone());
         let output = self.leg.tick(&self.sample, request, self.gravity, EVALUATIONS_PER_TICK);
         if let Some(before) = seeing
@@ -277,6 +300,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             }
         }
         let bus = samples.first().map_or(0, |sample| sample.bus_code);
+        self.bus_code = bus;
         self.brake = self.chopper.duty(SenseScale::ODRIVE_3_6.bus(bus));
         self.hash = samples.iter().zip(&self.commands).fold(self.hash, |hash, (sample, command)| {
             let [b, c] = sample.shunt_codes.map(u64::from);

@@ -101,6 +101,7 @@ fn one(bench: &Bench, chopper: bool) -> Result<RegenerationReport, ToolError> {
             AxisFault::EncoderFrozen => "encoder_frozen",
             AxisFault::OpenPhase => "open_phase",
             AxisFault::CurrentZero => "current_zero",
+            AxisFault::Parameters => "parameters",
             AxisFault::StuckConversion => "stuck_conversion",
         }),
         time_ms,

@@ -4,6 +4,7 @@
 use super::analog;
 use crate::leg::{LegDescription, MotorDescription};
 use crate::motor::{AxisConfiguration, BridgeTiming, CalibrationSettings, DeadTime, Direction, Sine};
+use crate::safety::{DeratingRamps, Ramp};
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt};
 
 /// Of the current loops.
@@ -37,6 +38,19 @@ pub const fn chopper(divider: f32) -> [Volt; 2] {
 #[must_use]
 pub const fn bus(divider: f32) -> [Volt; 2] {
     BUS[is_low(divider)]
+}
+
+/// Where torque is given less and less of, on a board with this divider of the bus voltage: over the last 20 degrees of a bridge, from
+/// a fifth above the lowest bus on, and between the chopper's end and the highest bus.
+#[must_use]
+pub const fn derating(divider: f32) -> DeratingRamps {
+    let ([low, high], [_, full]) = (bus(divider), chopper(divider));
+    let above = high.0 - full.0;
+    DeratingRamps {
+        temperature_c: Ramp::new(analog::HOTTEST_C - 20.0, analog::HOTTEST_C),
+        low: Ramp::new(1.2 * low.0, 1.05 * low.0),
+        high: Ramp::new(full.0 + 0.25 * above, high.0 - 0.1 * above),
+    }
 }
 
 /// The configuration of an axis that drives this motor, up to a joint's current and speed, on a board with this divider of the bus

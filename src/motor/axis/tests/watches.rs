@@ -173,6 +173,26 @@ fn a_code_that_stays_while_its_phase_is_asked_for_more_is_seen_in_the_fourth_tic
 }
 
 #[test]
+fn a_changed_bit_of_gains_or_limits_is_seen_within_100_ms() {
+    let flip = |number: &mut f32, bit: u32| *number = f32::from_bits(number.to_bits() ^ 1 << bit);
+    for bit in [0, 13, 31] {
+        for word in 0..4 {
+            let mut bench = Bench::settled(50.0, 5.0);
+            let constants = &mut bench.axis.constants;
+            match word {
+                0 => flip(&mut constants.current_limit, bit),
+                1 => flip(&mut constants.overcurrent_square, bit),
+                2 => flip(&mut constants.zeros[1], bit),
+                _ => constants.greatest_step ^= 1 << bit,
+            }
+            let found = bench.until_fault(ask(5.0), 400, |_| {});
+            let Some((periods, _)) = found else { panic!("word {word}, bit {bit}") };
+            assert!(periods <= 256, "{periods} servo periods");
+        }
+    }
+}
+
+#[test]
 fn codes_without_noise_that_stay_are_no_fault_while_nothing_is_asked_to_change() {
     let mut bench = Bench::at(0.0, &CONFIGURATION);
     bench.motor.noise_codes = 0.0;

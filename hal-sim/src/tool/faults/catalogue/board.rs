@@ -55,6 +55,6 @@ fn temperature(dice: &mut Dice, _: &Bounds) -> Scenario {
         by_design: degrees.is_some_and(|degrees| degrees < HOTTEST_C),
         // Twice the time between two looks.
         patience: PERIODS_PER_S / 8,
-        ..one(spoilt, Expected::Off)
+        ..one(spoilt, Expected::Damp)
     }
 }

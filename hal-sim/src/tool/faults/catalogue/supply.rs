@@ -24,12 +24,12 @@ pub static ROWS: [Row; 2] = [
     Row {
         id: "V2",
         fault: "undervoltage: reading, or the supply cut",
-        detector: "bus voltage in each tick, twice",
+        detector: "a fifth lost against the mean of a second, 1 ms: Damp; the lower border in each tick, twice: Off",
         state: "Damp if there is energy, else Off",
-        codes: &[FaultCode::BusVoltage],
+        codes: &[FaultCode::BusVoltage, FaultCode::SupplyLost],
         deadline_ms: 1.0,
         unit: "V beyond",
-        lacking: Some("the slope: at the lower border there is no energy left to damp with"),
+        lacking: None,
         draw: undervoltage,
     },
 ];

@@ -1,0 +1,291 @@
+//! Less before nothing: what of an asked torque a drive may still make while it is hot or its bus is low or high.
+//!
+//! Why ramps and not switches: a drive that gives up at a border drops its leg there; one that gives less from well before it tells its
+//! wearer, and mostly never arrives.
+//!
+//! ```text
+//! ramp(x) = clamp((x - none) / (all - none), 0, 1)
+//! |torque| <= cap * ramp(temperature) * ramp(bus, low)       where it drives the joint
+//! |torque| <= cap * ramp(temperature) * ramp(bus, high)      where the joint drives it
+//! ```
+//!
+//! Taken from what is asked before the joint's range and speed are looked at ([`super::Barrier`]): what stops a joint at its
+//! end, and what damps, keeps the whole cap. A number that is none leaves nothing.
+//!
+//! What is limited is told by [`LimitCode`]s, which are no faults: nothing is latched, and nothing has to be reset.
+//! Cost: the ramps where temperature and bus are looked at; in the monitor a product, two comparisons and a choice per joint.
+
+use super::barrier::Limited;
+use super::limits::JointLimits;
+use crate::real::{abs, max};
+use crate::units::Volt;
+
+macro_rules! limit_codes {
+    ($( $(#[doc = $doc:literal])* $code:ident = $number:literal, $name:literal; )*) => {
+        /// Something takes from what is asked. Numbers never change.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum LimitCode {
+            $( $(#[doc = $doc])* $code = $number, )*
+        }
+
+        impl LimitCode {
+            /// All of them, in the table's order.
+            pub const ALL: [Self; [$( $number, )*].len()] = [$( Self::$code, )*];
+
+            /// The word in records.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self { $( Self::$code => $name, )* }
+            }
+        }
+    };
+}
+
+limit_codes! {
+    /// Greatest torque of the joint.
+    Torque = 1, "torque";
+    /// Greatest current of the motor, where it is reached before the torque.
+    Current = 2, "current";
+    /// Greatest speed of the joint.
+    Speed = 3, "speed";
+    /// The joint could not stop within its range.
+    Position = 4, "position";
+    /// A bridge is hot.
+    Temperature = 5, "temperature";
+    /// The bus is low.
+    BusLow = 6, "bus_low";
+    /// The bus is high.
+    BusHigh = 7, "bus_high";
+}
+
+/// Any number of codes: bit n for the code n.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LimitCodes(u8);
+
+impl LimitCodes {
+    /// As bits.
+    #[must_use]
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// Whether a code is among them.
+    #[must_use]
+    pub const fn contains(self, code: LimitCode) -> bool {
+        self.0 & 1 << code as u8 != 0
+    }
+
+    /// With a code where it holds.
+    #[must_use]
+    pub const fn with(self, holds: bool, code: LimitCode) -> Self {
+        Self(self.0 | (holds as u8) << code as u8)
+    }
+
+    /// Those that are not among others.
+    #[must_use]
+    pub const fn without(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
+    }
+
+    /// The one with the lowest number.
+    #[must_use]
+    pub fn first(self) -> Option<LimitCode> {
+        // Codes begin with 1.
+        LimitCode::ALL.get((self.0.trailing_zeros() as usize).wrapping_sub(1)).copied()
+    }
+
+    /// What was taken from a joint.
+    #[must_use]
+    #[inline(never)]
+    pub fn of(limited: &Limited, limits: &JointLimits, derating: &Derating) -> Self {
+        if !limited.any() {
+            return Self::default();
+        }
+        let by_current = limits.current.0 * abs(limits.torque_per_ampere.0) < limits.torque.0;
+        Self::default()
+            .with(limited.torque && !by_current, LimitCode::Torque)
+            .with(limited.torque && by_current, LimitCode::Current)
+            .with(limited.speed, LimitCode::Speed)
+            .with(limited.range, LimitCode::Position)
+            .with(limited.derated && derating.temperature < 1.0, LimitCode::Temperature)
+            .with(limited.derated && derating.low < 1.0, LimitCode::BusLow)
+            .with(limited.derated && derating.high < 1.0, LimitCode::BusHigh)
+    }
+}
+
+/// Shares that are left, 0..=1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Derating {
+    temperature: f32,
+    low: f32,
+    high: f32,
+}
+
+impl Derating {
+    /// Nothing is taken.
+    pub const NONE: Self = Self { temperature: 1.0, low: 1.0, high: 1.0 };
+
+    /// Of a torque that drives a joint, and of one that the joint drives.
+    #[must_use]
+    pub fn shares(&self) -> [f32; 2] {
+        [self.temperature * self.low, self.temperature * self.high]
+    }
+}
+
+/// Where a ramp begins to take, and where it has taken all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ramp {
+    all: f32,
+    per_unit: f32,
+}
+
+impl Ramp {
+    /// Everything at `all`, nothing at `none`, which are apart: not so is an error of the compiler in a constant.
+    #[must_use]
+    pub const fn new(all: f32, none: f32) -> Self {
+        assert!(all < none || none < all, "a ramp has two ends");
+        Self { all, per_unit: 1.0 / (none - all) }
+    }
+
+    /// The share that is left; nothing of what is no number.
+    #[must_use]
+    #[inline(never)]
+    pub fn share(&self, value: f32) -> f32 {
+        let taken = (value - self.all) * self.per_unit;
+        // Not a number goes to the second: nothing is left.
+        if taken < 1.0 { 1.0 - max(taken, 0.0) } else { 0.0 }
+    }
+}
+
+/// Ramps of a board.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeratingRamps {
+    /// Of the hottest bridge, degrees Celsius.
+    pub temperature_c: Ramp,
+    /// Of a falling bus, V.
+    pub low: Ramp,
+    /// Of a rising bus, V.
+    pub high: Ramp,
+}
+
+impl DeratingRamps {
+    /// What is left at a temperature (degrees Celsius) and a bus voltage.
+    #[must_use]
+    pub fn at(&self, temperature_c: f32, bus: Volt) -> Derating {
+        Derating {
+            temperature: self.temperature_c.share(temperature_c),
+            low: self.low.share(bus.0),
+            high: self.high.share(bus.0),
+        }
+    }
+}
+
+/// Sees a supply that dies: a bus that has lost a fifth of what it was.
+///
+/// ```text
+/// slow += (bus - slow) / 4096 each tick (1 s);      bus < 0.8 slow, four ticks in a row (1 ms)
+/// ```
+///
+/// Why against what it was: a supply may have 22 V or 50 V. A load of 40 A takes 2 V from a sound one, so a fifth is none;
+/// what is left of the bus capacitor (0.6 of 1.7 J at 48 V and 1.5 mF, above the 20 V at which bridges are released) and what a
+/// moving leg gives back is enough to begin damping with. A bus that falls by less than a fifth in a second is left to the ramp.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SupplyWatch {
+    slow_v: f32,
+    fallen: u8,
+}
+
+impl SupplyWatch {
+    /// One servo tick: whether the supply is dying. Told once for each fall.
+    pub fn look(&mut self, bus: Volt) -> bool {
+        const SHARE: f32 = 1.0 / 4096.0;
+        const LOST: f32 = 0.8;
+        const PATIENCE: u8 = 4;
+        if self.slow_v == 0.0 {
+            self.slow_v = bus.0;
+        }
+        self.slow_v += SHARE * (bus.0 - self.slow_v);
+        self.fallen = if bus.0 < LOST * self.slow_v { PATIENCE.min(self.fallen).wrapping_add(1) } else { 0 };
+        self.fallen == PATIENCE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::limits::tests::HIP;
+    use super::*;
+
+    const RAMPS: DeratingRamps = DeratingRamps {
+        temperature_c: Ramp::new(80.0, 100.0),
+        low: Ramp::new(24.0, 21.0),
+        high: Ramp::new(55.0, 57.5),
+    };
+
+    #[test]
+    fn limit_numbers_are_fixed() {
+        let numbers = [
+            (LimitCode::Torque, 1),
+            (LimitCode::Current, 2),
+            (LimitCode::Speed, 3),
+            (LimitCode::Position, 4),
+            (LimitCode::Temperature, 5),
+            (LimitCode::BusLow, 6),
+            (LimitCode::BusHigh, 7),
+        ];
+        assert_eq!(numbers.map(|(code, _)| code), LimitCode::ALL);
+        assert!(numbers.iter().all(|(code, number)| *code as u8 == *number));
+    }
+
+    #[test]
+    fn shares_fall_along_their_ramps_and_what_is_no_number_leaves_nothing() {
+        let left = |temperature, bus| RAMPS.at(temperature, Volt(bus)).shares();
+        assert_eq!(left(25.0, 48.0), [1.0; 2]);
+        for (temperature, bus, expected) in [
+            (90.0, 48.0, [0.5, 0.5]),
+            (100.0, 48.0, [0.0, 0.0]),
+            (25.0, 22.5, [0.5, 1.0]),
+            (25.0, 56.25, [1.0, 0.5]),
+            (25.0, 10.0, [0.0, 1.0]),
+            (f32::NAN, 48.0, [0.0, 0.0]),
+            (25.0, f32::NAN, [0.0, 0.0]),
+        ] {
+            let left = left(temperature, bus);
+            assert!(left.iter().zip(expected).all(|(one, other)| (one - other).abs() < 1e-5), "{left:?}");
+        }
+    }
+
+    #[test]
+    fn every_limit_has_its_code() {
+        let none = Limited::default();
+        let hot = RAMPS.at(90.0, Volt(48.0));
+        let of = |limited: Limited, derating: &Derating| LimitCodes::of(&limited, &HIP, derating).bits();
+        assert_eq!(of(none, &hot), 0, "nothing was asked that was taken");
+        assert_eq!(of(Limited { torque: true, ..none }, &Derating::NONE), 1 << 1);
+        let weak = JointLimits { current: crate::units::Ampere(40.0), ..HIP };
+        let codes = LimitCodes::of(&Limited { torque: true, ..none }, &weak, &Derating::NONE);
+        assert!(codes.contains(LimitCode::Current) && !codes.contains(LimitCode::Torque));
+        assert_eq!(of(Limited { speed: true, range: true, ..none }, &Derating::NONE), 1 << 3 | 1 << 4);
+        assert_eq!(of(Limited { derated: true, ..none }, &hot), 1 << 5);
+        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(22.0))), 1 << 6);
+        assert_eq!(of(Limited { derated: true, ..none }, &RAMPS.at(25.0, Volt(56.0))), 1 << 7);
+    }
+
+    #[test]
+    fn a_supply_that_dies_is_seen_a_millisecond_after_a_fifth_is_gone_and_a_load_is_not() {
+        let mut watch = SupplyWatch::default();
+        assert!((0..8000).all(|_| !watch.look(Volt(48.0))));
+        // 40 A at 50 mOhm, and what comes back after a stop.
+        assert!([46.0, 54.0, 48.0, 44.0].into_iter().all(|bus| (0..400).all(|_| !watch.look(Volt(bus)))));
+        // 3 V per millisecond.
+        let mut bus = 48.0;
+        let mut ticks = 0;
+        while !watch.look(Volt(bus)) {
+            bus -= 0.75;
+            ticks += 1;
+            assert!(ticks < 40);
+        }
+        assert!((34.0..38.5).contains(&bus), "{bus} V");
+        assert!((0..400).all(|_| !watch.look(Volt(20.0))), "told once");
+    }
+}
