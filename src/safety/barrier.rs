@@ -59,41 +59,57 @@ pub struct Barrier {
     high_rad: f32,
     speed_rad_per_s: f32,
     damping_nm_s_per_rad: f32,
-    braking_rad_per_s2: f32,
+    twice_braking_rad_per_s2: f32,
+    /// a T, and its square.
+    lead_rad_per_s: f32,
+    lead_square: f32,
     cap_nm: f32,
+    /// What temperature and bus voltage leave of it: where it drives the joint, and where the joint drives it.
+    left_nm: [f32; 2],
 }
 
 impl Barrier {
     /// The bounds that follow from a joint's limits.
     #[must_use]
     pub fn new(limits: &JointLimits) -> Self {
+        let (braking, cap) = (limits.braking_acceleration().0, limits.torque_cap().0);
+        let lead = braking * REACTION_S;
         Self {
             low_rad: limits.low.0,
             high_rad: limits.high.0,
             speed_rad_per_s: limits.speed.0,
             damping_nm_s_per_rad: DAMPING_PER_INERTIA * limits.inertia.0,
-            braking_rad_per_s2: limits.braking_acceleration().0,
-            cap_nm: limits.torque_cap().0,
+            twice_braking_rad_per_s2: 2.0 * braking,
+            lead_rad_per_s: lead,
+            lead_square: lead * lead,
+            cap_nm: cap,
+            left_nm: [cap; 2],
         }
     }
 
-    /// The torque nearest to the wanted one that still lets the joint stop in its range, and what was taken; of what is wanted no
-    /// more than a share of the cap, one where it drives the joint and one where the joint drives it.
+    /// Of what is wanted no more than these shares of the cap, where it drives the joint and where the joint drives it.
+    pub fn derate(&mut self, shares: [f32; 2]) {
+        self.left_nm = shares.map(|share| share * self.cap_nm);
+    }
+
+    /// The torque nearest to the wanted one that still lets the joint stop in its range, and what was taken.
     #[must_use]
     pub fn bound(
         &self,
         position: Radian,
         velocity: RadianPerSecond,
         wanted: NewtonMetre,
-        shares: [f32; 2],
     ) -> (NewtonMetre, Limited) {
         let mut limited = Limited::default();
-        let share = if wanted.0 * velocity.0 < 0.0 { shares[1] } else { shares[0] };
-        let cap = share * self.cap_nm;
-        let mut torque = wanted.limited(NewtonMetre(cap)).0;
+        let [driving, driven] = self.left_nm;
+        let left = if wanted.0 * velocity.0 < 0.0 { driven } else { driving };
+        let mut torque = wanted.0;
         // Asked for too much, rather than braked too hard.
-        let over = wanted.abs().0 > cap;
-        (limited.torque, limited.derated) = (over && share >= 1.0, over && share < 1.0);
+        if wanted.abs().0 > left {
+            torque = wanted.limited(NewtonMetre(left)).0;
+            limited.derated = left < self.cap_nm;
+            limited.torque = !limited.derated;
+        }
         let (up, up_is_range) = self.approach_speed(self.high_rad - position.0);
         let highest = self.damping_nm_s_per_rad * (up - velocity.0);
         if torque > highest {
@@ -109,12 +125,16 @@ impl Barrier {
         (NewtonMetre(torque).limited(NewtonMetre(self.cap_nm)), limited)
     }
 
-    /// With everything of it.
+    /// With everything of it but what temperature and bus voltage change.
     #[must_use]
     pub fn add_to(&self, sum: Checksum) -> Checksum {
-        let Self { low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad, braking_rad_per_s2, cap_nm } =
-            *self;
-        sum.numbers([low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad, braking_rad_per_s2, cap_nm])
+        let Self { low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad, .. } = *self;
+        sum.numbers([low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad]).numbers([
+            self.twice_braking_rad_per_s2,
+            self.lead_rad_per_s,
+            self.lead_square,
+            self.cap_nm,
+        ])
     }
 
     /// The torque that opposes the joint's velocity, under the cap.
@@ -125,9 +145,8 @@ impl Barrier {
 
     /// Greatest speed towards an end that is `distance` away, and whether the range, not the speed limit, rules.
     fn approach_speed(&self, distance: f32) -> (f32, bool) {
-        let lead = self.braking_rad_per_s2 * REACTION_S;
         let stopping = if distance > 0.0 {
-            sqrt(lead * lead + 2.0 * self.braking_rad_per_s2 * distance) - lead
+            sqrt(self.lead_square + self.twice_braking_rad_per_s2 * distance) - self.lead_rad_per_s
         } else {
             max(distance * (1.0 / REACTION_S), -RETURN_SHARE * self.speed_rad_per_s)
         };
@@ -142,8 +161,6 @@ mod tests {
     use std::collections::VecDeque;
     extern crate std;
 
-    const ALL: [f32; 2] = [1.0; 2];
-
     /// An inertia with gravity, pushed by a wanted torque through the barrier, whose velocity is sensed late and whose
     /// drive is late as well; semi-implicit Euler at 16 kHz, double precision. Returns the farthest excursion beyond
     /// either end (negative inside), the greatest speed, and the greatest speed in the last of four seconds.
@@ -155,8 +172,9 @@ mod tests {
         start: (f64, f64),
     ) -> (f64, f64, f64) {
         // A joint that is pushed with all there is, or with what is left, stops all the same.
-        let shares = if wanted_nm == 30.0 { [0.5, 0.0] } else { ALL };
-        let barrier = Barrier::new(limits);
+        let shares = if wanted_nm == 30.0 { [0.5, 0.0] } else { [1.0; 2] };
+        let mut barrier = Barrier::new(limits);
+        barrier.derate(shares);
         let (mut position, mut velocity) = start;
         let mut drive_torque = 0.0;
         // 3.25 ms of velocity delay.
@@ -165,12 +183,8 @@ mod tests {
         for tick in 0..16_000 {
             sensed.push_back(velocity);
             let late = sensed.pop_front().expect("fourteen stay");
-            let (torque, _) = barrier.bound(
-                Radian(position as f32),
-                RadianPerSecond(late as f32),
-                NewtonMetre(wanted_nm),
-                shares,
-            );
+            let (torque, _) =
+                barrier.bound(Radian(position as f32), RadianPerSecond(late as f32), NewtonMetre(wanted_nm));
             assert!(torque.abs() <= limits.torque_cap());
             for _ in 0..4 {
                 let dt = 1.0 / 16_000.0;
@@ -253,7 +267,7 @@ mod tests {
             let distance = speed * speed / braking + margin;
             let torque = NewtonMetre(-0.5 * braking * HIP.inertia.0);
             let position = Radian(HIP.high.0 - distance);
-            let (bounded, limited) = barrier.bound(position, RadianPerSecond(speed), torque, ALL);
+            let (bounded, limited) = barrier.bound(position, RadianPerSecond(speed), torque);
             assert_eq!((bounded, limited), (torque, Limited::default()), "speed {speed}");
         }
     }
@@ -262,30 +276,32 @@ mod tests {
     fn what_was_taken_is_told_apart() {
         let barrier = Barrier::new(&HIP);
         let (middle, still) = (Radian(0.45), RadianPerSecond::ZERO);
-        let (torque, limited) = barrier.bound(middle, still, NewtonMetre(500.0), ALL);
+        let (torque, limited) = barrier.bound(middle, still, NewtonMetre(500.0));
         assert_eq!((torque, limited), (NewtonMetre(100.0), Limited { torque: true, ..Limited::default() }));
-        let (torque, limited) = barrier.bound(Radian(0.7), RadianPerSecond(2.5), NewtonMetre(10.0), ALL);
+        let (torque, limited) = barrier.bound(Radian(0.7), RadianPerSecond(2.5), NewtonMetre(10.0));
         assert!(torque.0 < 0.0 && limited.range, "{torque:?}");
         let wide = JointLimits { high: Radian(6.0), low: Radian(-6.0), ..HIP };
         let (torque, limited) =
-            Barrier::new(&wide).bound(Radian::ZERO, RadianPerSecond(3.3), NewtonMetre(10.0), ALL);
+            Barrier::new(&wide).bound(Radian::ZERO, RadianPerSecond(3.3), NewtonMetre(10.0));
         assert!(torque.0 < 0.0 && limited.speed && !limited.range, "{torque:?}");
     }
 
     #[test]
     fn what_is_derated_is_what_is_asked_and_not_what_stops_a_joint() {
-        let barrier = Barrier::new(&HIP);
+        let mut barrier = Barrier::new(&HIP);
+        barrier.derate([0.5, 0.2]);
         let at = |velocity, wanted| {
             let (torque, limited) =
-                barrier.bound(Radian(0.45), RadianPerSecond(velocity), NewtonMetre(wanted), [0.5, 0.2]);
+                barrier.bound(Radian(0.45), RadianPerSecond(velocity), NewtonMetre(wanted));
             (torque.0, limited.derated, limited.torque)
         };
         assert_eq!(at(0.0, 80.0), (50.0, true, false));
         assert_eq!(at(-0.1, 40.0), (20.0, true, false));
         assert_eq!(at(0.1, 40.0), (40.0, false, false));
-        let (torque, limited) =
-            barrier.bound(Radian(0.87), RadianPerSecond(1.0), NewtonMetre(40.0), [0.0; 2]);
+        barrier.derate([0.0; 2]);
+        let (torque, limited) = barrier.bound(Radian(0.87), RadianPerSecond(1.0), NewtonMetre(40.0));
         assert!(torque.0 < -90.0 && limited.range, "{torque:?}");
+        assert!(barrier.damp(RadianPerSecond(-10.0)).0 > 90.0);
     }
 
     #[test]

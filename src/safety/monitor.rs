@@ -98,7 +98,9 @@ pub struct Monitor<const N: usize> {
     barriers: [Barrier; N],
     ampere_per_nm: [f32; N],
     derating: Derating,
-    shares: [f32; 2],
+    /// 1.1 times the speed limits, rad/s; ends of the ranges with their tolerance.
+    fault_speed: [f32; N],
+    fault_range: [[Radian; 2]; N],
     damp_ticks: u32,
     glitch_window: u64,
     glitches: [u64; N],
@@ -119,7 +121,10 @@ impl<const N: usize> Monitor<N> {
             barriers: limits.joints().map(|joint| Barrier::new(&joint)),
             ampere_per_nm: limits.joints().map(|joint| 1.0 / joint.torque_per_ampere.0),
             derating: Derating::NONE,
-            shares: Derating::NONE.shares(),
+            fault_speed: limits.joints().map(|joint| OVERSPEED_FACTOR * joint.speed.0),
+            fault_range: limits
+                .joints()
+                .map(|joint| [joint.low - RANGE_TOLERANCE, joint.high + RANGE_TOLERANCE]),
             damp_ticks: rate_hz * DAMP_MS / 1000,
             glitch_window: u64::MAX.checked_shr(64 - window_ticks).unwrap_or(0),
             glitches: [0; N],
@@ -133,7 +138,12 @@ impl<const N: usize> Monitor<N> {
     pub fn checksum(&self) -> Checksum {
         let limits = self.limits.joints().iter().fold(Checksum::EMPTY, |sum, joint| joint.add_to(sum));
         let barriers = self.barriers.iter().fold(limits, |sum, barrier| barrier.add_to(sum));
-        barriers.numbers(self.ampere_per_nm).word(self.damp_ticks).word(self.glitch_window as u32)
+        barriers
+            .numbers(self.ampere_per_nm)
+            .numbers(self.fault_speed)
+            .numbers(self.fault_range.iter().flatten().map(|end| end.0))
+            .word(self.damp_ticks)
+            .word(self.glitch_window as u32)
     }
 
     /// Something else saw a fault: it is decided upon at the next tick, like those of the monitor's own detectors.
@@ -143,7 +153,10 @@ impl<const N: usize> Monitor<N> {
 
     /// What temperature and bus voltage leave of the torque cap from the next tick on.
     pub fn derate(&mut self, derating: &Derating) {
-        (self.derating, self.shares) = (*derating, derating.shares());
+        if self.derating != *derating {
+            self.derating = *derating;
+            self.barriers.iter_mut().for_each(|barrier| barrier.derate(derating.shares()));
+        }
     }
 
     /// Codes of what a decision took from each joint.
@@ -212,7 +225,6 @@ impl<const N: usize> Monitor<N> {
                         observation.position[joint],
                         observation.velocity[joint],
                         request.torque[joint],
-                        self.shares,
                     );
                 }
             }
@@ -250,9 +262,7 @@ impl<const N: usize> Monitor<N> {
         }
         if self.state.permission() != Permission::Released {
             for joint in 0..N {
-                if observation.velocity[joint].abs().0
-                    > OVERSPEED_FACTOR * self.limits.joints()[joint].speed.0
-                {
+                if observation.velocity[joint].abs().0 > self.fault_speed[joint] {
                     found = found.or(fault(FaultCode::Overspeed, joint));
                 }
                 if !self.in_range(joint, observation.position[joint]) {
@@ -279,8 +289,8 @@ impl<const N: usize> Monitor<N> {
     }
 
     fn in_range(&self, joint: usize, position: Radian) -> bool {
-        let limits = &self.limits.joints()[joint];
-        position >= limits.low - RANGE_TOLERANCE && position <= limits.high + RANGE_TOLERANCE
+        let [low, high] = self.fault_range[joint];
+        position >= low && position <= high
     }
 }
 
