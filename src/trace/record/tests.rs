@@ -146,6 +146,7 @@ const EXAMPLES: [Record<2>; 27] = [
     Record::NotEnabled { tick: 1, joint: 1, why: "-" },
     Record::Fault { tick: 1, code: 0x8400, name: "-", joint: 1 },
     Record::AxisFault { tick: 1, joint: 1, name: "-" },
+    Record::Limit { tick: 1, code: 5, name: "-", joint: 1 },
     Record::Calibration {
         joint: 1,
         result: "done",

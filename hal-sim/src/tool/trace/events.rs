@@ -89,6 +89,10 @@ pub fn of(line: &Line<'_>, servo_hz: f64) -> Read<Option<Event>> {
             let (name, code) = (text(line, "name")?, hex(line, "code")?);
             event(tick()?, Weight::Fault, format!("FAULT {code:#06x} {}: {}", spaced(&name), joint(line)?))
         }
+        "limit" => {
+            let words = format!("LIMIT {}: {}", spaced(&text(line, "name")?), joint(line)?);
+            event(tick()?, Weight::Note, words)
+        }
         "axis_fault" => {
             let words = format!("FAULT of the axis, {}: {}", spaced(&text(line, "name")?), joint(line)?);
             event(tick()?, Weight::Fault, words)
