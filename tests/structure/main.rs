@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use tokens::{Token, tokens};
 
 /// Each room and the rooms it may use beside itself and the open ones.
-const HOUSE: [(&str, &[&str]); 18] = [
+const HOUSE: [(&str, &[&str]); 19] = [
     ("units", &[]),
     ("real", &[]),
     ("place", &[]),

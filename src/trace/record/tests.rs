@@ -109,7 +109,7 @@ fn registers_are_written_in_base_sixteen() {
 }
 
 /// One of each kind, in the order of the list.
-const EXAMPLES: [Record<2>; 27] = [
+const EXAMPLES: [Record<2>; 28] = [
     Record::Boot {
         grammar: 1,
         version: "0.1.0",
