@@ -56,8 +56,8 @@ pub use crate::motor::{
     Refusal as CalibrationRefusal, StoredCalibration,
 };
 pub use crate::safety::{
-    DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, Permission, PowerRequest,
-    RefusalReason,
+    DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, Permission,
+    PowerRequest, RefusalReason,
 };
 
 use crate::hal::Sample;

@@ -170,6 +170,16 @@ pub struct DeratingRamps {
 }
 
 impl DeratingRamps {
+    /// From pairs of where everything is left and where nothing is; in a constant the compiler refuses ends that are not apart.
+    #[must_use]
+    pub const fn new(temperature_c: [f32; 2], low: [Volt; 2], high: [Volt; 2]) -> Self {
+        Self {
+            temperature_c: Ramp::new(temperature_c[0], temperature_c[1]),
+            low: Ramp::new(low[0].0, low[1].0),
+            high: Ramp::new(high[0].0, high[1].0),
+        }
+    }
+
     /// What is left at a temperature (degrees Celsius) and a bus voltage.
     #[must_use]
     pub fn at(&self, temperature_c: f32, bus: Volt) -> Derating {

@@ -1,7 +1,6 @@
 //! Everything that can be told.
 //!
-//! A record's format string is written once and serves twice: with the feature `defmt` the device sends its index and the
-//! values; without, [`Record::write`] fills it in. The first placeholder is always the record's number.
+//! A format string is written once and serves twice: with `defmt` the device sends index and values, without [`Record::write`] fills it in; first comes its number.
 
 use core::fmt::{self, Write};
 
@@ -126,14 +125,10 @@ records! {
     }
     /// Something takes from the torque that is asked of a joint: no fault; told once a second at most.
     Limit "limit n={=u32} tick={=u32} code={=u8} name={=str} joint={=u8}" {
-        /// Servo tick.
-        tick: u32,
-        /// [`crate::leg::LimitCode`].
-        code: u8,
-        /// Its word.
-        name: &'static str,
-        /// From 1.
-        joint: u8,
+        /** Servo tick. */ tick: u32,
+        /** [`crate::leg::LimitCode`]. */ code: u8,
+        /** Its word. */ name: &'static str,
+        /** From 1. */ joint: u8,
     }
     /// How a calibration ended.
     Calibration "calibration n={=u32} joint={=u8} result={=str} number={=u32} resistance_ohm={=f32} direct_h={=f32} quadrature_h={=f32} offset_turns={=f32} zero_b={=f32} zero_c={=f32}" {

@@ -2,9 +2,8 @@
 //! another machine (docs/board.md). What can be measured is measured by the calibration, and refused where it contradicts.
 
 use super::analog;
-use crate::leg::{LegDescription, MotorDescription};
+use crate::leg::{DeratingRamps, LegDescription, MotorDescription};
 use crate::motor::{AxisConfiguration, BridgeTiming, CalibrationSettings, DeadTime, Direction, Sine};
-use crate::safety::{DeratingRamps, Ramp};
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt};
 
 /// Of the current loops.
@@ -46,11 +45,11 @@ pub const fn bus(divider: f32) -> [Volt; 2] {
 pub const fn derating(divider: f32) -> DeratingRamps {
     let ([low, high], [_, full]) = (bus(divider), chopper(divider));
     let above = high.0 - full.0;
-    DeratingRamps {
-        temperature_c: Ramp::new(analog::HOTTEST_C - 20.0, analog::HOTTEST_C),
-        low: Ramp::new(1.2 * low.0, 1.05 * low.0),
-        high: Ramp::new(full.0 + 0.25 * above, high.0 - 0.1 * above),
-    }
+    DeratingRamps::new(
+        [analog::HOTTEST_C - 20.0, analog::HOTTEST_C],
+        [Volt(1.2 * low.0), Volt(1.05 * low.0)],
+        [Volt(full.0 + 0.25 * above), Volt(high.0 - 0.1 * above)],
+    )
 }
 
 /// The configuration of an axis that drives this motor, up to a joint's current and speed, on a board with this divider of the bus
