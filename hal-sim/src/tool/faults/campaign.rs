@@ -74,6 +74,7 @@ pub struct Campaign {
 }
 
 /// What is done with a fork.
+#[expect(clippy::large_enum_variant, reason = "some hundreds of them beside forks of 100 KB each")]
 enum Job {
     Row { row: &'static Row, scenario: Scenario, seed: u64, brief: bool },
     Trial { trial: Box<Trial>, seed: u64 },

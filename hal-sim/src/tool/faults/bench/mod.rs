@@ -16,13 +16,16 @@ use super::run::Outcome;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 
+/// What a bench makes of its row for some seeds.
+pub type Runs = fn(&Head, &LegFile, &[u64]) -> Result<Vec<Outcome>, ToolError>;
+
 /// A row with a bench of its own.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench {
     /// What is told of it.
     pub head: Head,
     /// Runs it for these seeds.
-    pub run: fn(&Head, &LegFile, &[u64]) -> Result<Vec<Outcome>, ToolError>,
+    pub run: Runs,
 }
 
 /// All of them.
