@@ -31,6 +31,7 @@ fn the_json_is_that_of_the_interface_and_its_numbers_add_up() {
         if let (Some(worst), Some(deadline)) = (worst.as_f64(), deadline.as_f64()) {
             assert!(worst <= deadline + 1e-9, "{row}");
         }
+        assert!(count("seen_by_own") <= count("detected"));
         assert!(row["state"].is_string());
     }
     let ids: Vec<_> = rows.iter().map(|row| row["fault"].as_str().expect("a word")).collect();
@@ -64,6 +65,7 @@ fn a_detector_that_is_switched_off_is_noticed() {
     let named: String = rows.iter().map(|row| format!("--fault {row} ")).collect();
     let report = report(&format!("{named}--seeds 4 --blind"), 0);
     for row in report["rows"].as_array().expect("a list") {
+        assert_eq!(row["seen_by_own"], 0, "{row}");
         assert!(row["missed"].as_u64() > Some(0), "nobody misses {}", row["fault"]);
     }
 }

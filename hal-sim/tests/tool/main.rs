@@ -3,11 +3,11 @@
 
 mod command;
 mod crash;
-mod eds;
 mod emulation;
 mod excite;
 mod faults;
 mod figures;
+mod fuzz;
 mod kept;
 mod leg_options;
 mod model_choice;

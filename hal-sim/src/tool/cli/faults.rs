@@ -47,7 +47,7 @@ pub struct FaultsArguments {
     /// The full campaign: 1,000 runs of each fault, every tick, a sweep of 8,000, 10,000 pairs, 10 hours; what is given beside counts instead.
     #[arg(long, conflicts_with_all = ["blind", "replay"])]
     full: bool,
-    /// Switch the detectors of each fault off: every run has to be missed, or nothing would notice a broken one. Exit code 0 if so.
+    /// Switch the detectors of each fault off: the campaign has to fail for each, or nothing would notice a broken one. Exit code 0 if it does.
     #[arg(long, conflicts_with = "every_tick")]
     blind: bool,
     /// Only the run of this seed of each fault, told in full.
@@ -168,7 +168,7 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     }
     if arguments.blind {
         let unnoticed: Vec<_> =
-            report.rows.iter().filter(|row| row.missed == 0).map(|row| row.fault).collect();
+            report.rows.iter().filter(|row| !row.is_noticed()).map(|row| row.fault).collect();
         let words = if unnoticed.is_empty() { "none" } else { &unnoticed.join(", ") };
         tables::print(&format!("detectors that nobody would miss: {words}\n"))?;
         return Ok(if unnoticed.is_empty() { EXIT_ACCEPTED } else { EXIT_REFUSED });

@@ -1,5 +1,7 @@
 //! A row of the table, whichever way it is run.
 
+use scarab::safety::FaultCode;
+
 use super::bench::{BENCHES, Bench};
 use super::catalogue::{Row, rows};
 
@@ -18,6 +20,8 @@ pub struct Head {
     pub deadline_ms: f64,
     /// Unit of the magnitude.
     pub unit: &'static str,
+    /// What the firmware says then; none of a bench.
+    pub codes: &'static [FaultCode],
     /// What is not seen yet.
     pub lacking: Option<&'static str>,
 }
@@ -49,6 +53,7 @@ impl Entry {
                 state: row.state,
                 deadline_ms: row.deadline_ms,
                 unit: row.unit,
+                codes: row.codes,
                 lacking: row.lacking,
             },
             Self::Bench(bench) => bench.head,

@@ -4,4 +4,4 @@
 mod broken;
 mod decoding;
 mod reported;
-mod session;
+pub mod session;

@@ -22,6 +22,7 @@ pub(super) const BENCH: Bench = Bench {
         state: "Refuse",
         deadline_ms: f64::INFINITY,
         unit: "",
+        codes: &[],
         lacking: None,
     },
     run: calibrate,

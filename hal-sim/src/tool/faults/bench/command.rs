@@ -33,6 +33,7 @@ pub(super) const BENCH: Bench = Bench {
         state: "Limit, Damp",
         deadline_ms: f64::INFINITY,
         unit: "N m",
+        codes: &[],
         lacking: None,
     },
     run: command,

@@ -19,6 +19,7 @@ pub(super) const BENCH: Bench = Bench {
         state: "Refuse",
         deadline_ms: f64::INFINITY,
         unit: "",
+        codes: &[],
         lacking: Some("a resistor that is absent: the bus rises until the axes release (V1)"),
     },
     run: chop,

@@ -33,6 +33,7 @@ pub(super) const BENCH: Bench = Bench {
         state: "old parameters stay",
         deadline_ms: f64::INFINITY,
         unit: "ticks of search",
+        codes: &[],
         lacking: None,
     },
     run: interrupt,
