@@ -180,13 +180,14 @@ impl Axis {
         self.act(sample, Wish::Brake)
     }
 
-    /// Either; with a fault released, but for a frozen counter, with which a motor that is to do anything brakes.
+    /// Either; with a fault released, but for a counter that is frozen or lost its place, with which a motor that is to do anything
+    /// brakes.
     #[inline(always)]
     pub fn act(&mut self, sample: &AxisSample, wish: Wish) -> AxisCommand {
         let wish = match (wish, self.fault) {
             (Wish::Released, _) => Wish::Released,
             (wish, None) => wish,
-            (_, Some(AxisFault::EncoderFrozen)) => Wish::Brake,
+            (_, Some(AxisFault::EncoderFrozen | AxisFault::Encoder)) => Wish::Brake,
             _ => Wish::Released,
         };
         self.last = self.step(sample, wish).unwrap_or_else(|fault| {

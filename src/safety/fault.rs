@@ -81,7 +81,7 @@ faults! {
     /// The encoder moved farther than the joint can, three times in 10 ms (7305: incremental sensor 1).
     EncoderStep = 0x7305, "E2", "encoder_step", Damp, "its encoder jumped";
     /// Counts were lost, and with them the rotor's angle: only a new calibration helps.
-    EncoderPlace = 0xFF02, "E4", "encoder_place", Off, "its counts jumped or the index came at another place";
+    EncoderPlace = 0xFF02, "E4", "encoder_place", Short, "its counts jumped or the index came at another place";
     /// The counter stands still while the motor's voltage says that it turns.
     EncoderFrozen = 0xFF09, "E1", "encoder_frozen", Short, "its encoder stopped while the motor turned";
     /// A phase takes voltage and no current.

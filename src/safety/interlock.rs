@@ -37,6 +37,8 @@ pub enum Cause {
     Axis2,
     /// An axis found its counter frozen: both brake.
     EncoderFrozen,
+    /// An axis that was switching lost its place, and with it the rotor's angle, without which nothing can be damped: both brake.
+    EncoderPlace,
     /// Current ticks went on being missed: 24 with none in time between.
     CurrentTicks,
     /// The servo did not answer three times in a row.
@@ -57,13 +59,14 @@ pub enum Cause {
 
 impl Cause {
     /// All of them, in the order of their bits.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::EmergencyStop,
         Self::GateFault,
         Self::GateConfiguration,
         Self::Axis1,
         Self::Axis2,
         Self::EncoderFrozen,
+        Self::EncoderPlace,
         Self::CurrentTicks,
         Self::ServoTicks,
         Self::Conversion,
@@ -83,6 +86,7 @@ impl Cause {
             Self::GateConfiguration => FaultCode::GateConfiguration,
             Self::Axis1 | Self::Axis2 => return None,
             Self::EncoderFrozen => FaultCode::EncoderFrozen,
+            Self::EncoderPlace => FaultCode::EncoderPlace,
             Self::CurrentTicks => FaultCode::CurrentTicks,
             Self::ServoTicks => FaultCode::ServoTicks,
             Self::Conversion => FaultCode::Conversion,
@@ -111,11 +115,12 @@ impl Cause {
         1 << self as u8
     }
 
-    /// What an axis (from 0) that found a fault of its own raises.
+    /// What an axis (from 0) that found a fault of its own raises; only one that was switching leads to a brake.
     #[must_use]
-    pub const fn of_axis(axis: usize, code: FaultCode) -> Self {
+    pub const fn of_axis(axis: usize, code: FaultCode, switching: bool) -> Self {
         match (code, axis) {
-            (FaultCode::EncoderFrozen, _) => Self::EncoderFrozen,
+            (FaultCode::EncoderFrozen, _) if switching => Self::EncoderFrozen,
+            (FaultCode::EncoderPlace, _) if switching => Self::EncoderPlace,
             (_, 0) => Self::Axis1,
             _ => Self::Axis2,
         }
@@ -151,10 +156,10 @@ impl Bridges {
     #[inline(always)]
     #[must_use]
     pub const fn of(causes: u32) -> Self {
-        const BRAKE: u32 = Cause::EncoderFrozen.bit();
-        match causes {
-            0 => Self::Follow,
-            BRAKE => Self::Brake,
+        const BRAKE: u32 = Cause::EncoderFrozen.bit() | Cause::EncoderPlace.bit();
+        match (causes, causes & !BRAKE) {
+            (0, _) => Self::Follow,
+            (_, 0) => Self::Brake,
             _ => Self::Release,
         }
     }
@@ -260,9 +265,10 @@ mod tests {
 
     #[test]
     fn bridges_brake_only_while_nothing_else_speaks_against_it() {
-        let frozen = Cause::EncoderFrozen.bit();
-        assert_eq!((Bridges::of(0), Bridges::of(frozen)), (Bridges::Follow, Bridges::Brake));
-        for cause in Cause::ALL.into_iter().filter(|cause| *cause != Cause::EncoderFrozen) {
+        let (frozen, place) = (Cause::EncoderFrozen.bit(), Cause::EncoderPlace.bit());
+        assert_eq!(Bridges::of(0), Bridges::Follow);
+        assert_eq!([frozen, place, frozen | place].map(Bridges::of), [Bridges::Brake; 3]);
+        for cause in Cause::ALL.into_iter().filter(|cause| cause.bit() & (frozen | place) == 0) {
             assert_eq!(
                 [cause.bit(), cause.bit() | frozen].map(Bridges::of),
                 [Bridges::Release; 2],

@@ -214,10 +214,10 @@ impl AxisLoop {
                 let command = running.act(sample, wish);
                 if let Some(fault) = running.fault().filter(|fault| self.faulted != Some(*fault)) {
                     self.faulted = Some(fault);
-                    let cause = Cause::of_axis(axis, axis_code(fault));
+                    let cause = Cause::of_axis(axis, axis_code(fault), wish != Wish::Released);
                     interlock::raise(cause);
                     // A fault of one axis takes the other: at once, or in its own next tick where both brake.
-                    if cause != Cause::EncoderFrozen {
+                    if Bridges::of(cause.bit()) == Bridges::Release {
                         bridge::release_all();
                     }
                     let _ = self.outcomes.enqueue(Outcome::Fault(fault));
@@ -255,10 +255,10 @@ impl AxisLoop {
                 if let Stage::Running(axis) = &mut self.stage {
                     // A place that was lost stays lost: only a new calibration helps, and the fault is told again. A motor
                     // that brakes is let go, and to be calibrated as well.
-                    let frozen = axis.fault() == Some(AxisFault::EncoderFrozen);
+                    let lost = matches!(axis.fault(), Some(AxisFault::EncoderFrozen | AxisFault::Encoder));
                     let _ = axis.clear_fault();
                     self.faulted = None;
-                    if frozen {
+                    if lost {
                         self.stage = Stage::Off;
                     }
                 }

@@ -204,7 +204,7 @@ impl Housekeeping {
                         *calibrated = false;
                     }
                     // A motor that brakes does so until a reset.
-                    if *fault != AxisFault::EncoderFrozen {
+                    if *fault == AxisFault::Parameters {
                         self.order(axis, Order::Off);
                     }
                 }

@@ -206,7 +206,10 @@ fn one_bad_sample_alone_is_survived_and_a_lost_place_is_not_cleared() {
         bench.tick(ask(5.0));
     }
     assert_eq!(bench.axis.fault(), Some(AxisFault::Encoder));
-    assert!(!bench.axis.clear_fault() && !bench.run(ask(5.0), 10).enabled);
+    // Without the rotor's angle there is nothing left but to brake.
+    assert_eq!(bench.run(ask(5.0), 10), AxisCommand::BRAKE);
+    assert_eq!(bench.run(AxisRequest::RELEASED, 1), AxisCommand::RELEASED);
+    assert!(!bench.axis.clear_fault());
 }
 
 #[test]

@@ -217,7 +217,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         for (joint, axis) in self.axes.iter_mut().enumerate() {
             if !axis.clear_fault() {
                 // Off, and to be calibrated; a motor that braked is let go.
-                self.causes |= Cause::of_axis(joint, FaultCode::EncoderPlace).bit();
+                self.causes |= Cause::of_axis(joint, FaultCode::EncoderPlace, false).bit();
             }
         }
         self.edges.reset = Some(self.period);
@@ -273,6 +273,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             if damp && !self.is_blind(Some(FaultCode::CurrentTicks)) {
                 self.leg.report(Fault { code: FaultCode::CurrentTicks, joint: joint as u8 });
             }
+            let switching = self.is_switching();
             let before = self.axes[joint];
             let current = self.targets.currents[joint];
             let command = match Bridges::of(self.causes) {
@@ -289,7 +290,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             self.commands[joint] = command;
             let axis = &self.axes[joint];
             if let Some(fault) = axis.fault() {
-                self.causes |= Cause::of_axis(joint, axis_code(fault)).bit();
+                self.causes |= Cause::of_axis(joint, axis_code(fault), switching).bit();
                 self.axis_fault = self.axis_fault.or(Some(axis_code(fault)));
             }
             // What one axis finds takes the other in the same period.

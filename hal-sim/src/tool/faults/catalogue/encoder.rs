@@ -30,7 +30,7 @@ pub static ROWS: [Row; 2] = [
         codes: &[FaultCode::EncoderPlace],
         deadline_ms: f64::INFINITY,
         unit: "counts",
-        lacking: Some("released instead of damped, since the rotor's angle is lost with the counts"),
+        lacking: Some("braked (Short) instead of damped, since the rotor's angle is lost with the counts"),
         draw: lost_counts,
     },
 ];
@@ -71,6 +71,6 @@ fn lost_counts(dice: &mut Dice, bounds: &Bounds) -> Scenario {
         // A turn of the rotor: seen when the index comes, if the leg moves that far.
         onset: Onset::Injection,
         patience: 2 * PERIODS_PER_S,
-        ..one(offset, Expected::Off)
+        ..one(offset, Expected::Brake)
     }
 }
