@@ -112,6 +112,8 @@ pub struct Axis {
     speed: SpeedTracker,
     /// Counter at the last plausible sample.
     counter: u16,
+    /// Of the counter, to that sample.
+    step: i32,
     /// Within one turn, in the electrical sense.
     place: i32,
     /// Unwrapped, in the joint's sense.
@@ -149,6 +151,7 @@ impl Axis {
             current_loop: CurrentLoop::default(),
             speed: SpeedTracker::at(constants.scale.angle(place).plus(constants.offset)),
             counter: sample.encoder_count,
+            step: 0,
             place,
             counts: 0,
             measured: Rotating::default(),
@@ -201,9 +204,12 @@ impl Axis {
     fn step(&mut self, sample: &AxisSample, wish: Wish) -> Result<AxisCommand, AxisFault> {
         let constants = &self.constants;
         let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
-        let plausible = step.abs() <= constants.greatest_step;
+        // The way back from a wrong reading that was just small enough to be believed is no jump.
+        let plausible =
+            step.abs() <= constants.greatest_step || (step + self.step).abs() <= constants.greatest_step;
         if plausible {
             self.counter = sample.encoder_count;
+            self.step = step;
             self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
             self.place = constants.scale.moved(self.place, constants.counter_sign * step);
             if let Some(at) = sample.index_count

@@ -27,8 +27,8 @@
 //! looks like while nothing is asked of the phases, none is seen. Turns that take longer than 25 ms or less than
 //! 3 ms, or turn back, are not judged.
 //!
-//! False alarms: on the default leg the mean stays below a third of its limit (docs/safety.md). Source: parity equation of a linear model,
-//! Isermann, Fault-Diagnosis Systems (2006), chapter 10. Cost: `scripts/count-instructions`, joint sample; 24 bytes.
+//! False alarms: those of the simulated hours in docs/safety.md; the margin between a healthy motor's residual and the limits has not been
+//! measured on a motor. Source: parity equation of a linear model, Isermann, Fault-Diagnosis Systems (2006), chapter 10. Cost: `scripts/count-instructions`, joint sample; 24 bytes.
 
 use super::axis::AxisFault;
 use super::configuration::AxisConfiguration;

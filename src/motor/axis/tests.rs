@@ -312,3 +312,29 @@ fn a_reading_that_was_not_believed_is_told_once() {
     assert_eq!([bench.axis.joint_sample().doubtful, bench.axis.joint_sample().doubtful], [true, false]);
     assert_eq!(bench.axis.fault(), None);
 }
+
+/// Believed or not, one wrong reading of any size stops nobody, and leaves the place where it was.
+#[test]
+fn the_way_back_from_a_wrong_reading_is_no_second_one() {
+    for speed in [-60.0, 0.0, 60.0] {
+        let bench = || {
+            let mut bench = Bench::at(speed, &CONFIGURATION);
+            bench.run(AxisRequest::RELEASED, 24);
+            bench
+        };
+        let mut sound = bench();
+        sound.run(AxisRequest::RELEASED, 12);
+        sound.axis.joint_sample();
+        sound.run(AxisRequest::RELEASED, 6);
+        let expected = sound.axis.joint_sample().encoder_counts;
+        for size in (1..=80).flat_map(|size| [size, -size]) {
+            let mut bench = bench();
+            bench.sample.encoder_count = bench.sample.encoder_count.wrapping_add_signed(size);
+            bench.run(AxisRequest::RELEASED, 12);
+            assert_eq!(bench.axis.fault(), None, "{size} counts at {speed} rad/s");
+            bench.axis.joint_sample();
+            bench.run(AxisRequest::RELEASED, 6);
+            assert_eq!(bench.axis.joint_sample().encoder_counts, expected, "{size} counts at {speed} rad/s");
+        }
+    }
+}
