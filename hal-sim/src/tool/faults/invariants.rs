@@ -91,7 +91,8 @@ impl<const N: usize> Invariants<N> {
                 self.note(rig, "more torque was asked for than the cap");
             }
         }
-        let damping = switching && rig.state().fault().is_some();
+        // A motor that brakes itself is not damped by the servo, whatever the servo did before.
+        let damping = switching && !rig.is_braking() && rig.state().fault().is_some();
         self.damped = if damping { self.damped + 1 } else { 0 };
         if self.damped == LONGEST_DAMPING + 1 {
             self.note(rig, "damped for more than 300 ms");
