@@ -11,6 +11,7 @@ const fn ask(current: f32) -> AxisRequest {
 }
 
 /// A motor that turns at a given mechanical speed, its axis, and the newest sample.
+#[derive(Clone)]
 struct Bench {
     motor: TestMotor,
     axis: Axis,
@@ -317,18 +318,14 @@ fn a_reading_that_was_not_believed_is_told_once() {
 #[test]
 fn the_way_back_from_a_wrong_reading_is_no_second_one() {
     for speed in [-60.0, 0.0, 60.0] {
-        let bench = || {
-            let mut bench = Bench::at(speed, &CONFIGURATION);
-            bench.run(AxisRequest::RELEASED, 24);
-            bench
-        };
-        let mut sound = bench();
+        let bench = Bench::at(speed, &CONFIGURATION);
+        let mut sound = bench.clone();
         sound.run(AxisRequest::RELEASED, 12);
         sound.axis.joint_sample();
         sound.run(AxisRequest::RELEASED, 6);
         let expected = sound.axis.joint_sample().encoder_counts;
         for size in (1..=80).flat_map(|size| [size, -size]) {
-            let mut bench = bench();
+            let mut bench = bench.clone();
             bench.sample.encoder_count = bench.sample.encoder_count.wrapping_add_signed(size);
             bench.run(AxisRequest::RELEASED, 12);
             assert_eq!(bench.axis.fault(), None, "{size} counts at {speed} rad/s");
