@@ -1,4 +1,4 @@
-//! What the adaptive beetle swarm learns at the end of an iteration: trust, gradient, metric, whisker length.
+//! What the adaptive beetle swarm learns at the end of a round: trust, gradient, metric, whisker length.
 //!
 //! Why apart from the moves: this is what makes one set of constants serve every function.
 //!   om    grows or shrinks by 10 % per pair of beetles in which the more or the less trusting one gained more
@@ -24,13 +24,13 @@ const TRUST_CHANGE: f64 = 0.1;
 /// Range of the usual whisker length, metric coordinates. Shorter ones cancel in single precision.
 const SHORTEST_WHISKER: f64 = 3e-4;
 const LONGEST_WHISKER: f64 = 0.3;
-/// Decay per iteration where the length follows nothing ([`Part::WhiskerAdaptation`]).
+/// Decay per round where the length follows nothing ([`Part::WhiskerAdaptation`]).
 const WHISKER_DECAY: f64 = 0.95;
-/// Weight of the latest iteration in whisker length and convex share.
+/// Weight of the latest round in whisker length and convex share.
 const SMOOTHING: f64 = 0.3;
 /// Share of convex readings from which the metric learns; in full at 1.
 const CONVEX_SHARE: f64 = 0.7;
-/// How far one iteration stretches towards the measured curvature, and the range of curvature over its mean.
+/// How far one round stretches towards the measured curvature, and the range of curvature over its mean.
 const METRIC_RATE: f64 = 0.7;
 const LEAST_CURVATURE: f64 = 0.25;
 const MOST_CURVATURE: f64 = 4.0;

@@ -2,7 +2,7 @@
 //!
 //! Why: in a badly scaled cost a step that suits one direction is far too long or too short in another. In metric
 //! coordinates, y = A^-1 u, the cost is to look equally curved in all directions. No covariance and no
-//! eigenproblem: every iteration stretches A along the directions in which curvature was just measured.
+//! eigenproblem: every round stretches A along the directions in which curvature was just measured.
 //!
 //! Stretch by al along a unit vector z of metric coordinates, exactly rank 1, inverse kept likewise:
 //!   A = A + (al - 1) (A z) z^T,    A^-1 = A^-1 + z (1/al - 1) (z^T A^-1)

@@ -19,7 +19,7 @@
 //! `Bso<f32, 20, 28>`. Stack, Cortex-M4F, D = 28: `advance` about 1.5 kB; [`Bso::new`] builds the value there
 //! before it is moved (7 kB at opt-level 3, about 45 kB at "s"); [`Bso::restart`] begins anew in place, 1 kB.
 //! Cost: adaptive.rs, paper.rs. The longest piece of work between two evaluations is the end of an adaptive
-//! iteration, 4 D^2 min(N, D) operations (63,000 at D = 28).
+//! round, 4 D^2 min(N, D) operations (63,000 at D = 28).
 
 mod adaptive;
 mod frame;

@@ -47,7 +47,7 @@ pub struct AdaptiveSettings<T> {
     pub individual_learning: T,
     /// c2, pull towards the swarm's best; default 1.4.
     pub global_learning: T,
-    /// Largest speed per coordinate and iteration; default 0.2.
+    /// Largest speed per coordinate and move; default 0.2.
     pub velocity_limit: T,
     /// lambda of Eq. (29), share of the velocity in a move; default 0.2. With 0.4 the tails get longer.
     pub velocity_share: T,

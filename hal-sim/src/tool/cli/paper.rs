@@ -112,12 +112,17 @@ pub fn run(arguments: &PaperArguments) -> Result<u8, ToolError> {
         document::read(path)?;
     }
     let options = PaperOptions { seeds: arguments.seeds, algorithms: arguments.algorithm.clone() };
-    let sections = paper::run(&arguments.parts(), &options)?;
-    if let Some(path) = &arguments.json {
-        write_json(path, &paper::report(&sections))?;
+    let parts = arguments.parts();
+    if !arguments.algorithm.is_empty() && !parts.contains(&Part::TableFour) {
+        return Err(ToolError::input("--algorithm: searches are chosen for table IV only"));
     }
+    let sections = paper::run(&parts, &options)?;
+    // First what cannot fail: runs take minutes.
     for section in &sections {
         tables::print(&format!("{}\n", section.markdown))?;
+    }
+    if let Some(path) = &arguments.json {
+        write_json(path, &paper::report(&sections))?;
     }
     if let Some(directory) = &arguments.out {
         let drawn: Vec<_> = sections.iter().flat_map(|section| section.figures.iter().cloned()).collect();
