@@ -60,7 +60,9 @@ mod tests {
         let mut grip = Grip::new(1, 50.0, 1.0, 2.0);
         assert_eq!(grip.torque(&[0.3, 0.5], &[1.0, 1.0], 0.9), [0.0; 2]);
         assert_eq!(grip.torque(&[0.3, 0.5], &[0.0, 0.0], 1.0), [0.0; 2]);
-        assert_eq!(grip.torque(&[0.4, 0.51], &[0.0, 0.0], 1.5), [0.0, -0.01 * STIFFNESS]);
+        let [hip, knee] = grip.torque(&[0.4, 0.51], &[0.0, 0.0], 1.5);
+        // The angle's difference is rounded.
+        assert!(hip == 0.0 && (knee + 0.01 * STIFFNESS).abs() < 1e-9, "{knee}");
         assert_eq!(grip.torque(&[0.4, 0.4], &[0.0, 0.0], 1.5), [0.0, 50.0]);
         assert_eq!(grip.torque(&[0.4, 0.4], &[0.0, 0.0], 3.0), [0.0; 2]);
     }
