@@ -93,6 +93,7 @@ fn the_swarm_arrives_on_single_base_and_consistent_parameters_of_the_leg() {
         ("chain-raw", 25),
         ("chain-base", 21),
         ("chain-log-cholesky", 36),
+        ("chain-log-cholesky-seen", 27),
         ("leg-raw", 11),
         ("leg-base", 10),
         ("leg-log-cholesky", 24),
@@ -102,6 +103,7 @@ fn the_swarm_arrives_on_single_base_and_consistent_parameters_of_the_leg() {
         ("chain-whole-raw", 31),
         ("chain-whole-base", 25),
         ("chain-whole-log-cholesky", 42),
+        ("chain-whole-log-cholesky-seen", 33),
     ];
     assert_eq!(rows, expected);
     for row in &report.rows {
