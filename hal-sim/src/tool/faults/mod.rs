@@ -6,7 +6,7 @@
 //! | [`catalogue`], [`draw`] | what is done to the machine, and what has to follow; rows by group |
 //! | [`run`], [`invariants`] | one run, and what holds in each of its periods |
 //! | [`campaign`] | many runs, forked from identifications |
-//! | [`bench`] | rows that are no forks: parts, calibrations, identifications of ideal drives |
+//! | [`mod@bench`] | rows that are no forks: parts, calibrations, identifications of ideal drives |
 //! | [`trial`] | every channel spoilt in every way, and two faults at once: nothing may be broken |
 //! | [`hours`] | normal motion, in which nothing may be raised |
 //! | [`recording`] | a run's curves |
