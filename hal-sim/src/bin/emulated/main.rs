@@ -33,11 +33,12 @@ use defmt_semihosting as _;
 use embassy_executor::{SpawnToken, raw};
 use heapless::spsc::Queue;
 use rehearsal::Start;
+use scarab::board::odrive_v3_6::settings::analog;
 use scarab::board::{crash, stack};
 use scarab::leg::{Control, Filters};
 use scarab::task::interlock::{self, Cause};
 use scarab::task::surroundings::{Introduction, Surroundings, crashed};
-use scarab::task::{identify, leg, links, servo};
+use scarab::task::{identify, leg, links, servo, statistics};
 use scarab::trace::Record;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -78,6 +79,11 @@ fn spin<S>(task: SpawnToken<S>) -> ! {
 
 /// How `embassy_executor` knows the thread's executor: it is woken by an event.
 const THREAD: usize = usize::MAX;
+
+/// Of the bus voltage, as on a board of 56 V.
+const DIVIDER: f32 = 19.0;
+/// The bus.
+const BUS_V: f32 = 48.0;
 
 const SURROUNDINGS: Surroundings = Surroundings {
     clock: clock::instructions,
@@ -121,8 +127,11 @@ fn hand_out(start: Start) -> identify::Thread {
         findings.1,
         drive.0,
         told.0,
+        DIVIDER,
         SURROUNDINGS.clock,
     ));
+    // The ideal drives need no supply; the leg is shown one that neither derates nor dies.
+    statistics::BUS[0].set((BUS_V / analog::sense(DIVIDER).volt_per_code.0) as u32);
     if let Some(mut home) = servo::SERVO.try_lock() {
         *home = Some(servo);
     }
