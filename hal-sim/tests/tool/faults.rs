@@ -59,6 +59,30 @@ fn the_same_seeds_leave_the_same_trace_and_one_of_them_is_repeated_alone() {
     assert!(all.printed.contains("trace hash"), "{}", all.printed);
 }
 
+/// The hash of all runs is made from those of the runs that are repeated alone: all of them the same to the bit.
+#[test]
+fn runs_of_the_sweep_and_of_two_faults_are_repeated_alone() {
+    for kind in ["sweep", "pairs"] {
+        let all = report(&format!("--fault {kind} --seeds 3"), 0);
+        assert_eq!((&all["rows"], &all["trials"][0]["runs"]), (&Value::Array(vec![]), &3.into()));
+        let folder = Folder::new();
+        let alone: String = (1..=3)
+            .map(|seed| {
+                let line = format!("faults --seconds 1 --fault {kind} --replay {seed} --report");
+                let printed = scarab(&line, &[&folder.path("run.html")]).ends_with(0).printed;
+                let told = printed.split_once(&format!("{kind} seed {seed}: ")).expect("it is told").1;
+                told.split_once("hash ").expect("its hash").1[..16].to_owned()
+            })
+            .collect();
+        let folded = alone.bytes().fold(0_u64, |hash, byte| {
+            hash.rotate_left(5).wrapping_mul(0x0000_0100_0000_01b3) ^ u64::from(byte)
+        });
+        assert_eq!(all["trace_hash"], format!("{folded:016x}"));
+        let page = std::fs::read_to_string(folder.path("run.html")).expect("written");
+        assert!(page.contains("<svg") && page.contains(&format!("{kind}, seed 3")));
+    }
+}
+
 #[test]
 fn a_detector_that_is_switched_off_is_noticed() {
     let rows = ["E4", "C2", "C3", "C4", "V1", "V2", "N1", "X1", "X2", "K1"];

@@ -8,11 +8,12 @@ use clap::Args;
 use super::common::write_json;
 use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
-use crate::tool::faults::campaign::{CampaignOptions, campaign};
+use crate::tool::faults::campaign::{Campaign, CampaignOptions, campaign};
 use crate::tool::faults::entry::{Entry, entries};
 use crate::tool::faults::hours::hours;
 use crate::tool::faults::report::{CampaignReport, told};
 use crate::tool::faults::run::{Manner, Outcome};
+use crate::tool::faults::trial::KINDS;
 use crate::tool::html::{self, Circumstances};
 use crate::tool::leg_file::LegFile;
 use crate::tool::paper::document;
@@ -26,7 +27,8 @@ const MOST_SEEDS: u64 = 1_000_000;
 pub struct FaultsArguments {
     #[command(flatten)]
     leg: LegOptions,
-    /// A row of the catalogue by its id; may be repeated. All of them unless given.
+    /// A row of the catalogue by its id, or `sweep` or `pairs`, of which then as many are run as of a row; may be repeated. All rows
+    /// unless given.
     #[arg(long, value_name = "ID")]
     fault: Vec<String>,
     /// Runs of each fault.
@@ -36,11 +38,11 @@ pub struct FaultsArguments {
     #[arg(long)]
     every_tick: bool,
     /// Runs of the sweep: each channel of a sensor spoilt in each way; nothing may be broken.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MOST_SEEDS))]
-    sweep: u64,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=MOST_SEEDS))]
+    sweep: Option<u64>,
     /// Runs of two random faults within 50 ms; nothing may be broken.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MOST_SEEDS))]
-    pairs: u64,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=MOST_SEEDS))]
+    pairs: Option<u64>,
     /// Simulated hours of normal motion with noise and a pushing wearer; nothing may be raised.
     #[arg(long, value_name = "H", default_value_t = 0.0)]
     hours: f64,
@@ -50,8 +52,9 @@ pub struct FaultsArguments {
     /// Switch the detectors of each fault off: the campaign has to fail for each, or nothing would notice a broken one. Exit code 0 if it does.
     #[arg(long, conflicts_with = "every_tick")]
     blind: bool,
-    /// Only the run of this seed of each fault, told in full.
-    #[arg(long, value_name = "SEED", conflicts_with_all = ["seeds", "every_tick"], value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
+    /// Only the run of this seed of each fault, told in full; `--fault sweep` and `--fault pairs` name runs of those. It is the same run to
+    /// the bit where --seconds, the leg and the program are.
+    #[arg(long, value_name = "SEED", conflicts_with_all = ["seeds", "every_tick", "sweep", "pairs"], value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     replay: Option<u64>,
     /// Inject only in the first seconds of each identification.
     #[arg(long, value_name = "S")]
@@ -70,9 +73,10 @@ pub struct FaultsArguments {
 fn rows(names: &[String]) -> Result<Vec<Entry>, ToolError> {
     let all = entries();
     for name in names {
-        if !all.iter().any(|entry| entry.head().id == name) {
+        if !all.iter().any(|entry| entry.head().id == name) && !KINDS.contains(&name.as_str()) {
             let mut known: Vec<_> = all.iter().map(|entry| entry.head().id).collect();
             known.dedup();
+            known.extend(KINDS);
             return Err(ToolError::input(format!("--fault {name}: is none of {}", known.join(", "))));
         }
     }
@@ -80,8 +84,9 @@ fn rows(names: &[String]) -> Result<Vec<Entry>, ToolError> {
     Ok(all.into_iter().filter(is_asked).collect())
 }
 
-fn page(leg: &LegFile, report: &CampaignReport, outcomes: &[Outcome]) -> Result<String, ToolError> {
-    let recorded = || outcomes.iter().filter_map(|outcome| Some((outcome, outcome.recording.as_ref()?)));
+fn page(leg: &LegFile, report: &CampaignReport, found: &Campaign) -> Result<String, ToolError> {
+    let all = || found.outcomes.iter().chain(&found.trials);
+    let recorded = || all().filter_map(|outcome: &Outcome| Some((outcome, outcome.recording.as_ref()?)));
     let lines: Vec<String> = recorded().map(|(outcome, _)| told(outcome)).collect();
     let figures = recorded()
         .map(|(outcome, recording)| {
@@ -101,6 +106,10 @@ const FULL_HOURS: f64 = 10.0;
 const SEEDS: u64 = 20;
 
 impl FaultsArguments {
+    fn names(&self, kind: &str) -> bool {
+        self.fault.iter().any(|name| name == kind)
+    }
+
     fn options(&self) -> Result<CampaignOptions, ToolError> {
         let mut rows = rows(&self.fault)?;
         if self.blind {
@@ -119,14 +128,23 @@ impl FaultsArguments {
         if !(0.0..=1000.0).contains(&self.hours) {
             return Err(ToolError::input(format!("--hours: {} is not from 0 to 1000", self.hours)));
         }
-        let of_full = |given: u64, full: u64| if self.full && given == 0 { full } else { given };
         let seeds = self.seeds.unwrap_or(if self.full { FULL_SEEDS } else { SEEDS });
+        let seeds: Vec<u64> = self.replay.map_or_else(|| (1..=seeds).collect(), |seed| vec![seed]);
+        // Named, as many as of a row; without any name all of them are meant, in the full campaign.
+        let trials = |kind: &str, given: Option<u64>, full: u64| match given {
+            Some(most) => (1..=most).collect(),
+            None if self.full && (self.fault.is_empty() || self.names(kind)) => {
+                (1..=full).collect()
+            }
+            None if self.names(kind) => seeds.clone(),
+            None => Vec::new(),
+        };
         Ok(CampaignOptions {
+            sweep: trials(KINDS[0], self.sweep, FULL_SWEEP),
+            pairs: trials(KINDS[1], self.pairs, FULL_PAIRS),
             rows,
-            seeds: self.replay.map_or_else(|| (1..=seeds).collect(), |seed| vec![seed]),
+            seeds,
             every_tick: self.every_tick || self.full && self.fault.is_empty(),
-            sweep: of_full(self.sweep, FULL_SWEEP),
-            pairs: of_full(self.pairs, FULL_PAIRS),
             manner: Manner { blind: self.blind, recorded: self.replay.is_some(), brief: false },
             seconds: self.seconds,
         })
@@ -157,12 +175,12 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
         whole_s - injected_s
     ))?;
     if arguments.replay.is_some() {
-        for outcome in &found.outcomes {
+        for outcome in found.outcomes.iter().chain(&found.trials) {
             tables::print(&format!("{}\n", told(outcome)))?;
         }
     }
     if let Some(path) = &arguments.report {
-        let page = page(&leg, &report, &found.outcomes)?;
+        let page = page(&leg, &report, &found)?;
         std::fs::write(path, page).map_err(|error| ToolError::cannot_write(path, &error))?;
         tables::print(&format!("report: {}\n", path.display()))?;
     }

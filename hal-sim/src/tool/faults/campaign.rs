@@ -52,10 +52,10 @@ pub struct CampaignOptions {
     pub every_tick: bool,
     /// Each row's detectors are switched off, curves are kept.
     pub manner: Manner,
-    /// Runs of the sweep.
-    pub sweep: u64,
-    /// Runs of two faults at once.
-    pub pairs: u64,
+    /// Seeds of the sweep's runs.
+    pub sweep: Vec<u64>,
+    /// Seeds of the runs of two faults at once.
+    pub pairs: Vec<u64>,
     /// Only so much of each identification, s.
     pub seconds: Option<f64>,
 }
@@ -102,8 +102,8 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
     let bounds = bounds(leg)?;
     let ids: Vec<&str> = options.rows.iter().map(|entry| entry.head().id).collect();
     let twice = |id: &str| ids.iter().filter(|other| **other == id).count() > 1;
-    let mut bases: Vec<u64> = options.seeds.iter().map(|seed| base_of(*seed)).collect();
-    bases.extend((1..=options.sweep.max(options.pairs)).step_by(RUNS_PER_BASE as usize).map(base_of));
+    let seeds = options.seeds.iter().chain(&options.sweep).chain(&options.pairs);
+    let mut bases: Vec<u64> = seeds.map(|seed| base_of(*seed)).collect();
     if options.every_tick {
         bases.push(base_of(1));
     }
@@ -210,14 +210,14 @@ impl Setting<'_> {
                 jobs.push((period, Job::Row { row, scenario, seed, brief: false }));
             }
         }
-        let mut trials = |most: u64, kind: &str, trial: &dyn Fn(u64) -> Trial| {
-            for seed in (1..=most).filter(|seed| base_of(*seed) == base) {
+        let mut trials = |seeds: &[u64], kind: &str, trial: &dyn Fn(u64) -> Trial| {
+            for seed in seeds.iter().copied().filter(|seed| base_of(*seed) == base) {
                 let period = Dice::new(kind, seed).below(self.length);
                 jobs.push((period, Job::Trial { trial: Box::new(trial(seed)), seed }));
             }
         };
-        trials(options.sweep, "sweep", &Trial::sweep);
-        trials(options.pairs, "pairs", &|seed| Trial::pair(seed, &self.bounds));
+        trials(&options.sweep, "sweep", &Trial::sweep);
+        trials(&options.pairs, "pairs", &|seed| Trial::pair(seed, &self.bounds));
         jobs
     }
 
@@ -249,7 +249,7 @@ impl Setting<'_> {
                 let manner = Manner { brief: *brief, ..self.manner };
                 (false, run(self.leg, row, scenario, *seed, manner, rig))
             }
-            Job::Trial { trial, seed } => (true, trial.run(self.leg, *seed, rig)),
+            Job::Trial { trial, seed } => (true, trial.run(self.leg, *seed, self.manner.recorded, rig)),
         };
         let (trials, rows): (Vec<_>, Vec<_>) =
             batch.par_iter().map(of).collect::<Vec<_>>().into_iter().partition(|(trial, _)| *trial);

@@ -70,6 +70,19 @@ impl Entry {
     }
 }
 
+/// Where the firmware leads a row beside the state of the catalogue, or instead of it: what the catalogue wants takes something that
+/// the fault itself took away.
+#[must_use]
+pub fn instead(id: &str) -> Option<&'static str> {
+    match id {
+        // Damping needs the rotor's angle.
+        "E4" => Some("Short"),
+        // A servo that does not answer cannot damp.
+        "K1" => Some("Off"),
+        _ => None,
+    }
+}
+
 /// All rows, in the catalogue's order.
 #[must_use]
 pub fn entries() -> Vec<Entry> {

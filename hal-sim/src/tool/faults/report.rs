@@ -4,7 +4,7 @@ use scarab::safety::FaultCode;
 use serde::Serialize;
 
 use super::campaign::Campaign;
-use super::entry::{Entry, Head};
+use super::entry::{Entry, Head, instead};
 use super::hours::HoursReport;
 use super::run::Outcome;
 use super::trial::KINDS;
@@ -35,7 +35,9 @@ pub struct RowReport {
     pub deadline_ms: Number,
     /// Where it leads: the catalogue's last column.
     pub state: &'static str,
-    /// Runs in which that state was reached.
+    /// What the firmware does instead, by design: docs/safety.md says why.
+    pub state_instead: Option<&'static str>,
+    /// Runs in which either of them was reached.
     pub state_reached: usize,
     /// Runs in which there was nothing that could be seen.
     pub undetectable_by_design: usize,
@@ -200,7 +202,10 @@ impl RowReport {
             self.runs.to_string(),
             self.detected.to_string(),
             format!("{} / {}", number(self.worst_ms, 3), number(self.deadline_ms, 3)),
-            format!("{} ({})", self.state, self.state_reached),
+            match self.state_instead {
+                None => format!("{} ({})", self.state, self.state_reached),
+                Some(instead) => format!("{}; here {instead} ({})", self.state, self.state_reached),
+            },
             self.missed.to_string(),
             self.undetectable_by_design.to_string(),
             smallest,
@@ -254,7 +259,11 @@ fn row_report(row: &Head, outcomes: &[Outcome]) -> RowReport {
         worst_ms: worst.into(),
         deadline_ms: row.deadline_ms.into(),
         state: row.state,
-        state_reached: count(&|outcome| outcome.state.is_some_and(|state| row.state.contains(state))),
+        state_instead: instead(row.id),
+        state_reached: count(&|outcome| {
+            let leads = |state: &str| row.state.contains(state) || instead(row.id).is_some_and(|to| to.contains(state));
+            outcome.state.is_some_and(leads)
+        }),
         undetectable_by_design: count(&|outcome| outcome.undetectable),
         what: row.fault,
         detector: row.detector,

@@ -15,6 +15,7 @@ use super::catalogue::{Bounds, Event, JOINTS, rows};
 use super::dice::Dice;
 use super::event::apply;
 use super::invariants::{Invariants, Scope};
+use super::recording::Recording;
 use super::rig::{PERIODS_PER_S, Rig};
 use super::run::Outcome;
 use crate::faults::{Channel, Form, Injection, Injector, Timing};
@@ -130,16 +131,29 @@ impl Trial {
         }
     }
 
-    /// On a fork of `base`.
+    /// On a fork of `base`; `recorded` keeps its curves.
     #[must_use]
-    pub fn run<const B: usize>(&self, leg: &LegFile, seed: u64, base: &Rig<JOINTS, B>) -> Outcome {
-        catch_unwind(AssertUnwindSafe(|| self.watched(leg, seed, base))).unwrap_or_else(|_| {
+    pub fn run<const B: usize>(
+        &self,
+        leg: &LegFile,
+        seed: u64,
+        recorded: bool,
+        base: &Rig<JOINTS, B>,
+    ) -> Outcome {
+        catch_unwind(AssertUnwindSafe(|| self.watched(leg, seed, recorded, base))).unwrap_or_else(|_| {
             let broken = vec!["a panic".into()];
             self.outcome(seed, base, None, broken, String::new())
         })
     }
 
-    fn watched<const B: usize>(&self, leg: &LegFile, seed: u64, base: &Rig<JOINTS, B>) -> Outcome {
+    fn watched<const B: usize>(
+        &self,
+        leg: &LegFile,
+        seed: u64,
+        recorded: bool,
+        base: &Rig<JOINTS, B>,
+    ) -> Outcome {
+        let mut recording = recorded.then(Recording::default);
         let mut rig = base.clone();
         let begun = rig.period;
         rig.injector = Injector::new(seed);
@@ -160,6 +174,9 @@ impl Trial {
             let stop = rig.injector.happens(Channel::EmergencyStop, 0, rig.period);
             rig.advance();
             invariants.see(&rig, stop);
+            if let Some(recording) = &mut recording {
+                recording.see(&rig, begun);
+            }
             alarm = alarm.or(rig.alarm());
             safe_since = if rig.is_switching() { None } else { safe_since.or(Some(since)) };
             let over = safe_since.is_some_and(|safe| since >= safe.max(self.last) + AFTERWARDS);
@@ -169,7 +186,7 @@ impl Trial {
             }
         }
         let hash = format!("{:016x}", rig.hash);
-        self.outcome(seed, base, alarm, invariants.into_broken(), hash)
+        Outcome { recording, ..self.outcome(seed, base, alarm, invariants.into_broken(), hash) }
     }
 
     fn outcome<const B: usize>(
