@@ -133,9 +133,7 @@ impl FaultsArguments {
         // Named, as many as of a row; without any name all of them are meant, in the full campaign.
         let trials = |kind: &str, given: Option<u64>, full: u64| match given {
             Some(most) => (1..=most).collect(),
-            None if self.full && (self.fault.is_empty() || self.names(kind)) => {
-                (1..=full).collect()
-            }
+            None if self.full && (self.fault.is_empty() || self.names(kind)) => (1..=full).collect(),
             None if self.names(kind) => seeds.clone(),
             None => Vec::new(),
         };

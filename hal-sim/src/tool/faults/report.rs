@@ -261,7 +261,9 @@ fn row_report(row: &Head, outcomes: &[Outcome]) -> RowReport {
         state: row.state,
         state_instead: instead(row.id),
         state_reached: count(&|outcome| {
-            let leads = |state: &str| row.state.contains(state) || instead(row.id).is_some_and(|to| to.contains(state));
+            let leads = |state: &str| {
+                row.state.contains(state) || instead(row.id).is_some_and(|to| to.contains(state))
+            };
             outcome.state.is_some_and(leads)
         }),
         undetectable_by_design: count(&|outcome| outcome.undetectable),
