@@ -128,6 +128,12 @@ impl SpeedTracker {
         Self { estimate: angle, speed: 0.0 }
     }
 
+    /// Turning at an angle, electrical rad/s.
+    #[must_use]
+    pub const fn turning(angle: ElectricalAngle, rad_per_s: f32) -> Self {
+        Self { estimate: angle, speed: rad_per_s / (RADIAN_PER_UNIT * CURRENT_RATE_HZ as f32) }
+    }
+
     /// Takes in the angle of one tick.
     pub fn track(&mut self, angle: ElectricalAngle) {
         let error = angle.0.wrapping_sub(self.estimate.0).cast_signed() as f32;

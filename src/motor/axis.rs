@@ -21,9 +21,12 @@
 //! Once per joint sample the voltages are held against currents and speed ([`ModelWatch`]): an open phase and a drifted zero
 //! release, a frozen counter makes the motor a passive brake ([`Axis::brake`]), since a leg whose encoder is gone should not drop.
 //!
-//! **Known limit.** Below the speed that [`ModelWatch`] derives a counter that stops looks like a rotor that is held: the current keeps
-//! its direction, the torque falls with the cosine of what is missed and the rotor comes to rest a quarter of an electrical turn
-//! further. The index sees it where counts come back too few. Without an index lost counts are not seen.
+//! **A brake has bounds.** A shorted motor carries `w flux / sqrt(R^2 + w^2 L^2)`. Where that is more than the overcurrent bound, above
+//! 2.5 rad/s of a joint of the default leg, it is released instead, as an overcurrent; so it is when its current passes the bound.
+//!
+//! **Known limit.** At a lower speed than [`ModelWatch`] derives, and a current that hardly changes, a counter that stops looks
+//! like a rotor that is held: the torque falls with the cosine of what is missed, the rotor comes to rest a quarter of an electrical
+//! turn further. The index sees it where counts come back too few. Without an index lost counts are not seen.
 //!
 //! **Signs.** Inside, positive current makes torque towards growing electrical angle. Outside, counts and current both grow
 //! with the joint's flexion: [`AxisConfiguration::flexion`] says which way the counter runs then.
@@ -37,7 +40,7 @@ use super::model_watch::Shown;
 use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, ShuntWatch, SpeedTracker};
 use crate::checksum::Checksum;
 use crate::hal::{AxisCommand, AxisSample, JointSample};
-use crate::real::{clamp, is_finite};
+use crate::real::{abs, clamp, is_finite};
 use crate::units::{Ampere, RadianPerSecond};
 
 mod window;
@@ -131,6 +134,8 @@ pub struct Axis {
     /// A count since the last joint sample was not believed.
     disbelieved: bool,
     fault: Option<AxisFault>,
+    /// Of place or parameters, whatever was found since.
+    lost: bool,
 }
 
 impl Axis {
@@ -164,6 +169,7 @@ impl Axis {
             doubtful: false,
             disbelieved: false,
             fault: None,
+            lost: false,
         })
     }
 
@@ -194,11 +200,16 @@ impl Axis {
             _ => Wish::Released,
         };
         self.last = self.step(sample, wish).unwrap_or_else(|fault| {
-            self.fault = Some(fault);
+            self.found(fault);
             self.current_loop.reset();
             AxisCommand::RELEASED
         });
         self.last
+    }
+
+    fn found(&mut self, fault: AxisFault) {
+        self.fault = Some(fault);
+        self.lost |= matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters);
     }
 
     fn step(&mut self, sample: &AxisSample, wish: Wish) -> Result<AxisCommand, AxisFault> {
@@ -263,6 +274,9 @@ impl Axis {
             return Err(AxisFault::Overcurrent);
         }
         let Wish::Follow(wanted) = wish else {
+            if abs(self.speed.rad_per_s()) > constants.brake_speed {
+                return Err(AxisFault::Overcurrent);
+            }
             self.current_loop.reset();
             return Ok(AxisCommand::BRAKE);
         };
@@ -323,9 +337,11 @@ impl Axis {
         // Every 64 ms.
         self.unchecked = self.unchecked.wrapping_add(1);
         if self.unchecked == 0 && self.constants.checksum() != self.checksum {
-            self.fault = Some(AxisFault::Parameters);
+            self.found(AxisFault::Parameters);
         }
-        if self.last.enabled && self.fault.is_none() && self.window.ticks > 0 {
+        // A motor that brakes is given no voltage that could be held against anything.
+        let follows = self.last.enabled && self.last != AxisCommand::BRAKE;
+        if follows && self.fault.is_none() && self.window.ticks > 0 {
             let angle = self.angle();
             let shown = Shown {
                 current_loop: &self.current_loop,
@@ -335,7 +351,14 @@ impl Axis {
                 angle,
                 sine: self.constants.sine,
             };
-            self.fault = self.model_watch.look(&self.constants.model, &shown);
+            if let Some(fault) = self.model_watch.look(&self.constants.model, &shown) {
+                if fault == AxisFault::EncoderFrozen {
+                    // Whether a brake may begin is a matter of the speed that was not counted.
+                    self.speed =
+                        SpeedTracker::turning(angle, self.model_watch.uncounted(&self.constants.model));
+                }
+                self.found(fault);
+            }
         }
         let sample = self.window.mean().unwrap_or(JointSample {
             encoder_counts: self.counts,
@@ -366,12 +389,10 @@ impl Axis {
 
     /// Forgets a fault, so that a request may enable again; `false` where the place was lost.
     pub fn clear_fault(&mut self) -> bool {
-        let lost =
-            matches!(self.fault, Some(AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters));
-        if !lost {
+        if !self.lost {
             self.fault = None;
         }
-        !lost
+        !self.lost
     }
 }
 

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::checksum::Checksum;
 use crate::hal::CURRENT_RATE_HZ;
+use crate::real::{min, sqrt};
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
 
 /// Which way something runs.
@@ -161,6 +162,8 @@ pub(super) struct Constants {
     pub model: ModelLimits,
     pub current_limit: f32,
     pub overcurrent_square: f32,
+    /// Electrical, rad/s; of a shorted motor that carries the overcurrent bound.
+    pub brake_speed: f32,
 }
 
 impl Constants {
@@ -171,8 +174,14 @@ impl Constants {
             u32::from(self.bus_codes[0]) | u32::from(self.bus_codes[1]) << 16,
             self.greatest_step.cast_unsigned(),
         ];
-        let limits =
-            [self.zeros[0], self.zeros[1], self.current_sign, self.current_limit, self.overcurrent_square];
+        let limits = [
+            self.zeros[0],
+            self.zeros[1],
+            self.current_sign,
+            self.current_limit,
+            self.overcurrent_square,
+            self.brake_speed,
+        ];
         words.into_iter().fold(self.gains.add_to(Checksum::EMPTY), Checksum::word).numbers(limits)
     }
 
@@ -211,6 +220,14 @@ impl Constants {
             model: ModelLimits::new(configuration, &motor, scale),
             current_limit: configuration.current_limit.0,
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
+            brake_speed: brake_speed(&motor, configuration.overcurrent),
         })
     }
+}
+
+/// Electrical speed at which a shorted motor carries a current, rad/s: `i R / sqrt(flux^2 - (i L)^2)`; infinite where none does.
+fn brake_speed(motor: &MotorConstants, current: Ampere) -> f32 {
+    let reactance = current.0 * min(motor.direct_inductance.0, motor.quadrature_inductance.0);
+    let square = motor.flux.0 * motor.flux.0 - reactance * reactance;
+    if square > 0.0 { current.0 * motor.resistance.0 / sqrt(square) } else { f32::INFINITY }
 }

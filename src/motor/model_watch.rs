@@ -9,6 +9,7 @@
 //! r = s - R i - (coupling and back-EMF, where they are not fed forward)                       d and q, each servo period
 //! |r| > V + 0.35 R |i| + |w| (0.2 flux + 0.3 L |i|)     32 periods more often than not         open, or frozen
 //! |mean of r, turned back to the stator, over an electrical turn| > 0.4 V + 0.06 R I           drifted zero
+//! max q - min q > I / 3 since the counter last moved by more than 2 counts                32 periods in a row: frozen
 //! V = 2 * 4/3 t_d f V_bus                               what dead time and switches take, twice; 0.44 V on the board
 //! ```
 //!
@@ -17,8 +18,14 @@
 //!
 //! **Frozen counter** (E1): r is the whole back-EMF, seen where `w flux > V + 0.35 R |i|` ([`ModelLimits::frozen_speed`]): on the
 //! default leg 0.44 rad/s of the joint without current, 1.3 rad/s with the greatest, 8 ms after the loop's speed has followed
-//! the counts to zero (1 ms). Below, and at rest, it is not seen. It is told apart by counts that stand still; a residual beyond the
-//! back-EMF of the greatest speed is none.
+//! the counts to zero (1 ms). It is told apart by counts that stand still; a residual beyond the back-EMF of the greatest speed is
+//! none.
+//!
+//! **Slower, or at rest**: whoever controls a place that no longer changes pulls harder and harder. A current that has changed by a
+//! third of its limit (19 A, 28 N m on the default leg) moves a rotor by more than 2 counts (0.03 mrad of that joint) within
+//! 8 ms, unless it has more than 20 kg m^2 to move, friction takes more than 28 N m from one side to the other (9 here), or what
+//! holds it is stiffer than 1e6 N m/rad (gears have 1e4 to 1e5; a hand 2e3). Up to that change, and so up to a torque that is wrong
+//! by 28 N m, a frozen counter is not seen. A rotor that is clamped itself, as on a test bench, is taken for a frozen counter.
 //!
 //! **Open phase** (P1): what is asked of the open phase cannot flow, the integral runs away and passes any limit; without current
 //! nothing is asked and nothing is seen. At rest it may be taken for a frozen counter: two phases brake as well. **Drifted zero** (C1): an offset o of one shunt leaves 2/sqrt(3) |R + j w L| o, at rest in the
@@ -28,13 +35,13 @@
 //! 3 ms, or turn back, are not judged.
 //!
 //! False alarms: those of the simulated hours in docs/safety.md; the margin between a healthy motor's residual and the limits has not been
-//! measured on a motor. Source: parity equation of a linear model, Isermann, Fault-Diagnosis Systems (2006), chapter 10. Cost: `scripts/count-instructions`, joint sample; 24 bytes.
+//! measured on a motor. Source: parity equation of a linear model, Isermann, Fault-Diagnosis Systems (2006), chapter 10. Cost: `scripts/count-instructions`, joint sample; 44 bytes.
 
 use super::axis::AxisFault;
 use super::configuration::AxisConfiguration;
 use super::{CountScale, CurrentLoop, ElectricalAngle, MotorConstants, Rotating, Sine, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
-use crate::real::abs;
+use crate::real::{abs, max, min, sqrt};
 use crate::units::Ampere;
 
 /// Periods of the servo that a residual has to be too large more often than not: 8 ms.
@@ -45,6 +52,8 @@ const LONGEST_TURN: u8 = 100;
 const SHORTEST_TURN: u8 = 12;
 /// Counts within which a counter stands still: an edge that a sensor sits on.
 const STANDSTILL: i32 = 2;
+/// Of the greatest current: a change that no rotor takes without moving.
+const SWING_SHARE: f32 = 1.0 / 3.0;
 /// Both halves of the vector that dead time makes, and as much again.
 const DEAD_VECTORS: f32 = 2.0 * 4.0 / 3.0;
 /// Shares by which constants may be off.
@@ -71,6 +80,7 @@ pub struct ModelLimits {
     back_emf_square: f32,
     scale: CountScale,
     back_emf_per_speed: f32,
+    swing_a: f32,
 }
 
 impl ModelLimits {
@@ -100,6 +110,7 @@ impl ModelLimits {
             back_emf_square: back_emf * back_emf,
             scale,
             back_emf_per_speed: motor.flux.0,
+            swing_a: SWING_SHARE * configuration.current_limit.0,
         }
     }
 
@@ -107,6 +118,17 @@ impl ModelLimits {
     #[must_use]
     pub fn frozen_speed(&self, current: Ampere) -> f32 {
         (self.still_v + self.volt_per_ampere * current.0) / self.back_emf_per_speed
+    }
+
+    /// Change of the current above which a counter that stands still is seen at any speed.
+    #[must_use]
+    pub fn frozen_swing(&self) -> Ampere {
+        Ampere(self.swing_a)
+    }
+
+    fn is_still(&self, place: i32, before: i32) -> bool {
+        let distance = self.scale.within_turn(place - before);
+        distance <= STANDSTILL || self.scale.counts_per_turn() - distance <= STANDSTILL
     }
 }
 
@@ -140,6 +162,38 @@ pub struct ModelWatch {
     way: f32,
     periods: u8,
     angle: Option<ElectricalAngle>,
+    still: Still,
+    /// Of the last period's residual, V^2.
+    square: f32,
+}
+
+/// A counter that stands still, and what its motor was given meanwhile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Still {
+    place: i32,
+    least_a: f32,
+    most_a: f32,
+    /// Periods since the current changed too much.
+    overdue: u8,
+}
+
+impl Still {
+    const fn at(place: i32) -> Self {
+        Self { place, least_a: f32::INFINITY, most_a: f32::NEG_INFINITY, overdue: 0 }
+    }
+
+    /// One servo period: whether nothing moved although it should have.
+    fn look(&mut self, limits: &ModelLimits, place: i32, current_a: f32) -> bool {
+        if !limits.is_still(place, self.place) {
+            *self = Self::at(place);
+        }
+        self.least_a = min(self.least_a, current_a);
+        self.most_a = max(self.most_a, current_a);
+        if self.most_a - self.least_a > limits.swing_a {
+            self.overdue += 1;
+        }
+        self.overdue >= PATIENCE
+    }
 }
 
 impl ModelWatch {
@@ -151,13 +205,22 @@ impl ModelWatch {
         way: 0.0,
         periods: 0,
         angle: None,
+        still: Still::at(0),
+        square: 0.0,
     };
+
+    /// Electrical speed of which the last period's residual would be the back-EMF, rad/s.
+    #[must_use]
+    pub fn uncounted(&self, limits: &ModelLimits) -> f32 {
+        sqrt(self.square) / limits.back_emf_per_speed
+    }
 
     /// One servo period: what is wrong, if anything.
     #[must_use]
     pub fn look(&mut self, limits: &ModelLimits, now: &Shown<'_>) -> Option<AxisFault> {
         let residual = residual(limits, now);
         let square = residual.d * residual.d + residual.q * residual.q;
+        self.square = square;
         let speed = abs(now.speed_rad_per_s);
         let current = abs(now.current.d.0) + abs(now.current.q.0);
         let limit = limits.still_v
@@ -173,11 +236,12 @@ impl ModelWatch {
             self.suspicion += 1;
             if self.suspicion >= PATIENCE {
                 self.suspicion = 0;
-                let distance = limits.scale.within_turn(now.place - self.place);
-                let still = distance <= STANDSTILL || limits.scale.counts_per_turn() - distance <= STANDSTILL;
-                let frozen = still && square <= limits.back_emf_square;
+                let frozen = limits.is_still(now.place, self.place) && square <= limits.back_emf_square;
                 return Some(if frozen { AxisFault::EncoderFrozen } else { AxisFault::OpenPhase });
             }
+        }
+        if self.still.look(limits, now.place, now.current.q.0) {
+            return Some(AxisFault::EncoderFrozen);
         }
         self.turn(limits, now, residual).then_some(AxisFault::CurrentZero)
     }

@@ -255,10 +255,9 @@ impl AxisLoop {
                 if let Stage::Running(axis) = &mut self.stage {
                     // A place that was lost stays lost: only a new calibration helps, and the fault is told again. A motor
                     // that brakes is let go, and to be calibrated as well.
-                    let lost = matches!(axis.fault(), Some(AxisFault::EncoderFrozen | AxisFault::Encoder));
-                    let _ = axis.clear_fault();
+                    let is_clear = axis.clear_fault();
                     self.faulted = None;
-                    if lost {
+                    if !is_clear {
                         self.stage = Stage::Off;
                     }
                 }

@@ -61,6 +61,15 @@ pub enum Onset {
         /// A.
         current: f64,
     },
+    /// While the joint of the first injection turns faster than this, or from when more and less was asked of it since, A.
+    Uncounted {
+        /// rad/s.
+        speed: f64,
+        /// And so much more for each ampere that is asked for, rad/s.
+        per_ampere: f64,
+        /// Between the most and the least, A.
+        swing: f64,
+    },
     /// While the current that is asked of the phase whose shunt is spoilt differs from that at the injection by more, A.
     Asked(f64),
 }
@@ -143,6 +152,8 @@ pub struct Bounds {
     pub bus_v: [f64; 2],
     /// Of a joint, rad/s, and rad/s for each ampere: above, back-EMF is more than dead time and warm copper; the higher of both joints.
     pub frozen_speed: [f64; 2],
+    /// Change of the current that no rotor takes without moving, A; the higher of both joints.
+    pub frozen_swing_a: f64,
     /// Of a joint, rad/s: an electrical turn takes 25 ms.
     pub judged_speed: f64,
     /// Offset of a shunt whose voltage is more than that of dead time and of what changes within a turn, A.

@@ -109,8 +109,13 @@ struct Watched<'a, const B: usize> {
     onset: Option<u64>,
     /// Counts of the joints at the injection, and the widest way from there.
     counts: [f64; JOINTS],
-    /// What was asked of the phases with shunts at the injection, A.
+    /// What was asked of the phases with shunts at the injection, and in the period before this one, A.
     asked: [f64; 2],
+    before: [f64; 2],
+    /// Largest change of it within a period since then, A.
+    steepest: [f64; 2],
+    /// Least and most that was asked of the joint since the injection, A.
+    swing: [f64; 2],
     hold: Hold,
     recording: Option<Recording>,
     brief: bool,
@@ -167,6 +172,9 @@ impl<'a, const B: usize> Watched<'a, B> {
             onset,
             counts: rig.world.anatomical_position(),
             asked: asked(&rig, scenario.injections[0].map_or(0, |injection| injection.joint)),
+            before: [f64::NAN; 2],
+            steepest: [0.0; 2],
+            swing: [f64::INFINITY, f64::NEG_INFINITY],
             hold: Hold::default(),
             recording: manner.recorded.then(Recording::default),
             brief: manner.brief,
@@ -184,6 +192,11 @@ impl<'a, const B: usize> Watched<'a, B> {
         if let Some(recording) = &mut self.recording {
             recording.see(&self.rig, self.begun);
         }
+        let phases = self.asked();
+        let step = |shunt: usize| self.steepest[shunt].max((phases[shunt] - self.before[shunt]).abs());
+        (self.steepest, self.before) = ([0, 1].map(step), phases);
+        let asked = self.rig.asked(self.joint());
+        self.swing = [self.swing[0].min(asked), self.swing[1].max(asked)];
         match (self.onset, self.has_begun()) {
             (None, true) => self.onset = Some(self.rig.period),
             // What is only a fault while something holds, and it does no more.
@@ -193,7 +206,8 @@ impl<'a, const B: usize> Watched<'a, B> {
     }
 
     fn has_begun(&self) -> bool {
-        let lasts = matches!(self.scenario.onset, Onset::Driven { .. } | Onset::Asked(_));
+        let lasts =
+            matches!(self.scenario.onset, Onset::Driven { .. } | Onset::Uncounted { .. } | Onset::Asked(_));
         if self.onset.is_some() && !lasts {
             return true;
         }
@@ -204,17 +218,29 @@ impl<'a, const B: usize> Watched<'a, B> {
             Onset::BusAbove(volts) => bus() > volts,
             Onset::BusBelow(volts) => bus() < volts,
             Onset::Driven { speed, per_ampere, current } => {
-                let asked = self.rig.asked(joint).abs();
-                self.rig.world.velocity()[joint].abs() > speed + per_ampere * asked && asked > current
+                self.turns(joint, speed, per_ampere) && self.rig.asked(joint).abs() > current
             }
-            Onset::Asked(amperes) => (0..2)
-                .any(|shunt| (self.asked()[shunt] - self.asked[shunt]).abs() > amperes && self.spoils(shunt)),
+            Onset::Uncounted { speed, per_ampere, swing } => {
+                self.turns(joint, speed, per_ampere) || self.swing[1] - self.swing[0] > swing
+            }
+            Onset::Asked(amperes) => {
+                let asked = self.asked();
+                // The axis knows the rotor's angle, and so the current at the injection, a period or two earlier or later.
+                let has_changed = |shunt: usize| {
+                    (asked[shunt] - self.asked[shunt]).abs() > amperes + 2.0 * self.steepest[shunt]
+                };
+                (0..2).any(|shunt| has_changed(shunt) && self.spoils(shunt))
+            }
             Onset::Speed(factor) => {
                 let truth = self.rig.world.velocity();
                 let limits = self.rig.leg.control().limits().joints();
                 (0..JOINTS).any(|joint| truth[joint].abs() > factor * f64::from(limits[joint].speed.0))
             }
         }
+    }
+
+    fn turns(&self, joint: usize, speed: f64, per_ampere: f64) -> bool {
+        self.rig.world.velocity()[joint].abs() > speed + per_ampere * self.rig.asked(joint).abs()
     }
 
     /// Of the first injection.

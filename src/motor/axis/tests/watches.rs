@@ -61,6 +61,62 @@ fn a_counter_that_freezes_above_the_derived_speed_is_seen_within_20_ms_and_brake
 }
 
 #[test]
+fn a_counter_that_stands_still_while_the_current_swings_is_frozen_at_any_speed() {
+    for speed in [0.0, 1.0, -3.0] {
+        for (swing, seen) in [(12.0, false), (15.0, true)] {
+            let mut bench = Bench::settled(speed, 4.0);
+            let count = bench.sample.encoder_count;
+            let freeze = |sample: &mut AxisSample| (sample.encoder_count, sample.index_count) = (count, None);
+            assert_eq!(bench.until_fault(ask(4.0), 4, freeze), None, "{speed} rad/s");
+            let found = bench.until_fault(ask(4.0 - swing), FIFTY_MS, freeze);
+            assert_eq!(found.is_some(), seen, "{speed} rad/s, {swing} A: {found:?}");
+            if let Some((periods, fault)) = found {
+                let patient = (32..40).contains(&periods);
+                assert!(patient && fault == AxisFault::EncoderFrozen, "{periods} {fault:?}");
+                assert_eq!(bench.tick(ask(4.0)), AxisCommand::BRAKE);
+            }
+        }
+        // A rotor that turns however little is none.
+        let mut bench = Bench::settled(if speed == 0.0 { 0.3 } else { speed }, 4.0);
+        for current in [-30.0, 30.0, -38.0] {
+            assert_eq!(bench.until_fault(ask(current), FIFTY_MS, |_| {}), None, "{speed} rad/s, {current} A");
+        }
+    }
+}
+
+#[test]
+fn a_sound_axis_brakes_for_as_long_as_the_other_one_needs_it() {
+    for speed in [20.0, -100.0, 140.0] {
+        let mut bench = Bench::settled(speed, 10.0);
+        for tick in 0..4800 {
+            assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::BRAKE, "{speed} rad/s, tick {tick}");
+            bench.sample = bench.motor.period(AxisCommand::BRAKE);
+            if tick % 6 == 5 {
+                let _ = bench.axis.joint_sample();
+            }
+        }
+        let current = bench.motor.current[0].hypot(bench.motor.current[1]);
+        assert_eq!(bench.axis.fault(), None, "{speed} rad/s: {current} A");
+    }
+}
+
+#[test]
+fn a_motor_too_fast_to_brake_below_the_current_bound_is_released() {
+    // 150 to 180 rad/s carry 55 A; a counter that froze says nothing of it, the back-EMF does.
+    for speed in [200.0, -260.0] {
+        let mut bench = Bench::settled(speed, 0.0);
+        assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::RELEASED, "{speed} rad/s");
+        assert_eq!(bench.axis.fault(), Some(AxisFault::Overcurrent));
+        assert!(bench.axis.clear_fault(), "nothing was lost");
+
+        let mut bench = Bench::settled(speed, 0.0);
+        assert!(matches!(bench.frozen(ask(0.0), FIFTY_MS), Some((_, AxisFault::EncoderFrozen))));
+        assert_eq!(bench.tick(ask(0.0)), AxisCommand::RELEASED, "{speed} rad/s");
+        assert!(!bench.axis.clear_fault(), "the place is lost, whatever was found since");
+    }
+}
+
+#[test]
 fn a_motor_that_brakes_is_released_when_it_is_told_or_when_its_current_passes_the_bound() {
     let mut bench = Bench::settled(60.0, 10.0);
     assert!(bench.frozen(ask(10.0), TWENTY_MS).is_some());
@@ -76,6 +132,7 @@ fn a_motor_that_brakes_is_released_when_it_is_told_or_when_its_current_passes_th
     assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::RELEASED);
     assert_eq!(bench.axis.fault(), Some(AxisFault::Overcurrent));
     assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::RELEASED);
+    assert!(!bench.axis.clear_fault(), "the place that was lost before stays lost");
 }
 
 #[test]
@@ -198,7 +255,8 @@ fn codes_without_noise_that_stay_are_no_fault_while_nothing_is_asked_to_change()
     bench.motor.noise_codes = 0.0;
     bench.motor.zeros = [12.0, -21.0];
     assert_eq!(bench.until_fault(ask(0.0), 200, |_| {}), None);
-    for current in [0.9, 5.0, -5.0, 35.0, 0.0] {
+    // A third of the limit, 13.3 A, moves any rotor but this one.
+    for current in [0.9, 5.0, -5.0, 7.0, 0.0] {
         assert_eq!(bench.until_fault(ask(current), 200, |_| {}), None, "{current} A");
     }
 }

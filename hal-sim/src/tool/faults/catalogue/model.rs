@@ -16,12 +16,14 @@ pub static ROWS: [Row; 3] = [
     Row {
         id: "E1",
         fault: "encoder frozen while moving",
-        detector: "back-EMF against counts, 8 ms; counts stand still",
+        detector: "back-EMF against counts, or counts that stand still while the current changes by a third of its limit; 8 ms",
         state: "Short",
         codes: &[FaultCode::EncoderFrozen],
         deadline_ms: 20.0,
         unit: "",
-        lacking: Some("at rest, and below the speed at which back-EMF outweighs dead time and resistance"),
+        lacking: Some(
+            "slower than back-EMF outweighs dead time and resistance, while the current changes by less than a third of its limit",
+        ),
         draw: frozen,
     },
     Row {
@@ -65,8 +67,9 @@ fn frozen(dice: &mut Dice, bounds: &Bounds) -> Scenario {
     let index = at(Channel::Index, joint, Form::Off, Timing::from(0));
     Scenario {
         injections: [Some(counter), Some(index)],
-        onset: Onset::Driven { speed, per_ampere, current: 0.0 },
-        patience: PATIENCE,
+        // What is measured follows what is asked for to 5 %.
+        onset: Onset::Uncounted { speed, per_ampere, swing: 1.05 * bounds.frozen_swing_a + 0.5 },
+        patience: PERIODS_PER_S,
         ..one(counter, Expected::Brake)
     }
 }
