@@ -63,7 +63,7 @@ pub struct ControlOutput<const N: usize> {
 /// Activity, servo and log of one leg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Control<const N: usize> {
-    servo: Servo<N>,
+    pub(super) servo: Servo<N>,
     averager: LogAverager<N>,
     tick: u32,
     activity: Activity,

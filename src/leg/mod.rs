@@ -133,6 +133,12 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         self.control.derate(derating);
     }
 
+    /// Flips a bit of the servo's numbers, see [`crate::servo::Servo::upset`]; on the host alone.
+    #[cfg(not(target_os = "none"))]
+    pub fn upset(&mut self, joint: usize, number: u8, bit: u8) {
+        self.control.servo.upset(joint, number, bit);
+    }
+
     /// The half that moves.
     #[must_use]
     pub fn control(&self) -> &Control<N> {

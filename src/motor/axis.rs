@@ -43,6 +43,8 @@ use crate::hal::{AxisCommand, AxisSample, JointSample};
 use crate::real::{abs, clamp, is_finite};
 use crate::units::{Ampere, RadianPerSecond};
 
+#[cfg(not(target_os = "none"))]
+mod upset;
 mod window;
 
 use window::Window;

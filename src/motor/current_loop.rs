@@ -96,6 +96,12 @@ impl CurrentGains {
         })
     }
 
+    /// The gain across the flux, for a bit that flips in it.
+    #[cfg(not(target_os = "none"))]
+    pub(super) const fn proportional_mut(&mut self) -> &mut f32 {
+        &mut self.proportional_ohm.q
+    }
+
     /// With what the tick computes with.
     #[must_use]
     pub(super) fn add_to(&self, sum: Checksum) -> Checksum {

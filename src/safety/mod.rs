@@ -15,6 +15,7 @@
 //! | [`SupplyWatch`] | a supply that dies |
 //! | [`Monitor`] | all of it, once per tick |
 //! | [`Cause`], [`TickWatch`], [`ServoWatch`] | why nothing may be enabled, and what every current tick looks at |
+//! | [`CheckIns`] | who has to have run before the watchdog is fed |
 //! | [`UpkeepClock`] | what is looked at every few milliseconds: gate drivers' registers, temperatures |
 //!
 //! Safe states: *Off* releases the bridges in the same tick. *Damp* opposes every joint's velocity under its torque
@@ -28,6 +29,7 @@
 //! was measured of the rest: docs/safety.md. No conformity with any safety standard is claimed.
 
 pub mod barrier;
+pub mod check_in;
 pub mod derating;
 pub mod fault;
 pub mod interlock;
@@ -38,6 +40,7 @@ pub mod step_gate;
 pub mod upkeep;
 
 pub use barrier::{Barrier, Limited};
+pub use check_in::CheckIns;
 pub use derating::{Derating, DeratingRamps, LimitCode, LimitCodes, Ramp, SupplyWatch};
 pub use fault::{Fault, FaultCode, Reaction};
 pub use interlock::{Bridges, Cause, ServoWatch, TickState, TickWatch};

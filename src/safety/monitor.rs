@@ -296,3 +296,5 @@ impl<const N: usize> Monitor<N> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(not(target_os = "none"))]
+mod upset;

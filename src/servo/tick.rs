@@ -255,3 +255,5 @@ impl<const N: usize> Servo<N> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(not(target_os = "none"))]
+mod upset;

@@ -21,7 +21,7 @@ use crate::motor::reference::{ReferenceStep, StatedPose};
 use crate::motor::{Axis, AxisConfiguration, Calibrator};
 use crate::operator::{Ask, Operator, RATE_HZ, Situation};
 use crate::real::max;
-use crate::safety::{UpkeepClock, of_gate_driver, of_temperature};
+use crate::safety::{CheckIns, UpkeepClock, of_gate_driver, of_temperature};
 use crate::trace::{Record, words};
 use crate::units::Hertz;
 
@@ -68,13 +68,11 @@ pub async fn watch() -> ! {
     let mut ticker = Ticker::every(Duration::from_millis(4));
     let [first, second] = &statistics::CURRENT_TICKS;
     let seen = || [first, second, &statistics::SERVO_TICKS, &ROUNDS].map(Count::get);
-    let mut before = seen();
+    let mut check_ins = CheckIns::new(seen());
     loop {
         ticker.next().await;
-        let now = seen();
-        if now.iter().zip(before).all(|(now, before)| *now != before) {
+        if check_ins.all(seen()) {
             watchdog::feed();
-            before = now;
         }
     }
 }

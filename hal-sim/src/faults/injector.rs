@@ -44,6 +44,8 @@ pub enum Channel {
     Tick,
     /// The servo does not come to its tick.
     Servo,
+    /// The housekeeping does not come to its round.
+    Housekeeping,
 }
 
 /// One fault of one channel.

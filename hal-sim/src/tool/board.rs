@@ -46,7 +46,7 @@ const CALIBRATION_TURNS_PER_S: f32 = drives::CALIBRATION.turns_per_s;
 const HALF_WAVE_S: f64 = 2.0 / 24_000.0;
 const WAVE_SHARE: f64 = 0.3;
 /// What turns on the stand: the rotor alone, kg m^2; bearings, N m; a little of drag, N m s/rad.
-const ROTOR: Load = Load::Free { inertia: 1e-4, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
+pub const ROTOR: Load = Load::Free { inertia: 1e-4, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
 /// Before a calibration: half a second.
 const REST_PERIODS: u32 = 12_000;
 /// A calibration takes some seconds.

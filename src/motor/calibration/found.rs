@@ -117,6 +117,13 @@ impl Calibration {
         })
     }
 
+    /// The same, had the counter begun so many counts further: for tests of where it wraps, on the host alone.
+    #[cfg(not(target_os = "none"))]
+    #[must_use]
+    pub fn with_counter_moved(&self, offset: u16) -> Self {
+        Self { counter: self.counter.wrapping_add(offset), ..*self }
+    }
+
     pub(in crate::motor) fn place_of(&self, scale: &CountScale, direction: Direction, counter: u16) -> i32 {
         let moved = i32::from(counter.wrapping_sub(self.counter).cast_signed());
         scale.within_turn(self.place + direction.sign() * moved)

@@ -142,6 +142,7 @@ impl FaultsArguments {
             pairs: trials(KINDS[1], self.pairs, FULL_PAIRS),
             rows,
             seeds,
+            whole: self.full && self.seeds.is_none(),
             every_tick: self.every_tick || self.full && self.fault.is_empty(),
             manner: Manner { blind: self.blind, recorded: self.replay.is_some(), brief: false },
             seconds: self.seconds,

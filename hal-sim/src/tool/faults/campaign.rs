@@ -11,6 +11,7 @@ use scarab::leg::{Activity, ControlRequest};
 use scarab::motor::AxisConfiguration;
 use scarab::safety::DriveState;
 
+use super::bench::offsets::OFFSETS;
 use super::catalogue::stop::ROWS as STOP;
 use super::catalogue::{Bounds, Event, Expected, JOINTS, Onset, Row, Scenario};
 use super::dice::Dice;
@@ -33,6 +34,9 @@ use crate::world::periods::PERIODS_PER_TICK;
 pub(super) const BASE: usize = 13;
 /// Runs of a row that share a base.
 const RUNS_PER_BASE: u64 = 256;
+/// The row that is about the torque caps, and how much wider they are where they are switched off.
+const CAPPED: &str = "H1";
+const WIDENED: f32 = 3.0;
 /// Forks that wait for each other; some 100 KB each.
 const BATCH: usize = 128;
 /// No identification takes longer, s.
@@ -56,6 +60,8 @@ pub struct CampaignOptions {
     pub sweep: Vec<u64>,
     /// Seeds of the runs of two faults at once.
     pub pairs: Vec<u64>,
+    /// What is finite is run whole: all 65,536 offsets of E3.
+    pub whole: bool,
     /// Only so much of each identification, s.
     pub seconds: Option<f64>,
 }
@@ -93,6 +99,8 @@ struct Setting<'a> {
     leg: &'a LegFile,
     bounds: Bounds,
     manner: Manner,
+    /// The torque caps are wider than the leg file's.
+    widened: bool,
     /// Periods of a whole identification.
     length: u64,
 }
@@ -109,8 +117,14 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
     }
     bases.sort_unstable();
     bases.dedup();
-    let found: Vec<Campaign> =
-        bases.par_iter().map(|base| based(leg, options, bounds, &twice, *base)).collect::<Result<_, _>>()?;
+    // Limits are switched off by widening them where the machine is built, so their row has a base of its own.
+    let ways: &[bool] = if options.manner.blind { &[false, true] } else { &[false] };
+    let bases: Vec<(u64, bool)> =
+        bases.iter().flat_map(|base| ways.iter().map(|widened| (*base, *widened))).collect();
+    let found: Vec<Campaign> = bases
+        .par_iter()
+        .map(|(base, widened)| based(leg, options, bounds, &twice, *base, *widened))
+        .collect::<Result<_, _>>()?;
     let mut campaign = Campaign::default();
     for found in found {
         campaign.outcomes.extend(found.outcomes);
@@ -121,9 +135,12 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
     for entry in &options.rows {
         if let Entry::Bench(bench) = entry {
             let halved = twice(bench.head.id);
-            let seeds: Vec<u64> =
-                options.seeds.iter().copied().filter(|seed| !halved || seed.is_multiple_of(2)).collect();
-            campaign.outcomes.extend((bench.run)(&bench.head, leg, &seeds)?);
+            let seeds: Vec<u64> = if options.whole && bench.head.id == "E3" {
+                (1..=OFFSETS).collect()
+            } else {
+                options.seeds.iter().copied().filter(|seed| !halved || seed.is_multiple_of(2)).collect()
+            };
+            campaign.outcomes.extend((bench.run)(&bench.head, leg, &seeds, options.manner.blind)?);
         }
     }
     campaign.outcomes.sort_by_key(|outcome| (ids.iter().position(|id| *id == outcome.fault), outcome.seed));
@@ -138,16 +155,22 @@ fn based(
     bounds: Bounds,
     twice: &(dyn Fn(&str) -> bool + Sync),
     base: u64,
+    widened: bool,
 ) -> Result<Campaign, ToolError> {
     let mut campaign = Campaign::default();
     let every = options.every_tick && base == base_of(1);
     let simulation = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(base) };
-    let context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
+    let mut context = Context::<JOINTS, BASE>::new(leg, &simulation)?;
+    if widened {
+        for joint in &mut context.configuration.joints {
+            (joint.torque, joint.current) = (joint.torque * WIDENED, joint.current * WIDENED);
+        }
+    }
     let mut length = length(leg, &context, base)?;
     if let Some(seconds) = options.seconds {
         length = length.min((seconds * PERIODS_PER_S as f64) as u64).max(1);
     }
-    let setting = Setting { leg, bounds, manner: options.manner, length };
+    let setting = Setting { leg, bounds, manner: options.manner, widened, length };
     let mut jobs = setting.jobs(options, twice, base);
     if jobs.is_empty() && !every {
         return Ok(campaign);
@@ -200,6 +223,9 @@ impl Setting<'_> {
         let mut jobs = Vec::new();
         for entry in &options.rows {
             let Entry::Forked(row) = entry else { continue };
+            if self.manner.blind && (row.id == CAPPED) != self.widened {
+                continue;
+            }
             for seed in options.seeds.iter().copied().filter(|seed| base_of(*seed) == base) {
                 if twice(row.id) && seed.is_multiple_of(2) {
                     continue;
@@ -234,7 +260,7 @@ impl Setting<'_> {
             injections: [Some(open), None],
             event: Event::None,
             onset: Onset::Injection,
-            expected: Expected::Off,
+            expected: Expected::Released,
             magnitude: None,
             by_design: false,
             patience: 4,

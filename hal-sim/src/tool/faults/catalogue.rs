@@ -9,6 +9,7 @@ pub mod board;
 pub mod current;
 pub mod encoder;
 pub mod joint;
+pub mod memory;
 pub mod model;
 pub mod number;
 pub mod stop;
@@ -26,6 +27,10 @@ use crate::faults::Injection;
 pub enum Expected {
     /// Both bridges released, and they stay so.
     Off,
+    /// The same, whatever else is being reacted to.
+    Released,
+    /// Reset by the watchdog; what boots refuses.
+    Restarted,
     /// Velocity damped, then released.
     Damp,
     /// Low sides on: the motors brake themselves.
@@ -91,6 +96,19 @@ pub enum Event {
     Hold(usize, f64, f64),
     /// The foot stands on the floor: seconds.
     Touch(f64),
+    /// The watchdog's oscillator runs at this, Hz.
+    Oscillator(f64),
+    /// A bit flips in a number that never changes, of an axis or of the servo's joint (`Axis::upset`, `Servo::upset`).
+    Upset {
+        /// Of the axis, else of the servo.
+        of_axis: bool,
+        /// From 0.
+        joint: usize,
+        /// Which.
+        number: u8,
+        /// From the lowest.
+        bit: u8,
+    },
     /// The operator's hands go on as they like after the emergency stop: see [`super::run`].
     Hands,
 }
@@ -165,7 +183,7 @@ pub const JOINTS: usize = 2;
 
 /// All rows, in the catalogue's order.
 pub fn rows() -> impl Iterator<Item = &'static Row> {
-    let groups: [&'static [Row]; 10] = [
+    let groups: [&'static [Row]; 11] = [
         &encoder::ROWS,
         &current::ROWS,
         &model::ROWS,
@@ -174,6 +192,7 @@ pub fn rows() -> impl Iterator<Item = &'static Row> {
         &number::ROWS,
         &stop::ROWS,
         &timing::ROWS,
+        &memory::ROWS,
         &joint::ROWS,
         &wearer::ROWS,
     ];

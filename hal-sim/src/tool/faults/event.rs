@@ -27,6 +27,8 @@ pub fn apply<const B: usize>(event: Event, leg: &LegFile, rig: &mut Rig<JOINTS, 
                 drives.break_wire(joint, output);
             }
         }
+        Event::Oscillator(hz) => rig.set_oscillator(hz),
+        Event::Upset { of_axis, joint, number, bit } => rig.upset(of_axis, joint, number, bit),
         Event::None | Event::Hands => {}
     }
 }

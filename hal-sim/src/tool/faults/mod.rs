@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`rig`] | firmware and plant, one PWM period at a time, faults on the ports between |
 //! | [`catalogue`], [`draw`] | what is done to the machine, and what has to follow; rows by group |
-//! | [`run`], [`invariants`] | one run, and what holds in each of its periods |
+//! | [`run`], [`outcome`], [`invariants`] | one run, what came of it, and what holds in each of its periods |
 //! | [`campaign`] | many runs, forked from identifications |
 //! | [`mod@bench`] | rows that are no forks: parts, calibrations, identifications of ideal drives |
 //! | [`trial`] | every channel spoilt in every way, and two faults at once: nothing may be broken |
@@ -23,6 +23,7 @@ pub mod entry;
 pub mod event;
 pub mod hours;
 pub mod invariants;
+pub mod outcome;
 pub mod recording;
 pub mod report;
 pub mod rig;

@@ -9,10 +9,11 @@
 //! every period        plant -> samples -> faults -> interlock -> axis -> command; anything that forbids releases all
 //! ```
 //!
-//! Not here: the watchdog, which needs the board or the emulator.
+//! The watchdog looks on at the end of each period ([`watchdog`]).
 
 use scarab::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use scarab::board::odrive_v3_6::settings::drives;
+use scarab::checksum::Checksum;
 use scarab::hal::{AxisCommand, DriveCommand, JointSample, Sample};
 use scarab::leg::{ControlOutput, ControlRequest, DriveState, axis_code, permitted};
 use scarab::motor::{Axis, AxisRequest, Chopper, SenseScale};
@@ -22,6 +23,10 @@ use scarab::safety::{
     TickWatch, UpkeepClock, of_gate_driver, of_temperature,
 };
 
+mod view;
+mod watchdog;
+
+use self::watchdog::Watchdog;
 use crate::faults::{Channel, Injector};
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
@@ -35,6 +40,8 @@ pub const PERIODS_PER_S: u64 = scarab::hal::CURRENT_RATE_HZ as u64;
 pub const PERIOD_MS: f64 = 1e3 / PERIODS_PER_S as f64;
 const PERIODS_PER_ROUND: u64 = PERIODS_PER_S / RATE_HZ as u64;
 
+/// Missed ticks of an axis that the other one does not wait for.
+const LATE: u8 = 3;
 /// Of the thermistor of a bridge at 41 degrees Celsius.
 const WARM_CODE: u16 = 1500;
 
@@ -88,6 +95,11 @@ pub struct Rig<const N: usize, const B: usize> {
     chopper: Chopper,
     supply: SupplyWatch,
     ramps: DeratingRamps,
+    watchdog: Watchdog<N>,
+    /// By the watchdog.
+    restarted: bool,
+    /// Of the servo's gains and limits as they were made.
+    checksum: Checksum,
     bus_code: u16,
     hottest_c: f32,
     brake: f32,
@@ -107,7 +119,6 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         let board = pair.board.ok_or_else(|| ToolError::input("faults need complete drives"))?;
         let (axes, chopper) = board.into_parts();
         Ok(Self {
-            leg: pair.leg,
             world: pair.world,
             injector: Injector::new(seed),
             hand: Hand::default(),
@@ -126,6 +137,9 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             chopper,
             supply: SupplyWatch::default(),
             ramps: drives::derating(19.0),
+            watchdog: Watchdog::new(),
+            restarted: false,
+            checksum: pair.leg.control().checksum(),
             // 48 V, until it is read.
             bus_code: 3136,
             hottest_c: 0.0,
@@ -137,6 +151,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             request: None,
             sample: pair.sample,
             gravity: context.gravity,
+            leg: pair.leg,
         })
     }
 
@@ -165,19 +180,24 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             let (_, forbids) = self.servo.look(self.servo_ticks);
             self.causes |= forbids & !self.blind_bits();
         }
+        self.watch();
     }
 
     /// The operator's contacts.
     fn round(&mut self) {
+        if self.injector.happens(Channel::Housekeeping, 0, self.period) {
+            return;
+        }
+        self.watchdog.rounds = self.watchdog.rounds.wrapping_add(1);
         self.upkeep();
-        let drive = self.leg.control().state();
+        let drive = self.state();
         let situation = Situation {
             enabling: self.hand.enabling,
             start: self.hand.start,
             blocked: self.causes != 0 || matches!(drive, DriveState::Fault { .. }),
-            calibrated: true,
+            calibrated: !self.restarted,
             calibrating: false,
-            referenced: true,
+            referenced: !self.restarted,
             drive: self.output.is_some().then_some(drive),
         };
         match self.operator.tick(&situation) {
@@ -229,6 +249,16 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             return;
         }
         self.servo_ticks = self.servo_ticks.wrapping_add(1);
+        if self.restarted {
+            return;
+        }
+        // Every 64 ms, as `task::servo` does.
+        if self.servo_ticks & 0xFF == 0
+            && self.leg.control().checksum() != self.checksum
+            && !self.is_blind(Some(FaultCode::Parameters))
+        {
+            self.leg.report(Fault { code: FaultCode::Parameters, joint: 0 });
+        }
         let state = self.leg.control().state();
         let request = permitted(self.request.take(), self.causes == 0, state);
         let bus = SenseScale::ODRIVE_3_6.bus(self.bus_code);
@@ -265,6 +295,12 @@ impl<const N: usize, const B: usize> Rig<N, B> {
                 self.missed[joint] = self.missed[joint].saturating_add(1);
                 continue;
             }
+            self.watchdog.ticks[joint] = self.watchdog.ticks[joint].wrapping_add(1);
+            // As `task::current` looks at the other axis, half a period later or earlier.
+            let late = self.missed.iter().enumerate().any(|(other, missed)| other != joint && *missed >= LATE);
+            if late && !self.is_blind(Some(FaultCode::CurrentTicks)) {
+                self.causes |= Cause::CurrentTicks.bit();
+            }
             let complete = !self.injector.happens(Channel::Conversion, joint, now);
             let missed = core::mem::take(&mut self.missed[joint]);
             let state = TickState { emergency_stop, gate_fault, complete, missed };
@@ -272,6 +308,10 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             self.causes |= forbids & !self.blind_bits();
             if damp && !self.is_blind(Some(FaultCode::CurrentTicks)) {
                 self.leg.report(Fault { code: FaultCode::CurrentTicks, joint: joint as u8 });
+            }
+            if self.restarted {
+                // Neither calibrated nor referenced: what runs is released.
+                continue;
             }
             let switching = self.is_switching();
             let before = self.axes[joint];
@@ -315,6 +355,15 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         self.hash = mixed(self.hash, u64::from(self.causes));
     }
 
+    /// Flips a bit of an axis' numbers (`Axis::upset`), or of those of the servo's joint.
+    pub fn upset(&mut self, of_axis: bool, joint: usize, number: u8, bit: u8) {
+        if of_axis {
+            self.axes[joint].upset(number, bit);
+        } else {
+            self.leg.upset(joint, number, bit);
+        }
+    }
+
     fn is_blind(&self, code: Option<FaultCode>) -> bool {
         code.is_some_and(|code| self.blind.contains(&code))
     }
@@ -322,62 +371,6 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     fn blind_bits(&self) -> u32 {
         let blind = |cause: &Cause| self.is_blind(cause.code());
         Cause::ALL.into_iter().filter(blind).fold(0, |bits, cause| bits | cause.bit())
-    }
-
-    /// Asks for something that the operator's contacts do not, at the next servo tick.
-    pub fn ask(&mut self, request: ControlRequest<N>) {
-        self.request = Some(request);
-    }
-
-    /// A request waits for the servo's next tick.
-    #[must_use]
-    pub fn is_asked(&self) -> bool {
-        self.request.is_some()
-    }
-
-    /// What forbids to enable, as the interlock's bits.
-    #[must_use]
-    pub fn causes(&self) -> u32 {
-        self.causes
-    }
-
-    /// The brake resistor's duty.
-    #[must_use]
-    pub fn brake(&self) -> f32 {
-        self.brake
-    }
-
-    /// Where the drive stands.
-    #[must_use]
-    pub fn state(&self) -> DriveState {
-        self.leg.control().state()
-    }
-
-    /// What the firmware says is wrong: an axis' fault, another cause, or the leg's fault.
-    #[must_use]
-    pub fn alarm(&self) -> Option<FaultCode> {
-        let cause = || Cause::ALL.into_iter().find(|cause| self.causes & cause.bit() != 0);
-        self.axis_fault
-            .or_else(|| cause().and_then(Cause::code))
-            .or_else(|| self.state().fault().map(|fault| fault.code))
-    }
-
-    /// Current that is asked of a joint, A; nothing while the drive is off.
-    #[must_use]
-    pub fn asked(&self, joint: usize) -> f64 {
-        if self.targets.enabled { f64::from(self.targets.currents[joint].0) } else { 0.0 }
-    }
-
-    /// Both motors brake themselves.
-    #[must_use]
-    pub fn is_braking(&self) -> bool {
-        self.commands.iter().all(|command| *command == AxisCommand::BRAKE)
-    }
-
-    /// Any bridge switches.
-    #[must_use]
-    pub fn is_switching(&self) -> bool {
-        self.commands.iter().any(|command| command.enabled)
     }
 }
 

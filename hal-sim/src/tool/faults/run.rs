@@ -3,65 +3,26 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use scarab::safety::{DriveState, FaultCode};
-use serde::Serialize;
 
 use super::catalogue::{Event, Expected, JOINTS, Onset, Row, Scenario};
 use super::dice::Dice;
 use super::event::apply;
 use super::invariants::{Invariants, Scope};
+pub use super::outcome::{Manner, Outcome};
 use super::recording::Recording;
 use super::rig::{Hand, PERIOD_MS, PERIODS_PER_S, Rig};
 use crate::faults::{Channel, Injector};
 use crate::tool::leg_file::LegFile;
 use crate::world::periods::PERIODS_PER_TICK;
 
+mod keep;
+
 /// A released machine is watched for so long: nothing may come back.
 const AFTERWARDS: u64 = PERIODS_PER_S / 50;
+/// A machine that was restarted, for so long: a switch that is opened and closed.
+const REFUSED: u64 = PERIODS_PER_S / 2;
 /// Hands at the contacts go on for so long.
 const HANDS: u64 = 6 * PERIODS_PER_S;
-
-/// What came of a run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Outcome {
-    /// The row.
-    pub fault: &'static str,
-    /// The run's.
-    pub seed: u64,
-    /// Period of the injection.
-    pub period: u64,
-    /// It was seen, in time, and made safe.
-    pub detected: bool,
-    /// There was nothing that could have been seen.
-    pub undetectable: bool,
-    /// Something was raised although nothing was wrong.
-    pub false_alarm: bool,
-    /// From the fault to the safe state's first command, ms.
-    pub after_ms: Option<f64>,
-    /// `Off`, `Damp`, `Limit`; nothing where the motion simply went on.
-    pub state: Option<&'static str>,
-    /// What the firmware says is wrong.
-    pub alarm: Option<&'static str>,
-    /// How large the fault was, in the row's unit.
-    pub magnitude: Option<f64>,
-    /// Invariants that did not hold.
-    pub broken: Vec<String>,
-    /// Of everything that crossed the ports.
-    pub hash: String,
-    /// Its curves, where they were asked for.
-    #[serde(skip)]
-    pub recording: Option<Recording>,
-}
-
-/// How a run is done.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Manner {
-    /// The row's detectors are switched off.
-    pub blind: bool,
-    /// Its curves are kept.
-    pub recorded: bool,
-    /// A machine that is safe is watched for a tenth of the usual time only: 2 ms.
-    pub brief: bool,
-}
 
 /// A fork of `base`, spoilt as the row's dice say.
 #[must_use]
@@ -188,7 +149,10 @@ impl<'a, const B: usize> Watched<'a, B> {
         }
         let stop = self.rig.injector.happens(Channel::EmergencyStop, 0, self.rig.period);
         self.rig.advance();
-        self.invariants.see(&self.rig, stop);
+        // Who is told other limits by his memory cannot hold those; what was noticed has to.
+        if !matches!(self.scenario.event, Event::Upset { .. }) || self.rig.alarm().is_some() {
+            self.invariants.see(&self.rig, stop);
+        }
         if let Some(recording) = &mut self.recording {
             recording.see(&self.rig, self.begun);
         }
@@ -303,7 +267,7 @@ impl<'a, const B: usize> Watched<'a, B> {
                 if !rejected {
                     break;
                 }
-            } else if self.rig.alarm().is_some() {
+            } else if self.rig.alarm().is_some() && !self.is_before() {
                 seen = self.safe_state();
             }
             if self.onset.is_some_and(|onset| self.is_too_late(onset)) {
@@ -340,43 +304,6 @@ impl<'a, const B: usize> Watched<'a, B> {
         }
     }
 
-    /// A run in which nothing is broken: the limits are held to the end.
-    fn keep(mut self) -> Outcome {
-        let limit = self.begun + self.scenario.patience;
-        let (mut limited, mut damped) = (None, None);
-        while self.rig.period < limit {
-            self.step();
-            let output = self.rig.output.as_ref();
-            if output.is_some_and(|output| output.servo.decision.limited.iter().any(|limited| limited.any()))
-            {
-                limited = limited.or(Some(self.rig.period));
-            }
-            if self.rig.alarm().is_some() {
-                damped = damped.or(Some(self.rig.period));
-            }
-        }
-        let alarm = self.rig.alarm();
-        let known = alarm.is_none_or(|code| self.row.codes.contains(&code));
-        let state = if damped.is_some() { Some("Damp") } else { limited.map(|_| "Limit") };
-        let broken = self.invariants.into_broken();
-        Outcome {
-            fault: self.row.id,
-            seed: self.seed,
-            period: self.begun,
-            detected: state.is_some() && broken.is_empty() && known,
-            // The limits were not come to.
-            undetectable: state.is_none() && broken.is_empty(),
-            false_alarm: !known,
-            after_ms: None,
-            state,
-            alarm: alarm.map(FaultCode::name),
-            magnitude: self.scenario.magnitude,
-            broken,
-            hash: format!("{:016x}", self.rig.hash),
-            recording: self.recording,
-        }
-    }
-
     fn is_too_late(&self, onset: u64) -> bool {
         let since = self.rig.period.saturating_sub(onset) as f64 * PERIOD_MS;
         if self.row.deadline_ms.is_infinite() {
@@ -394,7 +321,17 @@ impl<'a, const B: usize> Watched<'a, B> {
         (position[joint] - self.counts[joint]).abs() * ratio > 1.1 * core::f64::consts::TAU
     }
 
+    /// Of several faults the one that counts has not come yet.
+    fn is_before(&self) -> bool {
+        matches!(self.scenario.onset, Onset::After(_)) && self.onset >= Some(self.rig.period)
+    }
+
     fn safe_state(&self) -> Option<&'static str> {
+        match self.scenario.expected {
+            Expected::Restarted => return self.rig.is_restarted().then_some("Refuse"),
+            Expected::Released if self.rig.is_switching() => return None,
+            _ => {}
+        }
         match (self.rig.is_switching(), self.rig.state()) {
             (false, _) => Some("Off"),
             (true, _) if self.rig.is_braking() => Some("Short"),
@@ -408,10 +345,16 @@ impl<'a, const B: usize> Watched<'a, B> {
         let periods = match (self.scenario.event, seen) {
             (Event::Hands, _) => HANDS,
             (_, Some("Damp")) => PERIODS_PER_S * 3 / 10 + AFTERWARDS,
+            (_, Some("Refuse")) => REFUSED,
             _ if self.brief => AFTERWARDS / 10,
             _ => AFTERWARDS,
         };
-        for _ in 0..periods {
+        for period in 0..periods {
+            // Somebody lets go of the enabling switch and closes it anew, which must not enable.
+            if seen == Some("Refuse") && period.is_multiple_of(REFUSED / 2) {
+                self.rig.hand = Hand { enabling: period > 0, start: false };
+                self.rig.edges.closed = Some(self.rig.period).filter(|_| period > 0).or(self.rig.edges.closed);
+            }
             self.step();
         }
     }

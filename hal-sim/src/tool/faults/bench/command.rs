@@ -9,6 +9,7 @@ use scarab::leg::IdentifiedModel;
 use scarab::motion::MotionState;
 use scarab::safety::{DriveState, PowerRequest};
 use scarab::servo::{SERVO_RATE_HZ, Servo, ServoCommand};
+use scarab::units::Radian;
 
 use super::super::catalogue::JOINTS;
 use super::super::dice::Dice;
@@ -39,8 +40,16 @@ pub(super) const BENCH: Bench = Bench {
     run: command,
 };
 
-fn command(head: &Head, leg: &LegFile, seeds: &[u64]) -> Result<Vec<Outcome>, ToolError> {
-    let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(1))?;
+/// Radians that the ends of a range are moved by, where the clamp is not to be come to.
+const WIDENED: Radian = Radian(2.0);
+
+fn command(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    let mut context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(1))?;
+    if blind {
+        for joint in &mut context.configuration.joints {
+            (joint.low, joint.high) = (joint.low - WIDENED, joint.high + WIDENED);
+        }
+    }
     seeds.par_iter().map(|seed| one(head, leg, &context, *seed)).collect()
 }
 

@@ -6,6 +6,7 @@
 //! that is good although nothing was noticed is a disturbance too small to matter.
 
 use rayon::prelude::*;
+use scarab::ident::Estimator;
 use scarab::leg::IdentifiedModel;
 use scarab::servo::TorqueModel;
 
@@ -40,7 +41,7 @@ pub(super) const WEARER: Bench = Bench {
         codes: &[],
         lacking: None,
     },
-    run: |head, leg, seeds| all(head, leg, seeds, pushed),
+    run: |head, leg, seeds, blind| all(head, leg, seeds, blind, pushed),
 };
 
 pub(super) const CONTACT: Bench = Bench {
@@ -54,7 +55,7 @@ pub(super) const CONTACT: Bench = Bench {
         codes: &[],
         lacking: None,
     },
-    run: |head, leg, seeds| all(head, leg, seeds, touching),
+    run: |head, leg, seeds, blind| all(head, leg, seeds, blind, touching),
 };
 
 pub(super) const OTHER_LEG: Bench = Bench {
@@ -68,7 +69,7 @@ pub(super) const OTHER_LEG: Bench = Bench {
         codes: &[],
         lacking: None,
     },
-    run: |head, leg, seeds| all(head, leg, seeds, other),
+    run: |head, leg, seeds, blind| all(head, leg, seeds, blind, other),
 };
 
 /// Leg, what is wrong, how large.
@@ -78,11 +79,12 @@ fn all(
     head: &Head,
     leg: &LegFile,
     seeds: &[u64],
+    blind: bool,
     draw: fn(&mut Dice, &LegFile) -> Drawn,
 ) -> Result<Vec<Outcome>, ToolError> {
     let one = |seed: &u64| {
         let (leg, perturbations, magnitude) = draw(&mut Dice::new(head.id, *seed), leg);
-        judge(head, &leg, perturbations, magnitude, *seed)
+        judge(head, &leg, perturbations, magnitude, *seed, blind)
     };
     seeds.par_iter().map(one).collect()
 }
@@ -93,15 +95,24 @@ fn judge(
     perturbations: Vec<Perturbation>,
     magnitude: Option<f64>,
     seed: u64,
+    blind: bool,
 ) -> Result<Outcome, ToolError> {
-    let options = SimulationOptions { perturbations, ..SimulationOptions::of_seed(seed) };
+    let estimator = if blind { Estimator::Plain } else { Estimator::Robust };
+    let options = SimulationOptions { perturbations, estimator, ..SimulationOptions::of_seed(seed) };
     let wrong = options.perturbations.as_slice();
     let (believed, simulated) = (perturb::believed(leg, wrong)?, perturb::simulated(leg, wrong)?);
     let mut context = Context::<JOINTS, BASE>::new(&believed, &options)?;
     perturb::configure(&mut context, wrong)?;
     let pair = drive(leg, &simulated, &context, &options)?.pair;
-    let error =
-        pair.leg.control().model().map(|model| error_percent(&believed, &context, &pair.world, model));
+    let model = if blind {
+        // Whatever was found, by an estimate that counts every sample alike: as if there were neither weights nor verdict.
+        let finding = pair.leg.identification();
+        let found = finding.solver().filter(|_| finding.verdict().is_some());
+        found.map(|solver| IdentifiedModel::new(finding.model(), &solver.estimate().values))
+    } else {
+        pair.leg.control().model().copied()
+    };
+    let error = model.map(|model| error_percent(&believed, &context, &pair.world, &model));
     let shares = pair.leg.identification().solver().map(|solver| solver.record().outliers.disturbed_share);
     let noticed = shares.is_some_and(|shares| shares.iter().any(|share| *share > NOTICED_SHARE));
     let harmless = error.is_some_and(|error| error <= HARMFUL_PERCENT);

@@ -7,7 +7,10 @@ mod calibration;
 mod command;
 mod disturbed;
 mod parts;
+pub mod offsets;
 mod search;
+mod start;
+mod stopped;
 
 use scarab::safety::FaultCode;
 
@@ -16,8 +19,8 @@ use super::run::Outcome;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 
-/// What a bench makes of its row for some seeds.
-pub type Runs = fn(&Head, &LegFile, &[u64]) -> Result<Vec<Outcome>, ToolError>;
+/// What a bench makes of its row for some seeds; blind, what sees the fault is switched off, as each bench says.
+pub type Runs = fn(&Head, &LegFile, &[u64], bool) -> Result<Vec<Outcome>, ToolError>;
 
 /// A row with a bench of its own.
 #[derive(Clone, Copy, Debug)]
@@ -29,8 +32,11 @@ pub struct Bench {
 }
 
 /// All of them.
-pub static BENCHES: [Bench; 7] = [
+pub static BENCHES: [Bench; 10] = [
+    offsets::BENCH,
     calibration::BENCH,
+    start::ZEROS,
+    stopped::BENCH,
     parts::BENCH,
     command::BENCH,
     disturbed::WEARER,

@@ -25,14 +25,15 @@ pub(super) const BENCH: Bench = Bench {
     run: chop,
 };
 
-fn chop(head: &Head, _: &LegFile, seeds: &[u64]) -> Result<Vec<Outcome>, ToolError> {
-    Ok(seeds.iter().map(|seed| one(head, *seed)).collect())
+fn chop(head: &Head, _: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    Ok(seeds.iter().map(|seed| one(head, *seed, blind)).collect())
 }
 
 /// What no voltage is.
 const NONE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
-fn one(head: &Head, seed: u64) -> Outcome {
+/// Blind, the sound chopper and a sound voltage are shown instead: as if there were no check.
+fn one(head: &Head, seed: u64, blind: bool) -> Outcome {
     let mut dice = Dice::new(head.id, seed);
     let [begin, full] = BRAKE;
     let none = NONE[dice.below(3) as usize];
@@ -46,11 +47,13 @@ fn one(head: &Head, seed: u64) -> Outcome {
             3 => [dice.uniform(-100.0, 4.9) as f32, full.0],
             _ => [none, full.0],
         };
-        let made = Chopper::new(Volt(absurd[0]), Volt(absurd[1]));
+        let shown = if blind { [begin, full] } else { absurd.map(Volt) };
+        let made = Chopper::new(shown[0], shown[1]);
         return outcome(head, seed, made.is_none().then_some("Refuse"));
     }
     let volts = if dice.coin() { none } else { dice.uniform(-1e3, 1e3) as f32 };
-    let duty = Chopper::new(begin, full).map(|chopper| chopper.duty(Volt(volts)));
+    let shown = if blind { full } else { Volt(volts) };
+    let duty = Chopper::new(begin, full).map(|chopper| chopper.duty(shown));
     let sensible = duty.is_some_and(|duty| (0.0..=GREATEST_BRAKE_DUTY).contains(&duty));
     // A voltage that is none gives no duty, and is for the axes to refuse.
     let refused = sensible && (volts.is_finite() || duty == Some(0.0));

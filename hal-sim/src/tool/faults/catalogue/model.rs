@@ -34,7 +34,7 @@ pub static ROWS: [Row; 3] = [
         codes: &[FaultCode::CurrentZero, FaultCode::OpenPhase, FaultCode::Overcurrent],
         deadline_ms: 50.0,
         unit: "A",
-        lacking: Some("the zero window at arming, which is tested at the axis alone"),
+        lacking: Some("small offsets while the joint moves; below 2 A of the vector when arming"),
         draw: drift,
     },
     Row {

@@ -5,7 +5,7 @@ use scarab::safety::FaultCode;
 use super::super::dice::Dice;
 use super::super::draw::{at, one};
 use super::super::rig::{PERIOD_MS, PERIODS_PER_S};
-use super::{Bounds, Event, Expected, Row, Scenario};
+use super::{Bounds, Event, Expected, JOINTS, Onset, Row, Scenario};
 use crate::faults::{Channel, Form, Timing};
 
 /// Rows of this group.
@@ -34,10 +34,26 @@ pub static ROWS: [Row; 2] = [
     },
 ];
 
-/// X1: pressed, for 10 ms at most.
+/// X1: pressed, for 10 ms at most; in half of the runs while another fault is reacted to, by damping or by a brake.
 fn emergency_stop(dice: &mut Dice, _: &Bounds) -> Scenario {
     let lasting = 1 + dice.below(PERIODS_PER_S / 100);
-    one(at(Channel::EmergencyStop, 0, Form::Off, Timing::lasting(0, lasting)), Expected::Off)
+    let stop = |from| at(Channel::EmergencyStop, 0, Form::Off, Timing::lasting(from, lasting));
+    let reacted = dice.below(4);
+    let joint = dice.below(JOINTS as u64) as usize;
+    // Damping lasts 300 ms.
+    let later = 12 + dice.below(PERIODS_PER_S * 3 / 10);
+    let first = match reacted {
+        // A thermistor that breaks is looked at every 50 ms, an encoder that jumps at once.
+        0 => at(Channel::Thermistor, joint, Form::Rail(0.0), Timing::from(0)),
+        1 => at(Channel::Counter, joint, Form::Offset(5e3), Timing::from(0)),
+        _ => return one(stop(0), Expected::Released),
+    };
+    Scenario {
+        injections: [Some(first), Some(stop(later))],
+        onset: Onset::After(later),
+        patience: PERIODS_PER_S,
+        ..one(first, Expected::Released)
+    }
 }
 
 /// X2: a contact that bounces for up to a second, with hands at the other contacts.

@@ -14,7 +14,8 @@ pub static ROWS: [Row; 1] = [Row {
     detector: "torque cap; speed",
     state: "Limit",
     codes: &[FaultCode::Overspeed],
-    deadline_ms: f64::INFINITY,
+    // Of torque above the cap, without a break.
+    deadline_ms: 50.0,
     unit: "N m",
     lacking: None,
     draw: held,

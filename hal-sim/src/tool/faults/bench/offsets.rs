@@ -1,0 +1,140 @@
+//! E3: the counter of an encoder begins anywhere in its 16 bits, and wraps wherever it likes: nothing may come of it.
+//!
+//! Each motor is calibrated on its stand and driven to and fro for a while. What its axis saw is then shown once more to axes whose
+//! counter begins elsewhere, one for each offset: the same commands and the same joint samples, to the bit, are the same motion.
+//! Offsets are taken in the order seed * 40,503 modulo 65,536, so 65,536 seeds are all of them and some are spread over them.
+
+use core::f64::consts::TAU;
+
+use rayon::prelude::*;
+use scarab::hal::{AxisCommand, AxisSample, JointSample};
+use scarab::motor::{Axis, AxisConfiguration, AxisRequest, Calibration, CalibrationStep, Calibrator};
+use scarab::units::Ampere;
+
+use super::super::catalogue::JOINTS;
+use super::super::entry::Head;
+use super::super::run::Outcome;
+use super::{Bench, outcome};
+use crate::drive::stand::Stand;
+use crate::tool::board::{ROTOR, axis_configuration, calibration_settings};
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::LegFile;
+use crate::tool::setup::SetupError;
+use crate::world::periods::PERIODS_PER_TICK;
+
+pub(super) const BENCH: Bench = Bench {
+    head: Head {
+        id: "E3",
+        fault: "16-bit counter wraps, at any of 65,536 offsets",
+        detector: "none: differences wrap",
+        state: "-",
+        deadline_ms: f64::INFINITY,
+        unit: "",
+        codes: &[],
+        lacking: None,
+    },
+    run: shift,
+};
+
+/// All that a counter can begin with.
+pub const OFFSETS: u64 = 65_536;
+/// 50 ms: several hundred counts to and fro.
+const PERIODS: usize = 1200;
+/// Of what is asked for, A and Hz.
+const ASKED_A: f64 = 4.0;
+const ASKED_HZ: f64 = 40.0;
+const LONGEST: u64 = 24_000 * 60;
+
+/// What one axis saw and did.
+struct Driven {
+    configuration: AxisConfiguration,
+    calibration: Calibration,
+    first: AxisSample,
+    samples: Vec<AxisSample>,
+    commands: Vec<AxisCommand>,
+    joint: Vec<JointSample>,
+}
+
+fn asked(period: usize) -> AxisRequest {
+    let turns = ASKED_HZ * period as f64 / 24_000.0;
+    AxisRequest { enabled: true, current: Ampere((ASKED_A * (TAU * turns).sin()) as f32) }
+}
+
+/// Commands and joint samples of an axis that is shown these.
+fn run(axis: &mut Axis, mut sample: impl FnMut(usize, &AxisCommand) -> AxisSample) -> (Vec<AxisCommand>, Vec<JointSample>) {
+    let (mut commands, mut joint) = (Vec::with_capacity(PERIODS), Vec::new());
+    let mut command = AxisCommand::RELEASED;
+    for period in 0..PERIODS {
+        command = axis.tick(&sample(period, &command), asked(period));
+        commands.push(command);
+        if (period + 1).is_multiple_of(PERIODS_PER_TICK as usize) {
+            joint.push(axis.joint_sample());
+        }
+    }
+    (commands, joint)
+}
+
+impl Driven {
+    fn new(leg: &LegFile, index: usize) -> Result<Self, ToolError> {
+        let unfit = || SetupError::new(leg, "a motor for every joint that can be calibrated is needed");
+        let drives = leg.complete_description::<JOINTS>()?;
+        let joint = &leg.joints[index];
+        let motor = joint.motor.as_ref().ok_or_else(unfit)?;
+        let configuration = axis_configuration(joint, motor);
+        let settings = calibration_settings(&configuration, motor);
+        let mut stand = Stand::new(&drives.axes[index], &drives.supply, ROTOR, TAU * 0.3, 1);
+        let mut calibrator = Calibrator::new(&configuration, settings).map_err(|_| unfit())?;
+        let mut command = AxisCommand::RELEASED;
+        let mut calibration = None;
+        for _ in 0..LONGEST {
+            match calibrator.tick(&stand.period(&command, 0.0)) {
+                CalibrationStep::Running(next) => command = next,
+                CalibrationStep::Done(found) => {
+                    calibration = Some(found);
+                    break;
+                }
+                CalibrationStep::Refused(_) => break,
+            }
+        }
+        let calibration = calibration.ok_or_else(unfit)?;
+        let first = stand.period(&AxisCommand::RELEASED, 0.0);
+        let mut axis = Axis::new(&configuration, &calibration, &first).map_err(|_| unfit())?;
+        let mut samples = Vec::with_capacity(PERIODS);
+        let (commands, joint) = run(&mut axis, |_, command| {
+            let sample = stand.period(command, 0.0);
+            samples.push(sample);
+            sample
+        });
+        if axis.fault().is_some() {
+            return Err(SetupError::new(leg, "its motor cannot be driven on a stand").into());
+        }
+        Ok(Self { configuration, calibration, first, samples, commands, joint })
+    }
+}
+
+fn shift(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
+    let driven = (0..JOINTS).map(|joint| Driven::new(leg, joint)).collect::<Result<Vec<_>, _>>()?;
+    Ok(seeds.par_iter().map(|seed| one(head, &driven, *seed, blind)).collect())
+}
+
+/// Blind, a count that does not wrap but stays at its end.
+fn one(head: &Head, driven: &[Driven], seed: u64, blind: bool) -> Outcome {
+    let offset = (seed.wrapping_mul(40_503) % OFFSETS) as u16;
+    let moved = |count: u16| if blind { count.saturating_add(offset) } else { count.wrapping_add(offset) };
+    let shown = |sample: &AxisSample| AxisSample {
+        encoder_count: moved(sample.encoder_count),
+        index_count: sample.index_count.map(moved),
+        ..*sample
+    };
+    let same = driven.iter().all(|driven| {
+        let calibration = driven.calibration.with_counter_moved(offset);
+        let Ok(mut axis) = Axis::new(&driven.configuration, &calibration, &shown(&driven.first)) else {
+            return false;
+        };
+        let (commands, joint) = run(&mut axis, |period, _| shown(&driven.samples[period]));
+        axis.fault().is_none() && commands == driven.commands && joint == driven.joint
+    });
+    let mut found = outcome(head, seed, same.then_some("-"));
+    found.magnitude = Some(f64::from(offset));
+    found
+}

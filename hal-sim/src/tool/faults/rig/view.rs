@@ -1,0 +1,65 @@
+//! What a run sees of the machine, and asks of it.
+
+use scarab::hal::AxisCommand;
+use scarab::leg::{ControlRequest, DriveState};
+use scarab::safety::{Cause, FaultCode};
+
+use super::Rig;
+
+impl<const N: usize, const B: usize> Rig<N, B> {
+    /// Asks for something that the operator's contacts do not, at the next servo tick.
+    pub fn ask(&mut self, request: ControlRequest<N>) {
+        self.request = Some(request);
+    }
+
+    /// A request waits for the servo's next tick.
+    #[must_use]
+    pub fn is_asked(&self) -> bool {
+        self.request.is_some()
+    }
+
+    /// What forbids to enable, as the interlock's bits.
+    #[must_use]
+    pub fn causes(&self) -> u32 {
+        self.causes
+    }
+
+    /// The brake resistor's duty.
+    #[must_use]
+    pub fn brake(&self) -> f32 {
+        self.brake
+    }
+
+    /// Where the drive stands.
+    #[must_use]
+    pub fn state(&self) -> DriveState {
+        if self.restarted { DriveState::NotReadyToSwitchOn } else { self.leg.control().state() }
+    }
+
+    /// What the firmware says is wrong: an axis' fault, another cause, or the leg's fault.
+    #[must_use]
+    pub fn alarm(&self) -> Option<FaultCode> {
+        let cause = || Cause::ALL.into_iter().find(|cause| self.causes & cause.bit() != 0);
+        self.axis_fault
+            .or_else(|| cause().and_then(Cause::code))
+            .or_else(|| self.state().fault().map(|fault| fault.code))
+    }
+
+    /// Current that is asked of a joint, A; nothing while the drive is off.
+    #[must_use]
+    pub fn asked(&self, joint: usize) -> f64 {
+        if self.targets.enabled { f64::from(self.targets.currents[joint].0) } else { 0.0 }
+    }
+
+    /// Both motors brake themselves.
+    #[must_use]
+    pub fn is_braking(&self) -> bool {
+        self.commands.iter().all(|command| *command == AxisCommand::BRAKE)
+    }
+
+    /// Any bridge switches.
+    #[must_use]
+    pub fn is_switching(&self) -> bool {
+        self.commands.iter().any(|command| command.enabled)
+    }
+}

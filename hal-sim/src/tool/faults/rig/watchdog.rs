@@ -1,0 +1,93 @@
+//! The watchdog, and what is left of a machine that it reset.
+//!
+//! ```text
+//! every 4 ms   axes' ticks, servo's ticks, housekeeping's rounds -> `CheckIns` -> fed
+//! 512 cycles of its oscillator (32 kHz nominal: 16 ms) without that: reset
+//! ```
+//!
+//! A reset releases both bridges by hardware. The image that boots then knows no calibration and where no joint stands, is refused for
+//! [`Cause::Watchdog`], and its servo does not begin before it was calibrated and referenced, so nothing of the leg runs on here.
+
+use scarab::hal::{AxisCommand, DriveCommand};
+use scarab::operator::{Operator, RATE_HZ};
+use scarab::safety::{Cause, CheckIns, FaultCode, UpkeepClock};
+
+use super::{PERIODS_PER_S, Rig};
+use crate::faults::Injector;
+
+/// Between two looks at who has checked in.
+const PERIODS_PER_LOOK: u64 = PERIODS_PER_S / 250;
+/// Of the oscillator, from being fed to the reset: a divider of 4, 128 steps.
+const CYCLES: f64 = 512.0;
+/// Of the oscillator, Hz.
+const NOMINAL_HZ: f64 = 32_000.0;
+
+/// The watchdog and those that it waits for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Watchdog<const N: usize> {
+    /// Ticks of the axes, rounds of the housekeeping.
+    pub(super) ticks: [u32; N],
+    pub(super) rounds: u32,
+    check_ins: CheckIns<4>,
+    /// Period in which it was fed, and those that it then waits.
+    fed: u64,
+    patience: u64,
+}
+
+impl<const N: usize> Watchdog<N> {
+    pub(super) fn new() -> Self {
+        Self {
+            ticks: [0; N],
+            rounds: 0,
+            check_ins: CheckIns::new([0; 4]),
+            fed: 0,
+            patience: patience(NOMINAL_HZ),
+        }
+    }
+}
+
+fn patience(hz: f64) -> u64 {
+    (CYCLES / hz * PERIODS_PER_S as f64).ceil() as u64
+}
+
+impl<const N: usize, const B: usize> Rig<N, B> {
+    /// What the watchdog's oscillator runs at, Hz: 17 to 47 kHz.
+    pub fn set_oscillator(&mut self, hz: f64) {
+        self.watchdog.patience = patience(hz);
+    }
+
+    /// At the end of a period.
+    pub(super) fn watch(&mut self) {
+        let blind = self.is_blind(Some(FaultCode::Watchdog));
+        let dog = &mut self.watchdog;
+        if self.period.is_multiple_of(PERIODS_PER_LOOK) {
+            let [first, .., last] = dog.ticks.as_slice() else { return };
+            if dog.check_ins.all([*first, *last, self.servo_ticks, dog.rounds]) || blind {
+                dog.fed = self.period;
+            }
+        }
+        if self.period - dog.fed >= dog.patience {
+            self.restart();
+        }
+    }
+
+    /// What hung does so no more.
+    fn restart(&mut self) {
+        self.restarted = true;
+        self.commands = [AxisCommand::RELEASED; N];
+        self.targets = DriveCommand::RELEASED;
+        self.causes = Cause::Watchdog.bit();
+        (self.axis_fault, self.output, self.request) = (None, None, None);
+        self.missed = [0; N];
+        self.operator = Operator::default();
+        self.clock = UpkeepClock::new(RATE_HZ);
+        self.injector = Injector::new(0);
+        self.watchdog.fed = self.period;
+    }
+
+    /// It was reset by its watchdog.
+    #[must_use]
+    pub fn is_restarted(&self) -> bool {
+        self.restarted
+    }
+}

@@ -1,0 +1,61 @@
+//! Who has to have run since the last time before the watchdog is fed.
+//!
+//! Why here: counters and watchdog are the board's, but whether all have checked in is decided by values only, so the same code is tested
+//! against hangs of each on the host (row K3 of docs/safety.md).
+//!
+//! A count that did not move since the watchdog was last fed keeps it from being fed, whatever the others do; one that moves again within
+//! the watchdog's time is forgiven. Looked at every 4 ms, a hang is answered by a reset at most 4 ms and the watchdog's time after it began:
+//! 15 to 34.1 ms over the oscillator's 47 to 17 kHz, 20 ms nominally.
+
+/// The counters of `N` that have to run, as they were when the watchdog was last fed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CheckIns<const N: usize> {
+    before: [u32; N],
+}
+
+impl<const N: usize> CheckIns<N> {
+    /// Counters as they are now.
+    #[must_use]
+    pub const fn new(counts: [u32; N]) -> Self {
+        Self { before: counts }
+    }
+
+    /// Whether every one of them ran since this last said so; then they are waited for anew. Counters wrap.
+    pub fn all(&mut self, counts: [u32; N]) -> bool {
+        let all = counts.iter().zip(&self.before).all(|(now, before)| now != before);
+        if all {
+            self.before = counts;
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_one_that_hangs_keeps_the_watchdog_hungry_and_is_forgiven_when_it_runs_again() {
+        for hung in 0..4 {
+            let mut counts = [u32::MAX - 1; 4];
+            let mut check_ins = CheckIns::new(counts);
+            let mut look = |hangs: bool| {
+                for (place, count) in counts.iter_mut().enumerate() {
+                    *count = count.wrapping_add(u32::from(!(hangs && place == hung)));
+                }
+                check_ins.all(counts)
+            };
+            // Across the wrap; one hang of two looks; then it runs again.
+            let fed = [false, false, false, true, true, false, false].map(&mut look);
+            assert_eq!(fed, [true, true, true, false, false, true, true], "{hung}");
+        }
+    }
+
+    #[test]
+    fn what_ran_before_the_watchdog_was_fed_counts_once() {
+        let mut check_ins = CheckIns::new([7, 7]);
+        assert!(!check_ins.all([7, 8]));
+        assert!(check_ins.all([8, 8]));
+        assert!(!check_ins.all([8, 8]));
+    }
+}
