@@ -70,7 +70,7 @@ pub struct FaultsArguments {
     docs: Option<PathBuf>,
 }
 
-fn rows(names: &[String]) -> Result<Vec<Entry>, ToolError> {
+fn rows(names: &[String], full: bool) -> Result<Vec<Entry>, ToolError> {
     let all = entries();
     for name in names {
         if !all.iter().any(|entry| entry.head().id == name) && !KINDS.contains(&name.as_str()) {
@@ -81,7 +81,9 @@ fn rows(names: &[String]) -> Result<Vec<Entry>, ToolError> {
         }
     }
     let is_asked = |entry: &Entry| names.is_empty() || names.iter().any(|name| name == entry.head().id);
-    Ok(all.into_iter().filter(is_asked).collect())
+    // An image has to be built for those: only where they are named, or everything is meant.
+    let is_meant = |entry: &Entry| full || !names.is_empty() || !matches!(entry, Entry::Emulated(_));
+    Ok(all.into_iter().filter(is_asked).filter(is_meant).collect())
 }
 
 fn page(leg: &LegFile, report: &CampaignReport, found: &Campaign) -> Result<String, ToolError> {
@@ -111,7 +113,7 @@ impl FaultsArguments {
     }
 
     fn options(&self) -> Result<CampaignOptions, ToolError> {
-        let mut rows = rows(&self.fault)?;
+        let mut rows = rows(&self.fault, self.full)?;
         if self.blind {
             rows.retain(Entry::can_be_blind);
         }
@@ -168,6 +170,9 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     }
     tables::print(&report.table())?;
     tables::print(&report.notes())?;
+    if !found.left_out.is_empty() {
+        tables::print(&format!("not run, since there is no emulator (qemu-system-arm): {}\n", found.left_out.join(", ")))?;
+    }
     let whole_s = started.elapsed().as_secs_f64();
     tables::print(&format!(
         "time needed: {whole_s:.0} s, of which faults {injected_s:.0} s, normal motion {:.0} s\n",

@@ -37,6 +37,15 @@ const LOGGED: [&str; 2] = ["-d", "int,unimp,cpu_reset"];
 /// An identification takes some tens of seconds.
 const LONGEST: Duration = Duration::from_secs(300);
 
+/// Whether there is an emulator.
+#[must_use]
+pub fn is_there() -> bool {
+    let silent = || Stdio::null();
+    let mut emulator = Command::new(EMULATOR);
+    emulator.arg("--version").stdin(silent()).stdout(silent()).stderr(silent());
+    emulator.status().is_ok_and(|status| status.success())
+}
+
 /// Builds the image of a leg; `log`: it tells every sample of the 500 Hz log.
 pub fn build(leg: &LegFile, seed: u64, log: bool) -> Result<PathBuf, ToolError> {
     let directory = target_directory().join("firmware");

@@ -15,6 +15,7 @@ use super::bench::offsets::OFFSETS;
 use super::catalogue::stop::ROWS as STOP;
 use super::catalogue::{Bounds, Event, Expected, JOINTS, Onset, Row, Scenario};
 use super::dice::Dice;
+use super::emulated::emulated;
 use super::entry::Entry;
 use super::rig::{Hand, PERIODS_PER_S, Rig};
 use super::run::{Manner, Outcome, run};
@@ -75,6 +76,8 @@ pub struct Campaign {
     pub trials: Vec<Outcome>,
     /// Of those, runs with the emergency stop at every tick.
     pub every_tick: usize,
+    /// Rows that were not run, for want of an emulator.
+    pub left_out: Vec<&'static str>,
     /// Motion that was run without a fault meanwhile, s.
     pub undisturbed_s: f64,
 }
@@ -133,6 +136,12 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
         campaign.undisturbed_s += found.undisturbed_s;
     }
     for entry in &options.rows {
+        if let Entry::Emulated(head) = entry {
+            match emulated(head, leg, &options.seeds)? {
+                Some(outcomes) => campaign.outcomes.extend(outcomes),
+                None => campaign.left_out.push(head.id),
+            }
+        }
         if let Entry::Bench(bench) = entry {
             let halved = twice(bench.head.id);
             let seeds: Vec<u64> = if options.whole && bench.head.id == "E3" {

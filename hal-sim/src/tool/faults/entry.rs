@@ -3,6 +3,7 @@
 use scarab::safety::FaultCode;
 
 use super::bench::{BENCHES, Bench};
+use super::emulated::HEADS;
 use super::catalogue::{Row, rows};
 
 /// What is told of a row.
@@ -33,12 +34,14 @@ pub enum Entry {
     Forked(&'static Row),
     /// A bench of its own.
     Bench(&'static Bench),
+    /// The emulated processor.
+    Emulated(&'static Head),
 }
 
 /// The catalogue's order; what is not here comes last.
-const ORDER: [&str; 28] = [
+const ORDER: [&str; 31] = [
     "E1", "E2", "E3", "E4", "E5", "C1", "C2", "C3", "C4", "P1", "P2", "V1", "V2", "V3", "T1", "N1", "X1",
-    "X2", "K1", "K3", "M2", "J1", "J2", "H1", "H2", "H4", "H3", "I1",
+    "X2", "K1", "K2", "K3", "K4", "M1", "M2", "J1", "J2", "H1", "H2", "H4", "H3", "I1",
 ];
 
 impl Entry {
@@ -57,6 +60,7 @@ impl Entry {
                 lacking: row.lacking,
             },
             Self::Bench(bench) => bench.head,
+            Self::Emulated(head) => **head,
         }
     }
 }
@@ -66,7 +70,11 @@ impl Entry {
     /// range of J1 is widened on its bench, and not in its forks.
     #[must_use]
     pub fn can_be_blind(&self) -> bool {
-        matches!(self, Self::Bench(_)) || self.head().id != "J1"
+        match self {
+            Self::Forked(row) => row.id != "J1",
+            Self::Bench(_) => true,
+            Self::Emulated(_) => false,
+        }
     }
 }
 
@@ -89,6 +97,7 @@ pub fn instead(id: &str) -> Option<&'static str> {
 #[must_use]
 pub fn entries() -> Vec<Entry> {
     let mut all: Vec<Entry> = rows().map(Entry::Forked).chain(BENCHES.iter().map(Entry::Bench)).collect();
+    all.extend(HEADS.iter().map(Entry::Emulated));
     let place = |entry: &Entry| ORDER.iter().position(|id| *id == entry.head().id).unwrap_or(ORDER.len());
     all.sort_by_key(place);
     all

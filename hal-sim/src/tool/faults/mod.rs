@@ -7,6 +7,7 @@
 //! | [`run`], [`outcome`], [`invariants`] | one run, what came of it, and what holds in each of its periods |
 //! | [`campaign`] | many runs, forked from identifications |
 //! | [`mod@bench`] | rows that are no forks: parts, calibrations, identifications of ideal drives |
+//! | [`emulated`] | rows that only a processor can show, on the emulated one |
 //! | [`trial`] | every channel spoilt in every way, and two faults at once: nothing may be broken |
 //! | [`hours`] | normal motion, in which nothing may be raised |
 //! | [`recording`] | a run's curves |
@@ -19,6 +20,7 @@ pub mod campaign;
 pub mod catalogue;
 pub mod dice;
 pub mod draw;
+pub mod emulated;
 pub mod entry;
 pub mod event;
 pub mod hours;

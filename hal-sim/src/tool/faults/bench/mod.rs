@@ -46,7 +46,7 @@ pub static BENCHES: [Bench; 10] = [
 ];
 
 /// What came of a run: `state` where it was made safe, and nothing where it was not.
-fn outcome(head: &Head, seed: u64, state: Option<&'static str>) -> Outcome {
+pub(super) fn outcome(head: &Head, seed: u64, state: Option<&'static str>) -> Outcome {
     Outcome {
         fault: head.id,
         seed,
