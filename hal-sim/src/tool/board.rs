@@ -46,7 +46,7 @@ const CALIBRATION_TURNS_PER_S: f32 = drives::CALIBRATION.turns_per_s;
 const HALF_WAVE_S: f64 = 2.0 / 24_000.0;
 const WAVE_SHARE: f64 = 0.3;
 /// What turns on the stand: the rotor alone, kg m^2; bearings, N m; a little of drag, N m s/rad.
-pub const ROTOR: Load = Load::Free { inertia: 1e-4, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
+const ROTOR: Load = Load::Free { inertia: 1e-4, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
 /// Before a calibration: half a second.
 const REST_PERIODS: u32 = 12_000;
 /// A calibration takes some seconds.
@@ -81,6 +81,17 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
     }
 }
 
+/// A motor on its stand, free of its gear, that came to rest with its bridge released: the rotor began at `angle`, rad.
+#[must_use]
+pub fn rested(axis: &AxisDescription, supply: &SupplyDescription, angle: f64, seed: u64) -> Stand {
+    let mut stand = Stand::new(axis, supply, ROTOR, angle, seed);
+    // Cogging takes the rotor to a place where it rests.
+    for _ in 0..REST_PERIODS {
+        stand.period(&AxisCommand::RELEASED, 0.0);
+    }
+    stand
+}
+
 /// Calibrates a motor on its stand, the rotor at `angle` (rad); `name` is for the message where that fails.
 pub fn commission(
     name: &str,
@@ -92,14 +103,10 @@ pub fn commission(
     seed: u64,
 ) -> Result<Calibration, ToolError> {
     let refused = |reason: String| ToolError::input(format!("axis `{name}`: {reason}"));
-    let mut stand = Stand::new(axis, supply, ROTOR, angle, seed);
+    let mut stand = rested(axis, supply, angle, seed);
     let mut calibrator =
         Calibrator::new(configuration, settings).map_err(|error| refused(words::axis_error(error)))?;
     let mut command = AxisCommand::RELEASED;
-    // Cogging takes the rotor to a place where it rests.
-    for _ in 0..REST_PERIODS {
-        stand.period(&command, 0.0);
-    }
     for _ in 0..LONGEST_CALIBRATION {
         match calibrator.tick(&stand.period(&command, 0.0)) {
             CalibrationStep::Running(next) => command = next,

@@ -87,8 +87,8 @@ fn runs_of_the_sweep_and_of_two_faults_are_repeated_alone() {
 /// Of every row, those with a bench of their own among them.
 #[test]
 fn every_detector_that_is_switched_off_is_noticed() {
-    // Faults that are only to be seen in motion take more of it than a second's.
-    let report = report("--seconds 8 --seeds 16 --blind", 0);
+    // Faults that are only to be seen in motion take more of it than a second's: whole identifications.
+    let report = report("--seconds 300 --seeds 16 --blind", 0);
     let rows = report["rows"].as_array().expect("a list");
     assert!(rows.len() >= 28, "{}", rows.len());
     for row in rows {

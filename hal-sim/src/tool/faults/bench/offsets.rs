@@ -2,7 +2,8 @@
 //!
 //! Each motor is calibrated on its stand and driven to and fro for a while. What its axis saw is then shown once more to axes whose
 //! counter begins elsewhere, one for each offset: the same commands and the same joint samples, to the bit, are the same motion.
-//! Offsets are taken in the order seed * 40,503 modulo 65,536, so 65,536 seeds are all of them and some are spread over them.
+//! Seed after seed the counter begins one further from where it wraps, odd seeds below and even ones above, so 65,536 seeds are all there
+//! are, and of the first hundreds every other one wraps in the motion.
 
 use core::f64::consts::TAU;
 
@@ -15,8 +16,7 @@ use super::super::catalogue::JOINTS;
 use super::super::entry::Head;
 use super::super::run::Outcome;
 use super::{Bench, outcome};
-use crate::drive::stand::Stand;
-use crate::tool::board::{ROTOR, axis_configuration, calibration_settings};
+use crate::tool::board::{axis_configuration, calibration_settings, rested};
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 use crate::tool::setup::SetupError;
@@ -82,7 +82,7 @@ impl Driven {
         let motor = joint.motor.as_ref().ok_or_else(unfit)?;
         let configuration = axis_configuration(joint, motor);
         let settings = calibration_settings(&configuration, motor);
-        let mut stand = Stand::new(&drives.axes[index], &drives.supply, ROTOR, TAU * 0.3, 1);
+        let mut stand = rested(&drives.axes[index], &drives.supply, TAU * 0.3, 1);
         let mut calibrator = Calibrator::new(&configuration, settings).map_err(|_| unfit())?;
         let mut command = AxisCommand::RELEASED;
         let mut calibration = None;
@@ -119,14 +119,20 @@ fn shift(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<O
 
 /// Blind, a count that does not wrap but stays at its end.
 fn one(head: &Head, driven: &[Driven], seed: u64, blind: bool) -> Outcome {
-    let offset = (seed.wrapping_mul(40_503) % OFFSETS) as u16;
-    let moved = |count: u16| if blind { count.saturating_add(offset) } else { count.wrapping_add(offset) };
-    let shown = |sample: &AxisSample| AxisSample {
-        encoder_count: moved(sample.encoder_count),
-        index_count: sample.index_count.map(moved),
-        ..*sample
-    };
+    let seed = (seed - 1) % OFFSETS;
+    let begin = if seed.is_multiple_of(2) { !(seed / 2) as u16 } else { (seed / 2) as u16 };
     let same = driven.iter().all(|driven| {
+        let first = driven.first.encoder_count;
+        let moved = |count: u16| {
+            let since = count.wrapping_sub(first).cast_signed();
+            if blind { begin.saturating_add_signed(since) } else { begin.wrapping_add_signed(since) }
+        };
+        let shown = |sample: &AxisSample| AxisSample {
+            encoder_count: moved(sample.encoder_count),
+            index_count: sample.index_count.map(moved),
+            ..*sample
+        };
+        let offset = begin.wrapping_sub(first);
         let calibration = driven.calibration.with_counter_moved(offset);
         let Ok(mut axis) = Axis::new(&driven.configuration, &calibration, &shown(&driven.first)) else {
             return false;
@@ -135,6 +141,6 @@ fn one(head: &Head, driven: &[Driven], seed: u64, blind: bool) -> Outcome {
         axis.fault().is_none() && commands == driven.commands && joint == driven.joint
     });
     let mut found = outcome(head, seed, same.then_some("-"));
-    found.magnitude = Some(f64::from(offset));
+    found.magnitude = Some(f64::from(begin));
     found
 }

@@ -5,9 +5,12 @@ use scarab::safety::FaultCode;
 use super::{Outcome, Watched};
 use crate::tool::faults::rig::PERIOD_MS;
 
+/// What zeros and gains of the shunts and the ripple leave at the cap: more than that is beyond it.
+const BEYOND: f64 = 1.05;
+
 impl<const B: usize> Watched<'_, B> {
     /// The limits are held to the end. Where the row has a deadline, the time is the longest in which a motor made more torque than its
-    /// cap without a break.
+    /// cap and a twentieth without a break.
     pub(super) fn keep(mut self) -> Outcome {
         let limit = self.begun + self.scenario.patience;
         let (mut limited, mut damped) = (false, false);
@@ -50,7 +53,7 @@ impl<const B: usize> Watched<'_, B> {
     fn is_beyond_cap(&self) -> bool {
         let torque = self.rig.world.motor_torque();
         let limits = self.rig.leg.control().limits().joints();
-        let beyond = |(torque, cap): (&f64, f32)| torque.abs() > f64::from(cap);
+        let beyond = |(torque, cap): (&f64, f32)| torque.abs() > BEYOND * f64::from(cap);
         self.rig.is_switching() && torque.iter().zip(limits.map(|joint| joint.torque_cap().0)).any(beyond)
     }
 }
