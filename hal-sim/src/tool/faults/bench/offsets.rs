@@ -38,8 +38,8 @@ pub(super) const BENCH: Bench = Bench {
 
 /// All that a counter can begin with.
 pub const OFFSETS: u64 = 65_536;
-/// 50 ms: several hundred counts to and fro.
-const PERIODS: usize = 1200;
+/// 25 ms: some hundred counts.
+const PERIODS: usize = 600;
 /// Of what is asked for, A and Hz.
 const ASKED_A: f64 = 4.0;
 const ASKED_HZ: f64 = 40.0;
