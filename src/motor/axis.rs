@@ -7,16 +7,14 @@
 //! ```
 //!
 //! An [`Axis`] exists only with a [`Calibration`], and a calibration only where every check of the wiring was passed: there is
-//! no way to torque around it. The configuration and what follows from it never change; what a tick changes is [`Axis`]'s
-//! few state words.
+//! no way to torque around it. The configuration and what follows from it never change; what a tick changes is [`Axis`]'s few state words.
 //!
 //! **Borders.** A target that is not a number, a voltage that is none, a current beyond the bound release the bridge in the
 //! same tick. A saturated amplifier, a bus voltage out of range and an encoder step that no motor makes have one tick of
 //! patience, in which the duties of the tick before are kept; the second in a row releases. A single step that was not believed is
 //! told with the joint's sample, and three of them in 10 ms are the servo's fault (`safety::Monitor`). A code that stays while its
 //! phase is asked for something else, and shunts that do not begin at zero, release as well ([`ShuntWatch`]). Released stays released
-//! until [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases at once, whether or
-//! not anything switches: counts were lost, and with them the angle.
+//! until [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases, switching or not.
 //!
 //! Once per joint sample the voltages are held against currents and speed ([`ModelWatch`]): an open phase and a drifted zero
 //! release, a frozen counter makes the motor a passive brake ([`Axis::brake`]), since a leg whose encoder is gone should not drop.
