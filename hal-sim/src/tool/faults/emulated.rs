@@ -24,8 +24,8 @@ use crate::tool::trace::run as told;
 /// Runs of K2, K4 and M1 at most.
 pub const MOST: [u64; 3] = [1, 6, 2];
 
-/// Servo ticks at which an image crashes: the approach, and the excitation after it; before its end at some 40 s.
-const TICKS: [u64; 2] = [1_000, 40_000];
+/// Servo ticks at which an image crashes: the approach, and the excitation after it. Later ones only take longer.
+const TICKS: [u64; 2] = [1_000, 9_000];
 const MS_PER_INSTRUCTION: f64 = 8e-6;
 
 const SEARCH: Head = Head {
