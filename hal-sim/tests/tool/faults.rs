@@ -92,7 +92,11 @@ fn every_detector_that_is_switched_off_is_noticed() {
     let rows = report["rows"].as_array().expect("a list");
     assert!(rows.len() >= 28, "{}", rows.len());
     for row in rows {
-        assert!(row["missed"].as_u64() > Some(0) || row["seen_by_own"] == 0, "nobody misses {}", row["fault"]);
+        assert!(
+            row["missed"].as_u64() > Some(0) || row["seen_by_own"] == 0,
+            "nobody misses {}",
+            row["fault"]
+        );
     }
 }
 

@@ -171,7 +171,10 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     tables::print(&report.table())?;
     tables::print(&report.notes())?;
     if !found.left_out.is_empty() {
-        tables::print(&format!("not run, since there is no emulator (qemu-system-arm): {}\n", found.left_out.join(", ")))?;
+        tables::print(&format!(
+            "not run, since there is no emulator (qemu-system-arm): {}\n",
+            found.left_out.join(", ")
+        ))?;
     }
     let whole_s = started.elapsed().as_secs_f64();
     tables::print(&format!(

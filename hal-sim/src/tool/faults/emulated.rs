@@ -84,9 +84,9 @@ fn identified(head: &Head, image: &Path, seed: u64) -> Result<Outcome, ToolError
     run(image, &path)?;
     let trace = told::read(&path, Some(image), None)?;
     let loops = trace.statistics.loops();
-    let held = loops.as_ref().is_some_and(|loops| {
-        loops.current_missed + loops.servo_missed == 0 && loops.samples_lost == 0
-    });
+    let held = loops
+        .as_ref()
+        .is_some_and(|loops| loops.current_missed + loops.servo_missed == 0 && loops.samples_lost == 0);
     Ok(outcome(head, seed, held.then_some("-")))
 }
 

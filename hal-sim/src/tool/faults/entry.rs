@@ -3,8 +3,8 @@
 use scarab::safety::FaultCode;
 
 use super::bench::{BENCHES, Bench};
-use super::emulated::HEADS;
 use super::catalogue::{Row, rows};
+use super::emulated::HEADS;
 
 /// What is told of a row.
 #[derive(Clone, Copy, Debug)]

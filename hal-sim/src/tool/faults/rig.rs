@@ -297,7 +297,8 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             }
             self.watchdog.ticks[joint] = self.watchdog.ticks[joint].wrapping_add(1);
             // As `task::current` looks at the other axis, half a period later or earlier.
-            let late = self.missed.iter().enumerate().any(|(other, missed)| other != joint && *missed >= LATE);
+            let late =
+                self.missed.iter().enumerate().any(|(other, missed)| other != joint && *missed >= LATE);
             if late && !self.is_blind(Some(FaultCode::CurrentTicks)) {
                 self.causes |= Cause::CurrentTicks.bit();
             }

@@ -353,7 +353,8 @@ impl<'a, const B: usize> Watched<'a, B> {
             // Somebody lets go of the enabling switch and closes it anew, which must not enable.
             if seen == Some("Refuse") && period.is_multiple_of(REFUSED / 2) {
                 self.rig.hand = Hand { enabling: period > 0, start: false };
-                self.rig.edges.closed = Some(self.rig.period).filter(|_| period > 0).or(self.rig.edges.closed);
+                self.rig.edges.closed =
+                    Some(self.rig.period).filter(|_| period > 0).or(self.rig.edges.closed);
             }
             self.step();
         }

@@ -6,8 +6,8 @@
 mod calibration;
 mod command;
 mod disturbed;
-mod parts;
 pub mod offsets;
+mod parts;
 mod search;
 mod start;
 mod stopped;

@@ -61,7 +61,10 @@ fn asked(period: usize) -> AxisRequest {
 }
 
 /// Commands and joint samples of an axis that is shown these.
-fn run(axis: &mut Axis, mut sample: impl FnMut(usize, &AxisCommand) -> AxisSample) -> (Vec<AxisCommand>, Vec<JointSample>) {
+fn run(
+    axis: &mut Axis,
+    mut sample: impl FnMut(usize, &AxisCommand) -> AxisSample,
+) -> (Vec<AxisCommand>, Vec<JointSample>) {
     let (mut commands, mut joint) = (Vec::with_capacity(PERIODS), Vec::new());
     let mut command = AxisCommand::RELEASED;
     for period in 0..PERIODS {

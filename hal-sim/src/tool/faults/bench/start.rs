@@ -86,7 +86,8 @@ fn one(head: &Head, leg: &LegFile, ready: &Rig<JOINTS, BASE>, seed: u64, blind: 
         }
     }
     let refused = alarmed.is_some() && !switched;
-    let after = alarmed.zip(enabled).map(|(alarmed, enabled)| (alarmed - enabled.min(alarmed)) as f64 * PERIOD_MS);
+    let after =
+        alarmed.zip(enabled).map(|(alarmed, enabled)| (alarmed - enabled.min(alarmed)) as f64 * PERIOD_MS);
     let mut found = outcome(head, seed, refused.then_some("Refuse"));
     found.period = ready.period;
     found.after_ms = after.filter(|_| refused);

@@ -57,12 +57,23 @@ fn stop(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Ou
     let run = |seed: &u64| {
         let mut dice = Dice::new("X1 at rest", *seed);
         // Even seeds only come here where the odd ones are forks.
-        if dice.coin() { Ok(boot(head, leg, &ready, *seed, &mut dice, blind)) } else { calibration(head, leg, length, *seed, &mut dice, blind) }
+        if dice.coin() {
+            Ok(boot(head, leg, &ready, *seed, &mut dice, blind))
+        } else {
+            calibration(head, leg, length, *seed, &mut dice, blind)
+        }
     };
     seeds.par_iter().map(run).collect()
 }
 
-fn boot(head: &Head, leg: &LegFile, ready: &Rig<JOINTS, BASE>, seed: u64, dice: &mut Dice, blind: bool) -> Outcome {
+fn boot(
+    head: &Head,
+    leg: &LegFile,
+    ready: &Rig<JOINTS, BASE>,
+    seed: u64,
+    dice: &mut Dice,
+    blind: bool,
+) -> Outcome {
     let mut rig = ready.clone();
     rig.injector = Injector::new(seed);
     if blind {
@@ -100,7 +111,14 @@ fn boot(head: &Head, leg: &LegFile, ready: &Rig<JOINTS, BASE>, seed: u64, dice: 
     found
 }
 
-fn calibration(head: &Head, leg: &LegFile, length: u64, seed: u64, dice: &mut Dice, blind: bool) -> Result<Outcome, ToolError> {
+fn calibration(
+    head: &Head,
+    leg: &LegFile,
+    length: u64,
+    seed: u64,
+    dice: &mut Dice,
+    blind: bool,
+) -> Result<Outcome, ToolError> {
     let index = dice.below(JOINTS as u64) as usize;
     let pressed = dice.below(length);
     let (ticks, released) = calibrated(leg, index, seed, Some(pressed), blind)?;
@@ -116,7 +134,13 @@ fn calibration(head: &Head, leg: &LegFile, length: u64, seed: u64, dice: &mut Di
 }
 
 /// Ticks to the end of a calibration, as `task::current` runs it, and whether it was dropped; with the contact that opens at a tick.
-fn calibrated(leg: &LegFile, index: usize, seed: u64, pressed: Option<u64>, blind: bool) -> Result<(u64, bool), ToolError> {
+fn calibrated(
+    leg: &LegFile,
+    index: usize,
+    seed: u64,
+    pressed: Option<u64>,
+    blind: bool,
+) -> Result<(u64, bool), ToolError> {
     let unfit = || SetupError::new(leg, "a motor for every joint that can be calibrated is needed");
     let drives = leg.complete_description::<JOINTS>()?;
     let joint = &leg.joints[index];

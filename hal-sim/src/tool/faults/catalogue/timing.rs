@@ -19,7 +19,9 @@ const LATE: Row = Row {
     codes: &[FaultCode::CurrentTicks, FaultCode::ServoTicks],
     deadline_ms: 1.0,
     unit: "",
-    lacking: Some("a servo that does not answer cannot damp, nor an axis that misses three ticks at once: Off"),
+    lacking: Some(
+        "a servo that does not answer cannot damp, nor an axis that misses three ticks at once: Off",
+    ),
     draw: late_ticks,
 };
 
