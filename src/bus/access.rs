@@ -70,7 +70,7 @@ impl<O: Objects> Dictionary<'_, O> {
     /// Those of the object.
     pub fn bytes(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
         let row = find(object)?;
-        if row.kind == Type::Text {
+        if matches!(row.kind, Type::Text | Type::Domain) {
             return if object.index < PROFILE {
                 self.communication.text(object, offset, into)
             } else {

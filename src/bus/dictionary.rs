@@ -40,8 +40,12 @@ pub enum Type {
     U16 = 0x06,
     /// UNSIGNED32
     U32 = 0x07,
+    /// REAL32
+    F32 = 0x08,
     /// VISIBLE_STRING
     Text = 0x09,
+    /// DOMAIN
+    Domain = 0x0F,
 }
 
 impl Type {
@@ -51,8 +55,8 @@ impl Type {
         match self {
             Self::I8 | Self::U8 => Some(1),
             Self::I16 | Self::U16 => Some(2),
-            Self::I32 | Self::U32 => Some(4),
-            Self::Text => None,
+            Self::I32 | Self::U32 | Self::F32 => Some(4),
+            Self::Text | Self::Domain => None,
         }
     }
 }

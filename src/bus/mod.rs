@@ -8,7 +8,8 @@
 //! | [`Frame`], [`NodeId`] | classic CAN as far as a node sees it |
 //! | [`table`], [`dictionary`] | every object once: index, type, access, mapping, default, name |
 //! | [`Objects`] | the seam to whoever has the values |
-//! | [`Node`] | network management, heartbeat, emergency, SYNC, SDO, PDO |
+//! | [`Node`] | network management, heartbeat, emergency, SYNC, SDO, PDO; what of its objects outlives the power |
+//! | [`identification`] | the leg's identification and its log, told by every node |
 //! | [`drive`] | CiA 402 for one joint, and how several joints share one leg's drive |
 //!
 //! No frame makes it panic, loop or allocate: every frame costs at most what is written at [`Node`].
@@ -21,6 +22,8 @@ pub mod drive;
 mod emergency;
 mod frame;
 mod heartbeat;
+pub mod identification;
+mod kept;
 mod nmt;
 mod node;
 mod objects;
@@ -32,6 +35,7 @@ pub use abort::Abort;
 pub use communication::Identity;
 pub use emergency::ErrorReport;
 pub use frame::{Frame, NodeId};
+pub use kept::{LONGEST, kept_bit_rate, kept_node_id};
 pub use nmt::NmtState;
 pub use node::{Controller, Node};
 pub use objects::{Lost, Objects};

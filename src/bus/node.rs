@@ -58,6 +58,10 @@ impl Node {
         self.communication.node
     }
 
+    pub(super) const fn communication_mut(&mut self) -> &mut Communication {
+        &mut self.communication
+    }
+
     /// What it takes part in.
     #[must_use]
     pub const fn state(&self) -> NmtState {
@@ -128,7 +132,7 @@ impl Node {
             Controller::Off => Some(0x8140),
         };
         if matches!(told, Controller::Passive | Controller::Off) {
-            objects.lost(Lost::Bus);
+            objects.lost(Lost::Bus(told == Controller::Off));
         }
         self.communication.emergency.set(Source::Controller, code.map(ErrorReport::code));
     }

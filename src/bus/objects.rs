@@ -13,8 +13,8 @@ pub enum Lost {
     Heartbeat,
     /// A PDO that has an event timer.
     ReceivedPdo,
-    /// The controller left the bus, or is near it.
-    Bus,
+    /// The controller left the bus (`true`), or is near it.
+    Bus(bool),
     /// The master took the node out of Operational.
     Stopped,
     /// The master had the node, or its communication, begin anew.

@@ -24,6 +24,20 @@ pub static GROUPS: &[(u16, u16, &str, bool)] = &[
     (0x1600, 4, "RPDO mapping parameter", false),
     (0x1800, 4, "TPDO communication parameter", false),
     (0x1A00, 4, "TPDO mapping parameter", false),
+    (0x2100, 1, "Identification", false),
+    (0x2110, 1, "Parameter", true),
+    (0x2111, 1, "Parameter standard deviation", true),
+    (0x2112, 1, "Parameter status", true),
+    (0x2120, 1, "Base parameter", true),
+    (0x2121, 1, "Base parameter standard deviation", true),
+    (0x2122, 1, "Base parameter carrier", true),
+    (0x2123, 1, "Base parameter flags", true),
+    (0x2124, 1, "Base parameter by least squares", true),
+    (0x2130, 1, "Fit: root mean square error", true),
+    (0x2131, 1, "Fit: mean absolute torque", true),
+    (0x2132, 1, "Fit: root mean square torque", true),
+    (0x2133, 1, "Fit: rows", true),
+    (0x2140, 1, "Log", false),
     (0x607D, 1, "Software position limit", true),
     (0x60C1, 1, "Interpolation data record", false),
     (0x60C2, 1, "Interpolation time period", false),
@@ -122,7 +136,39 @@ rows! {
     0x1A02 x 2, 2, U32, Both, No, 0, "Mapped object";
     0x1A00 x 4, 3 x 6, U32, Both, No, 0, "Mapped object";
 
+    0x2001, 0, U8, Both, No, 0, "Node-ID after the next start";
+    0x2002, 0, U16, Both, No, 1000, "Bit rate after the next start";
     0x2010, 0, I16, Read, Transmit, 0, "Velocity actual value, short";
+    0x2011, 0, U8, Both, No, 0, "Model in the feedforward";
+    0x2100, 0, U8, Const, No, 12, "Number of entries";
+    0x2100, 1, U8, Both, No, 0, "Command";
+    0x2100, 2, U8, Read, Transmit, 0, "State";
+    0x2100, 3, U8, Read, Transmit, 0, "Motion of the validation";
+    0x2100, 4, U8, Both, No, 0, "Plan";
+    0x2100, 5, U32, Both, No, 1, "Seed, lower half";
+    0x2100, 6, U32, Both, No, 0, "Seed, upper half";
+    0x2100, 7, U32, Read, No, 0, "Generation";
+    0x2100, 8, U8, Read, No, 0, "Verdict";
+    0x2100, 9, U8, Read, No, 0, "Reasons";
+    0x2100, 10, U32, Read, No, 0, "Iterations";
+    0x2100, 11, U32, Read, No, 0, "Evaluations";
+    0x2100, 12, U8, Read, Transmit, 0, "Change";
+    0x2110 x 3, 0, U8, Const, No, 14, "Number of entries";
+    0x2110 x 2, 1 x 14, F32, Read, No, 0, "Parameter";
+    0x2112, 1 x 14, U8, Read, No, 0, "Parameter";
+    0x2120 x 5, 0, U8, Const, No, 13, "Number of entries";
+    0x2120 x 2, 1 x 13, F32, Read, No, 0, "Base parameter";
+    0x2122, 1 x 13, U16, Read, No, 0, "Base parameter";
+    0x2123, 1 x 13, U8, Read, No, 0, "Base parameter";
+    0x2124, 1 x 13, F32, Read, No, 0, "Base parameter";
+    0x2130 x 4, 0, U8, Const, No, 4, "Number of entries";
+    0x2130 x 3, 1 x 4, F32, Read, No, 0, "Motion";
+    0x2133, 1 x 4, U32, Read, No, 0, "Motion";
+    0x2140, 0, U8, Const, No, 4, "Number of entries";
+    0x2140, 1, U32, Both, No, 0, "Samples held";
+    0x2140, 2, Domain, Read, No, 0, "Samples";
+    0x2140, 3, U32, Read, No, 0, "Samples waiting";
+    0x2140, 4, U32, Read, No, 0, "Samples lost";
     0x219A, 0, U32, Read, Transmit, 0, "Digital inputs, raw";
     0x6007, 0, I16, Both, No, 3, "Abort connection option code";
     0x603F, 0, U16, Read, Transmit, 0, "Error code";

@@ -13,6 +13,8 @@ pub enum Activity {
     Identify(IdentifyPhase),
     /// Following a motion.
     Track(Step),
+    /// Following what a host commands, tick by tick.
+    Follow,
 }
 
 /// How far an identification is.

@@ -1,15 +1,19 @@
 //! The half of a leg that moves: activity, motions, servo, log. Ticked at 4 kHz.
 
+mod host;
+mod surroundings;
+
+pub use host::Host;
+
 use super::activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
 use super::configuration::{LegConfiguration, LegError, ProvedMotion};
 use super::identification::Finding;
 use super::model::IdentifiedModel;
 use super::succession::Succession;
-use crate::checksum::Checksum;
 use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
-use crate::safety::{Derating, DriveState, Fault, LimitCodes, Limits, PowerRequest};
+use crate::safety::{DriveState, PowerRequest};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
@@ -133,15 +137,38 @@ impl<const N: usize> Control<N> {
         request: Option<ControlRequest<N>>,
         gravity: [f32; 3],
     ) -> ControlOutput<N> {
+        self.tick_with(sample, request, gravity, None)
+    }
+
+    /// One tick of a leg that a host commands, where there is one.
+    #[inline]
+    pub fn tick_with(
+        &mut self,
+        sample: &Sample<N>,
+        request: Option<ControlRequest<N>>,
+        gravity: [f32; 3],
+        mut host: Option<Host<'_, N>>,
+    ) -> ControlOutput<N> {
         self.tick = self.tick.wrapping_add(1);
-        let refused = request.as_ref().is_some_and(|request| !self.may_begin(request));
+        let refused = request.as_ref().is_some_and(|request| !self.may_begin(request, host.as_ref()));
         let took_update = !refused && request == Some(ControlRequest::TakeUpdate);
         let power = self.accept(request.filter(|_| !refused));
-        let motion = self.motion.state_at(self.motion_tick);
+        let commanded = self.obey(host.as_mut());
+        let motion = match &commanded {
+            Some(commanded) => commanded.motion,
+            None => self.motion.state_at(self.motion_tick),
+        };
+        let placed = host.as_ref().map(|host| host.following.placed(sample));
+        let sample = placed.as_ref().unwrap_or(sample);
         let mixed = self.models.advance();
         let feedforward = self.models.faded(mixed.as_ref());
         let feedforward = feedforward.as_ref();
-        let servo = self.servo.tick(sample, &ServoCommand { motion, feedforward, power }, gravity);
+        let efforts = commanded.as_ref().map(|commanded| &commanded.efforts);
+        let command = ServoCommand { motion, feedforward, power };
+        let servo = self.servo.tick_with(sample, &command, efforts, gravity);
+        if let Some(host) = &mut host {
+            host.following.measure(&servo);
+        }
         self.motion_tick = self.motion_tick.saturating_add(1);
         if servo.decision.state != DriveState::OperationEnabled {
             // A leg that is not held is where it is: enabling must not pull it anywhere.
@@ -166,9 +193,11 @@ impl<const N: usize> Control<N> {
     }
 
     /// Power requests always; a new activity only from rest, since the way to it starts at rest.
-    fn may_begin(&self, request: &ControlRequest<N>) -> bool {
-        let still =
-            self.motion.state_at(self.motion_tick).velocity_rad_per_s.iter().all(|&speed| speed == 0.0);
+    fn may_begin(&self, request: &ControlRequest<N>, host: Option<&Host<'_, N>>) -> bool {
+        let still = match host {
+            Some(host) if self.activity == Activity::Follow => host.following.is_still(),
+            _ => self.motion.state_at(self.motion_tick).velocity_rad_per_s.iter().all(|&speed| speed == 0.0),
+        };
         let enabled = self.servo.state() == DriveState::OperationEnabled;
         match request {
             ControlRequest::Power(_) => true,
@@ -229,7 +258,9 @@ impl<const N: usize> Control<N> {
                 None => self.rest(Activity::Idle),
             },
             Activity::Track(Step::Run) => self.rest(Activity::Idle),
-            Activity::Idle | Activity::Identify(IdentifyPhase::Solve | IdentifyPhase::Judge) => {}
+            Activity::Idle
+            | Activity::Follow
+            | Activity::Identify(IdentifyPhase::Solve | IdentifyPhase::Judge) => {}
         }
     }
 
@@ -325,75 +356,5 @@ impl<const N: usize> Control<N> {
     fn hold(&mut self, pose_rad: [f32; N]) {
         self.motion = Motion::Hold(pose_rad);
         self.motion_tick = 0;
-    }
-
-    /// What the leg is doing.
-    #[must_use]
-    pub fn activity(&self) -> Activity {
-        self.activity
-    }
-
-    /// Where the drive stands.
-    #[must_use]
-    pub fn state(&self) -> DriveState {
-        self.servo.state()
-    }
-
-    /// Over gains, scales and limits, which do not change.
-    #[must_use]
-    pub fn checksum(&self) -> Checksum {
-        self.servo.checksum()
-    }
-
-    /// A fault that the board saw, for the next tick.
-    pub fn report(&mut self, fault: Fault) {
-        self.servo.report(fault);
-    }
-
-    /// What temperature and bus voltage leave of the torque caps from the next tick on.
-    pub fn derate(&mut self, derating: &Derating) {
-        self.servo.derate(derating);
-    }
-
-    /// Codes of what was taken from each joint at a tick.
-    #[must_use]
-    pub fn limit_codes(&self, output: &ControlOutput<N>) -> [LimitCodes; N] {
-        self.servo.limit_codes(&output.servo.decision)
-    }
-
-    /// What each joint may do.
-    #[must_use]
-    pub fn limits(&self) -> &Limits<N> {
-        self.servo.limits()
-    }
-
-    /// The verdict of the last identification.
-    #[must_use]
-    pub fn verdict(&self) -> Option<Verdict> {
-        self.verdict
-    }
-
-    /// The alarm that the model no longer fits; gone with a new activity or once an update is taken.
-    #[must_use]
-    pub fn change(&self) -> Option<&Change<f32, N>> {
-        self.change.as_ref()
-    }
-
-    /// What the quick pass made of the alarm; [`Cause::Unexplained`] asks for a full identification.
-    #[must_use]
-    pub fn cause(&self) -> Option<Cause> {
-        self.cause
-    }
-
-    /// Whether there is an update to take.
-    #[must_use]
-    pub fn is_update_offered(&self) -> bool {
-        self.models.is_offered()
-    }
-
-    /// The accepted model.
-    #[must_use]
-    pub fn model(&self) -> Option<&IdentifiedModel<N>> {
-        self.models.model()
     }
 }

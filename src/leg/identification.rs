@@ -135,6 +135,11 @@ where
         })
     }
 
+    /// With which plan and random numbers the next search is made.
+    pub fn prepare(&mut self, plan: Plan, swarm_seed: u64) {
+        (self.plan, self.swarm_seed) = (plan, swarm_seed);
+    }
+
     /// Takes a logged sample. The first one without a segment, or of another, ends the motion recorded so far.
     pub fn push(&mut self, logged: &LoggedSample<N>) {
         let recording = match self.work {

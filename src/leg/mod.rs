@@ -15,7 +15,7 @@
 //! ```text
 //!   Idle --identify--> Approach --> Excite --> Settle --> Solve --> Validate: Approach, Run (three times) --> Judge
 //!    ^ ^                                                                                                      |
-//!    | +--track--> Track                                                                                      |
+//!    | +--track--> Track        with commands of a host: Follow in the place of Idle while the drive is enabled
 //!    +---------------------- the drive is no longer enabled (quick stop, fault): from everywhere <-------------+
 //! ```
 
@@ -23,6 +23,7 @@ mod activity;
 mod configuration;
 mod control;
 mod description;
+mod follow;
 mod identification;
 mod model;
 mod permitted;
@@ -33,10 +34,11 @@ mod upkeep;
 
 pub use activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
 pub use configuration::{LegConfiguration, LegError, ProvedMotion};
-pub use control::{Control, ControlOutput, ControlRequest, LoggedSample};
+pub use control::{Control, ControlOutput, ControlRequest, Host, LoggedSample};
 pub use description::{
     DescriptionError, JointDescription, LegDescription, LinkDescription, MotorDescription,
 };
+pub use follow::{Following, JointCommand, JointStatus, Mode, SetPoint, Target};
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
 pub use permitted::{axis_code, permitted};
@@ -59,6 +61,7 @@ pub use crate::safety::{
     DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, Permission,
     PowerRequest, RefusalReason,
 };
+pub use crate::servo::LogSample;
 
 use crate::hal::Sample;
 use crate::safety::Derating;
@@ -68,6 +71,10 @@ use crate::safety::Derating;
 pub struct Leg<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
     control: Control<N>,
     identification: Identification<N, B, TAPS, PENDING>,
+    following: Following<N>,
+    commands: Option<[JointCommand; N]>,
+    cancel: bool,
+    sample: Option<Sample<N>>,
 }
 
 impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Leg<N, B, TAPS, PENDING> {
@@ -80,6 +87,10 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         Ok(Self {
             control: Control::new(configuration)?,
             identification: Identification::new(configuration)?,
+            following: Following::new(configuration),
+            commands: None,
+            cancel: false,
+            sample: None,
         })
     }
 
@@ -91,7 +102,10 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         gravity: [f32; 3],
         evaluations: u32,
     ) -> ControlOutput<N> {
-        let output = self.control.tick(sample, request, gravity);
+        let (following, cancel) = (&mut self.following, core::mem::take(&mut self.cancel));
+        let host = self.commands.as_ref().map(|commands| Host { following, commands, cancel });
+        self.sample = Some(*sample);
+        let output = self.control.tick_with(sample, request, gravity, host);
         if let Some(logged) = &output.logged {
             self.identification.push(logged);
         }
@@ -106,6 +120,29 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
             self.control.receive(finding);
         }
         output
+    }
+
+    /// What a host commands from the next tick on.
+    pub fn command(&mut self, commands: &[JointCommand; N]) {
+        self.commands = Some(*commands);
+    }
+
+    /// What a host is told of a joint, given what came of the last tick.
+    #[must_use]
+    pub fn joint_status(&self, joint: usize, output: &ControlOutput<N>) -> Option<JointStatus> {
+        let torque = self.control.torque(joint, self.sample.as_ref()?)?;
+        let follows = self.control.activity() == Activity::Follow;
+        self.following.status(joint, torque, follows, output)
+    }
+
+    /// A host gives an identification up: from the next tick on the joints come to rest.
+    pub fn cancel(&mut self) {
+        self.cancel = true;
+    }
+
+    /// With which plan and random numbers the next identification is made.
+    pub fn prepare(&mut self, plan: Plan, swarm_seed: u64) {
+        self.identification.prepare(plan, swarm_seed);
     }
 
     /// Has these base values validated in the place of those found; see [`Identification::examine`].

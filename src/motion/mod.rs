@@ -1,4 +1,5 @@
-//! What a leg is told to do: motions that start and end at rest and are proved to stay within limits.
+//! What a leg is told to do: motions that start and end at rest and are proved to stay within limits, and what a host
+//! commands tick by tick.
 //!
 //! Why a room of its own: identification needs exact derivatives of what was commanded, and a wearer needs to know
 //! before the first tick that a motion stays in range. So every motion here is closed-form, its derivatives are
@@ -11,6 +12,7 @@
 //! | [`Ramp`] | from a pose to a pose, at rest at both ends |
 //! | [`Periodic`] | whole cycles of a curve, entered and left at rest by ramping the speed of its phase |
 //! | [`Motion`] | one of them, or a pose held |
+//! | [`Course`] | one joint, tick by tick, towards a target that may change at any time |
 //! | [`ExcitationTable`] | a periodic motion as plain numbers, for a constant in an image |
 //! | [`JointEnvelope`], [`Proof`] | bounds of a motion, and the witness that they lie within limits |
 //!
@@ -19,6 +21,7 @@
 //! converts a curve once ([`Fourier::mapped`]) to the model's D-H angles and commands those.
 
 pub mod bounds;
+pub mod course;
 pub mod fourier;
 pub mod gait;
 pub mod periodic;
@@ -27,6 +30,7 @@ pub mod ramp;
 pub mod table;
 
 pub use bounds::{JointEnvelope, LimitViolation, Proof, Quantity};
+pub use course::{Course, Rates};
 pub use fourier::{Fourier, HARMONICS};
 pub use periodic::{Periodic, Phase};
 pub use plan::Motion;

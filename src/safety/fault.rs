@@ -126,6 +126,16 @@ faults! {
     Overspeed = 0x8400, "J2", "overspeed", Damp, "it was faster than 1.1 times its speed limit";
     /// Gains or limits are not what they were (6310: loss of parameters).
     Parameters = 0x6310, "M2", "parameters", Damp, "its gains or limits changed in memory";
+    /// Farther than the window from where the host commands it to be (8611: following error).
+    FollowingError = 0x8611, "B1", "following_error", Damp, "it did not follow where it was commanded";
+    /// The host's heartbeat is missed.
+    Heartbeat = 0x8130, "B1", "heartbeat", Damp, "the host's heartbeat is missed";
+    /// What the host sends in every cycle came late (8250: RPDO timeout).
+    LatePdo = 0x8250, "B1", "late_pdo", Damp, "what the host sends in every cycle came late";
+    /// The controller left the bus.
+    BusOff = 0x8140, "B2", "bus_off", Damp, "the controller left the bus";
+    /// The controller counts so many errors that it may no longer disturb others.
+    BusPassive = 0x8120, "B2", "bus_passive", Damp, "the controller sees too many errors on the bus";
     /// The bridges' timers are not in phase.
     Timers = 0xFF07, "-", "timers", Refuse, "the bridges' timers are not in phase";
     /// The factory's version does not tell the divider of the bus voltage.
@@ -183,6 +193,11 @@ mod tests {
             (FaultCode::PositionLimit, 0x8500),
             (FaultCode::Overspeed, 0x8400),
             (FaultCode::Parameters, 0x6310),
+            (FaultCode::FollowingError, 0x8611),
+            (FaultCode::Heartbeat, 0x8130),
+            (FaultCode::LatePdo, 0x8250),
+            (FaultCode::BusOff, 0x8140),
+            (FaultCode::BusPassive, 0x8120),
             (FaultCode::Timers, 0xFF07),
             (FaultCode::BoardVersion, 0xFF08),
             (FaultCode::Configuration, 0x6320),

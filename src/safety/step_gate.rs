@@ -37,6 +37,13 @@ impl StepGate {
         (self.last, self.rejected) = (None, 0);
     }
 
+    /// The same place has another count now.
+    pub const fn shift(&mut self, counts: i32) {
+        if let Some(last) = self.last {
+            self.last = Some(last.wrapping_add(counts));
+        }
+    }
+
     /// Judges one reading; the first is good.
     #[must_use]
     pub fn judge(&mut self, counts: i32) -> Reading {

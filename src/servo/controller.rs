@@ -112,6 +112,11 @@ impl Controller {
         self.integral_nm = clamp(integral_nm, -gains.cap_nm, gains.cap_nm);
     }
 
+    /// The integral gives this torque, as far as it may.
+    pub fn preset(&mut self, gains: &ControllerGains, torque: NewtonMetre) {
+        self.integral_nm = clamp(torque.0, -gains.cap_nm, gains.cap_nm);
+    }
+
     /// Empties the integral.
     pub fn reset(&mut self) {
         self.integral_nm = 0.0;

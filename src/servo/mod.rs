@@ -31,10 +31,10 @@ pub use feedforward::{NoModel, TorqueModel, smoothed_sign};
 pub use logging::{LOG_RATE_HZ, LogAverager, LogSample, TICKS_PER_LOG};
 pub use observer::{Observer, ObserverGains};
 pub use scale::JointScale;
-pub use tick::{Servo, ServoCommand, ServoOutput};
+pub use tick::{Effort, Servo, ServoCommand, ServoOutput};
 
 /// Ticks per second.
 pub const SERVO_RATE_HZ: u32 = 4000;
 
 /// Time between two ticks, s.
-const TICK_S: f32 = 1.0 / SERVO_RATE_HZ as f32;
+pub const TICK_S: f32 = 1.0 / SERVO_RATE_HZ as f32;

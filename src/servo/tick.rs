@@ -45,6 +45,20 @@ pub struct ServoCommand<'model, const N: usize, M> {
     pub power: Option<PowerRequest>,
 }
 
+/// What is asked of a joint beside the motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// On top of what holds the motion, or alone.
+    pub torque: NewtonMetre,
+    /// The motion is held; else the torque is all that is given.
+    pub held: bool,
+}
+
+impl Effort {
+    /// Only the motion.
+    pub const HELD: Self = Self { torque: NewtonMetre::ZERO, held: true };
+}
+
 /// What came of one tick, in the model's angles and signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoOutput<const N: usize> {
@@ -174,12 +188,33 @@ impl<const N: usize> Servo<N> {
         self.joints.map(|joint| joint.scale)
     }
 
+    /// The counts of each joint are so many more from now on, and its angle another one, though nothing moved.
+    pub fn shift(&mut self, counts: &[i32; N]) {
+        for joint in 0..N {
+            self.gates[joint].shift(counts[joint]);
+            self.observers[joint].shift(counts[joint]);
+        }
+    }
+
     /// One tick; `gravity` in the base frame, m/s^2.
     #[must_use]
     pub fn tick<M: TorqueModel<N>>(
         &mut self,
         sample: &Sample<N>,
         command: &ServoCommand<'_, N, M>,
+        gravity: [f32; 3],
+    ) -> ServoOutput<N> {
+        self.tick_with(sample, command, None, gravity)
+    }
+
+    /// The same with torques beside the motion.
+    #[must_use]
+    #[inline]
+    pub fn tick_with<M: TorqueModel<N>>(
+        &mut self,
+        sample: &Sample<N>,
+        command: &ServoCommand<'_, N, M>,
+        efforts: Option<&[Effort; N]>,
         gravity: [f32; 3],
     ) -> ServoOutput<N> {
         let motion = &command.motion;
@@ -202,8 +237,13 @@ impl<const N: usize> Servo<N> {
         let wanted_torque: [NewtonMetre; N] = core::array::from_fn(|joint| {
             let velocity_error = RadianPerSecond(motion.velocity_rad_per_s[joint]) - velocity[joint];
             let gains = &self.joints[joint].controller;
-            NewtonMetre(feedforward[joint])
-                + self.controllers[joint].torque(gains, tracking_error[joint], velocity_error)
+            let held = NewtonMetre(feedforward[joint])
+                + self.controllers[joint].torque(gains, tracking_error[joint], velocity_error);
+            match efforts.map(|efforts| &efforts[joint]) {
+                None => held,
+                Some(Effort { torque, held: true }) => held + *torque,
+                Some(Effort { torque, held: false }) => *torque,
+            }
         });
 
         // What the axis did not believe is gone from the sample, but it is told and counts as well.
@@ -213,6 +253,12 @@ impl<const N: usize> Servo<N> {
         let request = Request { torque: wanted_torque, power: command.power };
         let decision = self.monitor.decide(&observation, &request);
         self.settle(&tracking_error, &wanted_torque, &decision);
+        for joint in 0..N {
+            if efforts.is_some_and(|efforts| !efforts[joint].held) {
+                // Once the motion is held again it begins with the torque there is.
+                self.controllers[joint].preset(&self.joints[joint].controller, decision.torque[joint]);
+            }
+        }
         ServoOutput { position, velocity, believed_counts, tracking_error, wanted_torque, decision }
     }
 

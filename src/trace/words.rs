@@ -42,6 +42,7 @@ pub const fn activity(activity: Activity) -> (&'static str, &'static str, u8) {
         },
         Activity::Track(Step::Approach) => ("track", "approach", 0),
         Activity::Track(Step::Run) => ("track", "run", 0),
+        Activity::Follow => ("follow", "-", 0),
     }
 }
 

@@ -6,6 +6,7 @@
 mod aftermath;
 mod conditions;
 mod failures;
+mod host;
 mod identification;
 mod memory;
 mod monitor;

@@ -121,7 +121,7 @@ fn write_variable(out: &mut String, index: u16, sub: u8, part: &Part, identity: 
         (0x1018, 2) => Some(identity.product),
         (0x1018, 3) => Some(identity.revision),
         (0x1200, _) => Some(row.default),
-        _ if row.access == Access::Read || row.kind == Type::Text => None,
+        _ if row.access == Access::Read || row.kind.size().is_none() => None,
         _ => Some(row.default),
     };
     if let Some(default) = default {

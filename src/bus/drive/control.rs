@@ -12,10 +12,10 @@
 //! ```
 //! Source: CiA 402, controlword.
 
-use super::status::{AxisStatus, state_bits};
-use super::{AxisCommand, Mode, SetPoint, Target};
+use super::status::state_bits;
+use super::{JointCommand, JointStatus, Mode, SetPoint, Target};
 use crate::bus::objects::Lost;
-use crate::leg::{DriveEvent, DriveState, PowerRequest};
+use crate::leg::{DriveEvent, DriveState, FaultCode, PowerRequest};
 use crate::units::{Ampere, NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
 
 const RESET: u16 = 1 << 7;
@@ -62,6 +62,9 @@ pub(super) struct Settings {
     pub period_index: i8,
     pub outputs: u32,
     pub target_velocity: i32,
+    pub feedforward: bool,
+    pub node_id: u8,
+    pub bit_rate: u16,
 }
 
 impl Settings {
@@ -91,6 +94,9 @@ impl Settings {
         period_index: -3,
         outputs: 0,
         target_velocity: 0,
+        feedforward: false,
+        node_id: 0,
+        bit_rate: 1000,
     };
 }
 
@@ -99,7 +105,7 @@ impl Settings {
 pub struct Axis {
     pub(super) constants: AxisConstants,
     pub(super) settings: Settings,
-    pub(super) status: AxisStatus,
+    pub(super) status: JointStatus,
     pub(super) controlword: u16,
     /// Where this joint stands for itself.
     pub(super) own: DriveState,
@@ -108,7 +114,21 @@ pub struct Axis {
     set_point: SetPoint,
     /// The set-point or start of the present bit 4 was taken.
     taken: bool,
-    starts: u8,
+    /// Set-points and starts of homing.
+    asked: u8,
+    /// What the leg has to react to.
+    fault: Option<FaultCode>,
+}
+
+/// The fault of a lost host.
+const fn code(why: Lost) -> Option<FaultCode> {
+    match why {
+        Lost::Heartbeat => Some(FaultCode::Heartbeat),
+        Lost::ReceivedPdo => Some(FaultCode::LatePdo),
+        Lost::Bus(true) => Some(FaultCode::BusOff),
+        Lost::Bus(false) => Some(FaultCode::BusPassive),
+        Lost::Stopped | Lost::Reset => None,
+    }
 }
 
 const fn radian(micro: i32) -> Radian {
@@ -126,19 +146,26 @@ impl Axis {
         Self {
             constants,
             settings: Settings::NEW,
-            status: AxisStatus::NONE,
+            status: JointStatus::NONE,
             controlword: 0,
             own: DriveState::NotReadyToSwitchOn,
             resets: false,
-            set_point: SetPoint { number: 0, position: Radian::ZERO, relative: false, immediately: false },
+            set_point: SetPoint { position: Radian::ZERO, relative: false, immediately: false },
             taken: false,
-            starts: 0,
+            asked: 0,
+            fault: None,
         }
     }
 
     /// What the leg tells; then [`Coupling::power`](super::Coupling::power).
-    pub fn update(&mut self, status: &AxisStatus) {
+    pub fn update(&mut self, status: &JointStatus) {
         self.status = *status;
+    }
+
+    /// Where the leg's drive stands.
+    #[must_use]
+    pub const fn drive(&self) -> DriveState {
+        self.status.drive
     }
 
     /// This joint is enabled, and so is the leg.
@@ -163,19 +190,16 @@ impl Axis {
         match Mode::of(self.settings.mode) {
             Some(Mode::ProfilePosition) => {
                 self.set_point = SetPoint {
-                    number: self.set_point.number.wrapping_add(1),
                     position: radian(self.settings.target_position),
                     relative: word & RELATIVE != 0,
                     immediately: word & IMMEDIATELY != 0,
                 };
-                self.taken = true;
             }
-            Some(Mode::Homing) => {
-                self.starts = self.starts.wrapping_add(1);
-                self.taken = true;
-            }
-            _ => {}
+            Some(Mode::Homing) => {}
+            _ => return,
         }
+        self.asked = self.asked.wrapping_add(1);
+        self.taken = true;
     }
 
     fn ask(&mut self, word: u16) {
@@ -204,8 +228,13 @@ impl Axis {
     }
 
     /// The host is lost: as 6007 says.
-    pub(super) fn lose(&mut self, _why: Lost) {
+    pub(super) fn lose(&mut self, why: Lost) {
         match self.settings.connection_option {
+            // Told to stop or to begin anew the host is not lost: it stops as by quick stop.
+            1 => match code(why).filter(|_| self.is_powered()) {
+                Some(code) => self.fault = Some(code),
+                None => self.stop(),
+            },
             2 => self.own = self.own.after(DriveEvent::Asked(PowerRequest::DisableVoltage), 1),
             3 => self.stop(),
             _ => {}
@@ -215,13 +244,23 @@ impl Axis {
         self.taken = false;
     }
 
+    /// A fault that the leg has to react to, once: the host is lost and 6007 is 1.
+    pub fn take_fault(&mut self) -> Option<FaultCode> {
+        self.fault.take()
+    }
+
+    /// Object 6061: the leg's once it follows, and before that the one it will follow.
+    pub(super) fn mode(&self) -> i8 {
+        if self.is_powered() && self.status.mode != 0 { self.status.mode } else { self.settings.mode }
+    }
+
     /// Object 6041.
     #[must_use]
     pub fn statusword(&self) -> u16 {
         let status = &self.status;
         let bit = |is_set: bool, place: u16| u16::from(is_set) << place;
         let is_ready = self.own != DriveState::NotReadyToSwitchOn;
-        let (twelve, thirteen) = match Mode::of(status.mode) {
+        let (twelve, thirteen) = match Mode::of(self.mode()) {
             Some(Mode::ProfilePosition) => (self.taken, status.deviates),
             Some(Mode::Homing) => (status.homed, status.deviates),
             Some(Mode::CyclicPosition) => (self.is_powered(), status.deviates),
@@ -245,7 +284,7 @@ impl Axis {
 
     /// What the leg is told.
     #[must_use]
-    pub fn command(&self) -> AxisCommand {
+    pub fn command(&self) -> JointCommand {
         let settings = &self.settings;
         let torque_offset = self.torque(i32::from(settings.torque_offset));
         let target_torque = self.torque(i32::from(settings.target_torque));
@@ -257,7 +296,7 @@ impl Axis {
             Some(Mode::ProfileVelocity) => Target::ProfileVelocity(velocity),
             Some(Mode::ProfileTorque) => Target::ProfileTorque(target_torque),
             Some(Mode::Homing) if settings.homing_method == 0 => Target::Hold,
-            Some(Mode::Homing) => Target::Homing { start: self.starts, offset: radian(settings.home_offset) },
+            Some(Mode::Homing) => Target::Homing { offset: radian(settings.home_offset) },
             Some(Mode::CyclicPosition) => Target::CyclicPosition {
                 position: radian(settings.target_position),
                 velocity_offset,
@@ -269,8 +308,10 @@ impl Axis {
             Some(Mode::CyclicTorque) => Target::CyclicTorque(target_torque + torque_offset),
         };
         let acceleration = |micro: u32| RadianPerSecondSquared(micro as f32 * 1e-6);
-        AxisCommand {
+        JointCommand {
             target,
+            asked: self.asked,
+            feedforward: settings.feedforward,
             halt: self.controlword & HALT != 0,
             velocity: RadianPerSecond(settings.profile_velocity as f32 * 1e-6),
             acceleration: acceleration(settings.profile_acceleration),

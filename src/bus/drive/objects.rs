@@ -26,6 +26,11 @@ impl Objects for Axis {
         Ok(match (object.index, object.sub) {
             // A hundredth of a degree per second and more fits: 0.001 rad/s up to 32 rad/s.
             (0x2010, _) => bits!((status.velocity.0 * 1e3) as i16),
+            (0x2001, _) => u32::from(settings.node_id),
+            (0x2002, _) => u32::from(settings.bit_rate),
+            (0x2011, _) => u32::from(settings.feedforward),
+            // The leg's, which is not asked here.
+            (0x2100..=0x2198, _) => return Err(Abort::NoData),
             (0x219A | 0x60FD, _) => status.inputs,
             (0x6007, _) => bits!(settings.connection_option),
             (0x603F, _) => self.own.fault().map_or(0, |fault| u32::from(fault.code.number())),
@@ -35,7 +40,7 @@ impl Objects for Axis {
             (0x605D, _) => 1,
             (0x605E, _) => 2,
             (0x6060, _) => bits!(settings.mode),
-            (0x6061, _) => bits!(status.mode),
+            (0x6061, _) => bits!(self.mode()),
             (0x6062, _) => micro(status.position_demand.0),
             (0x6064, _) => micro(status.position.0),
             (0x6065, _) => settings.following_window,
@@ -77,7 +82,12 @@ impl Objects for Axis {
         let settings = &mut self.settings;
         let is = |allowed: &[i32]| allowed.contains(&i32::from(value as i16));
         match (object.index, object.sub) {
-            (0x6007, _) if is(&[0, 2, 3]) => settings.connection_option = value as i16,
+            (0x2100..=0x2198, _) => return Err(Abort::State),
+            // 0: as the board has it.
+            (0x2001, _) if value <= 127 => settings.node_id = value as u8,
+            (0x2002, _) if matches!(value, 125 | 250 | 500 | 1000) => settings.bit_rate = value as u16,
+            (0x2011, _) if value <= 1 => settings.feedforward = value == 1,
+            (0x6007, _) if is(&[0, 1, 2, 3]) => settings.connection_option = value as i16,
             (0x6040, _) => self.control(value as u16),
             // What a fault does is chosen per fault, and a halt slows down along the profile.
             (0x605A, _) if is(&[0, 2]) => settings.quick_stop_option = value as i16,
@@ -115,7 +125,19 @@ impl Objects for Axis {
             (0x60C2, 2) if matches!(value as i8, -6..=0) => settings.period_index = value as i8,
             (0x60FE, 1) => settings.outputs = value,
             (0x60FF, _) => settings.target_velocity = value as i32,
-            (0x6007 | 0x605A..=0x605E | 0x6083 | 0x6084 | 0x6086 | 0x6098 | 0x60C2, _) => {
+            (
+                0x2001
+                | 0x2002
+                | 0x2011
+                | 0x6007
+                | 0x605A..=0x605E
+                | 0x6083
+                | 0x6084
+                | 0x6086
+                | 0x6098
+                | 0x60C2,
+                _,
+            ) => {
                 return Err(Abort::Range);
             }
             _ => return Err(Abort::NoObject),

@@ -4,6 +4,7 @@ use super::super::tests::{Board, axis};
 use super::super::{Lost, NmtState, Objects, dictionary::Object};
 use super::*;
 use crate::leg::{DriveEvent, DriveState, Fault, FaultCode};
+use crate::units::{NewtonMetre, Radian, RadianPerSecond};
 
 const CONTROLWORD: Object = Object::at(0x6040, 0);
 
@@ -100,7 +101,7 @@ fn the_quick_stop_option_chooses_between_damping_and_off() {
     board.axes[0].write(CONTROLWORD, 2).expect("a word");
     board.tick();
     assert_eq!(board.drive, DriveState::SwitchOnDisabled);
-    for (object, value) in [(0x605A, 1), (0x605D, 2), (0x605E, 1), (0x6007, 1), (0x6086, 1), (0x6098, 1)] {
+    for (object, value) in [(0x605A, 1), (0x605D, 2), (0x605E, 1), (0x6007, 4), (0x6086, 1), (0x6098, 1)] {
         let refused = board.axes[0].write(Object::at(object, 0), value);
         assert_eq!(refused, Err(crate::bus::Abort::Range), "{object:x}");
     }
@@ -168,6 +169,36 @@ fn a_lost_host_stops_as_its_option_says() {
 }
 
 #[test]
+fn a_lost_host_is_a_fault_of_the_leg_where_its_option_says_so() {
+    let lose: [(fn(&mut Board), FaultCode); 3] = [
+        (|board| board.axes[0].lost(Lost::Heartbeat), FaultCode::Heartbeat),
+        (|board| board.axes[0].lost(Lost::ReceivedPdo), FaultCode::LatePdo),
+        (|board| board.axes[0].lost(Lost::Bus(true)), FaultCode::BusOff),
+    ];
+    for (lose, code) in lose {
+        let mut board = Board::enabled();
+        assert_eq!(board.write(0x6007, 0, 1, 2), Ok(()));
+        lose(&mut board);
+        assert_eq!((board.axes[0].take_fault(), board.axes[0].take_fault()), (Some(code), None));
+        // The fault is the leg's to react to; nothing else stops it.
+        assert_eq!(board.axes[0].own, DriveState::OperationEnabled);
+    }
+    let mut board = Board::enabled();
+    assert_eq!(board.write(0x6007, 0, 1, 2), Ok(()));
+    board.axes[0].lost(Lost::Stopped);
+    assert_eq!(board.axes[0].take_fault(), None);
+    board.run(2);
+    assert_eq!(board.states()[0], 0x07);
+}
+
+#[test]
+fn a_mode_is_displayed_before_the_leg_is_enabled() {
+    let mut board = Board::started(1);
+    assert_eq!(board.write(0x6060, 0, 8, 1), Ok(()));
+    assert_eq!(board.read(0x6061, 0), Ok(8));
+}
+
+#[test]
 fn a_bus_that_is_lost_and_a_master_that_takes_its_node_back_stop_a_drive_that_stays_off() {
     use super::super::Controller;
     let lose: [fn(&mut Board); 6] = [
@@ -195,7 +226,7 @@ fn a_bus_that_is_lost_and_a_master_that_takes_its_node_back_stop_a_drive_that_st
 #[test]
 fn a_set_point_is_taken_once_for_each_rising_edge() {
     let mut board = Board::enabled();
-    let mode = AxisStatus { mode: 1, drive: board.drive, ..AxisStatus::NONE };
+    let mode = JointStatus { mode: 1, drive: board.drive, ..JointStatus::NONE };
     let axis = &mut board.axes[0];
     axis.write(Object::at(0x6060, 0), 1).expect("a mode");
     let number = |axis: &Axis| match axis.command().target {
@@ -209,11 +240,11 @@ fn a_set_point_is_taken_once_for_each_rising_edge() {
         assert!(axis.statusword() & 1 << 12 != 0);
         axis.write(CONTROLWORD, 0x3F).expect("a word");
         let point = number(axis);
-        assert_eq!((point.number, point.immediately, point.relative), (count, true, false));
+        assert_eq!((axis.command().asked, point.immediately, point.relative), (count, true, false));
         assert!((point.position.0 - position as f32 * 1e-6).abs() < 1e-7);
         // A target alone moves nothing.
         axis.write(Object::at(0x607A, 0), 900_000).expect("a target");
-        assert_eq!(number(axis), point);
+        assert_eq!((number(axis), axis.command().asked), (point, count));
         axis.write(CONTROLWORD, 0x2F).expect("a word");
         assert!(axis.statusword() & 1 << 12 == 0);
     }
@@ -235,6 +266,7 @@ fn a_set_point_before_the_leg_is_powered_is_not_taken_afterwards() {
     board.control([0x0F, 15]);
     board.control([0x1F, 15]);
     assert_ne!(board.axes[0].command().target, Target::ProfilePosition(SetPoint::default()));
+    assert_eq!(board.axes[0].command().asked, 1);
 }
 
 #[test]
@@ -250,12 +282,12 @@ fn a_reset_that_was_asked_before_the_fault_does_not_reset_it() {
 #[test]
 fn units_are_micro_radians_and_thousandths_of_the_rated_torque() {
     let mut axis = axis();
-    axis.update(&AxisStatus {
+    axis.update(&JointStatus {
         position: Radian(-0.25),
         velocity: RadianPerSecond(1.5),
         torque: NewtonMetre(-10.0),
         position_demand: Radian(0.25),
-        ..AxisStatus::NONE
+        ..JointStatus::NONE
     });
     let read = |index| axis.read(Object::at(index, 0)).expect("a value") as i32;
     // Powers of two times 1e6: exact in f32.

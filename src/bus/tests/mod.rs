@@ -9,7 +9,7 @@ mod values;
 
 use std::vec::Vec;
 
-use super::drive::{Axis, AxisConstants, AxisStatus, Coupling, Mode};
+use super::drive::{Axis, AxisConstants, Coupling, JointStatus, Mode};
 use super::*;
 use crate::leg::{DriveEvent, DriveState, PowerRequest};
 use crate::units::{Ampere, NewtonMetre};
@@ -83,7 +83,7 @@ impl Board {
     pub fn tick(&mut self) -> Vec<Frame> {
         self.now_us += 250;
         self.drive = self.drive.after(DriveEvent::Tick, 4);
-        let status = AxisStatus { drive: self.drive, mode: 0, ..AxisStatus::NONE };
+        let status = JointStatus { drive: self.drive, mode: 0, ..JointStatus::NONE };
         for axis in &mut self.axes {
             axis.update(&status);
         }

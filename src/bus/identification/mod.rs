@@ -1,0 +1,261 @@
+//! The objects from 2100 on: a leg's identification, told by each of its nodes.
+//!
+//! ```text
+//! 2100   start, cancel, where it stands, plan, seed, verdict      the leg's, the same at each node
+//! 2110   fourteen parameters of the node's joint                  value, sigma, status
+//! 2120   base parameters                                          the leg's: value, sigma, carrier, what became of it
+//! 2130   fit of the joint's torque, by motion
+//! 2140   the 500 Hz log ([`Log`])
+//! ```
+//!
+//! What is asked here is asked of the leg at its next tick, as by the operator's contacts. Numbers are those of the trace;
+//! what is unknown is NaN, and everything is before the first identification.
+
+mod log;
+mod results;
+
+pub use log::Log;
+pub use results::Results;
+
+use super::abort::Abort;
+use super::dictionary::Object;
+use super::drive::Axis;
+use super::emergency::ErrorReport;
+use super::objects::{Lost, Objects};
+use crate::leg::{Activity, IdentifyPhase, Parameter, Permission, Plan, Reason, Status, Step};
+
+/// What a host asks of a leg beside power and targets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ask {
+    /// Excite, solve, validate.
+    Identify,
+    /// Give an identification up.
+    Cancel,
+    /// Take the update that is offered into use.
+    TakeUpdate,
+}
+
+/// What belongs to the leg and not to a joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LegObjects<const N: usize, const L: usize> {
+    /// The 500 Hz log.
+    pub log: Log<N, L>,
+    /// What the leg is doing; to be told after each tick.
+    pub activity: Activity,
+    /// The model no longer fits; an update is offered. To be told after each tick.
+    pub change: [bool; 2],
+    /// One-time or sequential; of the next identification.
+    pub plan: Plan,
+    /// Of the swarm's random numbers; of the next identification.
+    pub seed: u64,
+    /// Counts the models that were accepted on this board.
+    pub generation: u32,
+    /// The command that was written last.
+    command: u8,
+    asked: Option<Ask>,
+    /// To be kept, or (`true`) forgotten.
+    store: Option<bool>,
+}
+
+impl<const N: usize, const L: usize> LegObjects<N, L> {
+    /// Nothing asked.
+    #[must_use]
+    pub const fn new(plan: Plan, seed: u64, generation: u32) -> Self {
+        Self {
+            log: Log::EMPTY,
+            activity: Activity::Idle,
+            change: [false; 2],
+            plan,
+            seed,
+            generation,
+            command: 0,
+            asked: None,
+            store: None,
+        }
+    }
+
+    /// What the leg is asked, once.
+    pub fn take_asked(&mut self) -> Option<Ask> {
+        self.asked.take()
+    }
+
+    /// Whether everything is to be kept, or (`true`) forgotten; once.
+    pub fn take_store(&mut self) -> Option<bool> {
+        self.store.take()
+    }
+
+    /// Of 2100.
+    fn read(&self, sub: u8, results: &impl Results) -> Result<u32, Abort> {
+        let verdict = results.verdict();
+        Ok(match sub {
+            1 => u32::from(self.command),
+            2 => u32::from(state(self.activity).0),
+            3 => u32::from(state(self.activity).1),
+            4 => u32::from(self.plan == Plan::Sequential),
+            5 => self.seed as u32,
+            6 => (self.seed >> 32) as u32,
+            7 => self.generation,
+            8 => verdict.map_or(0, |verdict| if verdict.is_accepted() { 1 } else { 2 }),
+            9 => verdict.map_or(0, |verdict| {
+                let bits = Reason::ALL.into_iter().enumerate();
+                bits.fold(0, |bits, (place, reason)| bits | u32::from(verdict.has(reason)) << place)
+            }),
+            10 => results.search()[0],
+            11 => results.search()[1],
+            12 => match self.change {
+                [_, true] => 2,
+                [changed, _] => u32::from(changed),
+            },
+            _ => return Err(Abort::NoSubindex),
+        })
+    }
+
+    fn write(&mut self, sub: u8, value: u32) -> Result<(), Abort> {
+        let is_identifying = matches!(self.activity, Activity::Identify(_));
+        match (sub, value) {
+            (1, 0..=3) => {
+                self.asked = match value {
+                    1 => Some(Ask::Identify),
+                    2 => Some(Ask::Cancel),
+                    3 => Some(Ask::TakeUpdate),
+                    _ => None,
+                };
+                self.command = value as u8;
+            }
+            // What an identification was begun with stays until it ends.
+            (4..=6, _) if is_identifying => return Err(Abort::State),
+            (4, 0) => self.plan = Plan::OneTime,
+            (4, 1) => self.plan = Plan::Sequential,
+            (5, _) => self.seed = self.seed & !0xFFFF_FFFF | u64::from(value),
+            (6, _) => self.seed = self.seed & 0xFFFF_FFFF | u64::from(value) << 32,
+            _ => return Err(Abort::Range),
+        }
+        Ok(())
+    }
+}
+
+/// The number of 2100:2, and the motion of the validation from 1.
+const fn state(activity: Activity) -> (u8, u8) {
+    match activity {
+        Activity::Idle => (0, 0),
+        Activity::Identify(IdentifyPhase::Approach) => (1, 0),
+        Activity::Identify(IdentifyPhase::Excite) => (2, 0),
+        Activity::Identify(IdentifyPhase::Settle) => (3, 0),
+        Activity::Identify(IdentifyPhase::Solve) => (4, 0),
+        Activity::Identify(IdentifyPhase::Validate { motion, step: Step::Approach }) => {
+            (5, motion.saturating_add(1))
+        }
+        Activity::Identify(IdentifyPhase::Validate { motion, step: Step::Run }) => {
+            (6, motion.saturating_add(1))
+        }
+        Activity::Identify(IdentifyPhase::Judge) => (7, 0),
+        Activity::Track(_) => (8, 0),
+        Activity::Follow => (9, 0),
+    }
+}
+
+/// Everything a node asks for: its joint, its leg, and what was found.
+pub struct JointObjects<'a, R, const N: usize, const L: usize> {
+    /// The joint.
+    pub axis: &'a mut Axis,
+    /// Which of the leg's, from 0.
+    pub joint: usize,
+    /// The leg.
+    pub leg: &'a mut LegObjects<N, L>,
+    /// What was found.
+    pub results: &'a R,
+}
+
+impl<R: Results, const N: usize, const L: usize> JointObjects<'_, R, N, L> {
+    fn found(&self, object: Object) -> Result<u32, Abort> {
+        let place = usize::from(object.sub).wrapping_sub(1);
+        let number = |value: Option<f32>| value.unwrap_or(f32::NAN).to_bits();
+        let parameter = || {
+            let parameter = *Parameter::ALL.get(place)?;
+            self.results.parameter(self.joint, parameter)
+        };
+        let base = || self.results.base_parameter(place);
+        let fit = || self.results.fit(place, self.joint);
+        Ok(match object.index {
+            0x2110 => number(parameter().and_then(|found| found.value)),
+            0x2111 => number(parameter().and_then(|found| found.sigma)),
+            0x2112 => parameter().map_or(0, |found| match found.status {
+                Status::Identified => 1,
+                Status::Grouped => 2,
+                Status::Weak => 3,
+                Status::Prior => 4,
+            }),
+            0x2120 => number(base().and_then(|found| found.value)),
+            0x2121 => number(base().and_then(|found| found.sigma)),
+            0x2122 => base().map_or(0, |found| {
+                let (joint, parameter) = found.carrier;
+                ((joint as u32 + 1) << 8) | (parameter.index() as u32 + 1)
+            }),
+            0x2123 => base().map_or(0, |found| {
+                u32::from(found.value.is_some())
+                    | u32::from(found.grouped) << 1
+                    | u32::from(found.dropped) << 2
+            }),
+            0x2124 => number(base().map(|found| found.least_squares)),
+            0x2130 => number(fit().and_then(|fit| fit.rms_nm)),
+            0x2131 => number(fit().map(|fit| fit.mean_absolute_nm)),
+            0x2132 => number(fit().map(|fit| fit.torque_rms_nm)),
+            0x2133 => fit().map_or(0, |fit| fit.rows),
+            _ => return Err(Abort::NoObject),
+        })
+    }
+}
+
+impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R, N, L> {
+    fn read(&self, object: Object) -> Result<u32, Abort> {
+        match (object.index, object.sub) {
+            (0x2100, sub) => self.leg.read(sub, self.results),
+            (0x2140, 1) => Ok(self.leg.log.held()),
+            (0x2140, 3) => Ok(self.leg.log.waiting()),
+            (0x2140, 4) => Ok(self.leg.log.lost()),
+            (0x2101..=0x2198, _) => self.found(object),
+            _ => self.axis.read(object),
+        }
+    }
+
+    fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
+        match (object.index, object.sub) {
+            (0x2100, sub) => self.leg.write(sub, value),
+            (0x2140, 1) => {
+                self.leg.log.hold(value != 0);
+                Ok(())
+            }
+            _ => self.axis.write(object, value),
+        }
+    }
+
+    fn bytes(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
+        match (object.index, object.sub) {
+            (0x2140, 2) => Ok(self.leg.log.bytes(offset, into)),
+            _ => self.axis.bytes(object, offset, into),
+        }
+    }
+
+    fn error(&self) -> Option<ErrorReport> {
+        self.axis.error()
+    }
+
+    fn lost(&mut self, why: Lost) {
+        self.axis.lost(why);
+    }
+
+    fn reset(&mut self) {
+        self.axis.reset();
+    }
+
+    fn store(&mut self, defaults: bool) -> Result<(), Abort> {
+        if self.axis.drive().permission() != Permission::Released {
+            return Err(Abort::State);
+        }
+        self.leg.store = Some(defaults);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,324 @@
+//! A leg that a host commands tick by tick, in every mode of CiA 402 that it follows.
+
+use scarab::leg::{Fault, FaultCode, JointCommand, JointStatus, SetPoint, Target};
+use scarab::safety::PowerRequest;
+use scarab::units::{NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
+
+use super::*;
+
+const HOLD: JointCommand = JointCommand {
+    target: Target::Hold,
+    asked: 0,
+    feedforward: false,
+    halt: false,
+    velocity: RadianPerSecond(0.5),
+    acceleration: RadianPerSecondSquared(2.0),
+    deceleration: RadianPerSecondSquared(2.0),
+    torque_slope_nm_per_s: 40.0,
+    range: [Radian(-10.0), Radian(10.0)],
+    largest_torque: NewtonMetre(1000.0),
+    following_window: Radian(0.087_266),
+    following_time: Second(0.01),
+    position_window: Radian(0.017),
+    position_time: Second(0.01),
+    period: Second(0.002),
+};
+
+struct Hosted {
+    pair: Pair,
+    commands: [JointCommand; JOINTS],
+    status: [JointStatus; JOINTS],
+}
+
+impl Hosted {
+    fn new() -> Self {
+        let pair = Pair::new(&default_leg(), context(), 1).expect("the firmware takes the default leg");
+        let mut hosted = Self { pair, commands: [HOLD; JOINTS], status: [JointStatus::NONE; JOINTS] };
+        hosted.pair.leg.command(&[HOLD; JOINTS]);
+        assert!(hosted.pair.enable(context().gravity));
+        hosted.run(10);
+        assert_eq!(activity(&hosted.pair), Activity::Follow);
+        hosted
+    }
+
+    fn tick(&mut self, request: Option<ControlRequest<JOINTS>>) -> scarab::leg::ControlOutput<JOINTS> {
+        self.pair.leg.command(&self.commands);
+        let output = tick(&mut self.pair, request);
+        self.status =
+            core::array::from_fn(|joint| self.pair.leg.joint_status(joint, &output).expect("a joint"));
+        output
+    }
+
+    fn run(&mut self, ticks: u64) {
+        for _ in 0..ticks {
+            self.tick(None);
+        }
+    }
+
+    fn point(&mut self, joint: usize, position: f32, immediately: bool) {
+        let command = &mut self.commands[joint];
+        let point = SetPoint { position: Radian(position), relative: false, immediately };
+        (command.target, command.asked) = (Target::ProfilePosition(point), command.asked.wrapping_add(1));
+    }
+
+    fn cyclic(&mut self, joint: usize, position: f32) {
+        self.commands[joint].target = Target::CyclicPosition {
+            position: Radian(position),
+            velocity_offset: RadianPerSecond::ZERO,
+            torque_offset: NewtonMetre::ZERO,
+        };
+    }
+
+    /// Flexion of the plant's joint, rad.
+    fn truth(&self, joint: usize) -> f64 {
+        self.pair.world.anatomical_position()[joint]
+    }
+
+    fn position(&self, joint: usize) -> f32 {
+        self.status[joint].position.0
+    }
+}
+
+#[test]
+fn a_profile_position_is_reached_in_the_time_of_its_trapezoid_by_both_senses_of_turning() {
+    for joint in 0..JOINTS {
+        let mut hosted = Hosted::new();
+        let from = hosted.position(joint);
+        hosted.point(joint, from + 0.4, true);
+        hosted.run(1);
+        let mut ticks = 1;
+        while !hosted.status[joint].reached {
+            hosted.run(1);
+            ticks += 1;
+            assert!(hosted.status[joint].velocity_demand.0 <= 0.500_1);
+            assert!(ticks < 2 * SECOND, "not reached");
+        }
+        // 0.4 rad at 0.5 rad/s, up and down with 2 rad/s^2: 1.05 s, 10 ms in the window.
+        let time = ticks as f64 / SECOND as f64;
+        assert!((1.04..1.15).contains(&time), "{time} s");
+        hosted.run(SECOND);
+        assert!((hosted.truth(joint) - f64::from(from + 0.4)).abs() < 0.004, "{}", hosted.truth(joint));
+        assert!((hosted.position(joint) - from - 0.4).abs() < 0.004);
+    }
+}
+
+#[test]
+fn a_set_point_that_does_not_interrupt_waits_for_the_end_of_the_one_before() {
+    let mut hosted = Hosted::new();
+    let from = hosted.position(0);
+    hosted.point(0, from + 0.2, false);
+    hosted.run(400);
+    hosted.point(0, from, false);
+    hosted.run(1500);
+    assert!((hosted.status[0].position_demand.0 - from - 0.2).abs() < 0.05);
+    hosted.run(2 * SECOND);
+    assert!((hosted.position(0) - from).abs() < 0.01);
+    // One that does turns round at once.
+    hosted.point(0, from + 0.2, true);
+    hosted.run(400);
+    hosted.point(0, from, true);
+    let mut farthest = 0.0_f32;
+    for _ in 0..SECOND {
+        hosted.run(1);
+        farthest = farthest.max(hosted.status[0].position_demand.0 - from);
+    }
+    assert!(farthest < 0.05, "{farthest}");
+}
+
+#[test]
+fn velocity_and_halt_follow_their_ramps_and_a_range_ends_them() {
+    let mut hosted = Hosted::new();
+    hosted.commands[1].target = Target::ProfileVelocity(RadianPerSecond(0.3));
+    hosted.run(SECOND / 2);
+    assert!(hosted.status[1].reached && (hosted.status[1].velocity.0 - 0.3).abs() < 0.05);
+    hosted.commands[1].halt = true;
+    hosted.run(SECOND);
+    assert!(hosted.status[1].reached && hosted.status[1].velocity.0.abs() < 0.01);
+    hosted.commands[1].halt = false;
+    let end = hosted.position(1) + 0.1;
+    hosted.commands[1].range = [Radian(-10.0), Radian(end)];
+    hosted.run(2 * SECOND);
+    assert!((hosted.position(1) - end).abs() < 0.01, "{} {end}", hosted.position(1));
+    assert!(is_enabled(&hosted.pair));
+}
+
+#[test]
+fn a_torque_follows_its_slope_and_is_held_to_the_largest_torque() {
+    for cyclic in [false, true] {
+        let mut hosted = Hosted::new();
+        hosted.run(2 * SECOND);
+        let from = hosted.status[0].torque_demand.0;
+        let wanted = NewtonMetre(from + 4.0);
+        hosted.commands[0].target =
+            if cyclic { Target::CyclicTorque(wanted) } else { Target::ProfileTorque(wanted) };
+        let mut ticks = 0;
+        while (hosted.status[0].torque_demand.0 - wanted.0).abs() > 0.05 {
+            hosted.run(1);
+            ticks += 1;
+            assert!(ticks < SECOND, "{:?}", hosted.status[0]);
+        }
+        // 4 N m at 40 N m/s.
+        assert!(if cyclic { ticks <= 2 } else { (380..=420).contains(&ticks) }, "{ticks}");
+        let largest = wanted.0.abs() - 2.0;
+        hosted.commands[0].largest_torque = NewtonMetre(largest);
+        // 2 N m take 200 ticks.
+        hosted.run(220);
+        assert!((hosted.status[0].torque_demand.0.abs() - largest).abs() < 1e-3, "{:?}", hosted.status[0]);
+        assert!(hosted.status[0].limited);
+    }
+}
+
+#[test]
+fn a_joint_that_is_held_again_keeps_the_torque_it_had() {
+    let mut hosted = Hosted::new();
+    hosted.run(2 * SECOND);
+    // The torque that keeps it up, given by the host.
+    let weight = hosted.status[0].torque_demand;
+    hosted.commands[0].target = Target::CyclicTorque(weight);
+    hosted.run(200);
+    hosted.commands[0].target = Target::Hold;
+    let before = hosted.status[0].torque_demand.0;
+    hosted.run(1);
+    let step = (hosted.status[0].torque_demand.0 - before).abs();
+    assert!(step < 1.0, "{step} N m of {before}");
+    hosted.run(SECOND);
+    assert!(is_enabled(&hosted.pair) && hosted.status[0].velocity.0.abs() < 0.01);
+}
+
+#[test]
+fn cyclic_positions_of_two_milliseconds_are_followed_by_both_joints() {
+    let mut hosted = Hosted::new();
+    let from: [f32; JOINTS] = core::array::from_fn(|joint| hosted.position(joint));
+    let (mut squared, mut steps) = (0.0_f64, 0.0_f32);
+    let mut before = [0.0_f32; JOINTS];
+    for tick in 0..4 * SECOND {
+        if tick.is_multiple_of(8) {
+            let phase = tick as f32 / SECOND as f32 * core::f32::consts::TAU * 0.5;
+            for joint in 0..JOINTS {
+                hosted.cyclic(joint, from[joint] + 0.1 * (1.0 - phase.cos()));
+            }
+        }
+        hosted.run(1);
+        for joint in 0..JOINTS {
+            let error = hosted.status[joint].position_demand - hosted.status[joint].position;
+            squared += f64::from(error.0).powi(2);
+            if tick > 0 {
+                steps = steps.max((hosted.status[joint].velocity_demand.0 - before[joint]).abs());
+            }
+            before[joint] = hosted.status[joint].velocity_demand.0;
+        }
+    }
+    let rms = (squared / (8 * SECOND) as f64).sqrt();
+    println!("root mean square error {rms:.5} rad, largest step of velocity {steps:.4} rad/s");
+    // Feedback alone; the commanded velocity changes by at most 0.99 rad/s^2 * 2 ms from period to period.
+    assert!(rms < 0.01 && steps < 0.003, "{rms} {steps}");
+}
+
+#[test]
+fn a_target_beyond_the_window_is_a_fault_and_never_a_jump() {
+    // At once when the mode begins, and after its time later.
+    for later in [false, true] {
+        let mut hosted = Hosted::new();
+        let from = hosted.position(0);
+        if later {
+            hosted.cyclic(0, from);
+            hosted.run(100);
+        }
+        hosted.cyclic(0, from + 0.2);
+        let mut ticks = 0;
+        while is_enabled(&hosted.pair) {
+            hosted.run(1);
+            ticks += 1;
+            assert!(ticks < 100, "no fault");
+        }
+        let fault = hosted.pair.leg.control().state().fault();
+        assert_eq!(fault, Some(Fault { code: FaultCode::FollowingError, joint: 0 }));
+        assert!(if later { (38..=44).contains(&ticks) } else { ticks <= 2 }, "{later} {ticks}");
+        hosted.run(SECOND / 10);
+        // 10 ms at the speed limit are 0.045 rad, from standing still far less.
+        assert!((hosted.position(0) - from).abs() < 0.03, "{}", hosted.position(0) - from);
+    }
+    // Within the window it is led there along the profile.
+    let mut hosted = Hosted::new();
+    let from = hosted.position(0);
+    hosted.cyclic(0, from + 0.06);
+    for _ in 0..2 * SECOND {
+        hosted.run(1);
+        assert!(hosted.status[0].velocity_demand.0 < 0.501);
+    }
+    assert!((hosted.position(0) - from - 0.06).abs() < 0.004 && is_enabled(&hosted.pair));
+}
+
+#[test]
+fn homing_takes_the_place_for_the_offset_and_moves_nothing() {
+    let mut hosted = Hosted::new();
+    let (place, truth) = (hosted.position(1), hosted.truth(1));
+    hosted.commands[1].target = Target::Homing { offset: Radian(place + 0.05) };
+    hosted.run(SECOND);
+    assert!(!hosted.status[1].homed);
+    hosted.commands[1].asked += 1;
+    hosted.run(SECOND);
+    assert!(hosted.status[1].homed && !hosted.status[1].deviates);
+    assert!((hosted.position(1) - place - 0.05).abs() < 0.002, "{}", hosted.position(1));
+    assert!((hosted.truth(1) - truth).abs() < 0.003, "{} {truth}", hosted.truth(1));
+    // An offset out of the range is an error and changes nothing.
+    hosted.commands[1].target = Target::Homing { offset: Radian(9.0) };
+    hosted.commands[1].asked += 1;
+    hosted.run(SECOND / 10);
+    assert!(hosted.status[1].deviates && is_enabled(&hosted.pair));
+    assert!((hosted.position(1) - place - 0.05).abs() < 0.002);
+}
+
+#[test]
+fn what_was_asked_before_the_leg_was_enabled_is_not_done_afterwards() {
+    let mut hosted = Hosted::new();
+    hosted.tick(Some(ControlRequest::Power(PowerRequest::DisableVoltage)));
+    hosted.run(10);
+    let from = hosted.position(0);
+    hosted.point(0, from + 0.3, true);
+    hosted.run(10);
+    assert!(hosted.pair.enable(context().gravity));
+    hosted.run(SECOND);
+    assert!((hosted.status[0].position_demand.0 - from).abs() < 0.05);
+    assert_eq!(hosted.status[0].mode, 1);
+}
+
+#[test]
+fn a_lost_host_is_damped_and_stays_a_fault_until_it_is_reset() {
+    let mut hosted = Hosted::new();
+    hosted.commands[0].target = Target::ProfileVelocity(RadianPerSecond(0.3));
+    hosted.run(SECOND / 2);
+    hosted.pair.leg.report(Fault { code: FaultCode::Heartbeat, joint: 0 });
+    hosted.run(1);
+    assert!(matches!(hosted.pair.leg.control().state(), DriveState::FaultReactionActive { .. }));
+    hosted.run(SECOND / 2);
+    assert!(matches!(hosted.pair.leg.control().state(), DriveState::Fault { .. }));
+    assert!(!hosted.pair.enable(context().gravity));
+    hosted.tick(Some(ControlRequest::Power(PowerRequest::ResetFault)));
+    assert!(hosted.pair.enable(context().gravity));
+}
+
+#[test]
+fn an_identification_begins_from_rest_and_gives_the_leg_back_to_the_host() {
+    let mut hosted = Hosted::new();
+    hosted.commands[0].target = Target::ProfileVelocity(RadianPerSecond(0.2));
+    hosted.run(400);
+    assert!(hosted.tick(Some(ControlRequest::Identify)).refused);
+    hosted.commands[0].target = Target::Hold;
+    hosted.run(SECOND);
+    assert!(!hosted.tick(Some(ControlRequest::Identify)).refused);
+    hosted.run(SECOND);
+    assert!(matches!(activity(&hosted.pair), Activity::Identify(_)));
+    assert_eq!(hosted.status[0].mode, 0);
+    // Given up in motion, it comes to rest along the profile.
+    hosted.run(3 * SECOND);
+    assert!(matches!(activity(&hosted.pair), Activity::Identify(_)));
+    let before = hosted.status[1].velocity_demand.0;
+    hosted.pair.leg.cancel();
+    hosted.run(1);
+    assert_eq!(activity(&hosted.pair), Activity::Follow);
+    assert!((hosted.status[1].velocity_demand.0 - before).abs() < 0.01);
+    hosted.run(2 * SECOND);
+    assert!(is_enabled(&hosted.pair) && hosted.status[1].velocity_demand.0 == 0.0);
+    assert_eq!(hosted.pair.leg.control().verdict(), None);
+}
