@@ -17,6 +17,7 @@ mod paper;
 mod predict;
 mod regressor;
 mod replay;
+mod serve;
 mod trace;
 
 use std::process::ExitCode;
@@ -49,6 +50,8 @@ enum Command {
     Export(export::ExportArguments),
     /// Write the electronic data sheets of the bus' nodes, one per joint.
     Eds(eds::EdsArguments),
+    /// Put legs on a CANopen bus that host software reaches over TCP (slcan).
+    Serve(serve::ServeArguments),
     /// Change the load or the friction of a leg that walks: time to notice, what was found, false alarms.
     Monitor(monitor::MonitorArguments),
     /// Measure the current loop on a motor's test stand: steps, torque ripple, voltage limit, regeneration.
@@ -90,6 +93,7 @@ pub fn main() -> ExitCode {
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Eds(arguments) => eds::run(&arguments),
+        Command::Serve(arguments) => serve::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Motor(arguments) => motor::run(&arguments),
         Command::Paper(arguments) => paper::run(&arguments),

@@ -25,6 +25,7 @@
 //! | [`regressor`] | torques and regressor of given states |
 //! | [`consistent`], [`consistent_runs`] | legs that can exist: both searches and their optimum |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
+//! | [`bus`] | legs on a CANopen bus, for host software that exists |
 //! | [`image`] | the flash image: its leg, its build, its size |
 //! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
 
@@ -36,6 +37,7 @@
 pub mod analysis;
 pub mod anthropometry;
 pub mod board;
+pub mod bus;
 pub mod cli;
 pub mod consistent;
 pub mod consistent_runs;

@@ -1,6 +1,7 @@
 //! The tool as its users run it: each command, what it prints, writes and refuses. One program, so that helpers stand once.
 #![cfg(feature = "tool")]
 
+mod bus;
 mod command;
 mod crash;
 mod emulation;

@@ -1,0 +1,134 @@
+//! What a board on the bus remembers over the power: `scarab::store` over a simulated flash, which a file may outlive.
+//!
+//! As on the board nothing is written unless the drive is off, and a record that is damaged is refused by name. The file is the
+//! flash, byte by byte: two sectors of 128 KB.
+
+use embassy_futures::block_on;
+use scarab::bus::LONGEST;
+use scarab::leg::{DriveState, IdentifiedModel, Leg, LegConfiguration};
+use scarab::store::{JointProvenance, KeptModel, Key, Permit, Provenance, Store};
+use scarab::units::{Metre, NewtonMetre};
+
+use crate::flash::Flash;
+use crate::tool::pair::{PENDING, TAPS};
+
+/// A sector of the STM32F405's flash that is large enough, and how many there are of it.
+const SECTOR: usize = 128 * 1024;
+const SECTORS: usize = 2;
+/// Bytes of a board's flash.
+pub const BYTES: usize = SECTOR * SECTORS;
+
+/// Of the firmware: major, minor, patch.
+const VERSION: [u8; 3] = {
+    let mut version = [0; 3];
+    let (text, mut place, mut part) = (env!("CARGO_PKG_VERSION").as_bytes(), 0, 0);
+    while place < text.len() && part < version.len() {
+        match text[place] {
+            digit @ b'0'..=b'9' => version[part] = 10 * version[part] + (digit - b'0'),
+            _ => part += 1,
+        }
+        place += 1;
+    }
+    version
+};
+
+type Cells = Flash<SECTOR, SECTORS>;
+
+/// The flash of one board.
+#[derive(Debug)]
+pub struct Memory {
+    flash: Option<Cells>,
+}
+
+const KEYS: [Key; 2] = [Key::Objects1, Key::Objects2];
+
+impl Memory {
+    /// A flash that holds these bytes, or is erased.
+    #[must_use]
+    pub fn new(bytes: Option<&[u8]>) -> Self {
+        let mut flash = Cells::new(1);
+        if let Some(bytes) = bytes {
+            let count = bytes.len().min(BYTES);
+            flash.bytes_mut()[..count].copy_from_slice(&bytes[..count]);
+        }
+        Self { flash: Some(flash) }
+    }
+
+    fn with<T>(&mut self, ask: impl FnOnce(&mut Store<Cells>) -> T) -> Option<T> {
+        let flash = self.flash.take()?;
+        let mut store = Store::new(flash, 0..BYTES as u32).ok()?;
+        let told = ask(&mut store);
+        self.flash = Some(store.into_flash());
+        Some(told)
+    }
+
+    /// The bytes of the flash.
+    pub fn bytes(&mut self) -> &[u8] {
+        self.flash.as_mut().map_or(&[], |flash| flash.bytes_mut())
+    }
+
+    /// What was kept of a node's objects; of legs of more than two joints only the first two are.
+    pub fn objects(&mut self, joint: usize) -> Option<Vec<u8>> {
+        let key = *KEYS.get(joint)?;
+        let mut bytes = [0; LONGEST];
+        let length = self.with(|store| block_on(store.load_bytes(key, &mut bytes)))?.ok().flatten()?;
+        Some(bytes[..length].to_vec())
+    }
+
+    /// Keeps them; whether it could.
+    pub fn keep_objects(&mut self, state: DriveState, joint: usize, bytes: &[u8]) -> bool {
+        let (Some(permit), Some(key)) = (Permit::of(state), KEYS.get(joint)) else { return false };
+        self.with(|store| block_on(store.save_bytes(&permit, *key, bytes))).is_some_and(|saved| saved.is_ok())
+    }
+
+    /// The model that was kept, if it is this leg's, and its generation.
+    pub fn model<const N: usize, const B: usize>(
+        &mut self,
+        configuration: &LegConfiguration<N, B>,
+    ) -> Result<Option<(IdentifiedModel<N>, u32)>, String> {
+        let kept = self.with(|store| block_on(store.load::<KeptModel<N>>(Key::Model)));
+        let kept = kept.transpose().map_err(|why| format!("the kept model: {why:?}"))?.flatten();
+        let Some(kept) = kept else { return Ok(None) };
+        let model = configuration.restore(&kept.model).map_err(|why| format!("the kept model: {why:?}"))?;
+        Ok(Some((model, kept.provenance.generation)))
+    }
+
+    /// Keeps an accepted model with where it comes from, under the next generation; whether it could.
+    pub fn keep_model<const N: usize, const B: usize>(
+        &mut self,
+        state: DriveState,
+        configuration: &LegConfiguration<N, B>,
+        leg: &Leg<N, B, TAPS, PENDING>,
+        generation: u32,
+        swarm_seed: u64,
+    ) -> bool {
+        let (Some(permit), Some(model)) = (Permit::of(state), leg.control().model()) else { return false };
+        let identification = leg.identification();
+        let estimate = identification.estimate();
+        let chain = &configuration.model.chain;
+        let fit = |joint: usize| identification.fit(estimate.as_ref()?, 1, joint);
+        let kept = KeptModel {
+            model: configuration.keep(model),
+            provenance: Provenance {
+                firmware: VERSION,
+                generation,
+                swarm_seed,
+                bridge: None,
+                worn: None,
+                joints: core::array::from_fn(|joint| JointProvenance {
+                    length: Metre(chain.distance_to(joint).unwrap_or(0.0)),
+                    torque_per_ampere: configuration.joints[joint].scale.torque_per_ampere,
+                    rms: NewtonMetre(fit(joint).and_then(|fit| fit.rms_nm).unwrap_or(f32::NAN)),
+                    mean_absolute: NewtonMetre(fit(joint).map_or(f32::NAN, |fit| fit.mean_absolute_nm)),
+                }),
+            },
+        };
+        self.with(|store| block_on(store.save(&permit, Key::Model, &kept))).is_some_and(|saved| saved.is_ok())
+    }
+
+    /// Forgets everything; whether it could.
+    pub fn forget(&mut self, state: DriveState) -> bool {
+        let Some(permit) = Permit::of(state) else { return false };
+        self.with(|store| block_on(store.forget_all(&permit))).is_some_and(|forgotten| forgotten.is_ok())
+    }
+}

@@ -1,0 +1,17 @@
+//! Legs on a CANopen bus, simulated to the bit, for host software that exists.
+//!
+//! | part | what it is |
+//! | --- | --- |
+//! | [`board`] | firmware and plant of a leg behind its nodes |
+//! | [`wire`], [`network`] | arbitration and bits; several legs and a host on one wire |
+//! | [`slcan`], [`server`] | the port at which host software speaks to it |
+//! | [`memory`] | what a board remembers |
+//! | [`serve`] | all of it, at the pace of a clock |
+
+pub mod board;
+pub mod memory;
+pub mod network;
+pub mod serve;
+pub mod server;
+pub mod slcan;
+pub mod wire;

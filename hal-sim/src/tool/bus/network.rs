@@ -1,0 +1,76 @@
+//! Legs, one wire, and a host on it.
+
+use scarab::bus::Frame;
+
+use super::board::{Board, TICK_NS};
+use super::wire::{Mailbox, Sent, Wire};
+
+/// Everything on one bus.
+pub struct Network<const N: usize, const B: usize> {
+    boards: Vec<Board<N, B>>,
+    /// Of the host's adapter.
+    host: Mailbox,
+    wire: Wire,
+    now_ns: u64,
+}
+
+impl<const N: usize, const B: usize> Network<N, B> {
+    /// These boards on a wire of this bit rate.
+    #[must_use]
+    pub fn new(boards: Vec<Board<N, B>>, bits_per_s: u64) -> Self {
+        Self { boards, host: Mailbox::in_order(), wire: Wire::new(bits_per_s), now_ns: 0 }
+    }
+
+    /// A frame of the host's.
+    pub fn send(&mut self, frame: Frame) {
+        self.host.push(frame, self.now_ns);
+    }
+
+    /// A frame of the host's that is to leave at an instant to come.
+    pub fn send_at(&mut self, frame: Frame, at_ns: u64) {
+        self.host.push(frame, at_ns);
+    }
+
+    /// Frames of the host's that have not been sent yet.
+    #[must_use]
+    pub fn waiting(&self) -> usize {
+        self.host.len()
+    }
+
+    /// One servo tick of all legs and what the wire carries in it; every frame is shown, the host's (`sender` 0) as well.
+    pub fn tick(&mut self, mut show: impl FnMut(&Sent)) {
+        self.boards.iter_mut().for_each(Board::tick);
+        let end_ns = self.now_ns + TICK_NS;
+        let mut now_ns = self.now_ns;
+        loop {
+            self.boards.iter_mut().for_each(|board| board.speak(now_ns));
+            let nodes = self.boards.iter_mut().flat_map(|board| &mut board.mailboxes);
+            let mut mailboxes: Vec<&mut Mailbox> = core::iter::once(&mut self.host).chain(nodes).collect();
+            let Some(sent) = self.wire.advance(end_ns, &mut mailboxes) else { break };
+            now_ns = now_ns.max(sent.end_ns);
+            for (place, board) in self.boards.iter_mut().enumerate() {
+                let own = sent.sender.checked_sub(1 + place * N).filter(|joint| *joint < N);
+                board.hear(&sent.frame, sent.end_ns, own);
+            }
+            show(&sent);
+        }
+        self.now_ns = end_ns;
+    }
+
+    /// Simulated so far.
+    #[must_use]
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// The legs.
+    pub fn boards(&mut self) -> &mut [Board<N, B>] {
+        &mut self.boards
+    }
+
+    /// The wire.
+    #[must_use]
+    pub fn wire(&self) -> &Wire {
+        &self.wire
+    }
+}

@@ -1,0 +1,168 @@
+//! The serial line protocol of CAN adapters (Lawicel's, "slcan"), the adapter's side.
+//!
+//! ```text
+//! S0 .. S8, s...   bit rate            answered by CR            O, L   open         CR          C   close    CR
+//! tIIILDD..        frame               z CR                      TIIIIIIIILDD..      29-bit identifier: z CR, and dropped
+//! rIIIL            remote frame        z CR, and dropped         V, v, N, F, Z, M, m version, number, flags, settings
+//! anything else, or not while it is open: bell
+//! ```
+//!
+//! Source: Lawicel CANUSB manual, version 2; the driver `slcan` of Linux; python-can's `slcan` interface.
+
+use scarab::bus::Frame;
+
+/// What a line asks for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// A frame for the bus.
+    Frame(Frame),
+    /// Nothing but the answer.
+    Nothing,
+}
+
+/// The longest line: a frame with 29-bit identifier.
+const LONGEST: usize = 1 + 8 + 1 + 16;
+const BELL: u8 = 7;
+
+/// One client's side of the line.
+#[derive(Clone, Debug, Default)]
+pub struct Line {
+    bytes: Vec<u8>,
+    /// Too long: what comes up to the next CR is none of ours.
+    spoilt: bool,
+    is_open: bool,
+}
+
+impl Line {
+    /// Frames pass.
+    #[must_use]
+    pub const fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    /// A byte from the client; what is answered goes to `out`.
+    pub fn hear(&mut self, byte: u8, out: &mut Vec<u8>) -> Option<Frame> {
+        match byte {
+            b'\r' => {
+                let bytes = std::mem::take(&mut self.bytes);
+                let spoilt = std::mem::take(&mut self.spoilt);
+                match self.obey(&bytes).filter(|_| !spoilt) {
+                    Some((Heard::Frame(frame), answer)) => {
+                        out.extend_from_slice(answer);
+                        return Some(frame);
+                    }
+                    Some((Heard::Nothing, answer)) => out.extend_from_slice(answer),
+                    None => out.push(BELL),
+                }
+            }
+            b'\n' => {}
+            _ if self.bytes.len() < LONGEST => self.bytes.push(byte),
+            _ => self.spoilt = true,
+        }
+        None
+    }
+
+    fn obey(&mut self, line: &[u8]) -> Option<(Heard, &'static [u8])> {
+        let nothing = |answer: &'static [u8]| Some((Heard::Nothing, answer));
+        match line {
+            // Clients send a few empty lines to begin with.
+            [] => nothing(b"\r"),
+            [b'S' | b's', ..] if !self.is_open => nothing(b"\r"),
+            [b'O' | b'L'] => {
+                self.is_open = true;
+                nothing(b"\r")
+            }
+            [b'C'] => {
+                self.is_open = false;
+                nothing(b"\r")
+            }
+            [b'V'] => nothing(b"V1013\r"),
+            [b'v'] => nothing(b"v1013\r"),
+            [b'N'] => nothing(b"N5CA2\r"),
+            [b'F'] => nothing(b"F00\r"),
+            [b'Z' | b'M' | b'm', ..] => nothing(b"\r"),
+            [b't', rest @ ..] if self.is_open => Some((Heard::Frame(frame(rest)?), b"z\r")),
+            [b'T' | b'r' | b'R', ..] if self.is_open => nothing(b"z\r"),
+            _ => None,
+        }
+    }
+}
+
+fn digit(byte: u8) -> Option<u16> {
+    char::from(byte).to_digit(16).map(|digit| digit as u16)
+}
+
+/// Of `IIILDD..`.
+fn frame(text: &[u8]) -> Option<Frame> {
+    let (id, rest) = text.split_at_checked(3)?;
+    let id = id.iter().try_fold(0, |id, byte| Some(id << 4 | digit(*byte)?))?;
+    let (length, rest) = rest.split_first()?;
+    let length = usize::from(digit(*length)?);
+    if length > 8 || rest.len() != 2 * length || id > 0x7FF {
+        return None;
+    }
+    let mut data = Vec::with_capacity(8);
+    for pair in rest.chunks(2) {
+        data.push((digit(pair[0])? << 4 | digit(pair[1])?) as u8);
+    }
+    Some(Frame::new(id, &data))
+}
+
+/// A frame from the bus as a line.
+pub fn tell(frame: &Frame, out: &mut Vec<u8>) {
+    out.extend_from_slice(format!("t{:03X}{}", frame.id(), frame.data().len()).as_bytes());
+    for byte in frame.data() {
+        out.extend_from_slice(format!("{byte:02X}").as_bytes());
+    }
+    out.push(b'\r');
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn say(line: &mut Line, text: &str) -> (Vec<Frame>, String) {
+        let mut out = Vec::new();
+        let frames = text.bytes().filter_map(|byte| line.hear(byte, &mut out)).collect();
+        (frames, String::from_utf8(out).expect("ASCII"))
+    }
+
+    #[test]
+    fn a_frame_passes_once_the_channel_is_open_and_comes_back_as_it_was() {
+        let mut line = Line::default();
+        assert_eq!(say(&mut line, "t0000\r"), (Vec::new(), "\x07".into()));
+        assert_eq!(say(&mut line, "C\rS8\rO\r"), (Vec::new(), "\r\r\r".into()));
+        let frame = Frame::new(0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
+        assert_eq!(say(&mut line, "t60184041600000000000\r"), (vec![frame], "z\r".into()));
+        let mut told = Vec::new();
+        tell(&frame, &mut told);
+        assert_eq!(told, b"t60184041600000000000\r");
+        assert_eq!(say(&mut line, "C\r").1, "\r");
+        assert!(!line.is_open());
+    }
+
+    #[test]
+    fn what_is_no_command_rings_the_bell_and_spoils_nothing() {
+        let mut line = Line::default();
+        assert_eq!(say(&mut line, "O\r").1, "\r");
+        for text in ["x", "t60", "t6019", "tFFF0", "t60110", "t6011xx", "t6010Z", "O1", &"t".repeat(300)] {
+            assert_eq!(say(&mut line, &format!("{text}\r")), (Vec::new(), "\x07".into()), "{text}");
+        }
+        assert_eq!(say(&mut line, "t0010\r").0, [Frame::new(1, &[])]);
+        // Frames this bus does not carry are taken and dropped.
+        assert_eq!(say(&mut line, "T000000012AABB\rr0012\r"), (Vec::new(), "z\rz\r".into()));
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        let mut line = Line::default();
+        let mut state = 1_u32;
+        let mut out = Vec::new();
+        let letters = b"tTrROCSVvNFZMm0123456789ABCDEFabcdef\r\r\r\n\x00\xFF";
+        for _ in 0..200_000 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let _ = line.hear(letters[(state >> 16) as usize % letters.len()], &mut out);
+            out.clear();
+        }
+    }
+}

@@ -1,0 +1,211 @@
+//! The wire: one frame at a time, the lowest identifier first, each for as long as its bits take.
+//!
+//! Why bit by bit: whether a mapping fits a bus, and how late a target comes, is decided by stuffed bits and by who goes first.
+//! What is not here: errors on the wire, and the bits of a clock that drifts.
+//!
+//! Source: ISO 11898-1, classic frames with 11-bit identifiers.
+
+use std::collections::VecDeque;
+
+use scarab::bus::Frame;
+
+/// A bit at 1 Mbit/s.
+const NS_PER_S: u64 = 1_000_000_000;
+/// Check sum delimiter, acknowledge and its delimiter, end of frame, intermission: never stuffed.
+const TAIL_BITS: u32 = 1 + 2 + 7 + 3;
+
+/// Bits of a frame on the wire, those stuffed into it and the intermission after it included.
+#[must_use]
+pub fn bits(frame: &Frame) -> u32 {
+    let mut bits = vec![false];
+    let mut push = |value: u32, count: u32| {
+        bits.extend((0..count).rev().map(|place| value >> place & 1 == 1));
+    };
+    push(u32::from(frame.id()), 11);
+    push(0, 3);
+    push(frame.data().len() as u32, 4);
+    for byte in frame.data() {
+        push(u32::from(*byte), 8);
+    }
+    // x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1
+    let sum = bits.iter().fold(0_u32, |sum, bit| {
+        let next = sum << 1;
+        if *bit == (sum >> 14 & 1 == 1) { next & 0x7FFF } else { (next ^ 0x4599) & 0x7FFF }
+    });
+    bits.extend((0..15).rev().map(|place| sum >> place & 1 == 1));
+    let (mut stuffed, mut run, mut last) = (0, 0, true);
+    for bit in &bits {
+        run = if *bit == last { run + 1 } else { 1 };
+        last = *bit;
+        if run == 5 {
+            // The stuffed bit begins a run of its own.
+            (stuffed, run, last) = (stuffed + 1, 1, !last);
+        }
+    }
+    bits.len() as u32 + stuffed + TAIL_BITS
+}
+
+/// Frames of one controller that wait for the wire.
+#[derive(Clone, Debug, Default)]
+pub struct Mailbox {
+    waiting: VecDeque<(Frame, u64)>,
+    /// In the order in which they came, as an adapter of a host sends them; else by their identifiers, as a controller does.
+    in_order: bool,
+}
+
+impl Mailbox {
+    /// Of an adapter.
+    #[must_use]
+    pub fn in_order() -> Self {
+        Self { waiting: VecDeque::new(), in_order: true }
+    }
+
+    /// A frame to be sent, from this instant on.
+    pub fn push(&mut self, frame: Frame, now_ns: u64) {
+        self.waiting.push_back((frame, now_ns));
+    }
+
+    /// Frames that wait.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.waiting.len()
+    }
+
+    /// None waits.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.waiting.is_empty()
+    }
+
+    /// Nothing waits any more.
+    pub fn clear(&mut self) {
+        self.waiting.clear();
+    }
+
+    /// Place and identifier of the frame that it puts on the wire.
+    fn first(&self) -> Option<(usize, u16)> {
+        let named = self.waiting.iter().enumerate().map(|(place, (frame, _))| (place, frame.id()));
+        if self.in_order { named.into_iter().next() } else { named.min_by_key(|(_, id)| *id) }
+    }
+}
+
+/// A frame that has been sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sent {
+    /// What.
+    pub frame: Frame,
+    /// Whose mailbox it came from.
+    pub sender: usize,
+    /// When it was to be sent, and when its last bit had been.
+    pub asked_ns: u64,
+    /// See there.
+    pub end_ns: u64,
+}
+
+/// The wire and the frame on it.
+#[derive(Clone, Debug)]
+pub struct Wire {
+    bit_ns: u64,
+    /// Since then nothing is on it.
+    free_ns: u64,
+    moving: Option<Sent>,
+    busy_ns: u64,
+}
+
+impl Wire {
+    /// Nothing on it.
+    #[must_use]
+    pub fn new(bits_per_s: u64) -> Self {
+        Self { bit_ns: NS_PER_S / bits_per_s, free_ns: 0, moving: None, busy_ns: 0 }
+    }
+
+    /// The next frame whose end lies at or before this instant. Called again until there is none; what is pushed between two
+    /// calls takes part from then on.
+    pub fn advance(&mut self, until_ns: u64, mailboxes: &mut [&mut Mailbox]) -> Option<Sent> {
+        if self.moving.is_none() {
+            self.moving = self.arbitrate(until_ns, mailboxes);
+        }
+        let sent = self.moving.take_if(|sent| sent.end_ns <= until_ns)?;
+        self.free_ns = sent.end_ns;
+        Some(sent)
+    }
+
+    fn arbitrate(&mut self, until_ns: u64, mailboxes: &mut [&mut Mailbox]) -> Option<Sent> {
+        // The instant at which anybody may begin.
+        let earliest = mailboxes
+            .iter()
+            .filter_map(|mailbox| mailbox.waiting.iter().map(|(_, asked)| *asked).min())
+            .min()?
+            .max(self.free_ns);
+        if earliest >= until_ns {
+            return None;
+        }
+        let ready = |mailbox: &&mut Mailbox| {
+            mailbox.first().filter(|(place, _)| mailbox.waiting[*place].1 <= earliest)
+        };
+        let (sender, (place, _)) = mailboxes
+            .iter()
+            .enumerate()
+            .filter_map(|(sender, mailbox)| Some((sender, ready(mailbox)?)))
+            .min_by_key(|(_, (_, id))| *id)?;
+        let (frame, asked_ns) = mailboxes[sender].waiting.remove(place)?;
+        let length = u64::from(bits(&frame)) * self.bit_ns;
+        self.busy_ns += length;
+        Some(Sent { frame, sender, asked_ns, end_ns: earliest + length })
+    }
+
+    /// For how long it was in use so far.
+    #[must_use]
+    pub fn busy_ns(&self) -> u64 {
+        self.busy_ns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_lie_between_those_without_and_those_with_the_most_stuffing() {
+        // 0x000 with eight zero bytes stuffs much, 0x555 with alternating bits nothing but its length and check sum.
+        for frame in [
+            Frame::new(0, &[0; 8]),
+            Frame::new(0x555, &[0x55; 8]),
+            Frame::new(0x7FF, &[]),
+            Frame::new(0x80, &[]),
+        ] {
+            let [least, most] = frame.bits();
+            assert!((least..=most).contains(&bits(&frame)), "{frame:?} {}", bits(&frame));
+        }
+        assert!(bits(&Frame::new(0, &[0; 8])) > bits(&Frame::new(0x555, &[0x55; 8])) + 10);
+    }
+
+    #[test]
+    fn the_lowest_identifier_goes_first_and_nobody_interrupts() {
+        let (mut node, mut host) = (Mailbox::default(), Mailbox::in_order());
+        for id in [0x381, 0x181, 0x281] {
+            node.push(Frame::new(id, &[1, 2]), 0);
+        }
+        host.push(Frame::new(0x601, &[0; 8]), 0);
+        host.push(Frame::new(0x080, &[]), 0);
+        let mut wire = Wire::new(1_000_000);
+        let mut sent = Vec::new();
+        while let Some(frame) = wire.advance(2_000_000, &mut [&mut node, &mut host]) {
+            sent.push(frame.frame.id());
+        }
+        // The adapter's SYNC waits behind its own SDO.
+        assert_eq!(sent, [0x181, 0x281, 0x381, 0x601, 0x080]);
+        assert!(wire.busy_ns() > 5 * 47_000 && wire.busy_ns() < 5 * 135_000);
+    }
+
+    #[test]
+    fn a_frame_ends_after_its_bits() {
+        let mut host = Mailbox::in_order();
+        let frame = Frame::new(0x80, &[]);
+        host.push(frame, 10_000);
+        let mut wire = Wire::new(1_000_000);
+        let end = 10_000 + u64::from(bits(&frame)) * 1000;
+        assert_eq!(wire.advance(end - 1, &mut [&mut host]), None);
+        assert_eq!(wire.advance(end, &mut [&mut host]).map(|sent| sent.end_ns), Some(end));
+    }
+}

@@ -1,0 +1,53 @@
+//! `serve`: legs on a CANopen bus behind a port that host software speaks to.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::leg_options::LegOptions;
+use crate::tool::bus::serve::{ServeOptions, serve};
+use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::setup::DEFAULT_SEED;
+use crate::with_leg_size;
+
+/// Which legs, where, how fast.
+#[derive(Args, Debug)]
+pub struct ServeArguments {
+    #[command(flatten)]
+    leg: LegOptions,
+    /// Address and port of the CAN adapter that is simulated (slcan over TCP); port 0 is any that is free.
+    #[arg(long, value_name = "HOST:PORT")]
+    slcan: SocketAddr,
+    /// Boards on the bus, each with this leg.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=4))]
+    legs: u8,
+    /// Simulated seconds per second.
+    #[arg(long, value_name = "K", default_value_t = 1.0)]
+    speed: f64,
+    /// The boards' flash; it is made where there is none.
+    #[arg(long, value_name = "FILE")]
+    flash: Option<PathBuf>,
+    /// Of noise.
+    #[arg(long, default_value_t = DEFAULT_SEED)]
+    seed: u64,
+}
+
+/// Serves until SIGTERM; the exit code.
+pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
+    let leg = arguments.leg.load()?;
+    if !(arguments.speed > 0.0 && arguments.speed <= 100.0) {
+        return Err(ToolError::input(format!("--speed: {} is not from above 0 to 100", arguments.speed)));
+    }
+    let options = ServeOptions {
+        address: arguments.slcan,
+        legs: arguments.legs.into(),
+        speed: arguments.speed,
+        flash: arguments.flash.clone(),
+        seed: arguments.seed,
+        bits_per_s: 1_000_000,
+    };
+    let (leg, options) = (&leg, &options);
+    with_leg_size!(leg, serve(leg, options))?;
+    Ok(EXIT_ACCEPTED)
+}

@@ -1,0 +1,115 @@
+"""A leg on the bus, for Python: what `session.py` and `identify.py` share.
+
+Needs the packages `canopen`, `python-can` and `pyserial`; any CAN adapter that python-can knows will do, here it is the one that
+`cargo sim serve` simulates.
+"""
+
+import math
+import struct
+import threading
+import time
+
+import canopen
+
+HOST = 80
+MICRO = 1e-6
+PDO_OFF = 0x80000000
+
+
+def connect(address):
+    """The bus behind an slcan adapter on TCP, `host:port`."""
+    network = canopen.Network()
+    network.connect(interface="slcan", channel=f"socket://{address}", bitrate=1_000_000, sleep_after_open=0)
+    return network
+
+
+def until(what, condition, longest_s=20.0):
+    """Waits for a condition; its value."""
+    end = time.monotonic() + longest_s
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > end:
+            raise SystemExit(f"waited {longest_s} s for: {what}")
+        time.sleep(0.002)
+
+
+class Joint:
+    """A node of the bus by its number, without a data sheet."""
+
+    def __init__(self, network, number):
+        self.network, self.number = network, number
+        self.node = network.add_node(number, canopen.ObjectDictionary())
+        self.node.sdo.RESPONSE_TIMEOUT = 5.0
+        self.sent = {}
+        self.emergencies = []
+        self.node.emcy.add_callback(lambda error: self.emergencies.append(error.code))
+
+    def read(self, index, sub=0, kind="<I"):
+        """A number of an object."""
+        return struct.unpack(kind, self.node.sdo.upload(index, sub))[0]
+
+    def write(self, index, sub, value, kind="<I"):
+        """Gives an object a number."""
+        self.node.sdo.download(index, sub, struct.pack(kind, value))
+
+    def set_up_pdo(self, communication, cob, kind, objects):
+        """As recorded host software does it: off, mapping, on; every write is acknowledged."""
+        mapping = communication + 0x200
+        self.write(communication, 1, PDO_OFF | cob)
+        self.write(mapping, 0, 0, "<B")
+        self.write(communication, 2, kind, "<B")
+        for place, entry in enumerate(objects, 1):
+            self.write(mapping, place, entry)
+        self.write(mapping, 0, len(objects), "<B")
+        self.write(communication, 1, cob)
+        if communication >= 0x1800:
+            self.network.subscribe(cob, lambda _, data, when: self.sent.__setitem__(communication, (bytes(data), when)))
+
+    def pdo(self, communication, kind):
+        """The values of the last PDO of that number that came, or nothing."""
+        data = self.sent.get(communication)
+        return struct.unpack(kind, data[0]) if data else None
+
+    def state(self):
+        """The state bits of the statusword."""
+        return self.read(0x6041, 0, "<H") & 0x6F
+
+    def position(self):
+        """Flexion, rad."""
+        return self.read(0x6064, 0, "<i") * MICRO
+
+
+class Heartbeat:
+    """The host's heartbeat, until it is stopped."""
+
+    def __init__(self, network, period_s=0.02):
+        self.network, self.period_s, self.runs = network, period_s, True
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def run(self):
+        while self.runs:
+            self.network.send_message(0x700 + HOST, b"\x05")
+            time.sleep(self.period_s)
+
+    def stop(self):
+        self.runs = False
+        self.thread.join()
+
+
+def enable(joints):
+    """6, 7, F; a leg is enabled once all of its joints have asked."""
+    for word, state in ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27)):
+        for joint in joints:
+            joint.write(0x6040, 0, word, "<H")
+        for joint in joints:
+            # Bit 15: the joint is enabled for itself, the leg is not yet.
+            until(f"state {state:02X} of node {joint.number}",
+                  lambda: joint.read(0x6041, 0, "<H") & 0x806F == state)
+
+
+def known(value):
+    """What is not a number is not known."""
+    return None if math.isnan(value) else value

@@ -1,0 +1,155 @@
+"""A host's session with a leg, as recorded host software has it: `session.py HOST:PORT [NODE NODE]`.
+
+Network start, PDOs set up while Operational, 6 7 F, motions by received PDOs of type 255 and of type 1 under SYNC, a host that is lost
+in two ways, and the way back. Every step is checked; the last line is `session: ok`.
+"""
+
+import math
+import struct
+import sys
+import time
+
+from scarab_bus import HOST, Heartbeat, Joint, MICRO, connect, enable, until
+
+
+def set_up(joint):
+    """RPDO and TPDO as in the recorded session."""
+    node = joint.number
+    joint.set_up_pdo(0x1800, 0x180 + node, 1, [0x60410010])
+    joint.set_up_pdo(0x1801, 0x280 + node, 1, [0x60640020, 0x606C0020])
+    joint.set_up_pdo(0x1802, 0x380 + node, 1, [0x60770010])
+    joint.set_up_pdo(0x1803, 0x480 + node, 1, [0x219A0020])
+    joint.set_up_pdo(0x1400, 0x200 + node, 0xFF, [0x60400010])
+    joint.set_up_pdo(0x1401, 0x300 + node, 0xFF, [0x607A0020])
+    joint.set_up_pdo(0x1402, 0x400 + node, 0xFF, [0x60FF0020])
+    joint.set_up_pdo(0x1403, 0x500 + node, 0xFF, [0x60710010])
+
+
+def sync(network, joints, position):
+    """SYNC, and the positions that came with it; the statusword has to be among what came."""
+    for joint in joints:
+        joint.sent.clear()
+    network.send_message(0x80, b"")
+    for joint in joints:
+        until("the PDOs after SYNC", lambda: len(joint.sent) == 4)
+    if position:
+        return [joint.pdo(0x1801, "<ii")[0] * MICRO for joint in joints]
+    return [joint.pdo(0x1800, "<H")[0] for joint in joints]
+
+
+def profile_position(network, joints):
+    """A set-point by PDO of type 255: target, then bit 4."""
+    for joint in joints:
+        joint.write(0x6060, 0, 1, "<b")
+        until("mode 1", lambda: joint.read(0x6061, 0, "<b") == 1)
+        joint.write(0x6081, 0, 500_000)
+    begin = sync(network, joints, True)
+    goals = [place + 0.15 for place in begin]
+    for joint, goal in zip(joints, goals):
+        network.send_message(0x300 + joint.number, struct.pack("<i", round(goal / MICRO)))
+        network.send_message(0x200 + joint.number, struct.pack("<H", 0x3F))
+    # The target before, which was reached, is told until the leg has taken this one.
+    time.sleep(0.05)
+    for joint in joints:
+        until("target reached", lambda: joint.read(0x6041, 0, "<H") & 1 << 10)
+        network.send_message(0x200 + joint.number, struct.pack("<H", 0x2F))
+    for place, goal in zip(sync(network, joints, True), goals):
+        assert abs(place - goal) < 0.02, f"{place} instead of {goal}"
+    print("profile position: reached", ", ".join(f"{goal:.3f} rad" for goal in goals))
+
+
+def profile_velocity(network, joints):
+    """A velocity by PDO, then halt."""
+    joint = joints[0]
+    joint.write(0x6060, 0, 3, "<b")
+    network.send_message(0x400 + joint.number, struct.pack("<i", -200_000))
+    until("0.2 rad/s", lambda: abs(joint.read(0x606C, 0, "<i") + 200_000) < 40_000)
+    network.send_message(0x200 + joint.number, struct.pack("<H", 0x10F))
+    until("halt", lambda: joint.read(0x6041, 0, "<H") & 1 << 10 and abs(joint.read(0x606C, 0, "<i")) < 20_000)
+    network.send_message(0x400 + joint.number, struct.pack("<i", 0))
+    network.send_message(0x200 + joint.number, struct.pack("<H", 0x0F))
+    print("profile velocity: followed and halted")
+
+
+def cyclic_position(network, joints, seconds=3.0, period_s=0.01):
+    """Positions by PDO of type 1, taken at SYNC; the SYNCs come every 10 ms as far as this machine keeps its time."""
+    for joint in joints:
+        joint.set_up_pdo(0x1401, 0x300 + joint.number, 1, [0x607A0020])
+        joint.write(0x60C2, 1, 10, "<B")
+        # Of a host that is no real-time machine.
+        joint.write(0x6066, 0, 1000, "<H")
+    begin = [joint.position() for joint in joints]
+    for joint, place in zip(joints, begin):
+        joint.write(0x607A, 0, round(place / MICRO), "<i")
+        joint.write(0x6060, 0, 8, "<b")
+    largest, start = 0.0, time.monotonic()
+    while (now := time.monotonic() - start) < seconds:
+        offset = 0.05 * (1 - math.cos(2 * math.pi * now / seconds))
+        for joint, place in zip(joints, begin):
+            network.send_message(0x300 + joint.number, struct.pack("<i", round((place + offset) / MICRO)))
+        places = sync(network, joints, True)
+        largest = max(largest, *(abs(place - first - offset) for place, first in zip(places, begin)))
+        time.sleep(max(0.0, start + now + period_s - time.monotonic()))
+    for word in sync(network, joints, False):
+        assert word & 0x6F == 0x27, f"statusword {word:04X}"
+    # The joint is a period and the servo behind, and this machine may be later.
+    assert largest < 0.06, f"{largest} rad behind"
+    print(f"cyclic position: {seconds:.0f} s under SYNC, at most {largest * 1e3:.1f} mrad from the newest target")
+
+
+def lose_the_host(network, joints):
+    """Without the host's heartbeat the leg stops as 6007 says, with an emergency message, and stays off."""
+    for option, final in ((3, 0x40), (1, 0x08)):
+        for joint in joints:
+            joint.write(0x6060, 0, 0, "<b")
+        enable(joints)
+        heartbeat = Heartbeat(network)
+        for joint in joints:
+            joint.write(0x6007, 0, option, "<h")
+            joint.write(0x1016, 1, HOST << 16 | 1000)
+            joint.emergencies.clear()
+        time.sleep(0.5)
+        assert all(joint.state() == 0x27 for joint in joints)
+        heartbeat.stop()
+        for joint in joints:
+            until("emergency 8130", lambda: 0x8130 in joint.emergencies)
+            until(f"state {final:02X}", lambda: joint.state() == final)
+            # 1029:1 is 0: Pre-operational.
+            joint.write(0x1016, 1, 0)
+        network.nmt.state = "OPERATIONAL"
+        for joint in joints:
+            if final == 0x08:
+                joint.write(0x6040, 0, 0x80, "<H")
+            joint.write(0x6040, 0, 0x00, "<H")
+        for joint in joints:
+            until("switch on disabled", lambda: joint.state() == 0x40)
+        print(f"host lost, 6007 is {option}: emergency 8130, state {final:02X}, and back")
+
+
+def main(address, numbers):
+    network = connect(address)
+    joints = [Joint(network, number) for number in numbers]
+    # Started before it is set up: recorded host software does it in this order.
+    network.nmt.state = "OPERATIONAL"
+    for joint in joints:
+        set_up(joint)
+        assert joint.read(0x1000) == 0x00020192
+    assert all(word & 0x6F == 0x40 for word in sync(network, joints, False))
+    enable(joints)
+    print("enabled by 6, 7, F")
+    profile_position(network, joints)
+    profile_velocity(network, joints)
+    cyclic_position(network, joints)
+    for joint in joints:
+        joint.write(0x6040, 0, 0x02, "<H")
+    for joint in joints:
+        until("off after quick stop", lambda: joint.state() == 0x40)
+        joint.write(0x6040, 0, 0x00, "<H")
+    print("quick stop: damped, then off")
+    lose_the_host(network, joints)
+    network.disconnect()
+    print("session: ok")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], [int(number) for number in sys.argv[2:]] or [1, 2])
