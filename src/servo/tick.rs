@@ -52,11 +52,14 @@ pub struct Effort {
     pub torque: NewtonMetre,
     /// The motion is held; else the torque is all that is given.
     pub held: bool,
+    /// No more than this is asked for; what holds the motion does not wind up against it.
+    pub largest: NewtonMetre,
 }
 
 impl Effort {
     /// Only the motion.
-    pub const HELD: Self = Self { torque: NewtonMetre::ZERO, held: true };
+    pub const HELD: Self =
+        Self { torque: NewtonMetre::ZERO, held: true, largest: NewtonMetre(f32::INFINITY) };
 }
 
 /// What came of one tick, in the model's angles and signs.
@@ -241,8 +244,8 @@ impl<const N: usize> Servo<N> {
                 + self.controllers[joint].torque(gains, tracking_error[joint], velocity_error);
             match efforts.map(|efforts| &efforts[joint]) {
                 None => held,
-                Some(Effort { torque, held: true }) => held + *torque,
-                Some(Effort { torque, held: false }) => *torque,
+                Some(Effort { torque, held: true, .. }) => held + *torque,
+                Some(Effort { torque, held: false, .. }) => *torque,
             }
         });
 
@@ -250,7 +253,15 @@ impl<const N: usize> Servo<N> {
         let rejected = core::array::from_fn(|joint| rejected[joint] || sample.joints[joint].doubtful);
         let observation =
             Observation { position, velocity, current: sample.joints.map(|joint| joint.current), rejected };
-        let request = Request { torque: wanted_torque, power: command.power };
+        let torque = match efforts {
+            None => wanted_torque,
+            // What is no number goes through to the monitor, which switches off.
+            Some(efforts) => core::array::from_fn(|joint| match wanted_torque[joint] {
+                wanted if wanted.abs() > efforts[joint].largest => wanted.limited(efforts[joint].largest),
+                wanted => wanted,
+            }),
+        };
+        let request = Request { torque, power: command.power };
         let decision = self.monitor.decide(&observation, &request);
         self.settle(&tracking_error, &wanted_torque, &decision);
         for joint in 0..N {

@@ -169,6 +169,33 @@ fn a_torque_follows_its_slope_and_is_held_to_the_largest_torque() {
 }
 
 #[test]
+fn the_largest_torque_holds_in_every_mode_and_nothing_winds_up_against_it() {
+    let mut hosted = Hosted::new();
+    hosted.run(2 * SECOND);
+    let weight = hosted.status[0].torque_demand.0.abs();
+    hosted.commands[0].following_window = Radian(10.0);
+    hosted.commands[0].largest_torque = NewtonMetre(weight + 1.0);
+    let from = hosted.position(0);
+    hosted.commands[0].acceleration = RadianPerSecondSquared(30.0);
+    hosted.point(0, from + 0.1, true);
+    let mut limited = false;
+    for _ in 0..SECOND {
+        hosted.run(1);
+        limited |= hosted.status[0].limited;
+        assert!(hosted.status[0].torque_demand.0.abs() <= weight + 1.001, "{:?}", hosted.status[0]);
+    }
+    assert!(limited);
+    // Given back, it arrives and does not shoot beyond.
+    hosted.commands[0].largest_torque = NewtonMetre(1000.0);
+    let mut farthest = 0.0_f32;
+    for _ in 0..2 * SECOND {
+        hosted.run(1);
+        farthest = farthest.max(hosted.position(0) - from);
+    }
+    assert!(farthest < 0.13 && (hosted.position(0) - from - 0.1).abs() < 0.005, "{farthest}");
+}
+
+#[test]
 fn a_joint_that_is_held_again_keeps_the_torque_it_had() {
     let mut hosted = Hosted::new();
     hosted.run(2 * SECOND);

@@ -20,7 +20,8 @@ use crate::real::{abs, clamp, max, min};
 use crate::servo::{SERVO_RATE_HZ, TICK_S};
 use crate::units::{NewtonMetre, Radian, RadianPerSecond, Second};
 
-/// Slower than this a joint stands: 0.3 degrees per second, five counts of the default leg's encoder in a tick of the log.
+/// Slower than this a joint stands: 0.3 degrees per second, ten times what the observer makes of the steps of the default leg's
+/// encoder.
 const STANDING: f32 = 0.005;
 /// The longest period that is interpolated: a quarter of a second.
 const LONGEST_PERIOD: u32 = SERVO_RATE_HZ / 4;
@@ -60,6 +61,8 @@ pub struct Demand {
     pub torque: f32,
     /// The course is held, not only the torque given.
     pub held: bool,
+    /// The most that is asked for, N m.
+    pub largest: f32,
     /// Too far from where it is commanded to be.
     pub failed: bool,
     /// The joint's zero is moved by so much, rad.
@@ -157,6 +160,7 @@ impl Follower {
             velocity_offset: 0.0,
             torque: 0.0,
             held: true,
+            largest,
             failed: false,
             shift: None,
         };
@@ -236,7 +240,6 @@ impl Follower {
             self.course.shift(shift);
         }
         demand.course = self.course();
-        demand.torque = clamp(demand.torque, -largest, largest);
         demand.failed = demand.shift.is_none() && self.deviated(command, measured);
         demand
     }

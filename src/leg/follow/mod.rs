@@ -50,6 +50,7 @@ pub struct Following<const N: usize> {
     anatomy: [AnatomicalJoint<f32>; N],
     count_per_radian: [f32; N],
     measured: [Measured; N],
+    largest: [NewtonMetre; N],
     zeros: [i32; N],
 }
 
@@ -76,6 +77,7 @@ impl<const N: usize> Following<N> {
                 if mirrored { -1.0 / radian_per_count.0 } else { 1.0 / radian_per_count.0 }
             }),
             measured: [Measured::default(); N],
+            largest: [NewtonMetre::ZERO; N],
             zeros: [0; N],
         }
     }
@@ -134,14 +136,16 @@ impl<const N: usize> Following<N> {
         };
         let mut shifts = [0; N];
         for joint in 0..N {
-            let Demand { course, velocity_offset, torque, held, failed, shift } =
+            let Demand { course, velocity_offset, torque, held, largest, failed, shift } =
                 self.joints[joint].follow(&commands[joint], &self.measured[joint], &self.bounds[joint]);
             let anatomy = &self.anatomy[joint];
             let motion = &mut commanded.motion;
             motion.position_rad[joint] = anatomy.angle_to_chain(course.position());
             motion.velocity_rad_per_s[joint] = anatomy.to_chain(course.velocity() + velocity_offset);
             motion.acceleration_rad_per_s2[joint] = anatomy.to_chain(course.acceleration());
-            commanded.efforts[joint] = Effort { torque: NewtonMetre(anatomy.to_chain(torque)), held };
+            commanded.efforts[joint] =
+                Effort { torque: NewtonMetre(anatomy.to_chain(torque)), held, largest: NewtonMetre(largest) };
+            self.largest[joint] = NewtonMetre(largest);
             if failed {
                 let fault = Fault { code: FaultCode::FollowingError, joint: joint as u8 };
                 commanded.fault = commanded.fault.or(Some(fault));
@@ -179,7 +183,10 @@ impl<const N: usize> Following<N> {
             torque_demand: measured.torque,
             mode: follower.mode().filter(|_| follows).map_or(0, |mode| mode as i8),
             reached: follows && follower.reached,
-            limited: follows && follower.limited || decision.limited.get(joint)?.any(),
+            limited: follows
+                && (follower.limited
+                    || output.servo.wanted_torque.get(joint)?.abs() > *self.largest.get(joint)?)
+                || decision.limited.get(joint)?.any(),
             homed: follower.homed,
             deviates: follows && follower.deviates,
             inputs: 0,
