@@ -124,8 +124,8 @@ faults! {
     PositionLimit = 0x8500, "J1", "position_limit", Damp, "it left its range";
     /// Faster than 1.1 times the speed limit while enabled (8400: speed controller).
     Overspeed = 0x8400, "J2", "overspeed", Damp, "it was faster than 1.1 times its speed limit";
-    /// Gains or limits are not what they were (6310: loss of parameters).
-    Parameters = 0x6310, "M2", "parameters", Damp, "its gains or limits changed in memory";
+    /// Gains or limits are not what they were (6310: loss of parameters). Nothing that reckons with them is to be trusted to damp.
+    Parameters = 0x6310, "M2", "parameters", Off, "its gains or limits changed in memory";
     /// Farther than the window from where the host commands it to be (8611: following error).
     FollowingError = 0x8611, "B1", "following_error", Damp, "it did not follow where it was commanded";
     /// The host's heartbeat is missed.

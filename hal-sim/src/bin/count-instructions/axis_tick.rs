@@ -20,8 +20,9 @@ const MOST_INSTRUCTIONS: u32 = 700;
 const MOST_PERCENT: f32 = 35.0;
 const AXES: u32 = 2;
 
-/// Mechanical speeds and target currents: standstill, a joint's greatest behind 50:1, and near the voltage limit.
-const SPEEDS: [(f32, f32); 4] = [(0.0, 10.0), (225.0, 30.0), (-225.0, 30.0), (820.0, 40.0)];
+/// Mechanical speeds and target currents: nearly at rest (a rotor that a current of either sign does not move has an encoder that is
+/// frozen), a joint's greatest behind 50:1, and near the voltage limit.
+const SPEEDS: [(f32, f32); 4] = [(1.0, 10.0), (225.0, 30.0), (-225.0, 30.0), (820.0, 40.0)];
 /// Ticks counted at each speed; an electrical turn at the slowest moving speed is 96.
 const TICKS: u32 = 1200;
 
