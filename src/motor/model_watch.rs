@@ -9,7 +9,7 @@
 //! r = s - R i - (coupling and back-EMF, where they are not fed forward)                       d and q, each servo period
 //! |r| > V + 0.35 R |i| + |w| (0.2 flux + 0.3 L |i|)     32 periods more often than not         open, or frozen
 //! |mean of r, turned back to the stator, over an electrical turn| > 0.4 V + 0.06 R I           drifted zero
-//! max q - min q > I / 3 since the counter last moved by more than 2 counts                32 periods in a row: frozen
+//! max q - min q > I / 2 since the counter last moved by more than 2 counts                64 periods later: frozen
 //! V = 2 * 4/3 t_d f V_bus                               what dead time and switches take, twice; 0.44 V on the board
 //! ```
 //!
@@ -21,11 +21,12 @@
 //! the counts to zero (1 ms). It is told apart by counts that stand still; a residual beyond the back-EMF of the greatest speed is
 //! none.
 //!
-//! **Slower, or at rest**: whoever controls a place that no longer changes pulls harder and harder. A current that has changed by a
-//! third of its limit (19 A, 28 N m on the default leg) moves a rotor by more than 2 counts (0.03 mrad of that joint) within
-//! 8 ms, unless it has more than 20 kg m^2 to move, friction takes more than 28 N m from one side to the other (9 here), or what
-//! holds it is stiffer than 1e6 N m/rad (gears have 1e4 to 1e5; a hand 2e3). Up to that change, and so up to a torque that is wrong
-//! by 28 N m, a frozen counter is not seen. A rotor that is clamped itself, as on a test bench, is taken for a frozen counter.
+//! **Slower, or at rest**: whoever controls a place that no longer changes pulls harder and harder. A current that has changed by
+//! half of its limit (28 A, 42 N m on the default leg) moves a rotor by more than 2 counts (0.03 mrad of that joint) within
+//! 16 ms, unless it has more than 100 kg m^2 to move, friction takes more than 42 N m from one side to the other (9 here), what
+//! holds it is stiffer than 1e6 N m/rad (gears have 1e4 to 1e5, a hand 2e3), or a push grows as the torque does, to within friction: with
+//! a third of the limit and 8 ms that happened once in 75 pushes of up to 70 N m. Up to that change, and so up to a torque that is wrong by
+//! 42 N m, a frozen counter is not seen. A rotor that is clamped itself, as on a test bench, is taken for a frozen counter.
 //!
 //! **Open phase** (P1): what is asked of the open phase cannot flow, the integral runs away and passes any limit; without current
 //! nothing is asked and nothing is seen. At rest it may be taken for a frozen counter: two phases brake as well. **Drifted zero** (C1): an offset o of one shunt leaves 2/sqrt(3) |R + j w L| o, at rest in the
@@ -52,8 +53,9 @@ const LONGEST_TURN: u8 = 100;
 const SHORTEST_TURN: u8 = 12;
 /// Counts within which a counter stands still: an edge that a sensor sits on.
 const STANDSTILL: i32 = 2;
-/// Of the greatest current: a change that no rotor takes without moving.
-const SWING_SHARE: f32 = 1.0 / 3.0;
+/// Of the greatest current: a change that no rotor takes without moving, and periods in which it has moved: 16 ms.
+const SWING_SHARE: f32 = 0.5;
+const SWING_PATIENCE: u8 = 64;
 /// Both halves of the vector that dead time makes, and as much again.
 const DEAD_VECTORS: f32 = 2.0 * 4.0 / 3.0;
 /// Shares by which constants may be off.
@@ -192,7 +194,7 @@ impl Still {
         if self.most_a - self.least_a > limits.swing_a {
             self.overdue += 1;
         }
-        self.overdue >= PATIENCE
+        self.overdue >= SWING_PATIENCE
     }
 }
 

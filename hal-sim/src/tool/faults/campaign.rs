@@ -346,7 +346,7 @@ fn voltages(bounds: &mut Bounds, joint: &JointFile, motor: &MotorFile, configura
     let per_joint = f64::from(configuration.pole_pairs) * joint.encoder.ratio;
     let frozen = [still, 0.35 * resistance].map(|volts| volts / f64::from(configuration.flux.0) / per_joint);
     bounds.frozen_speed = core::array::from_fn(|part| bounds.frozen_speed[part].max(frozen[part]));
-    bounds.frozen_swing_a = bounds.frozen_swing_a.max(current / 3.0);
+    bounds.frozen_swing_a = bounds.frozen_swing_a.max(current / 2.0);
     bounds.judged_speed = bounds.judged_speed.max(TAU / 0.025 / per_joint);
     let offset = (0.4 * still + 0.06 * resistance * current) / (resistance * 2.0 / 3.0_f64.sqrt());
     // A tenth for what the estimates of the calibration lack, and dead time, which may be against it.

@@ -16,13 +16,13 @@ pub static ROWS: [Row; 3] = [
     Row {
         id: "E1",
         fault: "encoder frozen while moving",
-        detector: "back-EMF against counts, or counts that stand still while the current changes by a third of its limit; 8 ms",
+        detector: "back-EMF against counts, or counts that stand still while the current changes by half of its limit; 8 and 16 ms",
         state: "Short",
         codes: &[FaultCode::EncoderFrozen],
         deadline_ms: 20.0,
         unit: "",
         lacking: Some(
-            "slower than back-EMF outweighs dead time and resistance, while the current changes by less than a third of its limit",
+            "slower than back-EMF outweighs dead time and resistance, while the current changes by less than half of its limit",
         ),
         draw: frozen,
     },
