@@ -39,8 +39,9 @@ use super::{Calibration, CurrentLoop, ElectricalAngle, ModelWatch, Rotating, Shu
 use crate::checksum::Checksum;
 use crate::hal::{AxisCommand, AxisSample, JointSample};
 use crate::real::{abs, clamp, is_finite};
-use crate::units::{Ampere, RadianPerSecond};
+use crate::units::Ampere;
 
+mod told;
 #[cfg(not(target_os = "none"))]
 mod upset;
 mod window;
@@ -367,32 +368,6 @@ impl Axis {
         });
         self.window = Window::EMPTY;
         JointSample { doubtful: core::mem::take(&mut self.disbelieved), ..sample }
-    }
-
-    /// Currents of the last tick, in the electrical sense.
-    #[must_use]
-    pub fn measured(&self) -> Rotating<Ampere> {
-        self.measured
-    }
-
-    /// Electrical speed, rad/s.
-    #[must_use]
-    pub fn electrical_speed(&self) -> RadianPerSecond {
-        RadianPerSecond(self.speed.rad_per_s())
-    }
-
-    /// Why the bridge is released, if the axis did it.
-    #[must_use]
-    pub fn fault(&self) -> Option<AxisFault> {
-        self.fault
-    }
-
-    /// Forgets a fault, so that a request may enable again; `false` where the place was lost.
-    pub fn clear_fault(&mut self) -> bool {
-        if !self.lost {
-            self.fault = None;
-        }
-        !self.lost
     }
 }
 

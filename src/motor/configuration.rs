@@ -167,12 +167,16 @@ pub(super) struct Constants {
 }
 
 impl Constants {
-    /// Over gains, limits, zeros and the place of the flux.
+    /// Over gains, limits, zeros, directions and the place of the flux.
     pub(super) fn checksum(&self) -> Checksum {
         let words = [
             self.offset.units().cast_unsigned(),
             u32::from(self.bus_codes[0]) | u32::from(self.bus_codes[1]) << 16,
             self.greatest_step.cast_unsigned(),
+            self.counter_sign.cast_unsigned(),
+            self.flexion_sign.cast_unsigned(),
+            self.scale.counts_per_turn().cast_unsigned(),
+            u32::from(self.indexed),
         ];
         let limits = [
             self.zeros[0],

@@ -14,7 +14,7 @@
 
 use super::barrier::{Barrier, Limited};
 use super::derating::{Derating, LimitCodes};
-use super::fault::{Fault, FaultCode};
+use super::fault::{Fault, FaultCode, Reaction};
 use super::limits::Limits;
 use super::state::{DriveState, Event, Permission, PowerRequest};
 use crate::checksum::Checksum;
@@ -148,7 +148,9 @@ impl<const N: usize> Monitor<N> {
 
     /// Something else saw a fault: it is decided upon at the next tick, like those of the monitor's own detectors.
     pub fn report(&mut self, fault: Fault) {
-        self.reported = Some(fault);
+        if self.reported.is_none_or(|before| before.code.reaction() != Reaction::Off) {
+            self.reported = Some(fault);
+        }
     }
 
     /// What temperature and bus voltage leave of the torque cap from the next tick on.

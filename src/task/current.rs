@@ -5,7 +5,8 @@
 //! or uses a critical section.
 //!
 //! A bridge switches only for an axis with a calibration (or one that is being calibrated), with a target of the servo, while
-//! the interlock is clear, and while the servo goes on answering.
+//! the interlock is clear, and while the servo goes on answering. A target is followed only where both axes run; one that loses its place
+//! ends the servo's ticks at once, whatever else is found and told.
 
 use cortex_m::peripheral::DWT;
 use heapless::spsc::{Consumer, Producer};
@@ -106,6 +107,7 @@ impl CurrentLoops {
             brake::set(self.budget.spend(wanted));
         }
         self.look_at_the_others(axis, begun);
+        let all_run = self.axes.iter().all(|axis| matches!(axis.stage, Stage::Running(_)));
         let Some(this) = self.axes.get_mut(axis) else { return };
         this.watch(begun, complete);
         let sample = AxisSample {
@@ -118,7 +120,7 @@ impl CurrentLoops {
         if bridges == Bridges::Release {
             bridge::release_all();
         }
-        let command = this.step(axis, &sample, bridges);
+        let command = this.step(axis, &sample, bridges, all_run);
         bridge::set(axis, &command);
         this.ticks += 1;
         if this.ticks >= TICKS_PER_SERVO {
@@ -184,7 +186,7 @@ impl AxisLoop {
         }
     }
 
-    fn step(&mut self, axis: usize, sample: &AxisSample, bridges: Bridges) -> AxisCommand {
+    fn step(&mut self, axis: usize, sample: &AxisSample, bridges: Bridges, all_run: bool) -> AxisCommand {
         if self.orders.ready() {
             self.obey();
         }
@@ -207,9 +209,9 @@ impl AxisLoop {
             },
             Stage::Running(running) => {
                 let wish = match bridges {
-                    Bridges::Follow => target(axis).into(),
+                    Bridges::Follow if all_run => target(axis).into(),
                     Bridges::Brake => Wish::Brake,
-                    Bridges::Release => Wish::Released,
+                    Bridges::Follow | Bridges::Release => Wish::Released,
                 };
                 let command = running.act(sample, wish);
                 if let Some(fault) = running.fault().filter(|fault| self.faulted != Some(*fault)) {
@@ -220,7 +222,11 @@ impl AxisLoop {
                     if Bridges::of(cause.bit()) == Bridges::Release {
                         bridge::release_all();
                     }
-                    let _ = self.outcomes.enqueue(Outcome::Fault(fault));
+                    let lost = running.is_lost();
+                    if lost {
+                        servo::end();
+                    }
+                    let _ = self.outcomes.enqueue(Outcome::Fault { fault, lost });
                 }
                 command
             }

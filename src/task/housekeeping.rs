@@ -192,12 +192,12 @@ impl Housekeeping {
                 self.say(refused(joint, "interrupted", 0));
                 state.calibrating = None;
             }
-            Outcome::Fault(fault) => {
+            Outcome::Fault { fault, lost } => {
                 self.say(Record::AxisFault { tick: state.tick, joint, name: words::axis_fault(*fault) });
-                if matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters) {
-                    // The place is lost, and with it the joint's zero.
+                if *lost {
+                    // With the place goes the joint's zero, also one that is being looked for.
                     servo::end();
-                    state.drive = None;
+                    (state.drive, state.reference, state.placed) = (None, None, false);
                     if let Some(calibrated) = state.calibrated.get_mut(axis) {
                         *calibrated = false;
                     }
@@ -219,6 +219,8 @@ impl Housekeeping {
             return interlock::raise(Cause::Configuration);
         };
         *calibrated = true;
+        // Its counts begin anew, without a zero.
+        servo::end();
         self.order(axis, Order::Run(running));
         let next = (axis + 1..JOINTS).find(|&next| !state.calibrated.get(next).copied().unwrap_or(true));
         state.calibrating = next;
@@ -300,7 +302,7 @@ impl Housekeeping {
     }
 
     fn advance_reference(&mut self, state: &mut State) {
-        if core::mem::take(&mut state.placed) {
+        if core::mem::take(&mut state.placed) && state.calibrated.iter().all(|calibrated| *calibrated) {
             servo::begin();
         }
         let Some(mut poses) = state.reference else { return };

@@ -34,8 +34,13 @@ pub enum Outcome {
     Refused(CalibrationRefusal),
     /// The interlock or an order ended the measurement.
     Interrupted,
-    /// It released itself.
-    Fault(AxisFault),
+    /// It released itself, or brakes.
+    Fault {
+        /// Why.
+        fault: AxisFault,
+        /// It has to be calibrated anew.
+        lost: bool,
+    },
 }
 
 /// What the servo tells the identification, in its order.

@@ -188,3 +188,16 @@ fn a_quick_stop_damps_and_does_not_come_back_by_itself() {
     }
     assert_eq!(monitor.state(), DriveState::SwitchOnDisabled);
 }
+
+#[test]
+fn what_releases_is_not_forgotten_for_what_damps_in_the_same_tick() {
+    let fault = |code| Fault { code, joint: 0 };
+    let (off, damp) = (fault(FaultCode::Parameters), fault(FaultCode::SupplyLost));
+    for [first, second] in [[off, damp], [damp, off]] {
+        let mut monitor = enabled();
+        monitor.report(first);
+        monitor.report(second);
+        let decision = monitor.decide(&STANDING, &request(0.0));
+        assert_eq!((decision.fault, decision.command.enabled), (Some(off), false));
+    }
+}
