@@ -222,20 +222,20 @@ fn cyclic_positions_of_two_milliseconds_are_followed_by_both_joints() {
         if tick.is_multiple_of(8) {
             let phase = tick as f32 / SECOND as f32 * core::f32::consts::TAU * 0.5;
             for joint in 0..JOINTS {
-                hosted.cyclic(joint, from[joint] + 0.1 * (1.0 - phase.cos()));
+                hosted.cyclic(joint, from[joint] + 0.1 * (1.0 - scarab::real::sin_cos(phase).1));
             }
         }
         hosted.run(1);
         for joint in 0..JOINTS {
             let error = hosted.status[joint].position_demand - hosted.status[joint].position;
-            squared += f64::from(error.0).powi(2);
+            squared += f64::from(error.0) * f64::from(error.0);
             if tick > 0 {
                 steps = steps.max((hosted.status[joint].velocity_demand.0 - before[joint]).abs());
             }
             before[joint] = hosted.status[joint].velocity_demand.0;
         }
     }
-    let rms = (squared / (8 * SECOND) as f64).sqrt();
+    let rms = scarab::real::sqrt(squared / (8 * SECOND) as f64);
     println!("root mean square error {rms:.5} rad, largest step of velocity {steps:.4} rad/s");
     // Feedback alone; the commanded velocity changes by at most 0.99 rad/s^2 * 2 ms from period to period.
     assert!(rms < 0.01 && steps < 0.003, "{rms} {steps}");

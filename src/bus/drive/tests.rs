@@ -170,7 +170,8 @@ fn a_lost_host_stops_as_its_option_says() {
 
 #[test]
 fn a_lost_host_is_a_fault_of_the_leg_where_its_option_says_so() {
-    let lose: [(fn(&mut Board), FaultCode); 3] = [
+    type Loss = fn(&mut Board);
+    let lose: [(Loss, FaultCode); 3] = [
         (|board| board.axes[0].lost(Lost::Heartbeat), FaultCode::Heartbeat),
         (|board| board.axes[0].lost(Lost::ReceivedPdo), FaultCode::LatePdo),
         (|board| board.axes[0].lost(Lost::Bus(true)), FaultCode::BusOff),

@@ -55,7 +55,7 @@ pub struct RowReport {
     pub unit: &'static str,
     /// What the detector does not see yet.
     pub lacking: Option<&'static str>,
-    /// Seen over seen and missed, as the diagnostic coverage of ISO 13849-1; unknown where nothing was dangerous.
+    /// Seen over seen and missed, of these runs; unknown where nothing could be seen. Not that of ISO 13849-1, which weighs dangerous faults.
     pub coverage: Number,
 }
 
