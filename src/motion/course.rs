@@ -199,7 +199,7 @@ mod tests {
             }
             // Up to v with 4, down with 8: d = v^2/8 + v^2/16, at most 1 rad/s.
             let distance = target.abs();
-            let peak = crate::real::sqrt(distance * 16.0 / 3.0).min(1.0);
+            let peak = sqrt(distance * 16.0 / 3.0).min(1.0);
             let time = peak / 4.0 + peak / 8.0 + (distance - peak * peak * 3.0 / 16.0).max(0.0) / peak;
             assert!(
                 (ticks as f32 * TICK_S - time).abs() < 4.0 * TICK_S + 0.01 * time,
