@@ -9,7 +9,7 @@
 //! every period        plant -> samples -> faults -> interlock -> axis -> command; anything that forbids releases all
 //! ```
 //!
-//! The watchdog looks on at the end of each period ([`watchdog`]).
+//! The watchdog looks on at the end of each period (`watchdog.rs`).
 
 use scarab::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use scarab::board::odrive_v3_6::settings::drives;
