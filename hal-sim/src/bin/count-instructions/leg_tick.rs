@@ -5,14 +5,11 @@ use core::hint::black_box;
 
 use cortex_m_semihosting::hprintln;
 use scarab::hal::{JointSample, Sample};
-use scarab::leg::{
-    Activity, Control, ControlOutput, ControlRequest, Following, Host, IdentifiedModel, JointCommand,
-    LegConfiguration, Step, Target,
-};
+use scarab::leg::{Activity, Control, ControlOutput, ControlRequest, IdentifiedModel, Step};
 use scarab::motion::{Motion, MotionState, Periodic};
 use scarab::safety::PowerRequest;
 use scarab::servo::{JointConfiguration, NoModel, SERVO_RATE_HZ, Servo, ServoCommand};
-use scarab::units::{Ampere, NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
+use scarab::units::Ampere;
 
 use crate::account::Account;
 use crate::counter::{Tally, count, heading};
@@ -96,95 +93,8 @@ pub fn report(model: &Model, account: &mut Account) -> Option<()> {
     approach.print("tick on the way to the start, model fading in");
     run.print("tick with motion, model, monitor and log");
     account.add("leg tick: motion, servo, monitor, log", run, MOST_INSTRUCTIONS, SERVO_RATE_HZ);
-    for feedforward in [false, true] {
-        follow_a_host(&configuration, identified, feedforward)?;
-    }
     servo(&configuration.joints, &identified, periodic)?;
     hprintln!("{:<48} {:>8}", "once: proof of a motion's limits", proof);
-    Some(())
-}
-
-/// A host commands positions cyclically, another one every eighth tick.
-#[inline(never)]
-fn follow_a_host(
-    configuration: &LegConfiguration<JOINTS, { leg::BASE }>,
-    identified: IdentifiedModel<JOINTS>,
-    feedforward: bool,
-) -> Option<()> {
-    let (mut control, mut following) = (Control::new(configuration).ok()?, Following::new(configuration));
-    let mut command = JointCommand {
-        target: Target::Hold,
-        asked: 0,
-        feedforward,
-        halt: false,
-        velocity: RadianPerSecond(0.5),
-        acceleration: RadianPerSecondSquared(2.0),
-        deceleration: RadianPerSecondSquared(2.0),
-        torque_slope_nm_per_s: 40.0,
-        range: [Radian(-10.0), Radian(10.0)],
-        largest_torque: NewtonMetre(1000.0),
-        following_window: Radian(0.09),
-        following_time: Second(0.01),
-        position_window: Radian(0.02),
-        position_time: Second(0.01),
-        period: Second(0.002),
-    };
-    if feedforward && !control.adopt(identified) {
-        return None;
-    }
-    let start = MotionState::at_rest([0.5, -1.0]);
-    let mut sample = follow(&start, [Ampere::ZERO; JOINTS]);
-    let way = [
-        None,
-        Some(PowerRequest::Shutdown),
-        Some(PowerRequest::SwitchOn),
-        Some(PowerRequest::EnableOperation),
-    ];
-    let (mut tally, mut place) = (Tally::default(), [0.5, 1.0]);
-    for number in 0..TICKS {
-        if number > 100 && number % 8 == 0 {
-            // There and back within the range.
-            let step = if number / 1000 % 2 == 0 { 0.0005 } else { -0.0005 };
-            place = place.map(|place| place + step);
-            command.target = Target::CyclicPosition {
-                position: Radian::ZERO,
-                velocity_offset: RadianPerSecond::ZERO,
-                torque_offset: NewtonMetre::ZERO,
-            };
-        }
-        let commands = place.map(|place| JointCommand {
-            target: match command.target {
-                Target::CyclicPosition { velocity_offset, torque_offset, .. } => {
-                    Target::CyclicPosition { position: Radian(place), velocity_offset, torque_offset }
-                }
-                other => other,
-            },
-            ..command
-        });
-        let request = way.get(number as usize).copied().flatten().map(ControlRequest::Power);
-        let (instructions, output) = count(|| {
-            let host = Host { following: &mut following, commands: black_box(&commands), cancel: false };
-            black_box(&mut control).tick_with(black_box(&sample), request, GRAVITY, Some(host))
-        });
-        sample = follow(&output.motion, output.servo.drive().currents);
-        if number > 200 {
-            tally.push(instructions);
-        }
-    }
-    if control.activity() != Activity::Follow {
-        hprintln!("the leg does not follow the host: {:?}", control.state());
-        return None;
-    }
-    // In the place of a motion's tick, not beside it.
-    tally.print(if feedforward {
-        "tick that follows a host, with model"
-    } else {
-        "tick that follows a host"
-    });
-    if tally.most() > MOST_INSTRUCTIONS {
-        hprintln!("more than {MOST_INSTRUCTIONS} instructions");
-        return None;
-    }
     Some(())
 }
 
