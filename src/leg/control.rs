@@ -137,7 +137,16 @@ impl<const N: usize> Control<N> {
         request: Option<ControlRequest<N>>,
         gravity: [f32; 3],
     ) -> ControlOutput<N> {
-        self.tick_with(sample, request, gravity, None)
+        self.tick = self.tick.wrapping_add(1);
+        let refused = request.as_ref().is_some_and(|request| !self.may_begin(request, None));
+        let took_update = !refused && request == Some(ControlRequest::TakeUpdate);
+        let power = self.accept(request.filter(|_| !refused));
+        let motion = self.motion.state_at(self.motion_tick);
+        let mixed = self.models.advance();
+        let feedforward = self.models.faded(mixed.as_ref());
+        let feedforward = feedforward.as_ref();
+        let servo = self.servo.tick(sample, &ServoCommand { motion, feedforward, power }, gravity);
+        self.conclude(sample, servo, motion, [refused, took_update])
     }
 
     /// One tick of a leg that a host commands, where there is one.
@@ -169,6 +178,18 @@ impl<const N: usize> Control<N> {
         if let Some(host) = &mut host {
             host.following.measure(&servo);
         }
+        self.conclude(sample, servo, motion, [refused, took_update])
+    }
+
+    /// What follows the servo's tick.
+    #[inline(always)]
+    fn conclude(
+        &mut self,
+        sample: &Sample<N>,
+        servo: ServoOutput<N>,
+        motion: MotionState<N>,
+        [refused, took_update]: [bool; 2],
+    ) -> ControlOutput<N> {
         self.motion_tick = self.motion_tick.saturating_add(1);
         if servo.decision.state != DriveState::OperationEnabled {
             // A leg that is not held is where it is: enabling must not pull it anywhere.
