@@ -14,7 +14,7 @@
 //! | [`motor`] | field-oriented current control of one axis, 24 kHz, and its calibration |
 //! | [`safety`], [`servo`] | monitor and drive states; the 4 kHz tick |
 //! | [`leg`] | one leg: the activity machine, a control half and an identification half |
-//! | [`operator`] | two contacts in the operator's hand, and what they ask for |
+//! | [`operation`] | what each axis does, what is known of it, and what the operator's contacts may have |
 //! | `place` | large values built where they stay |
 //! | [`trace`] | what leaves the board: records, one line each |
 //! | [`store`] | what outlives the power: configuration, calibrations, the accepted model |
@@ -31,7 +31,7 @@ pub mod leg;
 pub mod model;
 pub mod motion;
 pub mod motor;
-pub mod operator;
+pub mod operation;
 mod place;
 pub mod real;
 pub mod safety;

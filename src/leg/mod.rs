@@ -122,6 +122,11 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         output
     }
 
+    /// As after the start, but for the model in use; see [`Control::restart`].
+    pub fn restart(&mut self) {
+        self.control.restart();
+    }
+
     /// What a host commands from the next tick on.
     pub fn command(&mut self, commands: &[JointCommand; N]) {
         self.commands = Some(*commands);

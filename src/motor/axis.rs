@@ -256,7 +256,8 @@ impl Axis {
         };
         if let Some(fault) = doubt {
             self.disbelieved |= !plausible;
-            if self.doubtful {
+            // Who is about to switch has no command to keep until the next reading.
+            if self.doubtful || switching && !self.last.enabled {
                 return Err(fault);
             }
             self.doubtful = true;

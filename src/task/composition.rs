@@ -56,8 +56,8 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, housekeeping::Housekeepi
     let [(give_1, take_1), (give_2, take_2)] = orders;
     let [(out_1, hear_1), (out_2, hear_2)] = outcomes;
     let [(sample_1, sampled_1), (sample_2, sampled_2)] = samples;
-    let loops = current::CurrentLoops::new([(take_1, out_1, sample_1), (take_2, out_2, sample_2)], divider);
-    static LOOPS: StaticCell<current::CurrentLoops> = StaticCell::new();
+    let loops = current::Current::new([(take_1, out_1, sample_1), (take_2, out_2, sample_2)], divider);
+    static LOOPS: StaticCell<current::Current> = StaticCell::new();
     place(&current::LOOPS, LOOPS.init(loops));
 
     let control = built.as_ref().and_then(|(configuration, _)| Control::new(configuration).ok());

@@ -5,43 +5,9 @@ use static_cell::ConstStaticCell;
 
 use super::leg::JOINTS;
 use crate::hal::JointSample;
-use crate::leg::{
-    Activity, AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, Finding, LoggedSample,
-};
-use crate::motor::{Axis, Calibrator};
+use crate::leg::{Activity, ControlRequest, DriveState, Finding, LoggedSample};
+use crate::operation::{Order, Outcome};
 use crate::trace::Record;
-
-/// What an axis is to do from its next tick on.
-#[expect(clippy::large_enum_variant, reason = "there is one of each axis, and no heap to box it on")]
-pub enum Order {
-    /// Bridge released.
-    Off,
-    /// Measure.
-    Calibrate(Calibrator),
-    /// Control its current.
-    Run(Axis),
-    /// The joint now stands at these counts.
-    Place(i32),
-    /// Forget a fault.
-    ClearFault,
-}
-
-/// What came of an axis.
-pub enum Outcome {
-    /// Measured.
-    Calibrated(Calibration),
-    /// Not measured.
-    Refused(CalibrationRefusal),
-    /// The interlock or an order ended the measurement.
-    Interrupted,
-    /// It released itself, or brakes.
-    Fault {
-        /// Why.
-        fault: AxisFault,
-        /// It has to be calibrated anew.
-        lost: bool,
-    },
-}
 
 /// What the servo tells the identification, in its order.
 #[expect(clippy::large_enum_variant, reason = "queues hold values, and there is no heap to box them on")]
@@ -97,7 +63,7 @@ impl Links {
     pub fn new(told: &'static mut Queue<Told, TOLD>) -> Self {
         Self {
             orders: [queue!(Order, 3), queue!(Order, 3)],
-            outcomes: [queue!(Outcome, 3), queue!(Outcome, 3)],
+            outcomes: [queue!(Outcome, 4), queue!(Outcome, 4)],
             samples: [queue!(JointSample, 4), queue!(JointSample, 4)],
             requests: queue!(ControlRequest<JOINTS>, 3),
             findings: queue!(Finding<JOINTS>, 3),

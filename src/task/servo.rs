@@ -11,13 +11,13 @@ use super::leg::{JOINTS, LEG};
 use super::links::{EVENTS, TOLD, Told};
 use super::{interlock, statistics};
 use crate::board::odrive_v3_6::settings::{analog, drives};
-use crate::checksum::Checksum;
 use crate::hal::{DriveCommand, JointSample, Sample};
 use crate::leg::{
     Activity, Control, ControlOutput, ControlRequest, DriveState, Finding, LimitCodes, permitted,
 };
 use crate::motor::AxisRequest;
-use crate::safety::{DeratingRamps, Fault, FaultCode, SupplyWatch};
+use crate::operation::{Gate, ServoRound};
+use crate::safety::{Fault, FaultCode};
 use crate::servo::SERVO_RATE_HZ;
 use crate::trace::{Record, words};
 use crate::units::{Ampere, Volt};
@@ -95,20 +95,13 @@ pub struct ServoLoop {
     told: Producer<'static, Told>,
     /// The newest of each joint.
     sample: [JointSample; JOINTS],
-    /// It was ticked in the tick before.
-    ticking: bool,
     /// What was told of last.
     state: Option<DriveState>,
     /// The same.
     activity: Activity,
-    /// Ticks of the leg.
-    tick: u32,
     /// Told of in this second.
     limits: [LimitCodes; JOINTS],
-    /// Of gains and limits as they were made.
-    checksum: Checksum,
-    supply: SupplyWatch,
-    ramps: DeratingRamps,
+    round: ServoRound,
     volt_per_code: Volt,
     /// Processor cycles; wraps.
     clock: fn() -> u32,
@@ -131,7 +124,7 @@ impl ServoLoop {
         clock: fn() -> u32,
     ) -> Self {
         Self {
-            checksum: control.checksum(),
+            round: ServoRound::new(control.checksum(), drives::derating(divider)),
             control,
             samples,
             requests,
@@ -139,13 +132,9 @@ impl ServoLoop {
             drive,
             told,
             sample: [JointSample::default(); JOINTS],
-            ticking: false,
             state: None,
             activity: Activity::Idle,
-            tick: 0,
             limits: Default::default(),
-            supply: SupplyWatch::default(),
-            ramps: drives::derating(divider),
             volt_per_code: analog::sense(divider).volt_per_code,
             clock,
         }
@@ -160,20 +149,19 @@ impl ServoLoop {
         for (count, sample) in statistics::COUNTS.iter().zip(&self.sample) {
             count.set(sample.encoder_counts.cast_unsigned());
         }
-        if !has_begun() {
-            release();
-            // What is asked meanwhile is asked of a leg that has no zeros.
-            let _ = self.requests.dequeue();
-            self.ticking = false;
-            return;
+        match self.round.gate(has_begun()) {
+            Gate::Closed => {
+                release();
+                // What is asked meanwhile is asked of a leg that has no zeros.
+                let _ = self.requests.dequeue();
+                return;
+            }
+            Gate::Anew => {
+                self.control.restart();
+                self.state = None;
+            }
+            Gate::Open => {}
         }
-        if !self.ticking {
-            // Whatever state it was left in, the drive begins off.
-            self.ticking = true;
-            self.control.restart();
-            self.state = None;
-        }
-        self.tick = self.tick.wrapping_add(1);
         if let Some(finding) = self.findings.dequeue() {
             self.control.receive(finding);
         }
@@ -194,21 +182,18 @@ impl ServoLoop {
                 self.control.report(Fault { code, joint: 0 });
             }
         }
-        // Every 64 ms.
-        if self.tick & 0xFF == 0 && self.control.checksum() != self.checksum {
-            self.control.report(Fault { code: FaultCode::Parameters, joint: 0 });
-        }
         let bus = self.volt_per_code * statistics::BUS[0].get() as f32;
-        if self.supply.look(bus) {
-            self.control.report(Fault { code: FaultCode::SupplyLost, joint: 0 });
-        }
         let hottest_c = f32::from_bits(HOTTEST_C.load(Ordering::Relaxed));
-        self.control.derate(&self.ramps.at(hottest_c, bus));
+        let found = self.round.look(|| self.control.checksum(), bus, hottest_c);
+        for code in [found.parameters, found.supply].into_iter().flatten() {
+            self.control.report(Fault { code, joint: 0 });
+        }
+        self.control.derate(&found.derating);
     }
 
     /// Limits that act and were not told of in this second.
     fn tell_limits(&mut self, output: &ControlOutput<JOINTS>) {
-        if self.tick.is_multiple_of(SERVO_RATE_HZ) {
+        if self.round.tick().is_multiple_of(SERVO_RATE_HZ) {
             self.limits = Default::default();
         }
         let codes = self.control.limit_codes(output);
@@ -220,7 +205,7 @@ impl ServoLoop {
             && let Some(code) = codes.without(*told).first()
         {
             *told = told.with(true, code);
-            let (tick, joint) = (self.tick, joint as u8 + 1);
+            let (tick, joint) = (self.round.tick(), joint as u8 + 1);
             self.say(Record::Limit { tick, code: code as u8, name: code.name(), joint });
         }
     }
@@ -232,7 +217,7 @@ impl ServoLoop {
         asked: Option<&ControlRequest<JOINTS>>,
         output: &ControlOutput<JOINTS>,
     ) {
-        let tick = self.tick;
+        let tick = self.round.tick();
         let accepted = asked.is_some() && !output.refused;
         if let Some(request) = request {
             let name = match request {

@@ -29,9 +29,9 @@ const HOUSE: [(&str, &[&str]); 19] = [
     ("trace", &["hal", "leg"]),
     ("store", &["hal", "leg"]),
     ("bus", &["hal", "leg"]),
-    ("operator", &["leg"]),
+    ("operation", &["hal", "motor", "leg", "safety", "servo", "trace"]),
     ("board", &["hal", "motor", "leg", "task"]),
-    ("task", &["hal", "motor", "leg", "operator", "safety", "servo", "trace", "board"]),
+    ("task", &["hal", "motor", "leg", "operation", "safety", "servo", "trace", "board"]),
 ];
 
 /// Rooms every other room may use.

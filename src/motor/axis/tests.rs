@@ -193,6 +193,25 @@ fn every_border_releases_and_stays_released_until_it_is_cleared() {
 }
 
 #[test]
+fn who_is_about_to_switch_is_patient_with_no_bad_sample() {
+    let cases: [(fn(&mut AxisSample), AxisFault); 3] = [
+        (|sample| sample.shunt_codes[0] = 0, AxisFault::CurrentSense),
+        (|sample| sample.bus_code = 4095, AxisFault::BusVoltage),
+        (|sample| sample.encoder_count ^= 0x4000, AxisFault::Encoder),
+    ];
+    for (spoil, fault) in cases {
+        let mut bench = Bench::at(0.0, &CONFIGURATION);
+        spoil(&mut bench.sample);
+        assert_eq!((bench.tick(ask(5.0)), bench.axis.fault()), (AxisCommand::RELEASED, Some(fault)));
+        // In between it is survived.
+        let mut bench = Bench::at(0.0, &CONFIGURATION);
+        bench.run(ask(5.0), 10);
+        spoil(&mut bench.sample);
+        assert!(bench.tick(ask(5.0)).enabled && bench.axis.fault().is_none(), "{fault:?}");
+    }
+}
+
+#[test]
 fn one_bad_sample_alone_is_survived_and_a_lost_place_is_not_cleared() {
     let mut bench = Bench::at(50.0, &CONFIGURATION);
     bench.run(ask(5.0), 100);

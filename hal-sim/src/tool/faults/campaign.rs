@@ -300,7 +300,6 @@ pub(super) fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), To
         rig.advance();
     }
     rig.hand.enabling = true;
-    rig.edges.closed = Some(rig.period);
     for _ in 0..ENABLED {
         rig.advance();
         if rig.state() == DriveState::OperationEnabled {

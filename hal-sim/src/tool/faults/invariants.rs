@@ -1,11 +1,13 @@
 //! What holds in every period of every run, whatever is broken.
 
+use core::f64::consts::TAU;
+
 use scarab::hal::AxisCommand;
 use scarab::leg::{Activity, IdentifiedModel};
 use scarab::safety::FaultCode;
 
 use super::catalogue::Event;
-use super::rig::{PERIODS_PER_S, Rig};
+use super::rig::{Edges, PERIODS_PER_S, Rig};
 use crate::faults::{Channel, Injection};
 use crate::tool::leg_file::{JointFile, LegFile};
 
@@ -23,6 +25,8 @@ pub struct Scope {
     pub torque: bool,
     /// No wearer is stronger than the drive.
     pub range: bool,
+    /// Counts reach the servo as the axis has them.
+    pub place: bool,
 }
 
 impl Scope {
@@ -35,11 +39,15 @@ impl Scope {
             |injection: &Injection| matches!(injection.channel, Counter | Index | JointCounts | Target);
         Self {
             torque: !injections.clone().any(lies),
+            place: !injections.clone().any(|injection| injection.channel == JointCounts),
             range: !injections.any(lost)
                 && !events.iter().any(|event| matches!(event, Event::Kick(..) | Event::Touch(_))),
         }
     }
 }
+
+/// Periods for which a joint may be driven by a wrong place: what is seen within them is seen in time.
+const ASTRAY: u64 = PERIODS_PER_S / 50;
 
 /// Watches one run.
 #[derive(Clone, Debug)]
@@ -56,6 +64,13 @@ pub struct Invariants<const N: usize> {
     /// The model in use, and what the leg was doing when it was looked at.
     model: Option<IdentifiedModel<N>>,
     judging: bool,
+    /// Counts of the joints less what their angles make, counts per rad, and counts by which they may be off.
+    places: [f64; N],
+    counts_per_rad: [f64; N],
+    doubt: [f64; N],
+    /// The places are watched; periods for which a joint has been driven by a wrong one.
+    watched: bool,
+    astray: u64,
     broken: Vec<String>,
 }
 
@@ -63,6 +78,7 @@ impl<const N: usize> Invariants<N> {
     /// Of a run of this leg.
     #[must_use]
     pub fn new<const B: usize>(leg: &LegFile, scope: Scope, rig: &Rig<N, B>) -> Self {
+        let counts_per_rad = core::array::from_fn(|joint| counts_per_rad(&leg.joints[joint]));
         Self {
             scope,
             range: core::array::from_fn(|joint| leg.joints[joint].range_deg.map(f64::to_radians)),
@@ -72,6 +88,11 @@ impl<const N: usize> Invariants<N> {
             stop_open: None,
             model: rig.leg.control().model().copied(),
             judging: is_judging(rig),
+            places: core::array::from_fn(|joint| place(rig, joint, counts_per_rad[joint])),
+            counts_per_rad,
+            doubt: core::array::from_fn(|joint| doubt(&leg.joints[joint])),
+            watched: false,
+            astray: 0,
             broken: Vec::new(),
         }
     }
@@ -82,8 +103,9 @@ impl<const N: usize> Invariants<N> {
             self.stop_open = Some(rig.period);
         }
         let switching = rig.is_switching();
-        self.commands(rig, &rig.commands);
+        self.commands(rig, rig.commands());
         self.parameters(rig);
+        self.places(rig);
         if let Some(output) = &rig.output {
             let torque = output.servo.decision.torque;
             let over = |joint: usize| f64::from(torque[joint].abs().0) > self.cap_nm[joint] * 1.000_001;
@@ -126,6 +148,26 @@ impl<const N: usize> Invariants<N> {
         }
     }
 
+    /// From now on: who switches knows where the rotors stand.
+    pub fn knows_places(&mut self) {
+        self.watched = self.scope.place;
+    }
+
+    fn places<const B: usize>(&mut self, rig: &Rig<N, B>) {
+        let follows = rig.is_switching() && !rig.is_braking();
+        if !self.watched || !follows || rig.is_restarted() {
+            self.astray = 0;
+            return;
+        }
+        let wrong = |joint: usize| {
+            (place(rig, joint, self.counts_per_rad[joint]) - self.places[joint]).abs() > self.doubt[joint]
+        };
+        self.astray = if (0..N).any(wrong) { self.astray + 1 } else { 0 };
+        if self.astray == ASTRAY {
+            self.note(rig, "enabled again with a rotor that stands elsewhere than its counts say");
+        }
+    }
+
     /// The parameters in use change with a verdict that accepts others, and never else.
     fn parameters<const B: usize>(&mut self, rig: &Rig<N, B>) {
         let model = rig.leg.control().model();
@@ -141,7 +183,8 @@ impl<const N: usize> Invariants<N> {
 
     fn was_asked<const B: usize>(&self, rig: &Rig<N, B>, since: u64) -> bool {
         let after = self.stop_open.map_or(since, |stop| stop.max(since));
-        match (rig.edges.reset, rig.edges.closed) {
+        let Edges { reset, closed } = rig.edges();
+        match (reset, closed) {
             (Some(reset), Some(closed)) => reset >= after && closed > reset,
             _ => false,
         }
@@ -159,7 +202,8 @@ impl<const N: usize> Invariants<N> {
         }
     }
 
-    fn note<const B: usize>(&mut self, rig: &Rig<N, B>, what: &str) {
+    /// Something that did not hold.
+    pub fn note<const B: usize>(&mut self, rig: &Rig<N, B>, what: &str) {
         if self.broken.len() < 4 {
             let alarm = rig.alarm().map_or("none", FaultCode::name);
             self.broken.push(format!("period {}: {what} (alarm: {alarm})", rig.period));
@@ -182,4 +226,19 @@ fn is_judging<const N: usize, const B: usize>(rig: &Rig<N, B>) -> bool {
 /// Torque that a joint may be driven with, of its file alone, N m.
 fn cap_nm(joint: &JointFile) -> f64 {
     joint.torque_limit_nm.min(joint.current_limit() * joint.torque_per_ampere.abs())
+}
+
+/// Counts of a joint beyond those that its angle makes.
+fn place<const N: usize, const B: usize>(rig: &Rig<N, B>, joint: usize, counts_per_rad: f64) -> f64 {
+    f64::from(rig.counts()[joint]) - counts_per_rad * rig.world.anatomical_position()[joint]
+}
+
+fn counts_per_rad(joint: &JointFile) -> f64 {
+    f64::from(joint.encoder.counts) * joint.encoder.ratio / TAU
+}
+
+/// Counts of an eighth of an electrical turn: what is asked for then makes 0.7 of its torque.
+fn doubt(joint: &JointFile) -> f64 {
+    let pole_pairs = joint.motor.as_ref().map_or(1.0, |motor| motor.pole_pairs as f64);
+    f64::from(joint.encoder.counts) / pole_pairs / 8.0
 }

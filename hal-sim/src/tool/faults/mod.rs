@@ -5,6 +5,7 @@
 //! | [`rig`] | firmware and plant, one PWM period at a time, faults on the ports between |
 //! | [`catalogue`], [`draw`] | what is done to the machine, and what has to follow; rows by group |
 //! | [`run`], [`outcome`], [`invariants`] | one run, what came of it, and what holds in each of its periods |
+//! | [`aftermath`] | what may follow: the safe state of each code, an operator who resets and enables again |
 //! | [`campaign`] | many runs, forked from identifications |
 //! | [`mod@bench`] | rows that are no forks: parts, calibrations, identifications of ideal drives |
 //! | [`emulated`] | rows that only a processor can show, on the emulated one |
@@ -15,6 +16,7 @@
 //!
 //! Everything follows from seeds: a run is repeated to the bit by its row and its seed.
 
+pub mod aftermath;
 pub mod bench;
 pub mod campaign;
 pub mod catalogue;

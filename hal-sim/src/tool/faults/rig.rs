@@ -1,49 +1,55 @@
 //! The whole firmware against the whole plant, one PWM period at a time, with faults on the ports between.
 //!
-//! What runs is the board's: operator, leg, current loops, and what looks after them (`scarab::safety`), put together as the
-//! board's tasks do it (`scarab::task`, which only the microcontroller builds). Level by level in one period:
+//! What runs is the board's: current loops, housekeeping and what stands around the servo (`scarab::operation`), the leg, and who waits
+//! for the watchdog. Only registers and queues are others (`ports.rs`). Level by level in one period:
 //!
 //! ```text
-//! every 48th period   operator's contacts -> requests; a reset forgets what no longer holds; registers and temperatures when due
-//! every 6th           servo: sample, request -> leg -> target currents
-//! every period        plant -> samples -> faults -> interlock -> axis -> command; anything that forbids releases all
+//! every 48th period   housekeeper: contacts -> requests; calibration, reference, resets; registers and temperatures when due
+//! when it is due      servo: samples, request -> leg -> target currents; due after the last axis' sixth tick
+//! every period        plant -> samples -> faults -> current loops -> bridges
 //! ```
 //!
 //! The watchdog looks on at the end of each period (`watchdog.rs`).
 
-use scarab::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
-use scarab::board::odrive_v3_6::settings::drives;
-use scarab::checksum::Checksum;
-use scarab::hal::{AxisCommand, DriveCommand, JointSample, Sample};
-use scarab::leg::{ControlOutput, ControlRequest, DriveState, axis_code, permitted};
-use scarab::motor::{Axis, AxisRequest, Chopper, SenseScale};
-use scarab::operator::{Ask, Operator, RATE_HZ, Situation};
-use scarab::safety::{
-    Bridges, Cause, DeratingRamps, Fault, FaultCode, PowerRequest, ServoWatch, SupplyWatch, TickState,
-    TickWatch, UpkeepClock, of_gate_driver, of_temperature,
-};
+use core::num::NonZeroU32;
+use std::sync::Arc;
 
+use scarab::board::odrive_v3_6::settings::analog::HOTTEST_C;
+use scarab::board::odrive_v3_6::settings::drives;
+use scarab::hal::{AxisCommand, CURRENT_RATE_HZ, Sample};
+use scarab::leg::{ControlOutput, DriveState, axis_code, permitted};
+use scarab::motor::SenseScale;
+use scarab::operation::{
+    CurrentLoops, Gate, Housekeeper, HousekeepingSettings, RATE_HZ, ServoRound, Stage, Tick,
+};
+use scarab::safety::{Fault, FaultCode};
+use scarab::trace::words;
+
+mod ports;
+#[cfg(test)]
+mod tests;
 mod view;
 mod watchdog;
 
+use self::ports::{Ports, WARM_CODE};
 use self::watchdog::Watchdog;
 use crate::faults::{Channel, Injector};
+use crate::tool::board::{axis_configuration, calibration_settings};
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 use crate::tool::pair::{Context, DeviceLeg, EVALUATIONS_PER_TICK, Pair};
 use crate::world::World;
-use crate::world::periods::PERIODS_PER_TICK;
 
 /// PWM periods per second.
-pub const PERIODS_PER_S: u64 = scarab::hal::CURRENT_RATE_HZ as u64;
+pub const PERIODS_PER_S: u64 = CURRENT_RATE_HZ as u64;
 /// One of them, ms.
 pub const PERIOD_MS: f64 = 1e3 / PERIODS_PER_S as f64;
 const PERIODS_PER_ROUND: u64 = PERIODS_PER_S / RATE_HZ as u64;
 
-/// Missed ticks of an axis that the other one does not wait for.
-const LATE: u8 = 3;
-/// Of the thermistor of a bridge at 41 degrees Celsius.
-const WARM_CODE: u16 = 1500;
+/// Of the processor in one period; the second axis is a quarter of it later.
+const CYCLES: NonZeroU32 = NonZeroU32::new(7000).expect("more than one");
+/// Of the bus voltage, on the board of 56 V.
+const DIVIDER: f32 = 19.0;
 
 /// What the operator's hand does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,10 +80,6 @@ pub struct Rig<const N: usize, const B: usize> {
     pub injector: Injector,
     /// The operator's.
     pub hand: Hand,
-    /// The same, as far as enabling goes.
-    pub edges: Edges,
-    /// Commands of the period that is over.
-    pub commands: [AxisCommand; N],
     /// What the last servo tick gave.
     pub output: Option<ControlOutput<N>>,
     /// PWM periods since the beginning.
@@ -86,69 +88,65 @@ pub struct Rig<const N: usize, const B: usize> {
     pub hash: u64,
     /// What the firmware must not see: its detectors are switched off, for the test of the tests.
     pub blind: &'static [FaultCode],
-    axes: [Axis; N],
-    missed: [u8; N],
-    watches: [TickWatch; N],
-    servo: ServoWatch,
-    servo_ticks: u32,
-    targets: DriveCommand<N>,
-    chopper: Chopper,
-    supply: SupplyWatch,
-    ramps: DeratingRamps,
+    loops: CurrentLoops<N>,
+    keeper: Housekeeper<N>,
+    round: ServoRound,
+    ports: Ports<N>,
+    cold: Arc<Cold<N, B>>,
     watchdog: Watchdog<N>,
     /// By the watchdog.
     restarted: bool,
-    /// Of the servo's gains and limits as they were made.
-    checksum: Checksum,
     bus_code: u16,
-    hottest_c: f32,
-    brake: f32,
-    causes: u32,
-    axis_fault: Option<FaultCode>,
-    operator: Operator,
-    clock: UpkeepClock,
-    request: Option<ControlRequest<N>>,
+    /// What the housekeeper was told of last.
+    told: Option<DriveState>,
     sample: Sample<N>,
     gravity: [f32; 3],
+}
+
+/// The firmware as it starts.
+#[derive(Debug, PartialEq)]
+struct Cold<const N: usize, const B: usize> {
+    leg: Box<DeviceLeg<N, B>>,
+    loops: CurrentLoops<N>,
+    keeper: Housekeeper<N>,
+    round: ServoRound,
 }
 
 impl<const N: usize, const B: usize> Rig<N, B> {
     /// A board that is ready, its leg at rest, drive off, nobody at the contacts.
     pub fn new(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
         let pair = Pair::new(leg, context, seed)?;
-        let board = pair.board.ok_or_else(|| ToolError::input("faults need complete drives"))?;
-        let (axes, chopper) = board.into_parts();
+        let unfit = || ToolError::input("faults need complete drives");
+        let (axes, chopper) = pair.board.ok_or_else(unfit)?.into_parts();
+        let settings = settings(context.complete.as_deref().unwrap_or(leg))?;
+        let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
+        let loops = |stages| CurrentLoops::new(stages, CYCLES, Some(chopper), volt_per_code);
+        let cold = Cold {
+            leg: pair.leg.clone(),
+            loops: loops([Stage::OFF; N]),
+            keeper: Housekeeper::new(settings),
+            round: ServoRound::new(pair.leg.control().checksum(), drives::derating(DIVIDER)),
+        };
+        let mut ports = Ports::new(pair.sample.joints);
+        (ports.begun, ports.servo_due) = (true, true);
         Ok(Self {
             world: pair.world,
             injector: Injector::new(seed),
             hand: Hand::default(),
-            edges: Edges::default(),
-            commands: [AxisCommand::RELEASED; N],
             output: None,
             period: 0,
             hash: FNV_BASIS,
             blind: &[],
-            axes,
-            missed: [0; N],
-            watches: [TickWatch::default(); N],
-            servo: ServoWatch::default(),
-            servo_ticks: 0,
-            targets: DriveCommand::RELEASED,
-            chopper,
-            supply: SupplyWatch::default(),
-            ramps: drives::derating(19.0),
+            loops: loops(axes.map(Stage::running)),
+            keeper: Housekeeper::ready(settings),
+            round: cold.round.clone(),
+            cold: Arc::new(cold),
+            ports,
             watchdog: Watchdog::new(),
             restarted: false,
-            checksum: pair.leg.control().checksum(),
             // 48 V, until it is read.
             bus_code: 3136,
-            hottest_c: 0.0,
-            brake: 0.0,
-            causes: 0,
-            axis_fault: None,
-            operator: Operator::default(),
-            clock: UpkeepClock::new(RATE_HZ),
-            request: None,
+            told: None,
             sample: pair.sample,
             gravity: context.gravity,
             leg: pair.leg,
@@ -157,194 +155,120 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// One PWM period.
     pub fn advance(&mut self) {
-        if self.period.is_multiple_of(PERIODS_PER_ROUND) {
-            self.round();
+        (self.ports.period, self.ports.blind) = (self.period, self.blind);
+        if self.ports.hand.enabling != self.hand.enabling && self.hand.enabling {
+            self.ports.edges.closed = Some(self.period);
         }
-        if self.period.is_multiple_of(u64::from(PERIODS_PER_TICK)) {
+        self.ports.hand = self.hand;
+        if self.period.is_multiple_of(PERIODS_PER_ROUND) {
+            self.housekeeping();
+        }
+        if core::mem::take(&mut self.ports.servo_due) {
             self.servo();
         }
         self.current();
         self.period += 1;
-        if self.period.is_multiple_of(u64::from(PERIODS_PER_TICK)) {
-            let mut joints = [JointSample::default(); N];
-            for (joint, (sample, axis)) in joints.iter_mut().zip(&mut self.axes).enumerate() {
-                let before = *axis;
-                *sample = axis.joint_sample();
-                if axis.fault().map(axis_code).is_some_and(|code| self.blind.contains(&code)) {
-                    *axis = before;
-                }
+        if self.ports.servo_due {
+            for (joint, sample) in self.ports.samples.iter_mut().enumerate() {
                 self.injector.joint(joint, self.period, sample);
             }
-            let measured = Sample { joints };
-            self.sample = self.world.observe(&measured);
-            let (_, forbids) = self.servo.look(self.servo_ticks);
-            self.causes |= forbids & !self.blind_bits();
+            self.sample = self.world.observe(&Sample { joints: self.ports.samples });
         }
         self.watch();
     }
 
-    /// The operator's contacts.
-    fn round(&mut self) {
-        if self.injector.happens(Channel::Housekeeping, 0, self.period) {
+    fn housekeeping(&mut self) {
+        let (now, injector) = (self.period, &mut self.injector);
+        if injector.happens(Channel::Housekeeping, 0, now) {
             return;
         }
         self.watchdog.rounds = self.watchdog.rounds.wrapping_add(1);
-        self.upkeep();
-        let drive = self.state();
-        let situation = Situation {
-            enabling: self.hand.enabling,
-            start: self.hand.start,
-            blocked: self.causes != 0 || matches!(drive, DriveState::Fault { .. }),
-            calibrated: !self.restarted,
-            calibrating: false,
-            referenced: !self.restarted,
-            drive: self.output.is_some().then_some(drive),
-        };
-        match self.operator.tick(&situation) {
-            Some(Ask::Power(power)) => self.request = Some(ControlRequest::Power(power)),
-            Some(Ask::Identify) => self.request = Some(ControlRequest::Identify),
-            Some(Ask::Reset) => self.reset(),
-            Some(Ask::Calibrate | Ask::EndCalibration | Ask::Reference) | None => {}
-        }
-    }
-
-    /// Gate drivers' registers and temperatures, as the housekeeping looks at them.
-    fn upkeep(&mut self) {
-        let due = self.clock.next();
-        let mut hottest_c = f32::MIN;
         for joint in 0..N {
-            let holds = !self.injector.happens(Channel::GateRegisters, joint, self.period);
-            let code = self.injector.thermistor(joint, self.period, WARM_CODE);
-            if let Some(cause) = of_gate_driver(holds).filter(|_| due.gates) {
-                self.causes |= cause.bit() & !self.blind_bits();
-            }
-            let degrees = temperature_c(code);
-            hottest_c = hottest_c.max(degrees.unwrap_or(HOTTEST_C));
-            if let Some(code) = of_temperature(degrees, HOTTEST_C).filter(|_| due.temperatures)
-                && !self.is_blind(Some(code))
-            {
-                self.leg.report(Fault { code, joint: joint as u8 });
-            }
+            self.ports.gates[joint] = !injector.happens(Channel::GateRegisters, joint, now);
+            self.ports.thermistors[joint] = injector.thermistor(joint, now, WARM_CODE);
         }
-        if due.temperatures {
-            self.hottest_c = hottest_c;
-        }
-    }
-
-    fn reset(&mut self) {
-        self.causes &= Cause::for_ever();
-        self.axis_fault = None;
-        for (joint, axis) in self.axes.iter_mut().enumerate() {
-            if !axis.clear_fault() {
-                // Off, and to be calibrated; a motor that braked is let go.
-                self.causes |= Cause::of_axis(joint, FaultCode::EncoderPlace, false).bit();
-            }
-        }
-        self.edges.reset = Some(self.period);
-        self.request = Some(ControlRequest::Power(PowerRequest::ResetFault));
+        self.keeper.round(&mut self.ports);
     }
 
     fn servo(&mut self) {
         if self.injector.happens(Channel::Servo, 0, self.period) {
             return;
         }
-        self.servo_ticks = self.servo_ticks.wrapping_add(1);
-        if self.restarted {
-            return;
+        self.ports.servo_ticks = self.ports.servo_ticks.wrapping_add(1);
+        self.ports.counts = self.sample.joints.map(|sample| sample.encoder_counts);
+        match self.round.gate(self.ports.begun) {
+            Gate::Closed => {
+                self.ports.targets.enabled = false;
+                self.ports.requests.pop_front();
+                return;
+            }
+            Gate::Anew => {
+                self.leg.restart();
+                self.told = None;
+            }
+            Gate::Open => {}
         }
-        // Every 64 ms, as `task::servo` does.
-        if self.servo_ticks & 0xFF == 0
-            && self.leg.control().checksum() != self.checksum
-            && !self.is_blind(Some(FaultCode::Parameters))
-        {
-            self.leg.report(Fault { code: FaultCode::Parameters, joint: 0 });
+        for (code, joint) in core::mem::take(&mut self.ports.reported) {
+            self.leg.report(Fault { code, joint: joint as u8 });
         }
-        let state = self.leg.control().state();
-        let request = permitted(self.request.take(), self.causes == 0, state);
         let bus = SenseScale::ODRIVE_3_6.bus(self.bus_code);
-        if self.supply.look(bus) && !self.is_blind(Some(FaultCode::SupplyLost)) {
-            self.leg.report(Fault { code: FaultCode::SupplyLost, joint: 0 });
+        let control = self.leg.control();
+        let found = self.round.look(|| control.checksum(), bus, self.ports.hottest_c);
+        for code in [found.parameters, found.supply].into_iter().flatten() {
+            if !self.ports.is_blind(Some(code)) {
+                self.leg.report(Fault { code, joint: 0 });
+            }
         }
-        self.leg.derate(&self.ramps.at(self.hottest_c, bus));
+        self.leg.derate(&found.derating);
+        let state = self.leg.control().state();
+        let request = permitted(self.ports.requests.pop_front(), self.ports.causes == 0, state);
         let seeing = (!self.blind.is_empty()).then(|| self.leg.clone());
         let output = self.leg.tick(&self.sample, request, self.gravity, EVALUATIONS_PER_TICK);
         if let Some(before) = seeing
-            && self.is_blind(self.leg.control().state().fault().map(|fault| fault.code))
+            && self.ports.is_blind(self.leg.control().state().fault().map(|fault| fault.code))
         {
             // As if it had not been seen: the leg goes on with what it was told before.
             self.leg = before;
             return;
         }
-        self.targets = *output.servo.drive();
-        for (joint, target) in self.targets.currents.iter_mut().enumerate() {
+        self.ports.targets = *output.servo.drive();
+        for (joint, target) in self.ports.targets.currents.iter_mut().enumerate() {
             *target = self.injector.target(joint, self.period, *target);
         }
+        let state = output.servo.decision.state;
+        if self.told.is_none_or(|told| words::drive(told) != words::drive(state)) {
+            self.ports.drive.push_back(state);
+        }
+        self.told = Some(state);
         self.output = Some(output);
     }
 
     /// Level 0, both axes.
     fn current(&mut self) {
         let now = self.period;
-        let brake = self.injector.brake(now, self.brake);
-        let mut samples = self.world.period(&self.commands, brake);
+        let brake = self.injector.brake(now, self.ports.brake);
+        // Without their supply the gate drivers open every switch, whatever the timers do.
+        let commands = if self.ports.gates_on { self.ports.commands } else { [AxisCommand::RELEASED; N] };
+        let mut samples = self.world.period(&commands, brake);
         let emergency_stop = self.injector.happens(Channel::EmergencyStop, 0, now);
         let gate_fault = self.injector.happens(Channel::GateFault, 0, now);
         for (joint, sample) in samples.iter_mut().enumerate() {
             self.injector.sample(joint, now, sample);
             if self.injector.happens(Channel::Tick, joint, now) {
-                self.missed[joint] = self.missed[joint].saturating_add(1);
                 continue;
             }
             self.watchdog.ticks[joint] = self.watchdog.ticks[joint].wrapping_add(1);
-            // As `task::current` looks at the other axis, half a period later or earlier.
-            let late =
-                self.missed.iter().enumerate().any(|(other, missed)| other != joint && *missed >= LATE);
-            if late && !self.is_blind(Some(FaultCode::CurrentTicks)) {
-                self.causes |= Cause::CurrentTicks.bit();
-            }
-            let complete = !self.injector.happens(Channel::Conversion, joint, now);
-            let missed = core::mem::take(&mut self.missed[joint]);
-            let state = TickState { emergency_stop, gate_fault, complete, missed };
-            let (forbids, damp) = self.watches[joint].look(&state);
-            self.causes |= forbids & !self.blind_bits();
-            if damp && !self.is_blind(Some(FaultCode::CurrentTicks)) {
-                self.leg.report(Fault { code: FaultCode::CurrentTicks, joint: joint as u8 });
-            }
-            if self.restarted {
-                // Neither calibrated nor referenced: what runs is released.
-                continue;
-            }
-            let switching = self.is_switching();
-            let before = self.axes[joint];
-            let current = self.targets.currents[joint];
-            let command = match Bridges::of(self.causes) {
-                Bridges::Follow if self.targets.enabled => {
-                    self.axes[joint].tick(sample, AxisRequest { enabled: true, current })
-                }
-                Bridges::Brake => self.axes[joint].brake(sample),
-                _ => self.axes[joint].tick(sample, AxisRequest::RELEASED),
+            (self.bus_code, self.ports.encoders[joint]) = (sample.bus_code, sample.encoder_count);
+            let tick = Tick {
+                now: (now as u32).wrapping_mul(CYCLES.get()).wrapping_add(joint as u32 * CYCLES.get() / 4),
+                emergency_stop,
+                gate_fault,
+                complete: !self.injector.happens(Channel::Conversion, joint, now),
+                sample: *sample,
             };
-            if self.is_blind(self.axes[joint].fault().map(axis_code)) {
-                self.axes[joint] = before;
-                continue;
-            }
-            self.commands[joint] = command;
-            let axis = &self.axes[joint];
-            if let Some(fault) = axis.fault() {
-                self.causes |= Cause::of_axis(joint, axis_code(fault), switching).bit();
-                self.axis_fault = self.axis_fault.or(Some(axis_code(fault)));
-            }
-            // What one axis finds takes the other in the same period.
-            match Bridges::of(self.causes) {
-                Bridges::Follow => {}
-                Bridges::Brake => self.commands = [AxisCommand::BRAKE; N],
-                Bridges::Release => self.commands = [AxisCommand::RELEASED; N],
-            }
+            self.tick(joint, &tick);
         }
-        let bus = samples.first().map_or(0, |sample| sample.bus_code);
-        self.bus_code = bus;
-        self.brake = self.chopper.duty(SenseScale::ODRIVE_3_6.bus(bus));
-        self.hash = samples.iter().zip(&self.commands).fold(self.hash, |hash, (sample, command)| {
+        self.hash = samples.iter().zip(&self.ports.commands).fold(self.hash, |hash, (sample, command)| {
             let [b, c] = sample.shunt_codes.map(u64::from);
             let seen = u64::from(sample.encoder_count) << 48 | b << 32 | c << 16 | u64::from(sample.bus_code);
             let duties = command
@@ -353,26 +277,52 @@ impl<const N: usize, const B: usize> Rig<N, B> {
                 .fold(mixed(hash, seen), |hash, duty| mixed(hash, u64::from(duty.to_bits())));
             mixed(duties, u64::from(command.enabled))
         });
-        self.hash = mixed(self.hash, u64::from(self.causes));
+        self.hash = mixed(self.hash, u64::from(self.ports.causes));
+    }
+
+    /// One tick of one axis; a fault that must not be seen has not been found, and what followed from it did not happen.
+    fn tick(&mut self, joint: usize, tick: &Tick) {
+        if self.blind.is_empty() {
+            return self.loops.tick(joint, tick, &mut self.ports);
+        }
+        let (stage, ports) = (self.loops.stage_mut(joint).copied(), self.ports.clone());
+        self.loops.tick(joint, tick, &mut self.ports);
+        if let (Some(now), Some(before)) = (self.loops.stage_mut(joint), stage)
+            && self.ports.is_blind(now.fault().map(axis_code))
+        {
+            *now = before;
+            let (samples, servo_due) = (self.ports.samples, self.ports.servo_due);
+            self.ports = Ports { samples, servo_due, ..ports };
+        }
     }
 
     /// Flips a bit of an axis' numbers (`Axis::upset`), or of those of the servo's joint.
     pub fn upset(&mut self, of_axis: bool, joint: usize, number: u8, bit: u8) {
         if of_axis {
-            self.axes[joint].upset(number, bit);
+            if let Some(axis) = self.loops.stage_mut(joint).and_then(Stage::axis_mut) {
+                axis.upset(number, bit);
+            }
         } else {
             self.leg.upset(joint, number, bit);
         }
     }
+}
 
-    fn is_blind(&self, code: Option<FaultCode>) -> bool {
-        code.is_some_and(|code| self.blind.contains(&code))
+/// What the housekeeper of this leg is built from.
+fn settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSettings<N>, ToolError> {
+    let unfit = || ToolError::input("a motor for every joint is needed");
+    let mut parts = Vec::with_capacity(N);
+    for joint in leg.joints.iter().take(N) {
+        let motor = joint.motor.as_ref().ok_or_else(unfit)?;
+        let configuration = axis_configuration(joint, motor);
+        parts.push((configuration, calibration_settings(&configuration, motor)));
     }
-
-    fn blind_bits(&self) -> u32 {
-        let blind = |cause: &Cause| self.is_blind(cause.code());
-        Cause::ALL.into_iter().filter(blind).fold(0, |bits, cause| bits | cause.bit())
-    }
+    let parts: [_; N] = parts.try_into().map_err(|_| unfit())?;
+    Ok(HousekeepingSettings {
+        axes: parts.map(|(axis, _)| axis),
+        calibration: parts.map(|(_, calibration)| calibration),
+        hottest_c: HOTTEST_C,
+    })
 }
 
 const fn mixed(hash: u64, word: u64) -> u64 {

@@ -4,6 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use scarab::safety::{DriveState, FaultCode};
 
+use super::aftermath::{RESET, RESET_EVERY, hand, leads_to};
 use super::catalogue::{Event, Expected, JOINTS, Onset, Row, Scenario};
 use super::dice::Dice;
 use super::event::apply;
@@ -243,9 +244,6 @@ impl<'a, const B: usize> Watched<'a, B> {
         // Long enough for a reset now and then.
         let longest = if choice == 3 { 3 * PERIODS_PER_S } else { PERIODS_PER_S / 2 };
         self.hold.until = now + 1 + self.dice.below(longest);
-        if hand.enabling && !self.rig.hand.enabling {
-            self.rig.edges.closed = Some(now);
-        }
         self.rig.hand = hand;
     }
 
@@ -253,7 +251,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         if self.scenario.expected == Expected::Kept {
             return self.keep();
         }
-        let before = self.rig.commands;
+        let before = *self.rig.commands();
         let limit = self.begun + self.scenario.patience;
         let mut seen = None;
         let mut false_alarm = false;
@@ -261,7 +259,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             self.step();
             if self.scenario.expected == Expected::Rejected && self.rig.period == self.begun + 1 {
                 let joint = self.scenario.injections[0].map_or(0, |injection| injection.joint);
-                let kept = self.rig.commands[joint] == before[joint];
+                let kept = self.rig.commands()[joint] == before[joint];
                 let rejected = kept && self.rig.alarm().is_none();
                 seen = rejected.then_some("Limit");
                 if !rejected {
@@ -275,7 +273,11 @@ impl<'a, const B: usize> Watched<'a, B> {
             }
         }
         let safe = self.rig.period;
-        let alarm = self.rig.alarm().map(FaultCode::name);
+        let alarm = self.rig.alarm();
+        if let (Some(state), Some(code)) = (seen, alarm) {
+            self.judge(state, code);
+        }
+        let alarm = alarm.map(FaultCode::name);
         self.watch_on(seen);
         if self.scenario.expected == Expected::Rejected {
             // One wrong reading stops nobody.
@@ -340,6 +342,22 @@ impl<'a, const B: usize> Watched<'a, B> {
         }
     }
 
+    /// Whatever found the fault, the machine is in the state of what it says is wrong.
+    fn judge(&mut self, state: &'static str, code: FaultCode) {
+        if !leads_to(code).contains(&state) {
+            self.invariants.note(&self.rig, &format!("led to {state}"));
+        }
+    }
+
+    /// Of some runs: the operator resets, and enables again what may be enabled.
+    fn reset(&mut self) {
+        self.invariants.knows_places();
+        for since in 0..RESET {
+            self.rig.hand = hand(since);
+            self.step();
+        }
+    }
+
     /// What follows the safe state: nothing comes back, damping ends.
     fn watch_on(&mut self, seen: Option<&'static str>) {
         let periods = match (self.scenario.event, seen) {
@@ -353,10 +371,13 @@ impl<'a, const B: usize> Watched<'a, B> {
             // Somebody lets go of the enabling switch and closes it anew, which must not enable.
             if seen == Some("Refuse") && period.is_multiple_of(REFUSED / 2) {
                 self.rig.hand = Hand { enabling: period > 0, start: false };
-                self.rig.edges.closed =
-                    Some(self.rig.period).filter(|_| period > 0).or(self.rig.edges.closed);
             }
             self.step();
+        }
+        let resets =
+            self.seed.is_multiple_of(RESET_EVERY) && !self.brief && self.scenario.event != Event::Hands;
+        if resets && seen.is_some() {
+            self.reset();
         }
     }
 }

@@ -11,6 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use scarab::safety::FaultCode;
 
+use super::aftermath::{RESET, RESET_EVERY, hand};
 use super::catalogue::{Bounds, Event, JOINTS, rows};
 use super::dice::Dice;
 use super::event::apply;
@@ -187,6 +188,15 @@ impl Trial {
             // Unseen for so long, or damped to its end.
             if over || alarm.is_none() && since >= self.last + PATIENCE {
                 break;
+            }
+        }
+        if alarm.is_some() && seed.is_multiple_of(RESET_EVERY) {
+            invariants.knows_places();
+            for since in 0..RESET {
+                rig.hand = hand(since);
+                let stop = rig.injector.happens(Channel::EmergencyStop, 0, rig.period);
+                rig.advance();
+                invariants.see(&rig, stop);
             }
         }
         let hash = format!("{:016x}", rig.hash);

@@ -73,7 +73,6 @@ fn one(head: &Head, leg: &LegFile, ready: &Rig<JOINTS, BASE>, seed: u64, blind: 
     for period in 0..RELEASED + ENABLED {
         if period == RELEASED {
             rig.hand.enabling = true;
-            rig.edges.closed = Some(rig.period);
         }
         rig.advance();
         invariants.see(&rig, false);

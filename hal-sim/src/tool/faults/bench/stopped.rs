@@ -84,13 +84,12 @@ fn boot(
     let pressed = begin + dice.below(BOOTED) * dice.below(1000).min(1);
     let lasting = 1 + dice.below(PERIODS_PER_S / 100);
     rig.injector.add(at(Channel::EmergencyStop, 0, Form::Off, Timing::lasting(pressed, lasting)));
-    let mut invariants = Invariants::new(leg, Scope { torque: true, range: true }, &rig);
+    let mut invariants = Invariants::new(leg, Scope { torque: true, range: true, place: true }, &rig);
     let (mut seen, mut came_back) = (None, false);
     for since in 0..BOOTED + CLOSED {
         rig.hand.start = rig.state() == DriveState::OperationEnabled && since >= PRESSED;
         if since == CLOSED {
             rig.hand.enabling = true;
-            rig.edges.closed = Some(rig.period);
         }
         let stop = rig.injector.happens(Channel::EmergencyStop, 0, rig.period);
         rig.advance();
@@ -133,7 +132,7 @@ fn calibration(
     Ok(found)
 }
 
-/// Ticks to the end of a calibration, as `task::current` runs it, and whether it was dropped; with the contact that opens at a tick.
+/// Ticks to the end of a calibration, as `operation::Stage` runs it, and whether it was dropped; with the contact that opens at a tick.
 fn calibrated(
     leg: &LegFile,
     index: usize,

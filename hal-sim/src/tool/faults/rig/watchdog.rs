@@ -8,10 +8,9 @@
 //! A reset releases both bridges by hardware. The image that boots then knows no calibration and where no joint stands, is refused for
 //! [`Cause::Watchdog`], and its servo does not begin before it was calibrated and referenced, so nothing of the leg runs on here.
 
-use scarab::hal::{AxisCommand, DriveCommand};
-use scarab::operator::{Operator, RATE_HZ};
-use scarab::safety::{Cause, CheckIns, FaultCode, UpkeepClock};
+use scarab::safety::{Cause, CheckIns, FaultCode};
 
+use super::ports::Ports;
 use super::{PERIODS_PER_S, Rig};
 use crate::faults::Injector;
 
@@ -58,11 +57,11 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// At the end of a period.
     pub(super) fn watch(&mut self) {
-        let blind = self.is_blind(Some(FaultCode::Watchdog));
+        let blind = self.ports.is_blind(Some(FaultCode::Watchdog));
         let dog = &mut self.watchdog;
         if self.period.is_multiple_of(PERIODS_PER_LOOK) {
             let [first, .., last] = dog.ticks.as_slice() else { return };
-            if dog.check_ins.all([*first, *last, self.servo_ticks, dog.rounds]) || blind {
+            if dog.check_ins.all([*first, *last, self.ports.servo_ticks, dog.rounds]) || blind {
                 dog.fed = self.period;
             }
         }
@@ -74,13 +73,12 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     /// What hung does so no more.
     fn restart(&mut self) {
         self.restarted = true;
-        self.commands = [AxisCommand::RELEASED; N];
-        self.targets = DriveCommand::RELEASED;
-        self.causes = Cause::Watchdog.bit();
-        (self.axis_fault, self.output, self.request) = (None, None, None);
-        self.missed = [0; N];
-        self.operator = Operator::default();
-        self.clock = UpkeepClock::new(RATE_HZ);
+        let samples = self.sample.joints;
+        self.ports = Ports { causes: Cause::Watchdog.bit(), period: self.period, ..Ports::new(samples) };
+        let cold = &self.cold;
+        (self.leg, self.loops) = (cold.leg.clone(), cold.loops);
+        (self.keeper, self.round) = (cold.keeper.clone(), cold.round.clone());
+        (self.output, self.told) = (None, None);
         self.injector = Injector::new(0);
         self.watchdog.fed = self.period;
     }
