@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use scarab::board::odrive_v3_6::settings::pins::{GATES_OFF, PINS};
 use scarab::board::odrive_v3_6::settings::{
     CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, FAST_TIMER_HZ, SLOW_TIMER_HZ, Write, analog,
-    chopper, converters, encoders, gate_driver, timers,
+    chopper, converters, encoders, external, gate_driver, timers,
 };
 
 /// Registers by address; what was never written is zero, as after a reset (but for the debug pins' modes).
@@ -55,7 +55,7 @@ fn started() -> Registers {
     registers.apply(&timers::TRIGGERS);
     (0..2).for_each(|axis| registers.apply(&[timers::repetition(axis)]));
     registers.apply(&converters::TRIGGERED);
-    registers.apply(&encoders::INDEX);
+    registers.apply(&external::EXTERNAL);
     registers
 }
 
@@ -202,7 +202,16 @@ fn encoders_count_every_edge_behind_a_filter_and_their_index_pulses_interrupt() 
     // PC9 and PC15.
     assert_eq!(registers.bits(0x4001_3810, 4, 4), 2);
     assert_eq!(registers.bits(0x4001_3814, 12, 4), 2);
-    assert_eq!([0x00, 0x08].map(|offset| registers.at(0x4001_3C00 + offset)), [1 << 9 | 1 << 15; 2]);
+    assert_eq!(registers.at(0x4001_3C08), 1 << 9 | 1 << 15, "as they rise");
+}
+
+#[test]
+fn the_emergency_stop_interrupts_as_its_contact_opens() {
+    let registers = started();
+    // PC4, closed to 3.3 V.
+    assert_eq!(registers.bits(0x4001_380C, 0, 4), 2);
+    assert_eq!(registers.at(0x4001_3C0C), 1 << 4, "as it falls");
+    assert_eq!(registers.at(0x4001_3C00), 1 << 4 | 1 << 9 | 1 << 15, "no other line");
 }
 
 #[test]

@@ -15,7 +15,7 @@
 //! | [`SupplyWatch`] | a supply that dies |
 //! | [`Monitor`] | all of it, once per tick |
 //! | [`Cause`], [`TickWatch`], [`ServoWatch`] | why nothing may be enabled, and what every current tick looks at |
-//! | [`CheckIns`] | who has to have run before the watchdog is fed |
+//! | [`CheckIns`], [`TickGuard`] | who has to have run before the watchdog is fed; current ticks that stop |
 //! | [`UpkeepClock`] | what is looked at every few milliseconds: gate drivers' registers, temperatures |
 //!
 //! Safe states: *Off* releases the bridges in the same tick. *Damp* opposes every joint's velocity under its torque
@@ -40,7 +40,7 @@ pub mod step_gate;
 pub mod upkeep;
 
 pub use barrier::{Barrier, Limited};
-pub use check_in::CheckIns;
+pub use check_in::{CheckIns, GUARD_RATE_HZ, TickGuard};
 pub use derating::{Derating, DeratingRamps, LimitCode, LimitCodes, Ramp, SupplyWatch};
 pub use fault::{Fault, FaultCode, Reaction};
 pub use interlock::{Bridges, Cause, ServoWatch, TickState, TickWatch};

@@ -1,6 +1,6 @@
 //! Level 6 on the board: contacts, gate drivers, thermistors and queues beneath `operation::Housekeeper`, and the watchdog.
 //!
-//! The watchdog is fed by a task of its own, and only if since the last time both axes' current loops, the servo and the
+//! The watchdog is fed by a task of its own, which also sees current ticks that no longer come, and only if since the last time both axes' current loops, the servo and the
 //! housekeeping have run: one of them hanging is a reset, after which the drive stays refused.
 
 use embassy_time::{Duration, Ticker};
@@ -13,11 +13,11 @@ use super::statistics::{self, Count};
 use crate::board::odrive_v3_6::gate_driver::GateDrivers;
 use crate::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use crate::board::odrive_v3_6::settings::drives::CALIBRATION;
-use crate::board::odrive_v3_6::{contacts, converter, encoder, watchdog};
+use crate::board::odrive_v3_6::{bridge, contacts, converter, encoder, watchdog};
 use crate::leg::{ControlRequest, DriveState};
 use crate::motor::AxisConfiguration;
 use crate::operation::{Housekeeper, HousekeepingBoard, HousekeepingSettings, Order, Outcome, RATE_HZ};
-use crate::safety::{CheckIns, FaultCode};
+use crate::safety::{CheckIns, FaultCode, GUARD_RATE_HZ, TickGuard};
 use crate::trace::Record;
 
 /// Rounds of the housekeeping, for the watchdog.
@@ -41,16 +41,27 @@ pub struct Housekeeping {
     pub notes: Producer<'static, Record<JOINTS>>,
 }
 
-/// Feeds the watchdog as long as everything else runs.
+/// Looks for one at who has checked in.
+const LOOKS: u32 = GUARD_RATE_HZ / 250;
+
+/// Releases both bridges where no current ticks come, and feeds the watchdog as long as everything else runs.
 #[embassy_executor::task]
 pub async fn watch() -> ! {
-    let mut ticker = Ticker::every(Duration::from_millis(4));
-    let [first, second] = &statistics::CURRENT_TICKS;
-    let seen = || [first, second, &statistics::SERVO_TICKS, &ROUNDS].map(Count::get);
-    let mut check_ins = CheckIns::new(seen());
+    let mut ticker = Ticker::every(Duration::from_hz(u64::from(GUARD_RATE_HZ)));
+    let ticks = || statistics::CURRENT_TICKS.each_ref().map(Count::get);
+    let seen = || {
+        let [first, second] = ticks();
+        [first, second, statistics::SERVO_TICKS.get(), ROUNDS.get()]
+    };
+    let (mut guard, mut check_ins, mut looks) = (TickGuard::new(), CheckIns::new(seen()), 0_u32);
     loop {
         ticker.next().await;
-        if check_ins.all(seen()) {
+        if guard.look(ticks()) {
+            interlock::raise(Cause::CurrentTicks);
+            bridge::release_all();
+        }
+        looks = (looks + 1) % LOOKS;
+        if looks == 0 && check_ins.all(seen()) {
             watchdog::feed();
         }
     }

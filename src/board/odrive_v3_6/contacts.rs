@@ -1,9 +1,14 @@
 //! Contacts: emergency stop, enabling switch, start button, and the fault line of the gate drivers.
 //!
 //! All contacts of the operator are closed to 3.3 V when they say "go", so that a wire that breaks says "stop". GPIO5 (PC4),
-//! the emergency stop, has no noise filter on the board: a spike stops, and only the operator starts again.
+//! the emergency stop, has no noise filter on the board: what is open for a microsecond stops, and only the operator starts again.
+//!
+//! The sense is looked at in each current tick. Besides, its opening is an interrupt above all others: it releases both bridges
+//! where the current loops hang or no longer come. A tick that it interrupts may let its bridge through once more, until its next.
 
+use super::bridge;
 use super::registers::{load, store};
+use super::settings::external::{PENDING, STOP_LINE};
 use super::settings::pins::{BSRR, IDR, port};
 
 fn is_high(letter: u8, number: u32) -> bool {
@@ -14,6 +19,19 @@ fn is_high(letter: u8, number: u32) -> bool {
 #[inline(always)]
 pub fn emergency_stop() -> bool {
     !is_high(b'C', 4)
+}
+
+/// Looks of some 60 ns each at a contact that is said to have opened: shorter spikes stop nothing.
+const LOOKS: u32 = 16;
+
+/// The contact has fallen: both bridges off, if it stays open. Whether it did.
+pub(super) fn stop_came() -> bool {
+    store(PENDING, 1 << STOP_LINE);
+    let open = (0..LOOKS).all(|_| emergency_stop());
+    if open {
+        bridge::release_all();
+    }
+    open
 }
 
 /// A gate driver reports a fault; only true where they are on.

@@ -3,7 +3,8 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::registers::{load, store};
-use super::settings::encoders::{BASES, CNT, INDEX_LINES, PENDING};
+use super::settings::encoders::{BASES, CNT};
+use super::settings::external::{INDEX_LINES, PENDING};
 
 /// Set beside a count that was taken at an index pulse.
 const SEEN: u32 = 1 << 16;

@@ -1,16 +1,17 @@
 //! Who interrupts whom.
 //!
-//! | level | vectors | what |
-//! | --- | --- | --- |
-//! | 0 | ADC, EXTI9_5, EXTI15_10 | current loops of both axes, index pulses; never masked |
-//! | 1 | OTG_HS | servo, pended by the current loop; never masked |
-//! | 3 | TIM5 | time of the executors |
-//! | 6 | I2C3_EV | executor of the housekeeping; and every vector that is not named |
+//! | priority | level | vectors | what |
+//! | --- | --- | --- | --- |
+//! | 0 | above all | EXTI4 | the emergency stop's contact as it opens; never masked |
+//! | 1 | 0 | ADC, EXTI9_5, EXTI15_10 | current loops of both axes, index pulses; never masked |
+//! | 2 | 1 | OTG_HS | servo, pended by the current loop; never masked |
+//! | 3 | 3 | TIM5 | time of the executors |
+//! | 6 | 6 | I2C3_EV | executor of the housekeeping; and every vector that is not named |
 //!
-//! Critical sections mask level 2 and below. Reset leaves every vector at level 0, where it could run inside a critical
+//! Critical sections mask priority 3 and below. Reset leaves every vector at level 0, where it could run inside a critical
 //! section of the same data: so all are moved before anything is enabled.
 
-use embassy_stm32::interrupt::{ADC, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS, Priority, TIM5};
+use embassy_stm32::interrupt::{ADC, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS, Priority, TIM5};
 
 use super::registers::store;
 
@@ -24,10 +25,11 @@ pub(super) fn set_levels() {
     for word in 0..WORDS {
         store(PRIORITIES + 4 * word, 0x6060_6060);
     }
+    EXTI4.set_priority(Priority::P0);
     for vector in [ADC, EXTI9_5, EXTI15_10] {
-        vector.set_priority(Priority::P0);
+        vector.set_priority(Priority::P1);
     }
-    OTG_HS.set_priority(Priority::P1);
+    OTG_HS.set_priority(Priority::P2);
     TIM5.set_priority(Priority::P3);
     I2C3_EV.set_priority(Priority::P6);
 }

@@ -12,7 +12,7 @@ use super::identity::Identity;
 use super::registers::{apply, load, store};
 use super::settings::timers::{BASES, CNT, CR1, DOWN, SR, TOP};
 use super::settings::{
-    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, chopper, converters, encoders, pins, timers,
+    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, chopper, converters, encoders, external, pins, timers,
 };
 use super::{interrupts, watchdog};
 use crate::board::crash::{self, Crash};
@@ -79,7 +79,7 @@ pub fn start() -> Board {
 
     let timers_in_phase = start_timers();
     apply(&converters::TRIGGERED);
-    apply(&encoders::INDEX);
+    apply(&external::EXTERNAL);
     let mut core = cortex_m::Peripherals::take();
     if let Some(core) = core.as_mut() {
         core.DCB.enable_trace();

@@ -2,17 +2,18 @@
 #![expect(unsafe_code, reason = "to unmask a vector, and to tell an executor of its own interrupt")]
 
 use embassy_stm32::interrupt;
-use embassy_stm32::interrupt::{ADC, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS};
+use embassy_stm32::interrupt::{ADC, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS};
 
-use super::encoder;
+use super::{contacts, encoder};
 use crate::task;
+use crate::task::interlock::Cause;
 
-/// From now on converters, index pulses and the servo interrupt; what they work on must be in its place.
+/// From now on the emergency stop, converters, index pulses and the servo interrupt; what they work on must be in its place.
 pub fn enable() {
     // SAFETY: called once, from `main`, outside any critical section; levels are set, and the handlers' data is behind locks
     // that are only tried.
     unsafe {
-        for vector in [EXTI9_5, EXTI15_10, OTG_HS, ADC] {
+        for vector in [EXTI4, EXTI9_5, EXTI15_10, OTG_HS, ADC] {
             vector.enable();
         }
     }
@@ -26,6 +27,13 @@ fn ADC() {
 #[interrupt]
 fn OTG_HS() {
     task::servo::interrupt();
+}
+
+#[interrupt]
+fn EXTI4() {
+    if contacts::stop_came() {
+        task::interlock::raise(Cause::EmergencyStop);
+    }
 }
 
 #[interrupt]

@@ -257,7 +257,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             if self.injector.happens(Channel::Tick, joint, now) {
                 continue;
             }
-            self.watchdog.ticks[joint] = self.watchdog.ticks[joint].wrapping_add(1);
+            self.ports.ticks[joint] = self.ports.ticks[joint].wrapping_add(1);
             (self.bus_code, self.ports.encoders[joint]) = (sample.bus_code, sample.encoder_count);
             let tick = Tick {
                 now: (now as u32).wrapping_mul(CYCLES.get()).wrapping_add(joint as u32 * CYCLES.get() / 4),

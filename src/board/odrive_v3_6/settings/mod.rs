@@ -8,6 +8,7 @@ pub mod chopper;
 pub mod converters;
 pub mod drives;
 pub mod encoders;
+pub mod external;
 pub mod gate_driver;
 pub mod pins;
 pub mod timers;

@@ -27,7 +27,7 @@ const LATE: Row = Row {
 
 const HUNG: Row = Row {
     id: "K3",
-    fault: "a current loop, the servo or the housekeeping hangs",
+    fault: "a current loop or both, the servo or the housekeeping hangs",
     detector: "watchdog, fed only if all of them ran since",
     state: "reset, boots Refuse with the reason",
     codes: &[FaultCode::Watchdog],
@@ -38,15 +38,18 @@ const HUNG: Row = Row {
     draw: hang,
 };
 
-/// K3: any one of those that check in, at any tick; the others go on.
+/// K3: any one of those that check in, or both current loops, at any tick; the others go on.
 fn hang(dice: &mut Dice, _: &Bounds) -> Scenario {
-    let (channel, joint) = match dice.below(4) {
-        joint @ 0..=1 => (Channel::Tick, joint as usize),
-        2 => (Channel::Servo, 0),
-        _ => (Channel::Housekeeping, 0),
+    let hung = |channel, joint| at(channel, joint, Form::Off, Timing::from(0));
+    let (first, second) = match dice.below(5) {
+        joint @ 0..=1 => (hung(Channel::Tick, joint as usize), None),
+        2 => (hung(Channel::Servo, 0), None),
+        3 => (hung(Channel::Housekeeping, 0), None),
+        // The converter by whose end both are ticked.
+        _ => (hung(Channel::Tick, 0), Some(hung(Channel::Tick, 1))),
     };
-    let oscillator = Event::Oscillator(dice.uniform(17e3, 47e3));
-    Scenario { event: oscillator, ..one(at(channel, joint, Form::Off, Timing::from(0)), Expected::Restarted) }
+    let event = Event::Oscillator(dice.uniform(17e3, 47e3));
+    Scenario { event, injections: [Some(first), second], ..one(first, Expected::Restarted) }
 }
 
 /// K1: current ticks missed now and then or at once, or the servo kept from its tick.

@@ -41,6 +41,8 @@ pub(super) struct Ports<const N: usize> {
     pub(super) samples: [JointSample; N],
     pub(super) counts: [i32; N],
     pub(super) encoders: [u16; N],
+    /// Current ticks of the axes.
+    pub(super) ticks: [u32; N],
     pub(super) servo_ticks: u32,
     pub(super) servo_due: bool,
     /// For the servo's next tick.
@@ -73,6 +75,7 @@ impl<const N: usize> Ports<N> {
             samples,
             counts: samples.map(|sample| sample.encoder_counts),
             encoders: [0; N],
+            ticks: [0; N],
             servo_ticks: 0,
             servo_due: false,
             reported: VecDeque::new(),

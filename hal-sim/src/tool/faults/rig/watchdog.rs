@@ -1,6 +1,7 @@
 //! The watchdog, and what is left of a machine that it reset.
 //!
 //! ```text
+//! every 0.5 ms axes' ticks -> `TickGuard` -> released
 //! every 4 ms   axes' ticks, servo's ticks, housekeeping's rounds -> `CheckIns` -> fed
 //! 512 cycles of its oscillator (32 kHz nominal: 16 ms) without that: reset
 //! ```
@@ -8,7 +9,8 @@
 //! A reset releases both bridges by hardware. The image that boots then knows no calibration and where no joint stands, is refused for
 //! [`Cause::Watchdog`], and its servo does not begin before it was calibrated and referenced, so nothing of the leg runs on here.
 
-use scarab::safety::{Cause, CheckIns, FaultCode};
+use scarab::hal::AxisCommand;
+use scarab::safety::{Cause, CheckIns, FaultCode, GUARD_RATE_HZ, TickGuard};
 
 use super::ports::Ports;
 use super::{PERIODS_PER_S, Rig};
@@ -16,6 +18,8 @@ use crate::faults::Injector;
 
 /// Between two looks at who has checked in.
 const PERIODS_PER_LOOK: u64 = PERIODS_PER_S / 250;
+/// Between two looks at the current ticks.
+const PERIODS_PER_GUARD: u64 = PERIODS_PER_S / GUARD_RATE_HZ as u64;
 /// Of the oscillator, from being fed to the reset: a divider of 4, 128 steps.
 const CYCLES: f64 = 512.0;
 /// Of the oscillator, Hz.
@@ -24,10 +28,10 @@ const NOMINAL_HZ: f64 = 32_000.0;
 /// The watchdog and those that it waits for.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Watchdog<const N: usize> {
-    /// Ticks of the axes, rounds of the housekeeping.
-    pub(super) ticks: [u32; N],
+    /// Of the housekeeping.
     pub(super) rounds: u32,
     check_ins: CheckIns<4>,
+    guard: TickGuard<N>,
     /// Period in which it was fed, and those that it then waits.
     fed: u64,
     patience: u64,
@@ -36,9 +40,9 @@ pub(super) struct Watchdog<const N: usize> {
 impl<const N: usize> Watchdog<N> {
     pub(super) fn new() -> Self {
         Self {
-            ticks: [0; N],
             rounds: 0,
             check_ins: CheckIns::new([0; 4]),
+            guard: TickGuard::new(),
             fed: 0,
             patience: patience(NOMINAL_HZ),
         }
@@ -57,10 +61,17 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// At the end of a period.
     pub(super) fn watch(&mut self) {
+        if self.period.is_multiple_of(PERIODS_PER_GUARD)
+            && self.watchdog.guard.look(self.ports.ticks)
+            && !self.ports.is_blind(Some(FaultCode::CurrentTicks))
+        {
+            self.ports.causes |= Cause::CurrentTicks.bit();
+            self.ports.commands = [AxisCommand::RELEASED; N];
+        }
         let blind = self.ports.is_blind(Some(FaultCode::Watchdog));
         let dog = &mut self.watchdog;
         if self.period.is_multiple_of(PERIODS_PER_LOOK) {
-            let [first, .., last] = dog.ticks.as_slice() else { return };
+            let [first, .., last] = self.ports.ticks.as_slice() else { return };
             if dog.check_ins.all([*first, *last, self.ports.servo_ticks, dog.rounds]) || blind {
                 dog.fed = self.period;
             }
@@ -80,7 +91,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         (self.keeper, self.round) = (cold.keeper.clone(), cold.round.clone());
         (self.output, self.told) = (None, None);
         self.injector = Injector::new(0);
-        self.watchdog.fed = self.period;
+        (self.watchdog.fed, self.watchdog.guard) = (self.period, TickGuard::new());
     }
 
     /// It was reset by its watchdog.
