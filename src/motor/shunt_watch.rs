@@ -1,7 +1,7 @@
 //! Shunts that say the same for too long, and zeros that are none any more.
 //!
 //! ```text
-//! stuck:  code as it was, while what is asked of its phase has changed by more than 1 A: 4 ticks in a row
+//! stuck:  code as it was, while what is asked of its phase has changed by more than 1 A: 4 ticks of it
 //! zero:   i0 += (i - i0) / 64 while the bridge is released;   |i0| > 2 A when it is to switch: refused
 //! ```
 //!
@@ -19,7 +19,7 @@ use super::Stationary;
 use crate::real::abs;
 use crate::units::Ampere;
 
-/// Ticks that a code may stay while it should have moved, less one.
+/// Ticks for which a code may stay while it should have moved, counted until it moves, less one.
 const PATIENCE: u8 = 4;
 /// What a phase has to be asked for anew, A.
 const ASKED_A: f32 = 1.0;

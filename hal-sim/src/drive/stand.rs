@@ -67,6 +67,11 @@ impl Stand {
         self.load = load;
     }
 
+    /// The wire of an output (A, B, C from 0) breaks.
+    pub fn break_wire(&mut self, output: usize) {
+        self.drives.break_wire(0, output);
+    }
+
     /// One PWM period: the command acts from its beginning, where the sample is taken.
     pub fn period(&mut self, command: &AxisCommand, brake: f64) -> AxisSample {
         if let Load::Turned(speed) = self.load {

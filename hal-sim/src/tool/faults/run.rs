@@ -69,8 +69,8 @@ struct Watched<'a, const B: usize> {
     dice: Dice,
     begun: u64,
     onset: Option<u64>,
-    /// Counts of the joints at the injection, and the widest way from there.
-    counts: [f64; JOINTS],
+    /// Of the joints at the injection, anatomical, rad.
+    angles: [f64; JOINTS],
     /// What was asked of the phases with shunts at the injection, and in the period before this one, A.
     asked: [f64; 2],
     before: [f64; 2],
@@ -132,7 +132,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             dice: Dice::new(row.id, !seed),
             begun,
             onset,
-            counts: rig.world.anatomical_position(),
+            angles: rig.world.anatomical_position(),
             asked: asked(&rig, scenario.injections[0].map_or(0, |injection| injection.joint)),
             before: [f64::NAN; 2],
             steepest: [0.0; 2],
@@ -320,7 +320,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         let drives = self.rig.world.complete_drives();
         let joint = self.scenario.injections[0].map_or(0, |injection| injection.joint);
         let ratio = drives.map_or(1.0, |drives| drives.axes()[joint].description().ratio);
-        (position[joint] - self.counts[joint]).abs() * ratio > 1.1 * core::f64::consts::TAU
+        (position[joint] - self.angles[joint]).abs() * ratio > 1.1 * core::f64::consts::TAU
     }
 
     /// Of several faults the one that counts has not come yet.

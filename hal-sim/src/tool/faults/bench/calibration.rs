@@ -1,23 +1,34 @@
-//! E5: a motor that is wired otherwise than its axis was told. Its calibration has to refuse, before any torque is asked for.
+//! E5: a motor that is wired otherwise than its axis was told, or that comes loose while it is measured. Its calibration has to refuse, before
+//! any torque is asked for.
+//!
+//! What breaks at a tick of the calibration (two runs of five): a phase's wire, the encoder, a shunt. One that passes all the same is missed
+//! where what it found is not what a sound motor shows; else nothing wrong is used, and what is broken is seen as the axis runs (P1, E1,
+//! C1 to C3).
 
 use core::f64::consts::TAU;
 
 use rayon::prelude::*;
 
+use scarab::hal::AxisCommand;
+use scarab::motor::{Calibration, CalibrationStep, Calibrator};
+
 use super::super::dice::Dice;
+use super::super::draw::AMPERE_PER_CODE;
 use super::super::entry::Head;
 use super::super::run::Outcome;
 use super::{Bench, outcome};
-use crate::drive::description::EncoderWiring;
-use crate::tool::board::{axis_configuration, calibration_settings, commission};
+use crate::drive::description::{AxisDescription, EncoderWiring, SupplyDescription};
+use crate::faults::{Channel, Form, Injection, Injector, Timing};
+use crate::tool::board::words::axis_error;
+use crate::tool::board::{axis_configuration, calibration_settings, commission, rested};
 use crate::tool::error::ToolError;
-use crate::tool::leg_file::LegFile;
+use crate::tool::leg_file::{JointFile, LegFile, MotorFile};
 use crate::tool::setup::SetupError;
 
 pub(super) const BENCH: Bench = Bench {
     head: Head {
         id: "E5",
-        fault: "phases, encoder or shunts connected wrongly, or not at all",
+        fault: "phases, encoder or shunts connected wrongly, not at all, or come loose in a calibration",
         detector: "checks of the calibration",
         state: "Refuse",
         deadline_ms: f64::INFINITY,
@@ -27,6 +38,9 @@ pub(super) const BENCH: Bench = Bench {
     },
     run: calibrate,
 };
+
+/// A calibration takes some seconds, periods.
+const LONGEST: u64 = 60 * 24_000;
 
 /// Ways to connect an axis wrongly.
 const WAYS: u64 = 11;
@@ -42,6 +56,9 @@ fn one(head: &Head, leg: &LegFile, seed: u64, blind: bool) -> Result<Outcome, To
     let joint = &leg.joints[index];
     let motor =
         joint.motor.as_ref().ok_or_else(|| SetupError::new(leg, "a motor for every joint is needed"))?;
+    if dice.below(5) < 2 {
+        return loose(head, joint, motor, &drives.axes[index], &drives.supply, seed, &mut dice, blind);
+    }
     let sound = drives.axes[index];
     let mut axis = sound;
     let wiring = &mut axis.wiring;
@@ -70,4 +87,80 @@ fn one(head: &Head, leg: &LegFile, seed: u64, blind: bool) -> Result<Outcome, To
     let name = &joint.name;
     let passed = commission(name, &configuration, settings, &axis, &drives.supply, angle, seed).is_ok();
     Ok(outcome(head, seed, (!passed).then_some("Refuse")))
+}
+
+/// What comes loose.
+enum Loose {
+    Wire(usize),
+    Reading(Injection),
+}
+
+/// Something comes loose at a tick of the calibration.
+#[expect(clippy::too_many_arguments, reason = "a motor, its surroundings, and how the run is done")]
+fn loose(
+    head: &Head,
+    joint: &JointFile,
+    motor: &MotorFile,
+    axis: &AxisDescription,
+    supply: &SupplyDescription,
+    seed: u64,
+    dice: &mut Dice,
+    blind: bool,
+) -> Result<Outcome, ToolError> {
+    let configuration = axis_configuration(joint, motor);
+    let settings = calibration_settings(&configuration, motor);
+    let angle = dice.uniform(0.0, TAU);
+    let measure = |loose: Option<(u64, &Loose)>| -> Result<(u64, Option<Calibration>), ToolError> {
+        let mut stand = rested(axis, supply, angle, seed);
+        let mut injector = Injector::new(seed);
+        if let Some((_, Loose::Reading(injection))) = loose {
+            injector.add(*injection);
+        }
+        let mut calibrator =
+            Calibrator::new(&configuration, settings).map_err(|error| ToolError::input(axis_error(error)))?;
+        let mut command = AxisCommand::RELEASED;
+        for tick in 0..LONGEST {
+            if let Some((at, Loose::Wire(output))) = loose
+                && at == tick
+            {
+                stand.break_wire(*output);
+            }
+            let mut sample = stand.period(&command, 0.0);
+            injector.sample(0, tick, &mut sample);
+            match calibrator.tick(&sample) {
+                CalibrationStep::Running(next) => command = next,
+                CalibrationStep::Done(found) => return Ok((tick, Some(found))),
+                CalibrationStep::Refused(_) => return Ok((tick, None)),
+            }
+        }
+        Ok((LONGEST, None))
+    };
+    let (length, sound) = measure(None)?;
+    let at = dice.below(length);
+    let shunt = if dice.coin() { Channel::ShuntB } else { Channel::ShuntC };
+    let reading =
+        |channel, form| Loose::Reading(Injection { channel, joint: 0, form, timing: Timing::from(at) });
+    let loose = match dice.below(6) {
+        output @ 0..=2 => Loose::Wire(output as usize),
+        3 => reading(Channel::Counter, Form::Stuck),
+        4 => reading(shunt, Form::Stuck),
+        _ => reading(shunt, Form::Offset(dice.sign() * dice.uniform(5.0, 60.0) / AMPERE_PER_CODE)),
+    };
+    // Checks that pass whatever they are shown.
+    let (_, found) = if blind { (at, sound) } else { measure(Some((at, &loose)))? };
+    let is_right = found.zip(sound).is_some_and(|(found, sound)| is_like(&found, &sound));
+    let mut came = outcome(head, seed, found.is_none().then_some("Refuse"));
+    came.period = at;
+    came.undetectable = is_right && !blind;
+    Ok(came)
+}
+
+/// Within what running axes bear: 5 degrees of the rotor's electrical angle, 1 A of zeros, a fifth of the resistance.
+fn is_like(found: &Calibration, sound: &Calibration) -> bool {
+    let turns = (found.offset().turns() - sound.offset().turns()).rem_euclid(1.0);
+    let mut zeros = found.zeros().into_iter().zip(sound.zeros());
+    let resistance = found.resistance().0 / sound.resistance().0;
+    turns.min(1.0 - turns) < 5.0 / 360.0
+        && zeros.all(|(found, sound)| f64::from(found - sound).abs() * AMPERE_PER_CODE < 1.0)
+        && (0.8..1.25).contains(&resistance)
 }
