@@ -72,6 +72,7 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
     std::io::stdout().flush().map_err(refused)?;
     let mut start = Instant::now();
     let mut before_ns = 0;
+    let mut alarms = vec![None; options.legs];
     while !stop.load(Ordering::Relaxed) {
         server.poll(|frame| network.send(frame));
         let late = start
@@ -90,6 +91,13 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
             });
         }
         server.flush();
+        for (place, (board, told)) in network.boards().iter().zip(&mut alarms).enumerate() {
+            let alarm = board.rig.alarm();
+            if let Some(code) = alarm.filter(|_| alarm != *told) {
+                eprintln!("leg {}: {} ({:#06x}): {}", place + 1, code.name(), code.number(), code.words());
+            }
+            *told = alarm;
+        }
         if network.boards().iter_mut().fold(false, |kept, board| board.take_kept() | kept) {
             write(options.flash.as_deref(), &mut network)?;
         }
