@@ -307,7 +307,13 @@ impl CampaignReport {
         if let Some(hours) = &self.hours {
             text.push_str(&hours.lines());
         }
-        text.push_str(&format!("diagnostic coverage: {}\n", percent(self.diagnostic_coverage)));
+        // Pooled it is that of the row with the most runs.
+        let covered = self.rows.iter().filter_map(|row| Some((row.coverage.known()?, row.fault)));
+        let least = covered.min_by(|one, other| one.0.total_cmp(&other.0));
+        let least = least.map_or_else(String::new, |(share, row)| {
+            format!(", least of a row {} ({row})", percent(share.into()))
+        });
+        text.push_str(&format!("diagnostic coverage: {}{least}\n", percent(self.diagnostic_coverage)));
         text.push_str(&format!(
             "invariants broken: {}; undisturbed motion without an alarm: {:.0} s; trace hash {}\n",
             self.invariants_broken, self.undisturbed_s, self.trace_hash
