@@ -88,7 +88,21 @@ fn an_axis_that_lost_its_place_moves_again_only_after_a_calibration_and_a_refere
         hold(&mut rig, PRESSED, 0.3);
         assert!(!hold(&mut rig, OPEN, 2.0));
         assert!(hold(&mut rig, HELD, 0.4), "joint {joint}: {:?} {:?}", rig.alarm(), rig.state());
+        assert!(rig.is_switching(), "joint {joint}: enabled, and no axis runs");
     }
+}
+
+#[test]
+fn a_lost_place_ends_the_servo_in_the_tick_that_finds_it() {
+    let mut rig = ready();
+    assert!(hold(&mut rig, HELD, 0.4));
+    lose_counts(&mut rig, 1);
+    for _ in 0..4 {
+        rig.advance();
+        let found = rig.alarm() == Some(FaultCode::EncoderPlace);
+        assert_eq!(rig.state() == DriveState::NotReadyToSwitchOn, found);
+    }
+    assert!(rig.alarm().is_some() && rig.is_braking());
 }
 
 #[test]
