@@ -28,9 +28,11 @@ pub enum Source {
     Receive,
     /// The controller of the bus.
     Controller,
+    /// What is kept over the power.
+    Store,
 }
 
-const SOURCES: usize = 5;
+const SOURCES: usize = 6;
 
 impl Source {
     const fn place(self) -> usize {
@@ -40,6 +42,7 @@ impl Source {
             Self::Heartbeat(_) => 2,
             Self::Receive => 3,
             Self::Controller => 4,
+            Self::Store => 5,
         }
     }
 }

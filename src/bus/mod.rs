@@ -11,6 +11,7 @@
 //! | [`Node`] | network management, heartbeat, emergency, SYNC, SDO, PDO; what of its objects outlives the power |
 //! | [`identification`] | the leg's identification and its log, told by every node |
 //! | [`drive`] | CiA 402 for one joint, and how several joints share one leg's drive |
+//! | [`station`] | all of it for one board: nodes, axes, what is kept, who has the drive |
 //!
 //! No frame makes it panic, loop or allocate: every frame costs at most what is written at [`Node`].
 
@@ -29,6 +30,7 @@ mod node;
 mod objects;
 mod pdo;
 mod sdo;
+pub mod station;
 pub mod table;
 
 pub use abort::Abort;
@@ -37,7 +39,7 @@ pub use emergency::ErrorReport;
 pub use frame::{Frame, NodeId};
 pub use kept::{LONGEST, kept_bit_rate, kept_node_id};
 pub use nmt::NmtState;
-pub use node::{Controller, Node};
+pub use node::{Controller, Node, Storing};
 pub use objects::{Lost, Objects};
 
 #[cfg(test)]

@@ -36,6 +36,17 @@ pub enum Controller {
     Overrun,
 }
 
+/// What becomes of what is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Storing {
+    /// Nothing is being kept, and the last that was is.
+    Done,
+    /// The flash is about to be written: the node may be silent for seconds, heartbeats included.
+    Busy,
+    /// What was to be kept was not.
+    Failed,
+}
+
 /// A node of the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
@@ -135,6 +146,17 @@ impl Node {
             objects.lost(Lost::Bus(told == Controller::Off));
         }
         self.communication.emergency.set(Source::Controller, code.map(ErrorReport::code));
+    }
+
+    /// What the store tells: once on every change.
+    pub fn on_store(&mut self, storing: Storing) {
+        // FF01 is the maker's own; 5530 is data storage.
+        let code = match storing {
+            Storing::Done => None,
+            Storing::Busy => Some(0xFF01),
+            Storing::Failed => Some(0x5530),
+        };
+        self.communication.emergency.set(Source::Store, code.map(ErrorReport::code));
     }
 
     fn obey<O: Objects>(&mut self, command: Command, objects: &mut O) {

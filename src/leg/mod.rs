@@ -132,6 +132,11 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         self.commands = Some(*commands);
     }
 
+    /// No host commands any more, from the next tick on.
+    pub fn let_go(&mut self) {
+        self.commands = None;
+    }
+
     /// What a host is told of a joint, given what came of the last tick.
     #[must_use]
     pub fn joint_status(&self, joint: usize, output: &ControlOutput<N>) -> Option<JointStatus> {

@@ -76,6 +76,14 @@ pub enum PowerRequest {
     ResetFault,
 }
 
+impl PowerRequest {
+    /// A step towards enabled.
+    #[must_use]
+    pub const fn enables(self) -> bool {
+        matches!(self, Self::Shutdown | Self::SwitchOn | Self::EnableOperation)
+    }
+}
+
 /// What moves the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {

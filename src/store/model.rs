@@ -4,11 +4,16 @@
 //! model that looks odd a year later can be judged: which firmware, how often before, which random numbers, how warm, worn or
 //! not, with which lengths and torque constants, and how well each joint's torque was explained.
 
+use core::borrow::BorrowMut;
+
 use zerocopy::little_endian::{F32, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
 use super::record::{Kept, LONGEST, RecordError};
-use crate::leg::{Constant, Fingerprint, PARAMETERS_PER_JOINT, StoredModel, Stribeck};
+use crate::leg::{
+    Constant, Fingerprint, Identification, IdentifiedModel, LegConfiguration, MotionWindow,
+    PARAMETERS_PER_JOINT, StoredModel, Stribeck,
+};
 use crate::units::{Celsius, Metre, NewtonMetre, NewtonMetrePerAmpere};
 
 /// Where one joint's parameters come from.
@@ -48,6 +53,61 @@ pub struct KeptModel<const N: usize> {
     pub model: StoredModel<N>,
     /// To be told to whoever asks.
     pub provenance: Provenance<N>,
+}
+
+/// Of the firmware: major, minor, patch.
+const VERSION: [u8; 3] = {
+    let mut version = [0; 3];
+    let (text, mut place, mut part) = (env!("CARGO_PKG_VERSION").as_bytes(), 0, 0);
+    while place < text.len() && part < version.len() {
+        match text[place] {
+            digit @ b'0'..=b'9' => version[part] = 10 * version[part] + (digit - b'0'),
+            _ => part += 1,
+        }
+        place += 1;
+    }
+    version
+};
+
+impl<const N: usize> KeptModel<N> {
+    /// A model that was just accepted, with what its identification tells of it; generation and seed are its own.
+    pub fn of<const B: usize, const TAPS: usize, const PENDING: usize, W>(
+        configuration: &LegConfiguration<N, B>,
+        identification: &Identification<N, B, TAPS, PENDING, W>,
+        model: &IdentifiedModel<N>,
+        generation: u32,
+        swarm_seed: u64,
+    ) -> Self
+    where
+        W: BorrowMut<MotionWindow<f32, N, B>>,
+    {
+        let estimate = identification.estimate();
+        let fit = |joint: usize| identification.fit(estimate.as_ref()?, 1, joint);
+        let mut joints = configuration.joints.each_ref().map(|joint| JointProvenance {
+            length: Metre(0.0),
+            torque_per_ampere: joint.scale.torque_per_ampere,
+            rms: NewtonMetre(f32::NAN),
+            mean_absolute: NewtonMetre(f32::NAN),
+        });
+        for (joint, from) in joints.iter_mut().enumerate() {
+            from.length = Metre(configuration.model.chain.distance_to(joint).unwrap_or(0.0));
+            if let Some(fit) = fit(joint) {
+                from.rms = NewtonMetre(fit.rms_nm.unwrap_or(f32::NAN));
+                from.mean_absolute = NewtonMetre(fit.mean_absolute_nm);
+            }
+        }
+        Self {
+            model: configuration.keep(model),
+            provenance: Provenance {
+                firmware: VERSION,
+                generation,
+                swarm_seed,
+                bridge: None,
+                worn: None,
+                joints,
+            },
+        }
+    }
 }
 
 /// One joint in the flash; 81 bytes.

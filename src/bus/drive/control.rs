@@ -118,6 +118,8 @@ pub struct Axis {
     asked: u8,
     /// What the leg has to react to.
     fault: Option<FaultCode>,
+    /// A host has sent a controlword that says something.
+    pub(super) commanded: bool,
 }
 
 /// The fault of a lost host.
@@ -154,6 +156,7 @@ impl Axis {
             taken: false,
             asked: 0,
             fault: None,
+            commanded: false,
         }
     }
 
@@ -168,6 +171,12 @@ impl Axis {
         self.status.drive
     }
 
+    /// A host has sent a controlword other than 0 since the start, or since the node was reset.
+    #[must_use]
+    pub const fn is_commanded(&self) -> bool {
+        self.commanded
+    }
+
     /// This joint is enabled, and so is the leg.
     pub(super) fn is_powered(&self) -> bool {
         self.own == DriveState::OperationEnabled && self.status.drive == DriveState::OperationEnabled
@@ -177,6 +186,7 @@ impl Axis {
     pub(super) fn control(&mut self, word: u16) {
         let rising = word & !self.controlword;
         self.controlword = word;
+        self.commanded |= word != 0;
         if rising & RESET != 0 {
             self.resets = self.own.fault().is_some();
         }

@@ -29,6 +29,14 @@ pub struct Coupling {
 }
 
 impl Coupling {
+    /// No host has the leg: every joint stands where it stands, and nothing that was asked is asked later.
+    pub fn look_on<const N: usize>(&mut self, axes: [&mut Axis; N], drive: DriveState) {
+        self.before = level(drive);
+        for axis in axes {
+            (axis.own, axis.resets) = (drive, false);
+        }
+    }
+
     /// The request for the leg's next tick, given where its drive stands and whether it refused the last one. To be called
     /// after [`Axis::update`] of every joint.
     pub fn power<const N: usize>(

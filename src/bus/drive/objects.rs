@@ -156,5 +156,6 @@ impl Objects for Axis {
 
     fn reset(&mut self) {
         self.settings = Settings::NEW;
+        self.commanded = false;
     }
 }

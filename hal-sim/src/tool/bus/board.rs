@@ -1,16 +1,16 @@
-//! A leg on the bus: the whole firmware and plant behind two nodes, as a board will put them together.
+//! A leg on the bus: the whole firmware and plant behind two nodes, put together by the board's own `Station`.
 //!
 //! ```text
-//! each servo tick   leg --JointStatus--> axes,  axes --JointCommand, PowerRequest, faults--> leg,  six PWM periods
+//! each servo tick   leg --LegTold--> station,  station --LegOrder--> leg,  six PWM periods
 //! any time          frame -> nodes; nodes -> mailboxes of three frames, as the controller of the STM32 has them
 //! ```
 //!
 //! The enabling switch stays a contact in the operator's hand, on the bus as without it: here a simulated operator holds it from the
 //! start, and what the hand asks for by closing it is over before the nodes say that they are there.
 
-use scarab::bus::drive::{Axis, AxisConstants, Coupling, Mode};
-use scarab::bus::identification::{Ask, JointObjects, LegObjects};
-use scarab::bus::{Frame, Identity, LONGEST, NmtState, Node, NodeId, kept_node_id};
+use scarab::bus::drive::{AxisConstants, Mode};
+use scarab::bus::station::{Keeping, LegRequest, LegTold, Station};
+use scarab::bus::{Frame, Identity, Node, NodeId, Storing};
 use scarab::leg::{ControlRequest, Fault, JointStatus};
 use scarab::safety::PowerRequest;
 use scarab::servo::SERVO_RATE_HZ;
@@ -32,9 +32,6 @@ const MAILBOXES: usize = 3;
 /// A contact counts after 20 ms, and each of the three steps takes one of the operator's rounds.
 const CONTACT_TICKS: u32 = SERVO_RATE_HZ / 10;
 const HOLDS: Hand = Hand { enabling: true, start: false };
-/// Digital inputs beyond CiA 402's: the enabling switch is held; something forbids to enable.
-const ENABLING: u32 = 1 << 16;
-const BLOCKED: u32 = 1 << 17;
 
 /// Both contacts open, then the enabling switch held. What closing it asks for, once, is to enable the leg: it holds its pose for some
 /// milliseconds and is taken off again, so that from then on only the bus asks.
@@ -67,14 +64,8 @@ pub struct Board<const N: usize, const B: usize> {
     pub rig: Rig<N, B>,
     /// What of each node's waits for the wire.
     pub mailboxes: [Mailbox; N],
-    nodes: [Node; N],
-    axes: [Axis; N],
-    leg: LegObjects<N, LOG>,
-    coupling: Coupling,
-    refused: bool,
+    station: Station<N, LOG>,
     memory: Memory,
-    identity: Identity,
-    first: u8,
     context: Context<N, B>,
     has_kept: bool,
     /// The accepted model is in the memory.
@@ -92,31 +83,22 @@ impl<const N: usize, const B: usize> Board<N, B> {
     ) -> Result<Self, ToolError> {
         let mut rig = Rig::new(leg, &context, seed)?;
         hold_the_switch(&mut rig);
-        let joints = &context.configuration.joints;
+        let configuration = &context.configuration;
         let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
-        let axes = core::array::from_fn(|joint| {
-            Axis::new(AxisConstants {
-                rated_torque: joints[joint].limits().torque_cap(),
-                rated_current: joints[joint].current,
-                modes,
-            })
+        let constants = configuration.joints.each_ref().map(|joint| AxisConstants {
+            rated_torque: joint.limits().torque_cap(),
+            rated_current: joint.current,
+            modes,
         });
-        let identity = Identity::scarab(u32::from(first), "simulated");
-        let mut board = Self {
-            rig,
-            mailboxes: core::array::from_fn(|_| Mailbox::default()),
-            nodes: core::array::from_fn(|joint| Node::new(own_number(first, joint), identity)),
-            axes,
-            leg: LegObjects::new(context.configuration.plan, context.configuration.swarm_seed, 0),
-            coupling: Coupling::default(),
-            refused: false,
-            memory,
-            identity,
-            first,
-            context,
-            has_kept: false,
-            model_kept: false,
-        };
+        let station = Station::new(
+            core::array::from_fn(|joint| own_number(first, joint)),
+            Identity::scarab(u32::from(first), "simulated"),
+            constants,
+            configuration.plan,
+            configuration.swarm_seed,
+        );
+        let mailboxes = core::array::from_fn(|_| Mailbox::default());
+        let mut board = Self { rig, mailboxes, station, memory, context, has_kept: false, model_kept: false };
         board.recall();
         Ok(board)
     }
@@ -124,56 +106,31 @@ impl<const N: usize, const B: usize> Board<N, B> {
     /// What the memory holds, as after the start; what it holds of another leg, or damaged, is said and left.
     fn recall(&mut self) {
         match self.memory.model(&self.context.configuration) {
-            Ok(Some((model, generation))) if self.rig.leg.adopt(model) => self.leg.generation = generation,
+            Ok(Some((model, generation))) if self.rig.leg.adopt(model) => {
+                self.station.set_generation(generation);
+            }
             Ok(_) => {}
             Err(why) => eprintln!("warning: {why}"),
         }
-        (0..N).for_each(|joint| self.restart(joint));
-    }
-
-    /// A node begins anew, with what the memory holds of it.
-    fn restart(&mut self, joint: usize) {
-        let kept = self.memory.objects(joint);
-        let axis = &mut self.axes[joint];
-        let own = own_number(self.first, joint);
-        let number = kept.as_deref().and_then(kept_node_id).unwrap_or(own);
-        self.nodes[joint] = Node::new(number, self.identity);
-        if let Some(kept) = kept {
-            self.nodes[joint].recall(&kept, axis);
+        for joint in 0..N {
+            self.station.recall(joint, &self.memory.objects(joint).unwrap_or_default());
         }
     }
 
     /// A frame on the bus; the node that sent it does not hear it.
     pub fn hear(&mut self, frame: &Frame, now_ns: u64, sender: Option<usize>) {
-        for joint in (0..N).filter(|joint| Some(*joint) != sender) {
-            let mut objects = JointObjects {
-                axis: &mut self.axes[joint],
-                joint,
-                leg: &mut self.leg,
-                results: self.rig.leg.identification(),
-            };
-            self.nodes[joint].on_frame(frame, now_ns / 1000, &mut objects);
-            if self.nodes[joint].state() == NmtState::Initialising {
-                self.restart(joint);
-            }
-        }
-        if let Some(defaults) = self.leg.take_store() {
-            self.keep(defaults);
+        self.station.hear(frame, now_ns / 1000, sender, self.rig.leg.identification());
+        if let Some(keeping) = self.station.take_store() {
+            self.keep(keeping);
         }
     }
 
     /// What the nodes have to say goes to their mailboxes.
     pub fn speak(&mut self, now_ns: u64) {
-        for joint in 0..N {
-            while self.mailboxes[joint].len() < MAILBOXES {
-                let mut objects = JointObjects {
-                    axis: &mut self.axes[joint],
-                    joint,
-                    leg: &mut self.leg,
-                    results: self.rig.leg.identification(),
-                };
-                match self.nodes[joint].poll(now_ns / 1000, &mut objects) {
-                    Some(frame) => self.mailboxes[joint].push(frame, now_ns),
+        for (joint, mailbox) in self.mailboxes.iter_mut().enumerate() {
+            while mailbox.len() < MAILBOXES {
+                match self.station.poll(joint, now_ns / 1000, self.rig.leg.identification()) {
+                    Some(frame) => mailbox.push(frame, now_ns),
                     None => break,
                 }
             }
@@ -186,76 +143,76 @@ impl<const N: usize, const B: usize> Board<N, B> {
         for _ in 0..PERIODS_PER_TICK {
             self.rig.advance();
         }
-        if let Some(output) = &self.rig.output {
-            if let Some(logged) = &output.logged {
-                self.leg.log.push(logged);
-            }
-            let control = self.rig.leg.control();
-            self.leg.activity = control.activity();
-            self.leg.change = [control.change().is_some(), control.is_update_offered()];
+        if let Some(logged) = self.rig.output.as_ref().and_then(|output| output.logged) {
+            self.station.log(&logged);
         }
     }
 
     /// What crosses the seam, once per tick.
     fn exchange(&mut self) {
-        let drive = self.rig.state();
-        let inputs =
-            (u32::from(self.rig.hand.enabling) * ENABLING) | (u32::from(self.rig.causes() != 0) * BLOCKED);
-        for (joint, axis) in self.axes.iter_mut().enumerate() {
-            let status = self.rig.output.as_ref().and_then(|output| self.rig.leg.joint_status(joint, output));
-            axis.update(&JointStatus {
-                inputs,
-                ..status.unwrap_or(JointStatus { drive, ..JointStatus::NONE })
-            });
-            if let Some(code) = axis.take_fault() {
+        let (drive, control) = (self.rig.state(), self.rig.leg.control());
+        let output = self.rig.output.as_ref();
+        let status = |joint| output.and_then(|output| self.rig.leg.joint_status(joint, output));
+        self.station.told(&LegTold {
+            joints: core::array::from_fn(|joint| {
+                status(joint).unwrap_or(JointStatus { drive, ..JointStatus::NONE })
+            }),
+            activity: control.activity(),
+            change: [control.change().is_some(), control.is_update_offered()],
+            refused: output.is_some_and(|output| output.servo.decision.refused.is_some()),
+            held: self.rig.hand.enabling,
+            blocked: self.rig.causes() != 0,
+        });
+        let order = self.station.order();
+        for (joint, code) in order.faults.into_iter().enumerate() {
+            if let Some(code) = code {
                 self.rig.leg.report(Fault { code, joint: joint as u8 });
             }
         }
-        let refused = core::mem::take(&mut self.refused)
-            || self.rig.output.as_ref().is_some_and(|output| output.servo.decision.refused.is_some());
-        let power = self.coupling.power(self.axes.each_mut(), drive, refused);
-        let blocked = self.rig.causes() != 0;
-        match (power, self.leg.take_asked()) {
-            (Some(power), _) => {
-                use PowerRequest::{EnableOperation, Shutdown, SwitchOn};
-                self.refused = blocked && matches!(power, Shutdown | SwitchOn | EnableOperation);
-                self.rig.ask(ControlRequest::Power(power));
-            }
-            (None, Some(Ask::Identify)) => {
-                self.rig.leg.prepare(self.leg.plan, self.leg.seed);
+        match order.request {
+            Some(LegRequest::Power(power)) => self.rig.ask(ControlRequest::Power(power)),
+            Some(LegRequest::Identify { plan, seed }) => {
+                self.rig.leg.prepare(plan, seed);
                 self.model_kept = false;
                 self.rig.ask(ControlRequest::Identify);
             }
-            (None, Some(Ask::Cancel)) => self.rig.leg.cancel(),
-            (None, Some(Ask::TakeUpdate)) => self.rig.ask(ControlRequest::TakeUpdate),
-            (None, None) => {}
+            Some(LegRequest::Cancel) => self.rig.leg.cancel(),
+            Some(LegRequest::TakeUpdate) => self.rig.ask(ControlRequest::TakeUpdate),
+            None => {}
         }
-        self.rig.leg.command(&self.axes.each_ref().map(Axis::command));
+        match &order.commands {
+            Some(commands) => self.rig.leg.command(commands),
+            None => self.rig.leg.let_go(),
+        }
     }
 
     /// Keeps all objects and the accepted model, or forgets everything.
-    fn keep(&mut self, defaults: bool) {
+    fn keep(&mut self, keeping: Keeping) {
         let state = self.rig.state();
         self.has_kept = true;
-        if defaults {
-            self.memory.forget(state);
-            return;
-        }
-        for joint in 0..N {
-            let mut bytes = [0; LONGEST];
-            if let Ok(length) = self.nodes[joint].keep(&mut self.axes[joint], &mut bytes) {
-                self.memory.keep_objects(state, joint, &bytes[..length]);
+        let kept = match keeping {
+            Keeping::Defaults => self.memory.forget(state),
+            Keeping::All => {
+                (0..N).all(|joint| self.memory.keep_objects(state, joint, self.station.kept(joint)))
+                    && self.keep_model()
             }
-        }
-        let leg = &self.rig.leg;
+        };
+        self.station.storing(if kept { Storing::Done } else { Storing::Failed });
+    }
+
+    /// The accepted model, unless it was kept already; whether nothing went wrong.
+    fn keep_model(&mut self) -> bool {
+        let (state, leg) = (self.rig.state(), &self.rig.leg);
         let is_accepted = leg.control().verdict().is_some_and(|verdict| verdict.is_accepted());
-        let next = self.leg.generation + 1;
-        if is_accepted
-            && !self.model_kept
-            && self.memory.keep_model(state, &self.context.configuration, leg, next, self.leg.seed)
-        {
-            (self.leg.generation, self.model_kept) = (next, true);
+        if !is_accepted || self.model_kept {
+            return true;
         }
+        let (next, seed) = (self.station.generation() + 1, self.station.seed());
+        self.model_kept = self.memory.keep_model(state, &self.context.configuration, leg, next, seed);
+        if self.model_kept {
+            self.station.set_generation(next);
+        }
+        self.model_kept
     }
 
     /// Whether something was kept or forgotten since this was asked.
@@ -271,6 +228,6 @@ impl<const N: usize, const B: usize> Board<N, B> {
     /// Nodes as they are.
     #[must_use]
     pub fn nodes(&self) -> &[Node; N] {
-        &self.nodes
+        self.station.nodes()
     }
 }

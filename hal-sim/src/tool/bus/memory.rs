@@ -6,8 +6,7 @@
 use embassy_futures::block_on;
 use scarab::bus::LONGEST;
 use scarab::leg::{DriveState, IdentifiedModel, Leg, LegConfiguration};
-use scarab::store::{JointProvenance, KeptModel, Key, Permit, Provenance, Store};
-use scarab::units::{Metre, NewtonMetre};
+use scarab::store::{KeptModel, Key, Permit, Store};
 
 use crate::flash::Flash;
 use crate::tool::pair::{PENDING, TAPS};
@@ -17,20 +16,6 @@ const SECTOR: usize = 128 * 1024;
 const SECTORS: usize = 2;
 /// Bytes of a board's flash.
 pub const BYTES: usize = SECTOR * SECTORS;
-
-/// Of the firmware: major, minor, patch.
-const VERSION: [u8; 3] = {
-    let mut version = [0; 3];
-    let (text, mut place, mut part) = (env!("CARGO_PKG_VERSION").as_bytes(), 0, 0);
-    while place < text.len() && part < version.len() {
-        match text[place] {
-            digit @ b'0'..=b'9' => version[part] = 10 * version[part] + (digit - b'0'),
-            _ => part += 1,
-        }
-        place += 1;
-    }
-    version
-};
 
 type Cells = Flash<SECTOR, SECTORS>;
 
@@ -103,26 +88,7 @@ impl Memory {
         swarm_seed: u64,
     ) -> bool {
         let (Some(permit), Some(model)) = (Permit::of(state), leg.control().model()) else { return false };
-        let identification = leg.identification();
-        let estimate = identification.estimate();
-        let chain = &configuration.model.chain;
-        let fit = |joint: usize| identification.fit(estimate.as_ref()?, 1, joint);
-        let kept = KeptModel {
-            model: configuration.keep(model),
-            provenance: Provenance {
-                firmware: VERSION,
-                generation,
-                swarm_seed,
-                bridge: None,
-                worn: None,
-                joints: core::array::from_fn(|joint| JointProvenance {
-                    length: Metre(chain.distance_to(joint).unwrap_or(0.0)),
-                    torque_per_ampere: configuration.joints[joint].scale.torque_per_ampere,
-                    rms: NewtonMetre(fit(joint).and_then(|fit| fit.rms_nm).unwrap_or(f32::NAN)),
-                    mean_absolute: NewtonMetre(fit(joint).map_or(f32::NAN, |fit| fit.mean_absolute_nm)),
-                }),
-            },
-        };
+        let kept = KeptModel::of(configuration, leg.identification(), model, generation, swarm_seed);
         self.with(|store| block_on(store.save(&permit, Key::Model, &kept))).is_some_and(|saved| saved.is_ok())
     }
 

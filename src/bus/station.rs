@@ -1,0 +1,327 @@
+//! A board on the bus: the nodes and axes of one leg, what stands between them and the leg, and what a restart of a node brings back.
+//!
+//! Why here: a simulated leg behind a port and the board's task put the same parts together in the same order. That order is decided by
+//! values only, so it exists once; who calls has the frames, the clock, the leg and the flash.
+//!
+//! ```text
+//! a frame came            hear(frame, now, who sent it)        a node that was reset begins anew with what was kept of it
+//! a mailbox is free       poll(joint, now) -> frame            again until there is none
+//! the leg has ticked      told(LegTold), then order() -> LegOrder: commands, at most one request, faults of a lost host
+//! a host wrote 1010/1011  take_store() -> Keeping, then kept(joint) for the store; storing(..) tells the hosts meanwhile
+//! ```
+//!
+//! **Who has the drive.** Until a host has sent a controlword that says something, the leg is its operator's: nothing is commanded
+//! or asked, statuswords tell what the leg does. From then on it is the host's, until every node was reset and the drive is off. The enabling
+//! switch stays in the operator's hand: while it is open, or something blocks, no step towards enabled is passed on, and a host that
+//! asked is told as by a leg that refused.
+//!
+//! Cost: two polls of a node and one copy of the leg's values; docs/bus.md. Memory: docs/bus.md.
+
+use super::communication::Identity;
+use super::drive::{Axis, AxisConstants, Coupling};
+use super::frame::{Frame, NodeId};
+use super::identification::{Ask, JointObjects, LegObjects, Results};
+use super::kept::{LONGEST, kept_bit_rate, kept_node_id};
+use super::nmt::NmtState;
+use super::node::{Controller, Node, Storing};
+use crate::leg::{
+    Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, Permission, Plan, PowerRequest,
+};
+
+/// Digital inputs beyond CiA 402's: the enabling switch is held; something forbids to enable.
+const HELD: u32 = 1 << 16;
+const BLOCKED: u32 = 1 << 17;
+
+/// What a leg tells of one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LegTold<const N: usize> {
+    /// Of each joint; its inputs are set here.
+    pub joints: [JointStatus; N],
+    /// What the leg is doing.
+    pub activity: Activity,
+    /// The model no longer fits; an update is offered.
+    pub change: [bool; 2],
+    /// The last request for power was refused.
+    pub refused: bool,
+    /// The operator holds the enabling switch.
+    pub held: bool,
+    /// Something forbids to enable.
+    pub blocked: bool,
+}
+
+impl<const N: usize> LegTold<N> {
+    /// A leg that does not tick yet.
+    pub const NONE: Self = Self {
+        joints: [JointStatus::NONE; N],
+        activity: Activity::Idle,
+        change: [false; 2],
+        refused: false,
+        held: false,
+        blocked: true,
+    };
+}
+
+/// What a leg is asked for beside its joints' targets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LegRequest {
+    /// A step of the drive's power states.
+    Power(PowerRequest),
+    /// An identification.
+    Identify {
+        /// One-time or sequential.
+        plan: Plan,
+        /// Of the swarm's random numbers.
+        seed: u64,
+    },
+    /// Give the identification up.
+    Cancel,
+    /// Take the update that is offered into use.
+    TakeUpdate,
+}
+
+/// What a leg is to do from its next tick on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LegOrder<const N: usize> {
+    /// Of each joint; none while no host has the drive.
+    pub commands: Option<[JointCommand; N]>,
+    /// Once.
+    pub request: Option<LegRequest>,
+    /// What it has to react to, by joint: once.
+    pub faults: [Option<FaultCode>; N],
+}
+
+/// What a host wants kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keeping {
+    /// All objects, and the model where one was accepted since.
+    All,
+    /// Nothing: everything is to be forgotten.
+    Defaults,
+}
+
+/// What is kept of a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Kept {
+    bytes: [u8; LONGEST],
+    length: usize,
+}
+
+impl Kept {
+    const NOTHING: Self = Self { bytes: [0; LONGEST], length: 0 };
+
+    fn of(bytes: &[u8]) -> Self {
+        let mut kept = Self::NOTHING;
+        for (to, from) in kept.bytes.iter_mut().zip(bytes) {
+            *to = *from;
+            kept.length += 1;
+        }
+        kept
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
+}
+
+/// See the module; a log of `LOG` samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Station<const N: usize, const LOG: usize> {
+    nodes: [Node; N],
+    axes: [Axis; N],
+    leg: LegObjects<N, LOG>,
+    coupling: Coupling,
+    own: [NodeId; N],
+    identity: Identity,
+    kept: [Kept; N],
+    /// A host has the drive.
+    hosted: bool,
+    /// A request that could only be refused was not passed on.
+    refused: bool,
+    request: Option<LegRequest>,
+}
+
+impl<const N: usize, const LOG: usize> Station<N, LOG> {
+    /// Nodes with these numbers, of which nothing was kept, before their boot-up messages.
+    #[must_use]
+    pub fn new(
+        own: [NodeId; N],
+        identity: Identity,
+        constants: [AxisConstants; N],
+        plan: Plan,
+        seed: u64,
+    ) -> Self {
+        Self {
+            nodes: own.map(|number| Node::new(number, identity)),
+            axes: constants.map(Axis::new),
+            leg: LegObjects::new(plan, seed, 0),
+            coupling: Coupling::default(),
+            own,
+            identity,
+            kept: [Kept::NOTHING; N],
+            hosted: false,
+            refused: false,
+            request: None,
+        }
+    }
+
+    /// What a memory holds of a node, as after the start.
+    pub fn recall(&mut self, joint: usize, bytes: &[u8]) {
+        if let Some(kept) = self.kept.get_mut(joint) {
+            *kept = Kept::of(bytes);
+        }
+        self.restart(joint);
+    }
+
+    /// A node begins anew, with what was kept of it.
+    fn restart(&mut self, joint: usize) {
+        let (Some(node), Some(axis), Some(kept), Some(own)) =
+            (self.nodes.get_mut(joint), self.axes.get_mut(joint), self.kept.get(joint), self.own.get(joint))
+        else {
+            return;
+        };
+        *node = Node::new(kept_node_id(kept.bytes()).unwrap_or(*own), self.identity);
+        node.recall(kept.bytes(), axis);
+    }
+
+    /// A frame on the bus, for every node but the one that sent it.
+    pub fn hear<R: Results>(&mut self, frame: &Frame, now_us: u64, sender: Option<usize>, results: &R) {
+        for joint in (0..N).filter(|joint| Some(*joint) != sender) {
+            self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects));
+            if self.nodes.get(joint).is_some_and(|node| node.state() == NmtState::Initialising) {
+                self.restart(joint);
+            }
+        }
+    }
+
+    /// The next frame that a node has to send; again until there is none.
+    pub fn poll<R: Results>(&mut self, joint: usize, now_us: u64, results: &R) -> Option<Frame> {
+        self.with(joint, results, |node, objects| node.poll(now_us, objects))?
+    }
+
+    /// What the controller tells: once on every change.
+    pub fn on_controller<R: Results>(&mut self, told: Controller, results: &R) {
+        for joint in 0..N {
+            self.with(joint, results, |node, objects| node.on_controller(told, objects));
+        }
+    }
+
+    fn with<R: Results, T>(
+        &mut self,
+        joint: usize,
+        results: &R,
+        ask: impl FnOnce(&mut Node, &mut JointObjects<'_, R, N, LOG>) -> T,
+    ) -> Option<T> {
+        let (node, axis) = (self.nodes.get_mut(joint)?, self.axes.get_mut(joint)?);
+        Some(ask(node, &mut JointObjects { axis, joint, leg: &mut self.leg, results }))
+    }
+
+    /// What the leg tells of a tick.
+    pub fn told(&mut self, told: &LegTold<N>) {
+        let drive = told.joints.first().map_or(DriveState::NotReadyToSwitchOn, |joint| joint.drive);
+        let inputs = u32::from(told.held) * HELD | u32::from(told.blocked) * BLOCKED;
+        for (axis, status) in self.axes.iter_mut().zip(&told.joints) {
+            axis.update(&JointStatus { inputs, ..*status });
+        }
+        (self.leg.activity, self.leg.change) = (told.activity, told.change);
+        let commanded = self.axes.iter().any(Axis::is_commanded);
+        self.hosted = commanded || self.hosted && drive.permission() != Permission::Released;
+        let refused = core::mem::take(&mut self.refused) || told.refused;
+        let asked = self.leg.take_asked();
+        if !self.hosted {
+            self.coupling.look_on(self.axes.each_mut(), drive);
+        }
+        let power = self.coupling.power(self.axes.each_mut(), drive, refused).filter(|_| self.hosted);
+        self.request = match (power, asked) {
+            (Some(power), _) if power.enables() && (told.blocked || !told.held) => {
+                self.refused = true;
+                None
+            }
+            (Some(power), _) => Some(LegRequest::Power(power)),
+            (None, Some(Ask::Identify)) => {
+                Some(LegRequest::Identify { plan: self.leg.plan, seed: self.leg.seed })
+            }
+            (None, Some(Ask::Cancel)) => Some(LegRequest::Cancel),
+            (None, Some(Ask::TakeUpdate)) => Some(LegRequest::TakeUpdate),
+            (None, None) => None,
+        };
+    }
+
+    /// What the leg is to do now; targets that came since the leg was heard are in it.
+    pub fn order(&mut self) -> LegOrder<N> {
+        LegOrder {
+            commands: self.hosted.then(|| self.axes.each_ref().map(Axis::command)),
+            request: self.request.take(),
+            faults: self.axes.each_mut().map(Axis::take_fault),
+        }
+    }
+
+    /// A host has the drive: the operator's contacts only hold it off.
+    #[must_use]
+    pub const fn is_hosted(&self) -> bool {
+        self.hosted
+    }
+
+    /// A sample of the leg's log.
+    pub fn log(&mut self, logged: &LoggedSample<N>) {
+        self.leg.log.push(logged);
+    }
+
+    /// What a host wants kept, once; all of it is then ready in [`Self::kept`].
+    pub fn take_store(&mut self) -> Option<Keeping> {
+        let defaults = self.leg.take_store()?;
+        for ((node, axis), kept) in self.nodes.iter_mut().zip(&mut self.axes).zip(&mut self.kept) {
+            let before = *kept;
+            kept.length = 0;
+            if !defaults {
+                match node.keep(axis, &mut kept.bytes) {
+                    Ok(length) => kept.length = length,
+                    Err(_) => *kept = before,
+                }
+            }
+        }
+        Some(if defaults { Keeping::Defaults } else { Keeping::All })
+    }
+
+    /// What is to be kept of a node.
+    #[must_use]
+    pub fn kept(&self, joint: usize) -> &[u8] {
+        self.kept.get(joint).map_or(&[], Kept::bytes)
+    }
+
+    /// Where the store stands: hosts are told by an emergency message.
+    pub fn storing(&mut self, storing: Storing) {
+        self.nodes.iter_mut().for_each(|node| node.on_store(storing));
+    }
+
+    /// The bit rate that is kept, kbit/s.
+    #[must_use]
+    pub fn bit_rate(&self) -> Option<u16> {
+        self.kept.iter().find_map(|kept| kept_bit_rate(kept.bytes()))
+    }
+
+    /// Models accepted and kept on this board (2100:7).
+    #[must_use]
+    pub const fn generation(&self) -> u32 {
+        self.leg.generation
+    }
+
+    /// The same, after one was kept or recalled.
+    pub fn set_generation(&mut self, generation: u32) {
+        self.leg.generation = generation;
+    }
+
+    /// Of the next identification's random numbers (2100:5, 6).
+    #[must_use]
+    pub const fn seed(&self) -> u64 {
+        self.leg.seed
+    }
+
+    /// Nodes as they are.
+    #[must_use]
+    pub const fn nodes(&self) -> &[Node; N] {
+        &self.nodes
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,233 @@
+extern crate std;
+
+use std::vec::Vec;
+
+use super::super::tests::IDENTITY;
+use super::*;
+use crate::bus::drive::Mode;
+use crate::leg::{FoundBase, FoundFit, FoundParameter, Parameter, Verdict};
+use crate::units::{Ampere, NewtonMetre};
+
+/// Nothing was identified.
+struct Nothing;
+
+impl Results for Nothing {
+    fn parameter(&self, _: usize, _: Parameter) -> Option<FoundParameter> {
+        None
+    }
+    fn base_parameter(&self, _: usize) -> Option<FoundBase> {
+        None
+    }
+    fn fit(&self, _: usize, _: usize) -> Option<FoundFit> {
+        None
+    }
+    fn verdict(&self) -> Option<Verdict> {
+        None
+    }
+    fn search(&self) -> [u32; 2] {
+        [0; 2]
+    }
+}
+
+/// A leg that does what is ordered, and a host on the wire.
+struct Bench {
+    station: Station<2, 4>,
+    drive: DriveState,
+    held: bool,
+    blocked: bool,
+    now_us: u64,
+    orders: Vec<LegOrder<2>>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let constants = AxisConstants {
+            rated_torque: NewtonMetre(40.0),
+            rated_current: Ampere(20.0),
+            modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+        };
+        let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));
+        let station = Station::new(own, IDENTITY, [constants; 2], Plan::OneTime, 1);
+        let mut bench = Self {
+            station,
+            drive: DriveState::SwitchOnDisabled,
+            held: true,
+            blocked: false,
+            now_us: 0,
+            orders: Vec::new(),
+        };
+        assert_eq!(bench.run(4).len(), 2);
+        bench
+    }
+
+    /// Ticks of the leg; what the nodes had to say, heard by the other as on a wire.
+    fn run(&mut self, ticks: u32) -> Vec<Frame> {
+        let mut frames = Vec::new();
+        for _ in 0..ticks {
+            self.now_us += 250;
+            self.drive = self.drive.after(crate::leg::DriveEvent::Tick, 4);
+            let joint = JointStatus { drive: self.drive, ..JointStatus::NONE };
+            let (held, blocked) = (self.held, self.blocked);
+            self.station.told(&LegTold { joints: [joint; 2], held, blocked, ..LegTold::NONE });
+            let order = self.station.order();
+            if let Some(LegRequest::Power(power)) = order.request {
+                self.drive = self.drive.after(crate::leg::DriveEvent::Asked(power), 4);
+            }
+            self.orders.push(order);
+            for joint in 0..2 {
+                while let Some(frame) = self.station.poll(joint, self.now_us, &Nothing) {
+                    self.station.hear(&frame, self.now_us, Some(joint), &Nothing);
+                    frames.push(frame);
+                }
+            }
+        }
+        frames
+    }
+
+    fn send(&mut self, id: u16, data: &[u8]) -> Vec<Frame> {
+        self.station.hear(&Frame::new(id, data), self.now_us, None, &Nothing);
+        self.run(8)
+    }
+
+    fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) {
+        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+        let frames = self.send(0x600 + node, &[0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]);
+        let answer = frames.iter().find(|frame| frame.id() == 0x580 + node).expect("an answer");
+        assert_eq!(answer.data()[0], 0x60, "{index:x}");
+    }
+
+    fn read(&mut self, node: u16, index: u16) -> u32 {
+        let [low, high] = index.to_le_bytes();
+        let frames = self.send(0x600 + node, &[0x40, low, high, 0, 0, 0, 0, 0]);
+        let answer = frames.iter().find(|frame| frame.id() == 0x580 + node).expect("an answer");
+        u32::from_le_bytes(answer.data()[4..].try_into().expect("four bytes"))
+    }
+
+    fn enable(&mut self) {
+        for word in [6, 7, 15] {
+            self.write(1, 0x6040, 0, word, 2);
+            self.write(2, 0x6040, 0, word, 2);
+        }
+    }
+}
+
+#[test]
+fn a_leg_that_its_operator_enabled_is_left_alone_until_a_host_says_something() {
+    let mut bench = Bench::new();
+    bench.drive = DriveState::OperationEnabled;
+    bench.orders.clear();
+    // Started, configured, read, told to enable nothing: still the operator's.
+    bench.send(0, &[1, 0]);
+    bench.write(1, 0x6060, 0, 8, 1);
+    bench.write(1, 0x6040, 0, 0, 2);
+    assert_eq!(bench.read(2, 0x6041) & 0x6F, 0x27);
+    assert_eq!((bench.drive, bench.station.is_hosted()), (DriveState::OperationEnabled, false));
+    assert!(bench.orders.iter().all(|order| order.request.is_none() && order.commands.is_none()));
+    // A node that is stopped is none of the operator's business either.
+    bench.send(0, &[2, 0]);
+    assert_eq!(bench.drive, DriveState::OperationEnabled);
+    bench.write_after_start();
+    assert_eq!((bench.drive, bench.station.is_hosted()), (DriveState::ReadyToSwitchOn, true));
+    assert!(bench.orders.last().is_some_and(|order| order.commands.is_some()));
+}
+
+impl Bench {
+    fn write_after_start(&mut self) {
+        self.send(0, &[1, 0]);
+        self.write(1, 0x6040, 0, 6, 2);
+    }
+}
+
+#[test]
+fn a_host_that_resets_its_nodes_stops_the_leg_and_then_has_it_no_longer() {
+    let mut bench = Bench::new();
+    bench.enable();
+    assert_eq!(bench.drive, DriveState::OperationEnabled);
+    bench.orders.clear();
+    bench.send(0, &[129, 0]);
+    let stop = Some(LegRequest::Power(PowerRequest::QuickStop));
+    assert!(bench.orders.iter().any(|order| order.request == stop));
+    assert_eq!((bench.drive, bench.station.is_hosted()), (DriveState::SwitchOnDisabled, false));
+    // One node alone: the other's host still has it.
+    bench.enable();
+    bench.send(0, &[129, 1]);
+    assert_eq!((bench.drive, bench.station.is_hosted()), (DriveState::SwitchOnDisabled, true));
+}
+
+#[test]
+fn no_step_towards_enabled_is_passed_on_while_the_switch_is_open_or_something_blocks() {
+    for (held, blocked) in [(false, false), (true, true), (false, true)] {
+        let mut bench = Bench::new();
+        (bench.held, bench.blocked) = (held, blocked);
+        bench.orders.clear();
+        bench.enable();
+        assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
+        assert!(bench.orders.iter().all(|order| order.request.is_none()));
+        assert_eq!(bench.read(1, 0x6041) & 0x6F, 0x40, "the node is down with the leg");
+        assert_eq!(bench.read(1, 0x60FD), u32::from(held) * HELD | u32::from(blocked) * BLOCKED);
+        // What was asked before is not done once nothing speaks against it any more.
+        (bench.held, bench.blocked) = (true, false);
+        bench.run(40);
+        assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
+        bench.enable();
+        assert_eq!(bench.drive, DriveState::OperationEnabled);
+    }
+}
+
+#[test]
+fn what_is_kept_is_ready_for_the_store_and_comes_back_with_a_reset() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x6065, 0, 12_345, 4);
+    bench.write(2, 0x2002, 0, 500, 2);
+    bench.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
+    assert_eq!((bench.station.take_store(), bench.station.take_store()), (Some(Keeping::All), None));
+    assert_eq!(bench.station.bit_rate(), Some(500));
+    let kept: [Vec<u8>; 2] = [0, 1].map(|joint| bench.station.kept(joint).to_vec());
+    bench.write(1, 0x6065, 0, 1, 4);
+    bench.send(0, &[129, 0]);
+    assert_eq!(bench.read(1, 0x6065), 12_345);
+    // Another start, from what the store gave back.
+    let mut other = Bench::new();
+    for (joint, bytes) in kept.iter().enumerate() {
+        other.station.recall(joint, bytes);
+    }
+    other.run(4);
+    assert_eq!(
+        (other.read(1, 0x6065), other.read(2, 0x2002), other.station.bit_rate()),
+        (12_345, 500, Some(500))
+    );
+    other.write(2, 0x1011, 1, u32::from_le_bytes(*b"load"), 4);
+    assert_eq!(other.station.take_store(), Some(Keeping::Defaults));
+    other.send(0, &[129, 0]);
+    assert_eq!((other.read(1, 0x6065), other.station.bit_rate()), (87_266, None));
+}
+
+#[test]
+fn hosts_are_told_before_the_flash_is_written_and_how_it_ended() {
+    let mut bench = Bench::new();
+    let codes = |frames: Vec<Frame>| -> Vec<(u16, u16)> {
+        let emergencies = frames.iter().filter(|frame| frame.id() & 0x780 == 0x80);
+        emergencies
+            .map(|frame| (frame.id(), u16::from_le_bytes([frame.data()[0], frame.data()[1]])))
+            .collect()
+    };
+    for (storing, code) in [(Storing::Busy, 0xFF01), (Storing::Failed, 0x5530), (Storing::Done, 0)] {
+        bench.station.storing(storing);
+        bench.station.storing(storing);
+        assert_eq!(codes(bench.run(4)), [(0x81, code), (0x82, code)]);
+    }
+}
+
+#[test]
+fn a_target_that_came_since_the_leg_was_heard_is_in_the_next_order() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    bench.write(1, 0x6060, 0, 8, 1);
+    bench.enable();
+    bench.station.hear(&Frame::new(0x301, &500_000_i32.to_le_bytes()), bench.now_us, None, &Nothing);
+    let commands = bench.station.order().commands.expect("a host has the drive");
+    let crate::leg::Target::CyclicPosition { position, .. } = commands[0].target else {
+        panic!("{:?}", commands[0].target)
+    };
+    assert!((position.0 - 0.5).abs() < 1e-6);
+}
