@@ -18,7 +18,7 @@
 //! | `place` | large values built where they stay |
 //! | [`trace`] | what leaves the board: records, one line each |
 //! | [`store`] | what outlives the power: configuration, calibrations, the accepted model |
-//! | [`bus`] | a CANopen node per joint, without I/O; not in the flash image yet |
+//! | [`bus`] | a CANopen node per joint, and a board's station of them, without I/O |
 //! | [`board`], `task` | one board's registers and interrupts; what runs at which priority (microcontroller only) |
 #![no_std]
 

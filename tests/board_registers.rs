@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use scarab::board::odrive_v3_6::settings::pins::{GATES_OFF, PINS};
 use scarab::board::odrive_v3_6::settings::{
-    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, FAST_TIMER_HZ, SLOW_TIMER_HZ, Write, analog,
-    chopper, converters, encoders, external, gate_driver, timers,
+    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, FAST_TIMER_HZ, SLOW_TIMER_HZ, Write, analog, can,
+    chopper, converters, encoders, external, flash, gate_driver, timers,
 };
 
 /// Registers by address; what was never written is zero, as after a reset (but for the debug pins' modes).
@@ -303,4 +303,53 @@ fn clocks_and_caches_are_on_and_a_failed_crystal_is_noticed() {
     assert_eq!(registers.at(0x4002_3844), 1 | 1 << 1 | 0b111 << 8 | 1 << 14);
     // Watchdog and both bridges' timers stand while a debugger holds the processor.
     assert_eq!((registers.at(0xE004_2008), registers.at(0xE004_200C)), (1 << 12, 0b11));
+}
+
+const CAN1: u32 = 0x4000_6400;
+
+#[test]
+fn the_bus_runs_at_the_rate_that_is_kept_and_hears_every_frame_of_eleven_bits() {
+    for (kbit, bits_per_s) in [(125, 125e3), (250, 250e3), (500, 500e3), (1000, 1e6), (800, 1e6), (0, 1e6)] {
+        let mut registers = started();
+        registers.apply(&can::CLOCK);
+        can::PINS.iter().for_each(|pin| registers.apply(&pin.writes()));
+        registers.apply(&can::EDGES);
+        registers.apply(&can::BEGIN);
+        // Timing is taken while the controller asks to be set up, and then it no longer does.
+        assert_eq!(registers.bits(CAN1, 0, 2), 0b01);
+        registers.apply(&can::set_up(kbit));
+        registers.apply(&can::TAKE_PART);
+        assert_eq!(registers.bits(CAN1, 0, 2), 0);
+        assert_eq!(registers.bits(0x4002_3840, 25, 1), 1, "clocked");
+        let timing = CAN1 + 0x1C;
+        let [before, after] = [(16, 4), (20, 3)].map(|(low, count)| registers.bits(timing, low, count) + 1);
+        let quanta = f64::from(1 + before + after);
+        assert_eq!(42e6 / f64::from(registers.bits(timing, 0, 10) + 1) / quanta, bits_per_s);
+        // ODrive's 16 and 4, jump width 4.
+        assert_eq!((before, after, registers.bits(timing, 24, 2) + 1), (16, 4, 4));
+        assert_eq!(registers.bits(timing, 30, 2), 0, "neither loop back nor silent");
+        // Mailboxes in their order, back on the bus by itself, repeats.
+        assert_eq!(registers.bits(CAN1, 2, 5), 0b10011);
+        // Filter 0: one mask of 32 bits into the first queue, identifiers not looked at, IDE and RTR must be 0.
+        assert_eq!((registers.bits(CAN1 + 0x21C, 0, 28), registers.bits(CAN1 + 0x200, 0, 1)), (1, 0));
+        assert_eq!((registers.bits(CAN1 + 0x204, 0, 1), registers.bits(CAN1 + 0x20C, 0, 1)), (0, 1));
+        assert_eq!((registers.at(CAN1 + 0x240), registers.at(CAN1 + 0x244)), (0, 0b110));
+        // PB8 and PB9 are function 9, pulled up, driven with medium edges.
+        assert_eq!((registers.bits(0x4002_0424, 0, 8), registers.bits(0x4002_0400, 16, 4)), (0x99, 0b1010));
+        assert_eq!((registers.bits(0x4002_040C, 16, 4), registers.bits(0x4002_0408, 18, 2)), (0b0101, 0b01));
+    }
+}
+
+#[test]
+fn the_image_ends_before_the_two_sectors_that_keep_what_outlives_the_power() {
+    let layout = include_str!("../src/board/odrive_v3_6/layout.x");
+    let length = layout.split("FLASH : ORIGIN = 0x08000000, LENGTH = ").nth(1).expect("the flash");
+    let kilobytes: u32 = length.split('K').next().expect("kilobytes").parse().expect("a number");
+    assert_eq!(0x0800_0000 + 1024 * kilobytes, flash::FIRST);
+    // Four sectors of 16 KB, one of 64 KB, and the rest of 128 KB (RM0090 table 5).
+    for (place, number) in flash::NUMBERS.into_iter().enumerate() {
+        assert_eq!(0x0802_0000 + (number - 5) * flash::SECTOR, flash::FIRST + place as u32 * flash::SECTOR);
+        assert_eq!(flash::erase(number) >> 3 & 0xF, number);
+    }
+    assert_eq!(flash::FIRST + flash::BYTES, 0x0810_0000, "the end of the megabyte");
 }

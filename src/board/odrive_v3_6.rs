@@ -19,10 +19,12 @@ macro_rules! target_only {
 target_only! {
     pub mod brake;
     pub mod bridge;
+    pub mod can;
     pub mod contacts;
     pub mod converter;
     pub mod crash;
     pub mod encoder;
+    pub mod flash;
     pub mod gate_driver;
     pub mod identity;
     pub mod interrupts;

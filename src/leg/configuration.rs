@@ -108,7 +108,7 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
         )
     }
 
-    /// Shows that a motion stays within the limits: 132,000 instructions, outside the tick.
+    /// Shows that a motion stays within the limits: 206,000 instructions, outside the tick.
     ///
     /// # Errors
     /// [`LegError::Limit`] names the first joint and quantity that do not.

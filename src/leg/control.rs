@@ -137,16 +137,7 @@ impl<const N: usize> Control<N> {
         request: Option<ControlRequest<N>>,
         gravity: [f32; 3],
     ) -> ControlOutput<N> {
-        self.tick = self.tick.wrapping_add(1);
-        let refused = request.as_ref().is_some_and(|request| !self.may_begin(request, None));
-        let took_update = !refused && request == Some(ControlRequest::TakeUpdate);
-        let power = self.accept(request.filter(|_| !refused));
-        let motion = self.motion.state_at(self.motion_tick);
-        let mixed = self.models.advance();
-        let feedforward = self.models.faded(mixed.as_ref());
-        let feedforward = feedforward.as_ref();
-        let servo = self.servo.tick(sample, &ServoCommand { motion, feedforward, power }, gravity);
-        self.conclude(sample, servo, motion, [refused, took_update])
+        self.tick_with(sample, request, gravity, None)
     }
 
     /// One tick of a leg that a host commands, where there is one.
@@ -204,8 +195,8 @@ impl<const N: usize> Control<N> {
         for (joint, counts) in believed.joints.iter_mut().zip(servo.believed_counts) {
             joint.encoder_counts = counts;
         }
-        let logged = self.averager.push(self.tick, &believed, &self.servo.scales());
-        let logged = logged.map(|sample| {
+        let logged = self.averager.collect(&believed).then(|| {
+            let sample = self.averager.means(self.tick, &self.servo.scales());
             let segment = self.segment.filter(|segment| Some(*segment) == self.activity.segment());
             self.segment = self.activity.segment();
             LoggedSample { sample, segment }

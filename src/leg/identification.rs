@@ -140,6 +140,12 @@ where
         (self.plan, self.swarm_seed) = (plan, swarm_seed);
     }
 
+    /// Of the next search's random numbers.
+    #[must_use]
+    pub const fn swarm_seed(&self) -> u64 {
+        self.swarm_seed
+    }
+
     /// Takes a logged sample. The first one without a segment, or of another, ends the motion recorded so far.
     pub fn push(&mut self, logged: &LoggedSample<N>) {
         let recording = match self.work {

@@ -30,7 +30,7 @@ use nalgebra::Vector3;
 use super::chain::Chain;
 use super::friction::drive_columns;
 use super::inertia::InertialParameters;
-use super::kinematics::{JointAxis, LinkMotion, cross};
+use super::kinematics::{JointAxis, LinkMotion, cross, sum};
 use super::newton_euler::JointState;
 use super::parameter::{LegParameters, PARAMETERS_PER_JOINT, RegressorRow};
 use crate::real::Real;
@@ -69,7 +69,7 @@ fn inertial_columns<T: Real>(axis: &JointAxis<T>, motion: &LinkMotion<T>) -> Ine
     let (w, wd, a) = (motion.angular_velocity, motion.angular_acceleration, motion.acceleration);
     let (u, v) = (axis.angular, axis.linear);
     let k = cross(&u, &w);
-    let h = cross(&a, &u) + cross(&v, &wd) + cross(&w, &cross(&w, &v));
+    let h = sum(&sum(&cross(&a, &u), &cross(&v, &wd)), &cross(&w, &cross(&w, &v)));
     [
         u.x * wd.x + k.x * w.x,
         u.x * wd.y + u.y * wd.x + k.x * w.y + k.y * w.x,

@@ -10,7 +10,7 @@
 //! and with k^3, k^4 for the first and second derivative. M = 64 H makes the remainder at most
 //! 0.12 % of `sum_k k^n A_k`. A further term covers the rounding of the tick's single precision.
 //!
-//! Cost: 64 H evaluations of the curve, 132,000 instructions for two joints and six harmonics; once, when a
+//! Cost: 64 H evaluations of the curve, 206,000 instructions for two joints and six harmonics; once, when a
 //! motion is accepted.
 
 use super::Fourier;

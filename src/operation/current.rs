@@ -163,12 +163,19 @@ impl<const N: usize> CurrentLoops<N> {
     #[inline(always)]
     fn look_at_the_others(&self, axis: usize, now: u32, board: &mut impl CurrentBoard) {
         let late = LATE_PERIODS.wrapping_mul(self.period.get());
+        let stands = is_storing(board);
         for (other, that) in self.axes.iter().enumerate() {
-            if other != axis && that.last.is_some_and(|last| now.wrapping_sub(last) > late) {
+            if other != axis && !stands && that.last.is_some_and(|last| now.wrapping_sub(last) > late) {
                 board.raise(Cause::CurrentTicks.bit());
             }
         }
     }
+}
+
+/// The flash is being written: bridges are released, and ticks that do not come are nobody's fault.
+#[inline(always)]
+fn is_storing(board: &impl CurrentBoard) -> bool {
+    board.causes() & Cause::Storing.bit() != 0
 }
 
 impl AxisLoop {
@@ -177,7 +184,8 @@ impl AxisLoop {
     fn look(&mut self, tick: &Tick, period: NonZeroU32, board: &mut impl CurrentBoard) {
         // Half a period late is one missed; a gap of three periods two.
         let since = |last| tick.now.wrapping_sub(last).saturating_add(period.get() / 2) / period;
-        let missed = self.last.map_or(1, since).saturating_sub(1).min(255) as u8;
+        let missed =
+            self.last.filter(|_| !is_storing(board)).map_or(1, since).saturating_sub(1).min(255) as u8;
         self.last = Some(tick.now);
         if missed > 0 {
             board.count_missed();

@@ -55,11 +55,13 @@ pub enum Cause {
     BoardVersion,
     /// The constants of an axis or of the leg make no sense.
     Configuration,
+    /// The flash is being written, and everything may stand still meanwhile.
+    Storing,
 }
 
 impl Cause {
     /// All of them, in the order of their bits.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::EmergencyStop,
         Self::GateFault,
         Self::GateConfiguration,
@@ -75,16 +77,17 @@ impl Cause {
         Self::Timers,
         Self::BoardVersion,
         Self::Configuration,
+        Self::Storing,
     ];
 
-    /// The fault behind it; none of an axis, which tells its own.
+    /// The fault behind it; none of an axis, which tells its own, nor of what is no fault.
     #[must_use]
     pub const fn code(self) -> Option<FaultCode> {
         Some(match self {
             Self::EmergencyStop => FaultCode::EmergencyStop,
             Self::GateFault => FaultCode::GateFault,
             Self::GateConfiguration => FaultCode::GateConfiguration,
-            Self::Axis1 | Self::Axis2 => return None,
+            Self::Axis1 | Self::Axis2 | Self::Storing => return None,
             Self::EncoderFrozen => FaultCode::EncoderFrozen,
             Self::EncoderPlace => FaultCode::EncoderPlace,
             Self::CurrentTicks => FaultCode::CurrentTicks,
@@ -104,6 +107,7 @@ impl Cause {
         match (self, self.code()) {
             (Self::Axis1, _) => "axis_1",
             (Self::Axis2, _) => "axis_2",
+            (Self::Storing, _) => "storing",
             (_, Some(code)) => code.name(),
             (_, None) => "-",
         }

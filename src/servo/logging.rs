@@ -47,6 +47,11 @@ impl<const N: usize> LogAverager<N> {
 
     /// Takes one tick in; every eighth returns the means and starts over.
     pub fn push(&mut self, tick: u32, sample: &Sample<N>, scales: &[JointScale; N]) -> Option<LogSample<N>> {
+        self.collect(sample).then(|| self.means(tick, scales))
+    }
+
+    /// Takes one tick in; whether there are eight.
+    pub fn collect(&mut self, sample: &Sample<N>) -> bool {
         if self.collected == 0 {
             *self = Self { first: sample.joints.map(|joint| joint.encoder_counts), ..Self::EMPTY };
         }
@@ -57,20 +62,26 @@ impl<const N: usize> LogAverager<N> {
         }
         self.collected += 1;
         if self.collected < TICKS_PER_LOG {
-            return None;
+            return false;
         }
         self.collected = 0;
+        true
+    }
+
+    /// The means of eight ticks, the last of which is this one.
+    #[must_use]
+    pub fn means(&self, tick: u32, scales: &[JointScale; N]) -> LogSample<N> {
         const SHARE: f32 = 1.0 / TICKS_PER_LOG as f32;
         let mean_counts = |joint: usize| self.first[joint] as f32 + self.counts[joint] as f32 * SHARE;
         let eightfold = |joint: usize| self.first[joint].wrapping_mul(TICKS_PER_LOG as i32);
-        Some(LogSample {
+        LogSample {
             position_rad: core::array::from_fn(|joint| scales[joint].position(mean_counts(joint)).0),
             torque_nm: core::array::from_fn(|joint| {
                 scales[joint].torque(Ampere(self.current_a[joint] * SHARE)).0
             }),
             counts_sum: core::array::from_fn(|joint| eightfold(joint).wrapping_add(self.counts[joint])),
             tick,
-        })
+        }
     }
 }
 

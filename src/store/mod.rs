@@ -76,7 +76,13 @@ impl Permit {
     /// Of a drive in this state; none where a bridge may switch.
     #[must_use]
     pub fn of(state: DriveState) -> Option<Self> {
-        (state.permission() == Permission::Released).then_some(Self(()))
+        Self::under(state.permission())
+    }
+
+    /// Of a drive that has this permission.
+    #[must_use]
+    pub fn under(permission: Permission) -> Option<Self> {
+        (permission == Permission::Released).then_some(Self(()))
     }
 }
 

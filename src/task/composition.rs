@@ -4,20 +4,24 @@ use embassy_executor::Executor;
 use static_cell::StaticCell;
 
 use super::interlock::{self, Cause};
+use super::leg::JOINTS;
 use super::surroundings::{Introduction, Surroundings, crashed};
-use super::{current, housekeeping, identify, leg, links, servo};
-use crate::board::odrive_v3_6::identity::Reset;
+use super::{bus, current, host, housekeeping, identify, keep, leg, links, servo};
+use crate::board::odrive_v3_6::identity::{Identity, Reset};
 use crate::board::odrive_v3_6::settings::analog::temperature_c;
+use crate::board::odrive_v3_6::settings::can::USUAL_KBIT;
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
-use crate::board::odrive_v3_6::{brake, converter, memory, vectors, watchdog};
+use crate::board::odrive_v3_6::{brake, can, contacts, converter, memory, vectors, watchdog};
 use crate::board::stack;
-use crate::leg::Control;
+use crate::bus::drive::{AxisConstants, Mode};
+use crate::bus::{LONGEST, NodeId, Storing};
+use crate::leg::{Control, Following};
 use cortex_m::peripheral::DWT;
 
 /// Builds the leg, hands everything to its level and starts them; does not return.
 pub fn run(board: Board) -> ! {
-    let (thread, keeping) = hand_out(board);
+    let (thread, keeping, keeper) = hand_out(board);
     vectors::enable();
     watchdog::tighten();
     let housekeeping = vectors::HOUSEKEEPING.start(vectors::HOUSEKEEPING_VECTOR);
@@ -30,12 +34,17 @@ pub fn run(board: Board) -> ! {
         if let Some(Ok(task)) = thread.map(identify::run) {
             spawner.spawn(task);
         }
+        if let Some(Ok(task)) = keeper.map(keep::run) {
+            spawner.spawn(task);
+        }
     })
 }
 
 /// Everything in its place; apart from [`run`], whose frame stays on the stack for ever.
 #[inline(never)]
-fn hand_out(board: Board) -> (Option<identify::Thread>, housekeeping::Housekeeping) {
+fn hand_out(
+    board: Board,
+) -> (Option<identify::Thread>, housekeeping::Housekeeping, Option<&'static mut keep::Keeper>) {
     judge(&board);
     let divider = analog::divider(board.identity.version).unwrap_or(LARGEST_DIVIDER);
     let surroundings = Surroundings {
@@ -60,7 +69,11 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, housekeeping::Housekeepi
     static LOOPS: StaticCell<current::Current> = StaticCell::new();
     place(&current::LOOPS, LOOPS.init(loops));
 
-    let control = built.as_ref().and_then(|(configuration, _)| Control::new(configuration).ok());
+    let mut control = built.as_ref().and_then(|(configuration, _)| Control::new(configuration).ok());
+    let (link, results, keeper) = match (&built, &mut control) {
+        (Some((configuration, _)), Some(control)) => join(configuration, control, &board.identity),
+        _ => (None, None, None),
+    };
     match control {
         Some(control) => {
             static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
@@ -73,6 +86,7 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, housekeeping::Housekeepi
                 told.0,
                 divider,
                 surroundings.clock,
+                link,
             ));
             place(&servo::SERVO, servo);
         }
@@ -87,14 +101,76 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, housekeeping::Housekeepi
         drive: drive.1,
         notes: notes.0,
     };
-    let thread = built.map(|(_, identification)| identify::Thread {
+    let thread = built.map(|(configuration, identification)| identify::Thread {
         identification,
         told: told.1,
         findings: findings.0,
         notes: notes.1,
         surroundings,
+        bus: results.map(|results| (results, configuration)),
     });
-    (thread, keeping)
+    (thread, keeping, keeper)
+}
+
+/// The numbers of hip and knee, where nothing else is kept.
+const NODES: [NodeId; JOINTS] = match (NodeId::new(1), NodeId::new(2)) {
+    (Some(hip), Some(knee)) => [hip, knee],
+    _ => panic!("both are numbers of nodes"),
+};
+
+const WIRE: bus::Wire = bus::Wire {
+    now_us: || embassy_time::Instant::now().as_micros(),
+    has_room: can::has_room,
+    send: can::send,
+    give_up: can::give_up,
+    status: can::status,
+    held: contacts::enabling,
+};
+
+/// Ends of the bus: the servo's, the identification's, the keeper.
+type Joined = (Option<host::HostLink>, Option<bus::ThreadEnd>, Option<&'static mut keep::Keeper>);
+
+/// The bus, with what was kept before; the controller takes part from here on.
+#[inline(never)]
+fn join(configuration: &leg::Leg, control: &mut Control<JOINTS>, identity: &Identity) -> Joined {
+    let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
+    let constants = configuration.joints.each_ref().map(|joint| AxisConstants {
+        rated_torque: joint.limits().torque_cap(),
+        rated_current: joint.current,
+        modes,
+    });
+    let [low, middle, high] = identity.unique;
+    let told = crate::bus::Identity::scarab(low ^ middle ^ high, "ODrive v3.6");
+    let (plan, seed) = (configuration.plan, configuration.swarm_seed);
+    let station = memory::station(|| bus::BoardStation::new(NODES, told, constants, plan, seed));
+    let mut keeper = memory::keeper();
+    if let Some(keeper) = &mut keeper {
+        for joint in 0..JOINTS {
+            let mut bytes = [0; LONGEST];
+            match keeper.objects(joint, &mut bytes) {
+                Some(length) => station.recall(joint, bytes.get(..length).unwrap_or_default()),
+                // Hosts are told that what was kept is lost.
+                None => station.storing(Storing::Failed),
+            }
+        }
+        if let Some((model, generation)) = keeper.model(configuration)
+            && control.adopt(model)
+        {
+            station.set_generation(generation);
+        }
+    }
+    let answers = can::start(station.bit_rate().unwrap_or(USUAL_KBIT));
+    let (frames, servo, thread, end, bus) = memory::bus().split(station, WIRE);
+    if answers {
+        static BUS: StaticCell<bus::BusLoop> = StaticCell::new();
+        place(&bus::BUS, BUS.init(bus));
+        place(&bus::FRAMES_IN, frames);
+    }
+    if let Some(keeper) = &mut keeper {
+        keeper.serve(end);
+    }
+    let link = host::HostLink::new(servo, Following::new(configuration), can::pend);
+    (Some(link), Some(thread), keeper)
 }
 
 /// Of a board whose version is not known: no voltage is then taken for a smaller one, and nothing is enabled.

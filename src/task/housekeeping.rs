@@ -6,6 +6,7 @@
 use embassy_time::{Duration, Ticker};
 use heapless::spsc::{Consumer, Producer};
 
+use super::bus;
 use super::interlock::{self, Cause};
 use super::leg::JOINTS;
 use super::servo;
@@ -56,7 +57,8 @@ pub async fn watch() -> ! {
     let (mut guard, mut check_ins, mut looks) = (TickGuard::new(), CheckIns::new(seen()), 0_u32);
     loop {
         ticker.next().await;
-        if guard.look(ticks()) {
+        // While the flash is written they stand, with the bridges released.
+        if guard.look(ticks()) && !interlock::is_storing() {
             interlock::raise(Cause::CurrentTicks);
             bridge::release_all();
         }
@@ -157,7 +159,9 @@ impl HousekeepingBoard<JOINTS> for Housekeeping {
     }
 
     fn request(&mut self, request: ControlRequest<JOINTS>) -> bool {
-        self.requests.enqueue(request).is_ok()
+        // The host has the drive: the switch permits, and no longer asks.
+        let is_hosts = matches!(request, ControlRequest::Power(power) if power.enables()) && bus::is_hosted();
+        !is_hosts && self.requests.enqueue(request).is_ok()
     }
 
     fn drive_state(&mut self) -> Option<DriveState> {

@@ -11,12 +11,14 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_time::{Duration, Instant, Timer};
 use heapless::spsc::{Consumer, Producer};
 
-use super::leg::{BASE, JOINTS, LEG, LegIdentification};
+use super::bus::{SEARCH, ThreadEnd};
+use super::leg::{BASE, JOINTS, LEG, Leg, LegIdentification};
 use super::links::Told;
 use super::statistics;
 use super::surroundings::{Introduction, Surroundings};
 use crate::leg::{Activity, Finding, IdentifyPhase, LoggedSample, Reason, SearchState, Segment, Verdict};
 use crate::servo::{LOG_RATE_HZ, SERVO_RATE_HZ, TICKS_PER_LOG};
+use crate::store::KeptModel;
 use crate::trace::{GRAMMAR, Record, Report, judged, words};
 
 /// Evaluations of the search in one slice: some 0.25 ms.
@@ -47,6 +49,8 @@ pub struct Thread {
     pub notes: Consumer<'static, Record<JOINTS>>,
     /// The board.
     pub surroundings: Surroundings,
+    /// The bus, where there is one, and what the leg was built from.
+    pub bus: Option<(ThreadEnd, &'static Leg)>,
 }
 
 /// What changes.
@@ -56,6 +60,10 @@ struct State {
     last: Option<(u32, Segment)>,
     /// A sample was lost in this identification.
     gap: bool,
+    /// Of this identification's random numbers.
+    seed: u64,
+    /// The bus is to answer with what there is now, and this verdict.
+    publish: Option<Option<Verdict>>,
     report: Option<Report>,
     next_paced: Instant,
     next_progress: Instant,
@@ -90,6 +98,8 @@ pub async fn run(mut thread: Thread) -> ! {
         activity: Activity::Idle,
         last: None,
         gap: false,
+        seed: thread.identification.swarm_seed(),
+        publish: None,
         report: None,
         next_paced: now,
         next_progress: now,
@@ -98,6 +108,7 @@ pub async fn run(mut thread: Thread) -> ! {
     loop {
         let heard = thread.hear(&mut state);
         let working = thread.work(&mut state);
+        thread.publish(&mut state);
         thread.speak(&mut state);
         if heard || working {
             embassy_futures_yield().await;
@@ -131,9 +142,14 @@ impl Thread {
             heard = true;
             match told {
                 Told::Sample(logged) => self.take(&logged, state),
-                Told::Begun => {
+                Told::Begun(prepared) => {
                     self.identification.cancel();
+                    if let Some((plan, seed)) = prepared {
+                        self.identification.prepare(plan, seed);
+                        state.seed = seed;
+                    }
                     (state.gap, state.report) = (false, None);
+                    state.publish = Some(None);
                 }
                 Told::Activity(activity) => {
                     state.activity = activity;
@@ -186,16 +202,26 @@ impl Thread {
                 let verdict = Verdict::refused(Reason::Input);
                 tell(&Record::Refused { why: "samples_lost", value: statistics::SAMPLES_LOST.get() });
                 let _ = self.findings.enqueue(Finding::Judged { verdict, model: None });
+                state.publish = Some(Some(verdict));
             }
             return false;
         }
         let Some(finding) = self.identification.advance(EVALUATIONS) else {
-            let searching = self.identification.solver().map(|solver| solver.search().state());
-            return searching == Some(SearchState::Running);
+            let Some(solver) = self.identification.solver() else { return false };
+            let search = solver.search();
+            SEARCH[0].set(search.iterations());
+            SEARCH[1].set(search.evaluations());
+            return search.state() == SearchState::Running;
         };
         match &finding {
             Finding::Solved => {}
-            Finding::Judged { .. } => state.report = Some(Report::default()),
+            Finding::Judged { verdict, model } => {
+                state.report = Some(Report::default());
+                state.publish = Some(Some(*verdict));
+                if let (Some((bus, leg)), Some(model)) = (&mut self.bus, model) {
+                    bus.accept(KeptModel::of(leg, self.identification, model, 0, state.seed));
+                }
+            }
             Finding::Changed(change) => tell(&Record::Change {
                 since_s: change.since_s,
                 joints: change.joints,
@@ -211,6 +237,20 @@ impl Thread {
         // Control takes one in every tick.
         let _ = self.findings.enqueue(finding);
         true
+    }
+
+    /// Results as the bus answers with them.
+    #[inline(never)]
+    fn publish(&mut self, state: &mut State) {
+        let (Some(verdict), Some((bus, _))) = (state.publish, &mut self.bus) else { return };
+        let identification = &*self.identification;
+        let published = bus.publish(|found| match verdict {
+            None => found.forget(),
+            Some(_) => found.take(identification, verdict),
+        });
+        if published {
+            state.publish = None;
+        }
     }
 
     /// What can wait.

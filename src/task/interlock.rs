@@ -34,7 +34,18 @@ pub fn causes() -> u32 {
     CAUSES.load(Ordering::Relaxed)
 }
 
-/// The operator has reset: what does not hold for ever is forgotten.
+/// The operator has reset: what does not hold for ever, or until the flash is written, is forgotten.
 pub fn reset() {
-    CAUSES.fetch_and(Cause::for_ever(), Ordering::Relaxed);
+    CAUSES.fetch_and(Cause::for_ever() | Cause::Storing.bit(), Ordering::Relaxed);
+}
+
+/// The flash is being written: everything may stand still for seconds.
+#[inline(always)]
+pub fn is_storing() -> bool {
+    causes() & Cause::Storing.bit() != 0
+}
+
+/// It is written.
+pub fn stored() {
+    CAUSES.fetch_and(!Cause::Storing.bit(), Ordering::Relaxed);
 }

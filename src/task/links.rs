@@ -5,7 +5,7 @@ use static_cell::ConstStaticCell;
 
 use super::leg::JOINTS;
 use crate::hal::JointSample;
-use crate::leg::{Activity, ControlRequest, DriveState, Finding, LoggedSample};
+use crate::leg::{Activity, ControlRequest, DriveState, Finding, LoggedSample, Plan};
 use crate::operation::{Order, Outcome};
 use crate::trace::Record;
 
@@ -16,8 +16,8 @@ pub enum Told {
     Sample(LoggedSample<JOINTS>),
     /// The leg does something else now.
     Activity(Activity),
-    /// An identification begins.
-    Begun,
+    /// An identification begins: with this plan and these random numbers, where a host said so.
+    Begun(Option<(Plan, u64)>),
     /// The update offered is in use now.
     TookUpdate,
     /// To be passed on.

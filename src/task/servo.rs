@@ -7,13 +7,15 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use heapless::spsc::{Consumer, Producer};
 
+use super::host::HostLink;
 use super::leg::{JOINTS, LEG};
 use super::links::{EVENTS, TOLD, Told};
 use super::{interlock, statistics};
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::hal::{DriveCommand, JointSample, Sample};
 use crate::leg::{
-    Activity, Control, ControlOutput, ControlRequest, DriveState, Finding, LimitCodes, permitted,
+    Activity, Control, ControlOutput, ControlRequest, DriveState, Finding, LimitCodes, Permission, Plan,
+    permitted,
 };
 use crate::motor::AxisRequest;
 use crate::operation::{Gate, ServoRound};
@@ -55,6 +57,27 @@ pub fn target(axis: usize) -> AxisRequest {
         None | Some(RELEASED) => AxisRequest::RELEASED,
         Some(bits) => AxisRequest { enabled: true, current: Ampere(f32::from_bits(bits)) },
     }
+}
+
+/// What the drive may do since the last tick, as [`permission`] tells it.
+static PERMISSION: AtomicU32 = AtomicU32::new(0);
+
+/// What the drive may do; released before the servo ticks.
+pub fn permission() -> Permission {
+    match PERMISSION.load(Ordering::Relaxed) {
+        0 => Permission::Released,
+        1 => Permission::Follow,
+        _ => Permission::Damp,
+    }
+}
+
+fn permit(permission: Permission) {
+    let number = match permission {
+        Permission::Released => 0,
+        Permission::Follow => 1,
+        Permission::Damp => 2,
+    };
+    PERMISSION.store(number, Ordering::Relaxed);
 }
 
 /// From now on the joints' samples are theirs.
@@ -105,6 +128,10 @@ pub struct ServoLoop {
     volt_per_code: Volt,
     /// Processor cycles; wraps.
     clock: fn() -> u32,
+    /// The bus, where there is one.
+    link: Option<HostLink>,
+    /// With what a host's identification begins.
+    prepared: Option<(Plan, u64)>,
 }
 
 /// What level 1 works on, once it is there.
@@ -122,6 +149,7 @@ impl ServoLoop {
         told: Producer<'static, Told>,
         divider: f32,
         clock: fn() -> u32,
+        link: Option<HostLink>,
     ) -> Self {
         Self {
             round: ServoRound::new(control.checksum(), drives::derating(divider)),
@@ -137,6 +165,8 @@ impl ServoLoop {
             limits: Default::default(),
             volt_per_code: analog::sense(divider).volt_per_code,
             clock,
+            link,
+            prepared: None,
         }
     }
 
@@ -152,13 +182,20 @@ impl ServoLoop {
         match self.round.gate(has_begun()) {
             Gate::Closed => {
                 release();
+                permit(Permission::Released);
                 // What is asked meanwhile is asked of a leg that has no zeros.
                 let _ = self.requests.dequeue();
+                if let Some(link) = &mut self.link {
+                    link.rest();
+                }
                 return;
             }
             Gate::Anew => {
                 self.control.restart();
                 self.state = None;
+                if let Some(link) = &mut self.link {
+                    link.begin();
+                }
             }
             Gate::Open => {}
         }
@@ -166,12 +203,33 @@ impl ServoLoop {
             self.control.receive(finding);
         }
         self.look_around();
-        let request = self.requests.dequeue();
+        let request = self.next_request();
         let asked = permitted(request, interlock::is_clear(), self.control.state());
-        let output = self.control.tick(&Sample { joints: self.sample }, asked, LEG.gravity);
+        let sample = Sample { joints: self.sample };
+        let host = self.link.as_mut().and_then(HostLink::host);
+        let output = self.control.tick_with(&sample, asked, LEG.gravity, host);
         command(output.servo.drive());
+        permit(output.servo.decision.state.permission());
+        if let Some(link) = &mut self.link {
+            link.told(&self.control, &sample, &output);
+        }
         self.tell_limits(&output);
         self.tell(request.as_ref(), asked.as_ref(), &output);
+    }
+
+    /// The operator's hand before the host.
+    fn next_request(&mut self) -> Option<ControlRequest<JOINTS>> {
+        if let Some(link) = &mut self.link {
+            link.hear(&mut self.control);
+        }
+        let by_hand = self.requests.dequeue();
+        if by_hand.is_some() {
+            self.prepared = None;
+            return by_hand;
+        }
+        let (request, prepared) = self.link.as_mut()?.request()?;
+        self.prepared = prepared;
+        Some(request)
     }
 
     /// What the rest of the board saw: faults, bus voltage, temperature.
@@ -231,7 +289,7 @@ impl ServoLoop {
             }
         }
         if accepted && asked == Some(&ControlRequest::Identify) {
-            self.event(Told::Begun);
+            self.event(Told::Begun(self.prepared));
         }
         let decision = &output.servo.decision;
         let activity = self.control.activity();

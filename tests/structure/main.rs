@@ -30,8 +30,8 @@ const HOUSE: [(&str, &[&str]); 19] = [
     ("store", &["hal", "leg"]),
     ("bus", &["hal", "leg"]),
     ("operation", &["hal", "motor", "leg", "safety", "servo", "trace"]),
-    ("board", &["hal", "motor", "leg", "task"]),
-    ("task", &["hal", "motor", "leg", "operation", "safety", "servo", "trace", "board"]),
+    ("board", &["hal", "motor", "leg", "bus", "task"]),
+    ("task", &["hal", "motor", "leg", "operation", "safety", "servo", "trace", "store", "bus", "board"]),
 ];
 
 /// Rooms every other room may use.

@@ -3,7 +3,7 @@
 //! Switching off is one store for each bridge, needs nothing else to work, and may be done from anywhere, also from a fault
 //! handler. Switching on is the current loop's alone.
 
-use super::registers::store;
+use super::registers::{load, store};
 use super::settings::timers::{BASES, BDTR, CCR1, MOE, TOP, bridge, compare};
 use crate::hal::AxisCommand;
 
@@ -18,6 +18,11 @@ const NO_VOLTAGE: u32 = TOP as u32 / 2;
 pub fn release_all() {
     store(BASES[0] + BDTR, RELEASED);
     store(BASES[1] + BDTR, RELEASED);
+}
+
+/// Neither bridge lets anything through.
+pub fn are_released() -> bool {
+    BASES.iter().all(|base| load(base + BDTR) & MOE == 0)
 }
 
 /// What an axis' bridge does in the next period.

@@ -6,12 +6,16 @@
 //! | 1 | 0 | ADC, EXTI9_5, EXTI15_10 | current loops of both axes, index pulses; never masked |
 //! | 2 | 1 | OTG_HS | servo, pended by the current loop; never masked |
 //! | 3 | 3 | TIM5 | time of the executors |
+//! | 4 | 4 | CAN1_RX0 | frames out of the bus' controller |
+//! | 5 | 5 | CAN1_TX | the bus' nodes and axes, pended by the former and by the servo |
 //! | 6 | 6 | I2C3_EV | executor of the housekeeping; and every vector that is not named |
 //!
 //! Critical sections mask priority 3 and below. Reset leaves every vector at level 0, where it could run inside a critical
 //! section of the same data: so all are moved before anything is enabled.
 
-use embassy_stm32::interrupt::{ADC, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS, Priority, TIM5};
+use embassy_stm32::interrupt::{
+    ADC, CAN1_RX0, CAN1_TX, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS, Priority, TIM5,
+};
 
 use super::registers::store;
 
@@ -31,6 +35,8 @@ pub(super) fn set_levels() {
     }
     OTG_HS.set_priority(Priority::P2);
     TIM5.set_priority(Priority::P3);
+    CAN1_RX0.set_priority(Priority::P4);
+    CAN1_TX.set_priority(Priority::P5);
     I2C3_EV.set_priority(Priority::P6);
 }
 

@@ -5,6 +5,10 @@ use heapless::spsc::Queue;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::leg::Filters;
+use super::flash::Flash;
+use super::settings::flash::BYTES;
+use crate::task::bus;
+use crate::task::keep::Keeper;
 use crate::task::links::{TOLD as TOLD_LENGTH, Told};
 use crate::task::leg::{LEG, Leg, LegIdentification, LegWindow};
 
@@ -31,4 +35,29 @@ static TOLD: StaticCell<Queue<Told, TOLD_LENGTH>> = StaticCell::new();
 /// The queue from the servo to the identification, once.
 pub fn told() -> &'static mut Queue<Told, TOLD_LENGTH> {
     TOLD.init_with(Queue::new)
+}
+
+#[unsafe(link_section = ".ccm.station")]
+static STATION: StaticCell<bus::BoardStation> = StaticCell::new();
+
+/// The nodes and axes, once.
+#[inline(never)]
+pub fn station(build: impl FnOnce() -> bus::BoardStation) -> &'static mut bus::BoardStation {
+    STATION.init_with(build)
+}
+
+#[unsafe(link_section = ".ccm.bus")]
+static BUS: StaticCell<bus::Memory> = StaticCell::new();
+
+/// What passes between the bus and the others, once.
+#[inline(never)]
+pub fn bus() -> &'static mut bus::Memory {
+    BUS.init_with(bus::Memory::new)
+}
+
+/// Whoever keeps what outlives the power, once; `None` where the flash cannot.
+#[inline(never)]
+pub fn keeper() -> Option<&'static mut Keeper> {
+    static KEEPER: StaticCell<Keeper> = StaticCell::new();
+    Some(KEEPER.init(Keeper::new(Flash::new(), BYTES)?))
 }

@@ -12,7 +12,8 @@ pub(super) fn load(address: u32) -> u32 {
 
 /// Writes a register.
 pub(super) fn store(address: u32, value: u32) {
-    // SAFETY: as for `load`; none of these registers is the address of a variable, and none starts DMA.
+    // SAFETY: as for `load`; none of these registers is the address of a variable, and none starts DMA. The words of the flash that
+    // `flash` programs lie beyond the image.
     unsafe { core::ptr::write_volatile(address as *mut u32, value) }
 }
 
@@ -25,8 +26,15 @@ pub(super) fn apply(writes: &[Write]) {
     }
 }
 
-/// One byte of system memory.
+/// One byte of system memory or of the flash.
 pub(super) fn byte(address: u32) -> u8 {
-    // SAFETY: the callers read one-time programmable memory, which is there and readable.
+    // SAFETY: the callers read one-time programmable memory and the flash beyond the image, which are there and readable.
     unsafe { core::ptr::read_volatile(address as *const u8) }
+}
+
+/// Bytes of the flash.
+pub(super) fn copy(address: u32, into: &mut [u8]) {
+    for (place, byte) in into.iter_mut().enumerate() {
+        *byte = self::byte(address + place as u32);
+    }
 }

@@ -2,9 +2,11 @@
 #![expect(unsafe_code, reason = "to unmask a vector, and to tell an executor of its own interrupt")]
 
 use embassy_stm32::interrupt;
-use embassy_stm32::interrupt::{ADC, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS};
+use embassy_stm32::interrupt::{
+    ADC, CAN1_RX0, CAN1_TX, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS,
+};
 
-use super::{contacts, encoder};
+use super::{can, contacts, encoder};
 use crate::task;
 use crate::task::interlock::Cause;
 
@@ -13,7 +15,7 @@ pub fn enable() {
     // SAFETY: called once, from `main`, outside any critical section; levels are set, and the handlers' data is behind locks
     // that are only tried.
     unsafe {
-        for vector in [EXTI4, EXTI9_5, EXTI15_10, OTG_HS, ADC] {
+        for vector in [EXTI4, EXTI9_5, EXTI15_10, OTG_HS, CAN1_RX0, CAN1_TX, ADC] {
             vector.enable();
         }
     }
@@ -44,6 +46,24 @@ fn EXTI9_5() {
 #[interrupt]
 fn EXTI15_10() {
     encoder::index_came(1);
+}
+
+/// The controller keeps three frames; whatever comes meanwhile raises this again.
+#[interrupt]
+fn CAN1_RX0() {
+    for _ in 0..3 {
+        let Some(frame) = can::receive() else { break };
+        if !task::bus::received(frame) {
+            can::lose();
+        }
+    }
+    can::pend();
+}
+
+#[interrupt]
+fn CAN1_TX() {
+    can::acknowledge();
+    task::bus::interrupt();
 }
 
 /// The executor of the housekeeping.

@@ -24,10 +24,18 @@ pub fn tighten() {
     set(0, 127);
 }
 
+/// 8 s (5.4 to 15): as long as the flash may stand still. The bridges are released meanwhile.
+pub fn stretch() {
+    set(6, 1000);
+}
+
 fn set(prescaler: u32, reload: u32) {
-    store(KEY, UNLOCK);
-    store(PRESCALER, prescaler);
-    store(RELOAD, reload);
+    // Feeding in between, from a level above, would lock both again.
+    critical_section::with(|_| {
+        store(KEY, UNLOCK);
+        store(PRESCALER, prescaler);
+        store(RELOAD, reload);
+    });
     // Five of its cycles; a status that stays would be an oscillator that stands, which nothing here can mend.
     for _ in 0..100_000 {
         if load(STATUS) == 0 {

@@ -11,9 +11,11 @@
 //! What is asked here is asked of the leg at its next tick, as by the operator's contacts. Numbers are those of the trace;
 //! what is unknown is NaN, and everything is before the first identification.
 
+mod found;
 mod log;
 mod results;
 
+pub use found::Found;
 pub use log::Log;
 pub use results::Results;
 

@@ -100,6 +100,31 @@ fn numbers_are_the_identification_s_and_what_is_unknown_is_no_number() {
 }
 
 #[test]
+fn a_copy_answers_every_object_as_the_original_does() {
+    let mut found = Found::<2, 13>::NOTHING;
+    found.take(&ACCEPTED, ACCEPTED.0);
+    let mut forgotten = found.clone();
+    forgotten.forget();
+    assert_eq!(forgotten, Found::NOTHING);
+    let mut compared = 0;
+    for row in ROWS.iter().filter(|row| (0x2100..0x2140).contains(&row.index)) {
+        for object in (row.sub..row.sub + row.subs).map(|sub| Object::at(row.index, sub)) {
+            let mut axis = super::super::tests::axis();
+            let mut leg = leg();
+            let copy =
+                JointObjects { axis: &mut axis, joint: 1, leg: &mut leg, results: &found }.read(object);
+            assert_eq!(
+                copy,
+                with(&mut self::leg(), &ACCEPTED, |objects| objects.read(object)),
+                "{object:x?}"
+            );
+            compared += 1;
+        }
+    }
+    assert!(compared > 100, "{compared}");
+}
+
+#[test]
 fn commands_are_asked_once_and_what_an_identification_began_with_stays() {
     let mut leg = leg();
     let write = |leg: &mut LegObjects<2, 8>, sub, value| {

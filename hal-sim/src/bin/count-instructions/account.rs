@@ -8,7 +8,7 @@ use crate::counter::Tally;
 pub const PROCESSOR_HZ: f32 = 168e6;
 /// Of this processor with its flash accelerator; the board has to confirm it.
 pub const CYCLES_PER_INSTRUCTION: f32 = 1.34;
-const MOST_LINES: usize = 4;
+const MOST_LINES: usize = 6;
 
 #[derive(Clone, Copy)]
 struct Line {

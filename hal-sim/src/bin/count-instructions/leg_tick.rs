@@ -1,15 +1,19 @@
 //! The 4 kHz tick of a leg that follows a motion with its model in the feedforward: motion, model, observers, controllers,
-//! monitor, log.
+//! monitor, log; and of one that follows a host. One function does all of it, as in the image: the same code called from elsewhere as well
+//! would be compiled otherwise.
 
 use core::hint::black_box;
 
 use cortex_m_semihosting::hprintln;
 use scarab::hal::{JointSample, Sample};
-use scarab::leg::{Activity, Control, ControlOutput, ControlRequest, IdentifiedModel, Step};
-use scarab::motion::{Motion, MotionState, Periodic};
+use scarab::leg::{
+    Activity, Control, ControlOutput, ControlRequest, Following, Host, IdentifiedModel, JointCommand,
+    LegConfiguration, Step, Target,
+};
+use scarab::motion::{Motion, MotionState};
 use scarab::safety::PowerRequest;
-use scarab::servo::{JointConfiguration, NoModel, SERVO_RATE_HZ, Servo, ServoCommand};
-use scarab::units::Ampere;
+use scarab::servo::SERVO_RATE_HZ;
+use scarab::units::{Ampere, NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
 
 use crate::account::Account;
 use crate::counter::{Tally, count, heading};
@@ -17,6 +21,8 @@ use crate::leg::{self, GRAVITY, JOINTS, Model};
 
 /// Design: both joints, feedforward and monitor included.
 const MOST_INSTRUCTIONS: u32 = 4000;
+/// Of a tick that follows a host with the model in the feedforward: what it takes, above the design in its worst tick (docs/bus.md, Cost).
+const MOST_WITH_HOST_AND_MODEL: u32 = 4400;
 /// Ticks of the motion that are counted, after the way to its start: 2.5 s.
 const TICKS: u32 = 10_000;
 /// Longest way to the start.
@@ -34,13 +40,15 @@ fn follow(motion: &MotionState<JOINTS>, currents: [Ampere; JOINTS]) -> Sample<JO
     }
 }
 
+/// As the image has it: one function, with a host or without.
 #[inline(never)]
 fn tick(
     control: &mut Control<JOINTS>,
     sample: &Sample<JOINTS>,
     request: Option<ControlRequest<JOINTS>>,
+    host: Option<Host<'_, JOINTS>>,
 ) -> ControlOutput<JOINTS> {
-    control.tick(sample, request, GRAVITY)
+    control.tick_with(sample, request, GRAVITY, host)
 }
 
 /// Prints the table; whether the bound is kept. `None` where the leg cannot be built or does not follow.
@@ -62,11 +70,15 @@ pub fn report(model: &Model, account: &mut Account) -> Option<()> {
         Some(PowerRequest::EnableOperation),
     ];
     for power in way {
-        let _ = tick(&mut control, &sample, power.map(ControlRequest::Power));
+        let _ = tick(&mut control, &sample, power.map(ControlRequest::Power), None);
     }
     let adopted = control.adopt(identified);
-    let mut output =
-        tick(&mut control, &sample, Some(ControlRequest::Track { motion: proved.ok()?, with_model: true }));
+    let mut output = tick(
+        &mut control,
+        &sample,
+        Some(ControlRequest::Track { motion: proved.ok()?, with_model: true }),
+        None,
+    );
     if !adopted || output.refused {
         hprintln!("the leg does not track: {:?}, {:?}", control.state(), control.activity());
         return None;
@@ -75,7 +87,7 @@ pub fn report(model: &Model, account: &mut Account) -> Option<()> {
     for _ in 0..MOST_APPROACH_TICKS {
         let running = control.activity() == Activity::Track(Step::Run);
         sample = follow(&output.motion, output.servo.drive().currents);
-        let (instructions, next) = count(|| tick(black_box(&mut control), black_box(&sample), None));
+        let (instructions, next) = count(|| tick(black_box(&mut control), black_box(&sample), None, None));
         if running {
             run.push(instructions)
         } else {
@@ -93,40 +105,90 @@ pub fn report(model: &Model, account: &mut Account) -> Option<()> {
     approach.print("tick on the way to the start, model fading in");
     run.print("tick with motion, model, monitor and log");
     account.add("leg tick: motion, servo, monitor, log", run, MOST_INSTRUCTIONS, SERVO_RATE_HZ);
-    servo(&configuration.joints, &identified, periodic)?;
+    for feedforward in [false, true] {
+        follow_a_host(&configuration, identified, feedforward, account)?;
+    }
     hprintln!("{:<48} {:>8}", "once: proof of a motion's limits", proof);
     Some(())
 }
 
-/// The servo alone, and what it is given.
-fn servo(
-    joints: &[JointConfiguration; JOINTS],
-    identified: &IdentifiedModel<JOINTS>,
-    periodic: Periodic<JOINTS>,
+/// A host commands positions cyclically, another one every eighth tick.
+#[inline(never)]
+fn follow_a_host(
+    configuration: &LegConfiguration<JOINTS, { leg::BASE }>,
+    identified: IdentifiedModel<JOINTS>,
+    feedforward: bool,
+    account: &mut Account,
 ) -> Option<()> {
-    let (mut bare, mut modelled) = (Servo::new(*joints).ok()?, Servo::new(*joints).ok()?);
-    let (mut state, mut without, mut with) = (Tally::default(), Tally::default(), Tally::default());
-    for number in 0..2000 {
-        let (instructions, motion) = count(|| black_box(&periodic).state_at(black_box(number)));
-        state.push(instructions);
-        let sample = follow(&motion, [Ampere::ZERO; JOINTS]);
-        // The first ticks switch on.
-        let power = [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation]
-            .get((number as usize).wrapping_sub(1))
-            .copied();
-        let command = ServoCommand::<JOINTS, NoModel> { motion, feedforward: None, power };
-        let (instructions, output) =
-            count(|| black_box(&mut bare).tick(black_box(&sample), black_box(&command), GRAVITY));
-        black_box(output);
-        without.push(instructions);
-        let command = ServoCommand { motion, feedforward: Some(identified), power };
-        let (instructions, output) =
-            count(|| black_box(&mut modelled).tick(black_box(&sample), black_box(&command), GRAVITY));
-        black_box(output);
-        with.push(instructions);
+    let (mut control, mut following) = (Control::new(configuration).ok()?, Following::new(configuration));
+    let mut command = JointCommand {
+        target: Target::Hold,
+        asked: 0,
+        feedforward,
+        halt: false,
+        velocity: RadianPerSecond(0.5),
+        acceleration: RadianPerSecondSquared(2.0),
+        deceleration: RadianPerSecondSquared(2.0),
+        torque_slope_nm_per_s: 40.0,
+        range: [Radian(-10.0), Radian(10.0)],
+        largest_torque: NewtonMetre(1000.0),
+        following_window: Radian(0.09),
+        following_time: Second(0.01),
+        position_window: Radian(0.02),
+        position_time: Second(0.01),
+        period: Second(0.002),
+    };
+    if feedforward && !control.adopt(identified) {
+        return None;
     }
-    state.print("  of it: the commanded state, six harmonics");
-    without.print("  of it: servo and monitor, no model");
-    with.print("  of it: servo, monitor and model");
+    let start = MotionState::at_rest([0.5, -1.0]);
+    let mut sample = follow(&start, [Ampere::ZERO; JOINTS]);
+    let way = [
+        None,
+        Some(PowerRequest::Shutdown),
+        Some(PowerRequest::SwitchOn),
+        Some(PowerRequest::EnableOperation),
+    ];
+    let (mut tally, mut place) = (Tally::default(), [0.5, 1.0]);
+    for number in 0..TICKS {
+        if number > 100 && number % 8 == 0 {
+            // There and back within the range.
+            let step = if number / 1000 % 2 == 0 { 0.0005 } else { -0.0005 };
+            place = place.map(|place| place + step);
+            command.target = Target::CyclicPosition {
+                position: Radian::ZERO,
+                velocity_offset: RadianPerSecond::ZERO,
+                torque_offset: NewtonMetre::ZERO,
+            };
+        }
+        let commands = place.map(|place| JointCommand {
+            target: match command.target {
+                Target::CyclicPosition { velocity_offset, torque_offset, .. } => {
+                    Target::CyclicPosition { position: Radian(place), velocity_offset, torque_offset }
+                }
+                other => other,
+            },
+            ..command
+        });
+        let request = way.get(number as usize).copied().flatten().map(ControlRequest::Power);
+        let (instructions, output) = count(|| {
+            let host = Host { following: &mut following, commands: black_box(&commands), cancel: false };
+            tick(black_box(&mut control), black_box(&sample), request, Some(host))
+        });
+        sample = follow(&output.motion, output.servo.drive().currents);
+        if number > 200 {
+            tally.push(instructions);
+        }
+    }
+    if control.activity() != Activity::Follow {
+        hprintln!("the leg does not follow the host: {:?}", control.state());
+        return None;
+    }
+    let name =
+        if feedforward { "  instead: follows a host, with model" } else { "  instead: follows a host" };
+    tally.print(name);
+    // In the place of a motion's tick, not beside it: no share of its own.
+    let most = if feedforward { MOST_WITH_HOST_AND_MODEL } else { MOST_INSTRUCTIONS };
+    account.add(name, tally, most, 0);
     Some(())
 }

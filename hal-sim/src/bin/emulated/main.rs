@@ -129,6 +129,7 @@ fn hand_out(start: Start) -> identify::Thread {
         told.0,
         DIVIDER,
         SURROUNDINGS.clock,
+        None,
     ));
     // The ideal drives need no supply; the leg is shown one that neither derates nor dies.
     statistics::BUS[0].set((BUS_V / analog::sense(DIVIDER).volt_per_code.0) as u32);
@@ -145,6 +146,7 @@ fn hand_out(start: Start) -> identify::Thread {
         findings: findings.0,
         notes: notes.1,
         surroundings: SURROUNDINGS,
+        bus: None,
     }
 }
 

@@ -4,11 +4,13 @@
 //! from the result what the board does (frequency, phase, dead time, channels, pins) and prints the table.
 
 pub mod analog;
+pub mod can;
 pub mod chopper;
 pub mod converters;
 pub mod drives;
 pub mod encoders;
 pub mod external;
+pub mod flash;
 pub mod gate_driver;
 pub mod pins;
 pub mod timers;

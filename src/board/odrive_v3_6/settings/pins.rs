@@ -1,6 +1,6 @@
 //! What every used pin is. Source: `Board/v3/Inc/main.h:77-156`, `board.cpp:35-254`; registers RM0090 8.4.
 //!
-//! Left as reset has them, since nothing uses them yet: CAN (PB8, PB9), UART_A (PA0, PA1), USB (PA11, PA12), GPIO6 to 8 (PB2,
+//! The bus' pins: [`super::can`]. Left as reset has them, since nothing uses them yet: UART_A (PA0, PA1), USB (PA11, PA12), GPIO6 to 8 (PB2,
 //! PA15, PB3).
 
 use super::Write;

@@ -1,7 +1,7 @@
 //! The way back: what an operator has to do after a fault, and what nobody gets without it.
 
 use scarab::leg::DriveState;
-use scarab::safety::FaultCode;
+use scarab::safety::{Cause, FaultCode};
 
 use super::{Hand, PERIODS_PER_S, Rig};
 use crate::faults::{Channel, Form, Injection, Injector, Timing};
@@ -147,5 +147,22 @@ fn a_calibration_ends_with_the_switch_and_with_the_emergency_stop() {
         }
         assert!(!rig.is_switching(), "stop {stop}");
         assert!(!hold(&mut rig, HELD, 1.0) && !rig.is_switching());
+    }
+}
+
+#[test]
+fn ticks_that_do_not_come_while_the_flash_is_written_are_nobody_s_fault() {
+    for storing in [false, true] {
+        let mut rig = ready();
+        rig.ports.causes |= if storing { Cause::Storing.bit() } else { 0 };
+        for joint in 0..2 {
+            // 4 ms: the watchdog is stretched on the board and not here.
+            let timing = Timing::lasting(rig.period, 100);
+            rig.injector.add(Injection { channel: Channel::Tick, joint, form: Form::Off, timing });
+        }
+        assert!(!hold(&mut rig, HELD, 0.4) || !storing, "nothing is enabled meanwhile");
+        rig.ports.causes &= !Cause::Storing.bit();
+        assert_eq!(rig.causes() == 0, storing);
+        assert_eq!(hold(&mut rig, OPEN, 0.1) || hold(&mut rig, HELD, 0.4), storing);
     }
 }
