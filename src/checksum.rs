@@ -35,6 +35,12 @@ impl Checksum {
     pub fn numbers(self, numbers: impl IntoIterator<Item = f32>) -> Self {
         numbers.into_iter().fold(self, Self::number)
     }
+
+    /// The sum as it is kept.
+    #[must_use]
+    pub const fn value(self) -> u32 {
+        self.0
+    }
 }
 
 #[cfg(test)]

@@ -31,6 +31,8 @@ pub trait Real: RealField + Copy {
     /// The number without what follows the point; 0 where it is negative or none, the largest integer where it is larger.
     fn to_count(self) -> u32;
     #[doc(hidden)]
+    fn door_abs(self) -> Self;
+    #[doc(hidden)]
     fn door_sin_cos(self) -> (Self, Self);
     #[doc(hidden)]
     fn door_sqrt(self) -> Self;
@@ -93,10 +95,10 @@ pub fn atan2<T: Real>(y: T, x: T) -> T {
     y.door_atan2(x)
 }
 
-/// Magnitude.
+/// Magnitude; one instruction on the device.
 #[must_use]
 pub fn abs<T: Real>(value: T) -> T {
-    if value < T::zero() { -value } else { value }
+    value.door_abs()
 }
 
 /// The smaller of two numbers; the other one where one is not a number.
@@ -158,6 +160,9 @@ impl Real for f64 {
     fn to_count(self) -> u32 {
         self as u32
     }
+    fn door_abs(self) -> Self {
+        f64::abs(self)
+    }
     fn door_sin_cos(self) -> (Self, Self) {
         libm::sincos(self)
     }
@@ -187,6 +192,9 @@ impl Real for f32 {
     }
     fn to_count(self) -> u32 {
         self as u32
+    }
+    fn door_abs(self) -> Self {
+        f32::abs(self)
     }
     fn door_sin_cos(self) -> (Self, Self) {
         sin_cos_single(self)
@@ -248,6 +256,7 @@ fn sin_cos_single(angle: f32) -> (f32, f32) {
 
 /// Sine and cosine of an angle within pi/4 of zero.
 #[expect(clippy::excessive_precision, reason = "coefficients as published")]
+#[inline]
 fn eighth_of_a_turn(x: f32) -> (f32, f32) {
     let z = x * x;
     let sine = ((-1.951_529_589e-4 * z + 8.332_160_873e-3) * z - 1.666_665_461e-1) * z * x + x;

@@ -21,11 +21,17 @@ macro_rules! unit {
             /// Neither NaN nor infinite.
             #[must_use]
             pub const fn is_finite(self) -> bool { self.0.is_finite() }
-            /// Limited to `-bound..=bound`; zero where the value is not a number.
+            /// Limited to `-bound..=bound`; zero where the value or the bound is not a number.
             #[must_use]
             pub fn limited(self, bound: Self) -> Self {
-                if self.0.is_nan() { return Self::ZERO; }
-                Self(self.0.max(-bound.0).min(bound.0))
+                let raised = if self.0 < -bound.0 { -bound.0 } else { self.0 };
+                if raised > bound.0 {
+                    bound
+                } else if raised <= bound.0 {
+                    Self(raised)
+                } else {
+                    Self::ZERO
+                }
             }
         }
         impl Add for $name { type Output = Self; fn add(self, other: Self) -> Self { Self(self.0 + other.0) } }

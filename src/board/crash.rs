@@ -22,8 +22,10 @@ use core::ptr;
 
 use cortex_m::peripheral::SCB;
 use static_cell::StaticCell;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 use super::stack;
+use crate::checksum::Checksum;
 
 /// Active vector of the processor, and its fault status and address registers.
 const ACTIVE: *const u32 = 0xE000_ED04 as *const u32;
@@ -46,7 +48,7 @@ unsafe extern "C" {
 }
 
 /// What ended the image before this one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, Immutable)]
 #[repr(C)]
 pub struct Crash {
     magic: u32,
@@ -69,6 +71,9 @@ pub struct Crash {
     name: [u8; NAME],
     check: u32,
 }
+
+/// Words of a record; the last is its check.
+const WORDS: usize = size_of::<Crash>() / 4;
 
 /// Kinds of crashes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,14 +111,10 @@ impl Crash {
         Self { cause: cause as u32, released, ..Self::NONE }
     }
 
+    /// Of all words but the check.
     fn sum(&self) -> u32 {
-        let [place, about] = [
-            [self.magic, self.cause, self.pc, self.lr, self.status],
-            [self.address, self.line, self.released, self.kept, self.length],
-        ];
-        let names = self.name.iter().map(|&byte| u32::from(byte));
-        let words = place.into_iter().chain(about).chain(names);
-        words.fold(0x811C_9DC5, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193))
+        let words: [u32; WORDS] = zerocopy::transmute!(*self);
+        words.iter().take(WORDS - 1).fold(Checksum::EMPTY, |sum, &word| sum.word(word)).value()
     }
 
     /// The word in records.
@@ -144,12 +145,13 @@ static mut RECORD: core::mem::MaybeUninit<Crash> = core::mem::MaybeUninit::unini
 /// The record of the image before this one, once.
 pub fn take() -> Option<&'static Crash> {
     static FOUND: StaticCell<Crash> = StaticCell::new();
-    let place = (&raw mut RECORD).cast::<Crash>();
-    // SAFETY: the static is there, aligned, and every pattern of bits is a `Crash`; volatile, because what it holds was
+    let place = (&raw mut RECORD).cast::<u32>();
+    // SAFETY: the static is there, aligned, of so many words, and every pattern of bits is one; volatile, because what it holds was
     // written before this image began. Nobody else reaches it but a crash, which never returns.
-    let found = unsafe { ptr::read_volatile(place) };
-    // SAFETY: as above.
-    unsafe { ptr::write_volatile(place, Crash { magic: 0, ..Crash::NONE }) };
+    let words = core::array::from_fn::<u32, WORDS, _>(|word| unsafe { ptr::read_volatile(place.add(word)) });
+    // SAFETY: as above; the first word is the magic number.
+    unsafe { ptr::write_volatile(place, 0) };
+    let found: Crash = zerocopy::transmute!(words);
     let whole = found.magic == MAGIC && found.check == found.sum();
     whole.then(|| FOUND.try_init(found)).flatten().map(|found| &*found)
 }
@@ -157,8 +159,13 @@ pub fn take() -> Option<&'static Crash> {
 fn end(mut crash: Crash) -> ! {
     crash.kept = scarab_release();
     crash.check = crash.sum();
-    // SAFETY: the static is there and aligned; whoever else might be writing it was interrupted by this and never returns.
-    unsafe { ptr::write_volatile((&raw mut RECORD).cast::<Crash>(), crash) };
+    let words: [u32; WORDS] = zerocopy::transmute!(crash);
+    let place = (&raw mut RECORD).cast::<u32>();
+    for (place, word) in (0..WORDS).map(|word| place.wrapping_add(word)).zip(words) {
+        // SAFETY: the static is there, aligned, of so many words; whoever else might be writing it was interrupted by this and
+        // never returns.
+        unsafe { ptr::write_volatile(place, word) };
+    }
     SCB::sys_reset()
 }
 

@@ -130,6 +130,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
     }
 
     /// Each joint's frame seen from the one before it, at the angles `q` (rad).
+    #[inline]
     pub(super) fn frames(&self, q: &[T; N]) -> [JointFrame<T>; N] {
         core::array::from_fn(|joint| {
             let placement = self.placements[joint];

@@ -55,6 +55,7 @@ pub struct Stribeck<T> {
 impl<T: Real> Stribeck<T> {
     /// Factor on the Coulomb column at this speed (rad/s). NaN where `velocity` and `qd` are both 0.
     #[must_use]
+    #[inline]
     pub fn factor(&self, qd: T) -> T {
         if self.excess == T::zero() {
             return T::one(); // without the exponential

@@ -290,6 +290,7 @@ impl<const N: usize> Monitor<N> {
         })
     }
 
+    #[inline]
     fn in_range(&self, joint: usize, position: Radian) -> bool {
         let [low, high] = self.fault_range[joint];
         position >= low && position <= high

@@ -109,6 +109,7 @@ pub enum Permission {
 impl DriveState {
     /// What the drive may do.
     #[must_use]
+    #[inline]
     pub const fn permission(self) -> Permission {
         match self {
             Self::OperationEnabled => Permission::Follow,

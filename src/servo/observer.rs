@@ -71,6 +71,7 @@ impl Observer {
     }
 
     /// Runs one tick without a reading.
+    #[inline]
     pub fn coast(&mut self, acceleration: f32) {
         self.deviation += TICK_S * (self.velocity_per_s + 0.5 * TICK_S * acceleration);
         self.velocity_per_s += TICK_S * acceleration;

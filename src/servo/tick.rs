@@ -221,21 +221,22 @@ impl<const N: usize> Servo<N> {
     ) -> ServoOutput<N> {
         let motion = &command.motion;
         let rejected = self.observe(sample, motion);
-        let believed_counts = core::array::from_fn(|joint| {
+        // One loop, not a closure for each: a build that is to be small would call every one of them for every joint.
+        let mut believed_counts = [0; N];
+        let mut position = [Radian::ZERO; N];
+        let mut velocity = [RadianPerSecond::ZERO; N];
+        let mut tracking_error = [Radian::ZERO; N];
+        for joint in 0..N {
+            let (observer, scale) = (&self.observers[joint], &self.joints[joint].scale);
             let reading = sample.joints[joint].encoder_counts;
-            if rejected[joint] { self.observers[joint].nearest_counts() } else { reading }
-        });
-        let position: [Radian; N] = core::array::from_fn(|joint| {
-            self.joints[joint].scale.position(self.observers[joint].position_counts())
-        });
-        let velocity: [RadianPerSecond; N] = core::array::from_fn(|joint| {
-            let radian_per_count = self.joints[joint].scale.signed_radian_per_count();
-            RadianPerSecond(radian_per_count * self.observers[joint].velocity_counts_per_s())
-        });
+            believed_counts[joint] = if rejected[joint] { observer.nearest_counts() } else { reading };
+            position[joint] = scale.position(observer.position_counts());
+            velocity[joint] =
+                RadianPerSecond(scale.signed_radian_per_count() * observer.velocity_counts_per_s());
+            tracking_error[joint] = Radian(motion.position_rad[joint]) - position[joint];
+        }
 
         let feedforward = feedforward_nm(command.feedforward, motion, gravity);
-        let tracking_error: [Radian; N] =
-            core::array::from_fn(|joint| Radian(motion.position_rad[joint]) - position[joint]);
         let wanted_torque: [NewtonMetre; N] = core::array::from_fn(|joint| {
             let velocity_error = RadianPerSecond(motion.velocity_rad_per_s[joint]) - velocity[joint];
             let gains = &self.joints[joint].controller;
