@@ -7,7 +7,7 @@
 //! ```
 //!
 //! A reset takes 24 ms: gate drivers off and on again, configured anew, then faults are forgotten and what still holds comes back.
-//! Meanwhile nobody looks at their registers, and contacts do not count.
+//! Meanwhile nobody looks at their registers, and contacts do not count: afterwards both have to be open once.
 
 use super::contacts::{Ask, Operator, RATE_HZ, Situation};
 use super::stage::{Order, Outcome};
@@ -317,6 +317,8 @@ impl<const N: usize> Housekeeper<N> {
             return true;
         }
         let configured = board.configure_gates();
+        // A switch that was closed meanwhile is not one that is closed after the reset: both contacts have to be open once.
+        self.operator = Operator::default();
         board.reset_interlock();
         if !configured {
             board.raise(Cause::GateConfiguration);

@@ -71,6 +71,9 @@ pub struct Invariants<const N: usize> {
     /// The places are watched; periods for which a joint has been driven by a wrong one.
     watched: bool,
     astray: u64,
+    /// Where the joints were when they were enabled last, rad, and the way of a rotor's turn and a tenth.
+    enabled_at: [f64; N],
+    turn: [f64; N],
     broken: Vec<String>,
 }
 
@@ -93,6 +96,8 @@ impl<const N: usize> Invariants<N> {
             doubt: core::array::from_fn(|joint| doubt(&leg.joints[joint])),
             watched: false,
             astray: 0,
+            enabled_at: [0.0; N],
+            turn: core::array::from_fn(|joint| 1.1 * TAU / leg.joints[joint].encoder.ratio),
             broken: Vec::new(),
         }
     }
@@ -148,19 +153,23 @@ impl<const N: usize> Invariants<N> {
         }
     }
 
-    /// From now on: who switches knows where the rotors stand.
+    /// From now on: who switches knows where the rotors stand, once they have turned: counts that were lost at rest show themselves
+    /// at the index, a counter that stands still by the motor's voltage.
     pub fn knows_places(&mut self) {
         self.watched = self.scope.place;
     }
 
     fn places<const B: usize>(&mut self, rig: &Rig<N, B>) {
         let follows = rig.is_switching() && !rig.is_braking();
+        let position = rig.world.anatomical_position();
         if !self.watched || !follows || rig.is_restarted() {
-            self.astray = 0;
+            (self.astray, self.enabled_at) = (0, position);
             return;
         }
         let wrong = |joint: usize| {
-            (place(rig, joint, self.counts_per_rad[joint]) - self.places[joint]).abs() > self.doubt[joint]
+            let off = place(rig, joint, self.counts_per_rad[joint]) - self.places[joint];
+            off.abs() > self.doubt[joint]
+                && (position[joint] - self.enabled_at[joint]).abs() > self.turn[joint]
         };
         self.astray = if (0..N).any(wrong) { self.astray + 1 } else { 0 };
         if self.astray == ASTRAY {
