@@ -63,6 +63,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     pub(super) fn watch(&mut self) {
         if self.period.is_multiple_of(PERIODS_PER_GUARD)
             && self.watchdog.guard.look(self.ports.ticks)
+            && self.ports.causes & Cause::Storing.bit() == 0
             && !self.ports.is_blind(Some(FaultCode::CurrentTicks))
         {
             self.ports.causes |= Cause::CurrentTicks.bit();
