@@ -273,8 +273,8 @@ impl Node {
         None
     }
 
-    /// Whether somebody is missed.
-    fn look_around<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
+    /// Whether somebody is missed; [`Node::poll`] asks as well.
+    pub fn look_around<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
         for place in 0..self.communication.consumers.len() {
             let consumer = self.communication.consumers.get_mut(place);
             let change = consumer.and_then(|consumer| consumer.poll(now_us));

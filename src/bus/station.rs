@@ -198,6 +198,13 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         self.with(joint, results, |node, objects| node.poll(now_us, objects))?
     }
 
+    /// Whether a host is missed; however full the bus is.
+    pub fn watch<R: Results>(&mut self, now_us: u64, results: &R) {
+        for joint in 0..N {
+            self.with(joint, results, |node, objects| node.look_around(now_us, objects));
+        }
+    }
+
     /// What the controller tells: once on every change.
     pub fn on_controller<R: Results>(&mut self, told: Controller, results: &R) {
         for joint in 0..N {
@@ -237,6 +244,8 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
                 None
             }
             (Some(power), _) => Some(LegRequest::Power(power)),
+            // A leg that the operator moves is not a host's to move.
+            (None, Some(Ask::Identify | Ask::TakeUpdate)) if !self.hosted => None,
             (None, Some(Ask::Identify)) => {
                 Some(LegRequest::Identify { plan: self.leg.plan, seed: self.leg.seed })
             }
@@ -251,7 +260,8 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         LegOrder {
             commands: self.hosted.then(|| self.axes.each_ref().map(Axis::command)),
             request: self.request.take(),
-            faults: self.axes.each_mut().map(Axis::take_fault),
+            // A bus that is lost takes nothing from who does not use it.
+            faults: self.axes.each_mut().map(|axis| axis.take_fault().filter(|_| self.hosted)),
         }
     }
 

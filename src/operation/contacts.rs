@@ -112,6 +112,12 @@ pub struct Operator {
 }
 
 impl Operator {
+    /// The switch is held, was closed since it was seen open, and does not bounce.
+    #[must_use]
+    pub const fn holds(&self) -> bool {
+        self.trusted && self.enabling.closed
+    }
+
     /// One tick.
     pub fn tick(&mut self, now: &Situation) -> Option<Ask> {
         let before = (self.enabling.closed, self.start.closed);
@@ -123,7 +129,8 @@ impl Operator {
             let open = !now.enabling && !now.start;
             self.open = if open { self.open + 1 } else { 0 };
             self.trusted = self.open >= STEADY_TICKS;
-            return None;
+            // To stop is no matter of trust.
+            return if now.enabling { None } else { stop(now) };
         }
         if !self.enabling.closed {
             self.steps = 0;
@@ -137,6 +144,10 @@ impl Operator {
                 return Some(Ask::Calibrate);
             }
             _ => {}
+        }
+        if now.blocked {
+            // What forbids may go by itself: this closing has been answered all the same.
+            self.steps = u8::MAX;
         }
         if now.blocked || !now.calibrated || !now.referenced {
             return None;
@@ -159,13 +170,8 @@ impl Operator {
     }
 
     fn without_the_switch(&mut self, now: &Situation, before: (bool, bool)) -> Option<Ask> {
-        match now.drive {
-            _ if now.calibrating => return Some(Ask::EndCalibration),
-            Some(DriveState::OperationEnabled) => return Some(Ask::Power(PowerRequest::QuickStop)),
-            Some(DriveState::ReadyToSwitchOn | DriveState::SwitchedOn) => {
-                return Some(Ask::Power(PowerRequest::DisableVoltage));
-            }
-            _ => {}
+        if let Some(stop) = stop(now) {
+            return Some(stop);
         }
         if self.start.closed {
             self.pressed = self.pressed.saturating_add(1);
@@ -174,6 +180,18 @@ impl Operator {
         let short = before.1 && self.pressed > 0 && self.pressed < RESET_TICKS;
         self.pressed = 0;
         (short && now.calibrated && !now.referenced).then_some(Ask::Reference)
+    }
+}
+
+/// What an open switch asks for.
+fn stop(now: &Situation) -> Option<Ask> {
+    match now.drive {
+        _ if now.calibrating => Some(Ask::EndCalibration),
+        Some(DriveState::OperationEnabled) => Some(Ask::Power(PowerRequest::QuickStop)),
+        Some(DriveState::ReadyToSwitchOn | DriveState::SwitchedOn) => {
+            Some(Ask::Power(PowerRequest::DisableVoltage))
+        }
+        _ => None,
     }
 }
 

@@ -140,6 +140,12 @@ impl<const N: usize> Housekeeper<N> {
         self.advance_reference(board);
     }
 
+    /// The operator lets the leg be enabled by whoever commands it; never while a reset is under way.
+    #[must_use]
+    pub fn permits(&self) -> bool {
+        self.resetting.is_none() && self.operator.holds()
+    }
+
     fn situation(&self, board: &impl HousekeepingBoard<N>) -> Situation {
         let (enabling, start) = board.contacts();
         Situation {

@@ -235,6 +235,7 @@ impl BusLoop {
         while let Some(logged) = self.logged.dequeue() {
             self.station.log(&logged);
         }
+        self.station.watch(now_us, self.found);
         self.keep();
         if let Some(told) = self.told.dequeue() {
             self.station.told(&LegTold { held: (self.wire.held)(), ..told });

@@ -12,7 +12,7 @@ use crate::board::odrive_v3_6::settings::analog::temperature_c;
 use crate::board::odrive_v3_6::settings::can::USUAL_KBIT;
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
-use crate::board::odrive_v3_6::{brake, can, contacts, converter, memory, vectors, watchdog};
+use crate::board::odrive_v3_6::{brake, can, converter, memory, vectors, watchdog};
 use crate::board::stack;
 use crate::bus::drive::{AxisConstants, Mode};
 use crate::bus::{LONGEST, NodeId, Storing};
@@ -124,7 +124,7 @@ const WIRE: bus::Wire = bus::Wire {
     send: can::send,
     give_up: can::give_up,
     status: can::status,
-    held: contacts::enabling,
+    held: housekeeping::permits,
 };
 
 /// Ends of the bus: the servo's, the identification's, the keeper.
@@ -169,7 +169,7 @@ fn join(configuration: &leg::Leg, control: &mut Control<JOINTS>, identity: &Iden
     if let Some(keeper) = &mut keeper {
         keeper.serve(end);
     }
-    let link = host::HostLink::new(servo, Following::new(configuration), can::pend);
+    let link = host::HostLink::new(servo, Following::new(configuration), can::pend, housekeeping::permits);
     (Some(link), Some(thread), keeper)
 }
 

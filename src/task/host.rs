@@ -8,7 +8,8 @@ use super::leg::JOINTS;
 use crate::bus::station::{LegRequest, LegTold};
 use crate::hal::Sample;
 use crate::leg::{
-    Activity, Control, ControlOutput, ControlRequest, Fault, Following, Host, JointCommand, JointStatus, Plan,
+    Activity, Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand,
+    JointStatus, Plan, PowerRequest,
 };
 
 /// Ticks between two of which the bus is told: 2 kHz, twice the fastest cycle that fits the wire.
@@ -25,13 +26,25 @@ pub struct HostLink {
     tick: u32,
     /// Has the bus run.
     pend: fn(),
+    /// The operator lets the leg be enabled.
+    held: fn() -> bool,
 }
 
 impl HostLink {
     /// Nothing heard yet.
     #[must_use]
-    pub const fn new(end: ServoEnd, following: Following<JOINTS>, pend: fn()) -> Self {
-        Self { end, following, commands: None, request: None, cancel: false, refused: false, tick: 0, pend }
+    pub const fn new(end: ServoEnd, following: Following<JOINTS>, pend: fn(), held: fn() -> bool) -> Self {
+        Self {
+            end,
+            following,
+            commands: None,
+            request: None,
+            cancel: false,
+            refused: false,
+            tick: 0,
+            pend,
+            held,
+        }
     }
 
     /// The joints have other zeros than before.
@@ -63,6 +76,21 @@ impl HostLink {
                 Some(request) => self.request = Some(request),
                 None => {}
             }
+        }
+    }
+
+    /// What is asked while the operator's switch is open, whoever enabled the leg and whatever the housekeeping knows of it.
+    pub fn held(
+        &self,
+        request: Option<ControlRequest<JOINTS>>,
+        state: DriveState,
+    ) -> Option<ControlRequest<JOINTS>> {
+        if (self.held)() || state != DriveState::OperationEnabled {
+            return request;
+        }
+        match request {
+            Some(ControlRequest::Power(power)) if !power.enables() => request,
+            _ => Some(ControlRequest::Power(PowerRequest::QuickStop)),
         }
     }
 

@@ -3,6 +3,8 @@
 //! The watchdog is fed by a task of its own, which also sees current ticks that no longer come, and only if since the last time both axes' current loops, the servo and the
 //! housekeeping have run: one of them hanging is a reset, after which the drive stays refused.
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use embassy_time::{Duration, Ticker};
 use heapless::spsc::{Consumer, Producer};
 
@@ -23,6 +25,14 @@ use crate::trace::Record;
 
 /// Rounds of the housekeeping, for the watchdog.
 static ROUNDS: Count = Count::zero();
+
+/// The operator's hand, without bounce, and not while a reset is under way.
+static PERMITS: AtomicBool = AtomicBool::new(false);
+
+/// Whether whoever commands the leg may have it enabled; an open switch counts at once.
+pub fn permits() -> bool {
+    contacts::enabling() && PERMITS.load(Ordering::Relaxed)
+}
 
 /// What level 6 works on.
 pub struct Housekeeping {
@@ -57,10 +67,14 @@ pub async fn watch() -> ! {
     let (mut guard, mut check_ins, mut looks) = (TickGuard::new(), CheckIns::new(seen()), 0_u32);
     loop {
         ticker.next().await;
-        // While the flash is written they stand, with the bridges released.
-        if guard.look(ticks()) && !interlock::is_storing() {
-            interlock::raise(Cause::CurrentTicks);
+        // A look that came late is not made up for: two in a row would see the same count.
+        ticker.reset();
+        if guard.look(ticks()) {
             bridge::release_all();
+            // While the flash is written they stand.
+            if !interlock::is_storing() {
+                interlock::raise(Cause::CurrentTicks);
+            }
         }
         looks = (looks + 1) % LOOKS;
         if looks == 0 && check_ins.all(seen()) {
@@ -80,6 +94,7 @@ pub async fn run(mut keeping: Housekeeping) -> ! {
         ticker.next().await;
         ROUNDS.add();
         keeper.round(&mut keeping);
+        PERMITS.store(keeper.permits(), Ordering::Relaxed);
     }
 }
 

@@ -106,7 +106,8 @@ pub async fn run(keeper: &'static mut Keeper) -> ! {
         }
         let Some(keep) = end.keep.dequeue() else { continue };
         keep.done = false;
-        if Permit::under(servo::permission()).is_some() {
+        // Where motors brake themselves, or anything else forbids to enable, nothing is written: it would let them go.
+        if Permit::under(servo::permission()).is_some() && interlock::is_clear() {
             interlock::raise(Cause::Storing);
             Timer::after_millis(ANNOUNCED_MS).await;
             watchdog::stretch();

@@ -204,6 +204,10 @@ impl ServoLoop {
         }
         self.look_around();
         let request = self.next_request();
+        let request = match &self.link {
+            Some(link) => link.held(request, self.control.state()),
+            None => request,
+        };
         let asked = permitted(request, interlock::is_clear(), self.control.state());
         let sample = Sample { joints: self.sample };
         let host = self.link.as_mut().and_then(HostLink::host);
