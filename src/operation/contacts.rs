@@ -288,6 +288,27 @@ mod tests {
     }
 
     #[test]
+    fn who_is_not_trusted_yet_can_still_stop() {
+        let mut operator = Operator::default();
+        let enabled =
+            Situation { enabling: true, start: true, drive: Some(DriveState::OperationEnabled), ..READY };
+        assert_eq!(asked(&mut operator, enabled, RATE_HZ).count(), 0);
+        let stop = Some(Ask::Power(PowerRequest::QuickStop));
+        assert_eq!(operator.tick(&Situation { enabling: false, ..enabled }), stop);
+        assert!(!operator.holds());
+    }
+
+    #[test]
+    fn a_closing_while_something_forbids_enables_nothing_once_it_is_gone() {
+        let mut operator = trusted();
+        let held = Situation { enabling: true, ..READY };
+        assert_eq!(asked(&mut operator, Situation { blocked: true, ..held }, RATE_HZ).count(), 0);
+        assert_eq!(asked(&mut operator, held, RATE_HZ).count(), 0);
+        assert_eq!(asked(&mut operator, READY, STEADY_TICKS).count(), 0);
+        assert_eq!(asked(&mut operator, held, RATE_HZ).next(), Some(Ask::Power(PowerRequest::Shutdown)));
+    }
+
+    #[test]
     fn nothing_moves_that_is_blocked_uncalibrated_or_without_reference() {
         let held = Situation { enabling: true, ..READY };
         for now in [
