@@ -225,7 +225,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     /// What the leg tells of a tick.
     pub fn told(&mut self, told: &LegTold<N>) {
         let drive = told.joints.first().map_or(DriveState::NotReadyToSwitchOn, |joint| joint.drive);
-        let inputs = u32::from(told.held) * HELD | u32::from(told.blocked) * BLOCKED;
+        let inputs = (u32::from(told.held) * HELD) | (u32::from(told.blocked) * BLOCKED);
         for (axis, status) in self.axes.iter_mut().zip(&told.joints) {
             axis.update(&JointStatus { inputs, ..*status });
         }

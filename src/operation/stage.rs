@@ -6,7 +6,6 @@ use crate::motor::{Axis, AxisFault, AxisRequest, CalibrationStep, Calibrator, Wi
 use crate::safety::Bridges;
 
 /// What an axis is to do from its next tick on.
-#[expect(clippy::large_enum_variant, reason = "there is one of each axis, and no heap to box it on")]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Order {
     /// Bridge released.
@@ -39,7 +38,6 @@ pub enum Outcome {
     },
 }
 
-#[expect(clippy::large_enum_variant, reason = "there is one of each axis, and no heap to box it on")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Doing {
     Nothing,
