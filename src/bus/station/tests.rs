@@ -164,7 +164,7 @@ fn no_step_towards_enabled_is_passed_on_while_the_switch_is_open_or_something_bl
         assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
         assert!(bench.orders.iter().all(|order| order.request.is_none()));
         assert_eq!(bench.read(1, 0x6041) & 0x6F, 0x40, "the node is down with the leg");
-        assert_eq!(bench.read(1, 0x60FD), u32::from(held) * HELD | u32::from(blocked) * BLOCKED);
+        assert_eq!(bench.read(1, 0x60FD), (u32::from(held) * HELD) | (u32::from(blocked) * BLOCKED));
         // What was asked before is not done once nothing speaks against it any more.
         (bench.held, bench.blocked) = (true, false);
         bench.run(40);

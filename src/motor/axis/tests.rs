@@ -194,7 +194,8 @@ fn every_border_releases_and_stays_released_until_it_is_cleared() {
 
 #[test]
 fn who_is_about_to_switch_is_patient_with_no_bad_sample() {
-    let cases: [(fn(&mut AxisSample), AxisFault); 3] = [
+    type Spoil = fn(&mut AxisSample);
+    let cases: [(Spoil, AxisFault); 3] = [
         (|sample| sample.shunt_codes[0] = 0, AxisFault::CurrentSense),
         (|sample| sample.bus_code = 4095, AxisFault::BusVoltage),
         (|sample| sample.encoder_count ^= 0x4000, AxisFault::Encoder),
