@@ -51,8 +51,10 @@ fn an_emulated_hard_fault_in_the_servo_releases_the_bridges_first_and_tells_its_
 fn an_emulated_stack_overflow_faults_below_the_memory_and_releases_the_bridges_first() {
     let run = crashed("stack_overflow");
     // The stack ends where the memory begins: the word that did not fit is within one call of it.
-    let address = run.printed.split_once("called from emulated::rehearsal::fill_the_stack, address 0x");
-    let digits = address.and_then(|(_, rest)| rest.lines().next()).expect("its caller is told");
+    // Its caller may be a sequence that the compiler made a function of its own, so its name is not asked for.
+    let told = run.printed.split_once("stack_overflow").map_or("", |(_, rest)| rest);
+    let address = told.split_once("address 0x");
+    let digits = address.and_then(|(_, rest)| rest.lines().next()).expect("its address is told");
     let address = u32::from_str_radix(digits, 16).expect("a number");
     assert!((0x2000_0000 - 0x800..0x2000_0000).contains(&address), "{address:#x}");
 }
