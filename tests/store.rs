@@ -7,8 +7,8 @@ use scarab::leg::{
     StoredCalibration, StoredModel, Stribeck,
 };
 use scarab::store::{
-    JointProvenance, KeptCalibration, KeptModel, Key, LoadError, Permit, Provenance, RecordError, SaveError,
-    Saved, Store, UnfitRange,
+    JointProvenance, Keeper, KeptCalibration, KeptModel, Key, LoadError, Permit, Provenance, RecordError,
+    SaveError, Saved, Store, UnfitRange,
 };
 use scarab::units::{Celsius, Henry, Metre, NewtonMetre, NewtonMetrePerAmpere, Ohm};
 
@@ -327,4 +327,69 @@ fn ten_thousand_models_wear_a_sector_little() {
     );
     // 204 bytes a record with its log's: some 640 in a sector.
     assert!(flash.erasures().iter().all(|&erased| erased <= 15), "{:?}", flash.erasures());
+}
+
+fn keeper(flash: Small) -> Keeper<Small, 2> {
+    Keeper::new(store(flash))
+}
+
+/// What a keeper that has just started finds: calibrations, generation of the model, bytes of the first node.
+fn found(flash: Small) -> ([Option<StoredCalibration>; 2], Option<u32>, Vec<u8>, Small) {
+    let mut keeper = keeper(flash);
+    let calibrations = [0, 1].map(|axis| block_on(keeper.calibration(axis)));
+    let generation = block_on(keeper.model()).map(|kept| kept.provenance.generation);
+    let mut bytes = [0; 64];
+    let length = block_on(keeper.objects(0, &mut bytes)).expect("readable");
+    (calibrations, generation, bytes[..length].to_vec(), keeper.into_flash())
+}
+
+#[test]
+fn a_host_that_saves_keeps_objects_calibrations_and_the_model() {
+    let stored = [1, 2].map(|number| calibration(number).0);
+    let mut first = keeper(Small::new(1));
+    // One axis passed: its calibration waits for the other's.
+    first.calibrated(0, Some(stored[0]));
+    assert_eq!(block_on(first.keep(&permit(), [b"hip", b"knee"], 4)), Some(4));
+    let (calibrations, generation, objects, flash) = found(first.into_flash());
+    assert_eq!((calibrations, generation, &objects[..]), ([None; 2], None, &b"hip"[..]));
+
+    let mut second = keeper(flash);
+    stored.iter().enumerate().for_each(|(axis, stored)| second.calibrated(axis, Some(*stored)));
+    second.accept(model(9));
+    assert_eq!(block_on(second.keep(&permit(), [b"HIP", b"knee"], 4)), Some(5));
+    // Kept once.
+    assert_eq!(block_on(second.keep(&permit(), [b"HIP", b"knee"], 5)), Some(5));
+    let (calibrations, generation, objects, _) = found(second.into_flash());
+    assert_eq!((calibrations, generation, &objects[..]), (stored.map(Some), Some(5), &b"HIP"[..]));
+}
+
+#[test]
+fn what_was_found_before_a_host_forgot_everything_is_not_kept_by_the_next_save() {
+    let mut keeper = keeper(Small::new(1));
+    let find = |keeper: &mut Keeper<Small, 2>| {
+        (0..2).for_each(|axis| keeper.calibrated(axis, Some(calibration(axis as u32).0)));
+        keeper.accept(model(3));
+    };
+    find(&mut keeper);
+    assert_eq!(block_on(keeper.keep(&permit(), [b"hip", b"knee"], 0)), Some(1));
+    find(&mut keeper);
+    assert_eq!(block_on(keeper.forget(&permit())), Some(0));
+    assert_eq!(block_on(keeper.keep(&permit(), [b"new", b"new"], 0)), Some(0));
+    let (calibrations, generation, objects, _) = found(keeper.into_flash());
+    assert_eq!((calibrations, generation, &objects[..]), ([None; 2], None, &b"new"[..]));
+}
+
+#[test]
+fn a_flash_that_refuses_keeps_nothing_and_says_so() {
+    let mut flash = Small::new(1);
+    flash.fail_after(Some(0));
+    let mut keeper = keeper(flash);
+    keeper.accept(model(3));
+    assert_eq!(block_on(keeper.forget(&permit())), None);
+    assert_eq!(block_on(keeper.keep(&permit(), [b"hip", b"knee"], 7)), None);
+    let mut flash = keeper.into_flash();
+    flash.fail_after(None);
+    let mut keeper = self::keeper(flash);
+    keeper.accept(model(3));
+    assert_eq!(block_on(keeper.keep(&permit(), [b"hip", b"knee"], 7)), Some(8));
 }

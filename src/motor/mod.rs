@@ -52,4 +52,4 @@ pub use shunt_watch::ShuntWatch;
 pub use transmission::{Transmission, TransmissionConfiguration};
 
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;

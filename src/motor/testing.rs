@@ -8,7 +8,7 @@ use crate::hal::{AxisCommand, AxisSample};
 use crate::real::{sin_cos, sqrt};
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
 
-pub(super) const CONFIGURATION: AxisConfiguration = AxisConfiguration {
+pub(crate) const CONFIGURATION: AxisConfiguration = AxisConfiguration {
     sense: SenseScale::ODRIVE_3_6,
     timing: BridgeTiming::ODRIVE_3_6,
     dead_time: DeadTime::Compensated { band: Ampere(0.5) },
@@ -31,7 +31,7 @@ const SUBSTEPS: usize = 10;
 const STEP_S: f64 = 1.0 / 24_000.0 / SUBSTEPS as f64;
 
 #[derive(Clone, Debug)]
-pub(super) struct TestMotor {
+pub(crate) struct TestMotor {
     pub resistance: f64,
     pub inductance: [f64; 2],
     pub flux: f64,
@@ -102,7 +102,7 @@ impl Default for TestMotor {
 }
 
 impl TestMotor {
-    pub(super) fn electrical(&self) -> f64 {
+    pub(crate) fn electrical(&self) -> f64 {
         self.angle * self.pole_pairs
     }
 
@@ -130,7 +130,7 @@ impl TestMotor {
     }
 
     /// One PWM period: the command given acts in the next one.
-    pub(super) fn period(&mut self, command: AxisCommand) -> AxisSample {
+    pub(crate) fn period(&mut self, command: AxisCommand) -> AxisSample {
         let acting = core::mem::replace(&mut self.pending, command);
         for _ in 0..SUBSTEPS {
             self.substep(&acting);
@@ -138,7 +138,7 @@ impl TestMotor {
         self.sample()
     }
 
-    pub(super) fn sample(&mut self) -> AxisSample {
+    pub(crate) fn sample(&mut self) -> AxisSample {
         let [_, b, c] = self.phases();
         let seen = (self.shunts)([b, c]);
         let mut shunt_codes = [0; 2];

@@ -5,7 +5,9 @@
 //! or uses a critical section.
 //!
 //! A bridge switches only for an axis with a calibration (or one that is being calibrated), with a target of the servo, while
-//! the interlock is clear, and while the servo goes on answering. A target is followed only where all axes run; one that loses its place
+//! the interlock is clear, and while the servo goes on answering. While the flash is written ([`Cause::Storing`]) nothing switches, not even
+//! the brake resistor, and everything may stand still: what an erasure lasted through is not known any more, so the joints' zeros are
+//! forgotten and the servo ends; no axis holds it against its counter. A target is followed only where all axes run; one that loses its place
 //! ends the servo's ticks at once, whatever else is found and told.
 
 use core::num::NonZeroU32;
@@ -23,6 +25,10 @@ const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
 
 /// After so many periods without a tick an axis is seen to have stopped, by the ticks of the others.
 const LATE_PERIODS: u32 = 3;
+
+/// Periods without a tick after which nobody knows any more how far a joint went: a sector's erasure, and not the writing of a word
+/// (0.1 ms). In 2 ms no motor goes half of the counter's range.
+const CERTAIN_PERIODS: u32 = CURRENT_RATE_HZ / 500;
 
 /// What level 0 needs of a board. Every method answers at once.
 pub trait CurrentBoard {
@@ -120,14 +126,26 @@ impl<const N: usize> CurrentLoops<N> {
         if axis == 0
             && let Some(chopper) = &self.chopper
         {
-            let wanted = chopper.duty(self.volt_per_code * f32::from(tick.sample.bus_code));
+            // Nobody would take it back while the flash stands; it refuses as long as there is one.
+            let wanted = match is_storing(board) {
+                true => 0.0,
+                false => chopper.duty(self.volt_per_code * f32::from(tick.sample.bus_code)),
+            };
             board.set_brake(self.budget.spend(wanted));
         }
         self.look_at_the_others(axis, tick.now, board);
         let all_run = self.axes.iter().all(|axis| axis.stage.is_running());
         let period = self.period;
         let Some(this) = self.axes.get_mut(axis) else { return };
-        this.look(tick, period, board);
+        let mut sample = tick.sample;
+        if let Some(stood) = this.look(tick, period, board) {
+            // Its interrupt is late by as much, and so is the count it took.
+            sample.index_count = None;
+            let long = stood > CERTAIN_PERIODS;
+            if stood > 0 && this.stage.stood_still(&sample, long) && long {
+                forget(axis, Outcome::StoodStill, board);
+            }
+        }
         let bridges = Bridges::of(board.causes());
         if bridges == Bridges::Release {
             board.release_all();
@@ -139,7 +157,7 @@ impl<const N: usize> CurrentLoops<N> {
             }
         }
         let target = if all_run { board.target(axis) } else { AxisRequest::RELEASED };
-        let (mut command, told) = this.stage.tick(&tick.sample, bridges, target);
+        let (mut command, told) = this.stage.tick(&sample, bridges, target);
         if let Some((outcome, switching)) = told {
             command = found::<N>(axis, outcome, switching, command, board);
         }
@@ -179,13 +197,15 @@ fn is_storing(board: &impl CurrentBoard) -> bool {
 }
 
 impl AxisLoop {
-    /// What forbids to enable is looked at before anything else: contacts, conversion, the time since the last tick.
+    /// What forbids to enable is looked at before anything else: contacts, conversion, the time since the last tick. While the flash is
+    /// written a time without ticks is nobody's fault, nor are conversions that nobody fetched: so many periods it was.
     #[inline(always)]
-    fn look(&mut self, tick: &Tick, period: NonZeroU32, board: &mut impl CurrentBoard) {
+    fn look(&mut self, tick: &Tick, period: NonZeroU32, board: &mut impl CurrentBoard) -> Option<u32> {
         // Half a period late is one missed; a gap of three periods two.
         let since = |last| tick.now.wrapping_sub(last).saturating_add(period.get() / 2) / period;
-        let missed =
-            self.last.filter(|_| !is_storing(board)).map_or(1, since).saturating_sub(1).min(255) as u8;
+        let periods = self.last.map_or(1, since).saturating_sub(1);
+        let stood = is_storing(board).then_some(periods);
+        let missed = if stood.is_some() { 0 } else { periods.min(255) as u8 };
         self.last = Some(tick.now);
         if missed > 0 {
             board.count_missed();
@@ -193,7 +213,7 @@ impl AxisLoop {
         let state = TickState {
             emergency_stop: tick.emergency_stop,
             gate_fault: tick.gate_fault,
-            complete: tick.complete,
+            complete: tick.complete || stood.is_some(),
             missed,
         };
         let (forbids, damp) = self.watch.look(&state);
@@ -201,6 +221,7 @@ impl AxisLoop {
         if damp {
             board.damp();
         }
+        stood
     }
 }
 
@@ -234,8 +255,11 @@ fn found<const N: usize>(
 
 /// With the place goes what the joints' samples mean.
 fn forget(axis: usize, outcome: Outcome, board: &mut impl CurrentBoard) {
-    if matches!(outcome, Outcome::Fault { lost: true, .. }) {
+    if matches!(outcome, Outcome::Fault { lost: true, .. } | Outcome::StoodStill) {
         board.end_servo();
     }
     board.tell(axis, outcome);
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,80 +6,32 @@
 //!        +--------------------------+------------------------ a place or parameters lost ----------+
 //! ```
 //!
+//! An axis of which a calibration was kept is checked against it: everything is done again but the inductances, which are taken as kept, and
+//! the offset has to be the kept one's. One that does not agree is refused, told, and measured anew the next time.
+//!
 //! A reset takes 24 ms: gate drivers off and on again, configured anew, then faults are forgotten and what still holds comes back.
 //! Meanwhile nobody looks at their registers, and contacts do not count: afterwards both have to be open once.
 
 use super::contacts::{Ask, Operator, RATE_HZ, Situation};
 use super::stage::{Order, Outcome};
 use crate::hal::{AxisSample, JointSample};
-use crate::leg::{AxisFault, Calibration, ControlRequest, DriveState, PowerRequest};
+use crate::leg::{
+    AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, PowerRequest, StoredCalibration,
+};
 use crate::motor::reference::{ReferenceStep, StatedPose};
-use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator};
+use crate::motor::{Axis, Calibrator};
 use crate::real::max;
-use crate::safety::{Cause, FaultCode, UpkeepClock, of_gate_driver, of_temperature};
+use crate::safety::{Cause, UpkeepClock, of_gate_driver, of_temperature};
 use crate::trace::{Record, words};
 use crate::units::Hertz;
+
+mod board;
+
+pub use board::{HousekeepingBoard, HousekeepingSettings};
 
 /// Rounds of a reset for which the gate drivers are off, and until they can be configured: 2 and 22 ms.
 const GATES_ON: u8 = 1;
 const GATES_READY: u8 = 12;
-
-/// What level 6 needs of a board of `N` joints. Every method answers at once.
-pub trait HousekeepingBoard<const N: usize> {
-    /// The enabling switch is held; the start button is pressed.
-    fn contacts(&self) -> (bool, bool);
-    /// Why nothing may be enabled: the interlock's bits.
-    fn causes(&self) -> u32;
-    /// One more.
-    fn raise(&mut self, cause: Cause);
-    /// What does not hold for ever is forgotten.
-    fn reset_interlock(&mut self);
-    /// A gate driver holds its registers.
-    fn gate_holds(&mut self, axis: usize) -> bool;
-    /// What the gate drivers say is wrong.
-    fn gate_status(&mut self) -> u32;
-    /// The gate drivers' supply.
-    fn switch_gates(&mut self, on: bool);
-    /// Writes all registers; whether they hold.
-    fn configure_gates(&mut self) -> bool;
-    /// Of a bridge, degrees Celsius; none of a thermistor that is open or shorted.
-    fn temperature(&self, axis: usize) -> Option<f32>;
-    /// The servo gives less torque from 20 degrees below the hottest on.
-    fn set_temperature(&mut self, degrees_c: f32);
-    /// The servo reacts from its next tick on.
-    fn report(&mut self, code: FaultCode, axis: usize);
-    /// The counter of an axis as it is.
-    fn encoder_count(&self, axis: usize) -> u16;
-    /// Of a joint as the servo saw them last.
-    fn joint_counts(&self, joint: usize) -> i32;
-    /// The servo's ticks mean something from now on.
-    fn begin_servo(&mut self);
-    /// They do no more.
-    fn end_servo(&mut self);
-    /// Whether they do.
-    fn has_begun(&self) -> bool;
-    /// To an axis. It takes one within 42 us, and here are at most two in 2 ms.
-    fn order(&mut self, axis: usize, order: Order);
-    /// From an axis.
-    fn outcome(&mut self, axis: usize) -> Option<Outcome>;
-    /// To the servo; whether there was room.
-    fn request(&mut self, request: ControlRequest<N>) -> bool;
-    /// What the servo told since the last round, oldest first.
-    fn drive_state(&mut self) -> Option<DriveState>;
-    /// To whoever tells.
-    fn say(&mut self, record: Record<N>);
-}
-
-/// What it is built from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HousekeepingSettings<const N: usize> {
-    /// As commissioned.
-    pub axes: [AxisConfiguration; N],
-    /// What a calibration may do to a motor.
-    pub calibration: [CalibrationSettings; N],
-    /// A bridge that is not cooler is too hot, degrees Celsius.
-    pub hottest_c: f32,
-}
 
 /// What is known between two rounds.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,6 +40,8 @@ pub struct Housekeeper<const N: usize> {
     clock: UpkeepClock,
     operator: Operator,
     calibrated: [bool; N],
+    /// Kept from before: checked at the motor where it is calibrated, instead of measured anew.
+    stored: [Option<StoredCalibration>; N],
     /// The axis that is being calibrated.
     calibrating: Option<usize>,
     /// Joints that are waited for to stand still, and which of them have.
@@ -110,6 +64,7 @@ impl<const N: usize> Housekeeper<N> {
             clock: UpkeepClock::new(RATE_HZ),
             operator: Operator::default(),
             calibrated: [false; N],
+            stored: [None; N],
             calibrating: None,
             reference: None,
             placed: false,
@@ -124,6 +79,12 @@ impl<const N: usize> Housekeeper<N> {
     #[must_use]
     pub fn ready(settings: HousekeepingSettings<N>) -> Self {
         Self { calibrated: [true; N], ..Self::new(settings) }
+    }
+
+    /// With calibrations that were kept.
+    #[must_use]
+    pub fn with_stored(self, stored: [Option<StoredCalibration>; N]) -> Self {
+        Self { stored, ..self }
     }
 
     /// One round.
@@ -192,6 +153,9 @@ impl<const N: usize> Housekeeper<N> {
                 self.hear(axis, &outcome, board);
             }
         }
+        if board.take_forgotten() {
+            self.stored = [None; N];
+        }
         self.tell_causes(board);
     }
 
@@ -215,23 +179,33 @@ impl<const N: usize> Housekeeper<N> {
         match outcome {
             Outcome::Calibrated(calibration) => {
                 board.say(found(joint, calibration));
+                board.calibrated(axis, calibration);
                 self.run_axis(axis, calibration, board);
             }
             Outcome::Refused(refusal) => {
                 let (result, number) = words::calibration(*refusal);
                 board.say(refused(joint, result, number));
                 self.calibrating = None;
+                // Not the motor that was kept, or not as it was mounted then: once that was told, the next one is measured anew.
+                if let (CalibrationRefusal::OtherMotor | CalibrationRefusal::StoredOffset, Some(stored)) =
+                    (refusal, self.stored.get_mut(axis))
+                {
+                    *stored = None;
+                }
             }
             Outcome::Interrupted => {
                 board.say(refused(joint, "interrupted", 0));
                 self.calibrating = None;
             }
+            // The axis runs on, without a zero.
+            Outcome::StoodStill => {
+                board.say(Record::AxisFault { tick: self.round, joint, name: "zero_forgotten" });
+                self.forget_zeros(board);
+            }
             Outcome::Fault { fault, lost } => {
                 board.say(Record::AxisFault { tick: self.round, joint, name: words::axis_fault(*fault) });
                 if *lost {
-                    // With the place goes the joint's zero, also one that is being looked for.
-                    board.end_servo();
-                    (self.drive, self.reference, self.placed) = (None, None, false);
+                    self.forget_zeros(board);
                     if let Some(calibrated) = self.calibrated.get_mut(axis) {
                         *calibrated = false;
                     }
@@ -242,6 +216,12 @@ impl<const N: usize> Housekeeper<N> {
                 }
             }
         }
+    }
+
+    /// With a place goes the joint's zero, also one that is being looked for.
+    fn forget_zeros(&mut self, board: &mut impl HousekeepingBoard<N>) {
+        board.end_servo();
+        (self.drive, self.reference, self.placed) = (None, None, false);
     }
 
     /// An axis that passed runs from now on, released; then the next one is measured.
@@ -266,7 +246,15 @@ impl<const N: usize> Housekeeper<N> {
 
     fn calibrate(&mut self, axis: usize, board: &mut impl HousekeepingBoard<N>) {
         let settings = self.settings.axes.get(axis).zip(self.settings.calibration.get(axis));
-        match settings.map(|(axis, settings)| Calibrator::new(axis, *settings)) {
+        let stored = self.stored.get(axis).copied().flatten();
+        let calibrator = settings.map(|(axis, settings)| match stored {
+            // One of another configuration is of no use.
+            Some(stored) => {
+                Calibrator::from_stored(axis, *settings, stored).or_else(|_| Calibrator::new(axis, *settings))
+            }
+            None => Calibrator::new(axis, *settings),
+        });
+        match calibrator {
             Some(Ok(calibrator)) => {
                 self.calibrating = Some(axis);
                 board.order(axis, Order::Calibrate(calibrator));
@@ -392,3 +380,6 @@ fn refused<const N: usize>(joint: u8, result: &'static str, number: u32) -> Reco
         zero_c: f32::NAN,
     }
 }
+
+#[cfg(test)]
+mod tests;

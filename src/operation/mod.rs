@@ -8,6 +8,7 @@
 //! level 0  CurrentLoops, one tick of one axis: the other axis, contacts, conversion -> interlock -> stage -> bridge
 //! level 1  ServoRound, around the leg's tick: begun or not, checksum, supply, temperature
 //! level 6  Housekeeper, 500 rounds per second: contacts -> requests; calibration, reference, reset; registers and temperatures
+//! thread   Storing, when a host asks: what stands around a change of the flash
 //! ```
 //!
 //! | from | to | what |
@@ -24,9 +25,11 @@ mod current;
 mod housekeeper;
 mod servo_round;
 mod stage;
+mod storing;
 
 pub use contacts::{Ask, Operator, RATE_HZ, Situation};
 pub use current::{CurrentBoard, CurrentLoops, Tick};
 pub use housekeeper::{Housekeeper, HousekeepingBoard, HousekeepingSettings};
 pub use servo_round::{Found, Gate, ServoRound};
 pub use stage::{Order, Outcome, Stage};
+pub use storing::{Storing, StoringBoard};

@@ -36,6 +36,8 @@ pub enum Outcome {
         /// It has to be calibrated anew.
         lost: bool,
     },
+    /// The flash was erased, and the joint may have gone any way meanwhile: its zero is not known.
+    StoodStill,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,6 +118,15 @@ impl Stage {
             }
         }
         None
+    }
+
+    /// The flash was written and nothing was looked at since the last tick, with the bridge released; `long` where nobody knows how far the
+    /// joint went. Whether there is an axis that followed it before.
+    #[cold]
+    #[inline(never)]
+    pub fn stood_still(&mut self, sample: &AxisSample, long: bool) -> bool {
+        let axis = self.axis_mut();
+        axis.map(|axis| axis.resume(sample, long)).is_some()
     }
 
     /// One PWM period: what the bridge does in the next one, and what is to be told; with a fault whether the axis was to do anything.

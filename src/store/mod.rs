@@ -17,7 +17,9 @@
 //!
 //! **Only while the bridges are released.** The one bank of the STM32F405's flash stands still while it is written (16 us a word)
 //! or erased (1 to 2 s for 128 KB), and with it every instruction fetched from it, the current loop's too. Whoever stores
-//! therefore shows a [`Permit`], which only a drive that is off gives.
+//! therefore shows a [`Permit`], which only a drive that is off gives. Reading may write as well: what a cut of the power left half done is
+//! repaired by the first read that comes across it (`MapStorage::fetch_item`: a sector is erased, records are copied). So a board reads
+//! at its start, before anything may switch, and its flash refuses whatever else (docs/store.md).
 //!
 //! **Wear.** A value that is already there is not written again. A sector is erased once per some 120 KB of records; measured
 //! in `tests/store.rs`.
@@ -27,10 +29,12 @@
 //! so records carry a generation instead of a date.
 
 mod calibration;
+mod keeper;
 mod model;
 mod record;
 
 pub use calibration::KeptCalibration;
+pub use keeper::Keeper;
 pub use model::{JointProvenance, KeptModel, Provenance};
 pub use record::{Kept, RecordError};
 

@@ -1,7 +1,8 @@
 //! What the ODrive v3.6's image is put together from: every value to its level.
 
 use embassy_executor::Executor;
-use static_cell::StaticCell;
+use heapless::spsc::{Consumer, Producer, Queue};
+use static_cell::{ConstStaticCell, StaticCell};
 
 use super::interlock::{self, Cause};
 use super::leg::JOINTS;
@@ -16,14 +17,17 @@ use crate::board::odrive_v3_6::{brake, can, converter, memory, vectors, watchdog
 use crate::board::stack;
 use crate::bus::drive::{AxisConstants, Mode};
 use crate::bus::{LONGEST, NodeId, Storing};
-use crate::leg::{Control, Following};
+use crate::leg::{Control, Following, StoredCalibration};
+use crate::trace::Record;
 use cortex_m::peripheral::DWT;
 
 /// Builds the leg, hands everything to its level and starts them; does not return.
 pub fn run(board: Board) -> ! {
     let (thread, keeping, keeper) = hand_out(board);
     vectors::enable();
-    watchdog::tighten();
+    if !watchdog::tighten_at_once() {
+        interlock::raise(Cause::Watchdog);
+    }
     let housekeeping = vectors::HOUSEKEEPING.start(vectors::HOUSEKEEPING_VECTOR);
     if let (Ok(watch), Ok(run)) = (housekeeping::watch(), housekeeping::run(keeping)) {
         housekeeping.spawn(watch);
@@ -60,7 +64,7 @@ fn hand_out(
     };
     identify::introduce(&introduction(&board), board.clock_hz);
     let built = memory::identification();
-    let links::Links { orders, outcomes, samples, requests, findings, drive, told, notes } =
+    let links::Links { orders, outcomes, samples, requests, findings, drive, told, mut notes } =
         links::Links::new(memory::told());
     let [(give_1, take_1), (give_2, take_2)] = orders;
     let [(out_1, hear_1), (out_2, hear_2)] = outcomes;
@@ -70,9 +74,13 @@ fn hand_out(
     place(&current::LOOPS, LOOPS.init(loops));
 
     let mut control = built.as_ref().and_then(|(configuration, _)| Control::new(configuration).ok());
-    let (link, results, keeper) = match (&built, &mut control) {
-        (Some((configuration, _)), Some(control)) => join(configuration, control, &board.identity),
-        _ => (None, None, None),
+    static CALIBRATED: ConstStaticCell<Queue<keep::Calibrated, 4>> = ConstStaticCell::new(Queue::new());
+    let (tell, calibrated) = CALIBRATED.take().split();
+    let (link, results, keeper, stored) = match (&built, &mut control) {
+        (Some((configuration, _)), Some(control)) => {
+            join(configuration, control, &board.identity, calibrated, &mut notes.0)
+        }
+        _ => (None, None, None, [None; JOINTS]),
     };
     match control {
         Some(control) => {
@@ -97,6 +105,8 @@ fn hand_out(
         axes: drives::axes(&leg::LEG, divider),
         orders: [give_1, give_2],
         outcomes: [hear_1, hear_2],
+        stored,
+        calibrated: tell,
         requests: requests.0,
         drive: drive.1,
         notes: notes.0,
@@ -127,12 +137,23 @@ const WIRE: bus::Wire = bus::Wire {
     held: housekeeping::permits,
 };
 
-/// Ends of the bus: the servo's, the identification's, the keeper.
-type Joined = (Option<host::HostLink>, Option<bus::ThreadEnd>, Option<&'static mut keep::Keeper>);
+/// Ends of the bus: the servo's, the identification's, the keeper; and the calibrations that are kept.
+type Joined = (
+    Option<host::HostLink>,
+    Option<bus::ThreadEnd>,
+    Option<&'static mut keep::Keeper>,
+    [Option<StoredCalibration>; JOINTS],
+);
 
 /// The bus, with what was kept before; the controller takes part from here on.
 #[inline(never)]
-fn join(configuration: &leg::Leg, control: &mut Control<JOINTS>, identity: &Identity) -> Joined {
+fn join(
+    configuration: &leg::Leg,
+    control: &mut Control<JOINTS>,
+    identity: &Identity,
+    calibrated: Consumer<'static, keep::Calibrated>,
+    notes: &mut Producer<'static, Record<JOINTS>>,
+) -> Joined {
     let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
     let constants = configuration.joints.each_ref().map(|joint| AxisConstants {
         rated_torque: joint.limits().torque_cap(),
@@ -144,7 +165,10 @@ fn join(configuration: &leg::Leg, control: &mut Control<JOINTS>, identity: &Iden
     let (plan, seed) = (configuration.plan, configuration.swarm_seed);
     let station = memory::station(|| bus::BoardStation::new(NODES, told, constants, plan, seed));
     let mut keeper = memory::keeper();
+    let mut calibrations = [None; JOINTS];
+    // Reading may repair what a cut of the power left, which erases: nothing may switch yet, and the watchdog still has the start's 4 s.
     if let Some(keeper) = &mut keeper {
+        calibrations = keeper.calibrations();
         for joint in 0..JOINTS {
             let mut bytes = [0; LONGEST];
             match keeper.objects(joint, &mut bytes) {
@@ -159,18 +183,19 @@ fn join(configuration: &leg::Leg, control: &mut Control<JOINTS>, identity: &Iden
             station.set_generation(generation);
         }
     }
-    let answers = can::start(station.bit_rate().unwrap_or(USUAL_KBIT));
-    let (frames, servo, thread, end, bus) = memory::bus().split(station, WIRE);
-    if answers {
-        static BUS: StaticCell<bus::BusLoop> = StaticCell::new();
-        place(&bus::BUS, BUS.init(bus));
-        place(&bus::FRAMES_IN, frames);
+    // One that does not answer is off the bus for good (`can::status`): the leg is its operator's, and who listens is told.
+    if !can::start(station.bit_rate().unwrap_or(USUAL_KBIT)) {
+        let _ = notes.enqueue(Record::AxisFault { tick: 0, joint: 0, name: "bus_controller" });
     }
+    let (frames, servo, thread, end, bus) = memory::bus().split(station, WIRE);
+    static BUS: StaticCell<bus::BusLoop> = StaticCell::new();
+    place(&bus::BUS, BUS.init(bus));
+    place(&bus::FRAMES_IN, frames);
     if let Some(keeper) = &mut keeper {
-        keeper.serve(end);
+        keeper.serve(end, calibrated);
     }
     let link = host::HostLink::new(servo, Following::new(configuration), can::pend, housekeeping::permits);
-    (Some(link), Some(thread), keeper)
+    (Some(link), Some(thread), keeper, calibrations)
 }
 
 /// Of a board whose version is not known: no voltage is then taken for a smaller one, and nothing is enabled.

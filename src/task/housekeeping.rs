@@ -8,16 +8,15 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_time::{Duration, Ticker};
 use heapless::spsc::{Consumer, Producer};
 
-use super::bus;
 use super::interlock::{self, Cause};
 use super::leg::JOINTS;
-use super::servo;
 use super::statistics::{self, Count};
+use super::{bus, keep, servo};
 use crate::board::odrive_v3_6::gate_driver::GateDrivers;
 use crate::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use crate::board::odrive_v3_6::settings::drives::CALIBRATION;
 use crate::board::odrive_v3_6::{bridge, contacts, converter, encoder, watchdog};
-use crate::leg::{ControlRequest, DriveState};
+use crate::leg::{Calibration, ControlRequest, DriveState, StoredCalibration};
 use crate::motor::AxisConfiguration;
 use crate::operation::{Housekeeper, HousekeepingBoard, HousekeepingSettings, Order, Outcome, RATE_HZ};
 use crate::safety::{CheckIns, FaultCode, GUARD_RATE_HZ, TickGuard};
@@ -44,6 +43,10 @@ pub struct Housekeeping {
     pub orders: [Producer<'static, Order>; JOINTS],
     /// From each axis.
     pub outcomes: [Consumer<'static, Outcome>; JOINTS],
+    /// Calibrations that were kept.
+    pub stored: [Option<StoredCalibration>; JOINTS],
+    /// To whoever keeps them.
+    pub calibrated: Producer<'static, keep::Calibrated>,
     /// To the servo.
     pub requests: Producer<'static, ControlRequest<JOINTS>>,
     /// From the servo.
@@ -88,7 +91,7 @@ pub async fn watch() -> ! {
 pub async fn run(mut keeping: Housekeeping) -> ! {
     let settings =
         HousekeepingSettings { axes: keeping.axes, calibration: [CALIBRATION; JOINTS], hottest_c: HOTTEST_C };
-    let mut keeper = Housekeeper::new(settings);
+    let mut keeper = Housekeeper::new(settings).with_stored(keeping.stored);
     let mut ticker = Ticker::every(Duration::from_hz(u64::from(RATE_HZ)));
     loop {
         ticker.next().await;
@@ -171,6 +174,14 @@ impl HousekeepingBoard<JOINTS> for Housekeeping {
 
     fn outcome(&mut self, axis: usize) -> Option<Outcome> {
         self.outcomes.get_mut(axis)?.dequeue()
+    }
+
+    fn calibrated(&mut self, axis: usize, calibration: &Calibration) {
+        let _ = self.calibrated.enqueue((axis, calibration.stored()));
+    }
+
+    fn take_forgotten(&mut self) -> bool {
+        keep::take_forgotten()
     }
 
     fn request(&mut self, request: ControlRequest<JOINTS>) -> bool {

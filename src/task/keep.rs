@@ -1,24 +1,14 @@
-//! Thread: what outlives the power is written, in the only way in which the board stands it.
+//! Thread: what outlives the power, on the board: flash, watchdog, interlock and queues beneath `operation::Storing` and `store::Keeper`.
 //!
-//! The flash's one bank stands still while it is written or erased, for up to two seconds a sector, and with it every level. So, in this order:
-//!
-//! ```text
-//! refused         unless the drive is off
-//! interlock       `storing`: both bridges released by the next current tick, the servo keeps its drive off, a calibration ends
-//! hosts           told by an emergency message (FF01): heartbeats may pause; 20 ms for it to leave
-//! watchdog        8 s instead of 16 ms
-//! flash           written; it looks at the bridges' registers itself
-//! watchdog        16 ms
-//! interlock       let go a millisecond later, when both current loops have ticked again; hosts are told (0000, or 5530)
-//! ```
-//!
-//! Time stands meanwhile for everybody who counts it (`board::odrive_v3_6::flash`), and the current loops do not count the gap while `storing`
-//! is raised. What an emergency stop does to bridges that are off is what it does after.
+//! Time stands for everybody who counts it while the flash is written (`board::odrive_v3_6::flash`), and the current loops do not count the
+//! gap while `storing` is raised (`operation::CurrentLoops`). What an emergency stop does to bridges that are off is what it does after.
 
 use core::pin::pin;
+use core::sync::atomic::{AtomicBool, Ordering};
 use core::task::{Context, Poll, Waker};
 
 use embassy_time::Timer;
+use heapless::spsc::Consumer;
 
 use super::bus::{Keep, KeeperEnd};
 use super::interlock::{self, Cause};
@@ -28,21 +18,29 @@ use crate::board::odrive_v3_6::flash::Flash;
 use crate::board::odrive_v3_6::watchdog;
 use crate::bus::LONGEST;
 use crate::bus::station::Keeping;
-use crate::leg::IdentifiedModel;
-use crate::store::{KeptModel, Key, Permit, Store};
+use crate::leg::{IdentifiedModel, Permission, StoredCalibration};
+use crate::operation::{Storing, StoringBoard};
+use crate::store::{self, Permit, Store};
 
 /// Looks for something to do so often, ms.
 const ROUND_MS: u64 = 10;
-/// For the hosts to be told, ms: two messages of 135 bits at 125 kbit/s and what stands before them.
-const ANNOUNCED_MS: u64 = 20;
-const KEYS: [Key; JOINTS] = [Key::Objects1, Key::Objects2];
+
+/// Everything was forgotten, and the housekeeping does not know it yet.
+static FORGOTTEN: AtomicBool = AtomicBool::new(false);
+
+/// Everything that was kept was forgotten; once.
+pub fn take_forgotten() -> bool {
+    FORGOTTEN.swap(false, Ordering::Relaxed)
+}
+
+/// What an axis passed, and what of it can be kept.
+pub type Calibrated = (usize, Option<StoredCalibration>);
 
 /// The store and who asks for it.
 pub struct Keeper {
-    store: Store<Flash>,
-    end: Option<KeeperEnd>,
-    /// Accepted since something was kept last.
-    accepted: Option<KeptModel<JOINTS>>,
+    keeper: store::Keeper<Flash, JOINTS>,
+    storing: Storing,
+    ends: Option<(KeeperEnd, Consumer<'static, Calibrated>)>,
 }
 
 /// Runs to its end at once: the flash never lets anybody wait.
@@ -57,67 +55,99 @@ impl Keeper {
     /// Of this flash; `None` where it does not fit, which no board of this kind is.
     #[must_use]
     pub fn new(flash: Flash, bytes: u32) -> Option<Self> {
-        Some(Self { store: Store::new(flash, 0..bytes).ok()?, end: None, accepted: None })
+        let store = Store::new(flash, 0..bytes).ok()?;
+        Some(Self { keeper: store::Keeper::new(store), storing: Storing::new(), ends: None })
     }
 
-    /// Who asks for it from now on.
-    pub fn serve(&mut self, end: KeeperEnd) {
-        self.end = Some(end);
+    /// Who asks for it from now on, and who calibrates.
+    pub fn serve(&mut self, end: KeeperEnd, calibrated: Consumer<'static, Calibrated>) {
+        self.ends = Some((end, calibrated));
     }
 
     /// What is kept of a node: so many bytes; `None` where it cannot be read.
     pub fn objects(&mut self, joint: usize, into: &mut [u8; LONGEST]) -> Option<usize> {
-        let key = *KEYS.get(joint)?;
-        Some(at_once(self.store.load_bytes(key, into))?.ok()?.unwrap_or(0))
+        at_once(self.keeper.objects(joint, into))?
+    }
+
+    /// The calibrations that are kept.
+    pub fn calibrations(&mut self) -> [Option<StoredCalibration>; JOINTS] {
+        core::array::from_fn(|axis| at_once(self.keeper.calibration(axis))?)
     }
 
     /// The model that is kept and its generation, if it is this leg's.
     pub fn model(&mut self, leg: &Leg) -> Option<(IdentifiedModel<JOINTS>, u32)> {
-        let kept = at_once(self.store.load::<KeptModel<JOINTS>>(Key::Model))?.ok()??;
+        let kept = at_once(self.keeper.model())??;
         Some((leg.restore(&kept.model).ok()?, kept.provenance.generation))
     }
+}
 
-    #[inline(never)]
-    fn change(&mut self, keep: &mut Keep) -> Option<()> {
-        let permit = Permit::under(servo::permission())?;
-        if keep.what == Keeping::Defaults {
-            return at_once(self.store.forget_all(&permit))?.ok();
+/// Whether it was done.
+#[inline(never)]
+fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep) -> Option<()> {
+    let permit = Permit::under(servo::permission())?;
+    keep.generation = match keep.what {
+        Keeping::Defaults => {
+            FORGOTTEN.store(true, Ordering::Relaxed);
+            at_once(keeper.forget(&permit))??
         }
-        for (key, (bytes, length)) in KEYS.into_iter().zip(&keep.objects) {
-            at_once(self.store.save_bytes(&permit, key, bytes.get(..*length)?))?.ok()?;
+        Keeping::All => {
+            let objects =
+                keep.objects.each_ref().map(|(bytes, length)| bytes.get(..*length).unwrap_or_default());
+            at_once(keeper.keep(&permit, objects, keep.generation))??
         }
-        if let Some(mut model) = self.accepted {
-            model.provenance.generation = keep.generation.wrapping_add(1);
-            at_once(self.store.save(&permit, Key::Model, &model))?.ok()?;
-            (self.accepted, keep.generation) = (None, model.provenance.generation);
-        }
-        Some(())
+    };
+    Some(())
+}
+
+/// The board, as a change of the flash has it.
+struct Ports;
+
+impl StoringBoard for Ports {
+    fn permission(&self) -> Permission {
+        servo::permission()
+    }
+
+    fn causes(&self) -> u32 {
+        interlock::causes()
+    }
+
+    fn raise(&mut self, cause: Cause) {
+        interlock::raise(cause);
+    }
+
+    fn stored(&mut self) {
+        interlock::stored();
+    }
+
+    fn stretch(&mut self) -> bool {
+        watchdog::stretch()
+    }
+
+    fn tighten(&mut self) -> bool {
+        watchdog::tighten()
+    }
+
+    fn wait_ms(&mut self, milliseconds: u64) -> impl Future<Output = ()> {
+        Timer::after_millis(milliseconds)
     }
 }
 
 /// Runs for ever.
 #[embassy_executor::task]
 pub async fn run(keeper: &'static mut Keeper) -> ! {
+    let Keeper { keeper, storing, ends } = keeper;
     loop {
         Timer::after_millis(ROUND_MS).await;
-        let Some(end) = &mut keeper.end else { continue };
+        storing.look_after(&mut Ports);
+        let Some((end, calibrated)) = ends else { continue };
         if let Some(model) = end.accepted.dequeue() {
-            keeper.accepted = Some(model);
+            keeper.accept(model);
+        }
+        while let Some((axis, calibration)) = calibrated.dequeue() {
+            keeper.calibrated(axis, calibration);
         }
         let Some(keep) = end.keep.dequeue() else { continue };
-        keep.done = false;
-        // Where motors brake themselves, or anything else forbids to enable, nothing is written: it would let them go.
-        if Permit::under(servo::permission()).is_some() && interlock::is_clear() {
-            interlock::raise(Cause::Storing);
-            Timer::after_millis(ANNOUNCED_MS).await;
-            watchdog::stretch();
-            keep.done = keeper.change(keep).is_some();
-            watchdog::tighten();
-            Timer::after_millis(1).await;
-            interlock::stored();
-        }
-        if let Some(end) = &mut keeper.end {
-            let _ = end.kept.enqueue(keep);
-        }
+        keep.done = storing.change(&mut Ports, || change(keeper, keep).is_some()).await;
+        let _ = end.kept.enqueue(keep);
     }
 }

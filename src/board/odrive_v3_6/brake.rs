@@ -26,3 +26,8 @@ pub fn set(duty: f32) {
 pub fn duty() -> f32 {
     TOP.saturating_sub(load(HIGH)) as f32 / TOP as f32
 }
+
+/// The resistor has a duty.
+pub fn is_on() -> bool {
+    load(HIGH) < TOP
+}

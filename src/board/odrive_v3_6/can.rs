@@ -36,6 +36,7 @@ const RELEASE: u32 = 1 << 5;
 const MAILBOXES: u32 = 3;
 
 static LOST: AtomicBool = AtomicBool::new(false);
+static TAKES_PART: AtomicBool = AtomicBool::new(false);
 
 /// Takes part in the bus from now on; the vectors are still masked. Whether the controller answered.
 pub fn start(kbit: u16) -> bool {
@@ -50,6 +51,7 @@ pub fn start(kbit: u16) -> bool {
         apply(&set_up(kbit));
         apply(&TAKE_PART);
     }
+    TAKES_PART.store(answers, Ordering::Relaxed);
     answers
 }
 
@@ -105,8 +107,11 @@ pub fn is_silent() -> bool {
     load(TSR) >> 26 & 0b111 == 0b111
 }
 
-/// How the controller does; an overrun is told once.
+/// How the controller does; an overrun is told once. One that did not answer at the start is off the bus.
 pub fn status() -> Controller {
+    if !TAKES_PART.load(Ordering::Relaxed) {
+        return Controller::Off;
+    }
     let [off, passive] = ERRORS;
     match load(super::settings::can::ESR) {
         errors if errors & off != 0 => Controller::Off,

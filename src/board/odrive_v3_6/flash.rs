@@ -2,8 +2,8 @@
 //!
 //! **What a write costs.** The chip has one bank: while it is written (16 us a word, 100 at most) or erased (1 s a sector, 2 at most), whoever
 //! fetches from it stands still, and that is everything: current loops, servo, bus, watchdog. So nothing is touched unless both
-//! bridges' main outputs are off, by their own registers, whatever the caller believes. The rest is `task::keep`'s: the interlock raised
-//! before, hosts told, the watchdog stretched.
+//! bridges' main outputs are off and the brake resistor's duty is none, by their own registers, whatever the caller believes: a duty would stay
+//! for as long as the flash stands. The rest is `operation::Storing`'s: the interlock raised before, hosts told, the watchdog stretched.
 //!
 //! An erase stops the executors' time (TIM5): a timer that overflowed unseen would count half a period wrong for ever, and with
 //! time that stands nobody is late afterwards. It also empties the data cache, which an erase leaves as it was.
@@ -20,7 +20,7 @@ use super::settings::CLOCK_HZ;
 use super::settings::flash::{
     ACR, BUSY, BYTES, CACHE, CR, FIRST, KEYR, KEYS, LOCK, NUMBERS, PROGRAM, SECTOR, SR, START, WRONG, erase,
 };
-use super::{bridge, watchdog};
+use super::{brake, bridge, watchdog};
 
 /// Longest wait, processor cycles: for an erased sector 5 s, for a word 1 ms.
 const ERASED: u32 = 5 * CLOCK_HZ;
@@ -36,7 +36,7 @@ pub enum FlashError {
     OutOfBounds,
     /// Not in whole words, or sectors.
     NotAligned,
-    /// A bridge is on.
+    /// A bridge is on, or the brake resistor.
     Armed,
     /// The flash says so, or does not answer.
     Failed,
@@ -68,7 +68,7 @@ impl Flash {
         patience: u32,
         change: impl FnOnce(),
     ) -> Result<(), FlashError> {
-        if !bridge::are_released() {
+        if !bridge::are_released() || brake::is_on() {
             return Err(FlashError::Armed);
         }
         store(SR, WRONG);

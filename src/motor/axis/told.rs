@@ -1,6 +1,7 @@
 //! What an axis tells of itself, and forgets when it is told to.
 
-use super::{Axis, AxisFault, Rotating};
+use super::{Axis, AxisFault, Rotating, SpeedTracker, Window};
+use crate::hal::AxisSample;
 use crate::units::{Ampere, RadianPerSecond};
 
 impl Axis {
@@ -34,5 +35,23 @@ impl Axis {
             self.fault = None;
         }
         !self.lost
+    }
+
+    /// After a time without ticks, in which the bridge was released and the counter went on by itself: it is followed from here, and no step
+    /// is held against it. `long` where it may have gone round: the place within a turn is then known only of an encoder whose turns
+    /// its range is a multiple of, as 65,536 of 8,192; of any other it is lost. Counts are off by multiples of the range, and for
+    /// whoever knows better.
+    pub fn resume(&mut self, sample: &AxisSample, long: bool) {
+        let constants = &self.constants;
+        let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
+        self.place = constants.scale.within_turn(self.place + constants.counter_sign * step);
+        self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
+        (self.counter, self.step) = (sample.encoder_count, 0);
+        self.speed = SpeedTracker::at(self.angle());
+        self.window = Window::EMPTY;
+        (self.doubtful, self.disbelieved) = (false, false);
+        if long && constants.scale.within_turn(1 << 16) != 0 {
+            self.found(AxisFault::Encoder);
+        }
     }
 }

@@ -312,4 +312,4 @@ impl Calibrator {
 const SCAN_BANDWIDTH: Hertz = Hertz(300.0);
 
 #[cfg(test)]
-pub(in crate::motor) mod tests;
+pub(crate) mod tests;

@@ -4,7 +4,7 @@ use super::*;
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::motor::{Axis, AxisRequest};
 
-const SETTINGS: CalibrationSettings =
+pub(crate) const SETTINGS: CalibrationSettings =
     CalibrationSettings { current: Ampere(20.0), voltage: Volt(4.0), turns_per_s: 8.0 };
 
 /// Runs a calibration to its end; no quadrature torque is ever allowed to run the rotor away. `spoil` sees every sample with
@@ -32,7 +32,7 @@ fn run(motor: &mut TestMotor, calibrator: Calibrator) -> Result<Calibration, Ref
     run_with(motor, calibrator, |_, _| ())
 }
 
-pub(in crate::motor) fn calibrate(
+pub(crate) fn calibrate(
     motor: &mut TestMotor,
     configuration: &AxisConfiguration,
 ) -> Result<Calibration, Refusal> {

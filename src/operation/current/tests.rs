@@ -1,0 +1,230 @@
+extern crate std;
+
+use std::vec::Vec;
+
+use super::*;
+use crate::leg::AxisFault;
+use crate::motor::calibration::tests::calibrate;
+use crate::motor::testing::{CONFIGURATION, TestMotor};
+use crate::motor::{Axis, AxisConfiguration, SenseScale};
+
+/// Ticks of the clock in a period, as on the board.
+const PERIOD: NonZeroU32 = NonZeroU32::new(7000).expect("more than none");
+/// 1.5 s.
+const ERASED: u32 = 36_000;
+/// 0.1 ms and what was missed before.
+const WRITTEN: u32 = 3;
+
+#[derive(Debug, Default)]
+struct Board {
+    causes: u32,
+    brake: f32,
+    begun: bool,
+    damped: bool,
+    told: Vec<(usize, Outcome)>,
+    servo_ticks: u32,
+}
+
+impl CurrentBoard for Board {
+    fn causes(&self) -> u32 {
+        self.causes
+    }
+    fn raise(&mut self, bits: u32) {
+        self.causes |= bits;
+    }
+    fn release_all(&mut self) {}
+    fn drive(&mut self, _: usize, command: &AxisCommand) {
+        assert!(!command.enabled, "nothing is asked for");
+    }
+    fn set_brake(&mut self, duty: f32) {
+        self.brake = duty;
+    }
+    fn target(&self, _: usize) -> AxisRequest {
+        AxisRequest::RELEASED
+    }
+    fn end_servo(&mut self) {
+        self.begun = false;
+    }
+    fn damp(&mut self) {
+        self.damped = true;
+    }
+    fn has_order(&self, _: usize) -> bool {
+        false
+    }
+    fn order(&mut self, _: usize) -> Option<Order> {
+        None
+    }
+    fn tell(&mut self, axis: usize, outcome: Outcome) {
+        self.told.push((axis, outcome));
+    }
+    fn sample(&mut self, _: usize, _: JointSample) {}
+    fn servo_ticks(&self) -> u32 {
+        self.servo_ticks
+    }
+    fn call_servo(&mut self, _: bool) {
+        self.servo_ticks += 1;
+    }
+    fn count_missed(&mut self) {}
+}
+
+/// Two axes on motors that somebody turns, with the servo begun.
+struct Bench {
+    loops: CurrentLoops<2>,
+    motors: [TestMotor; 2],
+    board: Board,
+    now: u32,
+}
+
+impl Bench {
+    fn new(configuration: &AxisConfiguration) -> Self {
+        let counts_per_turn = f64::from(configuration.counts_per_turn);
+        let mut motors = [0.3, 2.0].map(|angle| TestMotor { angle, counts_per_turn, ..TestMotor::default() });
+        let stages = motors.each_mut().map(|motor| {
+            let calibration = calibrate(motor, configuration).expect("sound");
+            (motor.speed, motor.driven) = (0.0, true);
+            Stage::running(Axis::new(configuration, &calibration, &motor.sample()).expect("usual"))
+        });
+        let chopper = Chopper::new(Volt(50.0), Volt(54.0));
+        let loops = CurrentLoops::new(stages, PERIOD, chopper, SenseScale::ODRIVE_3_6.volt_per_code);
+        let mut bench = Self { loops, motors, board: Board { begun: true, ..Board::default() }, now: 0 };
+        bench.run(100);
+        bench
+    }
+
+    /// Periods in which every axis ticks; where `torn`, one shunt's conversion is not there.
+    fn tick(&mut self, torn: bool) {
+        self.now = self.now.wrapping_add(PERIOD.get());
+        for (axis, motor) in self.motors.iter_mut().enumerate() {
+            let sample = motor.period(AxisCommand::RELEASED);
+            let now = self.now;
+            let tick = Tick { now, emergency_stop: false, gate_fault: false, complete: !torn, sample };
+            self.loops.tick(axis, &tick, &mut self.board);
+        }
+    }
+
+    fn run(&mut self, periods: u32) {
+        (0..periods).for_each(|_| self.tick(false));
+    }
+
+    /// Nothing runs for so many periods, and both rotors go so many turns meanwhile.
+    fn stand(&mut self, periods: u32, turns: f64) {
+        self.now = self.now.wrapping_add(periods * PERIOD.get());
+        for motor in &mut self.motors {
+            motor.angle += turns * core::f64::consts::TAU;
+        }
+    }
+
+    fn store(&mut self) {
+        self.board.causes |= Cause::Storing.bit();
+        self.run(480);
+    }
+
+    fn stored(&mut self) {
+        self.run(24);
+        self.board.causes &= !Cause::Storing.bit();
+        self.run(240);
+    }
+
+    /// Both rotors through a whole turn, past their index: whether no axis finds it where it does not belong.
+    fn is_at_its_place(&mut self) -> bool {
+        for motor in &mut self.motors {
+            motor.speed = 60.0;
+        }
+        self.run(2600);
+        let faults = self.loops.axes.each_ref().map(|axis| axis.stage.fault());
+        faults == [None; 2] && self.board.causes == 0
+    }
+}
+
+#[test]
+fn the_brake_resistor_has_no_duty_while_the_flash_is_written() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    for motor in &mut bench.motors {
+        motor.bus = 53.0;
+    }
+    bench.run(3);
+    assert!(bench.board.brake > 0.7, "{}", bench.board.brake);
+    bench.board.causes |= Cause::Storing.bit();
+    bench.tick(false);
+    assert_eq!(bench.board.brake, 0.0);
+    bench.board.causes = 0;
+    bench.tick(false);
+    assert!(bench.board.brake > 0.7, "{}", bench.board.brake);
+}
+
+#[test]
+fn an_erasure_forgets_the_zeros_and_nothing_else() {
+    // At rest, an eighth of a turn, half of the counter's range, once round it, far.
+    for turns in [0.0, 0.125, -0.4, 4.0, 8.0, -8.0, 123.456] {
+        let mut bench = Bench::new(&CONFIGURATION);
+        bench.store();
+        assert!(bench.board.begun);
+        bench.stand(ERASED, turns);
+        // The first conversions after it may be torn, and the index's interrupt comes when the index is elsewhere.
+        bench.tick(true);
+        bench.stand(ERASED, turns);
+        bench.stored();
+        assert!(!bench.board.begun && !bench.board.damped);
+        let told = [0, 1, 0, 1].map(|axis| (axis, Outcome::StoodStill));
+        assert_eq!(bench.board.told, told, "{turns}");
+        assert_eq!(bench.board.causes, 0);
+        // The rotor's angle is still known: the index is found at its place.
+        assert!(bench.is_at_its_place(), "{turns}");
+        assert_eq!(bench.board.told.len(), 4);
+    }
+}
+
+#[test]
+fn words_that_are_written_cost_nothing() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    bench.store();
+    for _ in 0..100 {
+        // Of a joint that falls: 60 rad/s of its motor.
+        bench.stand(WRITTEN, 60.0 / core::f64::consts::TAU * f64::from(WRITTEN) / 24_000.0);
+        bench.tick(false);
+    }
+    bench.stored();
+    assert_eq!((bench.board.begun, bench.board.told.len(), bench.board.causes), (true, 0, 0));
+    assert!(bench.is_at_its_place());
+}
+
+#[test]
+fn a_counter_whose_range_is_no_multiple_of_a_turn_is_not_believed_after_an_erasure() {
+    let configuration = AxisConfiguration { counts_per_turn: 10_000, ..CONFIGURATION };
+    let lost = Outcome::Fault { fault: AxisFault::Encoder, lost: true };
+    for (periods, is_lost) in [(WRITTEN, false), (ERASED, true)] {
+        let mut bench = Bench::new(&configuration);
+        bench.store();
+        bench.stand(periods, 0.001);
+        bench.stored();
+        assert_eq!(bench.board.told.contains(&(0, lost)), is_lost);
+        assert_eq!(bench.board.begun, !is_lost);
+    }
+}
+
+#[test]
+fn the_same_gap_is_a_fault_while_nothing_is_written() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    bench.stand(ERASED, 0.4);
+    bench.run(3);
+    assert!(bench.board.damped);
+    assert_eq!(bench.board.causes & Cause::CurrentTicks.bit(), Cause::CurrentTicks.bit());
+    let mut bench = Bench::new(&CONFIGURATION);
+    bench.tick(true);
+    assert_eq!(bench.board.causes, Cause::Conversion.bit());
+}
+
+#[test]
+fn the_emergency_stop_counts_while_the_flash_is_written() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    bench.store();
+    let tick = Tick {
+        now: bench.now,
+        emergency_stop: true,
+        gate_fault: false,
+        complete: true,
+        sample: bench.motors[0].sample(),
+    };
+    bench.loops.tick(0, &tick, &mut bench.board);
+    assert_eq!(bench.board.causes, Cause::Storing.bit() | Cause::EmergencyStop.bit());
+}
