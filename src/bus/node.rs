@@ -79,13 +79,14 @@ impl Node {
         self.communication.state
     }
 
-    /// A frame came.
-    pub fn on_frame<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) {
+    /// A frame came. Whether it had the node begin anew: what was kept of it is then to be recalled.
+    pub fn on_frame<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) -> bool {
         let node = self.communication.node;
         match frame.id() {
             nmt::COMMAND => {
                 if let Some(command) = nmt::command(frame.data(), node.number()) {
                     self.obey(command, objects);
+                    return matches!(command, Command::ResetNode | Command::ResetCommunication);
                 }
             }
             id if u32::from(id) == self.communication.sync => self.synchronise(frame, objects),
@@ -104,6 +105,7 @@ impl Node {
             }
             id => self.receive(id, frame, now_us, objects),
         }
+        false
     }
 
     /// The next frame to be sent; again until there is none.
@@ -142,8 +144,11 @@ impl Node {
             Controller::Passive => Some(0x8120),
             Controller::Off => Some(0x8140),
         };
-        if matches!(told, Controller::Passive | Controller::Off) {
-            objects.lost(Lost::Bus(told == Controller::Off));
+        match told {
+            Controller::Active => {}
+            Controller::Passive => objects.lost(Lost::Bus(false)),
+            // A frame that was lost may have been the one that stops.
+            Controller::Off | Controller::Overrun => objects.lost(Lost::Bus(true)),
         }
         self.communication.emergency.set(Source::Controller, code.map(ErrorReport::code));
     }

@@ -13,7 +13,7 @@ pub enum Lost {
     Heartbeat,
     /// A PDO that has an event timer.
     ReceivedPdo,
-    /// The controller left the bus (`true`), or is near it.
+    /// The controller left the bus, or frames were lost (`true`); or it is near leaving it.
     Bus(bool),
     /// The master took the node out of Operational.
     Stopped,

@@ -22,7 +22,6 @@ use super::drive::{Axis, AxisConstants, Coupling};
 use super::frame::{Frame, NodeId};
 use super::identification::{Ask, JointObjects, LegObjects, Results};
 use super::kept::{LONGEST, kept_bit_rate, kept_node_id};
-use super::nmt::NmtState;
 use super::node::{Controller, Node, Storing};
 use crate::leg::{
     Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, Permission, Plan, PowerRequest,
@@ -138,6 +137,10 @@ pub struct Station<const N: usize, const LOG: usize> {
     /// A request that could only be refused was not passed on.
     refused: bool,
     request: Option<LegRequest>,
+    /// The controller left the bus.
+    off: bool,
+    /// Of each node: it was reset, and what was kept of it is to be recalled.
+    anew: [bool; N],
 }
 
 impl<const N: usize, const LOG: usize> Station<N, LOG> {
@@ -161,6 +164,8 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
             hosted: false,
             refused: false,
             request: None,
+            off: false,
+            anew: [false; N],
         }
     }
 
@@ -183,23 +188,39 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         node.recall(kept.bytes(), axis);
     }
 
-    /// A frame on the bus, for every node but the one that sent it.
-    pub fn hear<R: Results>(&mut self, frame: &Frame, now_us: u64, sender: Option<usize>, results: &R) {
-        for joint in (0..N).filter(|joint| Some(*joint) != sender) {
-            self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects));
-            if self.nodes.get(joint).is_some_and(|node| node.state() == NmtState::Initialising) {
+    /// Nodes that were reset begin anew.
+    fn recall_reset(&mut self) {
+        for joint in 0..N {
+            if self.anew.get_mut(joint).is_some_and(core::mem::take) {
                 self.restart(joint);
             }
         }
     }
 
-    /// The next frame that a node has to send; again until there is none.
+    /// A frame on the bus, for every node but the one that sent it. What was kept of one that it resets
+    /// comes back with what is asked next, once for any number of frames.
+    pub fn hear<R: Results>(&mut self, frame: &Frame, now_us: u64, sender: Option<usize>, results: &R) {
+        for joint in (0..N).filter(|joint| Some(*joint) != sender) {
+            let begins = self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects));
+            if let (Some(true), Some(anew)) = (begins, self.anew.get_mut(joint)) {
+                *anew = true;
+            }
+        }
+    }
+
+    /// The next frame that a node has to send; again until there is none. None while the controller is off the bus: what it were given
+    /// then would leave when it is back, and be old.
     pub fn poll<R: Results>(&mut self, joint: usize, now_us: u64, results: &R) -> Option<Frame> {
+        self.recall_reset();
+        if self.off {
+            return None;
+        }
         self.with(joint, results, |node, objects| node.poll(now_us, objects))?
     }
 
     /// Whether a host is missed; however full the bus is.
     pub fn watch<R: Results>(&mut self, now_us: u64, results: &R) {
+        self.recall_reset();
         for joint in 0..N {
             self.with(joint, results, |node, objects| node.look_around(now_us, objects));
         }
@@ -207,6 +228,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
 
     /// What the controller tells: once on every change.
     pub fn on_controller<R: Results>(&mut self, told: Controller, results: &R) {
+        self.off = told == Controller::Off;
         for joint in 0..N {
             self.with(joint, results, |node, objects| node.on_controller(told, objects));
         }
@@ -222,7 +244,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         Some(ask(node, &mut JointObjects { axis, joint, leg: &mut self.leg, results }))
     }
 
-    /// What the leg tells of a tick.
+    /// What the leg tells of a tick; what it is asked then has to be taken by [`Self::order`] before the next.
     pub fn told(&mut self, told: &LegTold<N>) {
         let drive = told.joints.first().map_or(DriveState::NotReadyToSwitchOn, |joint| joint.drive);
         let inputs = (u32::from(told.held) * HELD) | (u32::from(told.blocked) * BLOCKED);
@@ -233,11 +255,17 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         let commanded = self.axes.iter().any(Axis::is_commanded);
         self.hosted = commanded || self.hosted && drive.permission() != Permission::Released;
         let refused = core::mem::take(&mut self.refused) || told.refused;
-        let asked = self.leg.take_asked();
         if !self.hosted {
             self.coupling.look_on(self.axes.each_mut(), drive);
         }
         let power = self.coupling.power(self.axes.each_mut(), drive, refused).filter(|_| self.hosted);
+        // A step of the drive goes first; what else was asked waits for the next tick. An identification that was asked for on the way up does
+        // not: nothing from before the leg was enabled is done afterwards.
+        let asked = match power {
+            None => self.leg.take_asked(),
+            Some(power) if power.enables() && self.leg.has_asked(Ask::Identify) => self.leg.take_asked(),
+            Some(_) => None,
+        };
         self.request = match (power, asked) {
             (Some(power), _) if power.enables() && (told.blocked || !told.held) => {
                 self.refused = true;
@@ -278,6 +306,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
 
     /// What a host wants kept, once; all of it is then ready in [`Self::kept`].
     pub fn take_store(&mut self) -> Option<Keeping> {
+        self.recall_reset();
         let defaults = self.leg.take_store()?;
         for ((node, axis), kept) in self.nodes.iter_mut().zip(&mut self.axes).zip(&mut self.kept) {
             let before = *kept;

@@ -237,7 +237,10 @@ impl BusLoop {
         }
         self.station.watch(now_us, self.found);
         self.keep();
-        if let Some(told) = self.told.dequeue() {
+        // What it leads to has to find room: an order that was not taken yet would be overwritten, and a request with it.
+        if self.orders.ready()
+            && let Some(told) = self.told.dequeue()
+        {
             self.station.told(&LegTold { held: (self.wire.held)(), ..told });
             HOSTED.store(self.station.is_hosted(), Ordering::Relaxed);
             self.due = true;
@@ -250,11 +253,12 @@ impl BusLoop {
 
     fn look_at_the_controller(&mut self) {
         let now = (self.wire.status)();
+        if now == Controller::Off {
+            // What waits in its mailboxes stays there until it is back, however old; the station gives it nothing meanwhile.
+            (self.wire.give_up)();
+        }
         if now != self.controller {
             self.controller = now;
-            if now == Controller::Off {
-                (self.wire.give_up)();
-            }
             self.station.on_controller(now, self.found);
             self.due = true;
         }

@@ -76,6 +76,12 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
         }
     }
 
+    /// This is what the leg is asked next.
+    #[must_use]
+    pub fn has_asked(&self, ask: Ask) -> bool {
+        self.asked == Some(ask)
+    }
+
     /// What the leg is asked, once.
     pub fn take_asked(&mut self) -> Option<Ask> {
         self.asked.take()

@@ -231,3 +231,147 @@ fn a_target_that_came_since_the_leg_was_heard_is_in_the_next_order() {
     };
     assert!((position.0 - 0.5).abs() < 1e-6);
 }
+
+#[test]
+fn a_node_that_was_reset_begins_anew_once_however_full_the_bus_is() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x6065, 0, 12_345, 4);
+    bench.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
+    assert_eq!(bench.station.take_store(), Some(Keeping::All));
+    bench.write(1, 0x6065, 0, 1, 4);
+    // Its communication first, then all of it; no mailbox is free for the boot-up message.
+    for command in [130, 129, 129] {
+        bench.station.hear(&Frame::new(0, &[command, 0]), bench.now_us, None, &Nothing);
+    }
+    assert_eq!(bench.station.anew, [true; 2]);
+    bench.station.watch(bench.now_us, &Nothing);
+    assert_eq!(bench.station.anew, [false; 2]);
+    for id in [0x080, 0x201, 0x601, 0x700] {
+        bench.station.hear(&Frame::new(id, &[0; 8]), bench.now_us, None, &Nothing);
+    }
+    assert_eq!(bench.station.anew, [false; 2], "it is not begun again");
+    let boots = bench.run(4).iter().filter(|frame| frame.id() & 0x780 == 0x700).count();
+    assert_eq!((boots, bench.read(1, 0x6065)), (2, 12_345));
+}
+
+#[test]
+fn what_is_stored_while_a_neighbour_begins_anew_is_what_was_kept_of_it() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x6065, 0, 12_345, 4);
+    bench.write(2, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
+    assert_eq!(bench.station.take_store(), Some(Keeping::All));
+    let before = bench.station.kept(0).to_vec();
+    let save = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
+    for frame in [Frame::new(0, &[129, 1]), Frame::new(0x602, &save)] {
+        bench.station.hear(&frame, bench.now_us, None, &Nothing);
+    }
+    assert_eq!(bench.station.take_store(), Some(Keeping::All));
+    assert_eq!(bench.station.kept(0), before);
+}
+
+#[test]
+fn nothing_leaves_for_a_bus_that_is_off_and_what_leaves_afterwards_is_new() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    bench.write(1, 0x1800, 2, 255, 1);
+    bench.station.on_controller(Controller::Off, &Nothing);
+    let request = Frame::new(0x080, &[]);
+    for _ in 0..50 {
+        bench.station.hear(&request, bench.now_us, None, &Nothing);
+        assert_eq!(bench.run(4), []);
+    }
+    bench.drive = DriveState::ReadyToSwitchOn;
+    bench.station.on_controller(Controller::Active, &Nothing);
+    let frames = bench.run(1);
+    let emergencies: Vec<u16> = frames
+        .iter()
+        .filter(|frame| frame.id() == 0x81)
+        .map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]]))
+        .collect();
+    assert_eq!(emergencies, [0x8140, 0]);
+    // The statusword of now, once.
+    let words: Vec<&[u8]> = frames.iter().filter(|frame| frame.id() == 0x181).map(Frame::data).collect();
+    assert_eq!(words.len(), 1, "{frames:?}");
+    assert_eq!(words[0][0] & 0x6F, 0x21);
+}
+
+#[test]
+fn a_request_waits_for_a_step_of_the_drive_and_is_not_lost_to_it() {
+    let mut bench = Bench::new();
+    bench.enable();
+    // Both within one tick: the drive goes down a step, then the update is asked for.
+    let ask = |bench: &mut Bench, command: u8| {
+        let frames = [
+            Frame::new(0x601, &[0x2F, 0x00, 0x21, 1, command, 0, 0, 0]),
+            Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 7, 0, 0, 0]),
+        ];
+        bench.orders.clear();
+        for frame in frames {
+            bench.station.hear(&frame, bench.now_us, None, &Nothing);
+            bench.station.poll(0, bench.now_us, &Nothing);
+        }
+        bench.run(8);
+        bench.orders.iter().filter_map(|order| order.request).collect::<Vec<LegRequest>>()
+    };
+    for (command, asked) in [(3, LegRequest::TakeUpdate), (2, LegRequest::Cancel)] {
+        bench.enable();
+        assert_eq!(bench.drive, DriveState::OperationEnabled);
+        let requests = ask(&mut bench, command);
+        assert_eq!(requests, [LegRequest::Power(PowerRequest::DisableOperation), asked]);
+    }
+}
+
+#[test]
+fn an_identification_that_was_asked_for_on_the_way_up_is_not_done_later() {
+    let mut bench = Bench::new();
+    for word in [6, 7] {
+        bench.write(1, 0x6040, 0, word, 2);
+        bench.write(2, 0x6040, 0, word, 2);
+    }
+    bench.write(1, 0x6040, 0, 15, 2);
+    bench.orders.clear();
+    for (id, data) in
+        [(0x602, [0x2B, 0x40, 0x60, 0, 15, 0, 0, 0]), (0x601, [0x2F, 0x00, 0x21, 1, 1, 0, 0, 0])]
+    {
+        bench.station.hear(&Frame::new(id, &data), bench.now_us, None, &Nothing);
+    }
+    bench.run(8);
+    assert_eq!(bench.drive, DriveState::OperationEnabled);
+    let identifies = |order: &LegOrder<2>| matches!(order.request, Some(LegRequest::Identify { .. }));
+    assert!(!bench.orders.iter().any(identifies));
+    // Asked for again it begins.
+    bench.send(0x601, &[0x2F, 0x00, 0x21, 1, 1, 0, 0, 0]);
+    assert_eq!(bench.orders.iter().filter(|order| identifies(order)).count(), 1);
+}
+
+#[test]
+fn frames_that_were_lost_stop_a_hosts_leg_as_a_lost_bus_does_and_no_one_elses() {
+    for (option, drive) in [
+        (0, DriveState::OperationEnabled),
+        (1, DriveState::OperationEnabled),
+        (2, DriveState::SwitchOnDisabled),
+        (3, DriveState::SwitchOnDisabled),
+    ] {
+        let mut bench = Bench::new();
+        for node in [1, 2] {
+            bench.write(node, 0x6007, 0, option, 2);
+        }
+        bench.enable();
+        assert_eq!(bench.drive, DriveState::OperationEnabled);
+        bench.orders.clear();
+        bench.station.on_controller(Controller::Overrun, &Nothing);
+        bench.station.on_controller(Controller::Active, &Nothing);
+        let frames = bench.run(40);
+        assert_eq!(bench.drive, drive, "{option}");
+        let told = frames.iter().filter(|frame| frame.id() == 0x81 && frame.data()[..2] == [0x10, 0x81]);
+        assert_eq!(told.count(), 1, "8110");
+        // The leg's own reaction, where it is to have one.
+        let fault = bench.orders.iter().find_map(|order| order.faults[0]);
+        assert_eq!(fault, (option == 1).then_some(FaultCode::BusOff));
+    }
+    let mut bench = Bench::new();
+    bench.drive = DriveState::OperationEnabled;
+    bench.station.on_controller(Controller::Overrun, &Nothing);
+    bench.run(40);
+    assert_eq!(bench.drive, DriveState::OperationEnabled);
+}
