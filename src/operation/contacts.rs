@@ -13,7 +13,9 @@
 //! open + start for two seconds                 reset of a fault
 //! ```
 //!
-//! A contact counts once it has been steady for 20 ms; opening the enabling switch counts at once, bounce or not.
+//! A contact counts once it has been steady for 20 ms; opening the enabling switch counts at once, bounce or not. With the switch open the
+//! button counts once it was seen open meanwhile: one that is welded closed neither resets nor takes a reference each time the operator
+//! lets go.
 //! Ticked at [`RATE_HZ`]; what is asked may be refused, and is asked again only by the hand.
 
 use crate::leg::{DriveState, PowerRequest};
@@ -105,7 +107,9 @@ pub struct Operator {
     /// Ticks for which both have been open; the start waits for some of them.
     open: u32,
     trusted: bool,
-    /// Ticks for which the button has been pressed with the switch open.
+    /// The button was open since the switch is.
+    ready: bool,
+    /// Ticks for which the button has been pressed since then.
     pressed: u32,
     /// The way to enabled was begun by this closing of the switch, so many of its steps were asked.
     steps: u8,
@@ -136,7 +140,7 @@ impl Operator {
             self.steps = 0;
             return self.without_the_switch(now, before);
         }
-        self.pressed = 0;
+        (self.ready, self.pressed) = (false, 0);
         let pressed = self.start.closed && !before.1;
         match now.drive {
             Some(DriveState::OperationEnabled) => return pressed.then_some(Ask::Identify),
@@ -174,9 +178,10 @@ impl Operator {
             return Some(stop);
         }
         if self.start.closed {
-            self.pressed = self.pressed.saturating_add(1);
+            self.pressed = self.pressed.saturating_add(u32::from(self.ready));
             return (self.pressed == RESET_TICKS).then_some(Ask::Reset);
         }
+        self.ready = true;
         let short = before.1 && self.pressed > 0 && self.pressed < RESET_TICKS;
         self.pressed = 0;
         (short && now.calibrated && !now.referenced).then_some(Ask::Reference)
@@ -335,6 +340,23 @@ mod tests {
         // Held for long it is a reset, and no reference when it is let go.
         assert!(asked(&mut operator, Situation { start: true, ..stands }, 2 * RESET_TICKS).eq([Ask::Reset]));
         assert_eq!(asked(&mut operator, stands, RATE_HZ).count(), 0);
+    }
+
+    #[test]
+    fn a_button_that_is_welded_closed_asks_for_nothing_when_the_switch_opens() {
+        let stands = Situation { calibrated: true, ..REST };
+        for now in [REST, stands, READY, Situation { blocked: true, ..READY }] {
+            let mut operator = holding();
+            let welded = Situation { start: true, ..now };
+            for _ in 0..3 {
+                let held = Situation { enabling: true, blocked: true, ..welded };
+                assert_eq!(asked(&mut operator, held, RATE_HZ).count(), 0);
+                assert_eq!(asked(&mut operator, welded, 2 * RESET_TICKS).count(), 0, "{now:?}");
+            }
+            // Let go it asks for nothing either, and once it was open it counts again.
+            assert_eq!(asked(&mut operator, now, RATE_HZ).count(), 0, "{now:?}");
+            assert!(asked(&mut operator, welded, 2 * RESET_TICKS).eq([Ask::Reset]), "{now:?}");
+        }
     }
 
     #[test]
