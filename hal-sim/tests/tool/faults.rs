@@ -136,6 +136,14 @@ fn bad_input_names_the_option() {
         ("--hours=-1", "--hours: -1 is not from 0 to 1000"),
         ("--fault C2 --every-tick", "--every-tick: is about the emergency stop"),
         ("--leg mujoco-leg", "has no [joint.motor]"),
+        ("--blind --fault K4", "--blind: --fault K4 leaves no row"),
+        ("--blind --fault sweep --fault pairs", "--blind: --fault sweep --fault pairs leaves no row"),
+        ("--blind --docs README.md", "cannot be used with"),
+        ("--replay 1 --docs README.md", "cannot be used with"),
+        ("--json no-such-folder/faults.json", "no-such-folder/faults.json: cannot be written"),
+        ("--report no-such-folder/faults.html", "no-such-folder/faults.html: cannot be written"),
+        ("--docs no-such-file.md", "no-such-file.md: cannot be read"),
+        ("--docs Cargo.toml", "Cargo.toml: has no `<!-- faults: table -->`"),
     ] {
         let message = scarab(&format!("faults {arguments}"), &[]).refusal();
         assert!(message.contains(words), "{arguments}: {message}");

@@ -19,6 +19,8 @@ use crate::tool::leg_file::LegFile;
 use crate::tool::paper::document;
 use crate::tool::{figures, tables};
 
+/// Kind and name of the table's place in a document.
+const DOCUMENT: [&str; 2] = ["faults", "table"];
 /// More runs of one fault are a mistake.
 const MOST_SEEDS: u64 = 1_000_000;
 
@@ -66,7 +68,7 @@ pub struct FaultsArguments {
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
     /// Put the table into this document, between its markers.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["blind", "replay"])]
     docs: Option<PathBuf>,
 }
 
@@ -112,10 +114,24 @@ impl FaultsArguments {
         self.fault.iter().any(|name| name == kind)
     }
 
+    /// Before hours of runs that nobody could write down.
+    fn check_files(&self) -> Result<(), ToolError> {
+        for path in [&self.json, &self.report].into_iter().flatten() {
+            document::check_writable(path)?;
+        }
+        self.docs.as_ref().map_or(Ok(()), |path| document::check(path, DOCUMENT[0], DOCUMENT[1]))
+    }
+
     fn options(&self) -> Result<CampaignOptions, ToolError> {
         let mut rows = rows(&self.fault, self.full)?;
         if self.blind {
             rows.retain(Entry::can_be_blind);
+            if rows.is_empty() {
+                return Err(ToolError::input(format!(
+                    "--blind: --fault {} leaves no row whose detectors can be switched off",
+                    self.fault.join(" --fault ")
+                )));
+            }
         }
         if self.every_tick && !rows.iter().any(|entry| entry.head().id == "X1") {
             return Err(ToolError::input(
@@ -156,18 +172,13 @@ impl FaultsArguments {
 pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     let options = arguments.options()?;
     let leg = arguments.leg.load()?;
+    arguments.check_files()?;
     let started = Instant::now();
     let found = campaign(&leg, &options)?;
     let injected_s = started.elapsed().as_secs_f64();
     let simulated = if arguments.full && arguments.hours == 0.0 { FULL_HOURS } else { arguments.hours };
     let hours = if simulated > 0.0 { Some(hours(&leg, simulated)?) } else { None };
     let report = CampaignReport::new(&options.rows, &found, hours);
-    if let Some(path) = &arguments.json {
-        write_json(path, &report)?;
-    }
-    if let Some(path) = &arguments.docs {
-        document::replace(path, "faults", "table", &report.markdown())?;
-    }
     tables::print(&report.table())?;
     tables::print(&report.notes())?;
     if !found.left_out.is_empty() {
@@ -185,6 +196,12 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
         for outcome in found.outcomes.iter().chain(&found.trials) {
             tables::print(&format!("{}\n", told(outcome)))?;
         }
+    }
+    if let Some(path) = &arguments.json {
+        write_json(path, &report)?;
+    }
+    if let Some(path) = &arguments.docs {
+        document::replace(path, DOCUMENT[0], DOCUMENT[1], &report.markdown())?;
     }
     if let Some(path) = &arguments.report {
         let page = page(&leg, &report, &found)?;

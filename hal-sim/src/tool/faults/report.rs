@@ -13,6 +13,8 @@ use crate::tool::tables::headed;
 
 /// Failures that are written out.
 const MOST_FAILURES: usize = 100;
+/// Rows with runs in which something harmless happens: to raise anything then is a false alarm. All others only ask what follows a fault.
+const JUDGED: [&str; 3] = ["E2", "J1", "H1"];
 
 /// One row of the catalogue as it was run. The names are an interface.
 #[derive(Clone, Debug, Serialize)]
@@ -29,6 +31,8 @@ pub struct RowReport {
     pub missed: usize,
     /// Runs in which something was raised although nothing was wrong.
     pub false_alarms: usize,
+    /// Whether there are runs in which that could have been.
+    pub judges_false_alarms: bool,
     /// Longest time from the fault to the safe state's first command, ms.
     pub worst_ms: Number,
     /// What it may take, ms.
@@ -85,6 +89,10 @@ pub struct CampaignReport {
     pub failures: Vec<Outcome>,
     /// Seen over seen and missed, over all rows.
     pub diagnostic_coverage: Number,
+    /// Runs of all rows.
+    pub runs: usize,
+    /// Of those, runs in which there was nothing that could be seen.
+    pub undetectable_by_design: usize,
     /// Runs with the emergency stop at every tick, which are among those of X1.
     pub every_tick: usize,
     /// The sweep, and two faults at once.
@@ -119,6 +127,8 @@ impl CampaignReport {
                 outcomes.iter().filter(|outcome| outcome.detected).count(),
                 outcomes.iter().filter(|outcome| !outcome.detected && !outcome.undetectable).count(),
             ),
+            runs: outcomes.len(),
+            undetectable_by_design: outcomes.iter().filter(|outcome| outcome.undetectable).count(),
             rows: heads.iter().map(|head| row_report(head, outcomes)).collect(),
             invariants_broken: all().map(|outcome| outcome.broken.len()).sum(),
             failures: all().filter(failed).take(MOST_FAILURES).cloned().collect(),
@@ -210,7 +220,7 @@ impl RowReport {
             self.missed.to_string(),
             self.undetectable_by_design.to_string(),
             smallest,
-            self.false_alarms.to_string(),
+            if self.judges_false_alarms { self.false_alarms.to_string() } else { "-".into() },
             percent(self.coverage),
         ]
     }
@@ -236,6 +246,11 @@ fn trials_report(kind: &'static str, trials: &[Outcome]) -> Option<TrialsReport>
     })
 }
 
+/// Whether a state is among these; `refused: contact` is another one than `refused`.
+fn names(states: &str, state: &str) -> bool {
+    states.match_indices(state).any(|(at, _)| !states[at + state.len()..].starts_with(':'))
+}
+
 fn row_report(row: &Head, outcomes: &[Outcome]) -> RowReport {
     let of: Vec<&Outcome> = outcomes.iter().filter(|outcome| outcome.fault == row.id).collect();
     let count = |holds: &dyn Fn(&Outcome) -> bool| of.iter().filter(|outcome| holds(outcome)).count();
@@ -257,14 +272,14 @@ fn row_report(row: &Head, outcomes: &[Outcome]) -> RowReport {
         }),
         missed: count(&|outcome| !outcome.detected && !outcome.undetectable),
         false_alarms: count(&|outcome| outcome.false_alarm),
+        judges_false_alarms: JUDGED.contains(&row.id),
         worst_ms: worst.into(),
         deadline_ms: row.deadline_ms.into(),
         state: row.state,
         state_instead: instead(row.id),
         state_reached: count(&|outcome| {
-            let leads = |state: &str| {
-                row.state.contains(state) || instead(row.id).is_some_and(|to| to.contains(state))
-            };
+            let leads =
+                |state: &str| names(row.state, state) || instead(row.id).is_some_and(|to| names(to, state));
             outcome.state.is_some_and(leads)
         }),
         undetectable_by_design: count(&|outcome| outcome.undetectable),
@@ -313,7 +328,11 @@ impl CampaignReport {
         let least = least.map_or_else(String::new, |(share, row)| {
             format!(", least of a row {} ({row})", percent(share.into()))
         });
-        text.push_str(&format!("diagnostic coverage: {}{least}\n", percent(self.diagnostic_coverage)));
+        let unseen = format!("; of {} runs not to be seen: {}", self.runs, self.undetectable_by_design);
+        text.push_str(&format!(
+            "diagnostic coverage: {}{least}{unseen}\n",
+            percent(self.diagnostic_coverage)
+        ));
         text.push_str(&format!(
             "invariants broken: {}; undisturbed motion without an alarm: {:.0} s; trace hash {}\n",
             self.invariants_broken, self.undisturbed_s, self.trace_hash
@@ -346,3 +365,6 @@ pub fn told(outcome: &Outcome) -> String {
         outcome.broken.iter().map(|broken| format!("; {broken}")).collect::<String>(),
     )
 }
+
+#[cfg(test)]
+mod tests;

@@ -2,7 +2,7 @@
 //!
 //! | kind | what |
 //! | --- | --- |
-//! | sweep | each channel of a sensor, each form, lasting or coming and going, at random size, joint and instant |
+//! | sweep | each channel of a sensor, each form, lasting or coming and going, at random size, joint (where there is one each) and instant |
 //! | pairs | two faults, of the catalogue or of the sweep, the second up to 50 ms after the first |
 //!
 //! What is held is what [`Invariants`] hold of every run.
@@ -93,7 +93,13 @@ fn spoilt(dice: &mut Dice, way: u64) -> Injection {
     } else {
         Timing { begin: 0, duration: PATIENCE, on: 1 + dice.below(50), off: 1 + dice.below(200) }
     };
-    Injection { channel, joint: dice.below(JOINTS as u64) as usize, form, timing }
+    let joint = dice.below(JOINTS as u64) as usize;
+    Injection { channel, joint: if is_one_for_all(channel) { 0 } else { joint }, form, timing }
+}
+
+/// What the board has once is spoilt under joint 0, and under no other.
+fn is_one_for_all(channel: Channel) -> bool {
+    matches!(channel, Channel::Bus | Channel::EmergencyStop | Channel::GateFault)
 }
 
 impl Trial {
@@ -230,6 +236,49 @@ impl Trial {
             broken: broken.into_iter().map(with).collect(),
             hash,
             recording: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::campaign::{BASE, begin};
+    use super::*;
+    use crate::tool::leg_file::DEFAULT_LEG;
+    use crate::tool::pair::Context;
+    use crate::tool::simulate::{DriveModel, SimulationOptions};
+
+    /// Seeds of the sweep in which this channel is spoilt and stays so, one for each form.
+    fn lasting(channel: Channel) -> impl Iterator<Item = u64> {
+        (1..=WAYS).filter(move |seed| {
+            let injection = Trial::sweep(*seed).injections[0];
+            injection.channel == channel && injection.timing == Timing::from(0)
+        })
+    }
+
+    #[test]
+    fn what_the_board_has_once_is_spoilt_whatever_the_dice_say() {
+        let once = [Channel::Bus, Channel::EmergencyStop, Channel::GateFault];
+        for seed in 1..=4 * WAYS {
+            let injection = Trial::sweep(seed).injections[0];
+            assert!(injection.joint == 0 || !once.contains(&injection.channel), "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn an_emergency_stop_and_a_gate_driver_s_fault_that_last_raise_something_in_every_run_of_the_sweep() {
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+        let context = Context::<JOINTS, BASE>::new(&leg, &options).expect("the default leg");
+        let mut base = Rig::new(&leg, &context, 1).expect("complete drives");
+        begin(&leg, &mut base).expect("it is enabled");
+        for channel in [Channel::EmergencyStop, Channel::GateFault] {
+            let seeds: Vec<u64> = lasting(channel).collect();
+            assert_eq!(seeds.len() as u64, FORMS);
+            for seed in seeds {
+                let outcome = Trial::sweep(seed).run(&leg, seed, false, &base);
+                assert!(outcome.detected && outcome.broken.is_empty(), "{channel:?}: {outcome:?}");
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Why: what a document says was measured cannot go stale while one command writes it. A place begins with a line
 //! `<!-- KIND: NAME -->` and ends with `<!-- end of NAME -->`; what stands between is replaced, all else stays.
 
+use std::fs::OpenOptions;
 use std::path::Path;
 
 use super::Section;
@@ -18,10 +19,29 @@ pub fn update(path: &Path, sections: &[Section]) -> Result<(), ToolError> {
 
 /// Replaces one place of a document; a document without it is an error.
 pub fn replace(path: &Path, kind: &str, name: &str, content: &str) -> Result<(), ToolError> {
-    let text = replaced(&read(path)?, kind, name, content).ok_or_else(|| {
-        ToolError::input(format!("{}: has no `<!-- {kind}: {name} -->` with its end", path.display()))
-    })?;
+    let text = replaced(&read(path)?, kind, name, content).ok_or_else(|| no_place(path, kind, name))?;
     std::fs::write(path, text).map_err(|error| ToolError::cannot_write(path, &error))
+}
+
+/// Whether a place could be replaced: a document that can be written and has it.
+pub fn check(path: &Path, kind: &str, name: &str) -> Result<(), ToolError> {
+    replaced(&read(path)?, kind, name, "").ok_or_else(|| no_place(path, kind, name))?;
+    check_writable(path)
+}
+
+/// Whether a file can be written: it is opened, and left as it was or absent.
+pub fn check_writable(path: &Path) -> Result<(), ToolError> {
+    let is_new = !path.exists();
+    let opened = OpenOptions::new().append(true).create(true).open(path);
+    opened.map_err(|error| ToolError::cannot_write(path, &error))?;
+    if is_new {
+        std::fs::remove_file(path).map_err(|error| ToolError::cannot_write(path, &error))?;
+    }
+    Ok(())
+}
+
+fn no_place(path: &Path, kind: &str, name: &str) -> ToolError {
+    ToolError::input(format!("{}: has no `<!-- {kind}: {name} -->` with its end", path.display()))
 }
 
 /// A document's text.

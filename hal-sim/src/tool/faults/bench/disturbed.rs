@@ -2,11 +2,11 @@
 //! firmware believes. Ideal drives: what is asked is what becomes of the result.
 //!
 //! A run is dangerous where a model is accepted that predicts an unseen motion's torque worse than [`HARMFUL_PERCENT`] of its mean: that
-//! is missed. A refusal is what has to follow; rows that are set aside are, where the model that is left is good; and a model
-//! that is good although nothing was noticed is a disturbance too small to matter.
+//! is missed. Seen is a refusal, or rows that are set aside where the model that is left is good; a model that is good although nothing was
+//! noticed is a disturbance too small to matter. Told is which of them it was.
 
 use rayon::prelude::*;
-use scarab::ident::Estimator;
+use scarab::ident::{Estimator, Reason, Verdict};
 use scarab::leg::IdentifiedModel;
 use scarab::servo::TorqueModel;
 
@@ -116,17 +116,25 @@ fn judge(
     let shares = pair.leg.identification().solver().map(|solver| solver.record().outliers.disturbed_share);
     let noticed = shares.is_some_and(|shares| shares.iter().any(|share| *share > NOTICED_SHARE));
     let harmless = error.is_some_and(|error| error <= HARMFUL_PERCENT);
-    let said = match head.id {
-        "H2" => "Limit",
-        _ => "refused",
+    let state = match error {
+        // A leg that is another one has to be refused, whatever is set aside.
+        Some(_) => (harmless && noticed && head.id != "H3").then_some("Limit"),
+        None => Some(refused(head, pair.leg.identification().verdict())),
     };
-    // Rows that are set aside are what a push leads to; a leg that is another one has to be refused.
-    let seen = error.is_none() || harmless && noticed && head.id != "H3";
-    let mut found = outcome(head, seed, seen.then_some(said));
+    let seen = state.is_some();
+    let mut found = outcome(head, seed, state);
     found.undetectable = harmless && !seen;
     found.magnitude = magnitude;
     found.hash = format!("{:016x}", error.unwrap_or(-1.0).to_bits());
     Ok(found)
+}
+
+/// Where no model is in use; of a foot on the floor, whether that was the reason, or one of them.
+fn refused(head: &Head, verdict: Option<Verdict>) -> &'static str {
+    match verdict {
+        Some(verdict) if head.id == "H4" && verdict.has(Reason::Contact) => "refused: contact",
+        _ => "refused",
+    }
 }
 
 /// Of a model's torque on the motions that were predicted, against the leg as it is now, in percent of the mean; of the worse

@@ -122,8 +122,8 @@ fn shift(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<O
 
 /// Blind, a count that does not wrap but stays at its end.
 fn one(head: &Head, driven: &[Driven], seed: u64, blind: bool) -> Outcome {
-    let seed = (seed - 1) % OFFSETS;
-    let begin = if seed.is_multiple_of(2) { !(seed / 2) as u16 } else { (seed / 2) as u16 };
+    let place = (seed - 1) % OFFSETS;
+    let begin = if place.is_multiple_of(2) { !(place / 2) as u16 } else { (place / 2) as u16 };
     let same = driven.iter().all(|driven| {
         let first = driven.first.encoder_count;
         let moved = |count: u16| {

@@ -1,4 +1,6 @@
-//! V3: a brake chopper that makes no sense is refused, and no voltage makes a duty that is none.
+//! V3: a brake chopper that makes no sense is refused, and what is no voltage makes no duty.
+//!
+//! Of voltages there is nothing to be seen: that their duties are within bounds is held in every run, and counts for none.
 
 use scarab::motor::{Chopper, GREATEST_BRAKE_DUTY};
 use scarab::units::Volt;
@@ -29,12 +31,27 @@ fn chop(head: &Head, _: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outc
     Ok(seeds.iter().map(|seed| one(head, *seed, blind)).collect())
 }
 
+/// Voltages that are shown to the sound chopper in each run.
+const SHOWN: usize = 16;
 /// What no voltage is.
 const NONE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
 /// Blind, the sound chopper and a sound voltage are shown instead: as if there were no check.
 fn one(head: &Head, seed: u64, blind: bool) -> Outcome {
     let mut dice = Dice::new(head.id, seed);
+    let mut found = outcome(head, seed, judge(&mut dice, blind).then_some("Refuse"));
+    for _ in 0..SHOWN {
+        let volts = dice.uniform(-1e3, 1e3) as f32;
+        let duty = Chopper::new(BRAKE[0], BRAKE[1]).map(|chopper| chopper.duty(Volt(volts)));
+        if !duty.is_some_and(|duty| (0.0..=GREATEST_BRAKE_DUTY).contains(&duty)) {
+            found.broken.push(format!("a duty of {duty:?} at {volts} V"));
+        }
+    }
+    found
+}
+
+/// Whether nonsense was refused.
+fn judge(dice: &mut Dice, blind: bool) -> bool {
     let [begin, full] = BRAKE;
     let none = NONE[dice.below(3) as usize];
     if dice.coin() {
@@ -48,14 +65,9 @@ fn one(head: &Head, seed: u64, blind: bool) -> Outcome {
             _ => [none, full.0],
         };
         let shown = if blind { [begin, full] } else { absurd.map(Volt) };
-        let made = Chopper::new(shown[0], shown[1]);
-        return outcome(head, seed, made.is_none().then_some("Refuse"));
+        return Chopper::new(shown[0], shown[1]).is_none();
     }
-    let volts = if dice.coin() { none } else { dice.uniform(-1e3, 1e3) as f32 };
-    let shown = if blind { full } else { Volt(volts) };
-    let duty = Chopper::new(begin, full).map(|chopper| chopper.duty(shown));
-    let sensible = duty.is_some_and(|duty| (0.0..=GREATEST_BRAKE_DUTY).contains(&duty));
-    // A voltage that is none gives no duty, and is for the axes to refuse.
-    let refused = sensible && (volts.is_finite() || duty == Some(0.0));
-    outcome(head, seed, refused.then_some("Refuse"))
+    // What is no voltage gives no duty, and is for the axes to refuse.
+    let shown = if blind { full } else { Volt(none) };
+    Chopper::new(begin, full).is_some_and(|chopper| chopper.duty(shown) == 0.0)
 }
