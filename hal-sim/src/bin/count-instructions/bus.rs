@@ -44,7 +44,7 @@ impl Bench {
 
     fn hear(&mut self, id: u16, data: &[u8]) {
         let frame = Frame::new(id, data);
-        let (instructions, ()) =
+        let (instructions, _) =
             count(|| black_box(&mut self.node).on_frame(&frame, self.now_us, &mut self.axis));
         self.heard.push(instructions);
     }
