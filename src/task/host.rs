@@ -62,9 +62,11 @@ impl HostLink {
         }
     }
 
-    /// Takes the newest order.
+    /// Takes the newest order; none while a request waits for the operator's hand, which goes first.
     pub fn hear(&mut self, control: &mut Control<JOINTS>) {
-        while let Some(order) = self.end.orders.dequeue() {
+        while self.request.is_none()
+            && let Some(order) = self.end.orders.dequeue()
+        {
             self.commands = order.commands;
             for (joint, code) in order.faults.into_iter().enumerate() {
                 if let Some(code) = code {

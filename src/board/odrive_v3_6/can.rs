@@ -115,8 +115,9 @@ pub fn status() -> Controller {
     let [off, passive] = ERRORS;
     match load(super::settings::can::ESR) {
         errors if errors & off != 0 => Controller::Off,
-        errors if errors & passive != 0 => Controller::Passive,
+        // Before a state that lasts: it would hide what was lost in it.
         _ if LOST.swap(false, Ordering::Relaxed) => Controller::Overrun,
+        errors if errors & passive != 0 => Controller::Passive,
         _ => Controller::Active,
     }
 }
