@@ -14,7 +14,7 @@
 //! patience, in which the duties of the tick before are kept; the second in a row releases. A single step that was not believed is
 //! told with the joint's sample, and three of them in 10 ms are the servo's fault (`safety::Monitor`). A code that stays while its
 //! phase is asked for something else, and shunts that do not begin at zero, release as well ([`ShuntWatch`]). Released stays released
-//! until [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases, switching or not.
+//! until [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases, switching or not; so do two turns without any.
 //!
 //! Once per joint sample the voltages are held against currents and speed ([`ModelWatch`]): an open phase and a drifted zero
 //! release, a frozen counter makes the motor a passive brake ([`Axis::brake`]), since a leg whose encoder is gone should not drop.
@@ -118,6 +118,8 @@ pub struct Axis {
     counter: u16,
     /// Of the counter, to that sample.
     step: i32,
+    /// Of the counter, since the index came last.
+    unindexed: i32,
     /// Within one turn, in the electrical sense.
     place: i32,
     /// Unwrapped, in the joint's sense.
@@ -158,6 +160,7 @@ impl Axis {
             speed: SpeedTracker::at(constants.scale.angle(place).plus(constants.offset)),
             counter: sample.encoder_count,
             step: 0,
+            unindexed: 0,
             place,
             counts: 0,
             measured: Rotating::default(),
@@ -210,7 +213,10 @@ impl Axis {
 
     fn found(&mut self, fault: AxisFault) {
         self.fault = Some(fault);
-        self.lost |= matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters);
+        // A counter that froze may show itself as something else first.
+        let doubted = self.last.enabled && self.model_watch.doubts(&self.constants.model, self.place);
+        self.lost |=
+            doubted || matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters);
     }
 
     fn step(&mut self, sample: &AxisSample, wish: Wish) -> Result<AxisCommand, AxisFault> {
@@ -224,11 +230,15 @@ impl Axis {
             self.step = step;
             self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
             self.place = constants.scale.moved(self.place, constants.counter_sign * step);
-            if let Some(at) = sample.index_count
-                && constants.indexed
-                && wish != Wish::Brake
-                && self.index_distance(at) > INDEX_WIDTH + step.abs() / INDEX_LATENCY
-            {
+            self.unindexed = self.unindexed.saturating_add(step);
+            let is_lost = match sample.index_count {
+                Some(at) => {
+                    self.unindexed = 0;
+                    constants.indexed && self.index_distance(at) > INDEX_WIDTH + step.abs() / INDEX_LATENCY
+                }
+                None => self.unindexed.unsigned_abs() > constants.unindexed,
+            };
+            if is_lost && wish != Wish::Brake {
                 return Err(AxisFault::Encoder);
             }
         }

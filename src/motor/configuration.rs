@@ -151,6 +151,8 @@ pub(super) struct Constants {
     pub offset: ElectricalAngle,
     /// Places count from an index.
     pub indexed: bool,
+    /// Counts within which an index has to come; without one any number.
+    pub unindexed: u32,
     pub counter_sign: i32,
     pub flexion_sign: i32,
     /// Joint's sense to the electrical one.
@@ -177,6 +179,7 @@ impl Constants {
             self.flexion_sign.cast_unsigned(),
             self.scale.counts_per_turn().cast_unsigned(),
             u32::from(self.indexed),
+            self.unindexed,
         ];
         let limits = [
             self.zeros[0],
@@ -214,6 +217,12 @@ impl Constants {
             scale,
             offset: calibration.offset(),
             indexed: calibration.indexed(),
+            // One that was not captured is nobody's fault.
+            unindexed: if calibration.indexed() {
+                scale.counts_per_turn().unsigned_abs() / 8 * 17
+            } else {
+                u32::MAX
+            },
             counter_sign: signs[0],
             flexion_sign: signs[1],
             current_sign: (signs[0] * signs[1]) as f32,

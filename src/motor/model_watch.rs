@@ -9,7 +9,7 @@
 //! r = s - R i - (coupling and back-EMF, where they are not fed forward)                       d and q, each servo period
 //! |r| > V + 0.35 R |i| + |w| (0.2 flux + 0.3 L |i|)     32 periods more often than not         open, or frozen
 //! |mean of r, turned back to the stator, over an electrical turn| > 0.4 V + 0.06 R I           drifted zero
-//! max q - min q > I / 2 since the counter last moved by more than 2 counts                64 periods later: frozen
+//! max q - min q > I / 2 since the counter last moved by more than 2 counts, less what fell within 12 periods      64 periods later: frozen
 //! V = 2 * 4/3 t_d f V_bus                               what dead time and switches take, twice; 0.44 V on the board
 //! ```
 //!
@@ -26,7 +26,8 @@
 //! 16 ms, unless it has more than 100 kg m^2 to move, friction takes more than 42 N m from one side to the other (9 here), what
 //! holds it is stiffer than 1e6 N m/rad (gears have 1e4 to 1e5, a hand 2e3), or a push grows as the torque does, to within friction: with
 //! a third of the limit and 8 ms that happened once in 75 pushes of up to 70 N m. Up to that change, and so up to a torque that is wrong by
-//! 42 N m, a frozen counter is not seen. A rotor that is clamped itself, as on a test bench, is taken for a frozen counter.
+//! 42 N m, a frozen counter is not seen. In the first 3 ms a current that falls does not count: that of a joint that is brought to rest is
+//! given back then, and a leg that was damped hard was taken for one with a frozen counter by that. A rotor that is clamped itself, as on a test bench, is taken for a frozen counter.
 //!
 //! **Open phase** (P1): what is asked of the open phase cannot flow, the integral runs away and passes any limit; without current
 //! nothing is asked and nothing is seen. At rest it may be taken for a frozen counter: two phases brake as well. **Drifted zero** (C1): an offset o of one shunt leaves 2/sqrt(3) |R + j w L| o, at rest in the
@@ -42,7 +43,7 @@ use super::axis::AxisFault;
 use super::configuration::AxisConfiguration;
 use super::{CountScale, CurrentLoop, ElectricalAngle, MotorConstants, Rotating, Sine, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
-use crate::real::{abs, max, min, sqrt};
+use crate::real::{abs, clamp, max, min, sqrt};
 use crate::units::Ampere;
 
 /// Periods of the servo that a residual has to be too large more often than not: 8 ms.
@@ -56,6 +57,8 @@ const STANDSTILL: i32 = 2;
 /// Of the greatest current: a change that no rotor takes without moving, and periods in which it has moved: 16 ms.
 const SWING_SHARE: f32 = 0.5;
 const SWING_PATIENCE: u8 = 64;
+/// Periods within which a joint that came to rest gives back the current that braked it: 3 ms.
+const SETTLED: u8 = 12;
 /// Both halves of the vector that dead time makes, and as much again.
 const DEAD_VECTORS: f32 = 2.0 * 4.0 / 3.0;
 /// Shares by which constants may be off.
@@ -173,6 +176,8 @@ pub struct ModelWatch {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Still {
     place: i32,
+    /// Periods at that place, no more than it takes to settle.
+    periods: u8,
     least_a: f32,
     most_a: f32,
     /// Periods since the current changed too much.
@@ -180,14 +185,25 @@ struct Still {
 }
 
 impl Still {
-    const fn at(place: i32) -> Self {
-        Self { place, least_a: f32::INFINITY, most_a: f32::NEG_INFINITY, overdue: 0 }
+    const fn at(place: i32, current_a: f32) -> Self {
+        Self { place, periods: 0, least_a: current_a, most_a: current_a, overdue: 0 }
     }
 
     /// One servo period: whether nothing moved although it should have.
     fn look(&mut self, limits: &ModelLimits, place: i32, current_a: f32) -> bool {
         if !limits.is_still(place, self.place) {
-            *self = Self::at(place);
+            *self = Self::at(place, current_a);
+        }
+        if self.periods < SETTLED {
+            self.periods += 1;
+            // As near to nothing as it has come.
+            let least_a = if self.least_a < 0.0 {
+                clamp(current_a, self.least_a, 0.0)
+            } else {
+                clamp(current_a, 0.0, self.least_a)
+            };
+            (self.least_a, self.most_a) = (least_a, least_a);
+            return false;
         }
         self.least_a = min(self.least_a, current_a);
         self.most_a = max(self.most_a, current_a);
@@ -207,9 +223,16 @@ impl ModelWatch {
         way: 0.0,
         periods: 0,
         angle: None,
-        still: Still::at(0),
+        still: Still::at(0, 0.0),
         square: 0.0,
     };
+
+    /// Whether the counter has stood still since voltages and currents no longer agreed: whatever else is found then, the place cannot be
+    /// believed.
+    #[must_use]
+    pub fn doubts(&self, limits: &ModelLimits, place: i32) -> bool {
+        self.suspicion > 0 && limits.is_still(place, self.place)
+    }
 
     /// Electrical speed of which the last period's residual would be the back-EMF, rad/s.
     #[must_use]

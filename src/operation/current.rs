@@ -30,6 +30,9 @@ const LATE_PERIODS: u32 = 3;
 /// (0.1 ms). In 2 ms no motor goes half of the counter's range.
 const CERTAIN_PERIODS: u32 = CURRENT_RATE_HZ / 500;
 
+/// So many periods in a row without a conversion of the bus voltage are too many.
+const UNCONVERTED: u8 = 2;
+
 /// What level 0 needs of a board. Every method answers at once.
 pub trait CurrentBoard {
     /// Why nothing may be enabled: the interlock's bits.
@@ -75,6 +78,8 @@ pub struct Tick {
     pub gate_fault: bool,
     /// Both of the axis' shunts were converted.
     pub complete: bool,
+    /// Bus voltage and temperatures were, since the last tick of this axis; asked of the first axis alone.
+    pub supply: bool,
     /// Of the axis.
     pub sample: AxisSample,
 }
@@ -96,6 +101,8 @@ pub struct CurrentLoops<const N: usize> {
     /// Ticks of the clock between two of one axis.
     period: NonZeroU32,
     servo: ServoWatch,
+    /// Periods without a conversion of the bus voltage.
+    unconverted: u8,
     /// Of the brake resistor, if there is one.
     chopper: Option<Chopper>,
     budget: BrakeBudget,
@@ -112,7 +119,8 @@ impl<const N: usize> CurrentLoops<N> {
         volt_per_code: Volt,
     ) -> Self {
         let axes = stages.map(|stage| AxisLoop { stage, ticks: 0, last: None, watch: TickWatch::default() });
-        Self { axes, period, servo: ServoWatch::default(), chopper, budget: BrakeBudget::FULL, volt_per_code }
+        let servo = ServoWatch::default();
+        Self { axes, period, servo, unconverted: 0, chopper, budget: BrakeBudget::FULL, volt_per_code }
     }
 
     /// What an axis does.
@@ -132,6 +140,13 @@ impl<const N: usize> CurrentLoops<N> {
                 false => chopper.duty(self.volt_per_code * f32::from(tick.sample.bus_code)),
             };
             board.set_brake(self.budget.spend(wanted));
+        }
+        if axis == 0 {
+            // Who does not know the bus cannot brake into it. One may be missing: the first of all, and the first after an erase.
+            self.unconverted = if tick.supply { 0 } else { self.unconverted.saturating_add(1) };
+            if self.unconverted >= UNCONVERTED {
+                board.raise(Cause::Conversion.bit());
+            }
         }
         self.look_at_the_others(axis, tick.now, board);
         let all_run = self.axes.iter().all(|axis| axis.stage.is_running());

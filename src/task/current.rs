@@ -55,6 +55,7 @@ impl Current {
             emergency_stop: contacts::emergency_stop(),
             gate_fault: contacts::gate_fault(),
             complete,
+            supply: axis != 0 || converter::supply_finished(),
             sample: AxisSample {
                 shunt_codes: converter::shunts(axis),
                 bus_code: bus,

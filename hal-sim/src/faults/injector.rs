@@ -40,6 +40,8 @@ pub enum Channel {
     Thermistor,
     /// A shunt's conversion does not end.
     Conversion,
+    /// Those of bus voltage and thermistors do not, and their codes stay as they are.
+    SupplyConversion,
     /// An axis' tick does not come.
     Tick,
     /// The servo does not come to its tick.

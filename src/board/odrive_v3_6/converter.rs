@@ -19,6 +19,15 @@ pub fn finished() -> [Option<bool>; 2] {
     [JEOC, EOC].map(|flag| (status & flag != 0).then_some(other & flag != 0))
 }
 
+/// Whether bus voltage and thermistors were converted since this was asked last. Their scan ends after the shunts' of axis 0, so in its
+/// interrupt it is the one before that is seen.
+#[inline(always)]
+pub fn supply_finished() -> bool {
+    let seen = load(ADC1 + SR) & JEOC;
+    store(ADC1 + SR, cleared(seen));
+    seen != 0
+}
+
 /// Codes of the shunts of B and C of an axis.
 #[inline(always)]
 pub fn shunts(axis: usize) -> [u16; 2] {

@@ -85,7 +85,7 @@ fn the_voltage_is_turned_to_where_the_rotor_will_be_in_the_middle_of_its_period(
         let mut sample = bench.sample;
         sample.shunt_codes = bench.axis.constants.zeros.map(|zero| (zero + 0.5) as u16);
         sample.index_count = None;
-        for _ in 0..2400 {
+        for _ in 0..1200 {
             bench.axis.tick(&sample, AxisRequest::RELEASED);
             sample.encoder_count = sample.encoder_count.wrapping_add(counts_per_tick as u16);
         }
@@ -252,6 +252,32 @@ fn an_index_away_from_its_place_is_a_lost_place() {
             }
         }
     }
+}
+
+#[test]
+fn two_turns_without_an_index_are_a_lost_place_where_there_was_one() {
+    // A turn takes 3,016 ticks.
+    for (speed, ticks, lost) in [(50.0, 5000, false), (50.0, 9000, true), (-50.0, 9000, true)] {
+        for request in [ask(5.0), AxisRequest::RELEASED] {
+            let mut bench = Bench::at(speed, &CONFIGURATION);
+            for _ in 0..ticks {
+                bench.sample.index_count = None;
+                bench.tick(request);
+            }
+            assert_eq!(bench.axis.fault(), lost.then_some(AxisFault::Encoder), "{speed} {ticks}");
+            assert_eq!(bench.axis.clear_fault(), !lost);
+        }
+    }
+    // Moved to and fro within a turn there is nothing to miss.
+    let mut bench = Bench::at(50.0, &CONFIGURATION);
+    for way in 0..40 {
+        bench.motor.speed = if way % 2 == 0 { 50.0 } else { -50.0 };
+        for _ in 0..2000 {
+            bench.sample.index_count = None;
+            bench.tick(ask(0.0));
+        }
+    }
+    assert_eq!(bench.axis.fault(), None);
 }
 
 #[test]

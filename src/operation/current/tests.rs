@@ -97,7 +97,8 @@ impl Bench {
         for (axis, motor) in self.motors.iter_mut().enumerate() {
             let sample = motor.period(AxisCommand::RELEASED);
             let now = self.now;
-            let tick = Tick { now, emergency_stop: false, gate_fault: false, complete: !torn, sample };
+            let tick =
+                Tick { now, emergency_stop: false, gate_fault: false, complete: !torn, supply: true, sample };
             self.loops.tick(axis, &tick, &mut self.board);
         }
     }
@@ -223,8 +224,25 @@ fn the_emergency_stop_counts_while_the_flash_is_written() {
         emergency_stop: true,
         gate_fault: false,
         complete: true,
+        supply: true,
         sample: bench.motors[0].sample(),
     };
     bench.loops.tick(0, &tick, &mut bench.board);
     assert_eq!(bench.board.causes, Cause::Storing.bit() | Cause::EmergencyStop.bit());
+}
+
+#[test]
+fn a_bus_voltage_that_is_no_longer_converted_releases_at_the_second_period() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    let mut causes = Vec::new();
+    for supply in [false, true, false, false] {
+        let sample = bench.motors[0].sample();
+        let tick =
+            Tick { now: bench.now, emergency_stop: false, gate_fault: false, complete: true, supply, sample };
+        bench.loops.tick(0, &tick, &mut bench.board);
+        bench.now += PERIOD.get();
+        causes.push(bench.board.causes);
+    }
+    // The first of all is not missed.
+    assert_eq!(causes, [0, 0, 0, Cause::Conversion.bit()]);
 }

@@ -10,7 +10,7 @@
 
 use scarab::bus::drive::{AxisConstants, Mode};
 use scarab::bus::station::{Keeping, LegRequest, LegTold, Station};
-use scarab::bus::{Frame, Identity, Node, NodeId, Storing};
+use scarab::bus::{Controller, Frame, Identity, Node, NodeId, Storing};
 use scarab::leg::{ControlRequest, Fault, JointStatus};
 use scarab::safety::PowerRequest;
 use scarab::servo::SERVO_RATE_HZ;
@@ -58,7 +58,26 @@ fn own_number(first: u8, joint: usize) -> NodeId {
     NodeId::new(first.saturating_add(joint as u8)).unwrap_or(FIRST)
 }
 
+/// Nodes and axes of which nothing was kept.
+fn station<const N: usize, const B: usize>(context: &Context<N, B>, first: u8) -> Station<N, LOG> {
+    let configuration = &context.configuration;
+    let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
+    let constants = configuration.joints.each_ref().map(|joint| AxisConstants {
+        rated_torque: joint.limits().torque_cap(),
+        rated_current: joint.current,
+        modes,
+    });
+    Station::new(
+        core::array::from_fn(|joint| own_number(first, joint)),
+        Identity::scarab(u32::from(first), "simulated"),
+        constants,
+        configuration.plan,
+        configuration.swarm_seed,
+    )
+}
+
 /// Firmware, plant and nodes of a leg of `N` joints.
+#[derive(Clone, Debug)]
 pub struct Board<const N: usize, const B: usize> {
     /// Firmware and plant.
     pub rig: Rig<N, B>,
@@ -70,6 +89,10 @@ pub struct Board<const N: usize, const B: usize> {
     has_kept: bool,
     /// The accepted model is in the memory.
     model_kept: bool,
+    /// How the controller does.
+    controller: Controller,
+    /// Number of the first node, unless the memory says otherwise.
+    first: u8,
 }
 
 impl<const N: usize, const B: usize> Board<N, B> {
@@ -83,24 +106,30 @@ impl<const N: usize, const B: usize> Board<N, B> {
     ) -> Result<Self, ToolError> {
         let mut rig = Rig::new(leg, &context, seed)?;
         hold_the_switch(&mut rig);
-        let configuration = &context.configuration;
-        let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
-        let constants = configuration.joints.each_ref().map(|joint| AxisConstants {
-            rated_torque: joint.limits().torque_cap(),
-            rated_current: joint.current,
-            modes,
-        });
-        let station = Station::new(
-            core::array::from_fn(|joint| own_number(first, joint)),
-            Identity::scarab(u32::from(first), "simulated"),
-            constants,
-            configuration.plan,
-            configuration.swarm_seed,
-        );
+        let station = station(&context, first);
         let mailboxes = core::array::from_fn(|_| Mailbox::default());
-        let mut board = Self { rig, mailboxes, station, memory, context, has_kept: false, model_kept: false };
+        let mut board = Self {
+            rig,
+            mailboxes,
+            station,
+            memory,
+            context,
+            has_kept: false,
+            model_kept: false,
+            controller: Controller::Active,
+            first,
+        };
         board.recall();
         Ok(board)
+    }
+
+    /// The power was away and is back: everything is forgotten but what the memory holds.
+    pub fn power_on(&mut self) {
+        self.rig.power_on();
+        self.station = station(&self.context, self.first);
+        self.mailboxes.iter_mut().for_each(Mailbox::clear);
+        (self.controller, self.model_kept) = (Controller::Active, false);
+        self.recall();
     }
 
     /// What the memory holds, as after the start; what it holds of another leg, or damaged, is said and left.
@@ -119,6 +148,9 @@ impl<const N: usize, const B: usize> Board<N, B> {
 
     /// A frame on the bus; the node that sent it does not hear it.
     pub fn hear(&mut self, frame: &Frame, now_ns: u64, sender: Option<usize>) {
+        if self.controller == Controller::Off {
+            return;
+        }
         self.station.hear(frame, now_ns / 1000, sender, self.rig.leg.identification());
         if let Some(keeping) = self.station.take_store() {
             self.keep(keeping);
@@ -127,6 +159,9 @@ impl<const N: usize, const B: usize> Board<N, B> {
 
     /// What the nodes have to say goes to their mailboxes.
     pub fn speak(&mut self, now_ns: u64) {
+        if self.controller == Controller::Off {
+            return;
+        }
         for (joint, mailbox) in self.mailboxes.iter_mut().enumerate() {
             while mailbox.len() < MAILBOXES {
                 match self.station.poll(joint, now_ns / 1000, self.rig.leg.identification()) {
@@ -137,11 +172,24 @@ impl<const N: usize, const B: usize> Board<N, B> {
         }
     }
 
-    /// One servo tick of the leg.
-    pub fn tick(&mut self) {
+    /// What the controller does from now on, and whether the nodes are told; one that is off the bus neither hears nor speaks.
+    pub fn set_controller(&mut self, controller: Controller, told: bool) {
+        self.controller = controller;
+        if controller == Controller::Off {
+            self.mailboxes.iter_mut().for_each(Mailbox::clear);
+        }
+        if told {
+            self.station.on_controller(controller, self.rig.leg.identification());
+        }
+    }
+
+    /// One servo tick of the leg; each of its PWM periods is shown when it is over.
+    pub fn tick(&mut self, now_ns: u64, mut show: impl FnMut(&Rig<N, B>)) {
+        self.station.watch(now_ns / 1000, self.rig.leg.identification());
         self.exchange();
         for _ in 0..PERIODS_PER_TICK {
             self.rig.advance();
+            show(&self.rig);
         }
         if let Some(logged) = self.rig.output.as_ref().and_then(|output| output.logged) {
             self.station.log(&logged);

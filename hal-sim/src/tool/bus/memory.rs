@@ -20,7 +20,7 @@ pub const BYTES: usize = SECTOR * SECTORS;
 type Cells = Flash<SECTOR, SECTORS>;
 
 /// The flash of one board.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Memory {
     flash: Option<Cells>,
 }
@@ -45,6 +45,35 @@ impl Memory {
         let told = ask(&mut store);
         self.flash = Some(store.into_flash());
         Some(told)
+    }
+
+    /// The power fails when so many more bytes have been programmed or erased; `None`: it is there.
+    pub fn fail_after(&mut self, bytes: Option<u64>) {
+        if let Some(flash) = &mut self.flash {
+            flash.fail_after(bytes);
+        }
+    }
+
+    /// Bytes programmed or erased so far, and sectors erased.
+    #[must_use]
+    pub fn worked(&self) -> (u64, u32) {
+        self.flash.as_ref().map_or((0, 0), |flash| (flash.worked(), flash.erasures().iter().sum()))
+    }
+
+    /// What is kept under the model's key, whoever's it is; `None` where nothing is, or nothing that can be read.
+    pub fn any_model<const N: usize>(&mut self) -> Option<KeptModel<N>> {
+        self.with(|store| block_on(store.load::<KeptModel<N>>(Key::Model)))?.ok().flatten()
+    }
+
+    /// Keeps any model.
+    pub fn keep_any<const N: usize>(&mut self, state: DriveState, kept: &KeptModel<N>) -> bool {
+        let Some(permit) = Permit::of(state) else { return false };
+        self.with(|store| block_on(store.save(&permit, Key::Model, kept))).is_some_and(|saved| saved.is_ok())
+    }
+
+    /// The bytes of the flash, to be spoilt.
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        self.flash.as_mut().map_or(&mut [], Cells::bytes_mut)
     }
 
     /// The bytes of the flash.

@@ -4,11 +4,13 @@
 //! | --- | --- |
 //! | [`board`] | firmware and plant of a leg behind its nodes |
 //! | [`wire`], [`network`] | arbitration and bits; several legs and a host on one wire |
+//! | [`host`] | a host that moves a leg, and falls silent where it is told to |
 //! | [`slcan`], [`server`] | the port at which host software speaks to it |
 //! | [`memory`] | what a board remembers |
 //! | [`serve`] | all of it, at the pace of a clock |
 
 pub mod board;
+pub mod host;
 pub mod memory;
 pub mod network;
 pub mod serve;

@@ -4,12 +4,17 @@ use scarab::bus::Frame;
 
 use super::board::{Board, TICK_NS};
 use super::wire::{Mailbox, Sent, Wire};
+use crate::tool::faults::rig::Rig;
 
 /// Everything on one bus.
+#[derive(Clone, Debug)]
 pub struct Network<const N: usize, const B: usize> {
     boards: Vec<Board<N, B>>,
     /// Of the host's adapter.
     host: Mailbox,
+    /// A node that always has this to send, and its controller.
+    babble: Option<Frame>,
+    babbler: Mailbox,
     wire: Wire,
     now_ns: u64,
 }
@@ -18,7 +23,14 @@ impl<const N: usize, const B: usize> Network<N, B> {
     /// These boards on a wire of this bit rate.
     #[must_use]
     pub fn new(boards: Vec<Board<N, B>>, bits_per_s: u64) -> Self {
-        Self { boards, host: Mailbox::in_order(), wire: Wire::new(bits_per_s), now_ns: 0 }
+        Self {
+            boards,
+            host: Mailbox::in_order(),
+            babble: None,
+            babbler: Mailbox::default(),
+            wire: Wire::new(bits_per_s),
+            now_ns: 0,
+        }
     }
 
     /// A frame of the host's.
@@ -31,6 +43,12 @@ impl<const N: usize, const B: usize> Network<N, B> {
         self.host.push(frame, at_ns);
     }
 
+    /// From now on another node sends this as often as the wire lets it; or no longer does.
+    pub fn babble(&mut self, frame: Option<Frame>) {
+        self.babble = frame;
+        self.babbler.clear();
+    }
+
     /// Frames of the host's that have not been sent yet.
     #[must_use]
     pub fn waiting(&self) -> usize {
@@ -38,14 +56,24 @@ impl<const N: usize, const B: usize> Network<N, B> {
     }
 
     /// One servo tick of all legs and what the wire carries in it; every frame is shown, the host's (`sender` 0) as well.
-    pub fn tick(&mut self, mut show: impl FnMut(&Sent)) {
-        self.boards.iter_mut().for_each(Board::tick);
-        let end_ns = self.now_ns + TICK_NS;
-        let mut now_ns = self.now_ns;
+    pub fn tick(&mut self, show: impl FnMut(&Sent)) {
+        self.tick_watched(show, |_| {});
+    }
+
+    /// The same; every PWM period of every leg is shown as well.
+    pub fn tick_watched(&mut self, mut show: impl FnMut(&Sent), mut watch: impl FnMut(&Rig<N, B>)) {
+        let now_ns = self.now_ns;
+        self.boards.iter_mut().for_each(|board| board.tick(now_ns, &mut watch));
+        let end_ns = now_ns + TICK_NS;
+        let mut now_ns = now_ns;
         loop {
             self.boards.iter_mut().for_each(|board| board.speak(now_ns));
             let nodes = self.boards.iter_mut().flat_map(|board| &mut board.mailboxes);
+            if let Some(frame) = self.babble.filter(|_| self.babbler.is_empty()) {
+                self.babbler.push(frame, now_ns);
+            }
             let mut mailboxes: Vec<&mut Mailbox> = core::iter::once(&mut self.host).chain(nodes).collect();
+            mailboxes.push(&mut self.babbler);
             let Some(sent) = self.wire.advance(end_ns, &mut mailboxes) else { break };
             now_ns = now_ns.max(sent.end_ns);
             for (place, board) in self.boards.iter_mut().enumerate() {

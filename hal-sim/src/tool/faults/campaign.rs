@@ -274,6 +274,7 @@ impl Setting<'_> {
             by_design: false,
             patience: 4,
             within_ms: None,
+            turns: 1.1,
         };
         Job::Row { row, scenario, seed: period, brief: true }
     }

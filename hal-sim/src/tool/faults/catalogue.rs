@@ -132,6 +132,8 @@ pub struct Scenario {
     pub patience: u64,
     /// Instead of the row's deadline, ms.
     pub within_ms: Option<f64>,
+    /// Turns of the rotor within which it is seen, of a row that has no deadline.
+    pub turns: f64,
 }
 
 /// A row of the catalogue.

@@ -27,6 +27,7 @@ pub const fn one(injection: Injection, expected: Expected) -> Scenario {
         by_design: false,
         patience: PERIODS_PER_S / 10,
         within_ms: None,
+        turns: 1.1,
     }
 }
 

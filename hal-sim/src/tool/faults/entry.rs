@@ -39,9 +39,10 @@ pub enum Entry {
 }
 
 /// The catalogue's order; what is not here comes last.
-const ORDER: [&str; 31] = [
-    "E1", "E2", "E3", "E4", "E5", "C1", "C2", "C3", "C4", "P1", "P2", "V1", "V2", "V3", "T1", "N1", "X1",
-    "X2", "K1", "K2", "K3", "K4", "M1", "M2", "J1", "J2", "H1", "H2", "H4", "H3", "I1",
+const ORDER: [&str; 39] = [
+    "E1", "E2", "E3", "E4", "E5", "C1", "C2", "C3", "C4", "P1", "P2", "V1", "V2", "V3", "T1", "N1", "B1",
+    "B2", "B3", "B4", "X1", "X2", "X3", "K1", "K2", "K3", "K4", "M1", "M2", "F1", "F2", "F3", "J1", "J2",
+    "H1", "H2", "H4", "H3", "I1",
 ];
 
 impl Entry {
@@ -83,8 +84,15 @@ impl Entry {
 #[must_use]
 pub fn instead(id: &str) -> Option<&'static str> {
     match id {
-        // Damping needs the rotor's angle.
-        "E4" => Some("Short"),
+        // A host that others' frames keep from being heard is lost.
+        "B4" => Some("Damp"),
+        // A motor that is too fast to be shorted is released.
+        "E1" => Some("Off"),
+        // Damping needs the rotor's angle; the rest as E1.
+        "E4" => Some("Short, Off"),
+        // While a joint hardly moves, a current that is wrong or does not flow looks like a counter that stands still: the motors are
+        // shorted, with the bound of speed that any short has.
+        "C1" | "C3" | "P1" => Some("Short"),
         // A servo that does not answer cannot damp.
         "K1" => Some("Off"),
         // An axis whose gains are not what they were cannot damp.

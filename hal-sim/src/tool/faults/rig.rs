@@ -258,12 +258,17 @@ impl<const N: usize, const B: usize> Rig<N, B> {
                 continue;
             }
             self.ports.ticks[joint] = self.ports.ticks[joint].wrapping_add(1);
+            let supply = !self.injector.happens(Channel::SupplyConversion, 0, now);
+            if !supply {
+                sample.bus_code = self.bus_code;
+            }
             (self.bus_code, self.ports.encoders[joint]) = (sample.bus_code, sample.encoder_count);
             let tick = Tick {
                 now: (now as u32).wrapping_mul(CYCLES.get()).wrapping_add(joint as u32 * CYCLES.get() / 4),
                 emergency_stop,
                 gate_fault,
                 complete: !self.injector.happens(Channel::Conversion, joint, now),
+                supply,
                 sample: *sample,
             };
             self.tick(joint, &tick);

@@ -7,6 +7,7 @@ use scarab::safety::{DriveState, FaultCode};
 use super::aftermath::{RESET, RESET_EVERY, hand, leads_to};
 use super::catalogue::{Event, Expected, JOINTS, Onset, Row, Scenario};
 use super::dice::Dice;
+use super::entry::instead;
 use super::event::apply;
 use super::invariants::{Invariants, Scope};
 pub use super::outcome::{Manner, Outcome};
@@ -22,6 +23,8 @@ mod keep;
 const AFTERWARDS: u64 = PERIODS_PER_S / 50;
 /// A machine that was restarted, for so long: a switch that is opened and closed.
 const REFUSED: u64 = PERIODS_PER_S / 2;
+/// Periods within which a current that falls is none of a swing: 3 ms from when the counter is seen to stand still.
+const SETTLED: u64 = PERIODS_PER_S * 36 / 10_000;
 /// Hands at the contacts go on for so long.
 const HANDS: u64 = 6 * PERIODS_PER_S;
 
@@ -161,7 +164,13 @@ impl<'a, const B: usize> Watched<'a, B> {
         let step = |shunt: usize| self.steepest[shunt].max((phases[shunt] - self.before[shunt]).abs());
         (self.steepest, self.before) = ([0, 1].map(step), phases);
         let asked = self.rig.asked(self.joint());
-        self.swing = [self.swing[0].min(asked), self.swing[1].max(asked)];
+        self.swing = if self.rig.period > self.begun + SETTLED {
+            [self.swing[0].min(asked), self.swing[1].max(asked)]
+        } else {
+            // A joint that is brought to rest gives back the current that braked it.
+            let before = if self.swing[0].is_finite() { self.swing[0] } else { asked };
+            [asked.clamp(before.min(0.0), before.max(0.0)); 2]
+        };
         match (self.onset, self.has_begun()) {
             (None, true) => self.onset = Some(self.rig.period),
             // What is only a fault while something holds, and it does no more.
@@ -277,18 +286,24 @@ impl<'a, const B: usize> Watched<'a, B> {
         if let (Some(state), Some(code)) = (seen, alarm) {
             self.judge(state, code);
         }
-        let alarm = alarm.map(FaultCode::name);
         self.watch_on(seen);
         if self.scenario.expected == Expected::Rejected {
             // One wrong reading stops nobody.
             false_alarm = self.rig.alarm().is_some();
         }
+        // What came before there was anything to see is only this row's if its own detectors spoke.
+        let own = alarm.is_none_or(|code| self.row.codes.contains(&code));
+        let early = self.onset.is_none() && !own;
+        let elsewhere = !early && seen.is_some_and(|state| !self.leads_to(state));
+        false_alarm |= self.is_only_pushed() && alarm.is_some_and(|code| !self.tells_of_a_push(code));
+        let alarm = alarm.map(FaultCode::name);
         let onset = self.onset.map_or(safe, |onset| onset.min(safe));
         let after_ms = seen.map(|_| (safe - onset) as f64 * PERIOD_MS);
         let in_time = after_ms.is_some_and(|after| after <= self.deadline_ms() + 1e-9);
-        let nothing_came = self.onset.is_none() && seen.is_none();
+        let nothing_came = self.onset.is_none() && (seen.is_none() || early);
         let stood = self.row.deadline_ms.is_infinite() && !self.has_turned();
-        let undetectable = !in_time && (self.scenario.by_design || nothing_came || stood);
+        let in_time = in_time && !early && !elsewhere;
+        let undetectable = !in_time && !elsewhere && (self.scenario.by_design || nothing_came || stood);
         Outcome {
             fault: self.row.id,
             seed: self.seed,
@@ -314,13 +329,38 @@ impl<'a, const B: usize> Watched<'a, B> {
         since > 2.0 * self.deadline_ms() + 1.0
     }
 
-    /// Some rotor made a whole turn, and a tenth, since the injection.
+    /// The rotor made as many turns since the injection as it may take.
     fn has_turned(&self) -> bool {
         let position = self.rig.world.anatomical_position();
         let drives = self.rig.world.complete_drives();
         let joint = self.scenario.injections[0].map_or(0, |injection| injection.joint);
         let ratio = drives.map_or(1.0, |drives| drives.axes()[joint].description().ratio);
-        (position[joint] - self.angles[joint]).abs() * ratio > 1.1 * core::f64::consts::TAU
+        (position[joint] - self.angles[joint]).abs() * ratio > self.scenario.turns * core::f64::consts::TAU
+    }
+
+    /// The catalogue's state, or what the firmware does instead.
+    fn leads_to(&self, state: &str) -> bool {
+        self.row.state.contains(state) || instead(self.row.id).is_some_and(|to| to.contains(state))
+    }
+
+    /// Nothing of the machine is broken.
+    fn is_only_pushed(&self) -> bool {
+        matches!(self.scenario.event, Event::Kick(..) | Event::Push(..) | Event::Hold(..) | Event::Touch(_))
+    }
+
+    /// What a push alone may lead to; anything else says that a sound part is broken. A kick may hold the other joint where it is while its
+    /// torque grows, and that looks like a frozen counter.
+    fn tells_of_a_push(&self, code: FaultCode) -> bool {
+        use FaultCode as Code;
+        match code {
+            Code::PositionLimit
+            | Code::Overspeed
+            | Code::Overcurrent
+            | Code::BusVoltage
+            | Code::FollowingError => true,
+            Code::EncoderFrozen => matches!(self.scenario.event, Event::Kick(..)),
+            _ => false,
+        }
     }
 
     /// Of several faults the one that counts has not come yet.

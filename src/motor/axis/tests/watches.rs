@@ -67,7 +67,7 @@ fn a_counter_that_stands_still_while_the_current_swings_is_frozen_at_any_speed()
             let mut bench = Bench::settled(speed, 4.0);
             let count = bench.sample.encoder_count;
             let freeze = |sample: &mut AxisSample| (sample.encoder_count, sample.index_count) = (count, None);
-            assert_eq!(bench.until_fault(ask(4.0), 4, freeze), None, "{speed} rad/s");
+            assert_eq!(bench.until_fault(ask(4.0), 16, freeze), None, "{speed} rad/s");
             let found = bench.until_fault(ask(4.0 - swing), FIFTY_MS, freeze);
             assert_eq!(found.is_some(), seen, "{speed} rad/s, {swing} A: {found:?}");
             if let Some((periods, fault)) = found {
@@ -76,6 +76,11 @@ fn a_counter_that_stands_still_while_the_current_swings_is_frozen_at_any_speed()
                 assert_eq!(bench.tick(ask(4.0)), AxisCommand::BRAKE);
             }
         }
+        // A joint that is brought to rest gives back what braked it.
+        let mut bench = Bench::settled(if speed == 0.0 { 2.0 } else { speed }, -30.0);
+        let count = bench.sample.encoder_count;
+        let freeze = |sample: &mut AxisSample| (sample.encoder_count, sample.index_count) = (count, None);
+        assert_eq!(bench.until_fault(ask(6.0), FIFTY_MS, freeze), None, "{speed} rad/s");
         // A rotor that turns however little is none.
         let mut bench = Bench::settled(if speed == 0.0 { 0.3 } else { speed }, 4.0);
         for current in [-30.0, 30.0, -38.0] {

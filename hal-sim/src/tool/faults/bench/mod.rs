@@ -5,7 +5,12 @@
 
 mod calibration;
 mod command;
+mod cut;
 mod disturbed;
+mod hosted;
+mod hostile;
+mod kept;
+mod lost;
 pub mod offsets;
 mod parts;
 mod search;
@@ -32,7 +37,7 @@ pub struct Bench {
 }
 
 /// All of them.
-pub static BENCHES: [Bench; 10] = [
+pub static BENCHES: [Bench; 18] = [
     offsets::BENCH,
     calibration::BENCH,
     start::ZEROS,
@@ -43,6 +48,14 @@ pub static BENCHES: [Bench; 10] = [
     disturbed::CONTACT,
     disturbed::OTHER_LEG,
     search::BENCH,
+    lost::HOST_LOST,
+    lost::BUS_LOST,
+    hostile::FRAMES_BENCH,
+    hostile::BABBLE,
+    cut::BENCH,
+    kept::CUT,
+    kept::ROT,
+    kept::ARMED,
 ];
 
 /// What came of a run: `state` where it was made safe, and nothing where it was not.

@@ -24,7 +24,7 @@ pub static ROWS: [Row; 3] = [
     Row {
         id: "C3",
         fault: "conversion stuck or missing",
-        detector: "same code while another current is asked for; end of conversion",
+        detector: "same code while another current is asked for; ends of conversion, of shunts and of the supply's",
         state: "Off",
         codes: &[FaultCode::Conversion, FaultCode::StuckConversion, FaultCode::CurrentZero],
         // Of one that is stuck; a missing one is seen in its own tick.
@@ -58,7 +58,14 @@ fn rail(dice: &mut Dice, _: &Bounds) -> Scenario {
 /// C3: conversions that do not end, or say the same for ever.
 fn conversion(dice: &mut Dice, _: &Bounds) -> Scenario {
     let joint = dice.below(JOINTS as u64) as usize;
-    if dice.coin() {
+    let way = dice.below(5);
+    if way == 0 {
+        // Of bus voltage and thermistors: told at the second.
+        let lasting = 1 + dice.below(4);
+        let missing = at(Channel::SupplyConversion, 0, Form::Off, Timing::lasting(0, lasting));
+        return Scenario { by_design: lasting == 1, ..one(missing, Expected::Off) };
+    }
+    if way < 3 {
         let channel = if dice.coin() { Channel::ShuntB } else { Channel::ShuntC };
         let stuck = at(channel, joint, Form::Stuck, Timing::from(0));
         return Scenario {

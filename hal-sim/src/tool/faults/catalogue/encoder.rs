@@ -24,8 +24,8 @@ pub static ROWS: [Row; 2] = [
     },
     Row {
         id: "E4",
-        fault: "lost counts",
-        detector: "index against counts; greatest step",
+        fault: "lost counts, no index",
+        detector: "index against counts, two turns without an index; greatest step",
         state: "Damp",
         codes: &[FaultCode::EncoderPlace],
         deadline_ms: f64::INFINITY,
@@ -61,6 +61,11 @@ fn glitch(dice: &mut Dice, bounds: &Bounds) -> Scenario {
 /// E4: a counter that lost counts, or won some.
 fn lost_counts(dice: &mut Dice, bounds: &Bounds) -> Scenario {
     let joint = dice.below(JOINTS as u64) as usize;
+    if dice.below(4) == 0 {
+        // The index does not come any more: told after two turns and an eighth from where it came last.
+        let gone = at(Channel::Index, joint, Form::Off, Timing::from(0));
+        return Scenario { patience: 4 * PERIODS_PER_S, turns: 3.3, ..one(gone, Expected::Brake) };
+    }
     let size = dice.logarithmic(1.0, 0.25 * f64::from(bounds.counts_per_turn)).round();
     let offset = at(Channel::Counter, joint, Form::Offset(dice.sign() * size), Timing::from(0));
     // 4 counts of index, and the way within a quarter of a period.

@@ -85,8 +85,18 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     /// What hung does so no more.
     fn restart(&mut self) {
         self.restarted = true;
+        self.boot(Cause::Watchdog.bit());
+    }
+
+    /// The power was away and is back. What the operator's hands do goes on, and so does the leg.
+    pub fn power_on(&mut self) {
+        self.boot(0);
+    }
+
+    /// The image from its beginning, with what forbids to enable from the start.
+    fn boot(&mut self, causes: u32) {
         let samples = self.sample.joints;
-        self.ports = Ports { causes: Cause::Watchdog.bit(), period: self.period, ..Ports::new(samples) };
+        self.ports = Ports { causes, period: self.period, ..Ports::new(samples) };
         let cold = &self.cold;
         (self.leg, self.loops) = (cold.leg.clone(), cold.loops);
         (self.keeper, self.round) = (cold.keeper.clone(), cold.round.clone());

@@ -1,0 +1,320 @@
+//! A host on a simulated bus that moves one leg, frame by frame as a program behind an adapter sends them.
+//!
+//! ```text
+//! once              network started, compact mapping, cyclic position, 6, 7, F
+//! every millisecond SYNC and one frame with both joints' targets
+//! every so often    heartbeat, and the controlword again
+//! ```
+//!
+//! Each of them can fall silent ([`Speaks`]).
+
+use core::f64::consts::TAU;
+
+use scarab::bus::Frame;
+use scarab::leg::Permission;
+
+use super::board::{Board, TICK_NS};
+use super::network::Network;
+use super::wire::Sent;
+use crate::tool::error::ToolError;
+use crate::tool::faults::rig::Rig;
+use crate::tool::leg_file::LegFile;
+
+/// Room for base parameters.
+const BASE: usize = 13;
+const JOINTS: usize = 2;
+const NODES: [u16; JOINTS] = [1, 2];
+/// The host's own number.
+const NUMBER: u16 = 0x70;
+const START: u16 = 0;
+const SYNC: u16 = 0x80;
+/// Both joints' targets, as the hip has them; it and the knee take their half each.
+const TARGETS: u16 = 0x301;
+const WORDS: u16 = 0x200;
+const REQUEST: u16 = 0x600;
+const ANSWER: u16 = 0x580;
+const HEARTBEAT: u16 = 0x700;
+/// Bit 31 of an identifier: not used.
+const UNUSED: u32 = 1 << 31;
+/// "enable operation".
+const ENABLED: u16 = 0xF;
+/// Servo ticks of a cycle, and within which an answer has to be there.
+const CYCLE: u64 = 4;
+const PATIENCE: u32 = 40;
+/// The motion: towards the middle of each joint's range and back, rad and Hz.
+const WAY_RAD: f64 = 0.25;
+const RATE_HZ: f64 = 0.7;
+
+/// What a host says without being asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Speaks {
+    /// SYNC and targets.
+    pub targets: bool,
+    /// The controlword, again and again.
+    pub words: bool,
+    /// Servo ticks between two heartbeats; none where 0.
+    pub heartbeat: u64,
+}
+
+/// One leg, one wire, one host.
+#[derive(Clone, Debug)]
+pub struct Host {
+    /// The bus and the leg on it.
+    pub network: Network<JOINTS, BASE>,
+    /// What it says.
+    pub speaks: Speaks,
+    ticks: u64,
+    /// Where the joints stand, as they told last; where they stood, and how far they are moved, micro-radian.
+    places: [i32; JOINTS],
+    from: Option<[f64; JOINTS]>,
+    way: [f64; JOINTS],
+    /// When the last bit of its last heartbeat, and of its last targets, was on the wire.
+    heard_ns: [u64; 2],
+    answer: Option<Frame>,
+    /// Codes of emergency messages, by node.
+    told: Vec<(u16, u16)>,
+}
+
+fn refused(words: String) -> ToolError {
+    ToolError::Refused(words)
+}
+
+impl Host {
+    /// Beside one board; nothing said yet.
+    #[must_use]
+    pub fn new(board: Board<JOINTS, BASE>) -> Self {
+        Self {
+            network: Network::new(vec![board], 1_000_000),
+            speaks: Speaks { targets: false, words: false, heartbeat: 0 },
+            ticks: 0,
+            places: [0; JOINTS],
+            from: None,
+            way: [0.0; JOINTS],
+            heard_ns: [0; 2],
+            answer: None,
+            told: Vec::new(),
+        }
+    }
+
+    /// The leg.
+    pub fn board(&mut self) -> &mut Board<JOINTS, BASE> {
+        let [board] = self.network.boards() else { unreachable!("made with one") };
+        board
+    }
+
+    /// Its firmware and plant.
+    pub fn rig(&mut self) -> &mut Rig<JOINTS, BASE> {
+        &mut self.board().rig
+    }
+
+    /// The leg's drive is enabled.
+    pub fn is_enabled(&mut self) -> bool {
+        self.rig().state().permission() == Permission::Follow
+    }
+
+    /// One servo tick; each of its PWM periods is shown.
+    pub fn tick(&mut self, watch: impl FnMut(&Rig<JOINTS, BASE>)) {
+        if self.speaks.targets && self.ticks.is_multiple_of(CYCLE) {
+            let seconds = self.ticks as f64 * TICK_NS as f64 * 1e-9;
+            let share = 0.5 - 0.5 * (TAU * RATE_HZ * seconds).cos();
+            // Until the leg is enabled, where it is.
+            let targets = match self.from {
+                None => self.places,
+                Some(from) => [0, 1].map(|joint| (from[joint] + share * self.way[joint]) as i32),
+            };
+            let targets = targets.map(i32::to_le_bytes).concat();
+            self.network.send(Frame::new(SYNC, &[]));
+            self.network.send(Frame::new(TARGETS, &targets));
+        }
+        if self.speaks.words && self.ticks.is_multiple_of(4 * CYCLE) {
+            NODES.into_iter().for_each(|node| self.command(node, ENABLED));
+        }
+        if self.speaks.heartbeat > 0 && self.ticks.is_multiple_of(self.speaks.heartbeat) {
+            self.network.send(Frame::new(HEARTBEAT + NUMBER, &[5]));
+        }
+        let (heard_ns, answer) = (&mut self.heard_ns, &mut self.answer);
+        let (told, places) = (&mut self.told, &mut self.places);
+        let show = |sent: &Sent| {
+            let id = sent.frame.id();
+            match (sent.sender, id) {
+                (0, TARGETS) => heard_ns[1] = sent.end_ns,
+                (0, _) if id == HEARTBEAT + NUMBER => heard_ns[0] = sent.end_ns,
+                (0, _) => {}
+                (_, 0x81..=0xFF) => {
+                    if let [low, high, ..] = sent.frame.data() {
+                        told.push((id & 0x7F, u16::from_le_bytes([*low, *high])));
+                    }
+                }
+                (_, 0x181 | 0x182) => {
+                    if let ([_, _, a, b, c, d, ..], Some(place)) =
+                        (sent.frame.data(), places.get_mut(usize::from(id - 0x181)))
+                    {
+                        *place = i32::from_le_bytes([*a, *b, *c, *d]);
+                    }
+                }
+                (_, 0x581..=0x5FF) => *answer = Some(sent.frame),
+                _ => {}
+            }
+        };
+        self.network.tick_watched(show, watch);
+        self.ticks += 1;
+    }
+
+    /// So many of them, unwatched.
+    pub fn run(&mut self, ticks: u64) {
+        (0..ticks).for_each(|_| self.tick(|_| {}));
+    }
+
+    /// A controlword, to be taken at once.
+    pub fn command(&mut self, node: u16, word: u16) {
+        self.network.send(Frame::new(WORDS + node, &word.to_le_bytes()));
+    }
+
+    /// When its last heartbeat and its last targets had been sent.
+    #[must_use]
+    pub fn heard_ns(&self) -> [u64; 2] {
+        self.heard_ns
+    }
+
+    /// Codes of the emergency messages so far, by node.
+    #[must_use]
+    pub fn told(&self) -> &[(u16, u16)] {
+        &self.told
+    }
+
+    /// One request of a node's dictionary, and its answer.
+    ///
+    /// # Errors
+    /// Nobody answers within 10 ms.
+    pub fn ask(&mut self, node: u16, request: [u8; 8]) -> Result<Frame, ToolError> {
+        self.answer = None;
+        self.network.send(Frame::new(REQUEST + node, &request));
+        for _ in 0..PATIENCE {
+            self.run(1);
+            if let Some(answer) = self.answer.take_if(|answer| answer.id() == ANSWER + node) {
+                return Ok(answer);
+            }
+        }
+        Err(refused(format!("node {node} does not answer to {request:x?}")))
+    }
+
+    /// Reads an object of at most four bytes.
+    ///
+    /// # Errors
+    /// Nobody answers, or otherwise than with a value.
+    pub fn read(&mut self, node: u16, index: u16, sub: u8) -> Result<u32, ToolError> {
+        let [low, high] = index.to_le_bytes();
+        let answer = self.ask(node, [0x40, low, high, sub, 0, 0, 0, 0])?;
+        match answer.data() {
+            [kind, _, _, _, a, b, c, d] if kind >> 5 == 2 => Ok(u32::from_le_bytes([*a, *b, *c, *d])),
+            data => Err(refused(format!("node {node}, object {index:x}:{sub}: {data:x?}"))),
+        }
+    }
+
+    /// Writes an object of `size` bytes.
+    ///
+    /// # Errors
+    /// Nobody answers, or the node refuses.
+    pub fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) -> Result<(), ToolError> {
+        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+        let answer = self.ask(node, [0x23 | (4 - size) << 2, low, high, sub, a, b, c, d])?;
+        match answer.data() {
+            [0x60, ..] => Ok(()),
+            data => Err(refused(format!("node {node}, object {index:x}:{sub}: {data:x?}"))),
+        }
+    }
+
+    /// Starts the nodes and maps the compact cycle: statusword, position and speed back, both targets in one frame.
+    ///
+    /// # Errors
+    /// A node refuses.
+    pub fn begin(&mut self) -> Result<(), ToolError> {
+        self.run(4);
+        self.network.send(Frame::new(START, &[1, 0]));
+        self.run(4);
+        for (joint, node) in NODES.into_iter().enumerate() {
+            for place in 1..4 {
+                self.write(node, 0x1800 + place, 1, UNUSED | u32::from(0x180 + 0x100 * place + node), 4)?;
+            }
+            let mut targets = [0x0007_0020; JOINTS];
+            targets[joint] = 0x607A_0020;
+            self.map(node, 0x1800, 0x180 + node, &[0x6041_0010, 0x6064_0020, 0x2010_0010])?;
+            self.map(node, 0x1401, TARGETS, &targets)?;
+            self.write(node, 0x6060, 0, 8, 1)?;
+        }
+        Ok(())
+    }
+
+    fn map(&mut self, node: u16, place: u16, identifier: u16, objects: &[u32]) -> Result<(), ToolError> {
+        let (mapping, identifier) = (place + 0x200, u32::from(identifier));
+        self.write(node, place, 1, UNUSED | identifier, 4)?;
+        self.write(node, mapping, 0, 0, 1)?;
+        self.write(node, place, 2, 1, 1)?;
+        for (sub, object) in (1..).zip(objects) {
+            self.write(node, mapping, sub, *object, 4)?;
+        }
+        self.write(node, mapping, 0, objects.len() as u32, 1)?;
+        self.write(node, place, 1, identifier, 4)
+    }
+
+    /// Enables the leg, then moves it there and back until it falls silent.
+    ///
+    /// # Errors
+    /// A node refuses, or the leg is not enabled.
+    pub fn move_leg(&mut self, leg: &LegFile) -> Result<(), ToolError> {
+        self.speaks.targets = true;
+        self.run(4 * CYCLE);
+        for word in [6, 7, ENABLED] {
+            NODES.into_iter().for_each(|node| self.command(node, word));
+            self.run(4 * CYCLE);
+        }
+        let from = self.places.map(f64::from);
+        for ((way, from), joint) in self.way.iter_mut().zip(from).zip(&leg.joints) {
+            let [low, high] = joint.range_deg.map(f64::to_radians);
+            *way = 1e6 * WAY_RAD * (0.5e6 * (low + high) - from).signum();
+        }
+        (self.ticks, self.from) = (0, Some(from));
+        self.speaks.words = true;
+        self.run(4 * CYCLE);
+        if self.is_enabled() {
+            return Ok(());
+        }
+        let (state, causes) = (self.rig().state(), self.rig().causes());
+        Err(refused(format!(
+            "a leg that its host does not enable: {state:?}, causes {causes:x}, told {:x?}",
+            self.told
+        )))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tool::bus::memory::Memory;
+    use crate::tool::leg_file::DEFAULT_LEG;
+    use crate::tool::pair::Context;
+    use crate::tool::simulate::{DriveModel, SimulationOptions};
+
+    #[test]
+    fn a_host_moves_a_leg_there_and_back_and_a_silent_one_leaves_it_where_it_is() {
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+        let context = Context::<JOINTS, BASE>::new(&leg, &options).expect("a leg");
+        let board = Board::new(&leg, context, 1, 1, Memory::new(None)).expect("a board");
+        let mut host = Host::new(board);
+        host.begin().expect("nodes that answer");
+        host.move_leg(&leg).expect("a leg that follows");
+        let place = |host: &mut Host| host.rig().world.anatomical_position();
+        let from = place(&mut host);
+        host.run(2857 - host.ticks);
+        let there = place(&mut host);
+        for (joint, (from, there)) in from.iter().zip(there).enumerate() {
+            assert!((there - from).abs() > 0.9 * WAY_RAD, "joint {joint}: {from} {there}");
+        }
+        host.speaks.targets = false;
+        host.run(1000);
+        let stands = place(&mut host);
+        assert!(host.is_enabled());
+        assert!(there.iter().zip(stands).all(|(there, stands)| (there - stands).abs() < 0.02));
+    }
+}
