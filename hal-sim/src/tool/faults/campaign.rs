@@ -80,6 +80,8 @@ pub struct Campaign {
     pub left_out: Vec<&'static str>,
     /// Motion that was run without a fault meanwhile, s.
     pub undisturbed_s: f64,
+    /// What was raised in it: its base's later runs are not run.
+    pub base_alarms: Vec<String>,
 }
 
 /// What is done with a fork.
@@ -134,6 +136,7 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
         campaign.trials.extend(found.trials);
         campaign.every_tick += found.every_tick;
         campaign.undisturbed_s += found.undisturbed_s;
+        campaign.base_alarms.extend(found.base_alarms);
     }
     for entry in &options.rows {
         if let Entry::Emulated(head) = entry {
@@ -152,7 +155,9 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
             campaign.outcomes.extend((bench.run)(&bench.head, leg, &seeds, options.manner.blind)?);
         }
     }
-    campaign.outcomes.sort_by_key(|outcome| (ids.iter().position(|id| *id == outcome.fault), outcome.seed));
+    campaign.outcomes.sort_by_key(|outcome| {
+        (ids.iter().position(|id| *id == outcome.fault), outcome.seed, outcome.period)
+    });
     campaign.trials.sort_by_key(|outcome| (outcome.fault, outcome.seed));
     Ok(campaign)
 }
@@ -204,8 +209,9 @@ fn based(
         }
         rig.advance();
         if let Some(code) = rig.alarm() {
-            let words = format!("base {base}: a false alarm at period {}: {}", rig.period, code.words());
-            return Err(ToolError::Refused(words));
+            let words = format!("base {base}, period {}: {}", rig.period, code.words());
+            campaign.base_alarms.push(format!("{words}; {} runs not run", jobs.count()));
+            break;
         }
     }
     setting.flush(&mut batch, &mut campaign);
@@ -283,7 +289,9 @@ impl Setting<'_> {
         let of = |(rig, job): &(Rig<JOINTS, BASE>, Job)| match job {
             Job::Row { row, scenario, seed, brief } => {
                 let manner = Manner { brief: *brief, ..self.manner };
-                (false, run(self.leg, row, scenario, *seed, manner, rig))
+                let outcome = run(self.leg, row, scenario, *seed, manner, rig);
+                // Nobody may take its period for a seed that draws another run.
+                (false, Outcome { seed: if *brief { 0 } else { *seed }, ..outcome })
             }
             Job::Trial { trial, seed } => (true, trial.run(self.leg, *seed, self.manner.recorded, rig)),
         };
@@ -353,7 +361,7 @@ fn voltages(bounds: &mut Bounds, joint: &JointFile, motor: &MotorFile, configura
     bounds.smallest_offset_a = bounds.smallest_offset_a.max(1.1 * offset + 0.5 * still / resistance / 1.15);
 }
 
-fn bounds(leg: &LegFile) -> Result<Bounds, ToolError> {
+pub(super) fn bounds(leg: &LegFile) -> Result<Bounds, ToolError> {
     if leg.joints.len() != JOINTS {
         return Err(SetupError::new(leg, "faults are injected into legs of two joints").into());
     }

@@ -9,7 +9,7 @@ use super::recording::Recording;
 pub struct Outcome {
     /// The row.
     pub fault: &'static str,
-    /// The run's.
+    /// The run's; 0 of one with the emergency stop at every tick, which its period names.
     pub seed: u64,
     /// Period of the injection.
     pub period: u64,

@@ -99,8 +99,10 @@ pub struct CampaignReport {
     pub trials: Vec<TrialsReport>,
     /// Hours of normal motion, where they were asked for.
     pub hours: Option<HoursReport>,
-    /// Motion without a fault, s; an alarm in it ends the campaign.
+    /// Motion without a fault, s.
     pub undisturbed_s: f64,
+    /// What was raised in it, in words: none in a campaign that is good.
+    pub base_alarms: Vec<String>,
     /// Of all runs, in their order.
     pub trace_hash: String,
 }
@@ -136,6 +138,7 @@ impl CampaignReport {
             trials: KINDS.iter().filter_map(|kind| trials_report(kind, &campaign.trials)).collect(),
             hours,
             undisturbed_s: campaign.undisturbed_s,
+            base_alarms: campaign.base_alarms.clone(),
             trace_hash: format!("{hash:016x}"),
         }
     }
@@ -144,7 +147,8 @@ impl CampaignReport {
     #[must_use]
     pub fn is_good(&self) -> bool {
         let calm = self.hours.as_ref().is_none_or(|hours| hours.false_alarms.is_empty());
-        calm && self.invariants_broken == 0
+        calm && self.base_alarms.is_empty()
+            && self.invariants_broken == 0
             && self.rows.iter().all(|row| !row.is_noticed() && row.false_alarms == 0)
     }
 
@@ -333,9 +337,15 @@ impl CampaignReport {
             "diagnostic coverage: {}{least}{unseen}\n",
             percent(self.diagnostic_coverage)
         ));
+        for alarm in &self.base_alarms {
+            text.push_str(&format!("false alarm in undisturbed motion: {alarm}\n"));
+        }
         text.push_str(&format!(
-            "invariants broken: {}; undisturbed motion without an alarm: {:.0} s; trace hash {}\n",
-            self.invariants_broken, self.undisturbed_s, self.trace_hash
+            "invariants broken: {}; undisturbed motion: {:.0} s, alarms in it: {}; trace hash {}\n",
+            self.invariants_broken,
+            self.undisturbed_s,
+            self.base_alarms.len(),
+            self.trace_hash
         ));
         for failure in self.failures.iter().take(10) {
             text.push_str(&format!("failed: {}\n", told(failure)));
@@ -352,11 +362,14 @@ pub fn told(outcome: &Outcome) -> String {
         Outcome { undetectable: true, .. } => "not to be seen",
         _ => "MISSED",
     };
+    let which = match outcome.seed {
+        0 => format!("at period {}, repeated by --every-tick", outcome.period),
+        seed => format!("seed {seed}"),
+    };
     let after = outcome.after_ms.map_or_else(|| "-".into(), |after| format!("{after:.3} ms"));
     format!(
-        "{} seed {}: {verdict}, after {after}, state {}, code {}, magnitude {}, injected at period {}, trace hash {}{}",
+        "{} {which}: {verdict}, after {after}, state {}, code {}, magnitude {}, injected at period {}, trace hash {}{}",
         outcome.fault,
-        outcome.seed,
         outcome.state.unwrap_or("-"),
         outcome.alarm.unwrap_or("-"),
         outcome.magnitude.map_or_else(|| "-".into(), |magnitude| format!("{magnitude:.2}")),
