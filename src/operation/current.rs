@@ -33,6 +33,10 @@ const CERTAIN_PERIODS: u32 = CURRENT_RATE_HZ / 500;
 /// So many periods in a row without a conversion of the bus voltage are too many.
 const UNCONVERTED: u8 = 2;
 
+/// Ticks after a time without any in which the index is not believed: its interrupt is late by as much, and so is the count it takes. It
+/// comes after the first of them.
+const LATE_TICKS: u8 = 2;
+
 /// What level 0 needs of a board. Every method answers at once.
 pub trait CurrentBoard {
     /// Why nothing may be enabled: the interlock's bits.
@@ -92,6 +96,8 @@ struct AxisLoop {
     /// Clock at the last tick.
     last: Option<u32>,
     watch: TickWatch,
+    /// Ticks that the index is not believed in.
+    late: u8,
 }
 
 /// What level 0 works on.
@@ -118,7 +124,13 @@ impl<const N: usize> CurrentLoops<N> {
         chopper: Option<Chopper>,
         volt_per_code: Volt,
     ) -> Self {
-        let axes = stages.map(|stage| AxisLoop { stage, ticks: 0, last: None, watch: TickWatch::default() });
+        let axes = stages.map(|stage| AxisLoop {
+            stage,
+            ticks: 0,
+            last: None,
+            watch: TickWatch::default(),
+            late: 0,
+        });
         let servo = ServoWatch::default();
         Self { axes, period, servo, unconverted: 0, chopper, budget: BrakeBudget::FULL, volt_per_code }
     }
@@ -142,8 +154,9 @@ impl<const N: usize> CurrentLoops<N> {
             board.set_brake(self.budget.spend(wanted));
         }
         if axis == 0 {
-            // Who does not know the bus cannot brake into it. One may be missing: the first of all, and the first after an erase.
-            self.unconverted = if tick.supply { 0 } else { self.unconverted.saturating_add(1) };
+            // Who does not know the bus cannot brake into it. One may be missing: the first of all.
+            let misses = !tick.supply && !is_storing(board);
+            self.unconverted = if misses { self.unconverted.saturating_add(1) } else { 0 };
             if self.unconverted >= UNCONVERTED {
                 board.raise(Cause::Conversion.bit());
             }
@@ -154,8 +167,13 @@ impl<const N: usize> CurrentLoops<N> {
         let Some(this) = self.axes.get_mut(axis) else { return };
         let mut sample = tick.sample;
         if let Some(stood) = this.look(tick, period, board) {
-            // Its interrupt is late by as much, and so is the count it took.
-            sample.index_count = None;
+            if stood > 0 {
+                this.late = LATE_TICKS;
+            }
+            if this.late > 0 {
+                this.late -= 1;
+                sample.index_count = None;
+            }
             let long = stood > CERTAIN_PERIODS;
             if stood > 0 && this.stage.stood_still(&sample, long) && long {
                 forget(axis, Outcome::StoodStill, board);

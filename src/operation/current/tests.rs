@@ -73,6 +73,8 @@ struct Bench {
     motors: [TestMotor; 2],
     board: Board,
     now: u32,
+    /// An index pulse came, and its interrupt only now: the count it takes is that of now.
+    late_index: bool,
 }
 
 impl Bench {
@@ -86,7 +88,13 @@ impl Bench {
         });
         let chopper = Chopper::new(Volt(50.0), Volt(54.0));
         let loops = CurrentLoops::new(stages, PERIOD, chopper, SenseScale::ODRIVE_3_6.volt_per_code);
-        let mut bench = Self { loops, motors, board: Board { begun: true, ..Board::default() }, now: 0 };
+        let mut bench = Self {
+            loops,
+            motors,
+            board: Board { begun: true, ..Board::default() },
+            now: 0,
+            late_index: false,
+        };
         bench.run(100);
         bench
     }
@@ -95,7 +103,10 @@ impl Bench {
     fn tick(&mut self, torn: bool) {
         self.now = self.now.wrapping_add(PERIOD.get());
         for (axis, motor) in self.motors.iter_mut().enumerate() {
-            let sample = motor.period(AxisCommand::RELEASED);
+            let mut sample = motor.period(AxisCommand::RELEASED);
+            if self.late_index {
+                sample.index_count = Some(sample.encoder_count);
+            }
             let now = self.now;
             let tick =
                 Tick { now, emergency_stop: false, gate_fault: false, complete: !torn, supply: true, sample };
@@ -162,7 +173,10 @@ fn an_erasure_forgets_the_zeros_and_nothing_else() {
         assert!(bench.board.begun);
         bench.stand(ERASED, turns);
         // The first conversions after it may be torn, and the index's interrupt comes when the index is elsewhere.
+        bench.late_index = true;
         bench.tick(true);
+        bench.tick(false);
+        bench.late_index = false;
         bench.stand(ERASED, turns);
         bench.stored();
         assert!(!bench.board.begun && !bench.board.damped);

@@ -239,7 +239,15 @@ impl<const N: usize, const B: usize> Board<N, B> {
         let state = self.rig.state();
         self.has_kept = true;
         let kept = match keeping {
-            Keeping::Defaults => self.memory.forget(state),
+            Keeping::Defaults => {
+                let forgotten = self.memory.forget(state);
+                if forgotten {
+                    // What was accepted before is not kept by the next "save".
+                    self.model_kept = true;
+                    self.station.set_generation(0);
+                }
+                forgotten
+            }
             Keeping::All => {
                 (0..N).all(|joint| self.memory.keep_objects(state, joint, self.station.kept(joint)))
                     && self.keep_model()
