@@ -13,8 +13,9 @@ use crate::tool::tables::headed;
 
 /// Failures that are written out.
 const MOST_FAILURES: usize = 100;
-/// Rows with runs in which something harmless happens: to raise anything then is a false alarm. All others only ask what follows a fault.
-const JUDGED: [&str; 3] = ["E2", "J1", "H1"];
+/// Rows with runs in which a false alarm can be told: something harmless or a mere push happens, or a host's own time is not over yet. All
+/// others only ask what follows a fault.
+const JUDGED: [&str; 5] = ["E2", "J1", "J2", "H1", "B1"];
 
 /// One row of the catalogue as it was run. The names are an interface.
 #[derive(Clone, Debug, Serialize)]
