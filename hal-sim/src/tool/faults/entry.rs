@@ -88,6 +88,11 @@ pub fn instead(id: &str) -> Option<&'static str> {
         "B4" => Some("Damp"),
         // A motor that is too fast to be shorted is released.
         "E1" => Some("Off"),
+        // A push or a foot that cannot be set aside has the result refused; a foot that can be is set aside.
+        "H2" => Some("refused"),
+        "H4" => Some("Limit, refused"),
+        // A kick that holds the other joint while its torque grows looks like a counter that stands still.
+        "J2" => Some("Short, Off"),
         // Damping needs the rotor's angle; the rest as E1.
         "E4" => Some("Short, Off"),
         // While a joint hardly moves, a current that is wrong or does not flow looks like a counter that stands still: the motors are
