@@ -2,12 +2,11 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use scarab::safety::{DriveState, FaultCode};
+use scarab::safety::FaultCode;
 
-use super::aftermath::{RESET, RESET_EVERY, hand, leads_to};
+use super::aftermath::{RESET, RESET_EVERY, hand};
 use super::catalogue::{Event, Expected, JOINTS, Onset, Row, Scenario};
 use super::dice::Dice;
-use super::entry::instead;
 use super::event::apply;
 use super::invariants::{Invariants, Scope};
 pub use super::outcome::{Manner, Outcome};
@@ -17,6 +16,7 @@ use crate::faults::{Channel, Injector};
 use crate::tool::leg_file::LegFile;
 use crate::world::periods::PERIODS_PER_TICK;
 
+mod judge;
 mod keep;
 
 /// A released machine is watched for so long: nothing may come back.
@@ -338,55 +338,9 @@ impl<'a, const B: usize> Watched<'a, B> {
         (position[joint] - self.angles[joint]).abs() * ratio > self.scenario.turns * core::f64::consts::TAU
     }
 
-    /// The catalogue's state, or what the firmware does instead.
-    fn leads_to(&self, state: &str) -> bool {
-        self.row.state.contains(state) || instead(self.row.id).is_some_and(|to| to.contains(state))
-    }
-
-    /// Nothing of the machine is broken.
-    fn is_only_pushed(&self) -> bool {
-        matches!(self.scenario.event, Event::Kick(..) | Event::Push(..) | Event::Hold(..) | Event::Touch(_))
-    }
-
-    /// What a push alone may lead to; anything else says that a sound part is broken. A kick may hold the other joint where it is while its
-    /// torque grows, and that looks like a frozen counter.
-    fn tells_of_a_push(&self, code: FaultCode) -> bool {
-        use FaultCode as Code;
-        match code {
-            Code::PositionLimit
-            | Code::Overspeed
-            | Code::Overcurrent
-            | Code::BusVoltage
-            | Code::FollowingError => true,
-            Code::EncoderFrozen => matches!(self.scenario.event, Event::Kick(..)),
-            _ => false,
-        }
-    }
-
     /// Of several faults the one that counts has not come yet.
     fn is_before(&self) -> bool {
         matches!(self.scenario.onset, Onset::After(_)) && self.onset >= Some(self.rig.period)
-    }
-
-    fn safe_state(&self) -> Option<&'static str> {
-        match self.scenario.expected {
-            Expected::Restarted => return self.rig.is_restarted().then_some("Refuse"),
-            Expected::Released if self.rig.is_switching() => return None,
-            _ => {}
-        }
-        match (self.rig.is_switching(), self.rig.state()) {
-            (false, _) => Some("Off"),
-            (true, _) if self.rig.is_braking() => Some("Short"),
-            (true, DriveState::FaultReactionActive { .. }) => Some("Damp"),
-            (true, _) => None,
-        }
-    }
-
-    /// Whatever found the fault, the machine is in the state of what it says is wrong.
-    fn judge(&mut self, state: &'static str, code: FaultCode) {
-        if !leads_to(code).contains(&state) {
-            self.invariants.note(&self.rig, &format!("led to {state}"));
-        }
     }
 
     /// Of some runs: the operator resets, and enables again what may be enabled.
