@@ -87,9 +87,14 @@ impl Motor {
     /// What the sensors say where the counter stands at `count` and the quadrature current is `current` (A).
     #[cfg(feature = "emulated")]
     pub fn seen(&mut self, count: u16, current: f32) -> AxisSample {
+        let before = (self.turns * COUNTS) as u32 as u16;
         self.turns = f32::from(count) / COUNTS;
         self.current = [0.0, current];
-        self.sample(None)
+        // Place zero of any turn, from either side.
+        let [from, to] = [before, count].map(|count| count / COUNTS as u16);
+        let forwards = count.wrapping_sub(before).cast_signed() > 0;
+        let index = (from != to).then_some(if forwards { to } else { from } * COUNTS as u16);
+        self.sample(index)
     }
 
     /// One PWM period; `command` acts in the next one.
