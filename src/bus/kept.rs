@@ -30,8 +30,8 @@ const fn is_kept(row: &Row) -> bool {
     matches!(row.access, Access::Both) && !commands && !others
 }
 
-/// Every object that is kept.
-fn objects() -> impl Iterator<Item = (Object, &'static Row)> {
+/// Every object that is kept, in the table's order.
+pub fn kept_objects() -> impl Iterator<Item = (Object, &'static Row)> {
     ROWS.iter().filter(|row| is_kept(row)).flat_map(|row| {
         (0..u16::from(row.indices)).flat_map(move |index| {
             (0..row.subs).map(move |sub| (Object::at(row.index + index, row.sub + sub), row))
@@ -43,8 +43,8 @@ fn default(row: &Row, node: NodeId) -> u32 {
     row.default + if row.plus_node { u32::from(node.number()) } else { 0 }
 }
 
-/// Object and value of each entry.
-fn entries(bytes: &[u8]) -> impl Iterator<Item = (Object, u32)> {
+/// Object and value of each entry; only the value's own bytes are set, whatever its sign.
+pub fn kept_entries(bytes: &[u8]) -> impl Iterator<Item = (Object, u32)> {
     let mut rest = bytes;
     core::iter::from_fn(move || {
         let (&[low, high, sub, size], after) = rest.split_first_chunk()?;
@@ -59,7 +59,7 @@ fn entries(bytes: &[u8]) -> impl Iterator<Item = (Object, u32)> {
 }
 
 fn number(bytes: &[u8], object: Object) -> Option<u32> {
-    entries(bytes).find(|(other, _)| *other == object).map(|(_, value)| value)
+    kept_entries(bytes).find(|(other, _)| *other == object).map(|(_, value)| value)
 }
 
 /// The node's number that a host had kept (2001), if it did.
@@ -72,6 +72,33 @@ pub fn kept_node_id(bytes: &[u8]) -> Option<NodeId> {
 #[must_use]
 pub fn kept_bit_rate(bytes: &[u8]) -> Option<u16> {
     number(bytes, BIT_RATE).map(|rate| rate as u16)
+}
+
+/// One entry in bytes; how many they are.
+fn append(object: Object, size: u8, value: u32, out: &mut [u8]) -> Result<usize, Abort> {
+    let [low, high] = object.index.to_le_bytes();
+    let head = [low, high, object.sub, size];
+    let bytes = value.to_le_bytes();
+    let entry = head.iter().chain(bytes.iter().take(usize::from(size)));
+    let length = head.len() + usize::from(size);
+    let room = out.get_mut(..length).ok_or(Abort::Store)?;
+    for (to, from) in room.iter_mut().zip(entry) {
+        *to = *from;
+    }
+    Ok(length)
+}
+
+/// One entry of what a node keeps, written by somebody else than the node; how many bytes it is. Of the value the low bytes count.
+///
+/// # Errors
+/// That there is no such object, [`Abort::ReadOnly`], [`Abort::Access`] for one that is never kept, [`Abort::Store`] where it does not fit.
+pub fn write_kept(object: Object, value: u32, out: &mut [u8]) -> Result<usize, Abort> {
+    let row = find(object)?;
+    match row.access {
+        Access::Both if is_kept(row) => append(object, row.kind.size().unwrap_or(4), value, out),
+        Access::Both => Err(Abort::Access),
+        _ => Err(Abort::ReadOnly),
+    }
 }
 
 /// A communication parameter of a PDO, and its mapping's index.
@@ -88,22 +115,14 @@ impl Node {
         let node = self.id();
         let dictionary = Dictionary { communication: self.communication_mut(), objects };
         let mut length = 0;
-        for (object, row) in self::objects() {
+        for (object, row) in kept_objects() {
             let Ok(value) = dictionary.read(object) else { continue };
             let size = row.kind.size().unwrap_or(4);
             let mask = u32::MAX >> (32 - 8 * u32::from(size));
             if (value ^ default(row, node)) & mask == 0 {
                 continue;
             }
-            let [low, high] = object.index.to_le_bytes();
-            let head = [low, high, object.sub, size];
-            let bytes = value.to_le_bytes();
-            let entry = head.iter().chain(bytes.iter().take(usize::from(size)));
-            let room = out.get_mut(length..length + 4 + usize::from(size)).ok_or(Abort::Store)?;
-            for (to, from) in room.iter_mut().zip(entry) {
-                *to = *from;
-            }
-            length += 4 + usize::from(size);
+            length += append(object, size, value, out.get_mut(length..).ok_or(Abort::Store)?)?;
         }
         Ok(length)
     }
@@ -121,7 +140,7 @@ impl Node {
         };
         let pdos = || (0x1400..0x1404).chain(0x1800..0x1804_u16);
         let touched = |index: u16| {
-            entries(bytes).any(|(object, _)| is_pdo(object.index) && object.index & !0x200 == index)
+            kept_entries(bytes).any(|(object, _)| is_pdo(object.index) && object.index & !0x200 == index)
         };
         let or_default = |object: Object| {
             number(bytes, object).or_else(|| find(object).ok().map(|row| default(row, node))).unwrap_or(0)
@@ -130,7 +149,7 @@ impl Node {
             write(Object::at(index, 1), or_default(Object::at(index, 1)) | OFF);
             write(Object::at(index + 0x200, 0), 0);
         }
-        for (object, value) in entries(bytes) {
+        for (object, value) in kept_entries(bytes) {
             let later = match object.index {
                 0x1400..=0x14FF | 0x1800..=0x18FF => object.sub == 1,
                 0x1600..=0x16FF | 0x1A00..=0x1AFF => object.sub == 0,
@@ -145,6 +164,19 @@ impl Node {
             write(count, or_default(count));
             write(Object::at(index, 1), or_default(Object::at(index, 1)));
         }
+    }
+
+    /// Takes back what was kept; the first object that did not take its value, if one did not. A node as after the start tells so whether a
+    /// board would take it.
+    pub fn try_recall<O: Objects>(&mut self, bytes: &[u8], objects: &mut O) -> Option<Object> {
+        self.recall(bytes, objects);
+        let dictionary = Dictionary { communication: self.communication_mut(), objects };
+        let differs = |object: Object, value: u32| {
+            let size = find(object).ok().and_then(|row| row.kind.size()).unwrap_or(4);
+            let mask = u32::MAX >> (32 - 8 * u32::from(size));
+            !dictionary.read(object).is_ok_and(|taken| (taken ^ value) & mask == 0)
+        };
+        kept_entries(bytes).find(|(object, value)| differs(*object, *value)).map(|(object, _)| object)
     }
 }
 
@@ -222,6 +254,38 @@ mod tests {
         let [node, _] = &mut board.nodes;
         node.recall(&[0x40, 0x60, 0, 2, 15, 0], &mut board.axes[0]);
         assert_eq!(board.read(0x6040, 0), Ok(0));
+    }
+
+    #[test]
+    fn what_a_tool_writes_is_what_the_node_would_and_what_is_refused_is_named() {
+        let mut board = Board::started(1);
+        assert_eq!(board.write(0x1017, 0, 50, 2), Ok(()));
+        assert_eq!(board.write(0x6007, 0, 1, 2), Ok(()));
+        let mut bytes = [0; LONGEST];
+        let first = write_kept(Object::at(0x1017, 0), 50, &mut bytes).expect("it fits");
+        let second = write_kept(Object::at(0x6007, 0), 1, &mut bytes[first..]).expect("it fits");
+        assert_eq!(&bytes[..first + second], kept(&mut board));
+        for (index, sub, why) in [
+            (0x5555, 0, Abort::NoObject),
+            (0x1018, 9, Abort::NoSubindex),
+            (0x6041, 0, Abort::ReadOnly),
+            (0x607D, 0, Abort::ReadOnly),
+            (0x6040, 0, Abort::Access),
+        ] {
+            assert_eq!(write_kept(Object::at(index, sub), 0, &mut bytes), Err(why), "{index:x} {sub}");
+        }
+        assert_eq!(write_kept(Object::at(0x1017, 0), 50, &mut bytes[..5]), Err(Abort::Store));
+
+        let told = |object: Object, value: u32| {
+            let (mut bytes, mut board) = ([0; LONGEST], Board::started(1));
+            let length = write_kept(object, value, &mut bytes).expect("it fits");
+            let [node, _] = &mut board.nodes;
+            node.try_recall(&bytes[..length], &mut board.axes[0])
+        };
+        assert_eq!(told(Object::at(0x2002, 0), 250), None);
+        assert_eq!(told(Object::at(0x60C2, 2), -4_i32 as u32), None);
+        assert_eq!(told(Object::at(0x2002, 0), 300), Some(Object::at(0x2002, 0)));
+        assert_eq!(told(Object::at(0x2001, 0), 128), Some(Object::at(0x2001, 0)));
     }
 
     #[test]

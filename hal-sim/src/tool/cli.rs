@@ -8,6 +8,7 @@ mod export;
 mod faults;
 mod identify;
 mod image;
+mod kept;
 mod leg_options;
 mod model;
 mod monitor;
@@ -52,6 +53,8 @@ enum Command {
     Eds(eds::EdsArguments),
     /// Put legs on a CANopen bus that host software reaches over TCP (slcan).
     Serve(serve::ServeArguments),
+    /// What a board remembers over the power: its flash as TOML, and TOML into a flash.
+    Kept(kept::KeptArguments),
     /// Change the load or the friction of a leg that walks: time to notice, what was found, false alarms.
     Monitor(monitor::MonitorArguments),
     /// Measure the current loop on a motor's test stand: steps, torque ripple, voltage limit, regeneration.
@@ -94,6 +97,7 @@ pub fn main() -> ExitCode {
         Command::Export(arguments) => export::run(&arguments),
         Command::Eds(arguments) => eds::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
+        Command::Kept(arguments) => kept::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Motor(arguments) => motor::run(&arguments),
         Command::Paper(arguments) => paper::run(&arguments),

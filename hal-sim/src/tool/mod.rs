@@ -26,6 +26,7 @@
 //! | [`consistent`], [`consistent_runs`] | legs that can exist: both searches and their optimum |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
 //! | [`bus`] | legs on a CANopen bus, for host software that exists |
+//! | [`kept_file`] | what a board remembers over the power, as TOML and back |
 //! | [`image`] | the flash image: its leg, its build, its size |
 //! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
 
@@ -53,6 +54,7 @@ pub mod html;
 pub mod identify;
 pub mod image;
 pub mod information;
+pub mod kept_file;
 pub mod leg_file;
 pub mod model_choice;
 pub mod model_file;

@@ -10,6 +10,7 @@ mod faults;
 mod figures;
 mod fuzz;
 mod kept;
+mod kept_file;
 mod leg_options;
 mod model_choice;
 mod model_file;

@@ -17,7 +17,8 @@ const SECTORS: usize = 2;
 /// Bytes of a board's flash.
 pub const BYTES: usize = SECTOR * SECTORS;
 
-type Cells = Flash<SECTOR, SECTORS>;
+/// All cells of it.
+pub(in crate::tool) type Cells = Flash<SECTOR, SECTORS>;
 
 /// The flash of one board.
 #[derive(Clone, Debug)]
@@ -39,7 +40,8 @@ impl Memory {
         Self { flash: Some(flash) }
     }
 
-    fn with<T>(&mut self, ask: impl FnOnce(&mut Store<Cells>) -> T) -> Option<T> {
+    /// Whatever the store is asked; `None` where it could not be made.
+    pub(in crate::tool) fn with<T>(&mut self, ask: impl FnOnce(&mut Store<Cells>) -> T) -> Option<T> {
         let flash = self.flash.take()?;
         let mut store = Store::new(flash, 0..BYTES as u32).ok()?;
         let told = ask(&mut store);

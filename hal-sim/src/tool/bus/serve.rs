@@ -123,7 +123,6 @@ fn read(path: &Path, legs: usize) -> Result<Option<Vec<u8>>, ToolError> {
     }
 }
 
-/// Beside the file first, then in its place.
 fn write<const N: usize, const B: usize>(
     path: Option<&Path>,
     network: &mut Network<N, B>,
@@ -131,6 +130,11 @@ fn write<const N: usize, const B: usize>(
     let Some(path) = path else { return Ok(()) };
     let bytes: Vec<u8> =
         network.boards().iter_mut().flat_map(|board| board.memory().bytes().to_vec()).collect();
+    replace(path, &bytes)
+}
+
+/// Beside the file first, then in its place: a file that is there is there as a whole.
+pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), ToolError> {
     let beside = path.with_extension("new");
     std::fs::write(&beside, bytes)
         .and_then(|()| std::fs::rename(&beside, path))

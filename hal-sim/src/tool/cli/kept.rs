@@ -1,0 +1,120 @@
+//! `kept`: what a board remembers over the power, as TOML and back.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+
+use crate::tool::bus::memory::{BYTES, Memory};
+use crate::tool::bus::serve::replace;
+use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::kept_file::KeptFile;
+use crate::tool::tables;
+
+/// Boards that a flash file may hold, as many as `serve` serves.
+const BOARDS: usize = 4;
+/// Larger files are something else.
+const LARGEST_FILE_BYTES: u64 = 1 << 20;
+
+/// Which way.
+#[derive(Args, Debug)]
+pub struct KeptArguments {
+    #[command(subcommand)]
+    way: Way,
+}
+
+#[derive(Subcommand, Debug)]
+enum Way {
+    /// Read a board's flash and write what is kept in it as TOML; exit code 3 where something is damaged.
+    Export {
+        /// As `serve --flash` has it: 256 KB per board.
+        flash: PathBuf,
+        /// Which board of the file.
+        #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=BOARDS as i64))]
+        board: u8,
+        /// Where to; standard output where it is not given.
+        #[arg(long, value_name = "FILE.toml")]
+        out: Option<PathBuf>,
+    },
+    /// Write what a TOML file says into a board's flash, all of it or nothing; what the file does not name stays.
+    Import {
+        /// As `export` writes it.
+        file: PathBuf,
+        /// As `serve --flash` has it; it is made where there is none.
+        flash: PathBuf,
+        /// Which board of the file.
+        #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=BOARDS as i64))]
+        board: u8,
+    },
+}
+
+/// Reads or writes; the exit code.
+pub fn run(arguments: &KeptArguments) -> Result<u8, ToolError> {
+    match &arguments.way {
+        Way::Export { flash, board, out } => export(flash, usize::from(*board), out.as_deref()),
+        Way::Import { file, flash, board } => import(file, flash, usize::from(*board)),
+    }
+}
+
+/// The flash of all boards of a file; `None` where there is no file.
+fn read(path: &Path) -> Result<Option<Vec<u8>>, ToolError> {
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(ToolError::input(format!("{}: {error}", path.display()))),
+    };
+    if bytes.is_empty() || !bytes.len().is_multiple_of(BYTES) || bytes.len() > BOARDS * BYTES {
+        let (file, count) = (path.display(), bytes.len());
+        return Err(ToolError::input(format!(
+            "{file}: {count} bytes; the flash of 1 to {BOARDS} boards has {BYTES} each"
+        )));
+    }
+    Ok(Some(bytes))
+}
+
+fn export(flash: &Path, board: usize, out: Option<&Path>) -> Result<u8, ToolError> {
+    let file = flash.display();
+    let Some(bytes) = read(flash)? else {
+        return Err(ToolError::input(format!("{file}: there is no such file")));
+    };
+    let Some(own) = bytes.get((board - 1) * BYTES..board * BYTES) else {
+        let boards = bytes.len() / BYTES;
+        return Err(ToolError::input(format!("--board {board}: {file} holds the flash of {boards}")));
+    };
+    let found = KeptFile::of_flash(&Memory::new(Some(own)));
+    for part in &found.absent {
+        eprintln!("absent: {file}: board {board}: {part}");
+    }
+    for fault in &found.damaged {
+        eprintln!("damaged: {file}: board {board}: {fault}");
+    }
+    let text = found.file.to_toml();
+    match out {
+        Some(path) => replace(path, text.as_bytes())?,
+        None => tables::print(&text)?,
+    }
+    Ok(if found.damaged.is_empty() { EXIT_ACCEPTED } else { EXIT_REFUSED })
+}
+
+fn import(file: &Path, flash: &Path, board: usize) -> Result<u8, ToolError> {
+    let name = file.display().to_string();
+    let unreadable = |error: std::io::Error| ToolError::input(format!("{name}: cannot be read: {error}"));
+    if std::fs::metadata(file).map_err(unreadable)?.len() > LARGEST_FILE_BYTES {
+        return Err(ToolError::input(format!("{name}: too large for what a board keeps")));
+    }
+    let text = std::fs::read_to_string(file).map_err(unreadable)?;
+    let kept = KeptFile::parse(&text, &name)?;
+    let mut bytes = read(flash)?.unwrap_or_default();
+    // Boards that the file does not hold yet are erased ones.
+    if bytes.len() < board * BYTES {
+        bytes.resize(board * BYTES, 0xFF);
+    }
+    let own = &mut bytes[(board - 1) * BYTES..board * BYTES];
+    let mut memory = Memory::new(Some(own));
+    kept.write_into(&mut memory)
+        .map_err(|why| ToolError::Refused(format!("{}: board {board}: {why}", flash.display())))?;
+    own.copy_from_slice(memory.bytes());
+    replace(flash, &bytes)?;
+    tables::print(&format!("flash: {}, board {board}\n", flash.display()))?;
+    Ok(EXIT_ACCEPTED)
+}
