@@ -14,7 +14,8 @@
 //! patience, in which the duties of the tick before are kept; the second in a row releases. A single step that was not believed is
 //! told with the joint's sample, and three of them in 10 ms are the servo's fault (`safety::Monitor`). A code that stays while its
 //! phase is asked for something else, and shunts that do not begin at zero, release as well ([`ShuntWatch`]). Released stays released
-//! until [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases, switching or not; so do two turns without any.
+//! until [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases, switching or not, and so do two turns without any: looked at with the
+//! joint's sample.
 //!
 //! Once per joint sample the voltages are held against currents and speed ([`ModelWatch`]): an open phase and a drifted zero
 //! release, a frozen counter makes the motor a passive brake ([`Axis::brake`]), since a leg whose encoder is gone should not drop.
@@ -118,8 +119,10 @@ pub struct Axis {
     counter: u16,
     /// Of the counter, to that sample.
     step: i32,
-    /// Of the counter, since the index came last.
-    unindexed: i32,
+    /// Where the index came since the last joint sample, as a place, and how far the counter went in that period.
+    index: Option<(i32, i32)>,
+    /// Counts when it came last.
+    indexed_at: i32,
     /// Within one turn, in the electrical sense.
     place: i32,
     /// Unwrapped, in the joint's sense.
@@ -127,6 +130,8 @@ pub struct Axis {
     measured: Rotating<Ampere>,
     window: Window,
     model_watch: ModelWatch,
+    /// It has not looked since the bridge began to switch.
+    begins: bool,
     shunt_watch: ShuntWatch,
     /// Of the constants as they were made.
     checksum: Checksum,
@@ -160,12 +165,14 @@ impl Axis {
             speed: SpeedTracker::at(constants.scale.angle(place).plus(constants.offset)),
             counter: sample.encoder_count,
             step: 0,
-            unindexed: 0,
+            index: None,
+            indexed_at: 0,
             place,
             counts: 0,
             measured: Rotating::default(),
             window: Window::EMPTY,
             model_watch: ModelWatch::EMPTY,
+            begins: true,
             shunt_watch: ShuntWatch::EMPTY,
             checksum: constants.checksum(),
             unchecked: 0,
@@ -179,6 +186,7 @@ impl Axis {
 
     /// States that the joint now stands at `counts`.
     pub fn set_counts(&mut self, counts: i32) {
+        self.indexed_at = self.indexed_at.wrapping_add(counts.wrapping_sub(self.counts));
         self.counts = counts;
         self.window = Window::EMPTY;
     }
@@ -211,10 +219,13 @@ impl Axis {
         self.last
     }
 
+    #[cold]
+    #[inline(never)]
     fn found(&mut self, fault: AxisFault) {
         self.fault = Some(fault);
         // A counter that froze may show itself as something else first.
-        let doubted = self.last.enabled && self.model_watch.doubts(&self.constants.model, self.place);
+        let doubted =
+            self.last.enabled && !self.begins && self.model_watch.doubts(&self.constants.model, self.place);
         self.lost |=
             doubted || matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters);
     }
@@ -230,16 +241,10 @@ impl Axis {
             self.step = step;
             self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
             self.place = constants.scale.moved(self.place, constants.counter_sign * step);
-            self.unindexed = self.unindexed.saturating_add(step);
-            let is_lost = match sample.index_count {
-                Some(at) => {
-                    self.unindexed = 0;
-                    constants.indexed && self.index_distance(at) > INDEX_WIDTH + step.abs() / INDEX_LATENCY
-                }
-                None => self.unindexed.unsigned_abs() > constants.unindexed,
-            };
-            if is_lost && wish != Wish::Brake {
-                return Err(AxisFault::Encoder);
+            if let Some(at) = sample.index_count {
+                let since =
+                    constants.counter_sign * i32::from(sample.encoder_count.wrapping_sub(at).cast_signed());
+                self.index = Some((self.place - since, step.abs()));
             }
         }
         let angle = self.angle();
@@ -296,7 +301,7 @@ impl Axis {
             return Err(AxisFault::NotANumber);
         }
         if !self.last.enabled {
-            self.model_watch = ModelWatch::EMPTY;
+            self.begins = true;
             if !self.shunt_watch.begins_at_zero() {
                 return Err(AxisFault::CurrentZero);
             }
@@ -329,15 +334,16 @@ impl Axis {
         self.constants.scale.angle(self.place).plus(self.constants.offset)
     }
 
-    /// From the place where the index came to where it belongs, counts. Once per turn of the motor: kept out of the way of the
-    /// other ticks.
-    #[cold]
-    #[inline(never)]
-    fn index_distance(&self, at: u16) -> i32 {
+    /// Whether the index came away from its place since the last call, or has not come for too long.
+    fn is_off_the_index(&mut self) -> bool {
+        let Some((place, step)) = self.index.take() else {
+            return self.counts.wrapping_sub(self.indexed_at).unsigned_abs() > self.constants.unindexed;
+        };
+        self.indexed_at = self.counts;
         let scale = &self.constants.scale;
-        let since = self.constants.counter_sign * i32::from(self.counter.wrapping_sub(at).cast_signed());
-        let distance = scale.within_turn(self.place - since);
-        distance.min(scale.counts_per_turn() - distance)
+        let distance = scale.within_turn(place);
+        let distance = distance.min(scale.counts_per_turn() - distance);
+        self.constants.indexed && distance > INDEX_WIDTH + step / INDEX_LATENCY
     }
 
     /// Means of count and current since the last call, in the joint's sense; both of the same ticks, so that they belong to one
@@ -351,9 +357,16 @@ impl Axis {
         if self.unchecked == 0 && self.constants.checksum() != self.checksum {
             self.found(AxisFault::Parameters);
         }
+        // A motor that brakes needs no place.
+        if self.is_off_the_index() && self.fault.is_none() && self.last != AxisCommand::BRAKE {
+            self.found(AxisFault::Encoder);
+        }
         // A motor that brakes is given no voltage that could be held against anything.
         let follows = self.last.enabled && self.last != AxisCommand::BRAKE;
         if follows && self.fault.is_none() && self.window.ticks > 0 {
+            if core::mem::take(&mut self.begins) {
+                self.model_watch = ModelWatch::EMPTY;
+            }
             let angle = self.angle();
             let shown = Shown {
                 current_loop: &self.current_loop,

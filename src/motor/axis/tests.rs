@@ -37,6 +37,17 @@ impl Bench {
         command
     }
 
+    /// With the joint's sample after every sixth, as a board takes it.
+    fn run_sampled(&mut self, request: AxisRequest, ticks: usize, spoil: impl Fn(&mut AxisSample)) {
+        for tick in 0..ticks {
+            spoil(&mut self.sample);
+            self.tick(request);
+            if tick % 6 == 5 {
+                let _ = self.axis.joint_sample();
+            }
+        }
+    }
+
     fn run(&mut self, request: AxisRequest, ticks: usize) -> AxisCommand {
         (0..ticks).fold(AxisCommand::RELEASED, |_, _| self.tick(request))
     }
@@ -242,11 +253,9 @@ fn an_index_away_from_its_place_is_a_lost_place() {
                 bench.run(request, 100);
                 bench.motor.encoder_zero += f64::from(missed) / 8192.0;
                 // The index stays where it is on the shaft: three turns.
-                for _ in 0..9048 {
-                    bench.sample.index_count =
-                        bench.sample.index_count.map(|at| at.wrapping_add(missed as u16));
-                    bench.tick(request);
-                }
+                bench.run_sampled(request, 9048, |sample| {
+                    sample.index_count = sample.index_count.map(|at| at.wrapping_add(missed as u16));
+                });
                 assert_eq!(bench.axis.fault(), lost.then_some(AxisFault::Encoder), "{missed} {speed}");
                 assert_eq!(bench.axis.clear_fault(), !lost);
             }
@@ -260,10 +269,7 @@ fn two_turns_without_an_index_are_a_lost_place_where_there_was_one() {
     for (speed, ticks, lost) in [(50.0, 5000, false), (50.0, 9000, true), (-50.0, 9000, true)] {
         for request in [ask(5.0), AxisRequest::RELEASED] {
             let mut bench = Bench::at(speed, &CONFIGURATION);
-            for _ in 0..ticks {
-                bench.sample.index_count = None;
-                bench.tick(request);
-            }
+            bench.run_sampled(request, ticks, |sample| sample.index_count = None);
             assert_eq!(bench.axis.fault(), lost.then_some(AxisFault::Encoder), "{speed} {ticks}");
             assert_eq!(bench.axis.clear_fault(), !lost);
         }
@@ -272,10 +278,7 @@ fn two_turns_without_an_index_are_a_lost_place_where_there_was_one() {
     let mut bench = Bench::at(50.0, &CONFIGURATION);
     for way in 0..40 {
         bench.motor.speed = if way % 2 == 0 { 50.0 } else { -50.0 };
-        for _ in 0..2000 {
-            bench.sample.index_count = None;
-            bench.tick(ask(0.0));
-        }
+        bench.run_sampled(ask(0.0), 2000, |sample| sample.index_count = None);
     }
     assert_eq!(bench.axis.fault(), None);
 }

@@ -46,7 +46,8 @@ impl Axis {
         let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
         self.place = constants.scale.within_turn(self.place + constants.counter_sign * step);
         self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
-        (self.counter, self.step, self.unindexed) = (sample.encoder_count, 0, 0);
+        (self.counter, self.step) = (sample.encoder_count, 0);
+        (self.index, self.indexed_at) = (None, self.counts);
         self.speed = SpeedTracker::at(self.angle());
         self.window = Window::EMPTY;
         (self.doubtful, self.disbelieved) = (false, false);
