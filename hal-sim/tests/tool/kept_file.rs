@@ -1,7 +1,7 @@
 //! What a board remembers, out of its flash and back: the same text, what is refused, and a board that starts with it.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::Path;
 
 use hal_sim::tool::bus::memory::{BYTES, Memory};
 use hal_sim::tool::bus::serve::{ServeOptions, network};
@@ -77,11 +77,11 @@ fn content(exported: &str) -> &str {
     &exported[exported.find("schema").expect("a schema")..]
 }
 
-fn export(flash: &std::path::Path) -> Run {
+fn export(flash: &Path) -> Run {
     scarab("kept export", &[flash])
 }
 
-fn import(folder: &Folder, text: &str, flash: &std::path::Path) -> Run {
+fn import(folder: &Folder, text: &str, flash: &Path) -> Run {
     let file = folder.write("kept.toml", text);
     scarab("kept import", &[&file, flash])
 }
