@@ -143,22 +143,21 @@ impl<const N: usize> CurrentLoops<N> {
     /// One tick of one axis.
     #[inline(always)]
     pub fn tick(&mut self, axis: usize, tick: &Tick, board: &mut impl CurrentBoard) {
-        if axis == 0
-            && let Some(chopper) = &self.chopper
-        {
-            // Nobody would take it back while the flash stands; it refuses as long as there is one.
-            let wanted = match is_storing(board) {
-                true => 0.0,
-                false => chopper.duty(self.volt_per_code * f32::from(tick.sample.bus_code)),
-            };
-            board.set_brake(self.budget.spend(wanted));
-        }
         if axis == 0 {
             // Who does not know the bus cannot brake into it. One may be missing: the first of all.
             let misses = !tick.supply && !is_storing(board);
             self.unconverted = if misses { self.unconverted.saturating_add(1) } else { 0 };
-            if self.unconverted >= UNCONVERTED {
+            let unknown = self.unconverted >= UNCONVERTED;
+            if unknown {
                 board.raise(Cause::Conversion.bit());
+            }
+            if let Some(chopper) = &self.chopper {
+                // Nobody would take it back while the flash stands; it refuses as long as there is one.
+                let wanted = match is_storing(board) || unknown {
+                    true => 0.0,
+                    false => chopper.duty(self.volt_per_code * f32::from(tick.sample.bus_code)),
+                };
+                board.set_brake(self.budget.spend(wanted));
             }
         }
         self.look_at_the_others(axis, tick.now, board);

@@ -15,9 +15,7 @@
 use super::contacts::{Ask, Operator, RATE_HZ, Situation};
 use super::stage::{Order, Outcome};
 use crate::hal::{AxisSample, JointSample};
-use crate::leg::{
-    AxisFault, Calibration, CalibrationRefusal, ControlRequest, DriveState, PowerRequest, StoredCalibration,
-};
+use crate::leg::{AxisFault, Calibration, ControlRequest, DriveState, PowerRequest, StoredCalibration};
 use crate::motor::reference::{ReferenceStep, StatedPose};
 use crate::motor::{Axis, Calibrator};
 use crate::real::max;
@@ -186,10 +184,8 @@ impl<const N: usize> Housekeeper<N> {
                 let (result, number) = words::calibration(*refusal);
                 board.say(refused(joint, result, number));
                 self.calibrating = None;
-                // Not the motor that was kept, or not as it was mounted then: once that was told, the next one is measured anew.
-                if let (CalibrationRefusal::OtherMotor | CalibrationRefusal::StoredOffset, Some(stored)) =
-                    (refusal, self.stored.get_mut(axis))
-                {
+                // Not the motor that was kept, not as it was mounted then, or whatever else that led to: the next one is measured anew.
+                if let Some(stored) = self.stored.get_mut(axis) {
                     *stored = None;
                 }
             }

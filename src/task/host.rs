@@ -87,12 +87,16 @@ impl HostLink {
         request: Option<ControlRequest<JOINTS>>,
         state: DriveState,
     ) -> Option<ControlRequest<JOINTS>> {
-        if (self.held)() || state != DriveState::OperationEnabled {
+        if (self.held)() {
             return request;
         }
         match request {
             Some(ControlRequest::Power(power)) if !power.enables() => request,
-            _ => Some(ControlRequest::Power(PowerRequest::QuickStop)),
+            _ if state == DriveState::OperationEnabled => {
+                Some(ControlRequest::Power(PowerRequest::QuickStop))
+            }
+            // A step that was asked for while the switch was held still.
+            _ => None,
         }
     }
 

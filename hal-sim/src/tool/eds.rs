@@ -49,7 +49,7 @@ fn write_all(out: &mut String, joint: &str) -> fmt::Result {
     writeln!(
         out,
         "[DeviceInfo]\nVendorName=Scarab\nVendorNumber={:#010X}\nProductName=Scarab {joint}\nProductNumber={:#010X}\nRevisionNumber={:#010X}\n\
-         BaudRate_10=0\nBaudRate_20=0\nBaudRate_50=0\nBaudRate_125=0\nBaudRate_250=0\nBaudRate_500=0\nBaudRate_800=0\nBaudRate_1000=1\n\
+         BaudRate_10=0\nBaudRate_20=0\nBaudRate_50=0\nBaudRate_125=1\nBaudRate_250=1\nBaudRate_500=1\nBaudRate_800=0\nBaudRate_1000=1\n\
          SimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity=8\nDynamicChannelsSupported=0\nGroupMessaging=0\nNrOfRXPDO=4\nNrOfTXPDO=4\n\
          LSS_Supported=0\n",
         identity.vendor, identity.product, identity.revision

@@ -248,6 +248,8 @@ fn the_emergency_stop_counts_while_the_flash_is_written() {
 #[test]
 fn a_bus_voltage_that_is_no_longer_converted_releases_at_the_second_period() {
     let mut bench = Bench::new(&CONFIGURATION);
+    // A code above where the brake resistor begins, which nobody measured any more.
+    bench.motors[0].bus = 53.0;
     let mut causes = Vec::new();
     for supply in [false, true, false, false] {
         let sample = bench.motors[0].sample();
@@ -259,4 +261,5 @@ fn a_bus_voltage_that_is_no_longer_converted_releases_at_the_second_period() {
     }
     // The first of all is not missed.
     assert_eq!(causes, [0, 0, 0, Cause::Conversion.bit()]);
+    assert_eq!(bench.board.brake, 0.0);
 }
