@@ -18,7 +18,7 @@
 //! Cost: two polls of a node and one copy of the leg's values; docs/bus.md. Memory: docs/bus.md.
 
 use super::communication::Identity;
-use super::drive::{Axis, AxisConstants, Coupling};
+use super::drive::{Axis, AxisConstants, BLOCKED, Coupling, HELD};
 use super::frame::{Frame, NodeId};
 use super::identification::{Ask, JointObjects, LegObjects, Results};
 use super::kept::{LONGEST, kept_bit_rate, kept_node_id};
@@ -26,10 +26,6 @@ use super::node::{Controller, Node, Storing};
 use crate::leg::{
     Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, Permission, Plan, PowerRequest,
 };
-
-/// Digital inputs beyond CiA 402's: the enabling switch is held; something forbids to enable.
-const HELD: u32 = 1 << 16;
-const BLOCKED: u32 = 1 << 17;
 
 /// What a leg tells of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -304,10 +300,17 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         self.leg.log.push(logged);
     }
 
-    /// What a host wants kept, once; all of it is then ready in [`Self::kept`].
+    /// What a host wants kept, once; all of it is then ready in [`Self::kept`]. More than fits is not kept, and hosts are told (5530).
     pub fn take_store(&mut self) -> Option<Keeping> {
         self.recall_reset();
         let defaults = self.leg.take_store()?;
+        let mut tried = [0; LONGEST];
+        let fits = |(node, axis): (&mut Node, &mut Axis)| node.keep(axis, &mut tried).is_ok();
+        if !defaults && !self.nodes.iter_mut().zip(&mut self.axes).all(fits) {
+            // All of it or nothing.
+            self.storing(Storing::Failed);
+            return None;
+        }
         for ((node, axis), kept) in self.nodes.iter_mut().zip(&mut self.axes).zip(&mut self.kept) {
             let before = *kept;
             kept.length = 0;

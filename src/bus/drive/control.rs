@@ -177,6 +177,11 @@ impl Axis {
         self.commanded
     }
 
+    /// Something forbids to enable.
+    pub(in crate::bus) const fn is_blocked(&self) -> bool {
+        self.status.inputs & super::BLOCKED != 0
+    }
+
     /// This joint is enabled, and so is the leg.
     pub(super) fn is_powered(&self) -> bool {
         self.own == DriveState::OperationEnabled && self.status.drive == DriveState::OperationEnabled

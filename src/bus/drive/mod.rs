@@ -22,5 +22,10 @@ pub use crate::leg::{JointCommand, JointStatus, Mode, SetPoint, Target};
 pub use control::{Axis, AxisConstants};
 pub use coupling::Coupling;
 
+/// Digital inputs (60FD) beyond CiA 402's: the enabling switch is held.
+pub(super) const HELD: u32 = 1 << 16;
+/// Something forbids to enable.
+pub(super) const BLOCKED: u32 = 1 << 17;
+
 #[cfg(test)]
 mod tests;

@@ -257,7 +257,8 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
     }
 
     fn store(&mut self, defaults: bool) -> Result<(), Abort> {
-        if self.axis.drive().permission() != Permission::Released {
+        // What forbids to enable forbids this as well: motors may be braking.
+        if self.axis.drive().permission() != Permission::Released || self.axis.is_blocked() {
             return Err(Abort::State);
         }
         self.leg.store = Some(defaults);
