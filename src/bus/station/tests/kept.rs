@@ -1,0 +1,85 @@
+//! What a host wants kept.
+
+use super::*;
+
+#[test]
+fn what_is_kept_is_ready_for_the_store_and_comes_back_with_a_reset() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x6065, 0, 12_345, 4);
+    bench.write(2, 0x2002, 0, 500, 2);
+    bench.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
+    assert_eq!((bench.station.take_store(), bench.station.take_store()), (Some(Keeping::All), None));
+    assert_eq!(bench.station.bit_rate(), Some(500));
+    let kept: [Vec<u8>; 2] = [0, 1].map(|joint| bench.station.kept(joint).to_vec());
+    bench.write(1, 0x6065, 0, 1, 4);
+    bench.send(0, &[129, 0]);
+    assert_eq!(bench.read(1, 0x6065), 12_345);
+    // Another start, from what the store gave back.
+    let mut other = Bench::new();
+    for (joint, bytes) in kept.iter().enumerate() {
+        other.station.recall(joint, bytes);
+    }
+    other.run(4);
+    assert_eq!(
+        (other.read(1, 0x6065), other.read(2, 0x2002), other.station.bit_rate()),
+        (12_345, 500, Some(500))
+    );
+    other.write(2, 0x1011, 1, u32::from_le_bytes(*b"load"), 4);
+    assert_eq!(other.station.take_store(), Some(Keeping::Defaults));
+    other.send(0, &[129, 0]);
+    assert_eq!((other.read(1, 0x6065), other.station.bit_rate()), (87_266, None));
+}
+
+#[test]
+fn what_does_not_fit_is_not_kept_and_hosts_are_told() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x6065, 0, 12_345, 4);
+    bench.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
+    assert_eq!(bench.station.take_store(), Some(Keeping::All));
+    let before = bench.station.kept(0).to_vec();
+    // Every PDO with eight objects: bytes of nothing in, modes out.
+    for place in 0..4 {
+        for (mapping, object) in [(0x1600 + place, 0x0005_0008), (0x1A00 + place, 0x6061_0008)] {
+            let (parameters, identifier) = (mapping - 0x200, 0x4000_0181 + u32::from(place));
+            bench.write(1, parameters, 1, 1 << 31 | identifier, 4);
+            bench.write(1, mapping, 0, 0, 1);
+            for sub in 1..=8 {
+                bench.write(1, mapping, sub, object, 4);
+            }
+            bench.write(1, mapping, 0, 8, 1);
+        }
+    }
+    bench.write(2, 0x6065, 0, 777, 4);
+    bench.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
+    assert_eq!(bench.station.take_store(), None);
+    let told = bench.run(4).into_iter().filter(|frame| frame.id() & 0x780 == 0x80);
+    assert_eq!(told.map(|frame| frame.data()[..2].to_vec()).collect::<Vec<_>>(), [[0x30, 0x55]; 2]);
+    assert_eq!((bench.station.kept(0), bench.station.kept(1)), (&before[..], &[][..]));
+}
+
+#[test]
+fn nothing_is_kept_while_something_blocks() {
+    let mut bench = Bench::new();
+    bench.blocked = true;
+    bench.run(4);
+    let frames = bench.send(0x601, &[0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e']);
+    let answer = frames.iter().find(|frame| frame.id() == 0x581).expect("an answer");
+    assert_eq!(answer.data(), [0x80, 0x10, 0x10, 1, 0x22, 0, 0, 0x08]);
+    assert_eq!(bench.station.take_store(), None);
+}
+
+#[test]
+fn hosts_are_told_before_the_flash_is_written_and_how_it_ended() {
+    let mut bench = Bench::new();
+    let codes = |frames: Vec<Frame>| -> Vec<(u16, u16)> {
+        let emergencies = frames.iter().filter(|frame| frame.id() & 0x780 == 0x80);
+        emergencies
+            .map(|frame| (frame.id(), u16::from_le_bytes([frame.data()[0], frame.data()[1]])))
+            .collect()
+    };
+    for (storing, code) in [(Storing::Busy, 0xFF01), (Storing::Failed, 0x5530), (Storing::Done, 0)] {
+        bench.station.storing(storing);
+        bench.station.storing(storing);
+        assert_eq!(codes(bench.run(4)), [(0x81, code), (0x82, code)]);
+    }
+}
