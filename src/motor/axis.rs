@@ -11,7 +11,8 @@
 //!
 //! **Borders.** A target that is not a number, a voltage that is none, a current beyond the bound release the bridge in the
 //! same tick. A saturated amplifier, a bus voltage out of range and an encoder step that no motor makes have one tick of
-//! patience, in which the duties of the tick before are kept; the second in a row releases. A single step that was not believed is
+//! patience, in which the duties of the tick before are kept; the second in a row releases, and so does the third of shunts or bus in
+//! every other tick. A single step that was not believed is
 //! told with the joint's sample, and three of them in 10 ms are the servo's fault (`safety::Monitor`). A code that stays while its
 //! phase is asked for something else, and shunts that do not begin at zero, release as well ([`ShuntWatch`]). Released stays released
 //! until [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases, switching or not, and so do two turns without any: looked at with the
@@ -42,72 +43,21 @@ use crate::hal::{AxisCommand, AxisSample, JointSample};
 use crate::real::{abs, clamp, is_finite};
 use crate::units::Ampere;
 
+mod asked;
 mod told;
 #[cfg(not(target_os = "none"))]
 mod upset;
 mod window;
 
+pub use asked::{AxisFault, AxisRequest, Wish};
 use window::Window;
 
+/// What a reading of shunts or bus that is not believed adds to the doubts; each that is believed takes one away. Beyond so many it is a fault:
+/// the third of three in every other tick, or one in four for ten.
+const DOUBT: u8 = 4;
+const MOST_DOUBTS: u8 = 8;
 /// A count that is taken by an interrupt at the index may be late by one part in so many of a period: 10 us.
 const INDEX_LATENCY: i32 = 4;
-
-/// What an axis is asked for in one tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxisRequest {
-    /// The bridge switches.
-    pub enabled: bool,
-    /// Quadrature current in the joint's sense, limited to the configuration's.
-    pub current: Ampere,
-}
-
-impl AxisRequest {
-    /// Bridge released.
-    pub const RELEASED: Self = Self { enabled: false, current: Ampere::ZERO };
-}
-
-/// Why an axis released its bridge by itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AxisFault {
-    /// A shunt amplifier at its rail, two ticks in a row.
-    CurrentSense,
-    /// The current vector is longer than the bound.
-    Overcurrent,
-    /// Bus voltage out of its range, two ticks in a row.
-    BusVoltage,
-    /// Two encoder steps in a row that no motor makes, or an index pulse away from the index's place. The place is lost: only a
-    /// new calibration helps.
-    Encoder,
-    /// Target or voltage not a number.
-    NotANumber,
-    /// The counter stands still while the motor turns. The motor is a brake until the fault is cleared; the place is lost.
-    EncoderFrozen,
-    /// The voltage is not that of the current: a phase does not conduct.
-    OpenPhase,
-    /// The shunts' zeros drifted.
-    CurrentZero,
-    /// A shunt's code stays while its phase is asked for another current.
-    StuckConversion,
-    /// Gains or limits are not what they were.
-    Parameters,
-}
-
-/// What the bridge is to do in a tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Wish {
-    /// Nothing.
-    Released,
-    /// Quadrature current in the joint's sense.
-    Follow(Ampere),
-    /// Low sides on: a passive brake.
-    Brake,
-}
-
-impl From<AxisRequest> for Wish {
-    fn from(request: AxisRequest) -> Self {
-        if request.enabled { Self::Follow(request.current) } else { Self::Released }
-    }
-}
 
 /// One axis; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,6 +89,8 @@ pub struct Axis {
     unchecked: u8,
     last: AxisCommand,
     doubtful: bool,
+    /// About shunts and bus, see [`DOUBT`].
+    doubts: u8,
     /// A count since the last joint sample was not believed.
     disbelieved: bool,
     fault: Option<AxisFault>,
@@ -178,6 +130,7 @@ impl Axis {
             unchecked: 0,
             last: AxisCommand::RELEASED,
             doubtful: false,
+            doubts: 0,
             disbelieved: false,
             fault: None,
             lost: false,
@@ -272,13 +225,15 @@ impl Axis {
         if let Some(fault) = doubt {
             self.disbelieved |= !plausible;
             // Who is about to switch has no command to keep until the next reading.
-            if self.doubtful || switching && !self.last.enabled {
+            self.doubts = self.doubts.saturating_add(u8::from(plausible) * DOUBT);
+            if self.doubtful || self.doubts > MOST_DOUBTS || switching && !self.last.enabled {
                 return Err(fault);
             }
             self.doubtful = true;
             return Ok(if switching { self.last } else { AxisCommand::RELEASED });
         }
         self.doubtful = false;
+        self.doubts = self.doubts.saturating_sub(1);
         if !switching {
             if let Some(currents) = currents {
                 self.shunt_watch.released(currents);
@@ -325,6 +280,9 @@ impl Axis {
             return Err(AxisFault::StuckConversion);
         }
         let duty = constants.modulator.duties(voltage.to_stationary(acting), 1.0 / bus.0, target);
+        if !is_finite(duty[0] + duty[1] + duty[2]) {
+            return Err(AxisFault::NotANumber);
+        }
         Ok(AxisCommand { enabled: true, duty })
     }
 

@@ -131,7 +131,7 @@ impl Modulator {
     }
 
     /// Duties of A, B and C for a voltage; `per_bus` is one over the bus voltage, `target` the current that is wanted while
-    /// they act.
+    /// they act. Of a voltage that is not a number duties are none.
     #[must_use]
     pub fn duties(&self, voltage: Stationary<Volt>, per_bus: f32, target: Stationary<Ampere>) -> [f32; 3] {
         let Phases { a, b, c } =
@@ -150,9 +150,22 @@ impl Modulator {
         [self.duty(a + shift, current.a), self.duty(b + shift, current.b), self.duty(c + shift, current.c)]
     }
 
+    /// None of the numbers is one any more; on the host alone, row N1 of docs/safety.md.
+    #[cfg(not(target_os = "none"))]
+    pub(super) const fn spoil(&mut self) {
+        self.dead_duty = f32::NAN;
+    }
+
     fn duty(&self, wanted: f32, current_in_bands: f32) -> f32 {
         let duty = wanted + self.dead_duty * clamp(current_in_bands, -1.0, 1.0);
-        clamp(duty, 0.0, self.greatest_duty)
+        // One that is no number stays so, for who asked to see.
+        if duty < 0.0 {
+            0.0
+        } else if duty > self.greatest_duty {
+            self.greatest_duty
+        } else {
+            duty
+        }
     }
 }
 
@@ -194,8 +207,13 @@ mod tests {
             for length in [5.0, 25.0, 1000.0, f32::INFINITY, f32::NAN] {
                 for degrees in 0..360 {
                     let target = Stationary { alpha: Ampere(60.0), beta: Ampere(-20.0) };
-                    for duty in modulator.duties(at(length, degrees), 1.0 / 48.0, target) {
-                        assert!((0.0..=modulator.greatest_duty()).contains(&duty), "{duty}");
+                    let duties = modulator.duties(at(length, degrees), 1.0 / 48.0, target);
+                    let within = |duty: &f32| (0.0..=modulator.greatest_duty()).contains(duty);
+                    if length.is_finite() {
+                        assert!(duties.iter().all(within), "{duties:?}");
+                    } else {
+                        // What is no voltage is told by what is no duty.
+                        assert!(duties.iter().any(|duty| duty.is_nan()), "{duties:?}");
                     }
                 }
             }

@@ -99,6 +99,12 @@ fn every_detector_that_is_switched_off_is_noticed() {
             row["fault"]
         );
     }
+    let detectors = report["detectors"].as_array().expect("a list");
+    assert!(detectors.len() >= 20, "{}", detectors.len());
+    for detector in detectors {
+        let of = |name: &str| detector[name].as_u64().expect("a number");
+        assert!(of("missed_without") + of("seen_by_others") > 0, "nobody misses {}", detector["code"]);
+    }
 }
 
 /// A hang of each that checks in is answered by a reset, neither sooner nor later than the watchdog's oscillator allows, and what boots
@@ -137,8 +143,9 @@ fn bad_input_names_the_option() {
         ("--hours=-1", "--hours: -1 is not from 0 to 1000"),
         ("--fault C2 --every-tick", "--every-tick: is about the emergency stop"),
         ("--leg mujoco-leg", "has no [joint.motor]"),
-        ("--blind --fault K4", "--blind: --fault K4 leaves no row"),
-        ("--blind --fault sweep --fault pairs", "--blind: --fault sweep --fault pairs leaves no row"),
+        ("--blind --fault K4", "--blind: of --fault K4 not every one"),
+        ("--blind --fault K4 --fault C2", "--blind: of --fault K4 --fault C2 not every one"),
+        ("--blind --fault sweep --fault pairs", "--blind: of --fault sweep --fault pairs not every one"),
         ("--blind --docs README.md", "cannot be used with"),
         ("--replay 1 --docs README.md", "cannot be used with"),
         ("--json no-such-folder/faults.json", "no-such-folder/faults.json: cannot be written"),

@@ -50,7 +50,7 @@ impl Axis {
         (self.index, self.indexed_at) = (None, self.counts);
         self.speed = SpeedTracker::at(self.angle());
         self.window = Window::EMPTY;
-        (self.doubtful, self.disbelieved) = (false, false);
+        (self.doubtful, self.doubts, self.disbelieved) = (false, 0, false);
         if long && constants.scale.within_turn(1 << 16) != 0 {
             self.found(AxisFault::Encoder);
         }

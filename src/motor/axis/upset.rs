@@ -21,4 +21,9 @@ impl Axis {
         };
         *upset = f32::from_bits(upset.to_bits() ^ 1 << (bit % 32));
     }
+
+    /// The modulator's numbers are none: what no port reaches (row N1).
+    pub const fn spoil_modulation(&mut self) {
+        self.constants.modulator.spoil();
+    }
 }

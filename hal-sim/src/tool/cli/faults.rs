@@ -12,7 +12,7 @@ use crate::tool::faults::campaign::{Campaign, CampaignOptions, campaign};
 use crate::tool::faults::entry::{Entry, entries};
 use crate::tool::faults::hours::hours;
 use crate::tool::faults::report::{CampaignReport, told};
-use crate::tool::faults::run::{Manner, Outcome};
+use crate::tool::faults::run::{Blind, Manner, Outcome};
 use crate::tool::faults::trial::KINDS;
 use crate::tool::html::{self, Circumstances};
 use crate::tool::leg_file::LegFile;
@@ -126,9 +126,10 @@ impl FaultsArguments {
         let mut rows = rows(&self.fault, self.full)?;
         if self.blind {
             rows.retain(Entry::can_be_blind);
-            if rows.is_empty() {
+            let named = |name: &String| rows.iter().any(|entry| entry.head().id == name);
+            if rows.is_empty() || !self.fault.iter().all(named) {
                 return Err(ToolError::input(format!(
-                    "--blind: --fault {} leaves no row whose detectors can be switched off",
+                    "--blind: of --fault {} not every one has detectors that can be switched off",
                     self.fault.join(" --fault ")
                 )));
             }
@@ -162,7 +163,11 @@ impl FaultsArguments {
             seeds,
             whole: self.full && self.seeds.is_none(),
             every_tick: self.every_tick || self.full && self.fault.is_empty(),
-            manner: Manner { blind: self.blind, recorded: self.replay.is_some(), brief: false },
+            manner: Manner {
+                blind: if self.blind { Blind::Row } else { Blind::Nobody },
+                recorded: self.replay.is_some(),
+                brief: false,
+            },
             seconds: self.seconds,
         })
     }
@@ -211,6 +216,19 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     if arguments.blind {
         let unnoticed: Vec<_> =
             report.rows.iter().filter(|row| !row.is_noticed()).map(|row| row.fault).collect();
+        for detector in &report.detectors {
+            tables::print(&detector.told())?;
+        }
+        let unnoticed: Vec<_> = unnoticed
+            .into_iter()
+            .chain(
+                report
+                    .detectors
+                    .iter()
+                    .filter(|detector| !detector.is_noticed())
+                    .map(|detector| detector.code),
+            )
+            .collect();
         let words = if unnoticed.is_empty() { "none" } else { &unnoticed.join(", ") };
         tables::print(&format!("detectors that nobody would miss: {words}\n"))?;
         let all = unnoticed.is_empty() && report.base_alarms.is_empty();

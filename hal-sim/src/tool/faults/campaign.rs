@@ -4,27 +4,24 @@
 //! from the run's seed alone, so that one run can be repeated without the others. A row that is run in two ways has its odd seeds
 //! forked and its even ones on its bench.
 
-use core::f64::consts::TAU;
-
 use rayon::prelude::*;
 use scarab::leg::{Activity, ControlRequest};
-use scarab::motor::AxisConfiguration;
 use scarab::safety::DriveState;
 
 use super::bench::offsets::OFFSETS;
+use super::bounds::bounds;
 use super::catalogue::stop::ROWS as STOP;
 use super::catalogue::{Bounds, Event, Expected, JOINTS, Onset, Row, Scenario};
+use super::detectors::views;
 use super::dice::Dice;
 use super::emulated::emulated;
 use super::entry::Entry;
 use super::rig::{Hand, PERIODS_PER_S, Rig};
-use super::run::{Manner, Outcome, run};
+use super::run::{Blind, Manner, Outcome, run};
 use super::trial::Trial;
-use crate::drive::description::BridgeDescription;
 use crate::faults::{Channel, Form, Injection, Timing};
-use crate::tool::board::{BUS, axis_configuration};
 use crate::tool::error::ToolError;
-use crate::tool::leg_file::{JointFile, LegFile, MotorFile};
+use crate::tool::leg_file::LegFile;
 use crate::tool::pair::{Context, Pair};
 use crate::tool::setup::SetupError;
 use crate::tool::simulate::{DriveModel, SimulationOptions};
@@ -36,7 +33,7 @@ pub(super) const BASE: usize = 13;
 /// Runs of a row that share a base.
 const RUNS_PER_BASE: u64 = 256;
 /// The row that is about the torque caps, and how much wider they are where they are switched off.
-const CAPPED: &str = "H1";
+pub(super) const CAPPED: &str = "H1";
 const WIDENED: f32 = 3.0;
 /// Forks that wait for each other; some 100 KB each.
 const BATCH: usize = 128;
@@ -74,6 +71,8 @@ pub struct Campaign {
     pub outcomes: Vec<Outcome>,
     /// Runs of the sweep and of two faults at once.
     pub trials: Vec<Outcome>,
+    /// Of a campaign that is blind: the forked rows' runs with every detector on, and with one code at a time off.
+    pub singly: Vec<(Blind, Outcome)>,
     /// Of those, runs with the emergency stop at every tick.
     pub every_tick: usize,
     /// Rows that were not run, for want of an emulator.
@@ -87,7 +86,7 @@ pub struct Campaign {
 /// What is done with a fork.
 #[expect(clippy::large_enum_variant, reason = "some hundreds of them beside forks of 100 KB each")]
 enum Job {
-    Row { row: &'static Row, scenario: Scenario, seed: u64, brief: bool },
+    Row { row: &'static Row, scenario: Scenario, seed: u64, manner: Manner },
     Trial { trial: Box<Trial>, seed: u64 },
 }
 
@@ -123,7 +122,7 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
     bases.sort_unstable();
     bases.dedup();
     // Limits are switched off by widening them where the machine is built, so their row has a base of its own.
-    let ways: &[bool] = if options.manner.blind { &[false, true] } else { &[false] };
+    let ways: &[bool] = if options.manner.is_blind() { &[false, true] } else { &[false] };
     let bases: Vec<(u64, bool)> =
         bases.iter().flat_map(|base| ways.iter().map(|widened| (*base, *widened))).collect();
     let found: Vec<Campaign> = bases
@@ -134,6 +133,7 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
     for found in found {
         campaign.outcomes.extend(found.outcomes);
         campaign.trials.extend(found.trials);
+        campaign.singly.extend(found.singly);
         campaign.every_tick += found.every_tick;
         campaign.undisturbed_s += found.undisturbed_s;
         campaign.base_alarms.extend(found.base_alarms);
@@ -152,7 +152,7 @@ pub fn campaign(leg: &LegFile, options: &CampaignOptions) -> Result<Campaign, To
             } else {
                 options.seeds.iter().copied().filter(|seed| !halved || seed.is_multiple_of(2)).collect()
             };
-            campaign.outcomes.extend((bench.run)(&bench.head, leg, &seeds, options.manner.blind)?);
+            campaign.outcomes.extend((bench.run)(&bench.head, leg, &seeds, options.manner.is_blind())?);
         }
     }
     campaign.outcomes.sort_by_key(|outcome| {
@@ -238,7 +238,7 @@ impl Setting<'_> {
         let mut jobs = Vec::new();
         for entry in &options.rows {
             let Entry::Forked(row) = entry else { continue };
-            if self.manner.blind && (row.id == CAPPED) != self.widened {
+            if self.manner.is_blind() && (row.id == CAPPED) != self.widened {
                 continue;
             }
             for seed in options.seeds.iter().copied().filter(|seed| base_of(*seed) == base) {
@@ -248,7 +248,11 @@ impl Setting<'_> {
                 let mut dice = Dice::new(row.id, seed);
                 let period = dice.below(self.length);
                 let scenario = (row.draw)(&mut dice, &self.bounds);
-                jobs.push((period, Job::Row { row, scenario, seed, brief: false }));
+                let views = if self.manner.is_blind() { views(row, &options.rows) } else { Vec::new() };
+                for blind in views.into_iter().chain([self.manner.blind]) {
+                    let manner = Manner { blind, ..self.manner };
+                    jobs.push((period, Job::Row { row, scenario, seed, manner }));
+                }
             }
         }
         let mut trials = |seeds: &[u64], kind: &str, trial: &dyn Fn(u64) -> Trial| {
@@ -282,23 +286,25 @@ impl Setting<'_> {
             within_ms: None,
             turns: 1.1,
         };
-        Job::Row { row, scenario, seed: period, brief: true }
+        Job::Row { row, scenario, seed: period, manner: Manner { brief: true, ..self.manner } }
     }
 
     fn flush(&self, batch: &mut Vec<(Rig<JOINTS, BASE>, Job)>, campaign: &mut Campaign) {
         let of = |(rig, job): &(Rig<JOINTS, BASE>, Job)| match job {
-            Job::Row { row, scenario, seed, brief } => {
-                let manner = Manner { brief: *brief, ..self.manner };
-                let outcome = run(self.leg, row, scenario, *seed, manner, rig);
+            Job::Row { row, scenario, seed, manner } => {
+                let outcome = run(self.leg, row, scenario, *seed, *manner, rig);
                 // Nobody may take its period for a seed that draws another run.
-                (false, Outcome { seed: if *brief { 0 } else { *seed }, ..outcome })
+                (Some(manner.blind), Outcome { seed: if manner.brief { 0 } else { *seed }, ..outcome })
             }
-            Job::Trial { trial, seed } => (true, trial.run(self.leg, *seed, self.manner.recorded, rig)),
+            Job::Trial { trial, seed } => (None, trial.run(self.leg, *seed, self.manner.recorded, rig)),
         };
-        let (trials, rows): (Vec<_>, Vec<_>) =
-            batch.par_iter().map(of).collect::<Vec<_>>().into_iter().partition(|(trial, _)| *trial);
-        campaign.outcomes.extend(rows.into_iter().map(|(_, outcome)| outcome));
-        campaign.trials.extend(trials.into_iter().map(|(_, outcome)| outcome));
+        for (blind, outcome) in batch.par_iter().map(of).collect::<Vec<_>>() {
+            match blind {
+                None => campaign.trials.push(outcome),
+                Some(blind) if blind == self.manner.blind => campaign.outcomes.push(outcome),
+                Some(blind) => campaign.singly.push((blind, outcome)),
+            }
+        }
         batch.clear();
     }
 }
@@ -342,56 +348,4 @@ fn length(leg: &LegFile, context: &Context<JOINTS, BASE>, seed: u64) -> Result<u
         }
     }
     Err(refused().into())
-}
-
-/// What the firmware's model of voltages (`scarab::motor::model_watch`) can tell of this joint, by its equations.
-fn voltages(bounds: &mut Bounds, joint: &JointFile, motor: &MotorFile, configuration: &AxisConfiguration) {
-    let dead = f64::from(configuration.timing.dead_time.0) * PERIODS_PER_S as f64;
-    let still = 2.0 * 4.0 / 3.0 * dead * f64::from(configuration.bus[1].0);
-    // Winding and switch.
-    let resistance = motor.resistance_ohm + BridgeDescription::default().on_resistance;
-    let current = f64::from(configuration.current_limit.0);
-    let per_joint = f64::from(configuration.pole_pairs) * joint.encoder.ratio;
-    let frozen = [still, 0.35 * resistance].map(|volts| volts / f64::from(configuration.flux.0) / per_joint);
-    bounds.frozen_speed = core::array::from_fn(|part| bounds.frozen_speed[part].max(frozen[part]));
-    bounds.frozen_swing_a = bounds.frozen_swing_a.max(current / 2.0);
-    bounds.judged_speed = bounds.judged_speed.max(TAU / 0.025 / per_joint);
-    let offset = (0.4 * still + 0.06 * resistance * current) / (resistance * 2.0 / 3.0_f64.sqrt());
-    // A tenth for what the estimates of the calibration lack, and dead time, which may be against it.
-    bounds.smallest_offset_a = bounds.smallest_offset_a.max(1.1 * offset + 0.5 * still / resistance / 1.15);
-}
-
-pub(super) fn bounds(leg: &LegFile) -> Result<Bounds, ToolError> {
-    if leg.joints.len() != JOINTS {
-        return Err(SetupError::new(leg, "faults are injected into legs of two joints").into());
-    }
-    let mut steps = [0; JOINTS];
-    let mut bounds = Bounds {
-        greatest_step: steps,
-        counts_per_turn: u32::MAX,
-        overcurrent_a: 0.0,
-        bus_v: [0.0; 2],
-        frozen_speed: [0.0; 2],
-        frozen_swing_a: 0.0,
-        judged_speed: 0.0,
-        smallest_offset_a: 0.0,
-    };
-    for (joint, step) in leg.joints.iter().zip(&mut steps) {
-        let motor = joint.motor.as_ref().ok_or_else(|| {
-            SetupError::new(
-                leg,
-                format!("joint `{}` has no [joint.motor]: faults need complete drives", joint.name),
-            )
-        })?;
-        let configuration = axis_configuration(joint, motor);
-        let turns = configuration.greatest_speed.0 / (core::f32::consts::TAU * PERIODS_PER_S as f32);
-        // As `AxisConfiguration` rounds it.
-        *step = (turns * configuration.counts_per_turn as f32) as i32 + 2;
-        bounds.counts_per_turn = bounds.counts_per_turn.min(configuration.counts_per_turn);
-        bounds.overcurrent_a = f64::from(configuration.overcurrent.0);
-        voltages(&mut bounds, joint, motor, &configuration);
-    }
-    bounds.bus_v = BUS.map(|volts| f64::from(volts.0));
-    bounds.greatest_step = [steps[0].min(steps[1]), steps[0].max(steps[1])];
-    Ok(bounds)
 }

@@ -109,6 +109,8 @@ pub enum Event {
         /// From the lowest.
         bit: u8,
     },
+    /// What a joint's axis modulates with is no number (`Axis::spoil_modulation`).
+    Modulation(usize),
     /// The operator's hands go on as they like after the emergency stop: see [`super::run`].
     Hands,
 }

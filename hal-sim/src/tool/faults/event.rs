@@ -29,6 +29,7 @@ pub fn apply<const B: usize>(event: Event, leg: &LegFile, rig: &mut Rig<JOINTS, 
         }
         Event::Oscillator(hz) => rig.set_oscillator(hz),
         Event::Upset { of_axis, joint, number, bit } => rig.upset(of_axis, joint, number, bit),
+        Event::Modulation(joint) => rig.spoil_modulation(joint),
         Event::None | Event::Hands => {}
     }
 }

@@ -3,10 +3,11 @@
 //! | part | what it is |
 //! | --- | --- |
 //! | [`rig`] | firmware and plant, one PWM period at a time, faults on the ports between |
-//! | [`catalogue`], [`draw`] | what is done to the machine, and what has to follow; rows by group |
+//! | [`catalogue`], [`draw`], [`bounds`] | what is done to the machine, and what has to follow; rows by group |
 //! | [`run`], [`outcome`], [`invariants`] | one run, what came of it, and what holds in each of its periods |
 //! | [`aftermath`] | what may follow: the safe state of each code, an operator who resets and enables again |
 //! | [`campaign`] | many runs, forked from identifications |
+//! | [`detectors`] | each code of the firmware switched off by itself |
 //! | [`mod@bench`] | rows that are no forks: parts, calibrations, identifications of ideal drives |
 //! | [`emulated`] | rows that only a processor can show, on the emulated one |
 //! | [`trial`] | every channel spoilt in every way, and two faults at once: nothing may be broken |
@@ -18,8 +19,10 @@
 
 pub mod aftermath;
 pub mod bench;
+pub mod bounds;
 pub mod campaign;
 pub mod catalogue;
+pub mod detectors;
 pub mod dice;
 pub mod draw;
 pub mod emulated;

@@ -1,5 +1,6 @@
 //! What came of a run, and how it is done.
 
+use scarab::safety::FaultCode;
 use serde::Serialize;
 
 use super::recording::Recording;
@@ -36,13 +37,33 @@ pub struct Outcome {
     pub recording: Option<Recording>,
 }
 
+/// Whose detectors are switched off in a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Blind {
+    /// Nobody's.
+    #[default]
+    Nobody,
+    /// Those of its row, all.
+    Row,
+    /// Those that tell this code.
+    Code(FaultCode),
+}
+
 /// How a run is done.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Manner {
-    /// The row's detectors are switched off.
-    pub blind: bool,
+    /// Which detectors are switched off.
+    pub blind: Blind,
     /// Its curves are kept.
     pub recorded: bool,
     /// A machine that is safe is watched for a tenth of the usual time only: 2 ms.
     pub brief: bool,
+}
+
+impl Manner {
+    /// Detectors are switched off.
+    #[must_use]
+    pub fn is_blind(&self) -> bool {
+        self.blind != Blind::Nobody
+    }
 }

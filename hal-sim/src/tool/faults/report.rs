@@ -4,6 +4,7 @@ use scarab::safety::FaultCode;
 use serde::Serialize;
 
 use super::campaign::Campaign;
+use super::detectors::{DetectorReport, detectors};
 use super::entry::{Entry, Head, instead};
 use super::hours::HoursReport;
 use super::run::Outcome;
@@ -96,6 +97,8 @@ pub struct CampaignReport {
     pub undetectable_by_design: usize,
     /// Runs with the emergency stop at every tick, which are among those of X1.
     pub every_tick: usize,
+    /// Each code of the firmware by itself, in a campaign that is blind.
+    pub detectors: Vec<DetectorReport>,
     /// The sweep, and two faults at once.
     pub trials: Vec<TrialsReport>,
     /// Hours of normal motion, where they were asked for.
@@ -136,6 +139,7 @@ impl CampaignReport {
             invariants_broken: all().map(|outcome| outcome.broken.len()).sum(),
             failures: all().filter(failed).take(MOST_FAILURES).cloned().collect(),
             every_tick: campaign.every_tick,
+            detectors: detectors(entries, campaign),
             trials: KINDS.iter().filter_map(|kind| trials_report(kind, &campaign.trials)).collect(),
             hours,
             undisturbed_s: campaign.undisturbed_s,

@@ -311,6 +311,13 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             self.leg.upset(joint, number, bit);
         }
     }
+
+    /// What an axis modulates with is no number any more.
+    pub fn spoil_modulation(&mut self, joint: usize) {
+        if let Some(axis) = self.loops.stage_mut(joint).and_then(Stage::axis_mut) {
+            axis.spoil_modulation();
+        }
+    }
 }
 
 /// What the housekeeper of this leg is built from.

@@ -9,7 +9,7 @@ use super::catalogue::{Event, Expected, JOINTS, Onset, Row, Scenario};
 use super::dice::Dice;
 use super::event::apply;
 use super::invariants::{Invariants, Scope};
-pub use super::outcome::{Manner, Outcome};
+pub use super::outcome::{Blind, Manner, Outcome};
 use super::recording::Recording;
 use super::rig::{Hand, PERIOD_MS, PERIODS_PER_S, Rig};
 use crate::faults::{Channel, Injector};
@@ -111,9 +111,13 @@ impl<'a, const B: usize> Watched<'a, B> {
         let mut rig = base.clone();
         let begun = rig.period;
         rig.injector = Injector::new(seed);
-        if manner.blind {
-            rig.blind = row.codes;
-        }
+        rig.blind = match manner.blind {
+            Blind::Nobody => &[],
+            Blind::Row => row.codes,
+            Blind::Code(code) => {
+                row.codes.iter().find(|own| **own == code).map_or(&[], core::slice::from_ref)
+            }
+        };
         for injection in scenario.injections.into_iter().flatten() {
             let mut injection = injection;
             injection.timing.begin = injection.timing.begin.saturating_add(begun);

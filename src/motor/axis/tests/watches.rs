@@ -265,3 +265,38 @@ fn codes_without_noise_that_stay_are_no_fault_while_nothing_is_asked_to_change()
         assert_eq!(bench.until_fault(ask(current), 200, |_| {}), None, "{current} A");
     }
 }
+
+#[test]
+fn a_code_that_is_wrong_every_other_tick_is_not_survived_for_long() {
+    type Spoil = fn(&mut AxisSample);
+    let spoils: [(Spoil, AxisFault); 2] = [
+        (|sample| sample.shunt_codes[1] = 4000, AxisFault::CurrentSense),
+        (|sample| sample.bus_code = 3950, AxisFault::BusVoltage),
+    ];
+    // One wrong reading of so many, and the wrong readings until it is told.
+    for (of, told) in [(2, Some(3)), (3, Some(4)), (4, Some(6)), (5, None)] {
+        for (spoil, fault) in spoils {
+            let mut bench = Bench::at(50.0, &CONFIGURATION);
+            bench.run(ask(5.0), 100);
+            let mut wrong = 0;
+            for tick in 0..400 {
+                if tick % of == 0 && bench.axis.fault().is_none() {
+                    spoil(&mut bench.sample);
+                    wrong += 1;
+                }
+                bench.tick(ask(5.0));
+            }
+            assert_eq!(bench.axis.fault(), told.map(|_| fault), "one of {of}");
+            assert!(told.is_none_or(|told| told == wrong), "one of {of}: {wrong}");
+        }
+    }
+}
+
+#[test]
+fn duties_that_are_no_numbers_release() {
+    let mut bench = Bench::at(50.0, &CONFIGURATION);
+    bench.run(ask(5.0), 100);
+    bench.axis.spoil_modulation();
+    assert_eq!(bench.tick(ask(5.0)), AxisCommand::RELEASED);
+    assert_eq!(bench.axis.fault(), Some(AxisFault::NotANumber));
+}

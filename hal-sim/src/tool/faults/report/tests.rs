@@ -1,6 +1,6 @@
 //! What the table says.
 
-use super::super::campaign::bounds;
+use super::super::bounds::bounds;
 use super::super::catalogue::{Event, Expected, rows};
 use super::super::dice::Dice;
 use super::{JUDGED, names};
