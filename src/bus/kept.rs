@@ -18,6 +18,36 @@ use super::table::ROWS;
 
 /// Room for what is kept of a node, as the store has it.
 pub const LONGEST: usize = 400;
+
+/// What is kept of a node: bytes as in this module's head.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeptNode {
+    bytes: [u8; LONGEST],
+    length: usize,
+}
+
+impl KeptNode {
+    /// A node as after the start.
+    pub const NOTHING: Self = Self { bytes: [0; LONGEST], length: 0 };
+
+    /// These bytes; what is beyond [`LONGEST`] is left out.
+    #[must_use]
+    pub fn of(bytes: &[u8]) -> Self {
+        let mut kept = Self::NOTHING;
+        for (to, from) in kept.bytes.iter_mut().zip(bytes) {
+            *to = *from;
+            kept.length += 1;
+        }
+        kept
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
+}
+
 const NODE_ID: Object = Object::at(0x2001, 0);
 const BIT_RATE: Object = Object::at(0x2002, 0);
 /// Of a PDO's identifier: it does not exist.
@@ -125,6 +155,16 @@ impl Node {
             length += append(object, size, value, out.get_mut(length..).ok_or(Abort::Store)?)?;
         }
         Ok(length)
+    }
+
+    /// The same, for the store. Where it does not fit nothing is kept.
+    ///
+    /// # Errors
+    /// As [`Self::keep`].
+    pub fn keep_into<O: Objects>(&mut self, objects: &mut O, kept: &mut KeptNode) -> Result<(), Abort> {
+        kept.length = 0;
+        kept.length = self.keep(objects, &mut kept.bytes)?;
+        Ok(())
     }
 
     /// Takes back what was kept, after the start.

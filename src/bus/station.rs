@@ -7,7 +7,7 @@
 //! a frame came            hear(frame, now, who sent it)        a node that was reset begins anew with what was kept of it
 //! a mailbox is free       poll(joint, now) -> frame            again until there is none
 //! the leg has ticked      told(LegTold), then order() -> LegOrder: commands, at most one request, faults of a lost host
-//! a host wrote 1010/1011  take_store() -> Keeping, then kept(joint) for the store; storing(..) tells the hosts meanwhile
+//! a host wrote 1010/1011  take_store(into) -> Keeping; storing(Busy) tells the hosts meanwhile, stored(done, objects) how it ended
 //! ```
 //!
 //! **Who has the drive.** Until a host has sent a controlword that says something, the leg is its operator's: nothing is commanded
@@ -21,7 +21,7 @@ use super::communication::Identity;
 use super::drive::{Axis, AxisConstants, BLOCKED, Coupling, HELD};
 use super::frame::{Frame, NodeId};
 use super::identification::{Ask, JointObjects, LegObjects, Results};
-use super::kept::{LONGEST, kept_bit_rate, kept_node_id};
+use super::kept::{KeptNode, kept_bit_rate, kept_node_id};
 use super::node::{Controller, Node, Storing};
 use crate::leg::{
     Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, Permission, Plan, PowerRequest,
@@ -94,30 +94,6 @@ pub enum Keeping {
     Defaults,
 }
 
-/// What is kept of a node.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Kept {
-    bytes: [u8; LONGEST],
-    length: usize,
-}
-
-impl Kept {
-    const NOTHING: Self = Self { bytes: [0; LONGEST], length: 0 };
-
-    fn of(bytes: &[u8]) -> Self {
-        let mut kept = Self::NOTHING;
-        for (to, from) in kept.bytes.iter_mut().zip(bytes) {
-            *to = *from;
-            kept.length += 1;
-        }
-        kept
-    }
-
-    fn bytes(&self) -> &[u8] {
-        self.bytes.get(..self.length).unwrap_or_default()
-    }
-}
-
 /// See the module; a log of `LOG` samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Station<const N: usize, const LOG: usize> {
@@ -127,7 +103,8 @@ pub struct Station<const N: usize, const LOG: usize> {
     coupling: Coupling,
     own: [NodeId; N],
     identity: Identity,
-    kept: [Kept; N],
+    /// What a node that is reset begins with: what the store has taken.
+    kept: [KeptNode; N],
     /// A host has the drive.
     hosted: bool,
     /// A request that could only be refused was not passed on.
@@ -156,7 +133,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
             coupling: Coupling::default(),
             own,
             identity,
-            kept: [Kept::NOTHING; N],
+            kept: [KeptNode::NOTHING; N],
             hosted: false,
             refused: false,
             request: None,
@@ -168,7 +145,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     /// What a memory holds of a node, as after the start.
     pub fn recall(&mut self, joint: usize, bytes: &[u8]) {
         if let Some(kept) = self.kept.get_mut(joint) {
-            *kept = Kept::of(bytes);
+            *kept = KeptNode::of(bytes);
         }
         self.restart(joint);
     }
@@ -300,34 +277,33 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         self.leg.log.push(logged);
     }
 
-    /// What a host wants kept, once; all of it is then ready in [`Self::kept`]. More than fits is not kept, and hosts are told (5530).
-    pub fn take_store(&mut self) -> Option<Keeping> {
+    /// What a host wants kept, once, and each node's objects for the store: until [`Self::stored`] says so nothing of it counts. More than
+    /// fits is not kept, and hosts are told (5530).
+    pub fn take_store(&mut self, into: &mut [KeptNode; N]) -> Option<Keeping> {
         self.recall_reset();
         let defaults = self.leg.take_store()?;
-        let mut tried = [0; LONGEST];
-        let fits = |(node, axis): (&mut Node, &mut Axis)| node.keep(axis, &mut tried).is_ok();
-        if !defaults && !self.nodes.iter_mut().zip(&mut self.axes).all(fits) {
+        let mut fits = true;
+        for ((node, axis), kept) in self.nodes.iter_mut().zip(&mut self.axes).zip(into) {
+            *kept = KeptNode::NOTHING;
+            if !defaults {
+                fits &= node.keep_into(axis, kept).is_ok();
+            }
+        }
+        if !fits {
             // All of it or nothing.
             self.storing(Storing::Failed);
             return None;
         }
-        for ((node, axis), kept) in self.nodes.iter_mut().zip(&mut self.axes).zip(&mut self.kept) {
-            let before = *kept;
-            kept.length = 0;
-            if !defaults {
-                match node.keep(axis, &mut kept.bytes) {
-                    Ok(length) => kept.length = length,
-                    Err(_) => *kept = before,
-                }
-            }
-        }
         Some(if defaults { Keeping::Defaults } else { Keeping::All })
     }
 
-    /// What is to be kept of a node.
-    #[must_use]
-    pub fn kept(&self, joint: usize) -> &[u8] {
-        self.kept.get(joint).map_or(&[], Kept::bytes)
+    /// How a store of these objects ended. Only what was done is what a node begins with when it is reset; after one that failed it
+    /// is what it was before.
+    pub fn stored(&mut self, done: bool, objects: &[KeptNode; N]) {
+        if done {
+            self.kept = *objects;
+        }
+        self.storing(if done { Storing::Done } else { Storing::Failed });
     }
 
     /// Where the store stands: hosts are told by an emergency message.

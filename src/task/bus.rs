@@ -21,7 +21,7 @@ use super::leg::{BASE, JOINTS};
 use super::statistics::Count;
 use crate::bus::identification::Found;
 use crate::bus::station::{Keeping, LegOrder, LegTold, Station};
-use crate::bus::{Controller, Frame, LONGEST, Storing};
+use crate::bus::{Controller, Frame, KeptNode, Storing};
 use crate::leg::LoggedSample;
 use crate::store::KeptModel;
 
@@ -67,8 +67,8 @@ pub struct Wire {
 pub struct Keep {
     /// What a host asked for.
     pub what: Keeping,
-    /// Of each node; so many bytes of it.
-    pub objects: [([u8; LONGEST], usize); JOINTS],
+    /// Of each node.
+    pub objects: [KeptNode; JOINTS],
     /// Models kept so far.
     pub generation: u32,
     /// It was kept.
@@ -161,7 +161,7 @@ impl Memory {
             results: [BoardFound::NOTHING; 2],
             lent: Keep {
                 what: Keeping::All,
-                objects: [([0; LONGEST], 0); JOINTS],
+                objects: [KeptNode::NOTHING; JOINTS],
                 generation: 0,
                 done: true,
             },
@@ -284,23 +284,16 @@ impl BusLoop {
     fn keep(&mut self) {
         if let Some(kept) = self.kept.dequeue() {
             self.station.set_generation(kept.generation);
-            self.station.storing(if kept.done { Storing::Done } else { Storing::Failed });
+            self.station.stored(kept.done, &kept.objects);
             self.lent = Some(kept);
         }
         let Some(lent) = self.lent.take() else { return };
-        let Some(what) = self.station.take_store() else {
+        let Some(what) = self.station.take_store(&mut lent.objects) else {
             self.lent = Some(lent);
             return;
         };
         lent.what = what;
         lent.generation = self.station.generation();
-        for (joint, (bytes, length)) in lent.objects.iter_mut().enumerate() {
-            *length = 0;
-            for (to, from) in bytes.iter_mut().zip(self.station.kept(joint)) {
-                *to = *from;
-                *length += 1;
-            }
-        }
         self.station.storing(Storing::Busy);
         let _ = self.keep.enqueue(lent);
     }

@@ -16,8 +16,8 @@ use super::leg::{JOINTS, Leg};
 use super::servo;
 use crate::board::odrive_v3_6::flash::Flash;
 use crate::board::odrive_v3_6::watchdog;
-use crate::bus::LONGEST;
 use crate::bus::station::Keeping;
+use crate::bus::{KeptNode, LONGEST};
 use crate::leg::{IdentifiedModel, Permission, StoredCalibration};
 use crate::operation::{Storing, StoringBoard};
 use crate::store::{self, Permit, Store};
@@ -91,8 +91,7 @@ fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep) -> Option<
             at_once(keeper.forget(&permit))??
         }
         Keeping::All => {
-            let objects =
-                keep.objects.each_ref().map(|(bytes, length)| bytes.get(..*length).unwrap_or_default());
+            let objects = keep.objects.each_ref().map(KeptNode::bytes);
             at_once(keeper.keep(&permit, objects, keep.generation))??
         }
     };

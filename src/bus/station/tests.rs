@@ -105,6 +105,22 @@ impl Bench {
         u32::from_le_bytes(answer.data()[4..].try_into().expect("four bytes"))
     }
 
+    /// What the store is asked to do, and with what, as it ended.
+    fn store(&mut self, done: bool) -> Option<(Keeping, [KeptNode; 2])> {
+        let mut objects = [KeptNode::of(&[0x55; 9]); 2];
+        let what = self.station.take_store(&mut objects)?;
+        self.station.stored(done, &objects);
+        Some((what, objects))
+    }
+
+    fn save(&mut self, node: u16) {
+        self.write(node, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
+    }
+
+    fn load(&mut self, node: u16) {
+        self.write(node, 0x1011, 1, u32::from_le_bytes(*b"load"), 4);
+    }
+
     fn enable(&mut self) {
         for word in [6, 7, 15] {
             self.write(1, 0x6040, 0, word, 2);
@@ -194,8 +210,8 @@ fn a_target_that_came_since_the_leg_was_heard_is_in_the_next_order() {
 fn a_node_that_was_reset_begins_anew_once_however_full_the_bus_is() {
     let mut bench = Bench::new();
     bench.write(1, 0x6065, 0, 12_345, 4);
-    bench.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
-    assert_eq!(bench.station.take_store(), Some(Keeping::All));
+    bench.save(1);
+    assert!(bench.store(true).is_some());
     bench.write(1, 0x6065, 0, 1, 4);
     // Its communication first, then all of it; no mailbox is free for the boot-up message.
     for command in [130, 129, 129] {
@@ -216,15 +232,14 @@ fn a_node_that_was_reset_begins_anew_once_however_full_the_bus_is() {
 fn what_is_stored_while_a_neighbour_begins_anew_is_what_was_kept_of_it() {
     let mut bench = Bench::new();
     bench.write(1, 0x6065, 0, 12_345, 4);
-    bench.write(2, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
-    assert_eq!(bench.station.take_store(), Some(Keeping::All));
-    let before = bench.station.kept(0).to_vec();
+    bench.save(2);
+    let before = bench.store(true);
+    assert!(before.is_some());
     let save = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
     for frame in [Frame::new(0, &[129, 1]), Frame::new(0x602, &save)] {
         bench.station.hear(&frame, bench.now_us, None, &Nothing);
     }
-    assert_eq!(bench.station.take_store(), Some(Keeping::All));
-    assert_eq!(bench.station.kept(0), before);
+    assert_eq!(bench.store(true), before);
 }
 
 #[test]

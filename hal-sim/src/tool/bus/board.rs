@@ -10,7 +10,7 @@
 
 use scarab::bus::drive::{AxisConstants, Mode};
 use scarab::bus::station::{Keeping, LegRequest, LegTold, Station};
-use scarab::bus::{Controller, Frame, Identity, Node, NodeId, Storing};
+use scarab::bus::{Controller, Frame, Identity, KeptNode, Node, NodeId};
 use scarab::leg::{ControlRequest, Fault, JointStatus};
 use scarab::safety::PowerRequest;
 use scarab::servo::SERVO_RATE_HZ;
@@ -152,8 +152,9 @@ impl<const N: usize, const B: usize> Board<N, B> {
             return;
         }
         self.station.hear(frame, now_ns / 1000, sender, self.rig.leg.identification());
-        if let Some(keeping) = self.station.take_store() {
-            self.keep(keeping);
+        let mut objects = [KeptNode::NOTHING; N];
+        if let Some(keeping) = self.station.take_store(&mut objects) {
+            self.keep(keeping, &objects);
         }
     }
 
@@ -235,7 +236,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
     }
 
     /// Keeps all objects and the accepted model, or forgets everything.
-    fn keep(&mut self, keeping: Keeping) {
+    fn keep(&mut self, keeping: Keeping, objects: &[KeptNode; N]) {
         let state = self.rig.state();
         self.has_kept = true;
         let kept = match keeping {
@@ -249,11 +250,12 @@ impl<const N: usize, const B: usize> Board<N, B> {
                 forgotten
             }
             Keeping::All => {
-                (0..N).all(|joint| self.memory.keep_objects(state, joint, self.station.kept(joint)))
+                let mut nodes = objects.iter().enumerate();
+                nodes.all(|(joint, kept)| self.memory.keep_objects(state, joint, kept.bytes()))
                     && self.keep_model()
             }
         };
-        self.station.storing(if kept { Storing::Done } else { Storing::Failed });
+        self.station.stored(kept, objects);
     }
 
     /// The accepted model, unless it was kept already; whether nothing went wrong.

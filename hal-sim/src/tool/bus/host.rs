@@ -295,13 +295,40 @@ mod tests {
     use crate::tool::pair::Context;
     use crate::tool::simulate::{DriveModel, SimulationOptions};
 
+    fn host(leg: &LegFile) -> Host {
+        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+        let context = Context::<JOINTS, BASE>::new(leg, &options).expect("a leg");
+        Host::new(Board::new(leg, context, 1, 1, Memory::new(None)).expect("a board"))
+    }
+
+    #[test]
+    fn what_a_flash_refused_is_told_and_does_not_come_back_with_a_reset() {
+        const WINDOW: u16 = 0x6065;
+        let mut host = host(&LegFile::load(DEFAULT_LEG).expect("shipped"));
+        host.begin().expect("nodes that answer");
+        let mut ask = |window: u32, (object, word): (u16, &[u8; 4]), fails: bool| {
+            host.told.clear();
+            host.write(1, WINDOW, 0, window, 4).expect("a window");
+            host.board().memory().fail_after(fails.then_some(1));
+            host.write(2, object, 1, u32::from_le_bytes(*word), 4).expect("a drive that is off");
+            host.run(40);
+            host.board().memory().fail_after(None);
+            let codes: Vec<u16> = host.told.iter().map(|(_, code)| *code).collect();
+            host.network.send(Frame::new(START, &[129, 0]));
+            host.run(40);
+            (codes, host.read(1, WINDOW, 0).expect("an answer"))
+        };
+        let (save, load) = ((0x1010, b"save"), (0x1011, b"load"));
+        assert_eq!(ask(11_111, save, false), (vec![], 11_111));
+        assert_eq!(ask(22_222, save, true), (vec![0x5530; 2], 11_111));
+        assert_eq!(ask(33_333, load, true), (vec![0x5530; 2], 11_111));
+        assert_eq!(ask(44_444, load, false), (vec![], 87_266));
+    }
+
     #[test]
     fn a_host_moves_a_leg_there_and_back_and_a_silent_one_leaves_it_where_it_is() {
         let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
-        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
-        let context = Context::<JOINTS, BASE>::new(&leg, &options).expect("a leg");
-        let board = Board::new(&leg, context, 1, 1, Memory::new(None)).expect("a board");
-        let mut host = Host::new(board);
+        let mut host = host(&leg);
         host.begin().expect("nodes that answer");
         host.move_leg(&leg).expect("a leg that follows");
         let place = |host: &mut Host| host.rig().world.anatomical_position();

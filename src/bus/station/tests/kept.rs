@@ -7,36 +7,68 @@ fn what_is_kept_is_ready_for_the_store_and_comes_back_with_a_reset() {
     let mut bench = Bench::new();
     bench.write(1, 0x6065, 0, 12_345, 4);
     bench.write(2, 0x2002, 0, 500, 2);
-    bench.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
-    assert_eq!((bench.station.take_store(), bench.station.take_store()), (Some(Keeping::All), None));
+    bench.save(1);
+    let (what, kept) = bench.store(true).expect("something to keep");
+    assert_eq!((what, bench.store(true)), (Keeping::All, None));
     assert_eq!(bench.station.bit_rate(), Some(500));
-    let kept: [Vec<u8>; 2] = [0, 1].map(|joint| bench.station.kept(joint).to_vec());
     bench.write(1, 0x6065, 0, 1, 4);
     bench.send(0, &[129, 0]);
     assert_eq!(bench.read(1, 0x6065), 12_345);
     // Another start, from what the store gave back.
     let mut other = Bench::new();
-    for (joint, bytes) in kept.iter().enumerate() {
-        other.station.recall(joint, bytes);
+    for (joint, kept) in kept.iter().enumerate() {
+        other.station.recall(joint, kept.bytes());
     }
     other.run(4);
     assert_eq!(
         (other.read(1, 0x6065), other.read(2, 0x2002), other.station.bit_rate()),
         (12_345, 500, Some(500))
     );
-    other.write(2, 0x1011, 1, u32::from_le_bytes(*b"load"), 4);
-    assert_eq!(other.station.take_store(), Some(Keeping::Defaults));
+    other.load(2);
+    assert_eq!(other.store(true), Some((Keeping::Defaults, [KeptNode::NOTHING; 2])));
     other.send(0, &[129, 0]);
     assert_eq!((other.read(1, 0x6065), other.station.bit_rate()), (87_266, None));
+}
+
+#[test]
+fn a_store_that_failed_leaves_what_a_reset_brings_back_as_it_was() {
+    let mut bench = Bench::new();
+    let window = |bench: &mut Bench| {
+        bench.send(0, &[129, 0]);
+        (bench.read(1, 0x6065), bench.station.bit_rate())
+    };
+    let set = |bench: &mut Bench, window: u32, rate: u32| {
+        bench.write(1, 0x6065, 0, window, 4);
+        bench.write(2, 0x2002, 0, rate, 2);
+        bench.save(1);
+    };
+    set(&mut bench, 11_111, 500);
+    assert_eq!(bench.store(false).map(|(what, _)| what), Some(Keeping::All));
+    assert_eq!(window(&mut bench), (87_266, None));
+    set(&mut bench, 22_222, 250);
+    // While it is under way nothing of it counts.
+    let mut objects = [KeptNode::NOTHING; 2];
+    assert_eq!(bench.station.take_store(&mut objects), Some(Keeping::All));
+    assert_eq!(window(&mut bench), (87_266, None));
+    bench.station.stored(true, &objects);
+    assert_eq!(window(&mut bench), (22_222, Some(250)));
+    set(&mut bench, 33_333, 125);
+    assert!(bench.store(false).is_some());
+    assert_eq!(window(&mut bench), (22_222, Some(250)));
+    bench.load(2);
+    assert_eq!(bench.store(false).map(|(what, _)| what), Some(Keeping::Defaults));
+    assert_eq!(window(&mut bench), (22_222, Some(250)));
+    bench.load(2);
+    assert!(bench.store(true).is_some());
+    assert_eq!(window(&mut bench), (87_266, None));
 }
 
 #[test]
 fn what_does_not_fit_is_not_kept_and_hosts_are_told() {
     let mut bench = Bench::new();
     bench.write(1, 0x6065, 0, 12_345, 4);
-    bench.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
-    assert_eq!(bench.station.take_store(), Some(Keeping::All));
-    let before = bench.station.kept(0).to_vec();
+    bench.save(1);
+    assert!(bench.store(true).is_some());
     // Every PDO with eight objects: bytes of nothing in, modes out.
     for place in 0..4 {
         for (mapping, object) in [(0x1600 + place, 0x0005_0008), (0x1A00 + place, 0x6061_0008)] {
@@ -50,11 +82,12 @@ fn what_does_not_fit_is_not_kept_and_hosts_are_told() {
         }
     }
     bench.write(2, 0x6065, 0, 777, 4);
-    bench.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
-    assert_eq!(bench.station.take_store(), None);
+    bench.save(1);
+    assert_eq!(bench.store(true), None);
     let told = bench.run(4).into_iter().filter(|frame| frame.id() & 0x780 == 0x80);
     assert_eq!(told.map(|frame| frame.data()[..2].to_vec()).collect::<Vec<_>>(), [[0x30, 0x55]; 2]);
-    assert_eq!((bench.station.kept(0), bench.station.kept(1)), (&before[..], &[][..]));
+    bench.send(0, &[129, 0]);
+    assert_eq!((bench.read(1, 0x6065), bench.read(2, 0x6065)), (12_345, 87_266));
 }
 
 #[test]
@@ -65,7 +98,7 @@ fn nothing_is_kept_while_something_blocks() {
     let frames = bench.send(0x601, &[0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e']);
     let answer = frames.iter().find(|frame| frame.id() == 0x581).expect("an answer");
     assert_eq!(answer.data(), [0x80, 0x10, 0x10, 1, 0x22, 0, 0, 0x08]);
-    assert_eq!(bench.station.take_store(), None);
+    assert_eq!(bench.store(true), None);
 }
 
 #[test]
