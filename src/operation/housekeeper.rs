@@ -6,8 +6,8 @@
 //!        +--------------------------+------------------------ a place or parameters lost ----------+
 //! ```
 //!
-//! An axis of which a calibration was kept is checked against it: everything is done again but the inductances, which are taken as kept, and
-//! the offset has to be the kept one's. One that does not agree is refused, told, and measured anew the next time.
+//! An axis of which a calibration was kept is checked against it: everything is measured again, and resistance, inductances and offset have to be
+//! the kept ones. One that does not agree is refused, told, and measured anew the next time.
 //!
 //! A reset takes 24 ms: gate drivers off and on again, configured anew, then faults are forgotten and what still holds comes back.
 //! Meanwhile nobody looks at their registers, and contacts do not count: afterwards both have to be open once.

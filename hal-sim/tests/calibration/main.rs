@@ -178,12 +178,34 @@ fn what_was_stored_is_accepted_by_the_same_motor_and_by_no_wrong_wiring() {
         // The counter forgets, the joint was moved.
         trial.axis.counter.start = trial.axis.counter.start.wrapping_add(12_345);
         trial.angle += 7.0 * TAU / f64::from(trial.axis.motor.cogging_periods);
-        let (_, found, _) = trial.run_stored(seed, stored);
+        // Other noise, as of another day.
+        let (_, found, _) = trial.run_stored(seed + 1000, stored);
         assert_eq!(found.map(|found| found.offset()), Ok(stored.offset), "seed {seed}");
+        let found = found.expect("accepted");
+        let (d, q) = (found.direct_inductance().0, found.quadrature_inductance().0);
+        let shares = [d / stored.direct_inductance.0, q / stored.quadrature_inductance.0];
+        // Each is within 2 % of the motor's.
+        assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.04), "seed {seed}: {shares:?}");
+        // Measured, and not taken from the store.
+        assert!(shares.iter().any(|share| *share != 1.0), "seed {seed}");
 
         let expected = spoil(&mut trial, seed);
         let (_, result, _) = trial.run_stored(seed, stored);
         assert_eq!(result.err(), Some(expected), "seed {seed}\n{trial:?}");
+    }
+}
+
+#[test]
+fn a_motor_of_another_inductance_is_seen_at_the_next_power_up() {
+    for (seed, share, seen) in [(1, 1.3, true), (2, 0.75, true), (3, 1.12, false), (4, 0.88, false)] {
+        for across in [false, true] {
+            let mut trial = Trial::sound(seed);
+            let stored = stored(&trial, seed);
+            let motor = &mut trial.axis.motor;
+            *if across { &mut motor.inductance_q } else { &mut motor.inductance_d } *= share;
+            let (_, result, _) = trial.run_stored(seed, stored);
+            assert_eq!(result.err(), seen.then_some(Refusal::OtherMotor), "seed {seed}: {share}");
+        }
     }
 }
 

@@ -38,7 +38,7 @@ pub enum Refusal {
     PhaseImbalance,
     /// Resistance or inductance out of range, or too large for the voltage allowed.
     MotorConstants,
-    /// Resistance more than 40 % from the stored one: another motor.
+    /// Resistance more than 40 %, or an inductance more than 20 % from the stored one: another motor.
     OtherMotor,
     /// The current does not settle in time.
     TimeOut,

@@ -51,7 +51,9 @@ pub fn refusal(reason: Refusal) -> String {
         Refusal::MotorConstants => {
             "resistance or inductance is out of range, or too large for 9.5 V at the calibration's current (`motor.resistance_ohm`, `motor.inductance_d_uh`, `motor.inductance_q_uh`)".into()
         }
-        Refusal::OtherMotor => "the resistance is more than 40 % from the stored one: another motor".into(),
+        Refusal::OtherMotor => {
+            "the resistance is more than 40 % or an inductance more than 20 % from the stored one: another motor".into()
+        }
         Refusal::TimeOut => "the current does not settle".into(),
         Refusal::NoCounts => "the field turned, the counter did not: encoder, or a blocked rotor".into(),
         Refusal::Direction => {
