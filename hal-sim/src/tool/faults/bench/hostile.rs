@@ -3,7 +3,8 @@
 //! | row | machine | what has to follow |
 //! | --- | --- | --- |
 //! | B3 | a leg that is off, its enabling switch open | nothing is ever enabled |
-//! | B3 | a leg that its host moves | every invariant holds: what is legal may stop it |
+//! | B3 | a leg that its host moves, frames that are all malformed | moved on, at most 2 mrad from where it would have been |
+//! | B3 | a leg that its host moves, any frames | every invariant holds: what is legal may stop it |
 //! | B4 | a leg that identifies itself in its operator's hand | the same bit for bit as on a bus that is still |
 //! | B4 | a leg that its host moves, others' frames of the lowest priority | moved on, at most 2 mrad from where it would have been |
 //! | B4 | the same, of the highest priority: the host is not heard any more | damped as by a host that is lost (B1), in its time |
@@ -22,6 +23,7 @@ use super::Bench;
 use super::hosted::{Fork, forked, hosted, identifying, started};
 use super::lost::{until_safe, watched};
 use crate::tool::bus::board::TICK_NS;
+use crate::tool::bus::host::Host;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 
@@ -103,15 +105,68 @@ fn frame(dice: &mut Dice) -> Frame {
     Frame::new(id, &data[..length])
 }
 
+/// A frame that says nothing legal to a leg that its host moves: cut short, of objects or transfers that are not there, or of nobody.
+fn malformed(dice: &mut Dice) -> Frame {
+    let mut data: [u8; 8] = core::array::from_fn(|_| dice.below(256) as u8);
+    let node = 1 + dice.below(2) as u16;
+    match dice.below(5) {
+        // A request of the dictionary that is cut short.
+        0 => Frame::new(0x600 + node, &data[..dice.below(8) as usize]),
+        // Objects that are not there, and pieces of transfers that nobody began.
+        1 | 2 => {
+            let index = 0x3000 + dice.below(0x2000) as u16;
+            [data[1], data[2]] = index.to_le_bytes();
+            Frame::new(0x600 + node, &data)
+        }
+        // Controlword and targets without all of their bytes.
+        3 => {
+            let id = [0x200 + node, 0x301, 0x400 + node, 0x500 + node][dice.below(4) as usize];
+            Frame::new(id, &data[..dice.below(if id == 0x301 { 4 } else { 2 }) as usize])
+        }
+        // Heartbeats, emergencies and answers of nodes that are not there; network management of others, and cut short.
+        _ => match dice.below(3) {
+            0 => Frame::new(0x710 + dice.below(0x50) as u16, &data[..dice.below(9) as usize]),
+            1 => Frame::new([0x090, 0x590, 0x610][dice.below(3) as usize] + dice.below(8) as u16, &data),
+            _ => Frame::new(0, &[data[0], 0x10 | data[1] & 0x6F][..dice.below(3) as usize]),
+        },
+    }
+}
+
 fn flood(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    let (off, on): (Vec<u64>, Vec<u64>) = seeds.iter().partition(|seed| seed.is_multiple_of(2));
+    let of = |way: u64| seeds.iter().copied().filter(|seed| seed % 3 == way).collect::<Vec<_>>();
     let mut base = started(leg)?;
     // Blind, the operator's hand permits what frames ask for.
     base.rig().hand = Hand { enabling: blind, start: false };
     base.run(400);
-    let mut outcomes = forked(head, leg, base, &off, |fork| flooded(fork, true))?;
-    outcomes.extend(forked(head, leg, hosted(leg)?, &on, |fork| flooded(fork, false))?);
+    let moved = hosted(leg)?;
+    let mut outcomes = forked(head, leg, base, &of(0), |fork| flooded(fork, true))?;
+    outcomes.extend(forked(head, leg, moved.clone(), &of(1), moved_on)?);
+    outcomes.extend(forked(head, leg, moved, &of(2), |fork| flooded(fork, false))?);
     Ok(outcomes)
+}
+
+/// Among frames that are malformed a leg goes on as its host says.
+fn moved_on(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
+    watched(&mut fork, [true; 2], false)?;
+    let mut alone = fork.host.clone();
+    for tick in 0..FLOOD {
+        // As many as leave room for the host's own and for the answers.
+        if tick.is_multiple_of(4) {
+            let frame = malformed(&mut fork.dice);
+            fork.host.network.send(frame);
+        }
+        fork.tick();
+    }
+    alone.run(FLOOD);
+    let unaffected = is_near(&mut fork, &mut alone) && fork.host.is_enabled();
+    let alarm = fork.host.rig().alarm().map(FaultCode::name);
+    Ok(fork.ended(unaffected.then_some("-"), alarm))
+}
+
+/// Both joints stand where they would have stood.
+fn is_near(fork: &mut Fork<'_>, alone: &mut Host) -> bool {
+    let [with, without] = [&mut fork.host, alone].map(|host| host.rig().world.anatomical_position());
+    with.iter().zip(without).all(|(with, without)| (with - without).abs() < OFF_RAD)
 }
 
 fn flooded(mut fork: Fork<'_>, off: bool) -> Result<Outcome, ToolError> {
@@ -185,9 +240,7 @@ fn beside_a_host(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
     fork.host.network.babble(Some(Frame::new(id, &[0x55; 8])));
     let full = load(&mut fork) > FULL;
     alone.run(FLOOD);
-    let [with, without] = [&mut fork.host, &mut alone].map(|host| host.rig().world.anatomical_position());
-    let near = with.iter().zip(without).all(|(with, without)| (with - without).abs() < OFF_RAD);
-    let unaffected = near && fork.host.is_enabled() && full;
+    let unaffected = is_near(&mut fork, &mut alone) && fork.host.is_enabled() && full;
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     Ok(fork.ended(unaffected.then_some("-"), alarm))
 }

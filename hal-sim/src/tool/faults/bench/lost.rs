@@ -6,9 +6,11 @@
 //! | B2 | bus off, error passive | status of the controller | the same |
 //!
 //! Times run from when the host's own time is over: its consumer time or its event timer, which each run draws. Then the host is back,
-//! with heartbeat, targets and "enable operation": nothing is enabled by that.
+//! with heartbeat and targets, starts the network and says "enable operation", again and again: nothing is enabled by that. Where 6007 makes a fault
+//! of it (1) it asks for each step from the first on, which enables nothing either without a reset; a quick stop (3) may be left that way.
+//! What happened has to be told by an emergency message within 10 ms of the safe state, of a bus that is off once it is back.
 
-use scarab::bus::Controller;
+use scarab::bus::{Controller, Frame};
 use scarab::safety::FaultCode;
 
 use super::super::entry::Head;
@@ -27,8 +29,14 @@ const MS: u64 = 1_000_000;
 /// Servo ticks: damping and some more; in which the host is back.
 const DAMPED: u64 = 1400;
 const BACK: u64 = 400;
+/// Between two tries of a host that is back.
+const TRIES: u64 = 40;
+/// In which an emergency message has to be on the wire.
+const TOLD: u64 = 40;
 const NODES: [u16; 2] = [1, 2];
 const HOST: u32 = 0x70;
+/// Of 6007.
+const FAULT: u32 = 1;
 /// Longest that is waited after a host's time is over, ns.
 const LATE_NS: u64 = 20 * MS;
 
@@ -67,6 +75,8 @@ pub(super) struct Patience {
     times_ms: [u32; 2],
     /// Which of both its silence is about.
     pub(super) silent: [bool; 2],
+    /// A loss is a fault, and no quick stop.
+    faults: bool,
 }
 
 impl Patience {
@@ -87,7 +97,7 @@ impl Patience {
 pub(super) fn watched(fork: &mut Fork<'_>, silent: [bool; 2], blind: bool) -> Result<Patience, ToolError> {
     let drawn = |fork: &mut Fork<'_>, low: f64, high: f64| fork.dice.logarithmic(low, high) as u32;
     let times_ms = [drawn(fork, 5.0, 200.0), drawn(fork, 4.0, 100.0)];
-    let option = if fork.dice.coin() { 1 } else { 3 };
+    let option = if fork.dice.coin() { FAULT } else { 3 };
     // Four in ten of its time, so that one that is lost on the wire is not missed.
     fork.host.speaks.heartbeat = (u64::from(times_ms[0]) * MS * 4 / 10 / TICK_NS).max(1);
     if !blind {
@@ -98,7 +108,7 @@ pub(super) fn watched(fork: &mut Fork<'_>, silent: [bool; 2], blind: bool) -> Re
         }
     }
     fork.run(3 * fork.host.speaks.heartbeat);
-    Ok(Patience { times_ms, silent })
+    Ok(Patience { times_ms, silent, faults: option == FAULT })
 }
 
 /// To the end of its time and on, until the leg is made safe: the state, and ms since then.
@@ -115,15 +125,31 @@ pub(super) fn until_safe(fork: &mut Fork<'_>, patience: &Patience) -> (Option<&'
     }
 }
 
+/// Both nodes tell of it, soon.
+fn tells(fork: &mut Fork<'_>, state: Option<&str>, codes: [u16; 2]) {
+    fork.run(TOLD);
+    let told = |node: &u16| fork.host.told().iter().any(|(from, code)| from == node && codes.contains(code));
+    if state.is_some() && !NODES.iter().all(told) {
+        fork.broken("no emergency message tells of it");
+    }
+}
+
 /// Damped to its end while nobody speaks, then the host is back as if nothing had been.
-fn comes_back(fork: &mut Fork<'_>, speaks: Speaks) {
+fn comes_back(fork: &mut Fork<'_>, speaks: Speaks, faults: bool) {
     fork.host.speaks = Speaks { targets: false, words: false, heartbeat: 0 };
     fork.run(DAMPED);
     if fork.host.rig().is_switching() {
         fork.broken("damped and not off afterwards");
     }
     fork.host.speaks = speaks;
-    for _ in 0..BACK {
+    for tick in 0..BACK {
+        if tick.is_multiple_of(TRIES) {
+            fork.host.network.send(Frame::new(0, &[1, 0]));
+            let words: &[u16] = if faults { &[6, 7, 15] } else { &[15] };
+            for word in words {
+                NODES.into_iter().for_each(|node| fork.host.command(node, *word));
+            }
+        }
         fork.tick();
         if fork.host.is_enabled() || fork.host.rig().is_switching() {
             return fork.broken("enabled by a host that came back");
@@ -148,11 +174,8 @@ fn silent(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     }
     let (state, after_ms) = until_safe(&mut fork, &patience);
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
-    comes_back(&mut fork, speaks);
-    let told = fork.host.told().iter().any(|(_, code)| matches!(code, 0x8130 | 0x8250));
-    if state.is_some() && !told {
-        fork.broken("no emergency message tells of it");
-    }
+    tells(&mut fork, state, [0x8130, 0x8250]);
+    comes_back(&mut fork, speaks, patience.faults);
     let early = after_ms.is_some_and(|after| after <= 0.0);
     let in_time = after_ms.is_some_and(|after| after <= TICK_MS + 1e-9);
     let found = fork.ended(state, alarm);
@@ -171,7 +194,7 @@ fn leave(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<O
 
 fn left(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     let how = if fork.dice.coin() { Controller::Off } else { Controller::Passive };
-    let option = if fork.dice.coin() { 1 } else { 3 };
+    let option = if fork.dice.coin() { FAULT } else { 3 };
     for node in NODES {
         fork.host.write(node, 0x6007, 0, option, 2)?;
     }
@@ -191,11 +214,8 @@ fn left(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     fork.run(lasts);
     fork.host.board().set_controller(Controller::Active, !blind);
-    comes_back(&mut fork, speaks);
-    let told = fork.host.told().iter().any(|(_, code)| matches!(code, 0x8120 | 0x8140));
-    if state.is_some() && !told {
-        fork.broken("no emergency message tells of it");
-    }
+    tells(&mut fork, state, [0x8120, 0x8140]);
+    comes_back(&mut fork, speaks, option == FAULT);
     let in_time = after_ms.is_some_and(|after| after <= fork.head.deadline_ms);
     let found = fork.ended(state, alarm);
     Ok(Outcome { detected: in_time && state == Some("Damp"), after_ms, ..found })
