@@ -337,7 +337,7 @@ fn keeper(flash: Small) -> Keeper<Small, 2> {
 fn found(flash: Small) -> ([Option<StoredCalibration>; 2], Option<u32>, Vec<u8>, Small) {
     let mut keeper = keeper(flash);
     let calibrations = [0, 1].map(|axis| block_on(keeper.calibration(axis)));
-    let generation = block_on(keeper.model()).map(|kept| kept.provenance.generation);
+    let generation = block_on(keeper.model()).expect("readable").map(|kept| kept.provenance.generation);
     let mut bytes = [0; 64];
     let length = block_on(keeper.objects(0, &mut bytes)).expect("readable");
     (calibrations, generation, bytes[..length].to_vec(), keeper.into_flash())

@@ -56,9 +56,9 @@ impl<F: NorFlash, const N: usize> Keeper<F, N> {
         self.store.load::<KeptCalibration>(key).await.ok()?.map(|kept| kept.0)
     }
 
-    /// The model that is kept, if one can be read.
-    pub async fn model(&mut self) -> Option<KeptModel<N>> {
-        self.store.load(Key::Model).await.ok()?
+    /// The model that is kept, if there is one; `None` where it cannot be read.
+    pub async fn model(&mut self) -> Option<Option<KeptModel<N>>> {
+        self.store.load(Key::Model).await.ok()
     }
 
     /// Keeps these objects of each node and what waited; the number of models kept so far, of which there were `generation`. `None` where

@@ -177,10 +177,10 @@ fn join(
                 None => station.storing(Storing::Failed),
             }
         }
-        if let Some((model, generation)) = keeper.model(configuration)
-            && control.adopt(model)
-        {
-            station.set_generation(generation);
+        match keeper.model(configuration) {
+            Some(Some((model, generation))) if control.adopt(model) => station.set_generation(generation),
+            Some(None) => {}
+            _ => station.storing(Storing::Failed),
         }
     }
     // One that does not answer is off the bus for good (`can::status`): the leg is its operator's, and who listens is told.

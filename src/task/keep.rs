@@ -74,10 +74,12 @@ impl Keeper {
         core::array::from_fn(|axis| at_once(self.keeper.calibration(axis))?)
     }
 
-    /// The model that is kept and its generation, if it is this leg's.
-    pub fn model(&mut self, leg: &Leg) -> Option<(IdentifiedModel<JOINTS>, u32)> {
-        let kept = at_once(self.keeper.model())??;
-        Some((leg.restore(&kept.model).ok()?, kept.provenance.generation))
+    /// The model that is kept and its generation, if there is one; `None` where it cannot be read or is not this leg's.
+    pub fn model(&mut self, leg: &Leg) -> Option<Option<(IdentifiedModel<JOINTS>, u32)>> {
+        match at_once(self.keeper.model())?? {
+            Some(kept) => Some(Some((leg.restore(&kept.model).ok()?, kept.provenance.generation))),
+            None => Some(None),
+        }
     }
 }
 

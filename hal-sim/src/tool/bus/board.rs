@@ -10,7 +10,7 @@
 
 use scarab::bus::drive::{AxisConstants, Mode};
 use scarab::bus::station::{Keeping, LegRequest, LegTold, Station};
-use scarab::bus::{Controller, Frame, Identity, KeptNode, Node, NodeId};
+use scarab::bus::{Controller, Frame, Identity, KeptNode, Node, NodeId, Storing};
 use scarab::leg::{ControlRequest, Fault, JointStatus};
 use scarab::safety::PowerRequest;
 use scarab::servo::SERVO_RATE_HZ;
@@ -119,7 +119,9 @@ impl<const N: usize, const B: usize> Board<N, B> {
             controller: Controller::Active,
             first,
         };
-        board.recall();
+        for why in board.recall() {
+            eprintln!("warning: {why}");
+        }
         Ok(board)
     }
 
@@ -132,18 +134,27 @@ impl<const N: usize, const B: usize> Board<N, B> {
         self.recall();
     }
 
-    /// What the memory holds, as after the start; what it holds of another leg, or damaged, is said and left.
-    fn recall(&mut self) {
+    /// What the memory holds, as after the start; what it holds of another leg, or damaged, is left, and hosts are told. Why, of each.
+    fn recall(&mut self) -> Vec<String> {
+        let mut lost = Vec::new();
         match self.memory.model(&self.context.configuration) {
             Ok(Some((model, generation))) if self.rig.leg.adopt(model) => {
                 self.station.set_generation(generation);
             }
-            Ok(_) => {}
-            Err(why) => eprintln!("warning: {why}"),
+            Ok(Some(_)) => lost.push("the kept model: not taken".into()),
+            Ok(None) => {}
+            Err(why) => lost.push(why),
         }
         for joint in 0..N {
-            self.station.recall(joint, &self.memory.objects(joint).unwrap_or_default());
+            match self.memory.objects(joint) {
+                Ok(bytes) => self.station.recall(joint, &bytes.unwrap_or_default()),
+                Err(why) => lost.push(why),
+            }
         }
+        if !lost.is_empty() {
+            self.station.storing(Storing::Failed);
+        }
+        lost
     }
 
     /// A frame on the bus; the node that sent it does not hear it.

@@ -83,12 +83,16 @@ impl Memory {
         self.flash.as_mut().map_or(&[], |flash| flash.bytes_mut())
     }
 
-    /// What was kept of a node's objects; of legs of more than two joints only the first two are.
-    pub fn objects(&mut self, joint: usize) -> Option<Vec<u8>> {
-        let key = *KEYS.get(joint)?;
+    /// What was kept of a node's objects, if anything was; of legs of more than two joints only the first two are.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    pub fn objects(&mut self, joint: usize) -> Result<Option<Vec<u8>>, String> {
+        let Some(key) = KEYS.get(joint) else { return Ok(None) };
         let mut bytes = [0; LONGEST];
-        let length = self.with(|store| block_on(store.load_bytes(key, &mut bytes)))?.ok().flatten()?;
-        Some(bytes[..length].to_vec())
+        let length = self.with(|store| block_on(store.load_bytes(*key, &mut bytes))).transpose();
+        let length = length.map_err(|why| format!("the kept objects of node {}: {why:?}", joint + 1))?;
+        Ok(length.flatten().map(|length| bytes[..length].to_vec()))
     }
 
     /// Keeps them; whether it could.

@@ -4,17 +4,18 @@
 //! | row | what | what has to follow |
 //! | --- | --- | --- |
 //! | F1 | the power fails at any byte that is programmed or erased while both nodes' objects and a model are kept; one time in four again while the next boot mends that | each record is the old or the new one, no later one is new where an earlier is old, and the next save succeeds |
-//! | F2 | bits flip, a stretch is overwritten, another leg's model, everything gone | what is used is what was kept, whole; all else is refused or as after the start |
+//! | F2 | bits flip, a stretch is overwritten, another leg's model, everything gone | each node has the newest of its records that is whole, or all as after the start; so has the leg its model, if it is its own; what cannot be read and what is another's is told (5530) |
 //! | F3 | "save" while the drive is on | refused (0800 0022), not a byte of the flash changes, the leg moves on |
 //!
 //! Flashes of F1 were filled before, to all levels up to where a sector has to be erased for the next record.
 
+use embassy_futures::block_on;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
-use scarab::bus::LONGEST;
+use scarab::bus::{LONGEST, kept_entries};
 use scarab::leg::{ControlRequest, DriveState, IdentifiedModel};
-use scarab::store::KeptModel;
+use scarab::store::{KeptModel, Key};
 
 use super::super::campaign::BASE;
 use super::super::catalogue::JOINTS;
@@ -42,6 +43,9 @@ const LEVELS: u64 = 24;
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 const WINDOW: u16 = 0x6065;
 const WINDOWS: [u32; 2] = [20_000, 30_000];
+const UNTOUCHED: u32 = 87_266;
+/// What was kept cannot be read.
+const LOST: u16 = 0x5530;
 
 const fn head(id: &'static str, fault: &'static str, detector: &'static str, state: &'static str) -> Head {
     Head { id, fault, detector, state, deadline_ms: f64::INFINITY, unit: "", codes: &[], lacking: None }
@@ -98,7 +102,7 @@ struct All {
 
 impl All {
     fn of(memory: &mut Memory) -> Self {
-        Self { objects: [0, 1].map(|joint| memory.objects(joint)), model: memory.any_model() }
+        Self { objects: [0, 1].map(|joint| memory.objects(joint).ok().flatten()), model: memory.any_model() }
     }
 
     /// Bytes of any value, since the store does not look into them.
@@ -220,12 +224,17 @@ fn cut(head: &Head, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
 /// A board whose memory holds older and newer objects and models, and the models that may be used.
 struct Rotting {
     board: Board<JOINTS, BASE>,
-    models: [IdentifiedModel<JOINTS>; 2],
+    models: [(KeptModel<JOINTS>, IdentifiedModel<JOINTS>); 2],
     kept: KeptModel<JOINTS>,
     other: KeptModel<JOINTS>,
 }
 
 impl Rotting {
+    /// What the leg makes of a model that it kept.
+    fn own(&self, kept: &KeptModel<JOINTS>) -> Option<IdentifiedModel<JOINTS>> {
+        self.models.into_iter().find(|(record, _)| record.model == kept.model).map(|(_, model)| model)
+    }
+
     fn new(leg: &LegFile) -> Result<Self, ToolError> {
         let refused = |words: &str| ToolError::from(SetupError::new(leg, words.to_owned()));
         let kept = [identified(leg, 1)?, identified(leg, 2)?];
@@ -251,7 +260,8 @@ impl Rotting {
             host.board().memory().keep_any(OFF, &kept);
             host.board().power_on();
             let model = host.rig().leg.control().model().copied();
-            models.push(model.ok_or_else(|| refused("a model of its own that is not taken back"))?);
+            let model = model.ok_or_else(|| refused("a model of its own that is not taken back"))?;
+            models.push((kept, model));
         }
         let models = models.try_into().map_err(|_| refused("two models"))?;
         Ok(Self { board: host.board().clone(), models, kept: kept[1], other })
@@ -263,14 +273,62 @@ fn rots(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Ou
     seeds.par_iter().map(|seed| rot(head, &rotting, *seed, blind)).collect()
 }
 
-/// Blind, another leg's model is taken as if it were this one's.
+/// Blind, one of two checks is not made: another leg's model is taken as if it were this one's, or what rotted as if its check sum held.
 fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome, ToolError> {
     let mut dice = Dice::new(head.id, seed);
     let mut board = rotting.board.clone();
     let before = All::of(board.memory());
+    spoil(&mut board, rotting, if blind { 4 } else { dice.below(6) }, &mut dice);
+    let told_apart = readable(board.memory());
+    // Nobody but the store can tell which of its records are whole: what it reads is one that was kept, or none.
+    let after = All::of(board.memory());
+    if blind && dice.coin() {
+        let mut own = rotting.kept;
+        own.model.parameters = rotting.other.model.parameters;
+        board.memory().keep_any(OFF, &own);
+    } else if blind && let Some(mut bytes) = after.objects[0].clone() {
+        let place = dice.below(bytes.len() as u64) as usize;
+        bytes[place] ^= 1 << dice.below(8);
+        board.memory().keep_objects(OFF, 0, &bytes);
+    }
+    board.power_on();
+    let used = board.rig.leg.control().model().copied();
+    let is_foreign =
+        after.model.is_some_and(|model| model.model.fingerprint != rotting.kept.model.fingerprint);
+    let expected = after.model.filter(|_| !is_foreign).map(|kept| rotting.own(&kept));
+    let is_own = used == expected.flatten();
+    let mut host = Host::new(board);
+    host.run(20);
+    let windows = [host.read(1, WINDOW, 0)?, host.read(2, WINDOW, 0)?];
+    let whole = [0, 1].map(|joint| after.objects[joint].as_deref().map_or(UNTOUCHED, window));
+    let lost = is_foreign || !told_apart;
+    let tells = [1, 2].map(|node| host.told().contains(&(node, LOST)));
+    let enabled = host.is_enabled();
+    let holds = is_own && windows == whole && tells == [lost; 2] && !enabled;
+    let mut found = outcome(head, seed, holds.then_some("Refuse"));
+    // Nothing that is read was hit.
+    if after == before && !blind && found.detected {
+        (found.detected, found.undetectable) = (false, true);
+    }
+    found.hash = format!("{:016x}", host.rig().hash);
+    Ok(found)
+}
+
+/// The following window among a node's objects, as it is after the start where it is not among them.
+fn window(bytes: &[u8]) -> u32 {
+    kept_entries(bytes).find(|(object, _)| object.index == WINDOW).map_or(UNTOUCHED, |(_, value)| value)
+}
+
+/// Every record can be read, whatever it says.
+fn readable(memory: &mut Memory) -> bool {
+    let model = memory.with(|store| block_on(store.load::<KeptModel<JOINTS>>(Key::Model)));
+    (0..2).all(|joint| memory.objects(joint).is_ok()) && model.is_some_and(|model| model.is_ok())
+}
+
+/// In one of six ways: bits, stretches, another leg's model, all of it.
+fn spoil(board: &mut Board<JOINTS, BASE>, rotting: &Rotting, way: u64, dice: &mut Dice) {
     let bytes = board.memory().bytes_mut();
     let used = bytes.iter().rposition(|byte| *byte != 0xFF).map_or(1, |last| last + 1) as u64;
-    let way = if blind { 4 } else { dice.below(6) };
     match way {
         0 | 1 => {
             for _ in 0..dice.logarithmic(1.0, 64.0) as u64 {
@@ -290,29 +348,6 @@ fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome
         }
         _ => bytes.fill([0x00, 0xFF][dice.below(2) as usize]),
     }
-    let after = All::of(board.memory());
-    board.power_on();
-    if blind {
-        let mut own = rotting.kept;
-        own.model.parameters = rotting.other.model.parameters;
-        board.memory().keep_any(OFF, &own);
-        board.power_on();
-    }
-    let used = board.rig.leg.control().model().copied();
-    let is_own = used.is_none_or(|used| rotting.models.contains(&used));
-    let mut host = Host::new(board);
-    host.run(20);
-    let windows = [host.read(1, WINDOW, 0)?, host.read(2, WINDOW, 0)?];
-    let untouched = 87_266;
-    let makes_sense = windows.iter().all(|window| WINDOWS.contains(window) || *window == untouched);
-    let enabled = host.is_enabled();
-    let mut found = outcome(head, seed, (is_own && makes_sense && !enabled).then_some("Refuse"));
-    // Nothing that is read was hit.
-    if after == before && found.detected {
-        (found.detected, found.undetectable) = (false, true);
-    }
-    found.hash = format!("{:016x}", host.rig().hash);
-    Ok(found)
 }
 
 fn armed(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
