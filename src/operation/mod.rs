@@ -7,6 +7,7 @@
 //! ```text
 //! level 0  CurrentLoops, one tick of one axis: the other axis, contacts, conversion -> interlock -> stage -> bridge
 //! level 1  ServoRound, around the leg's tick: begun or not, checksum, supply, temperature
+//! level 5  Speaker, what leaves for the bus and what has become too old for it
 //! level 6  Housekeeper, 500 rounds per second: contacts -> requests; calibration, reference, reset; registers and temperatures
 //! thread   Storing, when a host asks: what stands around a change of the flash
 //! ```
@@ -23,6 +24,7 @@
 mod contacts;
 mod current;
 mod housekeeper;
+mod mailboxes;
 mod servo_round;
 mod stage;
 mod storing;
@@ -30,6 +32,7 @@ mod storing;
 pub use contacts::{Ask, Operator, RATE_HZ, Situation};
 pub use current::{CurrentBoard, CurrentLoops, Tick};
 pub use housekeeper::{Housekeeper, HousekeepingBoard, HousekeepingSettings};
+pub use mailboxes::{Mailboxes, Speaker};
 pub use servo_round::{Found, Gate, ServoRound};
 pub use stage::{Order, Outcome, Stage};
 pub use storing::{Storing, StoringBoard};

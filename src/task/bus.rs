@@ -23,6 +23,7 @@ use crate::bus::identification::Found;
 use crate::bus::station::{Keeping, LegOrder, LegTold, Station};
 use crate::bus::{Controller, Frame, KeptNode, Storing};
 use crate::leg::LoggedSample;
+use crate::operation::{Mailboxes, Speaker};
 use crate::store::KeptModel;
 
 /// Samples of the log that wait for a host: 384 ms of it.
@@ -53,6 +54,8 @@ pub struct Wire {
     pub now_us: fn() -> u64,
     /// A frame may be given.
     pub has_room: fn() -> bool,
+    /// None waits.
+    pub is_empty: fn() -> bool,
     /// Gives one.
     pub send: fn(&Frame),
     /// What was given and not sent is not sent any more.
@@ -61,6 +64,24 @@ pub struct Wire {
     pub status: fn() -> Controller,
     /// The operator holds the enabling switch.
     pub held: fn() -> bool,
+}
+
+impl Mailboxes for Wire {
+    fn has_room(&self) -> bool {
+        (self.has_room)()
+    }
+
+    fn is_empty(&self) -> bool {
+        (self.is_empty)()
+    }
+
+    fn send(&mut self, frame: &Frame) {
+        (self.send)(frame);
+    }
+
+    fn give_up(&mut self) {
+        (self.give_up)();
+    }
 }
 
 /// What is to be kept: on its way to the keeper, and back with what became of it.
@@ -135,8 +156,7 @@ pub struct BusLoop {
     controller: Controller,
     /// The servo has not been told of what came since.
     due: bool,
-    /// The node that speaks first.
-    first: usize,
+    speaker: Speaker,
 }
 
 /// What level 5 works on, once it is there.
@@ -195,7 +215,7 @@ impl Memory {
             lent: Some(&mut self.lent),
             controller: Controller::Active,
             due: false,
-            first: 0,
+            speaker: Speaker::default(),
         };
         let _ = bus.spare.enqueue(other);
         let servo = ServoEnd { orders: orders_out, told: told_in, logged: logged_in };
@@ -248,36 +268,16 @@ impl BusLoop {
         if self.due && self.orders.ready() {
             self.due = self.orders.enqueue(self.station.order()).is_err();
         }
-        self.speak(now_us);
+        let Self { speaker, wire, controller, station, found, .. } = self;
+        speaker.speak(wire, *controller, now_us, station, &**found);
     }
 
     fn look_at_the_controller(&mut self) {
         let now = (self.wire.status)();
-        if now == Controller::Off {
-            // What waits in its mailboxes stays there until it is back, however old; the station gives it nothing meanwhile.
-            (self.wire.give_up)();
-        }
         if now != self.controller {
             self.controller = now;
             self.station.on_controller(now, self.found);
             self.due = true;
-        }
-    }
-
-    /// As many frames as the controller takes, one of each node in turn.
-    fn speak(&mut self, now_us: u64) {
-        let mut silent = 0;
-        while silent < JOINTS && (self.wire.has_room)() {
-            let joint = self.first;
-            self.first = (joint + 1) % JOINTS;
-            match self.station.poll(joint, now_us, self.found) {
-                Some(frame) => {
-                    (self.wire.send)(&frame);
-                    self.station.hear(&frame, now_us, Some(joint), self.found);
-                    silent = 0;
-                }
-                None => silent += 1,
-            }
         }
     }
 

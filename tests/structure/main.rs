@@ -29,7 +29,7 @@ const HOUSE: [(&str, &[&str]); 19] = [
     ("trace", &["hal", "leg"]),
     ("store", &["hal", "leg"]),
     ("bus", &["hal", "leg"]),
-    ("operation", &["hal", "motor", "leg", "safety", "servo", "trace"]),
+    ("operation", &["hal", "motor", "leg", "safety", "servo", "trace", "bus"]),
     ("board", &["hal", "motor", "leg", "bus", "task"]),
     ("task", &["hal", "motor", "leg", "operation", "safety", "servo", "trace", "store", "bus", "board"]),
 ];
