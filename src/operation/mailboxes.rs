@@ -49,6 +49,12 @@ fn is_told_once(frame: &Frame) -> bool {
 }
 
 impl Speaker {
+    /// Nobody has spoken.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { first: 0, since_us: None, given: None, again: None }
+    }
+
     /// What leaves in this round.
     pub fn speak<R: Results, const N: usize, const LOG: usize>(
         &mut self,

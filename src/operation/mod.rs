@@ -7,7 +7,8 @@
 //! ```text
 //! level 0  CurrentLoops, one tick of one axis: the other axis, contacts, conversion -> interlock -> stage -> bridge
 //! level 1  ServoRound, around the leg's tick: begun or not, checksum, supply, temperature
-//! level 5  Speaker, what leaves for the bus and what has become too old for it
+//! level 1  HostSide, the same tick: orders of the bus, the operator's hand before them
+//! level 5  BusRound: controller, frames, store, leg, mailboxes
 //! level 6  Housekeeper, 500 rounds per second: contacts -> requests; calibration, reference, reset; registers and temperatures
 //! thread   Storing, when a host asks: what stands around a change of the flash
 //! ```
@@ -21,16 +22,20 @@
 //! An axis switches only with a calibration (or while it is measured), a target is followed only where all axes run. An axis that loses
 //! its place ends the servo's ticks in its own tick; the housekeeper then forgets calibration and reference.
 
+mod bus_round;
 mod contacts;
 mod current;
+mod host_side;
 mod housekeeper;
 mod mailboxes;
 mod servo_round;
 mod stage;
 mod storing;
 
+pub use bus_round::{BusBoard, BusRound, Keep};
 pub use contacts::{Ask, Operator, RATE_HZ, Situation};
 pub use current::{CurrentBoard, CurrentLoops, Tick};
+pub use host_side::{HostBoard, HostRequest, HostSide};
 pub use housekeeper::{Housekeeper, HousekeepingBoard, HousekeepingSettings};
 pub use mailboxes::{Mailboxes, Speaker};
 pub use servo_round::{Found, Gate, ServoRound};

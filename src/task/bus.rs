@@ -1,4 +1,4 @@
-//! Level 5: the bus' nodes and axes, run whenever frames came, a mailbox is empty, or the servo has ticked.
+//! Level 5: queues and the controller beneath `operation::BusRound`, run whenever frames came, a mailbox is empty, or the servo has ticked.
 //!
 //! Why its own level and no executor: a poll takes 0.6 thousand instructions and a frame up to 2.4, which any level below the servo could give; but a
 //! block that is sent again takes 78 thousand in one call (0.6 ms), so it stands below the level that empties the controller's queue of three
@@ -20,10 +20,10 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use super::leg::{BASE, JOINTS};
 use super::statistics::Count;
 use crate::bus::identification::Found;
-use crate::bus::station::{Keeping, LegOrder, LegTold, Station};
-use crate::bus::{Controller, Frame, KeptNode, Storing};
+use crate::bus::station::{LegOrder, LegTold, Station};
+use crate::bus::{Controller, Frame};
 use crate::leg::LoggedSample;
-use crate::operation::{Mailboxes, Speaker};
+use crate::operation::{self, BusBoard, BusRound, Mailboxes};
 use crate::store::KeptModel;
 
 /// Samples of the log that wait for a host: 384 ms of it.
@@ -66,35 +66,8 @@ pub struct Wire {
     pub held: fn() -> bool,
 }
 
-impl Mailboxes for Wire {
-    fn has_room(&self) -> bool {
-        (self.has_room)()
-    }
-
-    fn is_empty(&self) -> bool {
-        (self.is_empty)()
-    }
-
-    fn send(&mut self, frame: &Frame) {
-        (self.send)(frame);
-    }
-
-    fn give_up(&mut self) {
-        (self.give_up)();
-    }
-}
-
-/// What is to be kept: on its way to the keeper, and back with what became of it.
-pub struct Keep {
-    /// What a host asked for.
-    pub what: Keeping,
-    /// Of each node.
-    pub objects: [KeptNode; JOINTS],
-    /// Models kept so far.
-    pub generation: u32,
-    /// It was kept.
-    pub done: bool,
-}
+/// What is to be kept of this board.
+pub type Keep = operation::Keep<JOINTS>;
 
 /// Every queue, and what is lent.
 pub struct Memory {
@@ -141,22 +114,24 @@ pub struct KeeperEnd {
 /// What level 5 works on.
 pub struct BusLoop {
     station: &'static mut BoardStation,
+    fresh: Consumer<'static, &'static mut BoardFound>,
+    spare: Producer<'static, &'static mut BoardFound>,
+    found: &'static mut BoardFound,
+    round: BusRound,
+    ports: Ports,
+}
+
+/// The board, as a round of the bus has it.
+struct Ports {
     wire: Wire,
     frames: Consumer<'static, Frame>,
     told: Consumer<'static, LegTold<JOINTS>>,
     orders: Producer<'static, LegOrder<JOINTS>>,
     logged: Consumer<'static, LoggedSample<JOINTS>>,
-    fresh: Consumer<'static, &'static mut BoardFound>,
-    spare: Producer<'static, &'static mut BoardFound>,
-    found: &'static mut BoardFound,
     keep: Producer<'static, &'static mut Keep>,
     kept: Consumer<'static, &'static mut Keep>,
     /// Not under way.
     lent: Option<&'static mut Keep>,
-    controller: Controller,
-    /// The servo has not been told of what came since.
-    due: bool,
-    speaker: Speaker,
 }
 
 /// What level 5 works on, once it is there.
@@ -179,12 +154,7 @@ impl Memory {
             kept: Queue::new(),
             accepted: Queue::new(),
             results: [BoardFound::NOTHING; 2],
-            lent: Keep {
-                what: Keeping::All,
-                objects: [KeptNode::NOTHING; JOINTS],
-                generation: 0,
-                done: true,
-            },
+            lent: Keep::NOTHING,
         }
     }
 
@@ -202,20 +172,11 @@ impl Memory {
         let [found, other] = &mut self.results;
         let mut bus = BusLoop {
             station,
-            wire,
-            frames,
-            told,
-            orders,
-            logged,
             fresh,
             spare,
             found,
-            keep,
-            kept,
-            lent: Some(&mut self.lent),
-            controller: Controller::Active,
-            due: false,
-            speaker: Speaker::default(),
+            round: BusRound::new(),
+            ports: Ports { wire, frames, told, orders, logged, keep, kept, lent: Some(&mut self.lent) },
         };
         let _ = bus.spare.enqueue(other);
         let servo = ServoEnd { orders: orders_out, told: told_in, logged: logged_in };
@@ -239,63 +200,81 @@ impl ThreadEnd {
     }
 }
 
+impl Mailboxes for Ports {
+    fn has_room(&self) -> bool {
+        (self.wire.has_room)()
+    }
+
+    fn is_empty(&self) -> bool {
+        (self.wire.is_empty)()
+    }
+
+    fn send(&mut self, frame: &Frame) {
+        (self.wire.send)(frame);
+    }
+
+    fn give_up(&mut self) {
+        (self.wire.give_up)();
+    }
+}
+
+impl BusBoard<JOINTS> for Ports {
+    fn status(&mut self) -> Controller {
+        (self.wire.status)()
+    }
+
+    fn frame(&mut self) -> Option<Frame> {
+        self.frames.dequeue()
+    }
+
+    fn logged(&mut self) -> Option<LoggedSample<JOINTS>> {
+        self.logged.dequeue()
+    }
+
+    fn told(&mut self) -> Option<LegTold<JOINTS>> {
+        self.told.dequeue()
+    }
+
+    fn takes_order(&self) -> bool {
+        self.orders.ready()
+    }
+
+    fn order(&mut self, order: LegOrder<JOINTS>) {
+        let _ = self.orders.enqueue(order);
+    }
+
+    fn held(&self) -> bool {
+        (self.wire.held)()
+    }
+
+    fn set_hosted(&mut self, hosted: bool) {
+        HOSTED.store(hosted, Ordering::Relaxed);
+    }
+
+    fn kept(&mut self) -> Option<&Keep> {
+        let kept = self.kept.dequeue()?;
+        Some(self.lent.insert(kept))
+    }
+
+    fn lent(&mut self) -> Option<&mut Keep> {
+        self.lent.as_deref_mut()
+    }
+
+    fn keep(&mut self) {
+        if let Some(lent) = self.lent.take() {
+            let _ = self.keep.enqueue(lent);
+        }
+    }
+}
+
 impl BusLoop {
     fn run(&mut self) {
-        let now_us = (self.wire.now_us)();
+        let now_us = (self.ports.wire.now_us)();
         while let Some(fresh) = self.fresh.dequeue() {
             let _ = self.spare.enqueue(core::mem::replace(&mut self.found, fresh));
         }
         self.found.search = [SEARCH[0].get(), SEARCH[1].get()];
-        self.look_at_the_controller();
-        for _ in 0..FRAMES {
-            let Some(frame) = self.frames.dequeue() else { break };
-            self.station.hear(&frame, now_us, None, self.found);
-            self.due = true;
-        }
-        while let Some(logged) = self.logged.dequeue() {
-            self.station.log(&logged);
-        }
-        self.station.watch(now_us, self.found);
-        self.keep();
-        // What it leads to has to find room: an order that was not taken yet would be overwritten, and a request with it.
-        if self.orders.ready()
-            && let Some(told) = self.told.dequeue()
-        {
-            self.station.told(&LegTold { held: (self.wire.held)(), ..told });
-            HOSTED.store(self.station.is_hosted(), Ordering::Relaxed);
-            self.due = true;
-        }
-        if self.due && self.orders.ready() {
-            self.due = self.orders.enqueue(self.station.order()).is_err();
-        }
-        let Self { speaker, wire, controller, station, found, .. } = self;
-        speaker.speak(wire, *controller, now_us, station, &**found);
-    }
-
-    fn look_at_the_controller(&mut self) {
-        let now = (self.wire.status)();
-        if now != self.controller {
-            self.controller = now;
-            self.station.on_controller(now, self.found);
-            self.due = true;
-        }
-    }
-
-    fn keep(&mut self) {
-        if let Some(kept) = self.kept.dequeue() {
-            self.station.set_generation(kept.generation);
-            self.station.stored(kept.done, &kept.objects);
-            self.lent = Some(kept);
-        }
-        let Some(lent) = self.lent.take() else { return };
-        let Some(what) = self.station.take_store(&mut lent.objects) else {
-            self.lent = Some(lent);
-            return;
-        };
-        lent.what = what;
-        lent.generation = self.station.generation();
-        self.station.storing(Storing::Busy);
-        let _ = self.keep.enqueue(lent);
+        self.round.round(now_us, FRAMES, self.station, &mut self.ports, &*self.found);
     }
 }
 

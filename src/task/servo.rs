@@ -186,7 +186,7 @@ impl ServoLoop {
                 // What is asked meanwhile is asked of a leg that has no zeros.
                 let _ = self.requests.dequeue();
                 if let Some(link) = &mut self.link {
-                    link.rest();
+                    link.side.rest();
                 }
                 return;
             }
@@ -205,7 +205,7 @@ impl ServoLoop {
         self.look_around();
         let request = self.next_request();
         let request = match &self.link {
-            Some(link) => link.held(request, self.control.state()),
+            Some(link) => link.side.held(request, self.control.state()),
             None => request,
         };
         let asked = permitted(request, interlock::is_clear(), self.control.state());
@@ -223,15 +223,14 @@ impl ServoLoop {
 
     /// The operator's hand before the host.
     fn next_request(&mut self) -> Option<ControlRequest<JOINTS>> {
-        if let Some(link) = &mut self.link {
-            link.hear(&mut self.control);
-        }
         let by_hand = self.requests.dequeue();
-        if by_hand.is_some() {
-            self.prepared = None;
-            return by_hand;
-        }
-        let (request, prepared) = self.link.as_mut()?.request()?;
+        let (request, prepared) = match &mut self.link {
+            Some(link) => {
+                link.side.hear(|fault| self.control.report(fault));
+                link.side.request(by_hand)?
+            }
+            None => (by_hand?, None),
+        };
         self.prepared = prepared;
         Some(request)
     }

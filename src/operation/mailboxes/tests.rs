@@ -71,7 +71,7 @@ impl Mailboxes for Wire {
 
 impl Wire {
     /// What is under way when the plug is in leaves.
-    fn empty(&mut self) {
+    pub(in crate::operation) fn empty(&mut self) {
         if !self.unplugged {
             let now_us = self.now_us;
             self.sent.extend(self.waiting.drain(..).map(|(frame, given_us)| (frame, given_us, now_us)));

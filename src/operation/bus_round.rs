@@ -1,0 +1,138 @@
+//! Level 5: one round of the bus, in this order.
+//!
+//! ```text
+//! controller   active, passive, off, or a frame was lost: told once on every change
+//! frames       that came, at most as many as fit the queue
+//! log          all that waits
+//! time         whether a host is missed, however full the bus is
+//! store        what ended, what is asked for
+//! leg          what it told, then its next order; neither while it has not taken the one before, which would be overwritten and a request with it
+//! mailboxes    [`Speaker`]
+//! ```
+
+use super::mailboxes::{Mailboxes, Speaker};
+use crate::bus::identification::Results;
+use crate::bus::station::{Keeping, LegOrder, LegTold, Station};
+use crate::bus::{Controller, Frame, KeptNode, Storing};
+use crate::leg::LoggedSample;
+
+/// What is to be kept: on its way to the keeper, and back with what became of it.
+pub struct Keep<const N: usize> {
+    /// What a host asked for.
+    pub what: Keeping,
+    /// Of each node.
+    pub objects: [KeptNode; N],
+    /// Models kept so far.
+    pub generation: u32,
+    /// It was kept.
+    pub done: bool,
+}
+
+impl<const N: usize> Keep<N> {
+    /// Not asked for anything yet.
+    pub const NOTHING: Self =
+        Self { what: Keeping::All, objects: [KeptNode::NOTHING; N], generation: 0, done: true };
+}
+
+/// What a round needs of a board. Every method answers at once.
+pub trait BusBoard<const N: usize>: Mailboxes {
+    /// How the controller does; a frame that was lost is told once.
+    fn status(&mut self) -> Controller;
+    /// The next frame that came.
+    fn frame(&mut self) -> Option<Frame>;
+    /// The next sample of the log.
+    fn logged(&mut self) -> Option<LoggedSample<N>>;
+    /// What the leg did, if it told since it was asked.
+    fn told(&mut self) -> Option<LegTold<N>>;
+    /// The leg has taken the order before.
+    fn takes_order(&self) -> bool;
+    /// What the leg is to do; not asked for unless it takes one.
+    fn order(&mut self, order: LegOrder<N>);
+    /// The operator holds the enabling switch.
+    fn held(&self) -> bool;
+    /// A host has the drive, or has it no longer.
+    fn set_hosted(&mut self, hosted: bool);
+    /// A store that has ended, once.
+    fn kept(&mut self) -> Option<&Keep<N>>;
+    /// Memory for the next store; none while one is under way.
+    fn lent(&mut self) -> Option<&mut Keep<N>>;
+    /// What is in the memory is to be kept.
+    fn keep(&mut self);
+}
+
+/// What is known between two rounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BusRound {
+    controller: Controller,
+    /// The leg has not been told of what came since.
+    due: bool,
+    speaker: Speaker,
+}
+
+impl BusRound {
+    /// Nothing heard yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { controller: Controller::Active, due: false, speaker: Speaker::new() }
+    }
+
+    /// One round; of the frames that came at most `frames`.
+    pub fn round<R: Results, const N: usize, const LOG: usize>(
+        &mut self,
+        now_us: u64,
+        frames: usize,
+        station: &mut Station<N, LOG>,
+        board: &mut impl BusBoard<N>,
+        results: &R,
+    ) {
+        let status = board.status();
+        if status != self.controller {
+            self.controller = status;
+            station.on_controller(status, results);
+            self.due = true;
+        }
+        for _ in 0..frames {
+            let Some(frame) = board.frame() else { break };
+            station.hear(&frame, now_us, None, results);
+            self.due = true;
+        }
+        while let Some(logged) = board.logged() {
+            station.log(&logged);
+        }
+        station.watch(now_us, results);
+        Self::keep(station, board);
+        if board.takes_order()
+            && let Some(told) = board.told()
+        {
+            station.told(&LegTold { held: board.held(), ..told });
+            board.set_hosted(station.is_hosted());
+            self.due = true;
+        }
+        if self.due && board.takes_order() {
+            board.order(station.order());
+            self.due = false;
+        }
+        self.speaker.speak(board, self.controller, now_us, station, results);
+    }
+
+    fn keep<const N: usize, const LOG: usize>(station: &mut Station<N, LOG>, board: &mut impl BusBoard<N>) {
+        if let Some(kept) = board.kept() {
+            station.set_generation(kept.generation);
+            station.stored(kept.done, &kept.objects);
+        }
+        let Some(lent) = board.lent() else { return };
+        let Some(what) = station.take_store(&mut lent.objects) else { return };
+        (lent.what, lent.generation) = (what, station.generation());
+        station.storing(Storing::Busy);
+        board.keep();
+    }
+}
+
+impl Default for BusRound {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests;
