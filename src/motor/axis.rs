@@ -53,7 +53,7 @@ pub use asked::{AxisFault, AxisRequest, Wish};
 use window::Window;
 
 /// What a reading of shunts or bus that is not believed adds to the doubts; each that is believed takes one away. Beyond so many it is a fault:
-/// the third of three in every other tick, or one in four for ten.
+/// the third of three in every other tick, or the sixth of one in four.
 const DOUBT: u8 = 4;
 const MOST_DOUBTS: u8 = 8;
 /// A count that is taken by an interrupt at the index may be late by one part in so many of a period: 10 us.
@@ -276,11 +276,12 @@ impl Axis {
         }
         let acting = self.speed.ahead(angle, DELAY_PERIODS).rotation(constants.sine);
         let target = Rotating { d: Ampere::ZERO, q: target }.to_stationary(acting);
-        if self.shunt_watch.is_stuck(sample.shunt_codes, target) {
+        if self.shunt_watch.is_stuck(sample.shunt_codes, target, constants.stuck_asked) {
             return Err(AxisFault::StuckConversion);
         }
         let duty = constants.modulator.duties(voltage.to_stationary(acting), 1.0 / bus.0, target);
-        if !is_finite(duty[0] + duty[1] + duty[2]) {
+        // They are within 0..1 or no numbers.
+        if !(duty[0] + duty[1] + duty[2] >= 0.0) {
             return Err(AxisFault::NotANumber);
         }
         Ok(AxisCommand { enabled: true, duty })

@@ -2,7 +2,7 @@
 
 use super::{
     BridgeTiming, Calibration, CountScale, CurrentGains, DeadTime, ElectricalAngle, EncoderSetting,
-    ModelLimits, Modulator, MotorConstants, SenseScale, Sine,
+    ModelLimits, Modulator, MotorConstants, SenseScale, ShuntWatch, Sine,
 };
 use crate::checksum::Checksum;
 use crate::hal::CURRENT_RATE_HZ;
@@ -162,6 +162,8 @@ pub(super) struct Constants {
     pub gains: CurrentGains,
     pub modulator: Modulator,
     pub model: ModelLimits,
+    /// Of a phase, A: its code has to show it.
+    pub stuck_asked: f32,
     pub current_limit: f32,
     pub overcurrent_square: f32,
     /// Electrical, rad/s; of a shorted motor that carries the overcurrent bound.
@@ -209,6 +211,7 @@ impl Constants {
         let gains = CurrentGains::new(&motor, configuration.bandwidth, configuration.feedforward)
             .ok_or(AxisError::Motor)?;
         let scale = configuration.scale()?;
+        let dead = configuration.bus[1] * (configuration.timing.dead_time.0 * CURRENT_RATE_HZ as f32);
         let signs = [configuration.counter.sign(), configuration.flexion.sign()];
         Ok(Self {
             sense: configuration.sense,
@@ -231,6 +234,7 @@ impl Constants {
             gains,
             modulator: configuration.modulator()?,
             model: ModelLimits::new(configuration, &motor, scale),
+            stuck_asked: ShuntWatch::asked(dead, gains.least_ohm()).0,
             current_limit: configuration.current_limit.0,
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
             brake_speed: brake_speed(&motor, configuration.overcurrent),

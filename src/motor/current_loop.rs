@@ -36,7 +36,7 @@
 use super::Rotating;
 use crate::checksum::Checksum;
 use crate::hal::CURRENT_RATE_HZ;
-use crate::real::{clamp, exp, sqrt};
+use crate::real::{clamp, exp, min, sqrt};
 use crate::units::{Ampere, Henry, Hertz, Ohm, Volt, Weber};
 
 /// From a sample to the middle of the period in which its answer acts, in periods.
@@ -94,6 +94,11 @@ impl CurrentGains {
             flux_vs: forward * motor.flux.0,
             bandwidth,
         })
+    }
+
+    /// The smaller of both proportional gains, ohm.
+    pub(super) fn least_ohm(&self) -> f32 {
+        min(self.proportional_ohm.d, self.proportional_ohm.q)
     }
 
     /// The gain across the flux, for a bit that flips in it.

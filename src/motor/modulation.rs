@@ -133,6 +133,7 @@ impl Modulator {
     /// Duties of A, B and C for a voltage; `per_bus` is one over the bus voltage, `target` the current that is wanted while
     /// they act. Of a voltage that is not a number duties are none.
     #[must_use]
+    #[inline(always)]
     pub fn duties(&self, voltage: Stationary<Volt>, per_bus: f32, target: Stationary<Ampere>) -> [f32; 3] {
         let Phases { a, b, c } =
             Stationary { alpha: voltage.alpha.0 * per_bus, beta: voltage.beta.0 * per_bus }.to_phases();
@@ -156,6 +157,7 @@ impl Modulator {
         self.dead_duty = f32::NAN;
     }
 
+    #[inline(always)]
     fn duty(&self, wanted: f32, current_in_bands: f32) -> f32 {
         let duty = wanted + self.dead_duty * clamp(current_in_bands, -1.0, 1.0);
         // One that is no number stays so, for who asked to see.

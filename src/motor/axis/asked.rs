@@ -19,16 +19,16 @@ impl AxisRequest {
 /// Why an axis released its bridge by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisFault {
-    /// A shunt amplifier at its rail, two ticks in a row.
+    /// A shunt amplifier at its rail: two ticks in a row, or too many of a few.
     CurrentSense,
     /// The current vector is longer than the bound.
     Overcurrent,
-    /// Bus voltage out of its range, two ticks in a row.
+    /// Bus voltage out of its range, as above.
     BusVoltage,
     /// Two encoder steps in a row that no motor makes, or an index pulse away from the index's place. The place is lost: only a
     /// new calibration helps.
     Encoder,
-    /// Target or voltage not a number.
+    /// Target, voltage or duty not a number.
     NotANumber,
     /// The counter stands still while the motor turns. The motor is a brake until the fault is cleared; the place is lost.
     EncoderFrozen,

@@ -24,6 +24,10 @@ fn voltages(bounds: &mut Bounds, joint: &JointFile, motor: &MotorFile, configura
     bounds.frozen_speed = core::array::from_fn(|part| bounds.frozen_speed[part].max(frozen[part]));
     bounds.frozen_swing_a = bounds.frozen_swing_a.max(current / 2.0);
     bounds.judged_speed = bounds.judged_speed.max(TAU / 0.025 / per_joint);
+    // 2 * 4/3 of it is `still`; the gain of a loop that is so fast is that of its inductance.
+    let inductance = 1e-6 * motor.inductance_d_uh.min(motor.inductance_q_uh);
+    let ohm = TAU * f64::from(configuration.bandwidth.0) * inductance;
+    bounds.stuck_a = bounds.stuck_a.max(1.25 * 0.5 * still / ohm);
     let offset = (0.4 * still + 0.06 * resistance * current) / (resistance * 2.0 / 3.0_f64.sqrt());
     // A tenth for what the estimates of the calibration lack, and dead time, which may be against it.
     bounds.smallest_offset_a = bounds.smallest_offset_a.max(1.1 * offset + 0.5 * still / resistance / 1.15);
@@ -42,6 +46,7 @@ pub(super) fn bounds(leg: &LegFile) -> Result<Bounds, ToolError> {
         frozen_speed: [0.0; 2],
         frozen_swing_a: 0.0,
         judged_speed: 0.0,
+        stuck_a: 1.0,
         smallest_offset_a: 0.0,
     };
     for (joint, step) in leg.joints.iter().zip(&mut steps) {

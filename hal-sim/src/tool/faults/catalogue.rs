@@ -2,8 +2,8 @@
 //!
 //! A row is in this table once its detector exists; what is missing of it stands in [`Row::lacking`], and docs/safety.md lists the
 //! rows that are not here. Magnitudes are drawn over all that a fault can be, so that the smallest one that is seen is a result.
-//! What lies below a detector's threshold is told apart beforehand, from the numbers the firmware is set to ([`Bounds`]), never
-//! from the outcome.
+//! What lies below a detector's threshold is told apart beforehand, from the numbers the firmware is set to ([`Bounds`]); what
+//! is a fault only while something holds ([`Onset`]) is judged by what the spoilt machine did until then.
 
 pub mod board;
 pub mod current;
@@ -33,6 +33,8 @@ pub enum Expected {
     Restarted,
     /// Velocity damped, then released.
     Damp,
+    /// The same, and nothing else: there is the energy for it.
+    Damped,
     /// Low sides on: the motors brake themselves.
     Brake,
     /// The reading is not believed, the motion goes on.
@@ -178,6 +180,8 @@ pub struct Bounds {
     pub frozen_swing_a: f64,
     /// Of a joint, rad/s: an electrical turn takes 25 ms.
     pub judged_speed: f64,
+    /// Of a phase, A: what a change of less may leave where it is, since dead time outweighs the current loop.
+    pub stuck_a: f64,
     /// Offset of a shunt whose voltage is more than that of dead time and of what changes within a turn, A.
     pub smallest_offset_a: f64,
 }

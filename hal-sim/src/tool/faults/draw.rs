@@ -1,7 +1,8 @@
 //! What the draws of all rows begin with.
 
 use super::catalogue::{Event, Expected, Onset, Scenario};
-use super::rig::PERIODS_PER_S;
+use super::dice::Dice;
+use super::rig::{PERIOD_MS, PERIODS_PER_S};
 use crate::faults::{Channel, Form, Injection, Timing};
 
 /// Of the board's shunts and converter.
@@ -36,4 +37,23 @@ pub const fn one(injection: Injection, expected: Expected) -> Scenario {
 pub const fn beside(event: Event, expected: Expected) -> Scenario {
     let nothing = at(Channel::Bus, 0, Form::Off, Timing::from(u64::MAX));
     Scenario { injections: [None; 2], event, ..one(nothing, expected) }
+}
+
+/// One time in four what lasts comes and goes: one wrong reading in two to five. By how many the axis believes them no longer follows from
+/// its count of doubts (`scarab::motor::Axis`); one in five is believed in for ever.
+pub fn now_and_then(dice: &mut Dice, lasting: Scenario) -> Scenario {
+    if dice.below(4) > 0 {
+        return lasting;
+    }
+    let off = 1 + dice.below(4);
+    let readings = [3, 4, 6, u64::MAX][off as usize - 1];
+    let [first, other] = lasting.injections;
+    let first =
+        first.map(|injection| Injection { timing: Timing { on: 1, off, ..injection.timing }, ..injection });
+    Scenario {
+        injections: [first, other],
+        by_design: off > 3,
+        within_ms: (off <= 3).then(|| ((readings - 1) * (1 + off) + 1) as f64 * PERIOD_MS),
+        ..lasting
+    }
 }

@@ -219,7 +219,7 @@ fn a_code_that_stays_while_its_phase_is_asked_for_more_is_seen_in_the_fourth_tic
             bench.sample.shunt_codes[shunt] = stuck;
             bench.tick(ask(20.0));
             ticks += 1;
-            assert!(ticks <= 24, "a turn of the current's phase is 34 ticks");
+            assert!(ticks <= 54, "a quarter of an electrical turn");
         }
         assert_eq!(bench.axis.fault(), Some(AxisFault::StuckConversion));
         // A step: the fourth tick after it.

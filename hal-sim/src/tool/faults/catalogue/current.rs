@@ -3,7 +3,7 @@
 use scarab::safety::FaultCode;
 
 use super::super::dice::Dice;
-use super::super::draw::{AMPERE_PER_CODE, at, one};
+use super::super::draw::{AMPERE_PER_CODE, at, now_and_then, one};
 use super::super::rig::{PERIOD_MS, PERIODS_PER_S};
 use super::{Bounds, Expected, JOINTS, Onset, Row, Scenario};
 use crate::faults::{Channel, Form, Timing};
@@ -52,11 +52,11 @@ fn rail(dice: &mut Dice, _: &Bounds) -> Scenario {
     let channel = if dice.coin() { Channel::ShuntB } else { Channel::ShuntC };
     // Of the amplifier or of the converter, low or high.
     let value = [0.0, 186.0, 3910.0, 4095.0][dice.below(4) as usize];
-    one(at(channel, joint, Form::Rail(value), Timing::from(0)), Expected::Off)
+    now_and_then(dice, one(at(channel, joint, Form::Rail(value), Timing::from(0)), Expected::Off))
 }
 
 /// C3: conversions that do not end, or say the same for ever.
-fn conversion(dice: &mut Dice, _: &Bounds) -> Scenario {
+fn conversion(dice: &mut Dice, bounds: &Bounds) -> Scenario {
     let joint = dice.below(JOINTS as u64) as usize;
     let way = dice.below(5);
     if way == 0 {
@@ -69,8 +69,8 @@ fn conversion(dice: &mut Dice, _: &Bounds) -> Scenario {
         let channel = if dice.coin() { Channel::ShuntB } else { Channel::ShuntC };
         let stuck = at(channel, joint, Form::Stuck, Timing::from(0));
         return Scenario {
-            // 1 A, and the tenth that rotor and estimate may be apart.
-            onset: Onset::Asked(1.1),
+            // What has to show, and the tenth that rotor and estimate may be apart.
+            onset: Onset::Asked(1.1 * bounds.stuck_a),
             patience: PERIODS_PER_S / 2,
             ..one(stuck, Expected::Off)
         };

@@ -3,7 +3,7 @@
 use scarab::safety::FaultCode;
 
 use super::super::dice::Dice;
-use super::super::draw::{VOLT_PER_CODE, at, one};
+use super::super::draw::{VOLT_PER_CODE, at, now_and_then, one};
 use super::super::rig::{PERIOD_MS, PERIODS_PER_S};
 use super::{Bounds, Event, Expected, Onset, Row, Scenario};
 use crate::faults::{Channel, Form, Timing};
@@ -41,7 +41,7 @@ fn overvoltage(dice: &mut Dice, bounds: &Bounds) -> Scenario {
         let volts = dice.uniform(high + 0.2, 62.0);
         let code = volts / VOLT_PER_CODE;
         let bus = at(Channel::Bus, 0, Form::Rail(code), Timing::from(0));
-        return Scenario { magnitude: Some(volts - high), ..one(bus, Expected::Off) };
+        return Scenario { magnitude: Some(volts - high), ..now_and_then(dice, one(bus, Expected::Off)) };
     }
     // What the leg gives back finds a resistor that is not there, and a supply that pushes.
     let volts = dice.uniform(high + 2.0, 75.0);
@@ -69,6 +69,6 @@ fn undervoltage(dice: &mut Dice, bounds: &Bounds) -> Scenario {
         onset: Onset::BusBelow(low - 0.1),
         magnitude: Some(low - volts),
         patience: 20 * PERIODS_PER_S,
-        ..one(at(Channel::Bus, 0, Form::Off, Timing::from(u64::MAX)), Expected::Off)
+        ..one(at(Channel::Bus, 0, Form::Off, Timing::from(u64::MAX)), Expected::Damped)
     }
 }

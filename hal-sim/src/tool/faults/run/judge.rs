@@ -10,6 +10,9 @@ use super::Watched;
 impl<const B: usize> Watched<'_, B> {
     /// The catalogue's state, or what the firmware does instead.
     pub(super) fn leads_to(&self, state: &str) -> bool {
+        if self.scenario.expected == Expected::Damped {
+            return state == "Damp";
+        }
         self.row.state.contains(state) || instead(self.row.id).is_some_and(|to| to.contains(state))
     }
 
