@@ -66,6 +66,11 @@ impl Consumer {
         core::mem::take(&mut self.lost).then_some(Change::Back)
     }
 
+    /// Nobody could be heard for so long: it is not held against who was not.
+    pub fn wait(&mut self, us: u64) {
+        self.due_us = self.due_us.map(|due| due + us);
+    }
+
     /// Time goes on.
     pub fn poll(&mut self, now_us: u64) -> Option<Change> {
         self.due_us.take_if(|due| now_us > *due).map(|_| {

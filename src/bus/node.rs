@@ -294,6 +294,12 @@ impl Node {
         }
     }
 
+    /// The board stood still for so long, as it does while its flash is written, and heard nobody: that is not a host's fault.
+    pub fn stood_still(&mut self, us: u64) {
+        self.communication.consumers.iter_mut().for_each(|consumer| consumer.wait(us));
+        self.communication.receive.iter_mut().for_each(|pdo| pdo.wait(us));
+    }
+
     fn watch<O: Objects>(&mut self, consumer: u8, change: Option<Change>, objects: &mut O) {
         let Some(change) = change else { return };
         // 8130: heartbeat error.

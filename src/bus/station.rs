@@ -27,6 +27,9 @@ use crate::leg::{
     Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, Permission, Plan, PowerRequest,
 };
 
+/// A board that has not looked at its bus for so long stood still.
+const STOOD_US: u64 = 2_000;
+
 /// What a leg tells of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LegTold<const N: usize> {
@@ -112,6 +115,8 @@ pub struct Station<const N: usize, const LOG: usize> {
     request: Option<LegRequest>,
     /// The controller left the bus.
     off: bool,
+    /// When the bus was looked at last.
+    looked_us: u64,
     /// Of each node: it was reset, and what was kept of it is to be recalled.
     anew: [bool; N],
 }
@@ -138,6 +143,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
             refused: false,
             request: None,
             off: false,
+            looked_us: 0,
             anew: [false; N],
         }
     }
@@ -173,6 +179,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     /// A frame on the bus, for every node but the one that sent it. What was kept of one that it resets
     /// comes back with what is asked next, once for any number of frames.
     pub fn hear<R: Results>(&mut self, frame: &Frame, now_us: u64, sender: Option<usize>, results: &R) {
+        self.look_back(now_us);
         for joint in (0..N).filter(|joint| Some(*joint) != sender) {
             let begins = self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects));
             if let (Some(true), Some(anew)) = (begins, self.anew.get_mut(joint)) {
@@ -191,9 +198,20 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         self.with(joint, results, |node, objects| node.poll(now_us, objects))?
     }
 
-    /// Whether a host is missed; however full the bus is.
+    /// A board that stood still heard nobody meanwhile.
+    fn look_back(&mut self, now_us: u64) {
+        let since_us = now_us.saturating_sub(self.looked_us);
+        self.looked_us = self.looked_us.max(now_us);
+        if since_us > STOOD_US {
+            self.nodes.iter_mut().for_each(|node| node.stood_still(since_us));
+        }
+    }
+
+    /// Whether a host is missed; however full the bus is. To be asked every millisecond: a time in which it was not is not held
+    /// against a host that nobody could hear.
     pub fn watch<R: Results>(&mut self, now_us: u64, results: &R) {
         self.recall_reset();
+        self.look_back(now_us);
         for joint in 0..N {
             self.with(joint, results, |node, objects| node.look_around(now_us, objects));
         }

@@ -90,7 +90,7 @@ faults! {
     CurrentZero = 0xFF0B, "C1", "current_zero", Off, "the zero of its current drifted";
     /// A shunt's code stays while its phase is asked for another current.
     StuckConversion = 0xFF0C, "C3", "stuck_conversion", Off, "a conversion is stuck";
-    /// A shunt amplifier at its rail, two ticks in a row (5210: measuring circuits).
+    /// A shunt amplifier at its rail, two ticks in a row or too many of a few (5210: measuring circuits).
     CurrentSense = 0x5210, "C2", "current_sense", Off, "a shunt amplifier stayed at its rail";
     /// One shunt's conversion ended without the other's.
     Conversion = 0xFF03, "C3", "conversion", Off, "a conversion is missing";
@@ -100,7 +100,7 @@ faults! {
     GateFault = 0x5410, "C4", "gate_fault", Off, "a gate driver reports a fault";
     /// A gate driver does not hold its configuration (5400: power section).
     GateConfiguration = 0x5400, "P2", "gate_configuration", Off, "a gate driver lost its configuration";
-    /// Bus voltage out of its range, two ticks in a row (3200: voltage inside the device).
+    /// Bus voltage out of its range, as the amplifiers (3200: voltage inside the device).
     BusVoltage = 0x3200, "V1", "bus_voltage", Off, "the bus voltage left its range";
     /// The supply dies while there is still energy (3220: DC link undervoltage).
     SupplyLost = 0x3220, "V2", "supply_lost", Damp, "its supply went away";

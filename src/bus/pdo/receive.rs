@@ -55,6 +55,11 @@ impl Receive {
         self.due_us.take_if(|due| now_us > *due).is_some()
     }
 
+    /// Nobody could be heard for so long.
+    pub fn wait(&mut self, us: u64) {
+        self.due_us = self.due_us.map(|due| due + us);
+    }
+
     /// What waited or was watched is forgotten.
     pub fn stop(&mut self) {
         (self.waits, self.due_us) = (false, None);

@@ -89,6 +89,9 @@ pub struct Board<const N: usize, const B: usize> {
     has_kept: bool,
     /// The accepted model is in the memory.
     model_kept: bool,
+    /// What hosts ask to keep waits for somebody who takes its time (`Board::take_asked`).
+    waits: bool,
+    asked: Option<(Keeping, [KeptNode; N])>,
     /// How the controller does.
     controller: Controller,
     /// Number of the first node, unless the memory says otherwise.
@@ -116,6 +119,8 @@ impl<const N: usize, const B: usize> Board<N, B> {
             context,
             has_kept: false,
             model_kept: false,
+            waits: false,
+            asked: None,
             controller: Controller::Active,
             first,
         };
@@ -165,8 +170,30 @@ impl<const N: usize, const B: usize> Board<N, B> {
         self.station.hear(frame, now_ns / 1000, sender, self.rig.leg.identification());
         let mut objects = [KeptNode::NOTHING; N];
         if let Some(keeping) = self.station.take_store(&mut objects) {
-            self.keep(keeping, &objects);
+            if self.waits {
+                // As the board's thread has it: hosts are told before the flash is touched.
+                self.station.storing(Storing::Busy);
+                self.asked = Some((keeping, objects));
+                return;
+            }
+            let kept = self.keep(keeping, &objects);
+            self.station.stored(kept, &objects);
         }
+    }
+
+    /// From now on what hosts ask to keep waits until somebody takes it.
+    pub fn keep_later(&mut self) {
+        self.waits = true;
+    }
+
+    /// What waits to be kept.
+    pub fn take_asked(&mut self) -> Option<(Keeping, [KeptNode; N])> {
+        self.asked.take()
+    }
+
+    /// It was kept, or not: hosts are told.
+    pub fn stored(&mut self, kept: bool, objects: &[KeptNode; N]) {
+        self.station.stored(kept, objects);
     }
 
     /// What the nodes have to say goes to their mailboxes.
@@ -246,11 +273,11 @@ impl<const N: usize, const B: usize> Board<N, B> {
         }
     }
 
-    /// Keeps all objects and the accepted model, or forgets everything.
-    fn keep(&mut self, keeping: Keeping, objects: &[KeptNode; N]) {
+    /// Keeps all objects and the accepted model, or forgets everything; whether it did.
+    pub fn keep(&mut self, keeping: Keeping, objects: &[KeptNode; N]) -> bool {
         let state = self.rig.state();
         self.has_kept = true;
-        let kept = match keeping {
+        match keeping {
             Keeping::Defaults => {
                 let forgotten = self.memory.forget(state);
                 if forgotten {
@@ -265,8 +292,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
                 nodes.all(|(joint, kept)| self.memory.keep_objects(state, joint, kept.bytes()))
                     && self.keep_model()
             }
-        };
-        self.station.stored(kept, objects);
+        }
     }
 
     /// The accepted model, unless it was kept already; whether nothing went wrong.

@@ -106,6 +106,8 @@ const FULL_SEEDS: u64 = 1000;
 const FULL_SWEEP: u64 = 8000;
 const FULL_PAIRS: u64 = 10_000;
 const FULL_HOURS: f64 = 10.0;
+/// Of a blind campaign: of fewer some rows have no run that is seen.
+const FEWEST_BLIND: usize = 16;
 /// Without it.
 const SEEDS: u64 = 20;
 
@@ -216,6 +218,11 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     if arguments.blind {
         let unnoticed: Vec<_> =
             report.rows.iter().filter(|row| !row.is_noticed()).map(|row| row.fault).collect();
+        if options.seeds.len() < FEWEST_BLIND {
+            tables::print(&format!(
+                "fewer than {FEWEST_BLIND} seeds may be too few for rows that are seldom seen\n"
+            ))?;
+        }
         for detector in &report.detectors {
             tables::print(&detector.told())?;
         }

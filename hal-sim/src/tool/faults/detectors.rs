@@ -24,7 +24,7 @@ pub struct DetectorReport {
     pub missed_without: usize,
     /// Of those, runs that another code tells in time without it.
     pub seen_by_others: usize,
-    /// Of those, runs in which nothing came to be a fault without it.
+    /// Of those, runs that cannot be judged without it: the fault did not last, or the joint did not move any more.
     pub harmless_without: usize,
 }
 
@@ -110,7 +110,7 @@ impl DetectorReport {
     pub fn told(&self) -> String {
         let Self { code, seen, missed_without, seen_by_others, harmless_without, .. } = self;
         format!(
-            "{code} ({}): told in {seen} runs; without it {missed_without} missed, {seen_by_others} seen by others, {harmless_without} no fault\n",
+            "{code} ({}): told in {seen} runs; without it {missed_without} missed, {seen_by_others} seen by others, {harmless_without} not to be judged\n",
             self.faults.join(", ")
         )
     }

@@ -116,3 +116,28 @@ fn hosts_are_told_before_the_flash_is_written_and_how_it_ended() {
         assert_eq!(codes(bench.run(4)), [(0x81, code), (0x82, code)]);
     }
 }
+
+#[test]
+fn a_host_is_not_missed_for_the_time_in_which_the_board_stood_still() {
+    let is_missed = |frames: &[Frame]| {
+        frames.iter().any(|frame| frame.id() == 0x81 && frame.data().starts_with(&[0x30, 0x81]))
+    };
+    let mut bench = Bench::new();
+    bench.write(1, 0x1016, 1, 0x70 << 16 | 100, 4);
+    bench.station.watch(bench.now_us, &Nothing);
+    bench.send(0x770, &[5]);
+    // A sector is erased, and what the host sends meanwhile is lost.
+    bench.now_us += 2_000_000;
+    bench.station.watch(bench.now_us, &Nothing);
+    assert!(!is_missed(&bench.run(8)));
+    let mut missed_after_ms = None;
+    for ms in 0..200 {
+        bench.station.watch(bench.now_us, &Nothing);
+        if is_missed(&bench.run(4)) {
+            missed_after_ms = Some(ms);
+            break;
+        }
+    }
+    // Its own time is what it was.
+    assert!(missed_after_ms.is_some_and(|ms| (90..=102).contains(&ms)), "{missed_after_ms:?}");
+}

@@ -148,7 +148,7 @@ fn flood(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<O
 /// Among frames that are malformed a leg goes on as its host says.
 fn moved_on(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
     watched(&mut fork, [true; 2], false)?;
-    let mut alone = fork.host.clone();
+    let (mut alone, mut near) = (fork.host.clone(), true);
     for tick in 0..FLOOD {
         // As many as leave room for the host's own and for the answers.
         if tick.is_multiple_of(4) {
@@ -156,9 +156,10 @@ fn moved_on(mut fork: Fork<'_>) -> Result<Outcome, ToolError> {
             fork.host.network.send(frame);
         }
         fork.tick();
+        alone.run(1);
+        near &= is_near(&mut fork, &mut alone);
     }
-    alone.run(FLOOD);
-    let unaffected = is_near(&mut fork, &mut alone) && fork.host.is_enabled();
+    let unaffected = near && fork.host.is_enabled();
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     Ok(fork.ended(unaffected.then_some("-"), alarm))
 }

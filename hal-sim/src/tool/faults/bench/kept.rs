@@ -6,6 +6,7 @@
 //! | F1 | the power fails at any byte that is programmed or erased while both nodes' objects and a model are kept; one time in four again while the next boot mends that | each record is the old or the new one, no later one is new where an earlier is old, and the next save succeeds |
 //! | F2 | bits flip, a stretch is overwritten, another leg's model, everything gone | each node has the newest of its records that is whole, or all as after the start; so has the leg its model, if it is its own; what cannot be read and what is another's is told (5530) |
 //! | F3 | "save" while the drive is on | refused (0800 0022), not a byte of the flash changes, the leg moves on |
+//! | F3 | "save" while it is off (`stall.rs`) | the processor stands meanwhile, and nobody takes it for a fault |
 //!
 //! Flashes of F1 were filled before, to all levels up to where a sector has to be erased for the next record.
 
@@ -23,6 +24,7 @@ use super::super::dice::Dice;
 use super::super::entry::Head;
 use super::super::run::Outcome;
 use super::hosted::{Fork, board, forked, hosted};
+use super::stall::stall;
 use super::{Bench, outcome};
 use crate::tool::bus::board::Board;
 use crate::tool::bus::host::Host;
@@ -70,7 +72,12 @@ pub(super) const ROT: Bench = Bench {
 };
 
 pub(super) const ARMED: Bench = Bench {
-    head: head("F3", "store asked for while the drive is on", "permit of a drive that is off", "-"),
+    head: head(
+        "F3",
+        "store asked for while the drive is on; the processor that stands meanwhile",
+        "permit of a drive that is off, interlock",
+        "-",
+    ),
     run: armed,
 };
 
@@ -224,6 +231,8 @@ fn cut(head: &Head, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
 /// A board whose memory holds older and newer objects and models, and the models that may be used.
 struct Rotting {
     board: Board<JOINTS, BASE>,
+    /// Of each node, all that were kept.
+    objects: [Vec<Vec<u8>>; 2],
     models: [(KeptModel<JOINTS>, IdentifiedModel<JOINTS>); 2],
     kept: KeptModel<JOINTS>,
     other: KeptModel<JOINTS>,
@@ -245,12 +254,16 @@ impl Rotting {
         let other = identified(&longer, 1)?;
         let mut host = Host::new(board(leg)?);
         host.begin()?;
+        let mut objects = [Vec::new(), Vec::new()];
         for (window, kept) in WINDOWS.into_iter().zip(&kept) {
             for node in [1, 2] {
                 host.write(node, WINDOW, 0, window, 4)?;
             }
             host.write(1, 0x1010, 1, SAVE, 4)?;
             host.run(400);
+            for (joint, objects) in objects.iter_mut().enumerate() {
+                objects.extend(host.board().memory().objects(joint).ok().flatten());
+            }
             if !host.board().memory().keep_any(OFF, kept) {
                 return Err(refused("a flash that keeps no model"));
             }
@@ -264,7 +277,7 @@ impl Rotting {
             models.push((kept, model));
         }
         let models = models.try_into().map_err(|_| refused("two models"))?;
-        Ok(Self { board: host.board().clone(), models, kept: kept[1], other })
+        Ok(Self { board: host.board().clone(), objects, models, kept: kept[1], other })
     }
 }
 
@@ -277,7 +290,6 @@ fn rots(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Ou
 fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome, ToolError> {
     let mut dice = Dice::new(head.id, seed);
     let mut board = rotting.board.clone();
-    let before = All::of(board.memory());
     spoil(&mut board, rotting, if blind { 4 } else { dice.below(6) }, &mut dice);
     let told_apart = readable(board.memory());
     // Nobody but the store can tell which of its records are whole: what it reads is one that was kept, or none.
@@ -293,6 +305,9 @@ fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome
     }
     board.power_on();
     let used = board.rig.leg.control().model().copied();
+    let was_kept = (0..2).all(|joint| {
+        after.objects[joint].as_ref().is_none_or(|bytes| rotting.objects[joint].contains(bytes))
+    });
     let is_foreign =
         after.model.is_some_and(|model| model.model.fingerprint != rotting.kept.model.fingerprint);
     let expected = after.model.filter(|_| !is_foreign).map(|kept| rotting.own(&kept));
@@ -304,10 +319,10 @@ fn rot(head: &Head, rotting: &Rotting, seed: u64, blind: bool) -> Result<Outcome
     let lost = is_foreign || !told_apart;
     let tells = [1, 2].map(|node| host.told().contains(&(node, LOST)));
     let enabled = host.is_enabled();
-    let holds = is_own && windows == whole && tells == [lost; 2] && !enabled;
+    let holds = is_own && was_kept && windows == whole && tells == [lost; 2] && !enabled;
     let mut found = outcome(head, seed, holds.then_some("Refuse"));
-    // Nothing that is read was hit.
-    if after == before && !blind && found.detected {
+    // Nothing that is read was hit; or the record before it is read, whole, as after a power cut, and nobody can tell.
+    if !lost && !blind && found.detected {
         (found.detected, found.undetectable) = (false, true);
     }
     found.hash = format!("{:016x}", host.rig().hash);
@@ -351,7 +366,10 @@ fn spoil(board: &mut Board<JOINTS, BASE>, rotting: &Rotting, way: u64, dice: &mu
 }
 
 fn armed(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    forked(head, leg, hosted(leg)?, seeds, |fork| asked(fork, blind))
+    let (off, on): (Vec<u64>, Vec<u64>) = seeds.iter().partition(|seed| seed.is_multiple_of(2));
+    let mut outcomes = stall(head, leg, &off, blind)?;
+    outcomes.extend(forked(head, leg, hosted(leg)?, &on, |fork| asked(fork, blind))?);
+    Ok(outcomes)
 }
 
 /// Blind, the flash is written as if the drive were off.

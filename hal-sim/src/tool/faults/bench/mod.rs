@@ -14,6 +14,7 @@ mod lost;
 pub mod offsets;
 mod parts;
 mod search;
+mod stall;
 mod start;
 mod stopped;
 

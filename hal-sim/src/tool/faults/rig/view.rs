@@ -24,6 +24,16 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         self.ports.causes
     }
 
+    /// Something that forbids to enable.
+    pub fn raise(&mut self, cause: Cause) {
+        self.ports.causes |= cause.bit();
+    }
+
+    /// The flash is written no more.
+    pub fn stored(&mut self) {
+        self.ports.causes &= !Cause::Storing.bit();
+    }
+
     /// Commands of the period that is over.
     #[must_use]
     pub fn commands(&self) -> &[AxisCommand; N] {

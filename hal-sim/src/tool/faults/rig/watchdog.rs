@@ -35,6 +35,8 @@ pub(super) struct Watchdog<const N: usize> {
     /// Period in which it was fed, and those that it then waits.
     fed: u64,
     patience: u64,
+    /// How many times as long as usual that is.
+    stretched: u64,
 }
 
 impl<const N: usize> Watchdog<N> {
@@ -45,6 +47,7 @@ impl<const N: usize> Watchdog<N> {
             guard: TickGuard::new(),
             fed: 0,
             patience: patience(NOMINAL_HZ),
+            stretched: 1,
         }
     }
 }
@@ -56,7 +59,26 @@ fn patience(hz: f64) -> u64 {
 impl<const N: usize, const B: usize> Rig<N, B> {
     /// What the watchdog's oscillator runs at, Hz: 17 to 47 kHz.
     pub fn set_oscillator(&mut self, hz: f64) {
-        self.watchdog.patience = patience(hz);
+        self.watchdog.patience = patience(hz) * self.watchdog.stretched;
+    }
+
+    /// So many times as long until it bites, counted from now; 1 is the usual.
+    pub fn stretch(&mut self, times: u64) {
+        let dog = &mut self.watchdog;
+        dog.patience = dog.patience / dog.stretched * times;
+        (dog.stretched, dog.fed) = (times, self.period);
+    }
+
+    /// The processor stands for so many periods, its flash being written: the plant goes on with every switch open, and the watchdog counts.
+    pub fn stand_still(&mut self, periods: u64) {
+        self.watchdog.fed = self.period;
+        for _ in 0..periods {
+            self.world.period(&[AxisCommand::RELEASED; N], 0.0);
+        }
+        self.period += periods;
+        if self.period - self.watchdog.fed >= self.watchdog.patience {
+            self.restart();
+        }
     }
 
     /// At the end of a period.
