@@ -107,6 +107,13 @@ fn every_detector_that_is_switched_off_is_noticed() {
     }
 }
 
+/// Its phase stands at zero current until the loop outweighs dead time: once in 500 times that was taken for a stuck conversion.
+#[test]
+fn a_leg_that_its_host_holds_still_is_not_released() {
+    let report = report("--fault F3 --replay 894", 0);
+    assert_eq!(report["rows"][0]["detected"], 1);
+}
+
 /// A hang of each that checks in is answered by a reset, neither sooner nor later than the watchdog's oscillator allows, and what boots
 /// is refused for it.
 #[test]
