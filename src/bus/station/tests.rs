@@ -5,31 +5,13 @@ use std::vec::Vec;
 use super::super::tests::IDENTITY;
 use super::*;
 use crate::bus::drive::Mode;
-use crate::leg::{FoundBase, FoundFit, FoundParameter, Parameter, Verdict};
+use crate::bus::identification::Found;
 use crate::units::{Ampere, NewtonMetre};
 
 mod kept;
 
 /// Nothing was identified.
-struct Nothing;
-
-impl Results for Nothing {
-    fn parameter(&self, _: usize, _: Parameter) -> Option<FoundParameter> {
-        None
-    }
-    fn base_parameter(&self, _: usize) -> Option<FoundBase> {
-        None
-    }
-    fn fit(&self, _: usize, _: usize) -> Option<FoundFit> {
-        None
-    }
-    fn verdict(&self) -> Option<Verdict> {
-        None
-    }
-    fn search(&self) -> [u32; 2] {
-        [0; 2]
-    }
-}
+const NOTHING: Found<2, 1> = Found::NOTHING;
 
 /// A leg that does what is ordered, and a host on the wire.
 struct Bench {
@@ -77,8 +59,8 @@ impl Bench {
             }
             self.orders.push(order);
             for joint in 0..2 {
-                while let Some(frame) = self.station.poll(joint, self.now_us, &Nothing) {
-                    self.station.hear(&frame, self.now_us, Some(joint), &Nothing);
+                while let Some(frame) = self.station.poll(joint, self.now_us, &NOTHING) {
+                    self.station.hear(&frame, self.now_us, Some(joint), &NOTHING);
                     frames.push(frame);
                 }
             }
@@ -87,7 +69,7 @@ impl Bench {
     }
 
     fn send(&mut self, id: u16, data: &[u8]) -> Vec<Frame> {
-        self.station.hear(&Frame::new(id, data), self.now_us, None, &Nothing);
+        self.station.hear(&Frame::new(id, data), self.now_us, None, &NOTHING);
         self.run(8)
     }
 
@@ -198,7 +180,7 @@ fn a_target_that_came_since_the_leg_was_heard_is_in_the_next_order() {
     bench.send(0, &[1, 0]);
     bench.write(1, 0x6060, 0, 8, 1);
     bench.enable();
-    bench.station.hear(&Frame::new(0x301, &500_000_i32.to_le_bytes()), bench.now_us, None, &Nothing);
+    bench.station.hear(&Frame::new(0x301, &500_000_i32.to_le_bytes()), bench.now_us, None, &NOTHING);
     let commands = bench.station.order().commands.expect("a host has the drive");
     let crate::leg::Target::CyclicPosition { position, .. } = commands[0].target else {
         panic!("{:?}", commands[0].target)
@@ -215,13 +197,13 @@ fn a_node_that_was_reset_begins_anew_once_however_full_the_bus_is() {
     bench.write(1, 0x6065, 0, 1, 4);
     // Its communication first, then all of it; no mailbox is free for the boot-up message.
     for command in [130, 129, 129] {
-        bench.station.hear(&Frame::new(0, &[command, 0]), bench.now_us, None, &Nothing);
+        bench.station.hear(&Frame::new(0, &[command, 0]), bench.now_us, None, &NOTHING);
     }
     assert_eq!(bench.station.anew, [true; 2]);
-    bench.station.watch(bench.now_us, &Nothing);
+    bench.station.watch(bench.now_us, &NOTHING);
     assert_eq!(bench.station.anew, [false; 2]);
     for id in [0x080, 0x201, 0x601, 0x700] {
-        bench.station.hear(&Frame::new(id, &[0; 8]), bench.now_us, None, &Nothing);
+        bench.station.hear(&Frame::new(id, &[0; 8]), bench.now_us, None, &NOTHING);
     }
     assert_eq!(bench.station.anew, [false; 2], "it is not begun again");
     let boots = bench.run(4).iter().filter(|frame| frame.id() & 0x780 == 0x700).count();
@@ -237,7 +219,7 @@ fn what_is_stored_while_a_neighbour_begins_anew_is_what_was_kept_of_it() {
     assert!(before.is_some());
     let save = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
     for frame in [Frame::new(0, &[129, 1]), Frame::new(0x602, &save)] {
-        bench.station.hear(&frame, bench.now_us, None, &Nothing);
+        bench.station.hear(&frame, bench.now_us, None, &NOTHING);
     }
     assert_eq!(bench.store(true), before);
 }
@@ -247,14 +229,14 @@ fn nothing_leaves_for_a_bus_that_is_off_and_what_leaves_afterwards_is_new() {
     let mut bench = Bench::new();
     bench.send(0, &[1, 0]);
     bench.write(1, 0x1800, 2, 255, 1);
-    bench.station.on_controller(Controller::Off, &Nothing);
+    bench.station.on_controller(Controller::Off, &NOTHING);
     let request = Frame::new(0x080, &[]);
     for _ in 0..50 {
-        bench.station.hear(&request, bench.now_us, None, &Nothing);
+        bench.station.hear(&request, bench.now_us, None, &NOTHING);
         assert_eq!(bench.run(4), []);
     }
     bench.drive = DriveState::ReadyToSwitchOn;
-    bench.station.on_controller(Controller::Active, &Nothing);
+    bench.station.on_controller(Controller::Active, &NOTHING);
     let frames = bench.run(1);
     let emergencies: Vec<u16> = frames
         .iter()
@@ -280,8 +262,8 @@ fn a_request_waits_for_a_step_of_the_drive_and_is_not_lost_to_it() {
         ];
         bench.orders.clear();
         for frame in frames {
-            bench.station.hear(&frame, bench.now_us, None, &Nothing);
-            bench.station.poll(0, bench.now_us, &Nothing);
+            bench.station.hear(&frame, bench.now_us, None, &NOTHING);
+            bench.station.poll(0, bench.now_us, &NOTHING);
         }
         bench.run(8);
         bench.orders.iter().filter_map(|order| order.request).collect::<Vec<LegRequest>>()
@@ -306,7 +288,7 @@ fn an_identification_that_was_asked_for_on_the_way_up_is_not_done_later() {
     for (id, data) in
         [(0x602, [0x2B, 0x40, 0x60, 0, 15, 0, 0, 0]), (0x601, [0x2F, 0x00, 0x21, 1, 1, 0, 0, 0])]
     {
-        bench.station.hear(&Frame::new(id, &data), bench.now_us, None, &Nothing);
+        bench.station.hear(&Frame::new(id, &data), bench.now_us, None, &NOTHING);
     }
     bench.run(8);
     assert_eq!(bench.drive, DriveState::OperationEnabled);
@@ -332,8 +314,8 @@ fn frames_that_were_lost_stop_a_hosts_leg_as_a_lost_bus_does_and_no_one_elses() 
         bench.enable();
         assert_eq!(bench.drive, DriveState::OperationEnabled);
         bench.orders.clear();
-        bench.station.on_controller(Controller::Overrun, &Nothing);
-        bench.station.on_controller(Controller::Active, &Nothing);
+        bench.station.on_controller(Controller::Overrun, &NOTHING);
+        bench.station.on_controller(Controller::Active, &NOTHING);
         let frames = bench.run(40);
         assert_eq!(bench.drive, drive, "{option}");
         let told = frames.iter().filter(|frame| frame.id() == 0x81 && frame.data()[..2] == [0x10, 0x81]);
@@ -344,7 +326,7 @@ fn frames_that_were_lost_stop_a_hosts_leg_as_a_lost_bus_does_and_no_one_elses() 
     }
     let mut bench = Bench::new();
     bench.drive = DriveState::OperationEnabled;
-    bench.station.on_controller(Controller::Overrun, &Nothing);
+    bench.station.on_controller(Controller::Overrun, &NOTHING);
     bench.run(40);
     assert_eq!(bench.drive, DriveState::OperationEnabled);
 }

@@ -3,7 +3,7 @@ extern crate std;
 use std::collections::VecDeque;
 use std::vec::Vec;
 
-use super::super::mailboxes::tests::{Nothing, Wire, station};
+use super::super::mailboxes::tests::{NOTHING, Wire, station};
 use super::*;
 use crate::bus::station::LegRequest;
 use crate::leg::{DriveEvent, DriveState, JointStatus, PowerRequest};
@@ -128,7 +128,7 @@ impl Bench {
             self.board.told.get_or_insert(LegTold { joints: [joint; 2], blocked: false, ..LegTold::NONE });
             self.board.wire.now_us += 500;
             let now_us = self.board.wire.now_us;
-            self.round.round(now_us, 33, &mut self.station, &mut self.board, &Nothing);
+            self.round.round(now_us, 33, &mut self.station, &mut self.board, &NOTHING);
             self.board.wire.empty();
         }
     }
@@ -193,7 +193,7 @@ fn a_leg_that_tells_nothing_is_ordered_what_frames_say_and_otherwise_nothing() {
         bench.board.wire.now_us += 500;
         bench.board.order = None;
         let now_us = bench.board.wire.now_us;
-        bench.round.round(now_us, 33, &mut bench.station, &mut bench.board, &Nothing);
+        bench.round.round(now_us, 33, &mut bench.station, &mut bench.board, &NOTHING);
         bench.board.order
     };
     quiet(&mut bench);

@@ -3,7 +3,7 @@ extern crate std;
 use std::collections::VecDeque;
 use std::vec::Vec;
 
-use super::super::mailboxes::tests::{Nothing, station};
+use super::super::mailboxes::tests::{NOTHING, station};
 use super::*;
 use crate::bus::Frame;
 use crate::leg::{FaultCode, JointStatus};
@@ -44,9 +44,9 @@ impl HostBoard<2> for Board {
 fn commanded() -> [JointCommand; 2] {
     let mut station = station();
     // Its boot-up message goes first.
-    assert!(station.poll(0, 0, &Nothing).is_some());
-    station.hear(&Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 6, 0, 0, 0]), 0, None, &Nothing);
-    assert!(station.poll(0, 0, &Nothing).is_some());
+    assert!(station.poll(0, 0, &NOTHING).is_some());
+    station.hear(&Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 6, 0, 0, 0]), 0, None, &NOTHING);
+    assert!(station.poll(0, 0, &NOTHING).is_some());
     let joint = JointStatus { drive: DriveState::SwitchOnDisabled, ..JointStatus::NONE };
     station.told(&LegTold { joints: [joint; 2], ..LegTold::NONE });
     station.order().commands.expect("a host")

@@ -4,30 +4,13 @@ use std::vec::Vec;
 
 use super::*;
 use crate::bus::drive::{AxisConstants, Mode};
+use crate::bus::identification::Found;
 use crate::bus::{Identity, NodeId};
-use crate::leg::{FoundBase, FoundFit, FoundParameter, Parameter, Plan, Verdict};
+use crate::leg::Plan;
 use crate::units::{Ampere, NewtonMetre};
 
 /// Nothing was identified.
-pub(in crate::operation) struct Nothing;
-
-impl Results for Nothing {
-    fn parameter(&self, _: usize, _: Parameter) -> Option<FoundParameter> {
-        None
-    }
-    fn base_parameter(&self, _: usize) -> Option<FoundBase> {
-        None
-    }
-    fn fit(&self, _: usize, _: usize) -> Option<FoundFit> {
-        None
-    }
-    fn verdict(&self) -> Option<Verdict> {
-        None
-    }
-    fn search(&self) -> [u32; 2] {
-        [0; 2]
-    }
-}
+pub(in crate::operation) const NOTHING: Found<2, 1> = Found::NOTHING;
 
 pub(in crate::operation) fn station() -> Station<2, 4> {
     let constants = AxisConstants {
@@ -110,18 +93,18 @@ impl Bench {
     }
 
     fn hear(&mut self, frame: &Frame) {
-        self.station.hear(frame, self.wire.now_us, None, &Nothing);
+        self.station.hear(frame, self.wire.now_us, None, &NOTHING);
     }
 
     fn set(&mut self, controller: Controller, unplugged: bool) {
         (self.controller, self.wire.unplugged) = (controller, unplugged);
-        self.station.on_controller(controller, &Nothing);
+        self.station.on_controller(controller, &NOTHING);
     }
 
     fn round(&mut self) {
         self.wire.now_us += ROUND_US;
         let now_us = self.wire.now_us;
-        self.speaker.speak(&mut self.wire, self.controller, now_us, &mut self.station, &Nothing);
+        self.speaker.speak(&mut self.wire, self.controller, now_us, &mut self.station, &NOTHING);
         self.wire.empty();
     }
 

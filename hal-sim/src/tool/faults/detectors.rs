@@ -25,7 +25,7 @@ pub struct DetectorReport {
     /// Of those, runs that another code tells in time without it.
     pub seen_by_others: usize,
     /// Of those, runs that cannot be judged without it: the fault did not last, or the joint did not move any more.
-    pub harmless_without: usize,
+    pub unjudged_without: usize,
 }
 
 fn forked(rows: &[Entry]) -> impl Iterator<Item = &'static Row> {
@@ -68,7 +68,7 @@ fn detector(code: FaultCode, rows: &[Entry], campaign: &Campaign) -> DetectorRep
         seen: 0,
         missed_without: 0,
         seen_by_others: 0,
-        harmless_without: 0,
+        unjudged_without: 0,
     };
     for row in forked(rows).filter(|row| row.codes.contains(&code)) {
         let of = |blind: Blind| {
@@ -90,7 +90,7 @@ fn detector(code: FaultCode, rows: &[Entry], campaign: &Campaign) -> DetectorRep
             report.seen += 1;
             match (without.detected, without.undetectable) {
                 (true, _) => report.seen_by_others += 1,
-                (_, true) => report.harmless_without += 1,
+                (_, true) => report.unjudged_without += 1,
                 _ => report.missed_without += 1,
             }
         }
@@ -108,9 +108,9 @@ impl DetectorReport {
     /// A line of it.
     #[must_use]
     pub fn told(&self) -> String {
-        let Self { code, seen, missed_without, seen_by_others, harmless_without, .. } = self;
+        let Self { code, seen, missed_without, seen_by_others, unjudged_without, .. } = self;
         format!(
-            "{code} ({}): told in {seen} runs; without it {missed_without} missed, {seen_by_others} seen by others, {harmless_without} not to be judged\n",
+            "{code} ({}): told in {seen} runs; without it {missed_without} missed, {seen_by_others} seen by others, {unjudged_without} not to be judged\n",
             self.faults.join(", ")
         )
     }

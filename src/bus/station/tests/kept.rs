@@ -124,15 +124,15 @@ fn a_host_is_not_missed_for_the_time_in_which_the_board_stood_still() {
     };
     let mut bench = Bench::new();
     bench.write(1, 0x1016, 1, 0x70 << 16 | 100, 4);
-    bench.station.watch(bench.now_us, &Nothing);
+    bench.station.watch(bench.now_us, &NOTHING);
     bench.send(0x770, &[5]);
     // A sector is erased, and what the host sends meanwhile is lost.
     bench.now_us += 2_000_000;
-    bench.station.watch(bench.now_us, &Nothing);
+    bench.station.watch(bench.now_us, &NOTHING);
     assert!(!is_missed(&bench.run(8)));
     let mut missed_after_ms = None;
     for ms in 0..200 {
-        bench.station.watch(bench.now_us, &Nothing);
+        bench.station.watch(bench.now_us, &NOTHING);
         if is_missed(&bench.run(4)) {
             missed_after_ms = Some(ms);
             break;
