@@ -133,8 +133,12 @@ def main():
         joint.write(0x6040, 0, 0x00, "<H")
     until("off", lambda: hip.state() == 0x40)
     # The model and everything that was set up, kept over the power.
+    hip.emergencies.clear()
     hip.write(0x1010, 1, int.from_bytes(b"save", "little"))
-    print("generation kept:", until("the generation", lambda: hip.read(0x2100, 7)))
+    until("how the store ended", lambda: hip.emergencies[-1:] in ([0x0000], [0x5530]))
+    assert hip.emergencies == [0xFF01, 0x0000], hip.emergencies
+    print("generation kept:", hip.read(0x2100, 7))
+    assert hip.read(0x2100, 7) > 0
     network.disconnect()
     print("identify: ok")
 

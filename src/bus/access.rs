@@ -6,7 +6,7 @@ use super::dictionary::{Access, Object, Row, Type, find};
 use super::objects::Objects;
 
 /// From here on the values are not the node's.
-const PROFILE: u16 = 0x2000;
+pub(super) const PROFILE: u16 = 0x2000;
 
 /// What 1010 and 1011 want to be written: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");

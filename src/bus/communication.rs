@@ -8,7 +8,7 @@ use super::heartbeat::{Clock, Consumer, WATCHED};
 use super::nmt::NmtState;
 use super::pdo::receive::Receive;
 use super::pdo::transmit::Transmit;
-use super::pdo::{PDOS, Parameters};
+use super::pdo::{ABSENT, PDOS, Parameters, is_assignable};
 
 /// What is mapped after the start: as host software for exoskeletons has it.
 const RECEIVED: [u32; PDOS] = [0x6040_0010, 0x607A_0020, 0x60FF_0020, 0x6071_0010];
@@ -137,8 +137,8 @@ impl Communication {
         match (index, sub) {
             (0x1003, _) => return self.emergency.forget(value),
             // Bit 30 would make this node the one that sends it.
-            (0x1005, _) if value & !0x7FF == 0 && value != 0 => self.sync = value,
-            (0x1014, _) if value & 0x7FFF_F800 == 0 => self.emergency.identifier = value,
+            (0x1005, _) if self.may_be_sync(value) => self.sync = value,
+            (0x1014, _) if self.may_be_emergency(value) => self.emergency.identifier = value,
             (0x1015, _) => self.emergency.inhibit = value as u16,
             (0x1016, 1..) => {
                 return self.consumers.get_mut(usize::from(sub) - 1).ok_or(Abort::NoSubindex)?.set(value);
@@ -147,6 +147,7 @@ impl Communication {
             (0x1019, _) if matches!(value, 0 | 2..=240) => self.sync_overflow = value as u8,
             (0x1029, _) if value <= 2 => self.on_error = value as u8,
             (0x1005 | 0x1014 | 0x1019 | 0x1029, _) => return Err(Abort::Range),
+            (0x1400..=0x14FF | 0x1800..=0x18FF, 1) if self.is_message(value) => return Err(Abort::Range),
             (0x1400..=0x16FF, _) => {
                 let receive = self.receive.get_mut(pdo).ok_or(Abort::NoObject)?;
                 receive.stop();
@@ -180,6 +181,30 @@ impl Communication {
             *to = *from;
         }
         Ok(text.len() as u32)
+    }
+
+    /// 1005 takes it: the standard's, or one that is a host's to give and nothing else here has.
+    fn may_be_sync(&self, value: u32) -> bool {
+        (value == 0x80 || is_assignable(value)) && value != self.emergency.identifier && !self.is_pdo(value)
+    }
+
+    /// 1014 takes it; with bit 31 there are no messages.
+    fn may_be_emergency(&self, value: u32) -> bool {
+        let number = value & !ABSENT;
+        let is_free = matches!(number, 0x81..=0xFF) || is_assignable(number);
+        is_free && (value & ABSENT != 0 || number != self.sync && !self.is_pdo(number))
+    }
+
+    /// A PDO that exists has this identifier.
+    fn is_pdo(&self, number: u32) -> bool {
+        let received = self.receive.iter().map(|pdo| &pdo.parameters);
+        let mut all = received.chain(self.transmit.iter().map(|pdo| &pdo.parameters));
+        all.any(|pdo| pdo.identifier().is_some_and(|own| u32::from(own) == number))
+    }
+
+    /// A PDO with this identifier would be a SYNC or an emergency message.
+    const fn is_message(&self, identifier: u32) -> bool {
+        identifier == self.sync || identifier == self.emergency.identifier
     }
 
     fn received(&self, pdo: usize) -> Result<&Parameters, Abort> {

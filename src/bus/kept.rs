@@ -9,9 +9,10 @@
 //! over, the others count.
 
 use super::abort::Abort;
-use super::access::Dictionary;
+use super::access::{Dictionary, PROFILE};
 use super::dictionary::{Access, Object, Row, find};
 use super::frame::NodeId;
+use super::nmt::Reset;
 use super::node::Node;
 use super::objects::Objects;
 use super::table::ROWS;
@@ -167,13 +168,15 @@ impl Node {
         Ok(())
     }
 
-    /// Takes back what was kept, after the start.
-    pub fn recall<O: Objects>(&mut self, bytes: &[u8], objects: &mut O) {
+    /// Takes back what was kept: after the start, or of what a reset had begin anew.
+    pub fn recall<O: Objects>(&mut self, bytes: &[u8], reset: Reset, objects: &mut O) {
         let node = self.id();
         let mut dictionary = Dictionary { communication: self.communication_mut(), objects };
         let mut write = |object: Object, value: u32| {
+            let is_anew = reset == Reset::Node || object.index < PROFILE;
             if let Ok(row) = dictionary.writable(object)
                 && is_kept(row)
+                && is_anew
             {
                 let _ = dictionary.write(object, value);
             }
@@ -209,7 +212,7 @@ impl Node {
     /// Takes back what was kept; the first object that did not take its value, if one did not. A node as after the start tells so whether a
     /// board would take it.
     pub fn try_recall<O: Objects>(&mut self, bytes: &[u8], objects: &mut O) -> Option<Object> {
-        self.recall(bytes, objects);
+        self.recall(bytes, Reset::Node, objects);
         let dictionary = Dictionary { communication: self.communication_mut(), objects };
         let differs = |object: Object, value: u32| {
             let size = find(object).ok().and_then(|row| row.kind.size()).unwrap_or(4);
@@ -266,7 +269,7 @@ mod tests {
         assert_eq!((kept_node_id(&bytes), kept_bit_rate(&bytes)), (NodeId::new(9), None));
         let mut other = Board::started(1);
         let [node, _] = &mut other.nodes;
-        node.recall(&bytes, &mut other.axes[0]);
+        node.recall(&bytes, Reset::Node, &mut other.axes[0]);
         for (index, sub, _, _) in compact {
             let expected = if index == 0x607A { Ok(0) } else { board.read(index, sub) };
             assert_eq!(other.read(index, sub), expected, "{index:x} {sub}");
@@ -286,13 +289,13 @@ mod tests {
                 .collect();
             let mut board = Board::started(1);
             let [node, _] = &mut board.nodes;
-            node.recall(&bytes, &mut board.axes[0]);
+            node.recall(&bytes, Reset::Node, &mut board.axes[0]);
             assert_eq!(board.read(0x6040, 0), Ok(0));
         }
         // The controlword is not taken back, whoever wrote it there.
         let mut board = Board::started(1);
         let [node, _] = &mut board.nodes;
-        node.recall(&[0x40, 0x60, 0, 2, 15, 0], &mut board.axes[0]);
+        node.recall(&[0x40, 0x60, 0, 2, 15, 0], Reset::Node, &mut board.axes[0]);
         assert_eq!(board.read(0x6040, 0), Ok(0));
     }
 

@@ -38,7 +38,7 @@ pub use communication::Identity;
 pub use emergency::ErrorReport;
 pub use frame::{Frame, NodeId};
 pub use kept::{KeptNode, LONGEST, kept_bit_rate, kept_entries, kept_node_id, kept_objects, write_kept};
-pub use nmt::NmtState;
+pub use nmt::{NmtState, Reset};
 pub use node::{Controller, Node, Storing};
 pub use objects::{Lost, Objects};
 

@@ -40,10 +40,17 @@ impl NmtState {
 pub enum Command {
     /// Go to a state.
     Go(NmtState),
-    /// Begin anew, application included.
-    ResetNode,
-    /// Begin anew with the communication's parameters.
-    ResetCommunication,
+    /// Begin anew.
+    Reset(Reset),
+}
+
+/// How much begins anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Reset {
+    /// The objects up to 1FFF, and the node's number.
+    Communication,
+    /// All objects.
+    Node,
 }
 
 /// The command in a frame's bytes, if it is one for this node.
@@ -57,8 +64,8 @@ pub fn command(data: &[u8], node: u8) -> Option<Command> {
         1 => Some(Command::Go(NmtState::Operational)),
         2 => Some(Command::Go(NmtState::Stopped)),
         128 => Some(Command::Go(NmtState::PreOperational)),
-        129 => Some(Command::ResetNode),
-        130 => Some(Command::ResetCommunication),
+        129 => Some(Command::Reset(Reset::Node)),
+        130 => Some(Command::Reset(Reset::Communication)),
         _ => None,
     }
 }

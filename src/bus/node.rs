@@ -17,7 +17,7 @@ use super::communication::{Communication, Identity};
 use super::emergency::{ErrorReport, Source};
 use super::frame::{Frame, NodeId};
 use super::heartbeat::Change;
-use super::nmt::{self, Command, NmtState};
+use super::nmt::{self, Command, NmtState, Reset};
 use super::objects::{Lost, Objects};
 use super::pdo::PDOS;
 use super::pdo::receive::Received;
@@ -36,6 +36,18 @@ pub enum Controller {
     Overrun,
 }
 
+impl Controller {
+    fn error(self) -> Option<ErrorReport> {
+        let code = match self {
+            Self::Active => return None,
+            Self::Overrun => 0x8110,
+            Self::Passive => 0x8120,
+            Self::Off => 0x8140,
+        };
+        Some(ErrorReport::code(code))
+    }
+}
+
 /// What becomes of what is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Storing {
@@ -45,6 +57,18 @@ pub enum Storing {
     Busy,
     /// What was to be kept was not.
     Failed,
+}
+
+impl Storing {
+    /// FF01 is the maker's own; 5530 is data storage.
+    fn error(self) -> Option<ErrorReport> {
+        let code = match self {
+            Self::Done => return None,
+            Self::Busy => 0xFF01,
+            Self::Failed => 0x5530,
+        };
+        Some(ErrorReport::code(code))
+    }
 }
 
 /// A node of the bus.
@@ -79,14 +103,15 @@ impl Node {
         self.communication.state
     }
 
-    /// A frame came. Whether it had the node begin anew: what was kept of it is then to be recalled.
-    pub fn on_frame<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) -> bool {
+    /// A frame came. What of the node it had begin anew, if it did: what was kept of that is then to be recalled.
+    pub fn on_frame<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) -> Option<Reset> {
         let node = self.communication.node;
         match frame.id() {
             nmt::COMMAND => {
-                if let Some(command) = nmt::command(frame.data(), node.number()) {
-                    self.obey(command, objects);
-                    return matches!(command, Command::ResetNode | Command::ResetCommunication);
+                let command = nmt::command(frame.data(), node.number())?;
+                self.obey(command, objects);
+                if let Command::Reset(reset) = command {
+                    return Some(reset);
                 }
             }
             id if u32::from(id) == self.communication.sync => self.synchronise(frame, objects),
@@ -105,7 +130,7 @@ impl Node {
             }
             id => self.receive(id, frame, now_us, objects),
         }
-        false
+        None
     }
 
     /// The next frame to be sent; again until there is none.
@@ -136,32 +161,33 @@ impl Node {
         Some(Frame::new(node.on(0x580), &answer))
     }
 
+    /// Whether a frame is this node's emergency or boot-up message.
+    pub(super) fn tells_once(&self, frame: &Frame) -> bool {
+        let Communication { node, emergency, .. } = &self.communication;
+        u32::from(frame.id()) == emergency.identifier
+            || frame.id() == node.on(nmt::HEARTBEAT) && frame.data() == [0]
+    }
+
     /// What the controller tells: once on every change.
     pub fn on_controller<O: Objects>(&mut self, told: Controller, objects: &mut O) {
-        let code = match told {
-            Controller::Active => None,
-            Controller::Overrun => Some(0x8110),
-            Controller::Passive => Some(0x8120),
-            Controller::Off => Some(0x8140),
-        };
         match told {
             Controller::Active => {}
             Controller::Passive => objects.lost(Lost::Bus(false)),
             // A frame that was lost may have been the one that stops.
             Controller::Off | Controller::Overrun => objects.lost(Lost::Bus(true)),
         }
-        self.communication.emergency.set(Source::Controller, code.map(ErrorReport::code));
+        self.communication.emergency.set(Source::Controller, told.error());
     }
 
     /// What the store tells: once on every change.
     pub fn on_store(&mut self, storing: Storing) {
-        // FF01 is the maker's own; 5530 is data storage.
-        let code = match storing {
-            Storing::Done => None,
-            Storing::Busy => Some(0xFF01),
-            Storing::Failed => Some(0x5530),
-        };
-        self.communication.emergency.set(Source::Store, code.map(ErrorReport::code));
+        self.communication.emergency.set(Source::Store, storing.error());
+    }
+
+    /// After a reset: what the board has told goes on, and hosts are told again.
+    pub(super) fn goes_on(&mut self, controller: Controller, storing: Storing) {
+        self.communication.emergency.set(Source::Controller, controller.error());
+        self.on_store(storing);
     }
 
     fn obey<O: Objects>(&mut self, command: Command, objects: &mut O) {
@@ -183,9 +209,9 @@ impl Node {
                     transmit.restart();
                 }
             }
-            Command::ResetNode | Command::ResetCommunication => {
+            Command::Reset(reset) => {
                 objects.lost(Lost::Reset);
-                if command == Command::ResetNode {
+                if reset == Reset::Node {
                     objects.reset();
                 }
                 *self = Self::new(node, identity);
@@ -298,6 +324,7 @@ impl Node {
     pub fn stood_still(&mut self, us: u64) {
         self.communication.consumers.iter_mut().for_each(|consumer| consumer.wait(us));
         self.communication.receive.iter_mut().for_each(|pdo| pdo.wait(us));
+        self.server.wait(us);
     }
 
     fn watch<O: Objects>(&mut self, consumer: u8, change: Option<Change>, objects: &mut O) {

@@ -22,6 +22,7 @@ use super::drive::{Axis, AxisConstants, BLOCKED, Coupling, HELD};
 use super::frame::{Frame, NodeId};
 use super::identification::{Ask, JointObjects, LegObjects, Results};
 use super::kept::{KeptNode, kept_bit_rate, kept_node_id};
+use super::nmt::Reset;
 use super::node::{Controller, Node, Storing};
 use crate::leg::{
     Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, Permission, Plan, PowerRequest,
@@ -113,12 +114,14 @@ pub struct Station<const N: usize, const LOG: usize> {
     /// A request that could only be refused was not passed on.
     refused: bool,
     request: Option<LegRequest>,
-    /// The controller left the bus.
-    off: bool,
+    /// What the controller told last that goes on.
+    controller: Controller,
+    /// Where the store stands.
+    storing: Storing,
     /// When the bus was looked at last.
     looked_us: u64,
-    /// Of each node: it was reset, and what was kept of it is to be recalled.
-    anew: [bool; N],
+    /// Of each node: what of it was reset; what was kept of that is to be recalled.
+    anew: [Option<Reset>; N],
 }
 
 impl<const N: usize, const LOG: usize> Station<N, LOG> {
@@ -142,9 +145,10 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
             hosted: false,
             refused: false,
             request: None,
-            off: false,
+            controller: Controller::Active,
+            storing: Storing::Done,
             looked_us: 0,
-            anew: [false; N],
+            anew: [None; N],
         }
     }
 
@@ -153,27 +157,45 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         if let Some(kept) = self.kept.get_mut(joint) {
             *kept = KeptNode::of(bytes);
         }
-        self.restart(joint);
+        // The number of one may free another's.
+        self.anew = [Some(Reset::Node); N];
+        self.recall_reset();
     }
 
-    /// A node begins anew, with what was kept of it.
-    fn restart(&mut self, joint: usize) {
-        let (Some(node), Some(axis), Some(kept), Some(own)) =
-            (self.nodes.get_mut(joint), self.axes.get_mut(joint), self.kept.get(joint), self.own.get(joint))
-        else {
-            return;
-        };
-        *node = Node::new(kept_node_id(kept.bytes()).unwrap_or(*own), self.identity);
-        node.recall(kept.bytes(), axis);
-    }
-
-    /// Nodes that were reset begin anew.
-    fn recall_reset(&mut self) {
-        for joint in 0..N {
-            if self.anew.get_mut(joint).is_some_and(core::mem::take) {
-                self.restart(joint);
-            }
+    /// The nodes' numbers with these objects; none where two would have the same.
+    fn numbers(&self, kept: &[KeptNode; N]) -> Option<[NodeId; N]> {
+        let mut numbers = self.own;
+        for (number, kept) in numbers.iter_mut().zip(kept) {
+            *number = kept_node_id(kept.bytes()).unwrap_or(*number);
         }
+        let is_other = |place: usize, number| numbers.iter().skip(place + 1).all(|other| other != number);
+        numbers.iter().enumerate().all(|(place, number)| is_other(place, number)).then_some(numbers)
+    }
+
+    /// Nodes that were reset begin anew, with what was kept of them.
+    fn recall_reset(&mut self) {
+        if self.anew.iter().all(Option::is_none) {
+            return;
+        }
+        let numbers = self.numbers(&self.kept).unwrap_or(self.own);
+        for (joint, number) in numbers.into_iter().enumerate() {
+            let Some(reset) = self.anew.get_mut(joint).and_then(Option::take) else { continue };
+            let (Some(node), Some(axis), Some(kept)) =
+                (self.nodes.get_mut(joint), self.axes.get_mut(joint), self.kept.get(joint))
+            else {
+                continue;
+            };
+            *node = Node::new(number, self.identity);
+            node.recall(kept.bytes(), reset, axis);
+            node.goes_on(self.controller, self.storing);
+            self.share_bit_rate(joint);
+        }
+    }
+
+    /// The leg has one controller: what a host set at one node holds for all.
+    fn share_bit_rate(&mut self, joint: usize) {
+        let Some(rate) = self.axes.get(joint).map(Axis::bit_rate) else { return };
+        self.axes.iter_mut().for_each(|axis| axis.set_bit_rate(rate));
     }
 
     /// A frame on the bus, for every node but the one that sent it. What was kept of one that it resets
@@ -181,9 +203,11 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     pub fn hear<R: Results>(&mut self, frame: &Frame, now_us: u64, sender: Option<usize>, results: &R) {
         self.look_back(now_us);
         for joint in (0..N).filter(|joint| Some(*joint) != sender) {
-            let begins = self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects));
-            if let (Some(true), Some(anew)) = (begins, self.anew.get_mut(joint)) {
-                *anew = true;
+            let begins =
+                self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects)).flatten();
+            self.share_bit_rate(joint);
+            if let Some(anew) = self.anew.get_mut(joint) {
+                *anew = begins.max(*anew);
             }
         }
     }
@@ -192,10 +216,16 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     /// then would leave when it is back, and be old.
     pub fn poll<R: Results>(&mut self, joint: usize, now_us: u64, results: &R) -> Option<Frame> {
         self.recall_reset();
-        if self.off {
+        if self.controller == Controller::Off {
             return None;
         }
         self.with(joint, results, |node, objects| node.poll(now_us, objects))?
+    }
+
+    /// Whether a frame is one of a node's that it tells once: an emergency or boot-up message.
+    #[must_use]
+    pub fn tells_once(&self, frame: &Frame) -> bool {
+        self.nodes.iter().any(|node| node.tells_once(frame))
     }
 
     /// A board that stood still heard nobody meanwhile.
@@ -219,7 +249,9 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
 
     /// What the controller tells: once on every change.
     pub fn on_controller<R: Results>(&mut self, told: Controller, results: &R) {
-        self.off = told == Controller::Off;
+        if told != Controller::Overrun {
+            self.controller = told;
+        }
         for joint in 0..N {
             self.with(joint, results, |node, objects| node.on_controller(told, objects));
         }
@@ -295,20 +327,21 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         self.leg.log.push(logged);
     }
 
-    /// What a host wants kept, once, and each node's objects for the store: until [`Self::stored`] says so nothing of it counts. More than
-    /// fits is not kept, and hosts are told (5530).
+    /// What a host wants kept, once, and each node's objects for the store: until [`Self::stored`] says so nothing of it counts. Neither more
+    /// than fits nor one number for two nodes is kept, and hosts are told (FF01, then 5530).
     pub fn take_store(&mut self, into: &mut [KeptNode; N]) -> Option<Keeping> {
         self.recall_reset();
         let defaults = self.leg.take_store()?;
         let mut fits = true;
-        for ((node, axis), kept) in self.nodes.iter_mut().zip(&mut self.axes).zip(into) {
+        for ((node, axis), kept) in self.nodes.iter_mut().zip(&mut self.axes).zip(into.iter_mut()) {
             *kept = KeptNode::NOTHING;
             if !defaults {
                 fits &= node.keep_into(axis, kept).is_ok();
             }
         }
-        if !fits {
-            // All of it or nothing.
+        if !fits || self.numbers(into).is_none() {
+            // All of it or nothing; and told again after one that failed before.
+            self.storing(Storing::Busy);
             self.storing(Storing::Failed);
             return None;
         }
@@ -326,6 +359,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
 
     /// Where the store stands: hosts are told by an emergency message.
     pub fn storing(&mut self, storing: Storing) {
+        self.storing = storing;
         self.nodes.iter_mut().for_each(|node| node.on_store(storing));
     }
 

@@ -64,6 +64,8 @@ pub trait BusBoard<const N: usize>: Mailboxes {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BusRound {
     controller: Controller,
+    /// The same, but for a frame that was lost in it.
+    lasting: Controller,
     /// The leg has not been told of what came since.
     due: bool,
     speaker: Speaker,
@@ -73,7 +75,12 @@ impl BusRound {
     /// Nothing heard yet.
     #[must_use]
     pub const fn new() -> Self {
-        Self { controller: Controller::Active, due: false, speaker: Speaker::new() }
+        Self {
+            controller: Controller::Active,
+            lasting: Controller::Active,
+            due: false,
+            speaker: Speaker::new(),
+        }
     }
 
     /// One round; of the frames that came at most `frames`.
@@ -90,6 +97,9 @@ impl BusRound {
             self.controller = status;
             station.on_controller(status, results);
             self.due = true;
+        }
+        if status != Controller::Overrun {
+            self.lasting = status;
         }
         for _ in 0..frames {
             let Some(frame) = board.frame() else { break };
@@ -112,7 +122,7 @@ impl BusRound {
             board.order(station.order());
             self.due = false;
         }
-        self.speaker.speak(board, self.controller, now_us, station, results);
+        self.speaker.speak(board, self.lasting, now_us, station, results);
     }
 
     fn keep<const N: usize, const LOG: usize>(station: &mut Station<N, LOG>, board: &mut impl BusBoard<N>) {

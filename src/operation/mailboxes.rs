@@ -5,10 +5,12 @@
 //!
 //! ```text
 //! active    as many frames as there is room for, of each node in turn
-//! passive   one at a time; what waits for longer than 10 ms is given up and a newer one takes its place. Emergency and boot-up messages, which
-//!           are told once, are given again instead
+//! passive   one at a time; what waits for longer than 10 ms is given up and a newer one takes its place
 //! off       what waits is given up as long as it lasts, and no node has a frame (`Station::poll`)
 //! ```
+//!
+//! Emergency and boot-up messages are told once: those that were given up are the first to be given again, whoever gave them and when. One
+//! that leaves in the very moment in which it is given up is told twice.
 
 use crate::bus::identification::Results;
 use crate::bus::station::Station;
@@ -18,14 +20,15 @@ use crate::bus::{Controller, Frame};
 /// cycle of 10 ms has newer ones by then.
 const PATIENCE_US: u64 = 10_000;
 
+/// Of a controller.
+const MAILBOXES: usize = 3;
+
 /// Where the controller keeps frames until they leave.
 pub trait Mailboxes {
-    /// One is empty.
-    fn has_room(&self) -> bool;
-    /// All are.
-    fn is_empty(&self) -> bool;
-    /// Into one of them.
-    fn send(&mut self, frame: &Frame);
+    /// In which of the three a frame waits, a bit each.
+    fn waiting(&self) -> u32;
+    /// Into an empty one.
+    fn send(&mut self, mailbox: u32, frame: &Frame);
     /// What has not left does not leave any more; they are empty soon.
     fn give_up(&mut self);
 }
@@ -37,25 +40,20 @@ pub struct Speaker {
     first: usize,
     /// Passive; and since when what is in the mailboxes waits there.
     since_us: Option<u64>,
-    /// The frame that a passive controller has.
-    given: Option<Frame>,
-    /// One that was given up and is to be told all the same.
-    again: Option<Frame>,
-}
-
-/// Emergency messages, and that of a node's start.
-fn is_told_once(frame: &Frame) -> bool {
-    matches!(frame.id(), 0x081..=0x0FF) || matches!((frame.id(), frame.data()), (0x701..=0x77F, [0]))
+    /// Of each mailbox, what is told once.
+    given: [Option<Frame>; MAILBOXES],
+    /// What was given up and is to be told all the same.
+    again: [Option<Frame>; MAILBOXES],
 }
 
 impl Speaker {
     /// Nobody has spoken.
     #[must_use]
     pub const fn new() -> Self {
-        Self { first: 0, since_us: None, given: None, again: None }
+        Self { first: 0, since_us: None, given: [None; MAILBOXES], again: [None; MAILBOXES] }
     }
 
-    /// What leaves in this round.
+    /// What leaves in this round, of a controller in a state that lasts.
     pub fn speak<R: Results, const N: usize, const LOG: usize>(
         &mut self,
         mailboxes: &mut impl Mailboxes,
@@ -64,48 +62,55 @@ impl Speaker {
         station: &mut Station<N, LOG>,
         results: &R,
     ) {
-        let mut next = || Self::next(&mut self.again, &mut self.first, now_us, station, results);
-        if controller != Controller::Passive {
-            (self.since_us, self.given) = (None, None);
-            if controller == Controller::Off {
-                mailboxes.give_up();
-                return;
-            }
-            while mailboxes.has_room()
-                && let Some(frame) = next()
-            {
-                mailboxes.send(&frame);
+        let waiting = mailboxes.waiting();
+        let waits = |place: usize| waiting & 1 << place != 0;
+        for (place, given) in self.given.iter_mut().enumerate() {
+            // What has left.
+            given.take_if(|_| !waits(place));
+        }
+        let is_passive = controller == Controller::Passive;
+        let since_us = *self.since_us.get_or_insert(now_us);
+        if !is_passive || waiting == 0 {
+            self.since_us = None;
+        }
+        let is_old = is_passive && waiting != 0 && now_us.saturating_sub(since_us) > PATIENCE_US;
+        if controller == Controller::Off || is_old {
+            mailboxes.give_up();
+            self.since_us = None;
+            for given in &mut self.given {
+                if let Some(free) = self.again.iter_mut().find(|again| again.is_none()) {
+                    *free = given.take();
+                }
             }
             return;
         }
-        let since_us = *self.since_us.get_or_insert(now_us);
-        if mailboxes.is_empty() {
-            // What was given has left.
-            (self.since_us, self.given) = (Some(now_us), next());
-            if let Some(frame) = &self.given {
-                mailboxes.send(frame);
+        let places = match controller {
+            Controller::Passive if waiting != 0 => 0,
+            Controller::Passive => 1,
+            _ => MAILBOXES,
+        };
+        for place in (0..places).filter(|place| !waits(*place)) {
+            let Some(frame) = self.next(now_us, station, results) else { break };
+            mailboxes.send(place as u32, &frame);
+            if let Some(given) = self.given.get_mut(place) {
+                *given = Some(frame).filter(|frame| station.tells_once(frame));
             }
-        } else if now_us.saturating_sub(since_us) > PATIENCE_US {
-            mailboxes.give_up();
-            self.since_us = Some(now_us);
-            self.again = self.given.take().filter(is_told_once);
         }
     }
 
     /// The next frame, of each node in turn; the others hear it, since the controller does not hear itself.
     fn next<R: Results, const N: usize, const LOG: usize>(
-        again: &mut Option<Frame>,
-        first: &mut usize,
+        &mut self,
         now_us: u64,
         station: &mut Station<N, LOG>,
         results: &R,
     ) -> Option<Frame> {
-        if again.is_some() {
-            return again.take();
+        if let Some(again) = self.again.iter_mut().find_map(Option::take) {
+            return Some(again);
         }
         for _ in 0..N {
-            let joint = *first;
-            *first = (joint + 1) % N;
+            let joint = self.first;
+            self.first = (joint + 1) % N;
             if let Some(frame) = station.poll(joint, now_us, results) {
                 station.hear(&frame, now_us, Some(joint), results);
                 return Some(frame);

@@ -13,17 +13,19 @@
 //! interlock       let go a millisecond later, when both current loops have ticked again
 //! ```
 //!
+//! Each wait is one of whole milliseconds: a step is taken in every one of them, and none waits itself.
+//!
 //! Where motors brake themselves, or anything else forbids to enable, nothing is written: it would let them go.
 
 use crate::leg::Permission;
 use crate::safety::Cause;
 
 /// For the hosts to be told, ms: two messages of 135 bits at 125 kbit/s and what stands before them.
-const ANNOUNCED_MS: u64 = 20;
+const ANNOUNCED_MS: u32 = 20;
 /// For the watchdog to take another time, ms: six cycles of its oscillator (17 kHz at the slowest) behind a divider of 256 take 91.
 const PATIENCE_MS: u32 = 200;
 
-/// What a change of the flash needs of a board. But for the waits every method answers at once.
+/// What a change of the flash needs of a board. Every method answers at once.
 pub trait StoringBoard {
     /// What the drive may do.
     fn permission(&self) -> Permission;
@@ -37,13 +39,28 @@ pub trait StoringBoard {
     fn stretch(&mut self) -> bool;
     /// Asks the watchdog for its usual time; whether it has that now.
     fn tighten(&mut self) -> bool;
-    /// Everybody else has the time.
-    fn wait_ms(&mut self, milliseconds: u64) -> impl Future<Output = ()>;
 }
 
-/// What is known between two changes.
+/// How far a change has come, and for how many milliseconds more that is waited for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Stage {
+    /// None is under way.
+    #[default]
+    Idle,
+    /// Hosts are told.
+    Announced(u32),
+    /// The watchdog is to have its longer time.
+    Stretches(u32),
+    /// It is to have its usual time; whether the flash was changed.
+    Tightens(u32, bool),
+    /// The interlock is let go next.
+    Settles(bool),
+}
+
+/// What is known between two steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Storing {
+    stage: Stage,
     /// The watchdog has not taken its usual time again.
     loose: bool,
 }
@@ -52,31 +69,49 @@ impl Storing {
     /// Nothing changed yet.
     #[must_use]
     pub const fn new() -> Self {
-        Self { loose: false }
+        Self { stage: Stage::Idle, loose: false }
     }
 
-    /// The whole way; whether `change` was done and said so.
-    pub async fn change(&mut self, board: &mut impl StoringBoard, change: impl FnOnce() -> bool) -> bool {
-        if self.loose || board.permission() != Permission::Released || board.causes() != 0 {
-            return false;
-        }
-        board.raise(Cause::Storing);
-        board.wait_ms(ANNOUNCED_MS).await;
-        // Who was on when the interlock came is released by now, and may still be damping.
-        let is_off = board.permission() == Permission::Released && board.causes() == Cause::Storing.bit();
-        let mut changed = false;
-        if is_off {
-            self.loose = true;
-            changed = takes(board, |board| board.stretch()).await && change();
-            self.loose = !takes(board, |board| board.tighten()).await;
-            self.forbid_while_loose(board);
-        }
-        board.wait_ms(1).await;
-        board.stored();
-        changed
+    /// One step of a change, to be taken every millisecond until it has ended; whether `change`, which is called at most once, was done
+    /// and said so.
+    pub fn step(&mut self, board: &mut impl StoringBoard, change: impl FnOnce() -> bool) -> Option<bool> {
+        let is_off = |board: &_, causes| {
+            StoringBoard::permission(board) == Permission::Released && StoringBoard::causes(board) == causes
+        };
+        self.stage = match self.stage {
+            Stage::Idle if self.loose || !is_off(board, 0) => return Some(false),
+            Stage::Idle => {
+                board.raise(Cause::Storing);
+                Stage::Announced(ANNOUNCED_MS - 1)
+            }
+            Stage::Announced(left @ 1..) => Stage::Announced(left - 1),
+            // Who was on when the interlock came is released by now, and may still be damping.
+            Stage::Announced(0) if !is_off(board, Cause::Storing.bit()) => Stage::Settles(false),
+            Stage::Announced(0) => {
+                self.loose = true;
+                Stage::Stretches(PATIENCE_MS)
+            }
+            Stage::Stretches(_) if board.stretch() => Stage::Tightens(PATIENCE_MS, change()),
+            Stage::Stretches(0) => Stage::Tightens(PATIENCE_MS, false),
+            Stage::Stretches(left) => Stage::Stretches(left - 1),
+            Stage::Tightens(left, changed) => {
+                self.loose = !board.tighten();
+                match left.checked_sub(1) {
+                    Some(left) if self.loose => Stage::Tightens(left, changed),
+                    _ => Stage::Settles(changed),
+                }
+            }
+            Stage::Settles(changed) => {
+                self.forbid_while_loose(board);
+                board.stored();
+                self.stage = Stage::Idle;
+                return Some(changed);
+            }
+        };
+        None
     }
 
-    /// To be called again and again: a watchdog that did not take its usual time is asked once more.
+    /// To be called again and again while no change is under way: a watchdog that did not take its usual time is asked once more.
     pub fn look_after(&mut self, board: &mut impl StoringBoard) {
         self.loose = self.loose && !board.tighten();
         self.forbid_while_loose(board);
@@ -87,17 +122,6 @@ impl Storing {
             board.raise(Cause::Watchdog);
         }
     }
-}
-
-/// Asks the watchdog until it has what it is asked for, or is not waited for any longer.
-async fn takes<B: StoringBoard>(board: &mut B, ask: impl Fn(&mut B) -> bool) -> bool {
-    for _ in 0..PATIENCE_MS {
-        if ask(board) {
-            return true;
-        }
-        board.wait_ms(1).await;
-    }
-    false
 }
 
 #[cfg(test)]

@@ -52,12 +52,10 @@ pub fn is_hosted() -> bool {
 pub struct Wire {
     /// Since the start.
     pub now_us: fn() -> u64,
-    /// A frame may be given.
-    pub has_room: fn() -> bool,
-    /// None waits.
-    pub is_empty: fn() -> bool,
-    /// Gives one.
-    pub send: fn(&Frame),
+    /// Mailboxes in which a frame waits, a bit each.
+    pub waiting: fn() -> u32,
+    /// Gives one into a mailbox.
+    pub send: fn(u32, &Frame),
     /// What was given and not sent is not sent any more.
     pub give_up: fn(),
     /// How it does.
@@ -201,16 +199,12 @@ impl ThreadEnd {
 }
 
 impl Mailboxes for Ports {
-    fn has_room(&self) -> bool {
-        (self.wire.has_room)()
+    fn waiting(&self) -> u32 {
+        (self.wire.waiting)()
     }
 
-    fn is_empty(&self) -> bool {
-        (self.wire.is_empty)()
-    }
-
-    fn send(&mut self, frame: &Frame) {
-        (self.wire.send)(frame);
+    fn send(&mut self, mailbox: u32, frame: &Frame) {
+        (self.wire.send)(mailbox, frame);
     }
 
     fn give_up(&mut self) {

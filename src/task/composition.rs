@@ -130,8 +130,7 @@ const NODES: [NodeId; JOINTS] = match (NodeId::new(1), NodeId::new(2)) {
 
 const WIRE: bus::Wire = bus::Wire {
     now_us: || embassy_time::Instant::now().as_micros(),
-    has_room: can::has_room,
-    is_empty: can::is_silent,
+    waiting: can::waiting,
     send: can::send,
     give_up: can::give_up,
     status: can::status,

@@ -25,6 +25,9 @@ use crate::store::{self, Permit, Store};
 /// Looks for something to do so often, ms.
 const ROUND_MS: u64 = 10;
 
+/// A change of the flash takes a step so often, ms.
+const STEP_MS: u64 = 1;
+
 /// Everything was forgotten, and the housekeeping does not know it yet.
 static FORGOTTEN: AtomicBool = AtomicBool::new(false);
 
@@ -89,8 +92,9 @@ fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep) -> Option<
     let permit = Permit::under(servo::permission())?;
     keep.generation = match keep.what {
         Keeping::Defaults => {
+            let generation = at_once(keeper.forget(&permit))??;
             FORGOTTEN.store(true, Ordering::Relaxed);
-            at_once(keeper.forget(&permit))??
+            generation
         }
         Keeping::All => {
             let objects = keep.objects.each_ref().map(KeptNode::bytes);
@@ -127,10 +131,6 @@ impl StoringBoard for Ports {
     fn tighten(&mut self) -> bool {
         watchdog::tighten()
     }
-
-    fn wait_ms(&mut self, milliseconds: u64) -> impl Future<Output = ()> {
-        Timer::after_millis(milliseconds)
-    }
 }
 
 /// Runs for ever.
@@ -148,7 +148,12 @@ pub async fn run(keeper: &'static mut Keeper) -> ! {
             keeper.calibrated(axis, calibration);
         }
         let Some(keep) = end.keep.dequeue() else { continue };
-        keep.done = storing.change(&mut Ports, || change(keeper, keep).is_some()).await;
+        keep.done = loop {
+            match storing.step(&mut Ports, || change(keeper, keep).is_some()) {
+                Some(done) => break done,
+                None => Timer::after_millis(STEP_MS).await,
+            }
+        };
         let _ = end.kept.enqueue(keep);
     }
 }

@@ -256,6 +256,7 @@ fn what_is_stored_is_there_after_a_reset_of_the_node_and_its_number_is_the_new_o
     bus.write(1, 0x6065, 0, 12_345, 4);
     bus.write(2, 0x2001, 0, 20, 1);
     bus.write(1, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
+    bus.run(200);
     bus.write(1, 0x6065, 0, 1, 4);
     bus.sent.clear();
     bus.network.send(Frame::new(0, &[129, 0]));
@@ -281,7 +282,24 @@ fn what_is_stored_is_there_after_a_reset_of_the_node_and_its_number_is_the_new_o
     };
     assert_eq!((read(&mut bus, 1, 0x6065), read(&mut bus, 20, 0x6065)), (12_345, 87_266));
     // Forgotten.
+    bus.sent.clear();
     bus.write(1, 0x1011, 1, u32::from_le_bytes(*b"load"), 4);
+    // Two sectors, a second each. The other leg goes on, and what else is sent to the one that stands is lost.
+    bus.run(2000);
+    for _ in 0..5 {
+        bus.network.send(Frame::new(0x601, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]));
+        bus.run(200);
+    }
+    bus.run(6000);
+    let codes = |bus: &Bus, id: u16| -> Vec<u16> {
+        let told = bus.sent.iter().filter(|sent| sent.frame.id() == id);
+        told.map(|sent| u16::from_le_bytes([sent.frame.data()[0], sent.frame.data()[1]])).collect()
+    };
+    assert_eq!(codes(&bus, 0x81), [0xFF01, 0x8110, 0, 0]);
+    assert!(codes(&bus, 0x83).is_empty());
+    let answers = bus.sent.iter().filter(|sent| sent.frame.id() == 0x581).count();
+    // The request to forget, and the last of the three that waited: they come at once, and a server answers one.
+    assert_eq!(answers, 2);
     bus.network.send(Frame::new(0, &[129, 0]));
     bus.run(20);
     assert_eq!((read(&mut bus, 1, 0x6065), read(&mut bus, 2, 0x6065)), (87_266, 87_266));

@@ -25,15 +25,14 @@ use crate::bus::{Controller, Frame};
 /// Longest wait for the controller to be set up: it ends what it receives, at most a frame of the slowest bus, 1.1 ms.
 const PATIENCE: u32 = 100_000;
 
-/// Transmit requests that were answered (RQCP), mailboxes that are empty (TME), and what gives a mailbox up (ABRQ).
+/// Transmit requests that were answered (RQCP), the first bit of the mailboxes that are empty (TME), and what gives a mailbox up (ABRQ).
 const ANSWERED: u32 = 1 | 1 << 8 | 1 << 16;
-const EMPTY: u32 = 1 << 26;
+const EMPTY: u32 = 26;
 const GIVE_UP: u32 = 1 << 7 | 1 << 15 | 1 << 23;
 /// Of the receiving queue: frames in it, one was lost, let the oldest go.
 const PENDING: u32 = 0b11;
 const OVERRUN: u32 = 1 << 4;
 const RELEASE: u32 = 1 << 5;
-const MAILBOXES: u32 = 3;
 
 static LOST: AtomicBool = AtomicBool::new(false);
 static TAKES_PART: AtomicBool = AtomicBool::new(false);
@@ -75,16 +74,14 @@ pub fn receive() -> Option<Frame> {
     Some(Frame::new((identifier >> 21) as u16, data.get(..length).unwrap_or(&data)))
 }
 
-/// A mailbox is empty.
-pub fn has_room() -> bool {
-    load(TSR) & (EMPTY | EMPTY << 1 | EMPTY << 2) != 0
+/// Mailboxes in which a frame waits to be sent, a bit each.
+pub fn waiting() -> u32 {
+    !(load(TSR) >> EMPTY) & 0b111
 }
 
-/// Gives a frame to the controller; without room it is dropped.
-pub fn send(frame: &Frame) {
-    let status = load(TSR);
-    let Some(free) = (0..MAILBOXES).find(|place| status & EMPTY << place != 0) else { return };
-    let mailbox = MAILBOX + 0x10 * free;
+/// Gives a frame into an empty mailbox.
+pub fn send(mailbox: u32, frame: &Frame) {
+    let mailbox = MAILBOX + 0x10 * mailbox;
     let mut bytes = [0; 8];
     for (to, from) in bytes.iter_mut().zip(frame.data()) {
         *to = *from;
@@ -100,11 +97,6 @@ pub fn send(frame: &Frame) {
 /// What waits in the mailboxes is not sent any more: what a bus that was off for seconds would be told first is old.
 pub fn give_up() {
     store(TSR, GIVE_UP);
-}
-
-/// No frame waits to be sent.
-pub fn is_silent() -> bool {
-    load(TSR) >> 26 & 0b111 == 0b111
 }
 
 /// How the controller does; an overrun is told once. One that did not answer at the start is off the bus.

@@ -165,6 +165,17 @@ impl Axis {
         self.status = *status;
     }
 
+    /// Object 2002.
+    #[must_use]
+    pub const fn bit_rate(&self) -> u16 {
+        self.settings.bit_rate
+    }
+
+    /// The same, as set at another node of the board.
+    pub const fn set_bit_rate(&mut self, kbit_per_s: u16) {
+        self.settings.bit_rate = kbit_per_s;
+    }
+
     /// Where the leg's drive stands.
     #[must_use]
     pub const fn drive(&self) -> DriveState {

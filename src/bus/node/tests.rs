@@ -1,7 +1,7 @@
 extern crate std;
 
-use super::super::Frame;
 use super::super::tests::{Board, axis};
+use super::super::{Abort, Frame};
 use super::*;
 
 fn started() -> Board {
@@ -20,13 +20,43 @@ fn a_node_boots_once_and_again_after_each_reset() {
     assert_eq!(board.nodes[0].state(), NmtState::PreOperational);
     for reset in [129, 130] {
         assert_eq!(board.write(0x6065, 0, 5, 4), Ok(()));
-        assert_eq!(board.write(0x1005, 0, 0x81, 4), Ok(()));
+        assert_eq!(board.write(0x1005, 0, 0x1FF, 4), Ok(()));
         board.hear(0, &[reset, 3]);
         assert_eq!(board.frames(), [boot[0]]);
         // The reset of the communication leaves what is not the communication's.
         let kept = if reset == 130 { 5 } else { 87_266 };
         assert_eq!((board.read(0x6065, 0), board.read(0x1005, 0)), (Ok(kept), Ok(0x80)));
     }
+}
+
+#[test]
+fn sync_and_emergency_take_no_identifier_that_would_lock_somebody_out() {
+    let mut board = started();
+    let range = Err(Abort::Range as u32);
+    // CiA 301's restricted identifiers, beyond eleven bits, SYNC producer, and what other messages have.
+    let restricted =
+        [0, 1, 0x7F, 0x101, 0x180, 0x580, 0x581, 0x5FF, 0x601, 0x67F, 0x6E0, 0x701, 0x77F, 0x7FF, 0x800];
+    let extended = [0x2000_0300, 0x4000_0300];
+    for identifier in restricted.into_iter().chain(extended).chain([0x181, 0x201, 0x481, 0x501]) {
+        assert_eq!(board.write(0x1005, 0, identifier, 4), range, "{identifier:x}");
+        assert_eq!(board.write(0x1014, 0, identifier, 4), range, "{identifier:x}");
+    }
+    assert_eq!((board.write(0x1005, 0, 0x81, 4), board.write(0x1014, 0, 0x80, 4)), (range, range));
+    assert_eq!(board.write(0x1014, 0, 1 << 31 | 0x601, 4), range);
+    // Neither of the two takes the other's, nor a PDO one of theirs.
+    assert_eq!((board.write(0x1005, 0, 0x300, 4), board.write(0x1014, 0, 0x300, 4)), (Ok(()), range));
+    assert_eq!((board.write(0x1014, 0, 0x310, 4), board.write(0x1005, 0, 0x310, 4)), (Ok(()), range));
+    for pdo in [0x1400, 0x1800] {
+        assert_eq!(board.write(pdo, 1, 1 << 31, 4), Ok(()));
+        assert_eq!((board.write(pdo, 1, 0x300, 4), board.write(pdo, 1, 0x310, 4)), (range, range));
+    }
+    // A PDO that is switched off gives its own back, and so does a message that is not.
+    assert_eq!(
+        (board.write(0x1005, 0, 0x201, 4), board.write(0x1014, 0, 1 << 31 | 0x310, 4)),
+        (Ok(()), Ok(()))
+    );
+    assert_eq!(board.write(0x1800, 1, 0x310, 4), Ok(()));
+    assert_eq!((board.write(0x1005, 0, 0x80, 4), board.write(0x1014, 0, 0x81, 4)), (Ok(()), Ok(())));
 }
 
 #[test]

@@ -25,8 +25,15 @@ pub const PDOS: usize = 4;
 /// Objects in one PDO.
 pub const MAPPED: usize = 8;
 
-const ABSENT: u32 = 1 << 31;
+/// Of an identifier: there is no such message.
+pub(super) const ABSENT: u32 = 1 << 31;
 const EXTENDED: u32 = 1 << 29;
+
+/// Whether a host may give this identifier to a message: the ones that network management, SYNC, emergency messages, SDO and heartbeat
+/// have by CiA 301 are nobody's.
+pub(super) const fn is_assignable(number: u32) -> bool {
+    matches!(number, 0x181..=0x57F | 0x681..=0x6DF)
+}
 
 /// One object in a PDO, and its bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,13 +133,12 @@ impl Parameters {
         Ok(())
     }
 
-    /// A PDO that exists keeps its identifier; the ones that network management, SDO and heartbeat need are nobody's.
+    /// A PDO that exists keeps its identifier.
     fn set_identifier(&mut self, value: u32) -> Result<(), Abort> {
         let number = value & 0x7FF;
         let exists = value & ABSENT == 0;
-        let is_free = matches!(number, 0x181..=0x57F | 0x681..=0x6DF);
         let changes = self.identifier().is_some_and(|own| u32::from(own) != number);
-        if value & EXTENDED != 0 || exists && (!is_free || changes) {
+        if value & EXTENDED != 0 || exists && (!is_assignable(number) || changes) {
             return Err(Abort::Range);
         }
         self.identifier = value;

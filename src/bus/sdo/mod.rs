@@ -183,6 +183,11 @@ impl Server {
         };
     }
 
+    /// Nobody could be heard for so long: it is not held against a client.
+    pub fn wait(&mut self, us: u64) {
+        self.due_us += us;
+    }
+
     /// The next answer: one that waits, the next segment of a block, or that the client has gone.
     pub fn poll<O: Objects>(&mut self, now_us: u64, dictionary: &mut Dictionary<'_, O>) -> Option<[u8; 8]> {
         let waiting = self.answer.take();

@@ -199,13 +199,13 @@ fn a_node_that_was_reset_begins_anew_once_however_full_the_bus_is() {
     for command in [130, 129, 129] {
         bench.station.hear(&Frame::new(0, &[command, 0]), bench.now_us, None, &NOTHING);
     }
-    assert_eq!(bench.station.anew, [true; 2]);
+    assert_eq!(bench.station.anew, [Some(Reset::Node); 2]);
     bench.station.watch(bench.now_us, &NOTHING);
-    assert_eq!(bench.station.anew, [false; 2]);
+    assert_eq!(bench.station.anew, [None; 2]);
     for id in [0x080, 0x201, 0x601, 0x700] {
         bench.station.hear(&Frame::new(id, &[0; 8]), bench.now_us, None, &NOTHING);
     }
-    assert_eq!(bench.station.anew, [false; 2], "it is not begun again");
+    assert_eq!(bench.station.anew, [None; 2], "it is not begun again");
     let boots = bench.run(4).iter().filter(|frame| frame.id() & 0x780 == 0x700).count();
     assert_eq!((boots, bench.read(1, 0x6065)), (2, 12_345));
 }

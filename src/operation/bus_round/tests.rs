@@ -25,14 +25,11 @@ struct Board {
 }
 
 impl Mailboxes for Board {
-    fn has_room(&self) -> bool {
-        self.wire.has_room()
+    fn waiting(&self) -> u32 {
+        self.wire.waiting()
     }
-    fn is_empty(&self) -> bool {
-        self.wire.is_empty()
-    }
-    fn send(&mut self, frame: &Frame) {
-        self.wire.send(frame);
+    fn send(&mut self, mailbox: u32, frame: &Frame) {
+        self.wire.send(mailbox, frame);
     }
     fn give_up(&mut self) {
         self.wire.give_up();
@@ -215,6 +212,20 @@ fn an_overrun_is_told_and_stops_a_hosted_leg() {
     bench.run(8);
     assert_eq!(bench.requests, [LegRequest::Power(PowerRequest::QuickStop)]);
     assert_eq!(bench.told(), [(0x81, 0x8110), (0x81, 0), (0x82, 0x8110), (0x82, 0)]);
+}
+
+#[test]
+fn a_frame_that_is_lost_while_the_controller_is_passive_fills_no_mailboxes() {
+    let mut bench = Bench::new();
+    bench.enable();
+    bench.board.status = Controller::Passive;
+    bench.run(1);
+    bench.board.wire.unplugged = true;
+    for round in 0..40 {
+        bench.board.lost = round % 3 == 0;
+        bench.run(1);
+        assert!(bench.board.wire.waiting().count_ones() <= 1);
+    }
 }
 
 #[test]

@@ -25,8 +25,9 @@ pub(in crate::operation) fn station() -> Station<2, 4> {
 /// Three mailboxes that leave in the order in which they were filled, at once where the plug is in.
 #[derive(Default)]
 pub(in crate::operation) struct Wire {
-    waiting: Vec<(Frame, u64)>,
-    unplugged: bool,
+    /// In which, what, since when.
+    waiting: Vec<(u32, Frame, u64)>,
+    pub(in crate::operation) unplugged: bool,
     /// What left, when, and when it was given.
     pub(in crate::operation) sent: Vec<(Frame, u64, u64)>,
     pub(in crate::operation) now_us: u64,
@@ -35,15 +36,12 @@ pub(in crate::operation) struct Wire {
 }
 
 impl Mailboxes for Wire {
-    fn has_room(&self) -> bool {
-        self.waiting.len() < 3
+    fn waiting(&self) -> u32 {
+        self.waiting.iter().fold(0, |bits, (mailbox, _, _)| bits | 1 << mailbox)
     }
-    fn is_empty(&self) -> bool {
-        self.waiting.is_empty()
-    }
-    fn send(&mut self, frame: &Frame) {
-        assert!(self.has_room(), "dropped");
-        self.waiting.push((*frame, self.now_us));
+    fn send(&mut self, mailbox: u32, frame: &Frame) {
+        assert!(mailbox < 3 && self.waiting() & 1 << mailbox == 0, "dropped");
+        self.waiting.push((mailbox, *frame, self.now_us));
         self.most = self.most.max(self.waiting.len());
     }
     fn give_up(&mut self) {
@@ -57,7 +55,7 @@ impl Wire {
     pub(in crate::operation) fn empty(&mut self) {
         if !self.unplugged {
             let now_us = self.now_us;
-            self.sent.extend(self.waiting.drain(..).map(|(frame, given_us)| (frame, given_us, now_us)));
+            self.sent.extend(self.waiting.drain(..).map(|(_, frame, given_us)| (frame, given_us, now_us)));
         }
     }
 }
@@ -182,7 +180,7 @@ fn nothing_waits_in_a_controller_that_is_off() {
     bench.set(Controller::Off, true);
     for _ in 0..50 {
         bench.round();
-        assert!(bench.wire.is_empty());
+        assert!(bench.wire.waiting.is_empty());
     }
     bench.set(Controller::Active, false);
     let back_us = bench.wire.now_us;
@@ -202,8 +200,44 @@ fn nodes_speak_in_turn_and_whichever_was_first_is_second_next() {
         bench.wire.waiting.truncate(2);
         bench.wire.now_us += 4 * ROUND_US;
         bench.round();
-        order.extend(bench.wire.waiting.get(2).map(|(frame, _)| frame.id() & 0x7F));
+        order.extend(bench.wire.waiting.get(2).map(|(_, frame, _)| frame.id() & 0x7F));
     }
     assert!(order == [1, 2, 1, 2, 1, 2, 1, 2] || order == [2, 1, 2, 1, 2, 1, 2, 1], "{order:?}");
     assert_eq!(bench.wire.most, 3);
+}
+
+#[test]
+fn an_emergency_that_waited_in_a_mailbox_is_told_whatever_the_controller_becomes() {
+    for controller in [Controller::Passive, Controller::Off] {
+        let mut bench = Bench::new();
+        // PDOs wait in two mailboxes, the store's message of one node in the third.
+        bench.wire.unplugged = true;
+        bench.run(1);
+        bench.wire.waiting.truncate(2);
+        bench.station.storing(crate::bus::Storing::Busy);
+        bench.run(1);
+        assert!(bench.wire.waiting.iter().any(|(_, frame, _)| frame.id() & 0x780 == 0x80));
+        bench.set(controller, true);
+        bench.run(60);
+        bench.wire.unplugged = false;
+        bench.set(Controller::Active, false);
+        bench.run(20);
+        let code = if controller == Controller::Off { 0x8140 } else { 0x8120 };
+        let mut told = [1, 2].map(|node| bench.told(node));
+        told.iter_mut().for_each(|codes| codes.truncate(2));
+        assert_eq!(told, [[0xFF01, code]; 2].map(Vec::from), "{controller:?}");
+    }
+}
+
+#[test]
+fn an_emergency_message_with_another_identifier_is_told_as_well() {
+    let mut bench = Bench::new();
+    bench.hear(&Frame::new(0x601, &[0x23, 0x14, 0x10, 0, 0x10, 0x03, 0, 0]));
+    bench.run(4);
+    bench.wire.unplugged = true;
+    bench.set(Controller::Passive, true);
+    bench.run(300);
+    bench.wire.unplugged = false;
+    bench.run(20);
+    assert_eq!(bench.leaving(0x310).count(), 1);
 }

@@ -1,8 +1,5 @@
 extern crate std;
 
-use core::pin::pin;
-use core::task::{Context, Poll, Waker};
-use std::cell::Cell;
 use std::vec::Vec;
 
 use super::*;
@@ -89,10 +86,12 @@ impl StoringBoard for Board {
     fn tighten(&mut self) -> bool {
         self.watchdog.ask(false)
     }
+}
 
-    async fn wait_ms(&mut self, milliseconds: u64) {
-        self.now_ms += milliseconds;
-        self.watchdog.pass(milliseconds);
+impl Board {
+    fn pass(&mut self) {
+        self.now_ms += 1;
+        self.watchdog.pass(1);
         if let Some((_, permission, causes)) = self.later.take_if(|(when, ..)| *when <= self.now_ms) {
             self.permission = permission;
             self.causes |= causes;
@@ -100,21 +99,24 @@ impl StoringBoard for Board {
     }
 }
 
-fn at_once<T>(future: impl Future<Output = T>) -> T {
-    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
-        Poll::Ready(value) => value,
-        Poll::Pending => panic!("nothing here waits"),
-    }
-}
-
 /// Whether it was done, and how often the flash was touched.
 fn change(storing: &mut Storing, board: &mut Board) -> (bool, u32) {
-    let touched = Cell::new(0);
-    let done = at_once(storing.change(board, || {
-        touched.set(touched.get() + 1);
-        true
-    }));
-    (done, touched.get())
+    change_with(storing, board, true)
+}
+
+fn change_with(storing: &mut Storing, board: &mut Board, says: bool) -> (bool, u32) {
+    let mut touched = 0;
+    for _ in 0..1000 {
+        let change = || {
+            touched += 1;
+            says
+        };
+        if let Some(done) = storing.step(board, change) {
+            return (done, touched);
+        }
+        board.pass();
+    }
+    panic!("it does not end");
 }
 
 #[test]
@@ -122,14 +124,14 @@ fn the_flash_is_changed_between_a_watchdog_that_is_stretched_and_one_that_is_tig
     let (mut storing, mut board) = (Storing::new(), Board::off());
     assert_eq!(change(&mut storing, &mut board), (true, 1));
     assert_eq!((board.watchdog.stretched, board.watchdog.under_way, board.causes), (false, None, 0));
-    // 20 ms of announcement, twice 48 ms of the watchdog's, one for the current loops.
-    assert_eq!(board.storing, [(0, true), (117, false)]);
+    // 20 ms of announcement, twice 48 ms of the watchdog's, some to step on, one of them for the current loops.
+    assert_eq!(board.storing, [(0, true), (119, false)]);
 }
 
 #[test]
 fn what_is_not_done_is_said() {
     let (mut storing, mut board) = (Storing::new(), Board::off());
-    assert!(!at_once(storing.change(&mut board, || false)));
+    assert_eq!(change_with(&mut storing, &mut board, false), (false, 1));
     assert_eq!((board.causes, board.watchdog.stretched), (0, false));
 }
 
@@ -185,11 +187,10 @@ fn a_watchdog_that_was_stretched_and_does_not_come_back_keeps_the_drive_off_unti
     board.watchdog.takes_ms = Some(190);
     let mut slow =
         Board { watchdog: Watchdog { takes_ms: Some(190), ..Watchdog::default() }, ..Board::off() };
-    let done = at_once(storing.change(&mut slow, || true));
-    assert_eq!((done, slow.causes), (true, 0));
+    assert_eq!((change(&mut storing, &mut slow), slow.causes), ((true, 1), 0));
     // Asked in every round of the keeper from then on.
     let mut stuck = Board { watchdog: Watchdog { stretched: true, ..Watchdog::default() }, ..Board::off() };
-    let mut storing = Storing { loose: true };
+    let mut storing = Storing { loose: true, ..Storing::new() };
     storing.look_after(&mut stuck);
     assert_eq!(stuck.causes, Cause::Watchdog.bit());
     stuck.watchdog.pass(u64::MAX);

@@ -3,19 +3,25 @@
 //! ```text
 //! each servo tick   leg --LegTold--> station,  station --LegOrder--> leg,  six PWM periods
 //! any time          frame -> nodes; nodes -> mailboxes of three frames, as the controller of the STM32 has them
+//! each millisecond  a step of what hosts want kept (`operation::Storing`)
 //! ```
+//!
+//! While its flash is written the processor stands ([`super::storing`]): the plant goes on, nobody ticks, and of what hosts send the controller
+//! keeps three frames.
 //!
 //! The enabling switch stays a contact in the operator's hand, on the bus as without it: here a simulated operator holds it from the
 //! start, and what the hand asks for by closing it is over before the nodes say that they are there.
 
 use scarab::bus::drive::{AxisConstants, Mode};
-use scarab::bus::station::{Keeping, LegRequest, LegTold, Station};
+use scarab::bus::station::{LegRequest, LegTold, Station};
 use scarab::bus::{Controller, Frame, Identity, KeptNode, Node, NodeId, Storing};
 use scarab::leg::{ControlRequest, Fault, JointStatus};
 use scarab::safety::PowerRequest;
 use scarab::servo::SERVO_RATE_HZ;
+use scarab::store::KeptModel;
 
 use super::memory::Memory;
+use super::storing::{Asked, Flashing};
 use super::wire::Mailbox;
 use crate::tool::error::ToolError;
 use crate::tool::faults::rig::{Hand, Rig};
@@ -86,12 +92,7 @@ pub struct Board<const N: usize, const B: usize> {
     station: Station<N, LOG>,
     memory: Memory,
     context: Context<N, B>,
-    has_kept: bool,
-    /// The accepted model is in the memory.
-    model_kept: bool,
-    /// What hosts ask to keep waits for somebody who takes its time (`Board::take_asked`).
-    waits: bool,
-    asked: Option<(Keeping, [KeptNode; N])>,
+    flashing: Flashing<N>,
     /// How the controller does.
     controller: Controller,
     /// Number of the first node, unless the memory says otherwise.
@@ -117,10 +118,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
             station,
             memory,
             context,
-            has_kept: false,
-            model_kept: false,
-            waits: false,
-            asked: None,
+            flashing: Flashing::new(),
             controller: Controller::Active,
             first,
         };
@@ -135,7 +133,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
         self.rig.power_on();
         self.station = station(&self.context, self.first);
         self.mailboxes.iter_mut().for_each(Mailbox::clear);
-        (self.controller, self.model_kept) = (Controller::Active, false);
+        (self.controller, self.flashing) = (Controller::Active, Flashing::new());
         self.recall();
     }
 
@@ -167,38 +165,19 @@ impl<const N: usize, const B: usize> Board<N, B> {
         if self.controller == Controller::Off {
             return;
         }
-        self.station.hear(frame, now_ns / 1000, sender, self.rig.leg.identification());
-        let mut objects = [KeptNode::NOTHING; N];
-        if let Some(keeping) = self.station.take_store(&mut objects) {
-            if self.waits {
-                // As the board's thread has it: hosts are told before the flash is touched.
-                self.station.storing(Storing::Busy);
-                self.asked = Some((keeping, objects));
-                return;
-            }
-            let kept = self.keep(keeping, &objects);
-            self.station.stored(kept, &objects);
+        if sender.is_some() || self.flashing.hear(frame, now_ns) {
+            self.station.hear(frame, now_ns / 1000, sender, self.rig.leg.identification());
         }
     }
 
-    /// From now on what hosts ask to keep waits until somebody takes it.
-    pub fn keep_later(&mut self) {
-        self.waits = true;
-    }
-
-    /// What waits to be kept.
-    pub fn take_asked(&mut self) -> Option<(Keeping, [KeptNode; N])> {
-        self.asked.take()
-    }
-
-    /// It was kept, or not: hosts are told.
-    pub fn stored(&mut self, kept: bool, objects: &[KeptNode; N]) {
-        self.station.stored(kept, objects);
+    /// Who keeps what hosts want kept.
+    pub fn flashing(&mut self) -> &mut Flashing<N> {
+        &mut self.flashing
     }
 
     /// What the nodes have to say goes to their mailboxes.
     pub fn speak(&mut self, now_ns: u64) {
-        if self.controller == Controller::Off {
+        if self.controller == Controller::Off || self.flashing.stands(now_ns) {
             return;
         }
         for (joint, mailbox) in self.mailboxes.iter_mut().enumerate() {
@@ -224,7 +203,12 @@ impl<const N: usize, const B: usize> Board<N, B> {
 
     /// One servo tick of the leg; each of its PWM periods is shown when it is over.
     pub fn tick(&mut self, now_ns: u64, mut show: impl FnMut(&Rig<N, B>)) {
+        if self.flashing.stands(now_ns) {
+            return self.rig.stand_still(u64::from(PERIODS_PER_TICK));
+        }
+        self.wake(now_ns);
         self.station.watch(now_ns / 1000, self.rig.leg.identification());
+        self.keep(now_ns);
         self.exchange();
         for _ in 0..PERIODS_PER_TICK {
             self.rig.advance();
@@ -260,7 +244,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
             Some(LegRequest::Power(power)) => self.rig.ask(ControlRequest::Power(power)),
             Some(LegRequest::Identify { plan, seed }) => {
                 self.rig.leg.prepare(plan, seed);
-                self.model_kept = false;
+                self.flashing.model_kept = false;
                 self.rig.ask(ControlRequest::Identify);
             }
             Some(LegRequest::Cancel) => self.rig.leg.cancel(),
@@ -273,46 +257,42 @@ impl<const N: usize, const B: usize> Board<N, B> {
         }
     }
 
-    /// Keeps all objects and the accepted model, or forgets everything; whether it did.
-    pub fn keep(&mut self, keeping: Keeping, objects: &[KeptNode; N]) -> bool {
-        let state = self.rig.state();
-        self.has_kept = true;
-        match keeping {
-            Keeping::Defaults => {
-                let forgotten = self.memory.forget(state);
-                if forgotten {
-                    // What was accepted before is not kept by the next "save".
-                    self.model_kept = true;
-                    self.station.set_generation(0);
-                }
-                forgotten
-            }
-            Keeping::All => {
-                let mut nodes = objects.iter().enumerate();
-                nodes.all(|(joint, kept)| self.memory.keep_objects(state, joint, kept.bytes()))
-                    && self.keep_model()
-            }
+    /// What came while the processor stood is heard: the frames that the controller had room for, and that others are lost.
+    fn wake(&mut self, now_ns: u64) {
+        let results = self.rig.leg.identification();
+        if self.flashing.recovers() {
+            self.station.on_controller(self.controller, results);
+        }
+        let (frames, lost) = self.flashing.take_heard();
+        if lost {
+            self.station.on_controller(Controller::Overrun, results);
+        }
+        for frame in frames {
+            self.station.hear(&frame, now_ns / 1000, None, results);
         }
     }
 
-    /// The accepted model, unless it was kept already; whether nothing went wrong.
-    fn keep_model(&mut self) -> bool {
-        let (state, leg) = (self.rig.state(), &self.rig.leg);
-        let is_accepted = leg.control().verdict().is_some_and(|verdict| verdict.is_accepted());
-        if !is_accepted || self.model_kept {
-            return true;
+    /// Takes what hosts want kept a step further.
+    fn keep(&mut self, now_ns: u64) {
+        let mut objects = [KeptNode::NOTHING; N];
+        if !self.flashing.is_under_way()
+            && let Some(what) = self.station.take_store(&mut objects)
+        {
+            self.station.storing(Storing::Busy);
+            let (leg, generation) = (&self.rig.leg, self.station.generation() + 1);
+            let is_accepted = leg.control().verdict().is_some_and(|verdict| verdict.is_accepted());
+            let model =
+                leg.control().model().filter(|_| is_accepted && !self.flashing.model_kept).map(|model| {
+                    let (leg, seed) = (leg.identification(), self.station.seed());
+                    KeptModel::of(&self.context.configuration, leg, model, generation, seed)
+                });
+            self.flashing.ask(Asked { what, objects, model });
         }
-        let (next, seed) = (self.station.generation() + 1, self.station.seed());
-        self.model_kept = self.memory.keep_model(state, &self.context.configuration, leg, next, seed);
-        if self.model_kept {
-            self.station.set_generation(next);
+        let Some((done, asked)) = self.flashing.step(now_ns, &mut self.rig, &mut self.memory) else { return };
+        if let Some(generation) = asked.generation().filter(|_| done) {
+            self.station.set_generation(generation);
         }
-        self.model_kept
-    }
-
-    /// Whether something was kept or forgotten since this was asked.
-    pub fn take_kept(&mut self) -> bool {
-        core::mem::take(&mut self.has_kept)
+        self.station.stored(done, &asked.objects);
     }
 
     /// The image of the memory.

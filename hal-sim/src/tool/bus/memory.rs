@@ -5,14 +5,15 @@
 
 use embassy_futures::block_on;
 use scarab::bus::LONGEST;
-use scarab::leg::{DriveState, IdentifiedModel, Leg, LegConfiguration};
+use scarab::bus::station::Keeping;
+use scarab::leg::{DriveState, IdentifiedModel, LegConfiguration};
 use scarab::store::{KeptModel, Key, Permit, Store};
 
+use super::storing::Asked;
 use crate::flash::Flash;
-use crate::tool::pair::{PENDING, TAPS};
 
 /// A sector of the STM32F405's flash that is large enough, and how many there are of it.
-const SECTOR: usize = 128 * 1024;
+pub(super) const SECTOR: usize = 128 * 1024;
 const SECTORS: usize = 2;
 /// Bytes of a board's flash.
 pub const BYTES: usize = SECTOR * SECTORS;
@@ -113,18 +114,16 @@ impl Memory {
         Ok(Some((model, kept.provenance.generation)))
     }
 
-    /// Keeps an accepted model with where it comes from, under the next generation; whether it could.
-    pub fn keep_model<const N: usize, const B: usize>(
-        &mut self,
-        state: DriveState,
-        configuration: &LegConfiguration<N, B>,
-        leg: &Leg<N, B, TAPS, PENDING>,
-        generation: u32,
-        swarm_seed: u64,
-    ) -> bool {
-        let (Some(permit), Some(model)) = (Permit::of(state), leg.control().model()) else { return false };
-        let kept = KeptModel::of(configuration, leg.identification(), model, generation, swarm_seed);
-        self.with(|store| block_on(store.save(&permit, Key::Model, &kept))).is_some_and(|saved| saved.is_ok())
+    /// Keeps all objects and a model, or forgets everything; whether it could.
+    pub(super) fn change<const N: usize>(&mut self, state: DriveState, asked: &Asked<N>) -> bool {
+        match asked.what {
+            Keeping::Defaults => self.forget(state),
+            Keeping::All => {
+                let mut nodes = asked.objects.iter().enumerate();
+                nodes.all(|(joint, kept)| self.keep_objects(state, joint, kept.bytes()))
+                    && asked.model.is_none_or(|model| self.keep_any(state, &model))
+            }
+        }
     }
 
     /// Forgets everything; whether it could.

@@ -6,7 +6,7 @@
 //! | [`wire`], [`network`] | arbitration and bits; several legs and a host on one wire |
 //! | [`host`] | a host that moves a leg, and falls silent where it is told to |
 //! | [`slcan`], [`server`] | the port at which host software speaks to it |
-//! | [`memory`] | what a board remembers |
+//! | [`memory`], [`storing`] | what a board remembers, and how it is changed |
 //! | [`serve`] | all of it, at the pace of a clock |
 
 pub mod board;
@@ -16,4 +16,5 @@ pub mod network;
 pub mod serve;
 pub mod server;
 pub mod slcan;
+pub mod storing;
 pub mod wire;

@@ -85,12 +85,6 @@ impl<const N: usize, const B: usize> Network<N, B> {
         self.now_ns = end_ns;
     }
 
-    /// A time in which nobody looks at the bus, and what is sent is lost.
-    pub fn pass(&mut self, ns: u64) {
-        self.host.clear();
-        self.now_ns += ns;
-    }
-
     /// Simulated so far.
     #[must_use]
     pub fn now_ns(&self) -> u64 {

@@ -20,6 +20,8 @@ use crate::tool::simulate::{DriveModel, SimulationOptions};
 const MOST_LATE: Duration = Duration::from_millis(100);
 /// Ticks between two looks at the port: 1 ms.
 const TICKS_PER_LOOK: u32 = 4;
+/// Ticks of the longest change of the flash: 5 s.
+const MOST_STORING: u32 = 20_000;
 /// Nothing is due before.
 const NAP: Duration = Duration::from_micros(200);
 
@@ -98,12 +100,19 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
             }
             *told = alarm;
         }
-        if network.boards().iter_mut().fold(false, |kept, board| board.take_kept() | kept) {
+        if network.boards().iter_mut().fold(false, |kept, board| board.flashing().take_kept() | kept) {
             write(options.flash.as_deref(), &mut network)?;
         }
         if due == 0 {
             std::thread::sleep(NAP);
         }
+    }
+    // What a host asked for before is kept, as fast as it goes.
+    for _ in 0..MOST_STORING {
+        if !network.boards().iter_mut().any(|board| board.flashing().is_under_way()) {
+            break;
+        }
+        network.tick(|_| {});
     }
     write(options.flash.as_deref(), &mut network)
 }

@@ -84,10 +84,105 @@ fn what_does_not_fit_is_not_kept_and_hosts_are_told() {
     bench.write(2, 0x6065, 0, 777, 4);
     bench.save(1);
     assert_eq!(bench.store(true), None);
-    let told = bench.run(4).into_iter().filter(|frame| frame.id() & 0x780 == 0x80);
-    assert_eq!(told.map(|frame| frame.data()[..2].to_vec()).collect::<Vec<_>>(), [[0x30, 0x55]; 2]);
-    bench.send(0, &[129, 0]);
+    let told = |bench: &mut Bench| {
+        let mut told = codes_of(&bench.run(4));
+        told.sort_by_key(|(id, _)| *id);
+        told
+    };
+    let failed = [(0x81, 0xFF01), (0x81, 0x5530), (0x82, 0xFF01), (0x82, 0x5530)];
+    assert_eq!(told(&mut bench), failed);
+    // So is a second one that fails like the first.
+    bench.save(1);
+    assert_eq!(bench.store(true), None);
+    assert_eq!(told(&mut bench), failed);
+    // A node that is reset does not hide it.
+    let frames = bench.send(0, &[129, 0]);
+    assert_eq!(codes_of(&frames), [(0x81, 0x5530), (0x82, 0x5530)]);
+    assert_eq!(bench.read(1, 0x1001) & 1, 1);
     assert_eq!((bench.read(1, 0x6065), bench.read(2, 0x6065)), (12_345, 87_266));
+}
+
+/// Emergency messages: identifier and code.
+fn codes_of(frames: &[Frame]) -> Vec<(u16, u16)> {
+    let emergencies = frames.iter().filter(|frame| frame.id() & 0x780 == 0x80);
+    emergencies.map(|frame| (frame.id(), u16::from_le_bytes([frame.data()[0], frame.data()[1]]))).collect()
+}
+
+#[test]
+fn two_nodes_of_one_number_are_not_kept_and_do_not_start() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x2001, 0, 2, 1);
+    bench.save(1);
+    assert_eq!(bench.store(true), None);
+    assert_eq!(codes_of(&bench.run(4)).last(), Some(&(0x82, 0x5530)));
+    // Exchanged they are two.
+    bench.write(2, 0x2001, 0, 1, 1);
+    bench.save(1);
+    let (_, [hip, knee]) = bench.store(true).expect("something to keep");
+    bench.send(0, &[129, 0]);
+    assert_eq!(bench.station.nodes().each_ref().map(|node| node.id().number()), [2, 1]);
+    // A memory that somebody else wrote: both begin with their own.
+    let mut other = Bench::new();
+    let mut bytes = [0; 5];
+    crate::bus::write_kept(crate::bus::dictionary::Object::at(0x2001, 0), 1, &mut bytes).expect("it fits");
+    other.station.recall(1, &bytes);
+    assert_eq!(other.station.nodes().each_ref().map(|node| node.id().number()), [1, 2]);
+    // The first moves away and makes room, in whatever order they are recalled.
+    for order in [[0, 1], [1, 0]] {
+        let mut other = Bench::new();
+        for joint in order {
+            other.station.recall(joint, [&hip, &knee][joint].bytes());
+        }
+        assert_eq!(other.station.nodes().each_ref().map(|node| node.id().number()), [2, 1]);
+    }
+}
+
+#[test]
+fn a_reset_of_the_communication_leaves_the_other_objects_as_they_are() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x1017, 0, 50, 2);
+    bench.write(1, 0x6065, 0, 12_345, 4);
+    bench.save(1);
+    assert!(bench.store(true).is_some());
+    for (command, expected) in [(130, (50, 777)), (129, (50, 12_345))] {
+        bench.write(1, 0x1017, 0, 90, 2);
+        bench.write(1, 0x6065, 0, 777, 4);
+        bench.send(0, &[command, 1]);
+        assert_eq!((bench.read(1, 0x1017), bench.read(1, 0x6065)), expected, "{command}");
+    }
+}
+
+#[test]
+fn the_bit_rate_is_one_for_both_nodes() {
+    let mut bench = Bench::new();
+    bench.write(2, 0x2002, 0, 500, 2);
+    assert_eq!(bench.read(1, 0x2002), 500);
+    bench.save(1);
+    assert!(bench.store(true).is_some());
+    // The usual one again, written at the other node.
+    bench.write(1, 0x2002, 0, 1000, 2);
+    bench.save(1);
+    let (_, kept) = bench.store(true).expect("something to keep");
+    assert_eq!((bench.station.bit_rate(), bench.read(2, 0x2002)), (None, 1000));
+    assert_eq!(kept, [KeptNode::NOTHING; 2]);
+    // Written and not kept, it ends with either node.
+    bench.write(1, 0x2002, 0, 250, 2);
+    bench.send(0, &[129, 2]);
+    assert_eq!((bench.read(1, 0x2002), bench.read(2, 0x2002)), (1000, 1000));
+}
+
+#[test]
+fn what_the_controller_told_outlives_a_node_that_is_reset() {
+    let mut bench = Bench::new();
+    bench.station.on_controller(Controller::Passive, &NOTHING);
+    bench.run(4);
+    // A frame that was lost is over at once.
+    bench.station.on_controller(Controller::Overrun, &NOTHING);
+    let frames = bench.send(0, &[129, 1]);
+    assert_eq!(codes_of(&frames).first(), Some(&(0x81, 0x8120)), "{frames:?}");
+    assert_eq!(bench.read(1, 0x1001), 0x11);
+    bench.station.on_controller(Controller::Active, &NOTHING);
+    assert_eq!(codes_of(&bench.run(4)), [(0x81, 0), (0x82, 0)]);
 }
 
 #[test]
@@ -104,16 +199,10 @@ fn nothing_is_kept_while_something_blocks() {
 #[test]
 fn hosts_are_told_before_the_flash_is_written_and_how_it_ended() {
     let mut bench = Bench::new();
-    let codes = |frames: Vec<Frame>| -> Vec<(u16, u16)> {
-        let emergencies = frames.iter().filter(|frame| frame.id() & 0x780 == 0x80);
-        emergencies
-            .map(|frame| (frame.id(), u16::from_le_bytes([frame.data()[0], frame.data()[1]])))
-            .collect()
-    };
     for (storing, code) in [(Storing::Busy, 0xFF01), (Storing::Failed, 0x5530), (Storing::Done, 0)] {
         bench.station.storing(storing);
         bench.station.storing(storing);
-        assert_eq!(codes(bench.run(4)), [(0x81, code), (0x82, code)]);
+        assert_eq!(codes_of(&bench.run(4)), [(0x81, code), (0x82, code)]);
     }
 }
 

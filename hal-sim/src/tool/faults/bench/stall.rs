@@ -2,25 +2,20 @@
 //!
 //! The order is the board's (`operation::Storing`): interlock, announcement, a second look, the watchdog's longer time, the flash, the watchdog's
 //! usual time, the interlock let go. Between them the bus and the leg go on. While the flash works nobody ticks, the plant goes on, the
-//! wearer turns the leg and what the host sends is lost.
+//! wearer turns the leg, and of what the host sends the controller keeps three frames.
 //!
 //! | flash | processor stands for | afterwards |
 //! | --- | --- | --- |
 //! | words only | 16 us for each four bytes | the host enables the leg as before |
 //! | a sector erased | 1 to 2 s each beside | joints have no zeros any more: nothing enables before a reference was taken |
 //!
-//! Neither is anybody's fault: nothing is raised, no watchdog bites. Hosts were told before (FF01) and are told after (0000), and what was
-//! asked for is kept.
+//! Neither is anybody's fault: nothing is raised, no watchdog bites. Hosts were told before (FF01) and are told after (0000), and, where they
+//! went on sending, that frames were lost (8110, 0000); what was asked for is kept.
 
-use core::cell::RefCell;
-
-use embassy_futures::block_on;
-use scarab::leg::{DriveState, Permission};
-use scarab::operation::{Storing, StoringBoard};
-use scarab::safety::{Cause, FaultCode};
+use scarab::leg::DriveState;
+use scarab::safety::FaultCode;
 
 use super::super::entry::Head;
-use super::super::rig::PERIODS_PER_S;
 use super::super::run::Outcome;
 use super::hosted::{Fork, forked, started};
 use super::lost::watched;
@@ -30,26 +25,22 @@ use crate::tool::leg_file::LegFile;
 
 /// A state in which may be written.
 const OFF: DriveState = DriveState::SwitchOnDisabled;
-/// Of a sector, bytes; records that fill one.
-const SECTOR: u64 = 128 * 1024;
+/// Records that fill a sector.
 const MOST_RECORDS: u32 = 1000;
-/// Servo ticks of a millisecond, until what was asked for is on its way, and until hosts were told.
-const TICKS_PER_MS: u64 = 4;
+/// Servo ticks until what was asked for is on its way, of the longest change of the flash, and until hosts were told.
 const ASKED: u64 = 16;
+const LONGEST: u64 = 20_000;
 const TOLD: u64 = 40;
-const NS_PER_S: u64 = 1_000_000_000;
-/// A word takes so long, ns.
-const WORD_NS: u64 = 16_000;
-/// 8 s instead of 16 ms.
-const STRETCHED: u64 = 500;
+const NS_PER_S: f64 = 1e9;
 /// Servo ticks of a host that wants its leg enabled.
 const ENABLING: u64 = 400;
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 /// Following window that is kept, micro-radian.
 const WINDOW: u16 = 0x6065;
 const NODES: [u16; 2] = [1, 2];
-/// Emergency messages: the flash is about to be written; nothing is wrong.
+/// Emergency messages: the flash is about to be written; frames were lost; nothing is wrong.
 const STORING: u16 = 0xFF01;
+const LOST: u16 = 0x8110;
 const CLEAR: u16 = 0;
 
 /// A host whose leg is off, on a board whose flash has no room for one more save.
@@ -89,43 +80,33 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
     for node in NODES {
         fork.host.write(node, WINDOW, 0, window, 4)?;
     }
-    fork.host.board().keep_later();
     if erases {
         // Somebody moves the leg meanwhile.
         let (joint, push) = (fork.dice.below(2) as usize, fork.dice.sign() * fork.dice.uniform(0.0, 20.0));
         fork.host.rig().world.push(joint, push, 3.0);
     }
+    let erasing_ns = (fork.dice.uniform(1.0, 2.0) * NS_PER_S) as u64;
+    let before = fork.host.board().memory().worked().1;
+    let flashing = fork.host.board().flashing();
+    (flashing.erasing_ns, flashing.unannounced) = (erasing_ns, blind);
     fork.host.write(1 + fork.dice.below(2) as u16, 0x1010, 1, SAVE, 4)?;
     fork.run(ASKED);
-    let Some((keeping, objects)) = fork.host.board().take_asked() else {
-        return Ok(fork.ended(None, None));
-    };
-    let before = fork.host.board().memory().worked();
-    let fork = RefCell::new(fork);
-    let mut board = Board { fork: &fork, blind, raised: false };
-    let change = || {
-        let mut fork = fork.borrow_mut();
-        let kept = fork.host.board().keep(keeping, &objects);
-        let after = fork.host.board().memory().worked();
-        let sectors = u64::from(after.1 - before.1);
-        let words = (after.0 - before.0 - sectors * SECTOR) / 4;
-        let erasing_ns = (fork.dice.uniform(1.0, 2.0) * NS_PER_S as f64) as u64;
-        let stands_ns = words * WORD_NS + sectors * erasing_ns;
-        fork.host.network.pass(stands_ns);
-        fork.host.rig().stand_still(stands_ns * PERIODS_PER_S / NS_PER_S);
-        kept
-    };
-    let kept = block_on(Storing::new().change(&mut board, change));
-    let mut fork = fork.into_inner();
-    fork.host.board().stored(kept, &objects);
-    let erased = fork.host.board().memory().worked().1 > before.1;
+    for _ in 0..LONGEST {
+        if !fork.host.board().flashing().is_under_way() {
+            break;
+        }
+        fork.tick();
+    }
+    let erased = fork.host.board().memory().worked().1 > before;
     fork.run(TOLD);
     let told = NODES.map(|node| {
         fork.host.told().iter().filter(|(from, _)| *from == node).map(|told| told.1).collect::<Vec<_>>()
     });
-    let tells = told
-        .iter()
-        .all(|codes| codes.starts_with(&[STORING]) && codes.ends_with(&[CLEAR]) && codes.len() == 2);
+    // What the host sent while the processor stood may have been lost, which it is told; nothing else.
+    let tells = told.iter().all(|codes| {
+        let first = codes.strip_prefix(&[STORING]);
+        first.is_some_and(|rest| rest == [CLEAR] || rest == [LOST, CLEAR, CLEAR] || rest == [LOST, CLEAR])
+    });
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     let calm = alarm.is_none() && !fork.host.rig().is_restarted();
     // Commanded to stay where it is, which takes some cycles to tell.
@@ -139,49 +120,6 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
     fork.host.board().power_on();
     fork.run(TOLD);
     let windows = [fork.host.read(1, WINDOW, 0)?, fork.host.read(2, WINDOW, 0)?];
-    let safe = kept && tells && calm && enabled != erased && erased == erases && windows == [window; 2];
+    let safe = tells && calm && enabled != erased && erased == erases && windows == [window; 2];
     Ok(fork.ended(safe.then_some("-"), alarm))
-}
-
-/// The board that stores; blind, nobody is told that it does.
-struct Board<'a, 'b> {
-    fork: &'a RefCell<Fork<'b>>,
-    blind: bool,
-    raised: bool,
-}
-
-impl StoringBoard for Board<'_, '_> {
-    fn permission(&self) -> Permission {
-        self.fork.borrow_mut().host.rig().state().permission()
-    }
-
-    fn causes(&self) -> u32 {
-        let unseen = if self.blind && self.raised { Cause::Storing.bit() } else { 0 };
-        self.fork.borrow_mut().host.rig().causes() | unseen
-    }
-
-    fn raise(&mut self, cause: Cause) {
-        self.raised = true;
-        if !self.blind {
-            self.fork.borrow_mut().host.rig().raise(cause);
-        }
-    }
-
-    fn stored(&mut self) {
-        self.fork.borrow_mut().host.rig().stored();
-    }
-
-    fn stretch(&mut self) -> bool {
-        self.fork.borrow_mut().host.rig().stretch(STRETCHED);
-        true
-    }
-
-    fn tighten(&mut self) -> bool {
-        self.fork.borrow_mut().host.rig().stretch(1);
-        true
-    }
-
-    async fn wait_ms(&mut self, milliseconds: u64) {
-        self.fork.borrow_mut().run(milliseconds * TICKS_PER_MS);
-    }
 }

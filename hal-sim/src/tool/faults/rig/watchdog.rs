@@ -71,7 +71,6 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// The processor stands for so many periods, its flash being written: the plant goes on with every switch open, and the watchdog counts.
     pub fn stand_still(&mut self, periods: u64) {
-        self.watchdog.fed = self.period;
         for _ in 0..periods {
             self.world.period(&[AxisCommand::RELEASED; N], 0.0);
         }
