@@ -111,7 +111,7 @@ impl<const N: usize> Control<N> {
             validation: configuration.validation,
             approach_speed,
             approach_acceleration,
-            models: Succession::EMPTY,
+            models: Succession::new(),
             change: None,
             cause: None,
             verdict: None,

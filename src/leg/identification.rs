@@ -197,7 +197,7 @@ where
             self.model.stribeck = no_stribeck();
             self.solver.clear();
             self.held_out.clear();
-            self.validation = [const { None }; VALIDATION_MOTIONS];
+            self.validation.iter_mut().for_each(|record| *record = None);
             self.verdict = None;
         } else if let Some(solver) = self.solver.as_ref() {
             let dropped = &solver.record().selection.dropped;

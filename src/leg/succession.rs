@@ -49,8 +49,11 @@ impl<const N: usize> TorqueModel<N> for Faded<'_, N> {
 }
 
 impl<const N: usize> Succession<N> {
-    /// No model.
-    pub const EMPTY: Self = Self { model: None, next: Next::Nothing, wanted: false, share: 0.0 };
+    /// No model. No constant: of one the whole image would lie in flash, to set two bytes of it.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { model: None, next: Next::Nothing, wanted: false, share: 0.0 }
+    }
 
     /// Whether the model is to feed forward from now on.
     pub fn want(&mut self, wanted: bool) {
@@ -100,7 +103,8 @@ impl<const N: usize> Succession<N> {
     pub fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
         let free = self.model.is_none() || !(self.share > 0.0);
         if free {
-            *self = Self { model: Some(model), ..Self::EMPTY };
+            self.accept(model);
+            (self.wanted, self.share) = (false, 0.0);
         }
         free
     }

@@ -13,6 +13,7 @@
 //!
 //! Frames of one node are heard by the other as they are given to the controller, which does not hear itself.
 
+use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -20,10 +21,11 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use super::leg::{BASE, JOINTS};
 use super::statistics::Count;
 use crate::bus::identification::Found;
-use crate::bus::station::{LegOrder, LegTold, Station};
-use crate::bus::{Controller, Frame};
+use crate::bus::station::{Keeping, LegOrder, LegTold, Station};
+use crate::bus::{Controller, Frame, KeptNode};
 use crate::leg::LoggedSample;
 use crate::operation::{self, BusBoard, BusRound, Mailboxes};
+use crate::place::{each, fill};
 use crate::store::KeptModel;
 
 /// Samples of the log that wait for a host: 384 ms of it.
@@ -138,22 +140,29 @@ pub static BUS: spin::Mutex<Option<&'static mut BusLoop>> = spin::Mutex::new(Non
 pub static FRAMES_IN: spin::Mutex<Option<Producer<'static, Frame>>> = spin::Mutex::new(None);
 
 impl Memory {
-    /// Empty.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            frames: Queue::new(),
-            told: Queue::new(),
-            orders: Queue::new(),
-            logged: Queue::new(),
-            found: Queue::new(),
-            spare: Queue::new(),
-            keep: Queue::new(),
-            kept: Queue::new(),
-            accepted: Queue::new(),
-            results: [BoardFound::NOTHING; 2],
-            lent: Keep::NOTHING,
-        }
+    /// Empty, built in its place.
+    pub fn place(slot: &mut MaybeUninit<Self>) -> &mut Self {
+        fill!(
+            slot,
+            {
+                frames: Queue::new(),
+                told: Queue::new(),
+                orders: Queue::new(),
+                logged: Queue::new(),
+                found: Queue::new(),
+                spare: Queue::new(),
+                keep: Queue::new(),
+                kept: Queue::new(),
+                accepted: Queue::new(),
+                lent: Keep {
+                    what: Keeping::All,
+                    objects: [KeptNode::NOTHING; JOINTS],
+                    generation: 0,
+                    done: true,
+                },
+            },
+            { results: |results| each(results, BoardFound::nothing) }
+        )
     }
 
     /// All ends; the frames' first.

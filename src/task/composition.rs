@@ -80,7 +80,7 @@ fn hand_out(
         (Some((configuration, _)), Some(control)) => {
             join(configuration, control, &board.identity, calibrated, &mut notes.0)
         }
-        _ => (None, None, None, [None; JOINTS]),
+        _ => Joined::default(),
     };
     match control {
         Some(control) => {

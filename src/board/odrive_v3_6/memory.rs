@@ -52,7 +52,7 @@ static BUS: StaticCell<bus::Memory> = StaticCell::new();
 /// What passes between the bus and the others, once.
 #[inline(never)]
 pub fn bus() -> &'static mut bus::Memory {
-    BUS.init_with(bus::Memory::new)
+    bus::Memory::place(BUS.uninit())
 }
 
 /// Whoever keeps what outlives the power, once; `None` where the flash cannot.

@@ -21,14 +21,17 @@ pub struct Found<const N: usize, const B: usize> {
 }
 
 impl<const N: usize, const B: usize> Found<N, B> {
-    /// Before the first identification, or while one is under way.
-    pub const NOTHING: Self = Self {
-        parameters: [[None; PARAMETERS_PER_JOINT]; N],
-        bases: [None; B],
-        fits: [[None; N]; MOTIONS],
-        verdict: None,
-        search: [0; 2],
-    };
+    /// Before the first identification, or while one is under way. No constant: of one the whole image would lie in flash.
+    #[must_use]
+    pub const fn nothing() -> Self {
+        Self {
+            parameters: [[None; PARAMETERS_PER_JOINT]; N],
+            bases: [None; B],
+            fits: [[None; N]; MOTIONS],
+            verdict: None,
+            search: [0; 2],
+        }
+    }
 
     /// Takes everything over; the verdict is given beside the results, which may have been broken off before they had one.
     pub fn take<R: Results>(&mut self, results: &R, verdict: Option<Verdict>) {

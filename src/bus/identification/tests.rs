@@ -101,11 +101,11 @@ fn numbers_are_the_identification_s_and_what_is_unknown_is_no_number() {
 
 #[test]
 fn a_copy_answers_every_object_as_the_original_does() {
-    let mut found = Found::<2, 13>::NOTHING;
+    let mut found = Found::<2, 13>::nothing();
     found.take(&ACCEPTED, ACCEPTED.0);
     let mut forgotten = found.clone();
     forgotten.forget();
-    assert_eq!(forgotten, Found::NOTHING);
+    assert_eq!(forgotten, Found::nothing());
     let mut compared = 0;
     for row in ROWS.iter().filter(|row| (0x2100..0x2140).contains(&row.index)) {
         for object in (row.sub..row.sub + row.subs).map(|sub| Object::at(row.index, sub)) {

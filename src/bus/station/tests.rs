@@ -11,7 +11,7 @@ use crate::units::{Ampere, NewtonMetre};
 mod kept;
 
 /// Nothing was identified.
-const NOTHING: Found<2, 1> = Found::NOTHING;
+const NOTHING: Found<2, 1> = Found::nothing();
 
 /// A leg that does what is ordered, and a host on the wire.
 struct Bench {

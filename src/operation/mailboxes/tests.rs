@@ -10,7 +10,7 @@ use crate::leg::Plan;
 use crate::units::{Ampere, NewtonMetre};
 
 /// Nothing was identified.
-pub(in crate::operation) const NOTHING: Found<2, 1> = Found::NOTHING;
+pub(in crate::operation) const NOTHING: Found<2, 1> = Found::nothing();
 
 pub(in crate::operation) fn station() -> Station<2, 4> {
     let constants = AxisConstants {
