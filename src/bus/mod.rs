@@ -39,7 +39,7 @@ pub use emergency::ErrorReport;
 pub use frame::{Frame, NodeId};
 pub use kept::{KeptNode, LONGEST, kept_bit_rate, kept_entries, kept_node_id, kept_objects, write_kept};
 pub use nmt::{NmtState, Reset};
-pub use node::{Controller, Node, Storing};
+pub use node::{Controller, Heard, Node, Storing};
 pub use objects::{Lost, Objects};
 
 #[cfg(test)]

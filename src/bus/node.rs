@@ -71,6 +71,17 @@ impl Storing {
     }
 }
 
+/// What came of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// It was none of this node's, or a heartbeat in time.
+    Nothing,
+    /// There may be something to say or to do.
+    Something,
+    /// So much begins anew: what was kept of that is to be recalled.
+    Reset(Reset),
+}
+
 /// A node of the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
@@ -103,15 +114,15 @@ impl Node {
         self.communication.state
     }
 
-    /// A frame came. What of the node it had begin anew, if it did: what was kept of that is then to be recalled.
-    pub fn on_frame<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) -> Option<Reset> {
+    /// A frame came.
+    pub fn on_frame<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) -> Heard {
         let node = self.communication.node;
         match frame.id() {
             nmt::COMMAND => {
-                let command = nmt::command(frame.data(), node.number())?;
+                let Some(command) = nmt::command(frame.data(), node.number()) else { return Heard::Nothing };
                 self.obey(command, objects);
                 if let Command::Reset(reset) = command {
-                    return Some(reset);
+                    return Heard::Reset(reset);
                 }
             }
             id if u32::from(id) == self.communication.sync => self.synchronise(frame, objects),
@@ -122,15 +133,20 @@ impl Node {
                 }
             }
             id @ 0x701..=0x77F => {
+                let mut heard = Heard::Nothing;
                 for place in 0..self.communication.consumers.len() {
                     let consumer = self.communication.consumers.get_mut(place);
                     let change = consumer.and_then(|consumer| consumer.heard((id & 0x7F) as u8, now_us));
+                    if change.is_some() {
+                        heard = Heard::Something;
+                    }
                     self.watch(place as u8, change, objects);
                 }
+                return heard;
             }
-            id => self.receive(id, frame, now_us, objects),
+            id => return self.receive(id, frame, now_us, objects),
         }
-        None
+        Heard::Something
     }
 
     /// The next frame to be sent; again until there is none.
@@ -214,7 +230,10 @@ impl Node {
                 if reset == Reset::Node {
                     objects.reset();
                 }
-                *self = Self::new(node, identity);
+                // One that has not spoken since it was reset is as new still.
+                if state != NmtState::Initialising {
+                    *self = Self::new(node, identity);
+                }
             }
         }
     }
@@ -241,13 +260,13 @@ impl Node {
         }
     }
 
-    fn receive<O: Objects>(&mut self, id: u16, frame: &Frame, now_us: u64, objects: &mut O) {
+    fn receive<O: Objects>(&mut self, id: u16, frame: &Frame, now_us: u64, objects: &mut O) -> Heard {
         if self.communication.state != NmtState::Operational {
-            return;
+            return Heard::Nothing;
         }
         let mut found = self.communication.receive.iter_mut().enumerate();
         let Some((place, receive)) = found.find(|(_, pdo)| pdo.parameters.identifier() == Some(id)) else {
-            return;
+            return Heard::Nothing;
         };
         let received = receive.take(frame, now_us);
         // 8210: PDO not processed, too short.
@@ -256,6 +275,7 @@ impl Node {
         if received == Received::Now {
             self.write_received(place, objects);
         }
+        Heard::Something
     }
 
     /// Gives the objects of a received PDO their values; what is refused keeps the one it had.

@@ -21,12 +21,14 @@ use super::communication::Identity;
 use super::drive::{Axis, AxisConstants, BLOCKED, Coupling, HELD};
 use super::frame::{Frame, NodeId};
 use super::identification::{Ask, JointObjects, LegObjects, Results};
-use super::kept::{KeptNode, kept_bit_rate, kept_node_id};
+use super::kept::KeptNode;
 use super::nmt::Reset;
-use super::node::{Controller, Node, Storing};
+use super::node::{Controller, Heard, Node, Storing};
 use crate::leg::{
     Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, Permission, Plan, PowerRequest,
 };
+
+mod keeping;
 
 /// A board that has not looked at its bus for so long stood still.
 const STOOD_US: u64 = 2_000;
@@ -152,64 +154,32 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         }
     }
 
-    /// What a memory holds of a node, as after the start.
-    pub fn recall(&mut self, joint: usize, bytes: &[u8]) {
-        if let Some(kept) = self.kept.get_mut(joint) {
-            *kept = KeptNode::of(bytes);
-        }
-        // The number of one may free another's.
-        self.anew = [Some(Reset::Node); N];
-        self.recall_reset();
-    }
-
-    /// The nodes' numbers with these objects; none where two would have the same.
-    fn numbers(&self, kept: &[KeptNode; N]) -> Option<[NodeId; N]> {
-        let mut numbers = self.own;
-        for (number, kept) in numbers.iter_mut().zip(kept) {
-            *number = kept_node_id(kept.bytes()).unwrap_or(*number);
-        }
-        let is_other = |place: usize, number| numbers.iter().skip(place + 1).all(|other| other != number);
-        numbers.iter().enumerate().all(|(place, number)| is_other(place, number)).then_some(numbers)
-    }
-
-    /// Nodes that were reset begin anew, with what was kept of them.
-    fn recall_reset(&mut self) {
-        if self.anew.iter().all(Option::is_none) {
-            return;
-        }
-        let numbers = self.numbers(&self.kept).unwrap_or(self.own);
-        for (joint, number) in numbers.into_iter().enumerate() {
-            let Some(reset) = self.anew.get_mut(joint).and_then(Option::take) else { continue };
-            let (Some(node), Some(axis), Some(kept)) =
-                (self.nodes.get_mut(joint), self.axes.get_mut(joint), self.kept.get(joint))
-            else {
-                continue;
-            };
-            *node = Node::new(number, self.identity);
-            node.recall(kept.bytes(), reset, axis);
-            node.goes_on(self.controller, self.storing);
-            self.share_bit_rate(joint);
-        }
-    }
-
-    /// The leg has one controller: what a host set at one node holds for all.
-    fn share_bit_rate(&mut self, joint: usize) {
-        let Some(rate) = self.axes.get(joint).map(Axis::bit_rate) else { return };
-        self.axes.iter_mut().for_each(|axis| axis.set_bit_rate(rate));
-    }
-
     /// A frame on the bus, for every node but the one that sent it. What was kept of one that it resets
-    /// comes back with what is asked next, once for any number of frames.
-    pub fn hear<R: Results>(&mut self, frame: &Frame, now_us: u64, sender: Option<usize>, results: &R) {
+    /// comes back with what is asked next, once for any number of frames. Whether a node may have something to say or to do.
+    pub fn hear<R: Results>(
+        &mut self,
+        frame: &Frame,
+        now_us: u64,
+        sender: Option<usize>,
+        results: &R,
+    ) -> bool {
         self.look_back(now_us);
+        let mut concerns = false;
         for joint in (0..N).filter(|joint| Some(*joint) != sender) {
-            let begins =
-                self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects)).flatten();
-            self.share_bit_rate(joint);
-            if let Some(anew) = self.anew.get_mut(joint) {
-                *anew = begins.max(*anew);
+            let heard = self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects));
+            match heard.unwrap_or(Heard::Nothing) {
+                Heard::Nothing => continue,
+                Heard::Something => {}
+                Heard::Reset(reset) => {
+                    if let Some(anew) = self.anew.get_mut(joint) {
+                        *anew = Some(reset).max(*anew);
+                    }
+                }
             }
+            concerns = true;
+            self.share_bit_rate(joint);
         }
+        concerns
     }
 
     /// The next frame that a node has to send; again until there is none. None while the controller is off the bus: what it were given
@@ -325,48 +295,6 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     /// A sample of the leg's log.
     pub fn log(&mut self, logged: &LoggedSample<N>) {
         self.leg.log.push(logged);
-    }
-
-    /// What a host wants kept, once, and each node's objects for the store: until [`Self::stored`] says so nothing of it counts. Neither more
-    /// than fits nor one number for two nodes is kept, and hosts are told (FF01, then 5530).
-    pub fn take_store(&mut self, into: &mut [KeptNode; N]) -> Option<Keeping> {
-        self.recall_reset();
-        let defaults = self.leg.take_store()?;
-        let mut fits = true;
-        for ((node, axis), kept) in self.nodes.iter_mut().zip(&mut self.axes).zip(into.iter_mut()) {
-            *kept = KeptNode::NOTHING;
-            if !defaults {
-                fits &= node.keep_into(axis, kept).is_ok();
-            }
-        }
-        if !fits || self.numbers(into).is_none() {
-            // All of it or nothing; and told again after one that failed before.
-            self.storing(Storing::Busy);
-            self.storing(Storing::Failed);
-            return None;
-        }
-        Some(if defaults { Keeping::Defaults } else { Keeping::All })
-    }
-
-    /// How a store of these objects ended. Only what was done is what a node begins with when it is reset; after one that failed it
-    /// is what it was before.
-    pub fn stored(&mut self, done: bool, objects: &[KeptNode; N]) {
-        if done {
-            self.kept = *objects;
-        }
-        self.storing(if done { Storing::Done } else { Storing::Failed });
-    }
-
-    /// Where the store stands: hosts are told by an emergency message.
-    pub fn storing(&mut self, storing: Storing) {
-        self.storing = storing;
-        self.nodes.iter_mut().for_each(|node| node.on_store(storing));
-    }
-
-    /// The bit rate that is kept, kbit/s.
-    #[must_use]
-    pub fn bit_rate(&self) -> Option<u16> {
-        self.kept.iter().find_map(|kept| kept_bit_rate(kept.bytes()))
     }
 
     /// Models accepted and kept on this board (2100:7).

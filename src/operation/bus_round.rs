@@ -9,12 +9,19 @@
 //! leg          what it told, then its next order; neither while it has not taken the one before, which would be overwritten and a request with it
 //! mailboxes    [`Speaker`]
 //! ```
+//!
+//! **How often.** Each frame raises a round, and a wire that is full of the shortest has 21 thousand a second. Frames that are no node's business end it at
+//! once; the others pay ([`Credit`]). Who is in debt hears nothing; what the leg told is taken all the same.
 
+use super::credit::Credit;
 use super::mailboxes::{Mailboxes, Speaker};
 use crate::bus::identification::Results;
 use crate::bus::station::{Keeping, LegOrder, LegTold, Station};
 use crate::bus::{Controller, Frame, KeptNode, Storing};
 use crate::leg::LoggedSample;
+
+/// Somebody may be missed, whoever says nothing.
+const WATCH_US: u64 = 1000;
 
 /// What is to be kept: on its way to the keeper, and back with what became of it.
 pub struct Keep<const N: usize> {
@@ -36,12 +43,16 @@ impl<const N: usize> Keep<N> {
 
 /// What a round needs of a board. Every method answers at once.
 pub trait BusBoard<const N: usize>: Mailboxes {
+    /// Since the start.
+    fn now_us(&self) -> u64;
     /// How the controller does; a frame that was lost is told once.
     fn status(&mut self) -> Controller;
     /// The next frame that came.
     fn frame(&mut self) -> Option<Frame>;
     /// The next sample of the log.
     fn logged(&mut self) -> Option<LoggedSample<N>>;
+    /// The leg told something.
+    fn is_told(&self) -> bool;
     /// What the leg did, if it told since it was asked.
     fn told(&mut self) -> Option<LegTold<N>>;
     /// The leg has taken the order before.
@@ -69,6 +80,10 @@ pub struct BusRound {
     /// The leg has not been told of what came since.
     due: bool,
     speaker: Speaker,
+    credit: Credit,
+    /// In which mailboxes something waited after the last round that was none for nobody's frames, and when that was.
+    waiting: u32,
+    whole_us: u64,
 }
 
 impl BusRound {
@@ -80,32 +95,63 @@ impl BusRound {
             lasting: Controller::Active,
             due: false,
             speaker: Speaker::new(),
+            credit: Credit::new(),
+            waiting: 0,
+            whole_us: 0,
         }
     }
 
     /// One round; of the frames that came at most `frames`.
     pub fn round<R: Results, const N: usize, const LOG: usize>(
         &mut self,
-        now_us: u64,
         frames: usize,
         station: &mut Station<N, LOG>,
         board: &mut impl BusBoard<N>,
         results: &R,
     ) {
+        let now_us = board.now_us();
+        self.credit.earn(now_us);
+        let may_hear = self.credit.is_left();
+        if !may_hear && !board.is_told() {
+            return;
+        }
         let status = board.status();
-        if status != self.controller {
+        let mut is_whole = status != self.controller;
+        if is_whole {
             self.controller = status;
             station.on_controller(status, results);
-            self.due = true;
         }
         if status != Controller::Overrun {
             self.lasting = status;
         }
         for _ in 0..frames {
+            if !(may_hear && self.credit.goes_on()) {
+                break;
+            }
             let Some(frame) = board.frame() else { break };
-            station.hear(&frame, now_us, None, results);
-            self.due = true;
+            if station.hear(&frame, now_us, None, results) {
+                is_whole = true;
+                self.credit.pay(board.now_us());
+            }
         }
+        self.due |= is_whole;
+        let is_late = now_us.saturating_sub(self.whole_us) >= WATCH_US;
+        if is_whole || is_late || board.is_told() || board.waiting() != self.waiting {
+            self.whole_us = now_us;
+            self.rest(now_us, station, board, results);
+            self.waiting = board.waiting();
+        }
+        self.credit.pay(board.now_us());
+    }
+
+    /// What follows from what was heard and from the time.
+    fn rest<R: Results, const N: usize, const LOG: usize>(
+        &mut self,
+        now_us: u64,
+        station: &mut Station<N, LOG>,
+        board: &mut impl BusBoard<N>,
+        results: &R,
+    ) {
         while let Some(logged) = board.logged() {
             station.log(&logged);
         }

@@ -8,7 +8,7 @@
 //! level 0  CurrentLoops, one tick of one axis: the other axis, contacts, conversion -> interlock -> stage -> bridge
 //! level 1  ServoRound, around the leg's tick: begun or not, checksum, supply, temperature
 //! level 1  HostSide, the same tick: orders of the bus, the operator's hand before them
-//! level 5  BusRound: controller, frames, store, leg, mailboxes
+//! level 5  BusRound: controller, frames, store, leg, mailboxes; Credit: how often
 //! level 6  Housekeeper, 500 rounds per second: contacts -> requests; calibration, reference, reset; registers and temperatures
 //! thread   Storing, when a host asks: what stands around a change of the flash
 //! ```
@@ -24,6 +24,7 @@
 
 mod bus_round;
 mod contacts;
+mod credit;
 mod current;
 mod host_side;
 mod housekeeper;
@@ -34,6 +35,7 @@ mod storing;
 
 pub use bus_round::{BusBoard, BusRound, Keep};
 pub use contacts::{Ask, Operator, RATE_HZ, Situation};
+pub use credit::Credit;
 pub use current::{CurrentBoard, CurrentLoops, Tick};
 pub use host_side::{HostBoard, HostRequest, HostSide};
 pub use housekeeper::{Housekeeper, HousekeepingBoard, HousekeepingSettings};

@@ -222,6 +222,10 @@ impl Mailboxes for Ports {
 }
 
 impl BusBoard<JOINTS> for Ports {
+    fn now_us(&self) -> u64 {
+        (self.wire.now_us)()
+    }
+
     fn status(&mut self) -> Controller {
         (self.wire.status)()
     }
@@ -232,6 +236,10 @@ impl BusBoard<JOINTS> for Ports {
 
     fn logged(&mut self) -> Option<LoggedSample<JOINTS>> {
         self.logged.dequeue()
+    }
+
+    fn is_told(&self) -> bool {
+        self.told.ready()
     }
 
     fn told(&mut self) -> Option<LegTold<JOINTS>> {
@@ -272,12 +280,11 @@ impl BusBoard<JOINTS> for Ports {
 
 impl BusLoop {
     fn run(&mut self) {
-        let now_us = (self.ports.wire.now_us)();
         while let Some(fresh) = self.fresh.dequeue() {
             let _ = self.spare.enqueue(core::mem::replace(&mut self.found, fresh));
         }
         self.found.search = [SEARCH[0].get(), SEARCH[1].get()];
-        self.round.round(now_us, FRAMES, self.station, &mut self.ports, &*self.found);
+        self.round.round(FRAMES, self.station, &mut self.ports, &*self.found);
     }
 }
 

@@ -15,6 +15,8 @@ struct Board {
     /// One was lost since the last round.
     lost: bool,
     frames: VecDeque<Frame>,
+    /// What hearing one takes.
+    frame_us: u64,
     told: Option<LegTold<2>>,
     order: Option<LegOrder<2>>,
     held: bool,
@@ -37,14 +39,22 @@ impl Mailboxes for Board {
 }
 
 impl BusBoard<2> for Board {
+    fn now_us(&self) -> u64 {
+        self.wire.now_us
+    }
     fn status(&mut self) -> Controller {
         if core::mem::take(&mut self.lost) { Controller::Overrun } else { self.status }
     }
     fn frame(&mut self) -> Option<Frame> {
-        self.frames.pop_front()
+        let frame = self.frames.pop_front()?;
+        self.wire.now_us += self.frame_us;
+        Some(frame)
     }
     fn logged(&mut self) -> Option<LoggedSample<2>> {
         None
+    }
+    fn is_told(&self) -> bool {
+        self.told.is_some()
     }
     fn told(&mut self) -> Option<LegTold<2>> {
         self.told.take()
@@ -94,6 +104,7 @@ impl Bench {
             status: Controller::Active,
             lost: false,
             frames: VecDeque::new(),
+            frame_us: 0,
             told: None,
             order: None,
             held: true,
@@ -124,8 +135,7 @@ impl Bench {
             let joint = JointStatus { drive: self.drive, ..JointStatus::NONE };
             self.board.told.get_or_insert(LegTold { joints: [joint; 2], blocked: false, ..LegTold::NONE });
             self.board.wire.now_us += 500;
-            let now_us = self.board.wire.now_us;
-            self.round.round(now_us, 33, &mut self.station, &mut self.board, &NOTHING);
+            self.round.round(33, &mut self.station, &mut self.board, &NOTHING);
             self.board.wire.empty();
         }
     }
@@ -189,8 +199,7 @@ fn a_leg_that_tells_nothing_is_ordered_what_frames_say_and_otherwise_nothing() {
     let quiet = |bench: &mut Bench| {
         bench.board.wire.now_us += 500;
         bench.board.order = None;
-        let now_us = bench.board.wire.now_us;
-        bench.round.round(now_us, 33, &mut bench.station, &mut bench.board, &NOTHING);
+        bench.round.round(33, &mut bench.station, &mut bench.board, &NOTHING);
         bench.board.order
     };
     quiet(&mut bench);
@@ -252,6 +261,70 @@ fn an_open_switch_lets_no_step_towards_enabled_reach_the_leg() {
     bench.board.held = true;
     bench.enable();
     assert_eq!(bench.drive, DriveState::OperationEnabled);
+}
+
+/// A round that nothing but frames raised.
+fn frames_alone(bench: &mut Bench, frames: &[Frame]) -> Option<LegOrder<2>> {
+    bench.board.frames.extend(frames);
+    (bench.board.told, bench.board.order) = (None, None);
+    bench.round.round(33, &mut bench.station, &mut bench.board, &NOTHING);
+    bench.board.order
+}
+
+#[test]
+fn a_frame_that_concerns_nobody_here_is_taken_and_nothing_else_is_done() {
+    let mut bench = Bench::new();
+    bench.enable();
+    for frame in [Frame::new(0x7F0, &[1]), Frame::new(0x205, &[15, 0]), Frame::new(0x605, &[0x40; 8])] {
+        assert_eq!(frames_alone(&mut bench, &[frame]), None, "{frame:?}");
+        assert!(bench.board.frames.is_empty());
+    }
+    for frame in
+        [Frame::new(0x80, &[]), Frame::new(0x201, &[15, 0]), Frame::new(0, &[1, 5]), Frame::new(0, &[1, 1])]
+    {
+        let concerns = frame.data() != [1, 5];
+        assert_eq!(frames_alone(&mut bench, &[frame]).is_some(), concerns, "{frame:?}");
+    }
+    // Somebody may be missed all the same.
+    bench.board.wire.now_us += 1000;
+    bench.send(0x601, &[0x23, 0x16, 0x10, 1, 2, 0, 0x70, 0]);
+    bench.board.frames.push_back(Frame::new(0x770, &[5]));
+    bench.run(1);
+    bench.told();
+    for _ in 0..8 {
+        bench.board.wire.now_us += 500;
+        frames_alone(&mut bench, &[Frame::new(0x7F0, &[])]);
+        bench.board.wire.empty();
+    }
+    assert_eq!(bench.told(), [(0x81, 0x8130)]);
+}
+
+#[test]
+fn frames_that_are_dear_get_half_of_the_time_and_the_leg_is_heard_all_the_same() {
+    let mut bench = Bench::new();
+    bench.enable();
+    bench.board.frame_us = 700;
+    let begin_us = bench.board.wire.now_us;
+    let (mut heard, mut rounds) = (0, 0);
+    while bench.board.wire.now_us < begin_us + 100_000 {
+        bench.board.frames.push_back(Frame::new(0x80, &[]));
+        let before = bench.board.frames.len();
+        bench.run(1);
+        heard += before - bench.board.frames.len();
+        rounds += 1;
+        // Whoever hears nothing is still told and ordered, at every tick.
+        assert!(bench.board.order.is_some() && bench.board.told.is_none());
+    }
+    let share = heard as f64 * 700.0 / 100_000.0;
+    assert!((0.4..0.6).contains(&share), "{share}, {rounds} rounds");
+    // All that came at once are heard, one after the other.
+    bench.board.frames.clear();
+    bench.run(40);
+    bench.board.frames.extend([Frame::new(0x80, &[]); 33]);
+    bench.run(1);
+    assert!((30..33).contains(&bench.board.frames.len()));
+    bench.run(100);
+    assert!(bench.board.frames.is_empty());
 }
 
 #[test]

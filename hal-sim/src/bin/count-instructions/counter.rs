@@ -34,7 +34,7 @@ fn hundred_nops() {
 }
 
 #[expect(unsafe_code, reason = "device register")]
-fn now() -> u32 {
+pub fn now() -> u32 {
     // SAFETY: an aligned register of TIM5, always mapped on this machine; reading it changes nothing.
     unsafe { TIM5_CNT.read_volatile() }
 }

@@ -11,6 +11,7 @@ mod account;
 mod axis_parts;
 mod axis_tick;
 mod bus;
+mod bus_round;
 mod counter;
 mod identification;
 mod leg;
@@ -35,8 +36,9 @@ fn main() -> ! {
             identification::report(&model, &mut account)
         });
         let swarm = swarm::report().and_then(|()| own_objective::report()).and_then(|()| bus::report());
+        let bus = bus_round::report();
         let kept = account.report();
-        axis && search == Some(true) && swarm.is_some() && kept
+        axis && search == Some(true) && swarm.is_some() && bus == Some(true) && kept
     };
     end(kept)
 }

@@ -1,0 +1,205 @@
+//! What a board's round of the bus costs while the wire is full: the interrupt of level 5 without its queues.
+//!
+//! Each frame that comes raises a round, each that has left another one, and every second tick of the servo a third. A wire at 1 Mbit/s carries at most
+//! so many: frames without data have 47 bits, of eight bytes 111, stuffed bits not counted. A round that takes its time is followed by the frames of
+//! that time at once, since it stands below nobody who hears them.
+
+use core::hint::black_box;
+
+use cortex_m_semihosting::hprintln;
+use heapless::Deque;
+
+use scarab::bus::drive::{AxisConstants, Mode};
+use scarab::bus::identification::Found;
+use scarab::bus::station::{LegOrder, LegTold, Station};
+use scarab::bus::{Controller, Frame, Identity, NmtState, NodeId};
+use scarab::leg::{DriveState, JointStatus, LoggedSample, Plan};
+use scarab::operation::{BusBoard, BusRound, Keep, Mailboxes};
+use scarab::units::{Ampere, NewtonMetre};
+
+use crate::account::{CYCLES_PER_INSTRUCTION, PROCESSOR_HZ, percent};
+use crate::counter::{self, Tally, count};
+
+/// Frames of each kind.
+const COUNT: usize = 2000;
+/// Late enough for the boot-up messages.
+const START_US: u64 = 10_000;
+/// The servo tells in every second tick.
+const TOLD_US: u64 = 500;
+/// Of the board's queue.
+const FRAMES: usize = 32;
+/// With it the rest of the firmware keeps a fifth of the processor for its housekeeping and the search.
+const MOST_PERCENT: f32 = 43.0;
+/// While the levels above take a third of the processor.
+const US_PER_INSTRUCTION: f32 = 1e6 / PROCESSOR_HZ * CYCLES_PER_INSTRUCTION / (1.0 - 0.33);
+
+/// Queues of one; what is sent leaves before the next round.
+struct Board {
+    frames: Deque<Frame, FRAMES>,
+    told: Option<LegTold<2>>,
+    sent: u32,
+    bits: u32,
+    lost: u32,
+    /// When the round began, and the counter then.
+    now_us: u64,
+    begun: u32,
+}
+
+/// Bits of a frame on the wire, and of the pause after it.
+fn bits(frame: &Frame) -> u32 {
+    47 + 8 * frame.data().len() as u32
+}
+
+impl Mailboxes for Board {
+    fn waiting(&self) -> u32 {
+        0
+    }
+    fn send(&mut self, _: u32, frame: &Frame) {
+        self.sent += 1;
+        self.bits += bits(frame);
+    }
+    fn give_up(&mut self) {}
+}
+
+impl BusBoard<2> for Board {
+    fn now_us(&self) -> u64 {
+        self.now_us + u64::from((counter::now().wrapping_sub(self.begun) as f32 * US_PER_INSTRUCTION) as u32)
+    }
+    fn status(&mut self) -> Controller {
+        Controller::Active
+    }
+    fn frame(&mut self) -> Option<Frame> {
+        self.frames.pop_front()
+    }
+    fn logged(&mut self) -> Option<LoggedSample<2>> {
+        None
+    }
+    fn is_told(&self) -> bool {
+        self.told.is_some()
+    }
+    fn told(&mut self) -> Option<LegTold<2>> {
+        self.told.take()
+    }
+    fn takes_order(&self) -> bool {
+        true
+    }
+    fn order(&mut self, order: LegOrder<2>) {
+        black_box(order);
+    }
+    fn held(&self) -> bool {
+        true
+    }
+    fn set_hosted(&mut self, hosted: bool) {
+        black_box(hosted);
+    }
+    fn kept(&mut self) -> Option<&Keep<2>> {
+        None
+    }
+    fn lent(&mut self) -> Option<&mut Keep<2>> {
+        None
+    }
+    fn keep(&mut self) {}
+}
+
+struct Bench {
+    station: Station<2, 16>,
+    found: Found<2, 1>,
+    round: BusRound,
+    board: Board,
+    now_us: u64,
+    tally: Tally,
+}
+
+impl Bench {
+    fn new() -> Option<Self> {
+        let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
+        let constants = AxisConstants { rated_torque: NewtonMetre(40.0), rated_current: Ampere(20.0), modes };
+        let own = [NodeId::new(1)?, NodeId::new(2)?];
+        let station = Station::new(own, Identity::scarab(1, "emulated"), [constants; 2], Plan::OneTime, 1);
+        let board =
+            Board { frames: Deque::new(), told: None, sent: 0, bits: 0, lost: 0, now_us: 0, begun: 0 };
+        let (round, tally) = (BusRound::new(), Tally::default());
+        let mut bench = Self { station, found: Found::nothing(), round, board, now_us: START_US, tally };
+        bench.hear(None);
+        bench.hear(Some(Frame::new(0, &[1, 0])));
+        let operational = bench.station.nodes().iter().all(|node| node.state() == NmtState::Operational);
+        operational.then_some(bench)
+    }
+
+    /// One round; whether something was sent.
+    fn hear(&mut self, frame: Option<Frame>) -> bool {
+        self.board.sent = 0;
+        if let Some(frame) = frame {
+            self.board.lost += u32::from(self.board.frames.push_back(frame).is_err());
+        }
+        (self.board.now_us, self.board.begun) = (self.now_us, counter::now());
+        let Self { station, found, round, board, .. } = self;
+        let (instructions, ()) = count(|| round.round(FRAMES, station, board, &*found));
+        self.tally.push(instructions);
+        self.board.sent > 0
+    }
+
+    /// These frames, one after the other, on a wire on which nothing else has room; what is sent raises rounds of its own.
+    fn run(&mut self, name: &str, frames: &[Frame]) -> bool {
+        (self.tally, self.board.bits, self.board.lost) = (Tally::default(), 0, 0);
+        let (begun_us, mut bits_heard, mut half_ms) = (self.now_us, 0, 0);
+        let joint = JointStatus { drive: DriveState::OperationEnabled, ..JointStatus::NONE };
+        let mut number = 0;
+        for frame in frames.iter().cycle().take(COUNT) {
+            bits_heard += bits(frame);
+            self.now_us = begun_us + u64::from(bits_heard + self.board.bits);
+            let mut sends = self.hear(Some(*frame));
+            while sends {
+                self.now_us = begun_us + u64::from(bits_heard + self.board.bits);
+                sends = self.hear(None);
+            }
+            number += 1;
+            if self.now_us / TOLD_US > half_ms {
+                half_ms = self.now_us / TOLD_US;
+                self.board.told =
+                    Some(LegTold { joints: [joint; 2], held: true, blocked: false, ..LegTold::NONE });
+                self.hear(None);
+            }
+        }
+        let seconds = (self.now_us - begun_us) as f32 * 1e-6;
+        let per_second = |count: u32| (count as f32 / seconds) as u32;
+        let share = percent(self.tally.mean(), per_second(self.tally.number()));
+        let kept = share <= MOST_PERCENT && self.board.lost == 0;
+        hprintln!(
+            "{:<40} {:>8} {:>8} {:>6.1}  {}",
+            name,
+            per_second(number),
+            self.tally.most(),
+            share,
+            if kept { "kept" } else { "MISSED" }
+        );
+        kept
+    }
+}
+
+/// Prints the table; whether all bounds are kept, `None` where there is no station.
+#[inline(never)]
+pub fn report() -> Option<bool> {
+    hprintln!(
+        "\nboth nodes on a full wire, goal {} %: frames a second, worst round, share of the processor",
+        MOST_PERCENT
+    );
+    let read = [0x40, 0x41, 0x60, 0, 0, 0, 0, 0];
+    let all = [
+        ("nobody's, without data", Frame::new(0x7F0, &[])),
+        ("nobody's, of eight bytes", Frame::new(0x7F0, &[0; 8])),
+        ("SYNC", Frame::new(0x80, &[])),
+        ("a PDO that is too short", Frame::new(0x301, &[])),
+        ("targets", Frame::new(0x301, &[1, 2, 3, 4])),
+        ("heartbeats", Frame::new(0x770, &[5])),
+        ("network management, operational", Frame::new(0, &[1, 0])),
+        ("network management, reset", Frame::new(0, &[129, 0])),
+        ("SDO, answered", Frame::new(0x601, &read)),
+    ];
+    let mut kept = true;
+    for (name, frame) in all {
+        kept &= Bench::new()?.run(name, &[frame]);
+    }
+    let mixed = [all[2].1, all[4].1, Frame::new(0x302, &[1, 2, 3, 4]), all[8].1];
+    Some(kept & Bench::new()?.run("SYNC, targets, SDO", &mixed))
+}
