@@ -147,7 +147,9 @@ impl Communication {
             (0x1019, _) if matches!(value, 0 | 2..=240) => self.sync_overflow = value as u8,
             (0x1029, _) if value <= 2 => self.on_error = value as u8,
             (0x1005 | 0x1014 | 0x1019 | 0x1029, _) => return Err(Abort::Range),
-            (0x1400..=0x14FF | 0x1800..=0x18FF, 1) if self.is_message(value) => return Err(Abort::Range),
+            (0x1400..=0x14FF | 0x1800..=0x18FF, 1) if self.is_message(object, value) => {
+                return Err(Abort::Range);
+            }
             (0x1400..=0x16FF, _) => {
                 let receive = self.receive.get_mut(pdo).ok_or(Abort::NoObject)?;
                 receive.stop();
@@ -202,9 +204,12 @@ impl Communication {
         all.any(|pdo| pdo.identifier().is_some_and(|own| u32::from(own) == number))
     }
 
-    /// A PDO with this identifier would be a SYNC or an emergency message.
-    const fn is_message(&self, identifier: u32) -> bool {
-        identifier == self.sync || identifier == self.emergency.identifier
+    /// A PDO that has this identifier from now on, with or without bit 30, would be a SYNC, an emergency message, or another PDO that exists.
+    fn is_message(&self, object: Object, identifier: u32) -> bool {
+        let number = identifier & 0x7FF;
+        let own = self.read(object).is_ok_and(|own| own & ABSENT == 0 && own & 0x7FF == number);
+        identifier & ABSENT == 0
+            && (number == self.sync || number == self.emergency.identifier || !own && self.is_pdo(number))
     }
 
     fn received(&self, pdo: usize) -> Result<&Parameters, Abort> {

@@ -66,9 +66,10 @@ impl Consumer {
         core::mem::take(&mut self.lost).then_some(Change::Back)
     }
 
-    /// Nobody could be heard for so long: it is not held against who was not.
-    pub fn wait(&mut self, us: u64) {
-        self.due_us = self.due_us.map(|due| due + us);
+    /// Nobody could be heard until now: it is not held against who was not.
+    pub fn wait(&mut self, now_us: u64) {
+        let time_us = self.time_us();
+        self.due_us = self.due_us.map(|_| now_us + time_us);
     }
 
     /// Time goes on.

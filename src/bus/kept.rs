@@ -147,7 +147,7 @@ impl Node {
         let dictionary = Dictionary { communication: self.communication_mut(), objects };
         let mut length = 0;
         for (object, row) in kept_objects() {
-            let Ok(value) = dictionary.read(object) else { continue };
+            let Ok(value) = dictionary.value(object) else { continue };
             let size = row.kind.size().unwrap_or(4);
             let mask = u32::MAX >> (32 - 8 * u32::from(size));
             if (value ^ default(row, node)) & mask == 0 {

@@ -89,13 +89,20 @@ pub struct Node {
     server: Server,
     /// The PDO that is looked at next, so that none has to wait for ever.
     next_pdo: usize,
+    /// How much of it began anew since it spoke last.
+    anew: Option<Reset>,
 }
 
 impl Node {
     /// Before its boot-up message.
     #[must_use]
     pub fn new(node: NodeId, identity: Identity) -> Self {
-        Self { communication: Communication::new(node, identity), server: Server::IDLE, next_pdo: 0 }
+        Self {
+            communication: Communication::new(node, identity),
+            server: Server::IDLE,
+            next_pdo: 0,
+            anew: None,
+        }
     }
 
     /// Its number.
@@ -119,10 +126,15 @@ impl Node {
         let node = self.communication.node;
         match frame.id() {
             nmt::COMMAND => {
-                let Some(command) = nmt::command(frame.data(), node.number()) else { return Heard::Nothing };
-                self.obey(command, objects);
-                if let Command::Reset(reset) = command {
-                    return Heard::Reset(reset);
+                match nmt::command(frame.data(), node.number()) {
+                    None => return Heard::Nothing,
+                    // One that has not spoken since is as new still.
+                    Some(Command::Reset(reset)) if self.anew >= Some(reset) => return Heard::Nothing,
+                    Some(Command::Reset(reset)) => {
+                        self.obey(Command::Reset(reset), objects);
+                        return Heard::Reset(reset);
+                    }
+                    Some(command) => self.obey(command, objects),
                 }
             }
             id if u32::from(id) == self.communication.sync => self.synchronise(frame, objects),
@@ -154,6 +166,7 @@ impl Node {
         let node = self.communication.node;
         if self.communication.state == NmtState::Initialising {
             self.communication.state = NmtState::PreOperational;
+            self.anew = None;
             return Some(Frame::new(node.on(nmt::HEARTBEAT), &[0]));
         }
         self.look_around(now_us, objects);
@@ -230,10 +243,10 @@ impl Node {
                 if reset == Reset::Node {
                     objects.reset();
                 }
-                // One that has not spoken since it was reset is as new still.
-                if state != NmtState::Initialising {
+                if self.anew.is_none() {
                     *self = Self::new(node, identity);
                 }
+                self.anew = Some(reset);
             }
         }
     }
@@ -340,11 +353,12 @@ impl Node {
         }
     }
 
-    /// The board stood still for so long, as it does while its flash is written, and heard nobody: that is not a host's fault.
-    pub fn stood_still(&mut self, us: u64) {
-        self.communication.consumers.iter_mut().for_each(|consumer| consumer.wait(us));
-        self.communication.receive.iter_mut().for_each(|pdo| pdo.wait(us));
-        self.server.wait(us);
+    /// The board stood still until now, as it does while its flash is written, and heard nobody: that is not a host's fault. Whoever is waited for has
+    /// his whole time again.
+    pub fn stood_still(&mut self, now_us: u64) {
+        self.communication.consumers.iter_mut().for_each(|consumer| consumer.wait(now_us));
+        self.communication.receive.iter_mut().for_each(|pdo| pdo.wait(now_us));
+        self.server.wait(now_us);
     }
 
     fn watch<O: Objects>(&mut self, consumer: u8, change: Option<Change>, objects: &mut O) {

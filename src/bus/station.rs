@@ -174,6 +174,8 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
                     if let Some(anew) = self.anew.get_mut(joint) {
                         *anew = Some(reset).max(*anew);
                     }
+                    concerns = true;
+                    continue;
                 }
             }
             concerns = true;
@@ -199,11 +201,11 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     }
 
     /// A board that stood still heard nobody meanwhile.
-    fn look_back(&mut self, now_us: u64) {
+    pub fn look_back(&mut self, now_us: u64) {
         let since_us = now_us.saturating_sub(self.looked_us);
         self.looked_us = self.looked_us.max(now_us);
         if since_us > STOOD_US {
-            self.nodes.iter_mut().for_each(|node| node.stood_still(since_us));
+            self.nodes.iter_mut().for_each(|node| node.stood_still(now_us));
         }
     }
 

@@ -20,6 +20,8 @@ use crate::bus::station::{Keeping, LegOrder, LegTold, Station};
 use crate::bus::{Controller, Frame, KeptNode, Storing};
 use crate::leg::LoggedSample;
 
+/// Frames that wait excuse who is missed for so long: longer than the deepest debt.
+const BEHIND_US: u64 = 20_000;
 /// Somebody may be missed, whoever says nothing.
 const WATCH_US: u64 = 1000;
 
@@ -84,6 +86,8 @@ pub struct BusRound {
     /// In which mailboxes something waited after the last round that was none for nobody's frames, and when that was.
     waiting: u32,
     whole_us: u64,
+    /// When nobody waited to be heard.
+    watched_us: u64,
 }
 
 impl BusRound {
@@ -98,6 +102,7 @@ impl BusRound {
             credit: Credit::new(),
             waiting: 0,
             whole_us: 0,
+            watched_us: 0,
         }
     }
 
@@ -124,21 +129,28 @@ impl BusRound {
         if status != Controller::Overrun {
             self.lasting = status;
         }
+        let mut is_behind = !may_hear;
         for _ in 0..frames {
-            if !(may_hear && self.credit.goes_on()) {
+            if is_behind {
                 break;
             }
             let Some(frame) = board.frame() else { break };
             if station.hear(&frame, now_us, None, results) {
                 is_whole = true;
                 self.credit.pay(board.now_us());
+                is_behind = !self.credit.goes_on();
             }
         }
+        // Who waits to be heard is not missed yet, unless that lasts.
+        if !is_behind {
+            self.watched_us = now_us;
+        }
+        let is_watching = !is_behind || now_us.saturating_sub(self.watched_us) > BEHIND_US;
         self.due |= is_whole;
         let is_late = now_us.saturating_sub(self.whole_us) >= WATCH_US;
         if is_whole || is_late || board.is_told() || board.waiting() != self.waiting {
             self.whole_us = now_us;
-            self.rest(now_us, station, board, results);
+            self.rest(now_us, is_watching, station, board, results);
             self.waiting = board.waiting();
         }
         self.credit.pay(board.now_us());
@@ -148,6 +160,7 @@ impl BusRound {
     fn rest<R: Results, const N: usize, const LOG: usize>(
         &mut self,
         now_us: u64,
+        is_watching: bool,
         station: &mut Station<N, LOG>,
         board: &mut impl BusBoard<N>,
         results: &R,
@@ -155,7 +168,11 @@ impl BusRound {
         while let Some(logged) = board.logged() {
             station.log(&logged);
         }
-        station.watch(now_us, results);
+        if is_watching {
+            station.watch(now_us, results);
+        } else {
+            station.look_back(now_us);
+        }
         Self::keep(station, board);
         if board.takes_order()
             && let Some(told) = board.told()

@@ -40,9 +40,10 @@ pub struct Speaker {
     first: usize,
     /// Passive; and since when what is in the mailboxes waits there.
     since_us: Option<u64>,
-    /// Of each mailbox, what is told once.
-    given: [Option<Frame>; MAILBOXES],
-    /// What was given up and is to be told all the same.
+    /// Of each mailbox, what is told once, and how many of these were given before.
+    given: [Option<(u32, Frame)>; MAILBOXES],
+    count: u32,
+    /// What was given up and is to be told all the same, the oldest first.
     again: [Option<Frame>; MAILBOXES],
 }
 
@@ -50,7 +51,7 @@ impl Speaker {
     /// Nobody has spoken.
     #[must_use]
     pub const fn new() -> Self {
-        Self { first: 0, since_us: None, given: [None; MAILBOXES], again: [None; MAILBOXES] }
+        Self { first: 0, since_us: None, given: [None; MAILBOXES], count: 0, again: [None; MAILBOXES] }
     }
 
     /// What leaves in this round, of a controller in a state that lasts.
@@ -77,11 +78,7 @@ impl Speaker {
         if controller == Controller::Off || is_old {
             mailboxes.give_up();
             self.since_us = None;
-            for given in &mut self.given {
-                if let Some(free) = self.again.iter_mut().find(|again| again.is_none()) {
-                    *free = given.take();
-                }
-            }
+            self.take_back();
             return;
         }
         let places = match controller {
@@ -93,9 +90,26 @@ impl Speaker {
             let Some(frame) = self.next(now_us, station, results) else { break };
             mailboxes.send(place as u32, &frame);
             if let Some(given) = self.given.get_mut(place) {
-                *given = Some(frame).filter(|frame| station.tells_once(frame));
+                *given = station.tells_once(&frame).then_some((self.count, frame));
+                self.count = self.count.wrapping_add(1);
             }
         }
+    }
+
+    /// What was given is to be given again, in its order, before what waits for that already.
+    fn take_back(&mut self) {
+        let mut back = [None; MAILBOXES];
+        let mut places = back.iter_mut();
+        for _ in 0..MAILBOXES {
+            let oldest = self.given.iter_mut().filter(|given| given.is_some());
+            let oldest = oldest.min_by_key(|given| given.map(|(number, _)| number)).and_then(Option::take);
+            let next = oldest.map(|(_, frame)| frame);
+            let next = next.or_else(|| self.again.iter_mut().find_map(Option::take));
+            if let Some(place) = places.next() {
+                *place = next;
+            }
+        }
+        self.again = back;
     }
 
     /// The next frame, of each node in turn; the others hear it, since the controller does not hear itself.

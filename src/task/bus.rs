@@ -1,7 +1,7 @@
 //! Level 5: queues and the controller beneath `operation::BusRound`, run whenever frames came, a mailbox is empty, or the servo has ticked.
 //!
-//! Why its own level and no executor: a poll takes 0.6 thousand instructions and a frame up to 2.4, which any level below the servo could give; but a
-//! block that is sent again takes 78 thousand in one call (0.6 ms), so it stands below the level that empties the controller's queue of three
+//! Why its own level and no executor: a poll takes 0.8 thousand instructions and a frame up to 2.4, which any level below the servo could give; but a
+//! block that is sent again takes 81 thousand in one call (0.6 ms), and a reset that recalls full records 219 thousand, so it stands below the level that empties the controller's queue of three
 //! frames, and above the housekeeping, whose rounds of 2 ms wait that long for nothing. Nobody waits here, so there is
 //! nothing for an executor to do.
 //!

@@ -9,7 +9,7 @@
 //! | 4 | CAN1_RX0 | frames out of the controller's queue of three into one of thirty-two |
 //! | 5 | CAN1_TX | a mailbox is empty; also pended by the former and by the servo: `task::bus` |
 //!
-//! Three frames of the shortest kind take 141 us at 1 Mbit/s; a block that is sent again keeps level 5 busy for 0.6 ms. So the
+//! Three frames of the shortest kind take 141 us at 1 Mbit/s; a reset that recalls full records keeps level 5 busy for 1.8 ms. So the
 //! queue is emptied above it.
 
 use core::sync::atomic::{AtomicBool, Ordering};

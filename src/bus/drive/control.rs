@@ -67,6 +67,9 @@ pub(super) struct Settings {
     pub bit_rate: u16,
 }
 
+/// Bit rate of a board of which nothing else is kept, kbit/s.
+pub(in crate::bus) const USUAL_KBIT: u16 = 1000;
+
 impl Settings {
     /// As after the start.
     pub const NEW: Self = Self {
@@ -96,7 +99,7 @@ impl Settings {
         target_velocity: 0,
         feedforward: false,
         node_id: 0,
-        bit_rate: 1000,
+        bit_rate: USUAL_KBIT,
     };
 }
 

@@ -19,6 +19,7 @@ mod objects;
 mod status;
 
 pub use crate::leg::{JointCommand, JointStatus, Mode, SetPoint, Target};
+pub(super) use control::USUAL_KBIT;
 pub use control::{Axis, AxisConstants};
 pub use coupling::Coupling;
 

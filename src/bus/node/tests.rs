@@ -50,6 +50,12 @@ fn sync_and_emergency_take_no_identifier_that_would_lock_somebody_out() {
         assert_eq!(board.write(pdo, 1, 1 << 31, 4), Ok(()));
         assert_eq!((board.write(pdo, 1, 0x300, 4), board.write(pdo, 1, 0x310, 4)), (range, range));
     }
+    // With bit 30 (no RTR) it is the same identifier, and another PDO's is taken as well.
+    assert_eq!(board.write(0x1401, 1, 1 << 31, 4), Ok(()));
+    for taken in [0x4000_0300, 0x4000_0310, 0x401, 0x4000_0401, 0x281] {
+        assert_eq!(board.write(0x1401, 1, taken, 4), range, "{taken:x}");
+    }
+    assert_eq!((board.write(0x1401, 1, 0x4000_0301, 4), board.write(0x1401, 1, 0x301, 4)), (Ok(()), Ok(())));
     // A PDO that is switched off gives its own back, and so does a message that is not.
     assert_eq!(
         (board.write(0x1005, 0, 0x201, 4), board.write(0x1014, 0, 1 << 31 | 0x310, 4)),

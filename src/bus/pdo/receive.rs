@@ -39,7 +39,7 @@ impl Receive {
         for (place, byte) in self.data.iter_mut().zip(frame.data()) {
             *place = *byte;
         }
-        let event_us = 1000 * u64::from(self.parameters.event_ms);
+        let event_us = self.event_us();
         self.due_us = (event_us > 0).then_some(now_us + event_us);
         self.waits = self.parameters.is_synchronous();
         if self.waits { Received::AtSync } else { Received::Now }
@@ -55,9 +55,14 @@ impl Receive {
         self.due_us.take_if(|due| now_us > *due).is_some()
     }
 
-    /// Nobody could be heard for so long.
-    pub fn wait(&mut self, us: u64) {
-        self.due_us = self.due_us.map(|due| due + us);
+    /// Nobody could be heard until now.
+    pub fn wait(&mut self, now_us: u64) {
+        let event_us = self.event_us();
+        self.due_us = self.due_us.map(|_| now_us + event_us);
+    }
+
+    fn event_us(&self) -> u64 {
+        1000 * u64::from(self.parameters.event_ms)
     }
 
     /// What waited or was watched is forgotten.

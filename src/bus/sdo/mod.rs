@@ -183,9 +183,9 @@ impl Server {
         };
     }
 
-    /// Nobody could be heard for so long: it is not held against a client.
-    pub fn wait(&mut self, us: u64) {
-        self.due_us += us;
+    /// Nobody could be heard until now: it is not held against a client.
+    pub fn wait(&mut self, now_us: u64) {
+        self.due_us = now_us + TIMEOUT_US;
     }
 
     /// The next answer: one that waits, the next segment of a block, or that the client has gone.

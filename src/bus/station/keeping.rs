@@ -1,7 +1,7 @@
 //! What of a board's nodes outlives power and reset: what a host wants kept, how that ended, and what a node begins with.
 
 use super::{Keeping, Station};
-use crate::bus::drive::Axis;
+use crate::bus::drive::{Axis, USUAL_KBIT};
 use crate::bus::frame::NodeId;
 use crate::bus::kept::{KeptNode, kept_bit_rate, kept_node_id};
 use crate::bus::nmt::{NmtState, Reset};
@@ -47,7 +47,11 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
             }
             node.recall(kept.bytes(), reset, axis);
             node.goes_on(self.controller, self.storing);
-            self.share_bit_rate(joint);
+            if reset == Reset::Node {
+                // What one of them keeps holds for all, and what nobody keeps is as after the start.
+                let rate = self.bit_rate().unwrap_or(USUAL_KBIT);
+                self.axes.iter_mut().for_each(|axis| axis.set_bit_rate(rate));
+            }
         }
     }
 
@@ -84,6 +88,8 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         if done {
             self.kept = *objects;
         }
+        // While the flash was written nobody was heard, and on a board no time passed.
+        self.nodes.iter_mut().for_each(|node| node.stood_still(self.looked_us));
         self.storing(if done { Storing::Done } else { Storing::Failed });
     }
 

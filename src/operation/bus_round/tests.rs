@@ -8,6 +8,8 @@ use super::*;
 use crate::bus::station::LegRequest;
 use crate::leg::{DriveEvent, DriveState, JointStatus, PowerRequest};
 
+mod flood;
+
 /// Queues of one, as the board's.
 struct Board {
     wire: Wire,
@@ -261,70 +263,6 @@ fn an_open_switch_lets_no_step_towards_enabled_reach_the_leg() {
     bench.board.held = true;
     bench.enable();
     assert_eq!(bench.drive, DriveState::OperationEnabled);
-}
-
-/// A round that nothing but frames raised.
-fn frames_alone(bench: &mut Bench, frames: &[Frame]) -> Option<LegOrder<2>> {
-    bench.board.frames.extend(frames);
-    (bench.board.told, bench.board.order) = (None, None);
-    bench.round.round(33, &mut bench.station, &mut bench.board, &NOTHING);
-    bench.board.order
-}
-
-#[test]
-fn a_frame_that_concerns_nobody_here_is_taken_and_nothing_else_is_done() {
-    let mut bench = Bench::new();
-    bench.enable();
-    for frame in [Frame::new(0x7F0, &[1]), Frame::new(0x205, &[15, 0]), Frame::new(0x605, &[0x40; 8])] {
-        assert_eq!(frames_alone(&mut bench, &[frame]), None, "{frame:?}");
-        assert!(bench.board.frames.is_empty());
-    }
-    for frame in
-        [Frame::new(0x80, &[]), Frame::new(0x201, &[15, 0]), Frame::new(0, &[1, 5]), Frame::new(0, &[1, 1])]
-    {
-        let concerns = frame.data() != [1, 5];
-        assert_eq!(frames_alone(&mut bench, &[frame]).is_some(), concerns, "{frame:?}");
-    }
-    // Somebody may be missed all the same.
-    bench.board.wire.now_us += 1000;
-    bench.send(0x601, &[0x23, 0x16, 0x10, 1, 2, 0, 0x70, 0]);
-    bench.board.frames.push_back(Frame::new(0x770, &[5]));
-    bench.run(1);
-    bench.told();
-    for _ in 0..8 {
-        bench.board.wire.now_us += 500;
-        frames_alone(&mut bench, &[Frame::new(0x7F0, &[])]);
-        bench.board.wire.empty();
-    }
-    assert_eq!(bench.told(), [(0x81, 0x8130)]);
-}
-
-#[test]
-fn frames_that_are_dear_get_half_of_the_time_and_the_leg_is_heard_all_the_same() {
-    let mut bench = Bench::new();
-    bench.enable();
-    bench.board.frame_us = 700;
-    let begin_us = bench.board.wire.now_us;
-    let (mut heard, mut rounds) = (0, 0);
-    while bench.board.wire.now_us < begin_us + 100_000 {
-        bench.board.frames.push_back(Frame::new(0x80, &[]));
-        let before = bench.board.frames.len();
-        bench.run(1);
-        heard += before - bench.board.frames.len();
-        rounds += 1;
-        // Whoever hears nothing is still told and ordered, at every tick.
-        assert!(bench.board.order.is_some() && bench.board.told.is_none());
-    }
-    let share = heard as f64 * 700.0 / 100_000.0;
-    assert!((0.4..0.6).contains(&share), "{share}, {rounds} rounds");
-    // All that came at once are heard, one after the other.
-    bench.board.frames.clear();
-    bench.run(40);
-    bench.board.frames.extend([Frame::new(0x80, &[]); 33]);
-    bench.run(1);
-    assert!((30..33).contains(&bench.board.frames.len()));
-    bench.run(100);
-    assert!(bench.board.frames.is_empty());
 }
 
 #[test]

@@ -241,3 +241,29 @@ fn an_emergency_message_with_another_identifier_is_told_as_well() {
     bench.run(20);
     assert_eq!(bench.leaving(0x310).count(), 1);
 }
+
+#[test]
+fn what_is_told_again_is_told_in_its_order_whatever_mailboxes_it_was_in() {
+    let mut bench = Bench::new();
+    bench.wire.unplugged = true;
+    bench.run(1);
+    bench.wire.waiting.truncate(2);
+    // An error in the last mailbox; its end in the first, which is free by then.
+    bench.station.storing(crate::bus::Storing::Busy);
+    bench.run(1);
+    assert_eq!(bench.wire.waiting.last().map(|(mailbox, _, _)| *mailbox), Some(2));
+    bench.wire.waiting.remove(0);
+    bench.run(1);
+    bench.wire.waiting.remove(0);
+    bench.station.storing(crate::bus::Storing::Done);
+    bench.run(1);
+    bench.set(Controller::Passive, true);
+    bench.run(60);
+    bench.wire.unplugged = false;
+    bench.run(20);
+    for node in [1, 2] {
+        let told = bench.told(node);
+        let told: Vec<u16> = told.into_iter().filter(|code| *code != 0x8120).collect();
+        assert_eq!(told, [0xFF01, 0], "{node}");
+    }
+}

@@ -165,6 +165,19 @@ fn the_bit_rate_is_one_for_both_nodes() {
     let (_, kept) = bench.store(true).expect("something to keep");
     assert_eq!((bench.station.bit_rate(), bench.read(2, 0x2002)), (None, 1000));
     assert_eq!(kept, [KeptNode::NOTHING; 2]);
+    // Kept of one node alone, as before it was one object, or by a tool: it holds for both, and outlives either's reset.
+    let mut bytes = [0; 8];
+    let rate = crate::bus::dictionary::Object::at(0x2002, 0);
+    let length = crate::bus::write_kept(rate, 500, &mut bytes).expect("it fits");
+    for joint in 0..2 {
+        let mut other = Bench::new();
+        other.station.recall(joint, &bytes[..length]);
+        other.run(4);
+        for node in [1, 2] {
+            other.send(0, &[129, node]);
+            assert_eq!((other.read(1, 0x2002), other.read(2, 0x2002)), (500, 500), "{joint} {node}");
+        }
+    }
     // Written and not kept, it ends with either node.
     bench.write(1, 0x2002, 0, 250, 2);
     bench.send(0, &[129, 2]);
@@ -227,6 +240,24 @@ fn a_host_is_not_missed_for_the_time_in_which_the_board_stood_still() {
             break;
         }
     }
-    // Its own time is what it was.
+    // It has its whole time again, and no more.
     assert!(missed_after_ms.is_some_and(|ms| (90..=102).contains(&ms)), "{missed_after_ms:?}");
+}
+
+#[test]
+fn whoever_was_silent_while_something_was_stored_has_all_of_his_time_again() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x1016, 1, 0x70 << 16 | 100, 4);
+    bench.save(1);
+    let mut objects = [KeptNode::NOTHING; 2];
+    bench.send(0x770, &[5]);
+    bench.run(320);
+    assert!(bench.station.take_store(&mut objects).is_some());
+    // On a board time stands meanwhile, and the heartbeat that came then is lost.
+    bench.station.stored(true, &objects);
+    bench.run(8);
+    bench.station.watch(bench.now_us, &NOTHING);
+    let codes = codes_of(&bench.run(320));
+    assert!(codes.iter().all(|(_, code)| *code != 0x8130), "{codes:x?}");
+    assert!(codes_of(&bench.run(100)).contains(&(0x81, 0x8130)));
 }

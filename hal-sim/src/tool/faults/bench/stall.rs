@@ -105,7 +105,7 @@ fn stalled(mut fork: Fork<'_>, erases: bool, blind: bool) -> Result<Outcome, Too
     // What the host sent while the processor stood may have been lost, which it is told; nothing else.
     let tells = told.iter().all(|codes| {
         let first = codes.strip_prefix(&[STORING]);
-        first.is_some_and(|rest| rest == [CLEAR] || rest == [LOST, CLEAR, CLEAR] || rest == [LOST, CLEAR])
+        first.is_some_and(|rest| rest == [CLEAR] || rest == [LOST, CLEAR, CLEAR])
     });
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     let calm = alarm.is_none() && !fork.host.rig().is_restarted();
