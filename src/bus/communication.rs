@@ -2,7 +2,7 @@
 
 use super::abort::Abort;
 use super::dictionary::{Mapping, Object};
-use super::emergency::Emergency;
+use super::emergency::{Emergency, Source};
 use super::frame::NodeId;
 use super::heartbeat::{Clock, Consumer, WATCHED};
 use super::nmt::NmtState;
@@ -141,7 +141,10 @@ impl Communication {
             (0x1014, _) if self.may_be_emergency(value) => self.emergency.identifier = value,
             (0x1015, _) => self.emergency.inhibit = value as u16,
             (0x1016, 1..) => {
-                return self.consumers.get_mut(usize::from(sub) - 1).ok_or(Abort::NoSubindex)?.set(value);
+                let place = sub - 1;
+                self.consumers.get_mut(usize::from(place)).ok_or(Abort::NoSubindex)?.set(value)?;
+                // Watched anew, nobody is missed.
+                self.emergency.set(Source::Heartbeat(place), None);
             }
             (0x1017, _) => (self.heartbeat_ms, self.heartbeat) = (value as u16, Clock::NEW),
             (0x1019, _) if matches!(value, 0 | 2..=240) => self.sync_overflow = value as u8,
@@ -153,6 +156,7 @@ impl Communication {
             (0x1400..=0x16FF, _) => {
                 let receive = self.receive.get_mut(pdo).ok_or(Abort::NoObject)?;
                 receive.stop();
+                self.emergency.set(Source::Receive(pdo as u8), None);
                 let parameters = &mut receive.parameters;
                 return if index < 0x1600 {
                     parameters.set_communication(sub, value)

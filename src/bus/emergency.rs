@@ -12,6 +12,7 @@
 
 use super::abort::Abort;
 use super::frame::Frame;
+use super::pdo::PDOS;
 
 /// Entries of the history.
 pub const HISTORY: usize = 8;
@@ -24,15 +25,15 @@ pub enum Source {
     Drive,
     /// The first or second heartbeat that is watched.
     Heartbeat(u8),
-    /// What is received as PDO.
-    Receive,
+    /// What is received as a PDO.
+    Receive(u8),
     /// The controller of the bus.
     Controller,
     /// What is kept over the power.
     Store,
 }
 
-const SOURCES: usize = 6;
+const SOURCES: usize = 5 + PDOS;
 
 impl Source {
     const fn place(self) -> usize {
@@ -40,9 +41,9 @@ impl Source {
             Self::Drive => 0,
             Self::Heartbeat(0) => 1,
             Self::Heartbeat(_) => 2,
-            Self::Receive => 3,
-            Self::Controller => 4,
-            Self::Store => 5,
+            Self::Controller => 3,
+            Self::Store => 4,
+            Self::Receive(pdo) => 5 + pdo as usize,
         }
     }
 }

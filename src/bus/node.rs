@@ -284,7 +284,7 @@ impl Node {
         let received = receive.take(frame, now_us);
         // 8210: PDO not processed, too short.
         let error = (received == Received::TooShort).then_some(ErrorReport::code(0x8210));
-        self.communication.emergency.set(Source::Receive, error);
+        self.communication.emergency.set(Source::Receive(place as u8), error);
         if received == Received::Now {
             self.write_received(place, objects);
         }
@@ -347,7 +347,9 @@ impl Node {
         for place in 0..PDOS {
             if self.communication.receive.get_mut(place).is_some_and(|pdo| pdo.is_missed(now_us)) {
                 // 8250: RPDO timeout.
-                self.communication.emergency.set(Source::Receive, Some(ErrorReport::code(0x8250)));
+                self.communication
+                    .emergency
+                    .set(Source::Receive(place as u8), Some(ErrorReport::code(0x8250)));
                 self.fail(Lost::ReceivedPdo, objects);
             }
         }

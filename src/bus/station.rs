@@ -18,7 +18,7 @@
 //! Cost: two polls of a node and one copy of the leg's values; docs/bus.md. Memory: docs/bus.md.
 
 use super::communication::Identity;
-use super::drive::{Axis, AxisConstants, BLOCKED, Coupling, HELD};
+use super::drive::{Axis, AxisConstants, BLOCKED, Coupling, HELD, RESTS};
 use super::frame::{Frame, NodeId};
 use super::identification::{Ask, JointObjects, LegObjects, Results};
 use super::kept::KeptNode;
@@ -48,6 +48,8 @@ pub struct LegTold<const N: usize> {
     pub held: bool,
     /// Something forbids to enable.
     pub blocked: bool,
+    /// The leg is not calibrated or has no reference: it does not tick.
+    pub rests: bool,
 }
 
 impl<const N: usize> LegTold<N> {
@@ -59,6 +61,7 @@ impl<const N: usize> LegTold<N> {
         refused: false,
         held: false,
         blocked: true,
+        rests: true,
     };
 }
 
@@ -242,7 +245,8 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     /// What the leg tells of a tick; what it is asked then has to be taken by [`Self::order`] before the next.
     pub fn told(&mut self, told: &LegTold<N>) {
         let drive = told.joints.first().map_or(DriveState::NotReadyToSwitchOn, |joint| joint.drive);
-        let inputs = (u32::from(told.held) * HELD) | (u32::from(told.blocked) * BLOCKED);
+        let bit = |is_set: bool, bit: u32| u32::from(is_set) * bit;
+        let inputs = bit(told.held, HELD) | bit(told.blocked, BLOCKED) | bit(told.rests, RESTS);
         for (axis, status) in self.axes.iter_mut().zip(&told.joints) {
             axis.update(&JointStatus { inputs, ..*status });
         }
@@ -262,7 +266,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
             Some(_) => None,
         };
         self.request = match (power, asked) {
-            (Some(power), _) if power.enables() && (told.blocked || !told.held) => {
+            (Some(power), _) if power.enables() && (told.blocked || told.rests || !told.held) => {
                 self.refused = true;
                 None
             }

@@ -114,7 +114,7 @@ impl<P: HostBoard<N>, const N: usize> HostSide<P, N> {
         self.refused |= refused;
         if self.is_due() {
             let (refused, blocked) = (core::mem::take(&mut self.refused), !self.board.is_clear());
-            self.board.tell(LegTold { refused, blocked, ..tell() });
+            self.board.tell(LegTold { refused, blocked, rests: false, ..tell() });
         }
     }
 

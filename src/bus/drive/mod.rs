@@ -27,6 +27,8 @@ pub use coupling::Coupling;
 pub(super) const HELD: u32 = 1 << 16;
 /// Something forbids to enable.
 pub(super) const BLOCKED: u32 = 1 << 17;
+/// The leg is not calibrated or has no reference.
+pub(super) const RESTS: u32 = 1 << 18;
 
 #[cfg(test)]
 mod tests;

@@ -180,3 +180,42 @@ fn what_the_controller_tells_becomes_an_emergency_message() {
         assert_eq!((frame.id(), &frame.data()[..2]), (0x89, &code.to_le_bytes()[..]), "{told:?}");
     }
 }
+
+/// Codes of the first node's emergency messages among these.
+fn codes(frames: &[Frame]) -> std::vec::Vec<u16> {
+    let told = frames.iter().filter(|frame| frame.id() == 0x81);
+    told.map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect()
+}
+
+#[test]
+fn an_error_of_a_heartbeat_that_is_watched_anew_is_over_and_the_next_is_told() {
+    let mut board = started();
+    assert_eq!(board.write(0x1029, 1, 1, 1), Ok(()));
+    for _ in 0..3 {
+        assert_eq!(board.write(0x1016, 1, 80 << 16 | 10, 4), Ok(()));
+        board.hear(0x750, &[5]);
+        board.frames();
+        board.now_us += 20_000;
+        assert_eq!(codes(&board.frames()), [0x8130]);
+        assert_eq!(board.write(0x1016, 1, 0, 4), Ok(()));
+        assert_eq!(board.read(0x1001, 0), Ok(0));
+        board.frames();
+    }
+}
+
+#[test]
+fn an_error_of_one_pdo_is_not_over_with_another_that_comes() {
+    let mut board = started();
+    for (object, value) in [(0x1400, 100), (0x1401, 0)] {
+        assert_eq!(board.write(object, 5, value, 2), Ok(()));
+    }
+    assert_eq!(board.write(0x1029, 1, 1, 1), Ok(()));
+    board.hear(0x201, &[0, 0]);
+    board.frames();
+    board.now_us += 101_000;
+    assert_eq!(codes(&board.frames()), [0x8250]);
+    board.hear(0x301, &[0; 4]);
+    assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), (std::vec::Vec::new(), Ok(0x11)));
+    board.hear(0x201, &[0, 0]);
+    assert_eq!((codes(&board.frames()), board.read(0x1001, 0)), ([0].into(), Ok(0)));
+}

@@ -28,6 +28,8 @@ pub const MAPPED: usize = 8;
 /// Of an identifier: there is no such message.
 pub(super) const ABSENT: u32 = 1 << 31;
 const EXTENDED: u32 = 1 << 29;
+/// Bits of an identifier that only extended ones have.
+const BEYOND: u32 = 0x1FFF_F800;
 
 /// Whether a host may give this identifier to a message: the ones that network management, SYNC, emergency messages, SDO and heartbeat
 /// have by CiA 301 are nobody's.
@@ -138,7 +140,7 @@ impl Parameters {
         let number = value & 0x7FF;
         let exists = value & ABSENT == 0;
         let changes = self.identifier().is_some_and(|own| u32::from(own) != number);
-        if value & EXTENDED != 0 || exists && (!is_assignable(number) || changes) {
+        if value & (EXTENDED | BEYOND) != 0 || exists && (!is_assignable(number) || changes) {
             return Err(Abort::Range);
         }
         self.identifier = value;

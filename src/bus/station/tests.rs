@@ -19,6 +19,7 @@ struct Bench {
     drive: DriveState,
     held: bool,
     blocked: bool,
+    rests: bool,
     now_us: u64,
     orders: Vec<LegOrder<2>>,
 }
@@ -37,6 +38,7 @@ impl Bench {
             drive: DriveState::SwitchOnDisabled,
             held: true,
             blocked: false,
+            rests: false,
             now_us: 0,
             orders: Vec::new(),
         };
@@ -52,7 +54,13 @@ impl Bench {
             self.drive = self.drive.after(crate::leg::DriveEvent::Tick, 4);
             let joint = JointStatus { drive: self.drive, ..JointStatus::NONE };
             let (held, blocked) = (self.held, self.blocked);
-            self.station.told(&LegTold { joints: [joint; 2], held, blocked, ..LegTold::NONE });
+            self.station.told(&LegTold {
+                joints: [joint; 2],
+                held,
+                blocked,
+                rests: self.rests,
+                ..LegTold::NONE
+            });
             let order = self.station.order();
             if let Some(LegRequest::Power(power)) = order.request {
                 self.drive = self.drive.after(crate::leg::DriveEvent::Asked(power), 4);
@@ -329,4 +337,20 @@ fn frames_that_were_lost_stop_a_hosts_leg_as_a_lost_bus_does_and_no_one_elses() 
     bench.station.on_controller(Controller::Overrun, &NOTHING);
     bench.run(40);
     assert_eq!(bench.drive, DriveState::OperationEnabled);
+}
+
+#[test]
+fn a_leg_without_a_reference_is_not_enabled_and_says_why() {
+    let mut bench = Bench::new();
+    bench.rests = true;
+    bench.enable();
+    assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
+    assert_eq!(bench.read(1, 0x60FD) >> 16, 0b101);
+    assert_ne!(bench.read(1, 0x6041) & 0x6F, 0x27);
+    // What is kept has nothing to do with it.
+    bench.save(1);
+    assert!(bench.store(true).is_some());
+    bench.rests = false;
+    bench.enable();
+    assert_eq!((bench.drive, bench.read(1, 0x60FD) >> 16), (DriveState::OperationEnabled, 0b001));
 }

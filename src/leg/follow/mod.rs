@@ -117,13 +117,18 @@ impl<const N: usize> Following<N> {
     /// What came of the servo's tick.
     pub fn measure(&mut self, output: &ServoOutput<N>) {
         for joint in 0..N {
-            let anatomy = &self.anatomy[joint];
-            self.measured[joint] = Measured {
-                position: Radian(anatomy.angle_from_chain(output.position[joint].0)),
-                velocity: RadianPerSecond(anatomy.from_chain(output.velocity[joint].0)),
-                torque: NewtonMetre(anatomy.from_chain(output.decision.torque[joint].0)),
-            };
+            self.measured[joint] = self.measured(joint, output).unwrap_or_default();
         }
+    }
+
+    /// A joint as the servo has it, whoever commands.
+    fn measured(&self, joint: usize, output: &ServoOutput<N>) -> Option<Measured> {
+        let anatomy = self.anatomy.get(joint)?;
+        Some(Measured {
+            position: Radian(anatomy.angle_from_chain(output.position.get(joint)?.0)),
+            velocity: RadianPerSecond(anatomy.from_chain(output.velocity.get(joint)?.0)),
+            torque: NewtonMetre(anatomy.from_chain(output.decision.torque.get(joint)?.0)),
+        })
     }
 
     /// One tick of all joints.
@@ -169,7 +174,7 @@ impl<const N: usize> Following<N> {
         output: &ControlOutput<N>,
     ) -> Option<JointStatus> {
         let (follower, anatomy) = (self.joints.get(joint)?, self.anatomy.get(joint)?);
-        let measured = self.measured.get(joint)?;
+        let measured = self.measured(joint, &output.servo)?;
         let decision = &output.servo.decision;
         Some(JointStatus {
             drive: decision.state,

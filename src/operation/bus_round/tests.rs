@@ -135,7 +135,12 @@ impl Bench {
             }
             self.drive = self.drive.after(DriveEvent::Tick, 4);
             let joint = JointStatus { drive: self.drive, ..JointStatus::NONE };
-            self.board.told.get_or_insert(LegTold { joints: [joint; 2], blocked: false, ..LegTold::NONE });
+            self.board.told.get_or_insert(LegTold {
+                joints: [joint; 2],
+                blocked: false,
+                rests: false,
+                ..LegTold::NONE
+            });
             self.board.wire.now_us += 500;
             self.round.round(33, &mut self.station, &mut self.board, &NOTHING);
             self.board.wire.empty();

@@ -48,7 +48,7 @@ fn commanded() -> [JointCommand; 2] {
     station.hear(&Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 6, 0, 0, 0]), 0, None, &NOTHING);
     assert!(station.poll(0, 0, &NOTHING).is_some());
     let joint = JointStatus { drive: DriveState::SwitchOnDisabled, ..JointStatus::NONE };
-    station.told(&LegTold { joints: [joint; 2], ..LegTold::NONE });
+    station.told(&LegTold { joints: [joint; 2], rests: false, ..LegTold::NONE });
     station.order().commands.expect("a host")
 }
 

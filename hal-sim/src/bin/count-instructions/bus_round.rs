@@ -171,8 +171,13 @@ impl Bench {
             number += 1;
             if self.now_us / TOLD_US > half_ms {
                 half_ms = self.now_us / TOLD_US;
-                self.board.told =
-                    Some(LegTold { joints: [joint; 2], held: true, blocked: false, ..LegTold::NONE });
+                self.board.told = Some(LegTold {
+                    joints: [joint; 2],
+                    held: true,
+                    blocked: false,
+                    rests: false,
+                    ..LegTold::NONE
+                });
                 self.hear(None);
             }
         }

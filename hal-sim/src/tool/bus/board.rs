@@ -233,6 +233,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
             refused: output.is_some_and(|output| output.servo.decision.refused.is_some()),
             held: self.rig.hand.enabling,
             blocked: self.rig.causes() != 0,
+            rests: output.is_none(),
         });
         let order = self.station.order();
         for (joint, code) in order.faults.into_iter().enumerate() {

@@ -108,8 +108,9 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
         }
     }
     // What a host asked for before is kept, as fast as it goes.
-    for _ in 0..MOST_STORING {
-        if !network.boards().iter_mut().any(|board| board.flashing().is_under_way()) {
+    for tick in 0..MOST_STORING {
+        if tick > TICKS_PER_LOOK && !network.boards().iter_mut().any(|board| board.flashing().is_under_way())
+        {
             break;
         }
         network.tick(|_| {});

@@ -37,6 +37,7 @@ impl Server {
 
     /// Takes what the client sent, and a new client once there is none.
     pub fn poll(&mut self, mut take: impl FnMut(Frame)) {
+        self.read(&mut take);
         while let Ok((stream, _)) = self.listener.accept() {
             // One at a time: whoever comes second is sent away.
             if self.client.is_none()
@@ -46,6 +47,10 @@ impl Server {
                 self.client = Some(Client { stream, line: Line::default(), out: Vec::new() });
             }
         }
+        self.read(&mut take);
+    }
+
+    fn read(&mut self, take: &mut impl FnMut(Frame)) {
         let Some(client) = &mut self.client else { return };
         let mut bytes = [0; 4096];
         loop {

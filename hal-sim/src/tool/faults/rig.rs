@@ -199,6 +199,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         match self.round.gate(self.ports.begun) {
             Gate::Closed => {
                 self.ports.targets.enabled = false;
+                self.output = None;
                 self.ports.requests.pop_front();
                 return;
             }
