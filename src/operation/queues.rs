@@ -216,6 +216,12 @@ impl<const N: usize> Queues<N> {
         self.samples.get(joint).and_then(|queue| queue.iter().last().copied())
     }
 
+    /// Outcomes of an axis that wait for the housekeeping.
+    #[cfg(not(target_os = "none"))]
+    pub fn outcomes(&self, axis: usize) -> impl Iterator<Item = &Outcome> {
+        self.outcomes.get(axis).into_iter().flat_map(Queue::iter)
+    }
+
     /// Requests that wait for the servo's tick.
     #[cfg(not(target_os = "none"))]
     #[must_use]
