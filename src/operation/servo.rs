@@ -91,7 +91,7 @@ impl<const N: usize> ServoLevel<N> {
             count.set(sample.encoder_counts.cast_unsigned());
         }
         let begun = signals.has_begun();
-        let begins = begun && !core::mem::replace(&mut self.ticking, begun);
+        let begins = !core::mem::replace(&mut self.ticking, begun) && begun;
         if !begun {
             self.rest(ends, signals, hardware);
             return None;
