@@ -26,6 +26,7 @@ target_only! {
     pub mod encoder;
     pub mod flash;
     pub mod gate_driver;
+    pub mod hardware;
     pub mod identity;
     pub mod interrupts;
     pub mod memory;

@@ -3,7 +3,7 @@
 use super::abort::Abort;
 use super::dictionary::{Mapping, Object};
 use super::emergency::{Emergency, Source};
-use super::frame::NodeId;
+use super::node_id::NodeId;
 use super::heartbeat::{Clock, Consumer, WATCHED};
 use super::nmt::NmtState;
 use super::pdo::receive::Receive;

@@ -11,7 +11,7 @@
 //! Source: CiA 301, emergency object. Four messages wait at most; further ones are in the history only.
 
 use super::abort::Abort;
-use super::frame::Frame;
+use crate::hal::Frame;
 use super::pdo::PDOS;
 
 /// Entries of the history.

@@ -11,7 +11,7 @@
 use super::abort::Abort;
 use super::access::{Dictionary, PROFILE};
 use super::dictionary::{Access, Object, Row, find};
-use super::frame::NodeId;
+use super::node_id::NodeId;
 use super::nmt::Reset;
 use super::node::Node;
 use super::objects::Objects;

@@ -21,12 +21,12 @@ mod communication;
 pub mod dictionary;
 pub mod drive;
 mod emergency;
-mod frame;
 mod heartbeat;
 pub mod identification;
 mod kept;
 mod nmt;
 mod node;
+mod node_id;
 mod objects;
 mod pdo;
 mod sdo;
@@ -36,10 +36,11 @@ pub mod table;
 pub use abort::Abort;
 pub use communication::Identity;
 pub use emergency::ErrorReport;
-pub use frame::{Frame, NodeId};
+pub use crate::hal::{Controller, Frame};
+pub use node_id::NodeId;
 pub use kept::{KeptNode, LONGEST, kept_bit_rate, kept_entries, kept_node_id, kept_objects, write_kept};
 pub use nmt::{NmtState, Reset};
-pub use node::{Controller, Heard, Node, Storing};
+pub use node::{Heard, Node, Storing};
 pub use objects::{Lost, Objects};
 
 #[cfg(test)]

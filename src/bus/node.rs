@@ -15,26 +15,14 @@
 use super::access::Dictionary;
 use super::communication::{Communication, Identity};
 use super::emergency::{ErrorReport, Source};
-use super::frame::{Frame, NodeId};
+use super::node_id::NodeId;
+use crate::hal::{Controller, Frame};
 use super::heartbeat::Change;
 use super::nmt::{self, Command, NmtState, Reset};
 use super::objects::{Lost, Objects};
 use super::pdo::PDOS;
 use super::pdo::receive::Received;
 use super::sdo::Server;
-
-/// What the controller of the bus tells of itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Controller {
-    /// Takes part.
-    Active,
-    /// Too many errors to disturb others.
-    Passive,
-    /// Left the bus.
-    Off,
-    /// Frames came faster than they were taken.
-    Overrun,
-}
 
 impl Controller {
     fn error(self) -> Option<ErrorReport> {

@@ -186,6 +186,11 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         self.control.servo.upset(joint, number, bit);
     }
 
+    /// Both halves, for whoever runs them at levels of their own (`operation`).
+    pub fn halves(&mut self) -> (&mut Control<N>, &mut Identification<N, B, TAPS, PENDING>) {
+        (&mut self.control, &mut self.identification)
+    }
+
     /// The half that moves.
     #[must_use]
     pub fn control(&self) -> &Control<N> {

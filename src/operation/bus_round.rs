@@ -14,18 +14,22 @@
 //! once; the others pay ([`Credit`]). Who is in debt hears nothing; what the leg told is taken all the same.
 
 use super::credit::Credit;
-use super::mailboxes::{Mailboxes, Speaker};
+use super::handover::Handover;
+use super::mailboxes::Speaker;
+use super::queues::{BusEnds, FRAMES};
+use super::signals::Signals;
 use crate::bus::identification::Results;
-use crate::bus::station::{Keeping, LegOrder, LegTold, Station};
-use crate::bus::{Controller, Frame, KeptNode, Storing};
-use crate::leg::LoggedSample;
+use crate::bus::station::{Keeping, Station};
+use crate::bus::{KeptNode, Storing};
+use crate::hal::{Controller, Hardware};
 
 /// Frames that wait excuse who is missed for so long: longer than the deepest debt.
 const BEHIND_US: u64 = 20_000;
 /// Somebody may be missed, whoever says nothing.
 const WATCH_US: u64 = 1000;
 
-/// What is to be kept: on its way to the keeper, and back with what became of it.
+/// What a host wants stored: on its way to the storage, and back with the result.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Keep<const N: usize> {
     /// What a host asked for.
     pub what: Keeping,
@@ -41,36 +45,6 @@ impl<const N: usize> Keep<N> {
     /// Not asked for anything yet.
     pub const NOTHING: Self =
         Self { what: Keeping::All, objects: [KeptNode::NOTHING; N], generation: 0, done: true };
-}
-
-/// What a round needs of a board. Every method answers at once.
-pub trait BusBoard<const N: usize>: Mailboxes {
-    /// Since the start.
-    fn now_us(&self) -> u64;
-    /// How the controller does; a frame that was lost is told once.
-    fn status(&mut self) -> Controller;
-    /// The next frame that came.
-    fn frame(&mut self) -> Option<Frame>;
-    /// The next sample of the log.
-    fn logged(&mut self) -> Option<LoggedSample<N>>;
-    /// The leg told something.
-    fn is_told(&self) -> bool;
-    /// What the leg did, if it told since it was asked.
-    fn told(&mut self) -> Option<LegTold<N>>;
-    /// The leg has taken the order before.
-    fn takes_order(&self) -> bool;
-    /// What the leg is to do; not asked for unless it takes one.
-    fn order(&mut self, order: LegOrder<N>);
-    /// The operator holds the enabling switch.
-    fn held(&self) -> bool;
-    /// A host has the drive, or has it no longer.
-    fn set_hosted(&mut self, hosted: bool);
-    /// A store that has ended, once.
-    fn kept(&mut self) -> Option<&Keep<N>>;
-    /// Memory for the next store; none while one is under way.
-    fn lent(&mut self) -> Option<&mut Keep<N>>;
-    /// What is in the memory is to be kept.
-    fn keep(&mut self);
 }
 
 /// What is known between two rounds.
@@ -106,21 +80,23 @@ impl BusRound {
         }
     }
 
-    /// One round; of the frames that came at most `frames`.
+    /// One round.
     pub fn round<R: Results, const N: usize, const LOG: usize>(
         &mut self,
-        frames: usize,
         station: &mut Station<N, LOG>,
-        board: &mut impl BusBoard<N>,
+        ends: &mut BusEnds<'_, N>,
+        storage: &Handover<Keep<N>>,
+        signals: &Signals<N>,
+        hardware: &mut impl Hardware<N>,
         results: &R,
     ) {
-        let now_us = board.now_us();
+        let now_us = hardware.now_us();
         self.credit.earn(now_us);
         let may_hear = self.credit.is_left();
-        if !may_hear && !board.is_told() {
+        if !may_hear && !ends.told.ready() {
             return;
         }
-        let status = board.status();
+        let status = hardware.controller();
         let mut is_whole = status != self.controller;
         if is_whole {
             self.controller = status;
@@ -130,74 +106,74 @@ impl BusRound {
             self.lasting = status;
         }
         let mut is_behind = !may_hear;
-        for _ in 0..frames {
+        for _ in 0..FRAMES {
             if is_behind {
                 break;
             }
-            let Some(frame) = board.frame() else { break };
+            let Some(frame) = ends.frames.dequeue() else { break };
             if station.hear(&frame, now_us, None, results) {
                 is_whole = true;
-                self.credit.pay(board.now_us());
+                self.credit.pay(hardware.now_us());
                 is_behind = !self.credit.goes_on();
             }
         }
-        // Who waits to be heard is not missed yet, unless that lasts.
+        // A host whose frames still wait is not missing yet, unless that lasts.
         if !is_behind {
             self.watched_us = now_us;
         }
         let is_watching = !is_behind || now_us.saturating_sub(self.watched_us) > BEHIND_US;
         self.due |= is_whole;
         let is_late = now_us.saturating_sub(self.whole_us) >= WATCH_US;
-        if is_whole || is_late || board.is_told() || board.waiting() != self.waiting {
+        if is_whole || is_late || ends.told.ready() || hardware.mailboxes_waiting() != self.waiting {
             self.whole_us = now_us;
-            self.rest(now_us, is_watching, station, board, results);
-            self.waiting = board.waiting();
+            while let Some(logged) = ends.logged.dequeue() {
+                station.log(&logged);
+            }
+            if is_watching {
+                station.watch(now_us, results);
+            } else {
+                station.look_back(now_us);
+            }
+            Self::store(station, storage);
+            self.exchange(station, ends, signals);
+            self.speaker.speak(hardware, self.lasting, now_us, station, results);
+            self.waiting = hardware.mailboxes_waiting();
         }
-        self.credit.pay(board.now_us());
+        self.credit.pay(hardware.now_us());
     }
 
-    /// What follows from what was heard and from the time.
-    fn rest<R: Results, const N: usize, const LOG: usize>(
+    /// Takes the leg's report and gives its next order; neither while the leg has not taken the order before.
+    fn exchange<const N: usize, const LOG: usize>(
         &mut self,
-        now_us: u64,
-        is_watching: bool,
         station: &mut Station<N, LOG>,
-        board: &mut impl BusBoard<N>,
-        results: &R,
+        ends: &mut BusEnds<'_, N>,
+        signals: &Signals<N>,
     ) {
-        while let Some(logged) = board.logged() {
-            station.log(&logged);
+        if !ends.orders.ready() {
+            return;
         }
-        if is_watching {
-            station.watch(now_us, results);
-        } else {
-            station.look_back(now_us);
-        }
-        Self::keep(station, board);
-        if board.takes_order()
-            && let Some(told) = board.told()
-        {
-            station.told(&LegTold { held: board.held(), ..told });
-            board.set_hosted(station.is_hosted());
+        if let Some(told) = ends.told.dequeue() {
+            station.told(&told);
+            signals.set_hosted(station.is_hosted());
             self.due = true;
         }
-        if self.due && board.takes_order() {
-            board.order(station.order());
+        if self.due {
+            let _ = ends.orders.enqueue(station.order());
             self.due = false;
         }
-        self.speaker.speak(board, self.lasting, now_us, station, results);
     }
 
-    fn keep<const N: usize, const LOG: usize>(station: &mut Station<N, LOG>, board: &mut impl BusBoard<N>) {
-        if let Some(kept) = board.kept() {
-            station.set_generation(kept.generation);
-            station.stored(kept.done, &kept.objects);
+    fn store<const N: usize, const LOG: usize>(station: &mut Station<N, LOG>, storage: &Handover<Keep<N>>) {
+        if let Some(stored) = storage.take_back() {
+            station.set_generation(stored.generation);
+            station.stored(stored.done, &stored.objects);
         }
-        let Some(lent) = board.lent() else { return };
-        let Some(what) = station.take_store(&mut lent.objects) else { return };
-        (lent.what, lent.generation) = (what, station.generation());
+        let Some(mut next) = storage.idle() else { return };
+        let Some(what) = station.take_store(&mut next.objects) else { return };
+        (next.what, next.generation) = (what, station.generation());
         station.storing(Storing::Busy);
-        board.keep();
+        drop(next);
+        storage.give();
     }
 }
 

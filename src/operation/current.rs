@@ -1,22 +1,26 @@
 //! Level 0: the current loops of all axes, one after the other, each when its converters are done.
 //!
-//! In this order, every tick of either axis: what forbids to enable is looked at, then the axis' stage answers, then the bridge
-//! is told. So from an emergency stop to both bridges off it is half a PWM period at most. Nothing here waits, formats
-//! or uses a critical section.
+//! Order in every tick of either axis: inhibit causes, then the axis' stage, then its bridge. Nothing here waits or formats. From an
+//! emergency stop to both bridges off takes the stop's own interrupt or, if that were missing, the rest of the time to the next tick
+//! and this tick's way to its bridge.
 //!
-//! A bridge switches only for an axis with a calibration (or one that is being calibrated), with a target of the servo, while
-//! the interlock is clear, and while the servo goes on answering. While the flash is written ([`Cause::Storing`]) nothing switches, not even
-//! the brake resistor, and everything may stand still: what an erasure lasted through is not known any more, so the joints' zeros are
-//! forgotten and the servo ends; no axis holds it against its counter. A target is followed only where all axes run; one that loses its place
-//! ends the servo's ticks at once, whatever else is found and told.
+//! A bridge switches only for an axis with a calibration (or one that is being calibrated), with a target of the servo, while the
+//! inhibit word is clear, and while the servo goes on answering. The stop's interrupt may come between any two instructions of a tick,
+//! so the inhibit word is read again with interrupts masked in the moment in which the outputs are switched on ([`apply`]).
+//!
+//! While the flash is written ([`Cause::Storing`]) nothing switches, not even the brake resistor, and everything may stand still: how
+//! far a joint went during an erasure is unknown, so the joints' zeros are forgotten and the servo ends. A target is followed only
+//! where all axes run. An axis that loses its rotor position ends the servo's ticks at once.
 
 use core::num::NonZeroU32;
 
-use super::stage::{Order, Outcome, Stage};
-use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, JointSample};
+use super::queues::CurrentEnds;
+use super::signals::Signals;
+use super::stage::{Outcome, Stage};
+use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, Hardware};
 use crate::leg::axis_code;
 use crate::motor::{AxisRequest, BrakeBudget, Chopper};
-use crate::safety::{Bridges, Cause, ServoWatch, TickState, TickWatch};
+use crate::safety::{BoardFault, Bridges, Cause, ServoWatch, TickState, TickWatch};
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::Volt;
 
@@ -36,40 +40,6 @@ const UNCONVERTED: u8 = 2;
 /// Ticks after a time without any in which the index is not believed: its interrupt is late by as much, and so is the count it takes. It
 /// comes after the first of them.
 const LATE_TICKS: u8 = 2;
-
-/// What level 0 needs of a board. Every method answers at once.
-pub trait CurrentBoard {
-    /// Why nothing may be enabled: the interlock's bits.
-    fn causes(&self) -> u32;
-    /// More of them.
-    fn raise(&mut self, bits: u32);
-    /// Both bridges off, now.
-    fn release_all(&mut self);
-    /// What a bridge does in its next period.
-    fn drive(&mut self, axis: usize, command: &AxisCommand);
-    /// What the brake resistor does, a share of time.
-    fn set_brake(&mut self, duty: f32);
-    /// What the servo asks of an axis.
-    fn target(&self, axis: usize) -> AxisRequest;
-    /// The joints' samples mean nothing any more.
-    fn end_servo(&mut self);
-    /// Current ticks are missing: the servo has to damp.
-    fn damp(&mut self);
-    /// An order waits for an axis.
-    fn has_order(&self, axis: usize) -> bool;
-    /// It.
-    fn order(&mut self, axis: usize) -> Option<Order>;
-    /// What came of an axis, for the housekeeper.
-    fn tell(&mut self, axis: usize, outcome: Outcome);
-    /// The mean of a joint's last periods, for the servo.
-    fn sample(&mut self, axis: usize, sample: JointSample);
-    /// How often the servo has ticked.
-    fn servo_ticks(&self) -> u32;
-    /// Its next tick is due; `missed` where it did not answer the last call.
-    fn call_servo(&mut self, missed: bool);
-    /// A tick of an axis came late.
-    fn count_missed(&mut self);
-}
 
 /// What a board shows at a tick of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -140,32 +110,31 @@ impl<const N: usize> CurrentLoops<N> {
         self.axes.get_mut(axis).map(|axis| &mut axis.stage)
     }
 
+    /// The stage of an axis.
+    #[must_use]
+    pub fn stage(&self, axis: usize) -> Option<&Stage> {
+        self.axes.get(axis).map(|axis| &axis.stage)
+    }
+
     /// One tick of one axis.
     #[inline(always)]
-    pub fn tick(&mut self, axis: usize, tick: &Tick, board: &mut impl CurrentBoard) {
+    pub fn tick<H: Hardware<N>>(
+        &mut self,
+        axis: usize,
+        tick: &Tick,
+        ends: &mut CurrentEnds<'_, N>,
+        signals: &Signals<N>,
+        hardware: &mut H,
+    ) {
         if axis == 0 {
-            // Who does not know the bus cannot brake into it. One may be missing: the first of all.
-            let misses = !tick.supply && !is_storing(board);
-            self.unconverted = if misses { self.unconverted.saturating_add(1) } else { 0 };
-            let unknown = self.unconverted >= UNCONVERTED;
-            if unknown {
-                board.raise(Cause::Conversion.bit());
-            }
-            if let Some(chopper) = &self.chopper {
-                // Nobody would take it back while the flash stands; it refuses as long as there is one.
-                let wanted = match is_storing(board) || unknown {
-                    true => 0.0,
-                    false => chopper.duty(self.volt_per_code * f32::from(tick.sample.bus_code)),
-                };
-                board.set_brake(self.budget.spend(wanted));
-            }
+            self.brake(tick, signals, hardware);
         }
-        self.look_at_the_others(axis, tick.now, board);
+        self.look_at_the_others(axis, tick.now, signals);
         let all_run = self.axes.iter().all(|axis| axis.stage.is_running());
         let period = self.period;
         let Some(this) = self.axes.get_mut(axis) else { return };
         let mut sample = tick.sample;
-        if let Some(stood) = this.look(tick, period, board) {
+        if let Some(stood) = this.look(tick, period, signals) {
             if stood > 0 {
                 this.late = LATE_TICKS;
             }
@@ -175,72 +144,115 @@ impl<const N: usize> CurrentLoops<N> {
             }
             let long = stood > CERTAIN_PERIODS;
             if stood > 0 && this.stage.stood_still(&sample, long) && long {
-                forget(axis, Outcome::StoodStill, board);
+                report(axis, Outcome::StoodStill, ends, signals);
             }
         }
-        let bridges = Bridges::of(board.causes());
+        let bridges = Bridges::of(signals.inhibit.causes());
         if bridges == Bridges::Release {
-            board.release_all();
+            hardware.release_all();
         }
-        if board.has_order(axis) {
-            let ended = board.order(axis).and_then(|order| this.stage.obey(order));
-            if let Some(outcome) = ended {
-                forget(axis, outcome, board);
+        if ends.orders.get(axis).is_some_and(|orders| orders.ready()) {
+            let order = ends.orders.get_mut(axis).and_then(|orders| orders.dequeue());
+            if let Some(outcome) = order.and_then(|order| this.stage.obey(order)) {
+                report(axis, outcome, ends, signals);
             }
         }
-        let target = if all_run { board.target(axis) } else { AxisRequest::RELEASED };
-        let (mut command, told) = this.stage.tick(&sample, bridges, target);
-        if let Some((outcome, switching)) = told {
-            command = found::<N>(axis, outcome, switching, command, board);
+        let target = if all_run { signals.target(axis) } else { AxisRequest::RELEASED };
+        let (mut command, outcome) = this.stage.tick(&sample, bridges, target);
+        if let Some((outcome, switching)) = outcome {
+            command = react(axis, outcome, switching, command, ends, signals, hardware);
         }
-        board.drive(axis, &command);
+        apply(axis, &command, signals, hardware);
         this.ticks += 1;
         if this.ticks >= TICKS_PER_SERVO {
             this.ticks = 0;
-            if let Some(running) = this.stage.axis_mut() {
-                // A servo that does not fetch is noticed below.
-                board.sample(axis, running.joint_sample());
+            if let Some(running) = this.stage.axis_mut()
+                && let Some(samples) = ends.samples.get_mut(axis)
+            {
+                // A servo that does not read its samples is noticed below.
+                let _ = samples.enqueue(running.joint_sample());
             }
             if axis + 1 == N {
-                let (missed, forbids) = self.servo.look(board.servo_ticks());
-                board.raise(forbids);
-                board.call_servo(missed);
+                let (missed, forbids) = self.servo.look(signals.statistics.servo_ticks.get());
+                signals.inhibit.raise_bits(forbids);
+                if missed {
+                    signals.statistics.servo_missed.add();
+                }
+                hardware.pend_servo();
             }
+        }
+        if let Some(ticks) = signals.statistics.current_ticks.get(axis) {
+            ticks.add();
+        }
+        signals.statistics.see_bus(tick.sample.bus_code);
+    }
+
+    /// Sets the brake resistor. Without a reading of the bus voltage it stays off; one reading may be missing, the first of all.
+    #[inline(always)]
+    fn brake<H: Hardware<N>>(&mut self, tick: &Tick, signals: &Signals<N>, hardware: &mut H) {
+        let stands = signals.inhibit.is_storing();
+        let misses = !tick.supply && !stands;
+        self.unconverted = if misses { self.unconverted.saturating_add(1) } else { 0 };
+        let unknown = self.unconverted >= UNCONVERTED;
+        if unknown {
+            signals.inhibit.raise(Cause::Conversion);
+        }
+        if let Some(chopper) = &self.chopper {
+            // While the flash stands still, no tick would switch the resistor off again.
+            let wanted = match stands || unknown {
+                true => 0.0,
+                false => chopper.duty(self.volt_per_code * f32::from(tick.sample.bus_code)),
+            };
+            hardware.set_brake(self.budget.spend(wanted));
         }
     }
 
-    /// An axis whose ticks no longer come cannot say so itself, and its bridge does what it was told last.
+    /// An axis whose ticks stop cannot report it itself, and its bridge goes on with its last command.
     #[inline(always)]
-    fn look_at_the_others(&self, axis: usize, now: u32, board: &mut impl CurrentBoard) {
+    fn look_at_the_others(&self, axis: usize, now: u32, signals: &Signals<N>) {
         let late = LATE_PERIODS.wrapping_mul(self.period.get());
-        let stands = is_storing(board);
+        let stands = signals.inhibit.is_storing();
         for (other, that) in self.axes.iter().enumerate() {
             if other != axis && !stands && that.last.is_some_and(|last| now.wrapping_sub(last) > late) {
-                board.raise(Cause::CurrentTicks.bit());
+                signals.inhibit.raise(Cause::CurrentTicks);
             }
         }
     }
 }
 
-/// The flash is being written: bridges are released, and ticks that do not come are nobody's fault.
+/// Gives a command to a bridge. Its outputs are switched on only if the inhibit word still allows it: a stop that came since the
+/// word was read has already switched them off.
 #[inline(always)]
-fn is_storing(board: &impl CurrentBoard) -> bool {
-    board.causes() & Cause::Storing.bit() != 0
+fn apply<const N: usize, H: Hardware<N>>(
+    axis: usize,
+    command: &AxisCommand,
+    signals: &Signals<N>,
+    hardware: &mut H,
+) {
+    if !command.enabled {
+        return hardware.release(axis);
+    }
+    hardware.set_duty(axis, &command.duty);
+    hardware.masked(|hardware| {
+        if Bridges::of(signals.inhibit.causes()) != Bridges::Release {
+            hardware.enable(axis);
+        }
+    });
 }
 
 impl AxisLoop {
-    /// What forbids to enable is looked at before anything else: contacts, conversion, the time since the last tick. While the flash is
-    /// written a time without ticks is nobody's fault, nor are conversions that nobody fetched: so many periods it was.
+    /// Raises what forbids to enable: contacts, conversion, the time since the last tick. While the flash is written, missing ticks and
+    /// conversions are no fault; returns how many periods were missed then.
     #[inline(always)]
-    fn look(&mut self, tick: &Tick, period: NonZeroU32, board: &mut impl CurrentBoard) -> Option<u32> {
+    fn look<const N: usize>(&mut self, tick: &Tick, period: NonZeroU32, signals: &Signals<N>) -> Option<u32> {
         // Half a period late is one missed; a gap of three periods two.
         let since = |last| tick.now.wrapping_sub(last).saturating_add(period.get() / 2) / period;
         let periods = self.last.map_or(1, since).saturating_sub(1);
-        let stood = is_storing(board).then_some(periods);
+        let stood = signals.inhibit.is_storing().then_some(periods);
         let missed = if stood.is_some() { 0 } else { periods.min(255) as u8 };
         self.last = Some(tick.now);
         if missed > 0 {
-            board.count_missed();
+            signals.statistics.current_missed.add();
         }
         let state = TickState {
             emergency_stop: tick.emergency_stop,
@@ -249,48 +261,57 @@ impl AxisLoop {
             missed,
         };
         let (forbids, damp) = self.watch.look(&state);
-        board.raise(forbids);
+        signals.inhibit.raise_bits(forbids);
         if damp {
-            board.damp();
+            signals.report(BoardFault::CurrentTicks, 0);
         }
         stood
     }
 }
 
-/// What came of an axis, and what its bridge does then: a fault takes the others at once, whether they are released or brake.
+/// Reports what came of an axis and returns what its bridge does then. A fault takes the other axes along at once.
 #[inline(never)]
-fn found<const N: usize>(
+fn react<const N: usize, H: Hardware<N>>(
     axis: usize,
     outcome: Outcome,
     switching: bool,
     command: AxisCommand,
-    board: &mut impl CurrentBoard,
+    ends: &mut CurrentEnds<'_, N>,
+    signals: &Signals<N>,
+    hardware: &mut H,
 ) -> AxisCommand {
     let mut command = command;
     if let Outcome::Fault { fault, .. } = outcome {
-        board.raise(Cause::of_axis(axis, axis_code(fault), switching).bit());
-        match Bridges::of(board.causes()) {
+        signals.inhibit.raise(Cause::of_axis(axis, axis_code(fault), switching));
+        match Bridges::of(signals.inhibit.causes()) {
             Bridges::Follow => {}
             Bridges::Brake => {
                 command = AxisCommand::BRAKE;
-                (0..N).for_each(|other| board.drive(other, &command));
+                (0..N).for_each(|other| apply(other, &command, signals, hardware));
             }
             Bridges::Release => {
                 command = AxisCommand::RELEASED;
-                board.release_all();
+                hardware.release_all();
             }
         }
     }
-    forget(axis, outcome, board);
+    report(axis, outcome, ends, signals);
     command
 }
 
-/// With the place goes what the joints' samples mean.
-fn forget(axis: usize, outcome: Outcome, board: &mut impl CurrentBoard) {
+/// Sends an outcome to the housekeeping. Without the rotor's position the joints' samples are invalid.
+fn report<const N: usize>(
+    axis: usize,
+    outcome: Outcome,
+    ends: &mut CurrentEnds<'_, N>,
+    signals: &Signals<N>,
+) {
     if matches!(outcome, Outcome::Fault { lost: true, .. } | Outcome::StoodStill) {
-        board.end_servo();
+        signals.end_servo();
     }
-    board.tell(axis, outcome);
+    if let Some(outcomes) = ends.outcomes.get_mut(axis) {
+        let _ = outcomes.enqueue(outcome);
+    }
 }
 
 #[cfg(test)]

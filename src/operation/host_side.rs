@@ -1,37 +1,26 @@
 //! Level 1: the servo's side of the bus: newest commands in, at most one request, and what came of the tick out.
 //!
-//! Orders are taken in every tick; the leg tells in every second one, as soon as the bus has taken what it was told before.
+//! Orders are taken in every tick. The servo reports in every second one, as soon as the bus has taken the report before.
 
-use crate::bus::station::{LegOrder, LegRequest, LegTold};
-use crate::leg::{ControlRequest, DriveState, Fault, JointCommand, Plan, PowerRequest};
+use super::queues::HostEnds;
+use super::signals::Signals;
+use crate::bus::station::{LegRequest, LegTold};
+use crate::hal::{Hardware, Sample};
+use crate::leg::{
+    Activity, Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand, JointStatus,
+    Plan, PowerRequest,
+};
 
-/// Ticks between two of which the bus is told: 2 kHz, twice the fastest cycle that fits the wire.
+/// Ticks between two reports to the bus: 2 kHz, twice the fastest cycle that fits the wire.
 const TICKS: u32 = 2;
-
-/// What it needs of a board. Every method answers at once.
-pub trait HostBoard<const N: usize> {
-    /// The next order.
-    fn order(&mut self) -> Option<LegOrder<N>>;
-    /// The bus has taken what it was told before.
-    fn takes_told(&self) -> bool;
-    /// What came of the tick.
-    fn tell(&mut self, told: LegTold<N>);
-    /// The bus runs as soon as the servo is done.
-    fn pend(&mut self);
-    /// The operator lets the leg be enabled.
-    fn held(&self) -> bool;
-    /// Nothing forbids to enable.
-    fn is_clear(&self) -> bool;
-}
 
 /// A request and, where it begins an identification, its plan and seed.
 pub type HostRequest<const N: usize> = (ControlRequest<N>, Option<(Plan, u64)>);
 
-/// What the servo remembers of the bus.
-#[derive(Debug)]
-pub struct HostSide<P, const N: usize> {
-    /// What it was made with.
-    pub board: P,
+/// What the servo knows of the bus.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HostSide<const N: usize> {
+    following: Following<N>,
     commands: Option<[JointCommand; N]>,
     request: Option<LegRequest>,
     cancel: bool,
@@ -39,27 +28,38 @@ pub struct HostSide<P, const N: usize> {
     tick: u32,
 }
 
-impl<P: HostBoard<N>, const N: usize> HostSide<P, N> {
-    /// Nothing heard yet.
+/// Whether the operator lets the leg be enabled; an open switch counts at once.
+fn is_held<const N: usize>(signals: &Signals<N>, hardware: &impl Hardware<N>) -> bool {
+    hardware.contacts().enabling && signals.permits()
+}
+
+impl<const N: usize> HostSide<N> {
+    /// Nothing received yet.
     #[must_use]
-    pub const fn new(board: P) -> Self {
-        Self { board, commands: None, request: None, cancel: false, refused: false, tick: 0 }
+    pub const fn new(following: Following<N>) -> Self {
+        Self { following, commands: None, request: None, cancel: false, refused: false, tick: 0 }
     }
 
-    /// No tick of the leg: what is asked meanwhile is asked of a leg that has no zeros.
-    pub fn rest(&mut self) {
-        while self.board.order().is_some() {}
+    /// The joints have other zeros than before.
+    pub fn begin(&mut self) {
+        self.following.forget_zeros();
+    }
+
+    /// No tick of the leg: orders of this time are for a leg without zeros, and are dropped.
+    pub fn rest(&mut self, ends: &mut HostEnds<'_, N>, signals: &Signals<N>, hardware: &mut impl Hardware<N>) {
+        while ends.orders.dequeue().is_some() {}
         (self.commands, self.request, self.cancel) = (None, None, false);
-        if self.is_due() {
-            let blocked = !self.board.is_clear();
-            self.board.tell(LegTold { blocked, ..LegTold::NONE });
+        if self.is_due(ends, hardware) {
+            let blocked = !signals.inhibit.is_clear();
+            let held = is_held(signals, hardware);
+            let _ = ends.told.enqueue(LegTold { blocked, held, ..LegTold::NONE });
         }
     }
 
-    /// Takes the newest order; none while a request waits for the operator's hand, which goes first. What a host's loss is a fault of is reported.
-    pub fn hear(&mut self, mut report: impl FnMut(Fault)) {
+    /// Takes the newest order, unless a request still waits behind the operator's. Reports the faults that a lost host means.
+    pub fn hear(&mut self, ends: &mut HostEnds<'_, N>, mut report: impl FnMut(Fault)) {
         while self.request.is_none()
-            && let Some(order) = self.board.order()
+            && let Some(order) = ends.orders.dequeue()
         {
             self.commands = order.commands;
             for (joint, code) in order.faults.into_iter().enumerate() {
@@ -75,7 +75,7 @@ impl<P: HostBoard<N>, const N: usize> HostSide<P, N> {
         }
     }
 
-    /// What is asked at this tick: by the operator's hand, or else by a host, once.
+    /// The request of this tick: the operator's, or else the host's, once.
     pub fn request(&mut self, by_hand: Option<ControlRequest<N>>) -> Option<HostRequest<N>> {
         if let Some(request) = by_hand {
             return Some((request, None));
@@ -88,9 +88,15 @@ impl<P: HostBoard<N>, const N: usize> HostSide<P, N> {
         })
     }
 
-    /// What is asked while the operator's switch is open, whoever enabled the leg and whatever the housekeeping knows of it.
-    pub fn held(&self, request: Option<ControlRequest<N>>, state: DriveState) -> Option<ControlRequest<N>> {
-        if self.board.held() {
+    /// The request that remains while the operator's switch is open: nothing that enables, and a quick stop of an enabled leg.
+    pub fn held(
+        &self,
+        request: Option<ControlRequest<N>>,
+        state: DriveState,
+        signals: &Signals<N>,
+        hardware: &impl Hardware<N>,
+    ) -> Option<ControlRequest<N>> {
+        if is_held(signals, hardware) {
             return request;
         }
         match request {
@@ -98,34 +104,64 @@ impl<P: HostBoard<N>, const N: usize> HostSide<P, N> {
             _ if state == DriveState::OperationEnabled => {
                 Some(ControlRequest::Power(PowerRequest::QuickStop))
             }
-            // A step that was asked for while the switch was held still.
+            // A step that was requested while the switch was still held.
             _ => None,
         }
     }
 
-    /// What a host commands at this tick, and whether an identification is to be given up; while it has the drive.
-    pub fn commands(&mut self) -> Option<(&[JointCommand; N], bool)> {
+    /// What a host commands at this tick while it has the drive.
+    pub fn commands(&mut self) -> Option<Host<'_, N>> {
         let cancel = core::mem::take(&mut self.cancel);
-        self.commands.as_ref().map(|commands| (commands, cancel))
+        let (following, commands) = (&mut self.following, self.commands.as_ref()?);
+        Some(Host { following, commands, cancel })
     }
 
-    /// What came of the tick; whether a request for power was refused, and the rest where it is due.
-    pub fn told(&mut self, refused: bool, tell: impl FnOnce() -> LegTold<N>) {
-        self.refused |= refused;
-        if self.is_due() {
-            let (refused, blocked) = (core::mem::take(&mut self.refused), !self.board.is_clear());
-            self.board.tell(LegTold { refused, blocked, rests: false, ..tell() });
+    /// Reports what came of the tick, where a report is due.
+    pub fn report(
+        &mut self,
+        control: &Control<N>,
+        sample: &Sample<N>,
+        output: &ControlOutput<N>,
+        ends: &mut HostEnds<'_, N>,
+        signals: &Signals<N>,
+        hardware: &mut impl Hardware<N>,
+    ) {
+        if let Some(logged) = output.logged {
+            // The host sees by its tick that one is missing.
+            let _ = ends.logged.enqueue(logged);
         }
+        self.refused |= output.servo.decision.refused.is_some();
+        if !self.is_due(ends, hardware) {
+            return;
+        }
+        let activity = control.activity();
+        let mut joints = [JointStatus::NONE; N];
+        for (joint, slot) in joints.iter_mut().enumerate() {
+            let torque = control.torque(joint, sample);
+            let status = torque
+                .and_then(|torque| self.following.status(joint, torque, activity == Activity::Follow, output));
+            *slot = status.unwrap_or(JointStatus::NONE);
+        }
+        let told = LegTold {
+            joints,
+            activity,
+            change: [control.change().is_some(), control.is_update_offered()],
+            refused: core::mem::take(&mut self.refused),
+            held: is_held(signals, hardware),
+            blocked: !signals.inhibit.is_clear(),
+            rests: false,
+        };
+        let _ = ends.told.enqueue(told);
     }
 
-    /// The bus has to run, and has taken what it was told before.
-    fn is_due(&mut self) -> bool {
+    /// The bus has to run, and has taken the report before.
+    fn is_due(&mut self, ends: &HostEnds<'_, N>, hardware: &mut impl Hardware<N>) -> bool {
         self.tick = self.tick.wrapping_add(1);
         if !self.tick.is_multiple_of(TICKS) {
             return false;
         }
-        self.board.pend();
-        self.board.takes_told()
+        hardware.pend_bus();
+        ends.told.ready()
     }
 }
 

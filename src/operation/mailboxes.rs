@@ -14,7 +14,7 @@
 
 use crate::bus::identification::Results;
 use crate::bus::station::Station;
-use crate::bus::{Controller, Frame};
+use crate::hal::{Controller, Frame, Hardware};
 
 /// The longest that a frame waits in a passive controller, microseconds: the longest frame takes 1.1 ms of the slowest bus, and whoever works on a
 /// cycle of 10 ms has newer ones by then.
@@ -22,16 +22,6 @@ const PATIENCE_US: u64 = 10_000;
 
 /// Of a controller.
 const MAILBOXES: usize = 3;
-
-/// Where the controller keeps frames until they leave.
-pub trait Mailboxes {
-    /// In which of the three a frame waits, a bit each.
-    fn waiting(&self) -> u32;
-    /// Into an empty one.
-    fn send(&mut self, mailbox: u32, frame: &Frame);
-    /// What has not left does not leave any more; they are empty soon.
-    fn give_up(&mut self);
-}
 
 /// Who speaks next, and what was given to a passive controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -57,13 +47,13 @@ impl Speaker {
     /// What leaves in this round, of a controller in a state that lasts.
     pub fn speak<R: Results, const N: usize, const LOG: usize>(
         &mut self,
-        mailboxes: &mut impl Mailboxes,
+        hardware: &mut impl Hardware<N>,
         controller: Controller,
         now_us: u64,
         station: &mut Station<N, LOG>,
         results: &R,
     ) {
-        let waiting = mailboxes.waiting();
+        let waiting = hardware.mailboxes_waiting();
         let waits = |place: usize| waiting & 1 << place != 0;
         for (place, given) in self.given.iter_mut().enumerate() {
             // What has left.
@@ -76,7 +66,7 @@ impl Speaker {
         }
         let is_old = is_passive && waiting != 0 && now_us.saturating_sub(since_us) > PATIENCE_US;
         if controller == Controller::Off || is_old {
-            mailboxes.give_up();
+            hardware.abort_transmission();
             self.since_us = None;
             self.take_back();
             return;
@@ -88,7 +78,7 @@ impl Speaker {
         };
         for place in (0..places).filter(|place| !waits(*place)) {
             let Some(frame) = self.next(now_us, station, results) else { break };
-            mailboxes.send(place as u32, &frame);
+            hardware.send(place as u32, &frame);
             if let Some(given) = self.given.get_mut(place) {
                 *given = station.tells_once(&frame).then_some((self.count, frame));
                 self.count = self.count.wrapping_add(1);

@@ -17,6 +17,8 @@
 //!
 //! Where motors brake themselves, or anything else forbids to enable, nothing is written: it would let them go.
 
+use super::signals::Inhibit;
+use crate::hal::Hardware;
 use crate::leg::Permission;
 use crate::safety::Cause;
 
@@ -24,22 +26,6 @@ use crate::safety::Cause;
 const ANNOUNCED_MS: u32 = 20;
 /// For the watchdog to take another time, ms: six cycles of its oscillator (17 kHz at the slowest) behind a divider of 256 take 91.
 const PATIENCE_MS: u32 = 200;
-
-/// What a change of the flash needs of a board. Every method answers at once.
-pub trait StoringBoard {
-    /// What the drive may do.
-    fn permission(&self) -> Permission;
-    /// Why nothing may be enabled: the interlock's bits.
-    fn causes(&self) -> u32;
-    /// One more.
-    fn raise(&mut self, cause: Cause);
-    /// [`Cause::Storing`] is let go.
-    fn stored(&mut self);
-    /// Asks the watchdog for as long as the flash may stand; whether it has that now.
-    fn stretch(&mut self) -> bool;
-    /// Asks the watchdog for its usual time; whether it has that now.
-    fn tighten(&mut self) -> bool;
-}
 
 /// How far a change has come, and for how many milliseconds more that is waited for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,38 +58,42 @@ impl Storing {
         Self { stage: Stage::Idle, loose: false }
     }
 
-    /// One step of a change, to be taken every millisecond until it has ended; whether `change`, which is called at most once, was done
-    /// and said so.
-    pub fn step(&mut self, board: &mut impl StoringBoard, change: impl FnOnce() -> bool) -> Option<bool> {
-        let is_off = |board: &_, causes| {
-            StoringBoard::permission(board) == Permission::Released && StoringBoard::causes(board) == causes
-        };
+    /// One step of a change, to be called every millisecond until it returns whether the change was made. `change` is called at most
+    /// once and returns whether it succeeded; `permission` is what the drive may do now.
+    pub fn step<const N: usize>(
+        &mut self,
+        inhibit: &Inhibit,
+        permission: Permission,
+        hardware: &mut impl Hardware<N>,
+        change: impl FnOnce() -> bool,
+    ) -> Option<bool> {
+        let is_off = |causes| permission == Permission::Released && inhibit.causes() == causes;
         self.stage = match self.stage {
-            Stage::Idle if self.loose || !is_off(board, 0) => return Some(false),
+            Stage::Idle if self.loose || !is_off(0) => return Some(false),
             Stage::Idle => {
-                board.raise(Cause::Storing);
+                inhibit.raise(Cause::Storing);
                 Stage::Announced(ANNOUNCED_MS - 1)
             }
             Stage::Announced(left @ 1..) => Stage::Announced(left - 1),
-            // Who was on when the interlock came is released by now, and may still be damping.
-            Stage::Announced(0) if !is_off(board, Cause::Storing.bit()) => Stage::Settles(false),
+            // A drive that was on when the inhibit word was raised is released by now, or still damps.
+            Stage::Announced(0) if !is_off(Cause::Storing.bit()) => Stage::Settles(false),
             Stage::Announced(0) => {
                 self.loose = true;
                 Stage::Stretches(PATIENCE_MS)
             }
-            Stage::Stretches(_) if board.stretch() => Stage::Tightens(PATIENCE_MS, change()),
+            Stage::Stretches(_) if hardware.stretch_watchdog() => Stage::Tightens(PATIENCE_MS, change()),
             Stage::Stretches(0) => Stage::Tightens(PATIENCE_MS, false),
             Stage::Stretches(left) => Stage::Stretches(left - 1),
             Stage::Tightens(left, changed) => {
-                self.loose = !board.tighten();
+                self.loose = !hardware.tighten_watchdog();
                 match left.checked_sub(1) {
                     Some(left) if self.loose => Stage::Tightens(left, changed),
                     _ => Stage::Settles(changed),
                 }
             }
             Stage::Settles(changed) => {
-                self.forbid_while_loose(board);
-                board.stored();
+                self.forbid_while_loose(inhibit);
+                inhibit.end_storing();
                 self.stage = Stage::Idle;
                 return Some(changed);
             }
@@ -111,15 +101,15 @@ impl Storing {
         None
     }
 
-    /// To be called again and again while no change is under way: a watchdog that did not take its usual time is asked once more.
-    pub fn look_after(&mut self, board: &mut impl StoringBoard) {
-        self.loose = self.loose && !board.tighten();
-        self.forbid_while_loose(board);
+    /// To be called regularly while no change is under way: asks a watchdog that did not take its usual time once more.
+    pub fn look_after<const N: usize>(&mut self, inhibit: &Inhibit, hardware: &mut impl Hardware<N>) {
+        self.loose = self.loose && !hardware.tighten_watchdog();
+        self.forbid_while_loose(inhibit);
     }
 
-    fn forbid_while_loose(&self, board: &mut impl StoringBoard) {
+    fn forbid_while_loose(&self, inhibit: &Inhibit) {
         if self.loose {
-            board.raise(Cause::Watchdog);
+            inhibit.raise(Cause::Watchdog);
         }
     }
 }

@@ -7,22 +7,23 @@
 //! the watchdog's time is forgiven. Looked at every 4 ms, a hang is answered by a reset at most 4 ms and the watchdog's time after it began:
 //! 15 to 34.1 ms over the oscillator's 47 to 17 kHz, 20 ms nominally.
 
-/// The counters of `N` that have to run, as they were when the watchdog was last fed.
+/// Counters of `N` axes and of `M` levels that have to run, as they were when the watchdog was last fed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CheckIns<const N: usize> {
-    before: [u32; N],
+pub struct CheckIns<const N: usize, const M: usize> {
+    before: ([u32; N], [u32; M]),
 }
 
-impl<const N: usize> CheckIns<N> {
+impl<const N: usize, const M: usize> CheckIns<N, M> {
     /// Counters as they are now.
     #[must_use]
-    pub const fn new(counts: [u32; N]) -> Self {
+    pub const fn new(counts: ([u32; N], [u32; M])) -> Self {
         Self { before: counts }
     }
 
     /// Whether every one of them ran since this last said so; then they are waited for anew. Counters wrap.
-    pub fn all(&mut self, counts: [u32; N]) -> bool {
-        let all = counts.iter().zip(&self.before).all(|(now, before)| now != before);
+    pub fn all(&mut self, counts: ([u32; N], [u32; M])) -> bool {
+        let now = counts.0.iter().chain(&counts.1);
+        let all = now.zip(self.before.0.iter().chain(&self.before.1)).all(|(now, before)| now != before);
         if all {
             self.before = counts;
         }
@@ -69,12 +70,13 @@ mod tests {
     fn any_one_that_hangs_keeps_the_watchdog_hungry_and_is_forgiven_when_it_runs_again() {
         for hung in 0..4 {
             let mut counts = [u32::MAX - 1; 4];
-            let mut check_ins = CheckIns::new(counts);
+            let split = |[first, second, servo, rounds]: [u32; 4]| ([first, second], [servo, rounds]);
+            let mut check_ins = CheckIns::new(split(counts));
             let mut look = |hangs: bool| {
                 for (place, count) in counts.iter_mut().enumerate() {
                     *count = count.wrapping_add(u32::from(!(hangs && place == hung)));
                 }
-                check_ins.all(counts)
+                check_ins.all(split(counts))
             };
             // Across the wrap; one hang of two looks; then it runs again.
             let fed = [false, false, false, true, true, false, false].map(&mut look);
@@ -84,9 +86,9 @@ mod tests {
 
     #[test]
     fn what_ran_before_the_watchdog_was_fed_counts_once() {
-        let mut check_ins = CheckIns::new([7, 7]);
-        assert!(!check_ins.all([7, 8]));
-        assert!(check_ins.all([8, 8]));
-        assert!(!check_ins.all([8, 8]));
+        let mut check_ins = CheckIns::new(([7], [7]));
+        assert!(!check_ins.all(([7], [8])));
+        assert!(check_ins.all(([8], [8])));
+        assert!(!check_ins.all(([8], [8])));
     }
 }

@@ -214,20 +214,21 @@ impl TickWatch {
     }
 }
 
-/// Looks whether the servo answers.
+/// Checks that the servo answers each request for a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ServoWatch {
-    ticks: u32,
+    /// Ticks of the servo at the last request; `None` before the first.
+    ticks: Option<u32>,
     unanswered: u8,
 }
 
 impl ServoWatch {
-    /// Before the servo is called: so many ticks it has done so far. Whether it has not answered, and the bit of what then
-    /// forbids to enable.
+    /// Call before each request, with the ticks that the servo has done so far. Returns whether the last request was not answered, and
+    /// the bit of the cause that then forbids to enable.
     pub fn look(&mut self, ticks: u32) -> (bool, u32) {
-        let missed = ticks == self.ticks;
+        let missed = self.ticks == Some(ticks);
         self.unanswered = if missed { self.unanswered.saturating_add(1) } else { 0 };
-        self.ticks = ticks;
+        self.ticks = Some(ticks);
         (missed, if self.unanswered >= PATIENCE { Cause::ServoTicks.bit() } else { 0 })
     }
 }
@@ -269,13 +270,19 @@ mod tests {
     }
 
     #[test]
-    fn a_servo_that_does_not_answer_three_times_is_given_up() {
+    fn a_servo_that_does_not_answer_three_requests_is_given_up() {
         let mut watch = ServoWatch::default();
         let seen = [1, 2, 2, 2, 3, 3, 3, 3].map(|ticks| watch.look(ticks));
         let given_up = Cause::ServoTicks.bit();
         let expected = [false, false, true, true, false, true, true, true];
         assert_eq!(seen.map(|(missed, _)| missed), expected);
         assert_eq!(seen.map(|(_, bits)| bits), [0, 0, 0, 0, 0, 0, 0, given_up]);
+    }
+
+    #[test]
+    fn the_first_request_after_the_start_is_not_missed() {
+        let mut watch = ServoWatch::default();
+        assert_eq!([0, 0].map(|ticks| watch.look(ticks).0), [false, true]);
     }
 
     #[test]

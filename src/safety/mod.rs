@@ -48,4 +48,4 @@ pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
 pub use monitor::{Decision, Monitor, Observation, Refusal, RefusalReason, Request};
 pub use state::{DriveState, Event, Permission, PowerRequest};
 pub use step_gate::{Reading, StepGate};
-pub use upkeep::{UpkeepClock, of_gate_driver, of_temperature};
+pub use upkeep::{BoardFault, UpkeepClock, of_gate_driver, of_temperature};

@@ -15,6 +15,39 @@
 use super::fault::FaultCode;
 use super::interlock::Cause;
 
+/// Faults that the board's other levels see and the servo reacts to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum BoardFault {
+    /// Current ticks are missing.
+    CurrentTicks,
+    /// A bridge is too hot.
+    Temperature,
+    /// A thermistor is open or shorted.
+    Thermistor,
+}
+
+impl BoardFault {
+    /// All of them, in the order of their bits.
+    pub const ALL: [Self; 3] = [Self::CurrentTicks, Self::Temperature, Self::Thermistor];
+
+    /// One bit for each fault.
+    #[must_use]
+    pub const fn bit(self) -> u32 {
+        1 << self as u8
+    }
+
+    /// Code of the fault.
+    #[must_use]
+    pub const fn code(self) -> FaultCode {
+        match self {
+            Self::CurrentTicks => FaultCode::CurrentTicks,
+            Self::Temperature => FaultCode::Temperature,
+            Self::Thermistor => FaultCode::Thermistor,
+        }
+    }
+}
+
 /// When to look; counts rounds of the housekeeping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UpkeepClock {
@@ -58,11 +91,11 @@ pub const fn of_gate_driver(holds: bool) -> Option<Cause> {
 /// What the servo has to hear of because of a bridge's temperature, degrees Celsius; none is that of a thermistor that is open or
 /// shorted.
 #[must_use]
-pub fn of_temperature(degrees: Option<f32>, hottest: f32) -> Option<FaultCode> {
+pub fn of_temperature(degrees: Option<f32>, hottest: f32) -> Option<BoardFault> {
     match degrees {
-        None => Some(FaultCode::Thermistor),
+        None => Some(BoardFault::Thermistor),
         Some(degrees) if degrees < hottest => None,
-        Some(_) => Some(FaultCode::Temperature),
+        Some(_) => Some(BoardFault::Temperature),
     }
 }
 
@@ -89,9 +122,9 @@ mod tests {
     #[test]
     fn what_is_hot_what_is_none_and_what_is_no_number_keeps_the_drive_off() {
         assert_eq!(of_temperature(Some(99.9), 100.0), None);
-        assert_eq!(of_temperature(Some(100.0), 100.0), Some(FaultCode::Temperature));
-        assert_eq!(of_temperature(Some(f32::NAN), 100.0), Some(FaultCode::Temperature));
-        assert_eq!(of_temperature(None, 100.0), Some(FaultCode::Thermistor));
+        assert_eq!(of_temperature(Some(100.0), 100.0), Some(BoardFault::Temperature));
+        assert_eq!(of_temperature(Some(f32::NAN), 100.0), Some(BoardFault::Temperature));
+        assert_eq!(of_temperature(None, 100.0), Some(BoardFault::Thermistor));
         assert_eq!((of_gate_driver(true), of_gate_driver(false)), (None, Some(Cause::GateConfiguration)));
     }
 }

@@ -1,16 +1,17 @@
 //! What the ODrive v3.6's image is put together from: every value to its level.
 
 use embassy_executor::Executor;
-use heapless::spsc::{Consumer, Producer, Queue};
+use heapless::spsc::{Consumer, Producer};
 use static_cell::{ConstStaticCell, StaticCell};
 
-use super::interlock::{self, Cause};
 use super::leg::JOINTS;
 use super::surroundings::{Introduction, Surroundings, crashed};
-use super::{bus, current, host, housekeeping, identify, keep, leg, links, servo};
+use super::{SIGNALS, bus, current, housekeeping, identify, keep, leg, servo};
+use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::board::odrive_v3_6::identity::{Identity, Reset};
-use crate::board::odrive_v3_6::settings::analog::temperature_c;
+use crate::board::odrive_v3_6::settings::analog::{HOTTEST_C, temperature_c};
 use crate::board::odrive_v3_6::settings::can::USUAL_KBIT;
+use crate::board::odrive_v3_6::settings::drives::CALIBRATION;
 use crate::board::odrive_v3_6::settings::{analog, drives};
 use crate::board::odrive_v3_6::start::Board;
 use crate::board::odrive_v3_6::{brake, can, converter, memory, vectors, watchdog};
@@ -18,18 +19,26 @@ use crate::board::stack;
 use crate::bus::drive::{AxisConstants, Mode};
 use crate::bus::{LONGEST, NodeId, Storing};
 use crate::leg::{Control, Following, StoredCalibration};
+use crate::operation::{
+    Calibrated, Ends, HostEnds, Housekeeper, HousekeepingEnds, HousekeepingSettings, Queues, ServoLevel,
+};
+use crate::safety::Cause;
 use crate::trace::Record;
 use cortex_m::peripheral::DWT;
+
+/// What the housekeeping's task is started with.
+type Housekeeping = (Housekeeper<JOINTS>, HousekeepingEnds<'static, JOINTS>, Odrive);
 
 /// Builds the leg, hands everything to its level and starts them; does not return.
 pub fn run(board: Board) -> ! {
     let (thread, keeping, keeper) = hand_out(board);
     vectors::enable();
     if !watchdog::tighten_at_once() {
-        interlock::raise(Cause::Watchdog);
+        SIGNALS.inhibit.raise(Cause::Watchdog);
     }
     let housekeeping = vectors::HOUSEKEEPING.start(vectors::HOUSEKEEPING_VECTOR);
-    if let (Ok(watch), Ok(run)) = (housekeeping::watch(), housekeeping::run(keeping)) {
+    let (housekeeper, ends, board) = keeping;
+    if let (Ok(watch), Ok(run)) = (housekeeping::watch(), housekeeping::run(housekeeper, ends, board)) {
         housekeeping.spawn(watch);
         housekeeping.spawn(run);
     }
@@ -48,7 +57,7 @@ pub fn run(board: Board) -> ! {
 #[inline(never)]
 fn hand_out(
     board: Board,
-) -> (Option<identify::Thread>, housekeeping::Housekeeping, Option<&'static mut keep::Keeper>) {
+) -> (Option<identify::Thread>, Housekeeping, Option<&'static mut keep::Keeper>) {
     judge(&board);
     let divider = analog::divider(board.identity.version).unwrap_or(LARGEST_DIVIDER);
     let surroundings = Surroundings {
@@ -64,62 +73,41 @@ fn hand_out(
     };
     identify::introduce(&introduction(&board), board.clock_hz);
     let built = memory::identification();
-    let links::Links { orders, outcomes, samples, requests, findings, drive, told, mut notes } =
-        links::Links::new(memory::told());
-    let [(give_1, take_1), (give_2, take_2)] = orders;
-    let [(out_1, hear_1), (out_2, hear_2)] = outcomes;
-    let [(sample_1, sampled_1), (sample_2, sampled_2)] = samples;
-    let loops = current::Current::new([(take_1, out_1, sample_1), (take_2, out_2, sample_2)], divider);
+    static QUEUES: ConstStaticCell<Queues<JOINTS>> = ConstStaticCell::new(Queues::new());
+    let Ends { current, servo: mut servo_ends, housekeeping: mut housekeeping_ends, identification, calibrated } =
+        QUEUES.take().split(memory::events());
     static LOOPS: StaticCell<current::Current> = StaticCell::new();
-    place(&current::LOOPS, LOOPS.init(loops));
+    place(&current::LOOPS, LOOPS.init(current::Current::new(current, divider)));
 
     let mut control = built.as_ref().and_then(|(configuration, _)| Control::new(configuration).ok());
-    static CALIBRATED: ConstStaticCell<Queue<keep::Calibrated, 4>> = ConstStaticCell::new(Queue::new());
-    let (tell, calibrated) = CALIBRATED.take().split();
-    let (link, results, keeper, stored) = match (&built, &mut control) {
+    let notes = &mut housekeeping_ends.notes;
+    let Joined { host, following, results, keeper, stored } = match (&built, &mut control) {
         (Some((configuration, _)), Some(control)) => {
-            join(configuration, control, &board.identity, calibrated, &mut notes.0)
+            join(configuration, control, &board.identity, calibrated, notes)
         }
         _ => Joined::default(),
     };
+    servo_ends.host = host;
     match control {
         Some(control) => {
+            let volt_per_code = analog::sense(divider).volt_per_code;
+            let level = ServoLevel::new(&control, drives::derating(divider), volt_per_code, following);
             static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
-            let servo = SERVO.init(servo::ServoLoop::new(
-                control,
-                [sampled_1, sampled_2],
-                requests.1,
-                findings.1,
-                drive.0,
-                told.0,
-                divider,
-                surroundings.clock,
-                link,
-            ));
-            place(&servo::SERVO, servo);
+            let clock = surroundings.clock;
+            place(&servo::SERVO, SERVO.init(servo::ServoLoop { control, level, ends: servo_ends, clock }));
         }
-        None => interlock::raise(Cause::Configuration),
+        None => SIGNALS.inhibit.raise(Cause::Configuration),
     }
-    let keeping = housekeeping::Housekeeping {
-        gate_drivers: board.gate_drivers,
-        axes: drives::axes(&leg::LEG, divider),
-        orders: [give_1, give_2],
-        outcomes: [hear_1, hear_2],
-        stored,
-        calibrated: tell,
-        requests: requests.0,
-        drive: drive.1,
-        notes: notes.0,
-    };
-    let thread = built.map(|(configuration, identification)| identify::Thread {
-        identification,
-        told: told.1,
-        findings: findings.0,
-        notes: notes.1,
+    let axes = drives::axes(&leg::LEG, divider);
+    let settings = HousekeepingSettings { axes, calibration: [CALIBRATION; JOINTS], hottest_c: HOTTEST_C };
+    let housekeeper = Housekeeper::new(settings).with_stored(stored);
+    let thread = built.map(|(configuration, built)| identify::Thread {
+        identification: built,
+        ends: identification,
         surroundings,
         bus: results.map(|results| (results, configuration)),
     });
-    (thread, keeping, keeper)
+    (thread, (housekeeper, housekeeping_ends, Odrive::new(board.gate_drivers)), keeper)
 }
 
 /// The numbers of hip and knee, where nothing else is kept.
@@ -128,22 +116,15 @@ const NODES: [NodeId; JOINTS] = match (NodeId::new(1), NodeId::new(2)) {
     _ => panic!("both are numbers of nodes"),
 };
 
-const WIRE: bus::Wire = bus::Wire {
-    now_us: || embassy_time::Instant::now().as_micros(),
-    waiting: can::waiting,
-    send: can::send,
-    give_up: can::give_up,
-    status: can::status,
-    held: housekeeping::permits,
-};
-
-/// Ends of the bus: the servo's, the identification's, the keeper; and the calibrations that are kept.
-type Joined = (
-    Option<host::HostLink>,
-    Option<bus::ThreadEnd>,
-    Option<&'static mut keep::Keeper>,
-    [Option<StoredCalibration>; JOINTS],
-);
+/// Ends of the bus: the servo's, the identification's, the storage; and the stored calibrations.
+#[derive(Default)]
+struct Joined {
+    host: Option<HostEnds<'static, JOINTS>>,
+    following: Option<Following<JOINTS>>,
+    results: Option<bus::ThreadEnd>,
+    keeper: Option<&'static mut keep::Keeper>,
+    stored: [Option<StoredCalibration>; JOINTS],
+}
 
 /// The bus, with what was kept before; the controller takes part from here on.
 #[inline(never)]
@@ -151,7 +132,7 @@ fn join(
     configuration: &leg::Leg,
     control: &mut Control<JOINTS>,
     identity: &Identity,
-    calibrated: Consumer<'static, keep::Calibrated>,
+    calibrated: Consumer<'static, Calibrated>,
     notes: &mut Producer<'static, Record<JOINTS>>,
 ) -> Joined {
     let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
@@ -187,15 +168,15 @@ fn join(
     if !can::start(station.bit_rate().unwrap_or(USUAL_KBIT)) {
         let _ = notes.enqueue(Record::AxisFault { tick: 0, joint: 0, name: "bus_controller" });
     }
-    let (frames, servo, thread, end, bus) = memory::bus().split(station, WIRE);
+    let (frames, servo, thread, end, bus) = memory::bus().split(station);
     static BUS: StaticCell<bus::BusLoop> = StaticCell::new();
     place(&bus::BUS, BUS.init(bus));
     place(&bus::FRAMES_IN, frames);
     if let Some(keeper) = &mut keeper {
         keeper.serve(end, calibrated);
     }
-    let link = host::HostLink::new(servo, Following::new(configuration), can::pend, housekeeping::permits);
-    (Some(link), Some(thread), keeper, calibrations)
+    let following = Some(Following::new(configuration));
+    Joined { host: Some(servo), following, results: Some(thread), keeper, stored: calibrations }
 }
 
 /// Of a board whose version is not known: no voltage is then taken for a smaller one, and nothing is enabled.
@@ -217,7 +198,7 @@ fn judge(board: &Board) {
         (analog::divider(board.identity.version).is_none(), Cause::BoardVersion),
     ];
     for (_, cause) in found.into_iter().filter(|(found, _)| *found) {
-        interlock::raise(cause);
+        SIGNALS.inhibit.raise(cause);
     }
 }
 

@@ -1,35 +1,31 @@
-//! Thread: the identification, in slices, whenever nobody else wants the processor; and every record that leaves the board.
+//! Thread level on the board: the task around `operation::IdentificationLevel`, and all records that leave the board.
 //!
-//! Records are sent from here alone: whoever sends one holds a critical section for up to 5,000 instructions, which delays nothing
-//! that matters from here. At most one in two milliseconds is sent of what can wait, so that the probe keeps up.
-//!
-//! **Gaps.** Samples come with their tick. One that is missing would bend every row it should have been in: the identification
-//! is broken off, and what control waits for is told as refused for its input.
+//! Records that cannot wait leave at once; what can wait leaves at most once in 2 ms, so that the probe keeps up.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_time::{Duration, Instant, Timer};
-use heapless::spsc::{Consumer, Producer};
 
-use super::bus::{SEARCH, ThreadEnd};
+use super::SIGNALS;
+use super::bus::ThreadEnd;
 use super::leg::{BASE, JOINTS, LEG, Leg, LegIdentification};
-use super::links::Told;
-use super::statistics;
 use super::surroundings::{Introduction, Surroundings};
-use crate::leg::{Activity, Finding, IdentifyPhase, LoggedSample, Reason, SearchState, Segment, Verdict};
-use crate::servo::{LOG_RATE_HZ, SERVO_RATE_HZ, TICKS_PER_LOG};
+use crate::leg::{Activity, IdentifyPhase, LoggedSample};
+use crate::operation::{IdentificationEnds, IdentificationLevel, Slice};
+use crate::servo::{LOG_RATE_HZ, SERVO_RATE_HZ};
 use crate::store::KeptModel;
-use crate::trace::{GRAMMAR, Record, Report, judged, words};
+use crate::trace::{GRAMMAR, Record, Report, words};
 
 /// Evaluations of the search in one slice: some 0.25 ms.
 const EVALUATIONS: u32 = 4;
-/// What can wait is told at most this often.
+/// Shortest time between two records that can wait.
 const PACE: Duration = Duration::from_millis(2);
-/// Progress of the search, loops and supply.
+/// Time between two records of the search's progress.
 const PROGRESS: Duration = Duration::from_millis(250);
+/// Time between two records of loops and supply.
 const LOOPS: Duration = Duration::from_secs(1);
-/// Every sample of the log is told: asked for when the image is built.
-const TELLS_LOG: bool = option_env!("SCARAB_TRACE_LOG").is_some();
+/// Every sample of the log is sent: set when the image is built.
+const SENDS_LOG: bool = option_env!("SCARAB_TRACE_LOG").is_some();
 
 static NUMBER: AtomicU32 = AtomicU32::new(0);
 
@@ -39,14 +35,10 @@ fn tell(record: &Record<JOINTS>) {
 
 /// What the thread works on.
 pub struct Thread {
-    /// The half of the leg that finds out.
+    /// The half of the leg that identifies.
     pub identification: &'static mut LegIdentification,
-    /// From the servo.
-    pub told: Consumer<'static, Told>,
-    /// To the servo.
-    pub findings: Producer<'static, Finding<JOINTS>>,
-    /// From the housekeeping.
-    pub notes: Consumer<'static, Record<JOINTS>>,
+    /// Its ends of the queues.
+    pub ends: IdentificationEnds<'static, JOINTS>,
     /// The board.
     pub surroundings: Surroundings,
     /// The bus, where there is one, and what the leg was built from.
@@ -55,15 +47,7 @@ pub struct Thread {
 
 /// What changes.
 struct State {
-    activity: Activity,
-    /// Tick and segment of the sample before.
-    last: Option<(u32, Segment)>,
-    /// A sample was lost in this identification.
-    gap: bool,
-    /// Of this identification's random numbers.
-    seed: u64,
-    /// The bus is to answer with what there is now, and this verdict.
-    publish: Option<Option<Verdict>>,
+    level: IdentificationLevel,
     report: Option<Report>,
     next_paced: Instant,
     next_progress: Instant,
@@ -95,18 +79,14 @@ pub fn introduce(introduction: &Introduction, clock_hz: u32) {
 pub async fn run(mut thread: Thread) -> ! {
     let now = Instant::now();
     let mut state = State {
-        activity: Activity::Idle,
-        last: None,
-        gap: false,
-        seed: thread.identification.swarm_seed(),
-        publish: None,
+        level: IdentificationLevel::new(thread.identification.swarm_seed()),
         report: None,
         next_paced: now,
         next_progress: now,
         next_loops: now,
     };
     loop {
-        let heard = thread.hear(&mut state);
+        let heard = state.level.hear(thread.identification, &mut thread.ends, tell, log);
         let working = thread.work(&mut state);
         thread.publish(&mut state);
         thread.speak(&mut state);
@@ -115,6 +95,22 @@ pub async fn run(mut thread: Thread) -> ! {
         } else {
             Timer::after_millis(1).await;
         }
+    }
+}
+
+/// Sends a sample of the log, if the image does.
+fn log(logged: &LoggedSample<JOINTS>) {
+    if SENDS_LOG {
+        let (segment, motion) = words::segment(logged.segment);
+        let sample = &logged.sample;
+        tell(&Record::Log {
+            tick: sample.tick,
+            segment,
+            motion,
+            position_rad: sample.position_rad,
+            torque_nm: sample.torque_nm,
+            counts: sample.counts_sum,
+        });
     }
 }
 
@@ -132,124 +128,37 @@ async fn embassy_futures_yield() {
 }
 
 impl Thread {
-    /// Takes what the servo told; whether there was anything.
-    #[inline(never)]
-    fn hear(&mut self, state: &mut State) -> bool {
-        let mut heard = false;
-        // No more than there is room for at once, so that the search is not starved by what comes meanwhile.
-        for _ in 0..super::links::TOLD {
-            let Some(told) = self.told.dequeue() else { break };
-            heard = true;
-            match told {
-                Told::Sample(logged) => self.take(&logged, state),
-                Told::Begun(prepared) => {
-                    self.identification.cancel();
-                    if let Some((plan, seed)) = prepared {
-                        self.identification.prepare(plan, seed);
-                        state.seed = seed;
-                    }
-                    (state.gap, state.report) = (false, None);
-                    state.publish = Some(None);
-                }
-                Told::Activity(activity) => {
-                    state.activity = activity;
-                    if !matches!(activity, Activity::Identify(_)) {
-                        self.identification.cancel();
-                    }
-                }
-                Told::TookUpdate => self.identification.take_update(),
-                Told::Say(record) => tell(&record),
-            }
-        }
-        heard
-    }
-
-    #[inline(never)]
-    fn take(&mut self, logged: &LoggedSample<JOINTS>, state: &mut State) {
-        let tick = logged.sample.tick;
-        if let (Some((before, segment)), Some(now)) = (state.last, logged.segment)
-            && segment == now
-            && tick.wrapping_sub(before) != TICKS_PER_LOG
-        {
-            state.gap = true;
-        }
-        state.last = logged.segment.map(|segment| (tick, segment));
-        if TELLS_LOG {
-            let (segment, motion) = words::segment(logged.segment);
-            let sample = &logged.sample;
-            tell(&Record::Log {
-                tick,
-                segment,
-                motion,
-                position_rad: sample.position_rad,
-                torque_nm: sample.torque_nm,
-                counts: sample.counts_sum,
-            });
-        }
-        if !state.gap {
-            self.identification.push(logged);
-        }
-    }
-
     /// One slice; whether there was anything to do.
     #[inline(never)]
     fn work(&mut self, state: &mut State) -> bool {
-        use IdentifyPhase::{Judge, Settle, Solve};
-        if state.gap {
-            if let Activity::Identify(Settle | Solve | Judge) = state.activity {
-                state.gap = false;
-                self.identification.cancel();
-                let verdict = Verdict::refused(Reason::Input);
-                tell(&Record::Refused { why: "samples_lost", value: statistics::SAMPLES_LOST.get() });
-                let _ = self.findings.enqueue(Finding::Judged { verdict, model: None });
-                state.publish = Some(Some(verdict));
-            }
-            return false;
-        }
-        let Some(finding) = self.identification.advance(EVALUATIONS) else {
-            let Some(solver) = self.identification.solver() else { return false };
-            let search = solver.search();
-            SEARCH[0].set(search.iterations());
-            SEARCH[1].set(search.evaluations());
-            return search.state() == SearchState::Running;
-        };
-        match &finding {
-            Finding::Solved => {}
-            Finding::Judged { verdict, model } => {
+        match state.level.work(self.identification, EVALUATIONS, &mut self.ends, &SIGNALS, tell) {
+            Slice::Idle => false,
+            Slice::Busy => true,
+            Slice::Judged(model) => {
                 state.report = Some(Report::default());
-                state.publish = Some(Some(*verdict));
-                if let (Some((bus, leg)), Some(model)) = (&mut self.bus, model) {
-                    bus.accept(KeptModel::of(leg, self.identification, model, 0, state.seed));
+                if let (Some((bus, leg)), Some(model)) = (&mut self.bus, &model) {
+                    bus.accept(KeptModel::of(leg, self.identification, model, 0, state.level.seed()));
                 }
-            }
-            Finding::Changed(change) => tell(&Record::Change {
-                since_s: change.since_s,
-                joints: change.joints,
-                statistic: change.statistic,
-                limit: change.limit,
-            }),
-            Finding::Updated { cause, verdict, model } => {
-                let (cause, link) = words::cause(*cause);
-                let verdict = judged(verdict.is_accepted());
-                tell(&Record::Update { cause, link, verdict, offered: model.is_some() });
+                true
             }
         }
-        // Control takes one in every tick.
-        let _ = self.findings.enqueue(finding);
-        true
     }
 
     /// Results as the bus answers with them.
     #[inline(never)]
     fn publish(&mut self, state: &mut State) {
-        let (Some(verdict), Some((bus, _))) = (state.publish, &mut self.bus) else { return };
+        let Some(verdict) = state.level.unpublished() else { return };
+        if verdict.is_none() {
+            state.report = None;
+        }
+        let Some((bus, _)) = &mut self.bus else { return state.level.published() };
         let identification = &*self.identification;
         let published = bus.publish(|found| match verdict {
             None => found.forget(),
             Some(_) => found.take(identification, verdict),
         });
         if published {
-            state.publish = None;
+            state.level.published();
         }
     }
 
@@ -261,7 +170,7 @@ impl Thread {
             return;
         }
         state.next_paced = now + PACE;
-        if let Some(note) = self.notes.dequeue() {
+        if let Some(note) = self.ends.notes.dequeue() {
             return tell(&note);
         }
         if let Some(report) = &mut state.report {
@@ -274,7 +183,7 @@ impl Thread {
                 }
             }
         }
-        if now >= state.next_progress && matches!(state.activity, Activity::Identify(IdentifyPhase::Solve)) {
+        if now >= state.next_progress && matches!(state.level.activity(), Activity::Identify(IdentifyPhase::Solve)) {
             state.next_progress = now + PROGRESS;
             return self.tell_progress(state);
         }
@@ -289,7 +198,7 @@ impl Thread {
         let Some(solver) = self.identification.solver() else { return };
         let search = solver.search();
         tell(&Record::Progress {
-            tick: state.last.map_or(0, |(tick, _)| tick),
+            tick: state.level.tick(),
             iterations: search.iterations(),
             evaluations: search.evaluations(),
             excess_chi2: search.stage_excess().unwrap_or(f32::NAN),
@@ -299,11 +208,11 @@ impl Thread {
     fn tell_supply(&self, state: &State) {
         let board = &self.surroundings;
         let Some(volt_per_code) = board.volt_per_code else { return };
-        let [now, low, high] = &statistics::BUS;
+        let [now, low, high] = &SIGNALS.statistics.bus;
         let volt = |code: u32| volt_per_code.0 * code.min(4095) as f32;
         let [first, second, chopper] = (board.temperatures_c)();
         tell(&Record::Supply {
-            tick: state.last.map_or(0, |(tick, _)| tick),
+            tick: state.level.tick(),
             bus_v: volt(now.get()),
             bus_low_v: volt(low.swap(u32::MAX)),
             bus_high_v: volt(high.swap(0)),
@@ -314,18 +223,19 @@ impl Thread {
     }
 
     fn tell_loops(&self, state: &State) {
+        let statistics = &SIGNALS.statistics;
         let board = &self.surroundings;
         tell(&Record::Loops {
-            tick: state.last.map_or(0, |(tick, _)| tick),
-            current_worst: statistics::CURRENT_WORST.swap(0),
-            servo_worst: statistics::SERVO_WORST.swap(0),
-            current_missed: statistics::CURRENT_MISSED.get(),
-            servo_missed: statistics::SERVO_MISSED.get(),
+            tick: state.level.tick(),
+            current_worst: statistics.current_worst.swap(0),
+            servo_worst: statistics.servo_worst.swap(0),
+            current_missed: statistics.current_missed.get(),
+            servo_missed: statistics.servo_missed.get(),
             cycles_per_tick: board.clock_hz / SERVO_RATE_HZ,
             stack_used: (board.stack_used)(),
             stack_bytes: (board.stack_bytes)(),
-            samples_lost: statistics::SAMPLES_LOST.get(),
-            records_lost: statistics::RECORDS_LOST.get(),
+            samples_lost: statistics.samples_lost.get(),
+            records_lost: statistics.records_lost.get(),
         });
     }
 }

@@ -4,22 +4,20 @@
 //! gap while `storing` is raised (`operation::CurrentLoops`). What an emergency stop does to bridges that are off is what it does after.
 
 use core::pin::pin;
-use core::sync::atomic::{AtomicBool, Ordering};
 use core::task::{Context, Poll, Waker};
 
 use embassy_time::Timer;
 use heapless::spsc::Consumer;
 
-use super::bus::{Keep, KeeperEnd};
-use super::interlock::{self, Cause};
+use super::SIGNALS;
+use super::bus::KeeperEnd;
 use super::leg::{JOINTS, Leg};
-use super::servo;
 use crate::board::odrive_v3_6::flash::Flash;
-use crate::board::odrive_v3_6::watchdog;
+use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::bus::station::Keeping;
 use crate::bus::{KeptNode, LONGEST};
-use crate::leg::{IdentifiedModel, Permission, StoredCalibration};
-use crate::operation::{Storing, StoringBoard};
+use crate::leg::{IdentifiedModel, StoredCalibration};
+use crate::operation::{Calibrated, Keep, Storing};
 use crate::store::{self, Permit, Store};
 
 /// Looks for something to do so often, ms.
@@ -27,17 +25,6 @@ const ROUND_MS: u64 = 10;
 
 /// A change of the flash takes a step so often, ms.
 const STEP_MS: u64 = 1;
-
-/// Everything was forgotten, and the housekeeping does not know it yet.
-static FORGOTTEN: AtomicBool = AtomicBool::new(false);
-
-/// Everything that was kept was forgotten; once.
-pub fn take_forgotten() -> bool {
-    FORGOTTEN.swap(false, Ordering::Relaxed)
-}
-
-/// What an axis passed, and what of it can be kept.
-pub type Calibrated = (usize, Option<StoredCalibration>);
 
 /// The store and who asks for it.
 pub struct Keeper {
@@ -88,12 +75,12 @@ impl Keeper {
 
 /// Whether it was done.
 #[inline(never)]
-fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep) -> Option<()> {
-    let permit = Permit::under(servo::permission())?;
+fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep<JOINTS>) -> Option<()> {
+    let permit = Permit::under(SIGNALS.permission())?;
     keep.generation = match keep.what {
         Keeping::Defaults => {
             let generation = at_once(keeper.forget(&permit))??;
-            FORGOTTEN.store(true, Ordering::Relaxed);
+            SIGNALS.forget_stored();
             generation
         }
         Keeping::All => {
@@ -104,42 +91,13 @@ fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep) -> Option<
     Some(())
 }
 
-/// The board, as a change of the flash has it.
-struct Ports;
-
-impl StoringBoard for Ports {
-    fn permission(&self) -> Permission {
-        servo::permission()
-    }
-
-    fn causes(&self) -> u32 {
-        interlock::causes()
-    }
-
-    fn raise(&mut self, cause: Cause) {
-        interlock::raise(cause);
-    }
-
-    fn stored(&mut self) {
-        interlock::stored();
-    }
-
-    fn stretch(&mut self) -> bool {
-        watchdog::stretch()
-    }
-
-    fn tighten(&mut self) -> bool {
-        watchdog::tighten()
-    }
-}
-
 /// Runs for ever.
 #[embassy_executor::task]
 pub async fn run(keeper: &'static mut Keeper) -> ! {
     let Keeper { keeper, storing, ends } = keeper;
     loop {
         Timer::after_millis(ROUND_MS).await;
-        storing.look_after(&mut Ports);
+        storing.look_after(&SIGNALS.inhibit, &mut Odrive);
         let Some((end, calibrated)) = ends else { continue };
         if let Some(model) = end.accepted.dequeue() {
             keeper.accept(model);
@@ -147,13 +105,15 @@ pub async fn run(keeper: &'static mut Keeper) -> ! {
         while let Some((axis, calibration)) = calibrated.dequeue() {
             keeper.calibrated(axis, calibration);
         }
-        let Some(keep) = end.keep.dequeue() else { continue };
+        let Some(mut keep) = end.storage.given() else { continue };
         keep.done = loop {
-            match storing.step(&mut Ports, || change(keeper, keep).is_some()) {
+            let change = || change(keeper, &mut keep).is_some();
+            match storing.step(&SIGNALS.inhibit, SIGNALS.permission(), &mut Odrive, change) {
                 Some(done) => break done,
                 None => Timer::after_millis(STEP_MS).await,
             }
         };
-        let _ = end.kept.enqueue(keep);
+        drop(keep);
+        end.storage.give_back();
     }
 }

@@ -72,6 +72,15 @@ records! {
         /// What was found.
         value: u32,
     }
+    /// Status of a gate driver, once per driver when a cause of theirs forbids to enable.
+    GateDriver "gate_driver n={=u32} why={=str} joint={=u8} status={=u32:#x}" {
+        /// `gate_fault` or `gate_configuration`.
+        why: &'static str,
+        /// From 1.
+        joint: u8,
+        /// Status registers of the DRV8301, the first in the upper half; all ones if it does not answer.
+        status: u32,
+    }
     /// Drive or activity changed.
     State "state n={=u32} tick={=u32} drive={=str} activity={=str} phase={=str} motion={=u8}" {
         /// Servo tick.

@@ -1,26 +1,26 @@
-//! The firmware's side of a complete drive: the board's current loops, six PWM periods per servo tick.
+//! The firmware's side of a complete drive: all levels of the board ([`levels`]) over simulated registers ([`registers`]).
 //!
-//! Exactly the code of the board runs here: [`Axis`] at 24 kHz for every joint, its calibration before, the brake chopper. What
-//! the plant says in a period is answered in the same period and acts in the next; the servo's sample is the mean of the six
+//! What the plant says in a PWM period is answered in the same period and acts in the next; the servo's sample is the mean of the six
 //! periods since its last tick.
 //!
 //! A run begins with a drive that is ready: every motor was calibrated on a stand, free of its gear and at rest, with the rotor
 //! and the counter where they are in the leg, and the pose in which the leg stands is taken for the reference (a released leg
 //! would swing for the half second that `StatedPose` waits).
-//!
-//! An axis that releases itself takes the others with it: a leg on which one joint still pulls is worse than a leg that lets go.
 
+pub mod levels;
+pub mod registers;
 pub mod words;
 
 use core::f64::consts::TAU;
 
+use scarab::board::odrive_v3_6::settings::analog::HOTTEST_C;
 use scarab::board::odrive_v3_6::settings::drives;
-use scarab::hal::{AxisCommand, DriveCommand, JointSample, LegDrives, Sample};
+use scarab::hal::{AxisCommand, LegDrives};
 use scarab::leg::MotorDescription;
 use scarab::motor::{
-    Axis, AxisConfiguration, AxisFault, AxisRequest, Calibration, CalibrationSettings, CalibrationStep,
-    Calibrator, Chopper, SenseScale,
+    Axis, AxisConfiguration, Calibration, CalibrationSettings, CalibrationStep, Calibrator, Chopper,
 };
+use scarab::operation::HousekeepingSettings;
 use scarab::units::{Ampere, RadianPerSecond, Volt, Weber};
 
 use super::error::ToolError;
@@ -119,94 +119,57 @@ pub fn commission(
     Err(refused("the calibration did not end".into()))
 }
 
-/// The board of a leg: its axes with their last commands.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Board<const N: usize> {
-    axes: [Axis; N],
-    commands: [AxisCommand; N],
-    chopper: Chopper,
-    brake: f32,
-    fault: Option<(usize, AxisFault)>,
+/// Axes of a board that is ready, and its chopper: motors calibrated, counts as those of the pose in which the world's leg stands.
+fn ready<const N: usize>(
+    believed: &LegFile,
+    description: &CompleteDescription<N>,
+    world: &mut World<N>,
+    seed: u64,
+) -> Result<([Axis; N], Chopper), ToolError> {
+    let pose = world.sample();
+    let samples = world.period(&[AxisCommand::RELEASED; N], 0.0);
+    let mut axes = Vec::with_capacity(N);
+    for (index, joint) in believed.joints.iter().enumerate().take(N) {
+        let motor = joint
+            .motor
+            .as_ref()
+            .ok_or_else(|| ToolError::input(format!("joint `{}` has no motor", joint.name)))?;
+        let configuration = axis_configuration(joint, motor);
+        let (name, simulated) = (&joint.name, &description.axes[index]);
+        let settings = calibration_settings(&configuration, motor);
+        let counts = pose.joints[index].encoder_counts;
+        // The counter wraps at 16 bits, which are no whole turns of every encoder: it has to begin where the leg's does.
+        let angle = TAU * f64::from(counts) / simulated.counter.counts;
+        let supply = &description.supply;
+        let calibration = commission(name, &configuration, settings, simulated, supply, angle, seed)?;
+        let mut axis = Axis::new(&configuration, &calibration, &samples[index])
+            .map_err(|error| ToolError::input(format!("axis `{name}`: {}", words::axis_error(error))))?;
+        axis.set_counts(counts);
+        axes.push(axis);
+    }
+    let chopper = Chopper::new(BRAKE[0], BRAKE[1])
+        .ok_or_else(|| ToolError::input("the firmware refuses the chopper's voltages"))?;
+    let axes = axes.try_into().map_err(|_| ToolError::input("a motor for every joint is needed"))?;
+    // The first period was that of the reference; the rest of its servo tick passes released.
+    for _ in 1..PERIODS_PER_TICK {
+        world.period(&[AxisCommand::RELEASED; N], 0.0);
+    }
+    Ok((axes, chopper))
 }
 
-impl<const N: usize> Board<N> {
-    /// A board that is ready: motors calibrated, counts as those of the pose in which the world's leg stands. `believed` is
-    /// the leg as the firmware has it, `description` what is simulated.
-    pub fn new(
-        believed: &LegFile,
-        description: &CompleteDescription<N>,
-        world: &mut World<N>,
-        seed: u64,
-    ) -> Result<Self, ToolError> {
-        let pose = world.sample();
-        let samples = world.period(&[AxisCommand::RELEASED; N], 0.0);
-        let mut axes = Vec::with_capacity(N);
-        for (index, joint) in believed.joints.iter().enumerate().take(N) {
-            let motor = joint
-                .motor
-                .as_ref()
-                .ok_or_else(|| ToolError::input(format!("joint `{}` has no motor", joint.name)))?;
-            let configuration = axis_configuration(joint, motor);
-            let (name, simulated) = (&joint.name, &description.axes[index]);
-            let settings = calibration_settings(&configuration, motor);
-            let counts = pose.joints[index].encoder_counts;
-            // The counter wraps at 16 bits, which are no whole turns of every encoder: it has to begin where the leg's does.
-            let angle = TAU * f64::from(counts) / simulated.counter.counts;
-            let supply = &description.supply;
-            let calibration = commission(name, &configuration, settings, simulated, supply, angle, seed)?;
-            let mut axis = Axis::new(&configuration, &calibration, &samples[index])
-                .map_err(|error| ToolError::input(format!("axis `{name}`: {}", words::axis_error(error))))?;
-            axis.set_counts(counts);
-            axes.push(axis);
-        }
-        let chopper = Chopper::new(BRAKE[0], BRAKE[1])
-            .ok_or_else(|| ToolError::input("the firmware refuses the chopper's voltages"))?;
-        let axes = axes.try_into().map_err(|_| ToolError::input("a motor for every joint is needed"))?;
-        // The first period was that of the reference; the rest of its servo tick passes released.
-        for _ in 1..PERIODS_PER_TICK {
-            world.period(&[AxisCommand::RELEASED; N], 0.0);
-        }
-        Ok(Self { axes, commands: [AxisCommand::RELEASED; N], chopper, brake: 0.0, fault: None })
+/// What the housekeeping of this leg is built from.
+fn housekeeping_settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSettings<N>, ToolError> {
+    let unfit = || ToolError::input("a motor for every joint is needed");
+    let mut parts = Vec::with_capacity(N);
+    for joint in leg.joints.iter().take(N) {
+        let motor = joint.motor.as_ref().ok_or_else(unfit)?;
+        let configuration = axis_configuration(joint, motor);
+        parts.push((configuration, calibration_settings(&configuration, motor)));
     }
-
-    /// One servo tick of drives and plant; what the servo sees at its end.
-    pub fn tick(&mut self, world: &mut World<N>, command: &DriveCommand<N>) -> Sample<N> {
-        for _ in 0..PERIODS_PER_TICK {
-            let samples = world.period(&self.commands, f64::from(self.brake));
-            for (joint, axis) in self.axes.iter_mut().enumerate() {
-                let enabled = command.enabled && self.fault.is_none();
-                let request = AxisRequest { enabled, current: command.currents[joint] };
-                self.commands[joint] = axis.tick(&samples[joint], request);
-                self.fault = self.fault.or(axis.fault().map(|fault| (joint, fault)));
-            }
-            if self.fault.is_some() {
-                self.commands = [AxisCommand::RELEASED; N];
-            }
-            let bus = samples.first().map_or(0, |sample| sample.bus_code);
-            self.brake = self.chopper.duty(SenseScale::ODRIVE_3_6.bus(bus));
-        }
-        let mut joints = [JointSample::default(); N];
-        for (joint, axis) in joints.iter_mut().zip(&mut self.axes) {
-            *joint = axis.joint_sample();
-        }
-        world.observe(&Sample { joints })
-    }
-
-    /// The first axis that released itself, and why; since then all are released.
-    #[must_use]
-    pub fn fault(&self) -> Option<(usize, AxisFault)> {
-        self.fault
-    }
-
-    /// Current loops and chopper, for whoever ticks them otherwise.
-    #[must_use]
-    pub fn into_parts(self) -> ([Axis; N], Chopper) {
-        (self.axes, self.chopper)
-    }
-
-    /// The current loops.
-    #[must_use]
-    pub fn axes(&self) -> &[Axis; N] {
-        &self.axes
-    }
+    let parts: [_; N] = parts.try_into().map_err(|_| unfit())?;
+    Ok(HousekeepingSettings {
+        axes: parts.map(|(axis, _)| axis),
+        calibration: parts.map(|(_, calibration)| calibration),
+        hottest_c: HOTTEST_C,
+    })
 }

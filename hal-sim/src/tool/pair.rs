@@ -10,7 +10,7 @@ use scarab::motion::Periodic;
 use scarab::safety::{DriveState, PowerRequest};
 
 use super::analysis::Background;
-use super::board::Board;
+use super::board::levels::{Conditions, Levels};
 use super::board::words::axis_fault;
 use super::error::ToolError;
 use super::leg_file::LegFile;
@@ -19,6 +19,7 @@ use super::setup::{SetupError, background, configuration};
 use super::simulate::{DriveModel, SimulationOptions};
 use super::words::drive_stop;
 use super::words::leg_error;
+use crate::world::periods::PERIODS_PER_TICK;
 use crate::world::{TICK_S, World};
 
 /// Taps of the device's filter.
@@ -129,14 +130,16 @@ pub struct Pair<const N: usize, const B: usize> {
     pub leg: Box<DeviceLeg<N, B>>,
     /// The plant.
     pub world: World<N>,
-    /// The board's current loops, where the plant's drives are complete.
-    pub board: Option<Board<N>>,
+    /// All levels of the board, where the plant's drives are complete.
+    pub board: Option<Box<Levels<N>>>,
     /// What the sensors said last.
     pub sample: Sample<N>,
     /// So far.
     pub ticks: u64,
     /// Evaluations of the search at each tick.
     pub evaluations: u32,
+    /// What the last tick of complete drives gave.
+    output: Option<ControlOutput<N>>,
     /// Which joint of the plant hangs on each joint's connectors.
     wiring: [usize; N],
 }
@@ -154,18 +157,24 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         world.place(&start_position(leg));
         let device = DeviceLeg::new(&context.configuration)
             .map_err(|error| SetupError::new(leg, leg_error(leg, error)))?;
+        let device = Box::new(device);
         let sample = world.sample();
         let board = match believed.zip(drives.as_ref()) {
-            Some((believed, drives)) => Some(Board::new(believed, drives, &mut world, seed)?),
+            Some((believed, drives)) => {
+                let mut board = Levels::ready(believed, drives, &device, &mut world, seed)?;
+                board.queues.set_samples(&sample.joints);
+                Some(Box::new(board))
+            }
             None => None,
         };
         Ok(Self {
-            leg: Box::new(device),
+            leg: device,
             world,
             board,
             sample,
             ticks: 0,
             evaluations: EVALUATIONS_PER_TICK,
+            output: None,
             wiring: core::array::from_fn(|joint| joint),
         })
     }
@@ -174,26 +183,60 @@ impl<const N: usize, const B: usize> Pair<N, B> {
     pub fn exchange(&mut self, one: usize, other: usize) {
         self.wiring.swap(one, other);
         self.sample.joints.swap(one, other);
+        if let Some(board) = &mut self.board {
+            board.exchange(one, other);
+            board.queues.set_samples(&self.sample.joints);
+        }
     }
 
     /// One servo tick of both.
     pub fn tick(&mut self, request: Option<ControlRequest<N>>, gravity: [f32; 3]) -> ControlOutput<N> {
-        // As on the board: an axis that released itself takes the drive out of operation.
-        let released = self.board.as_ref().is_some_and(|board| board.fault().is_some());
-        let off = ControlRequest::Power(PowerRequest::DisableVoltage);
-        let request = if released { Some(off) } else { request };
-        let output = self.leg.tick(&self.sample, request, gravity, self.evaluations);
-        let mut command = *output.servo.drive();
-        for (joint, &wired) in self.wiring.iter().enumerate() {
-            command.currents[wired] = output.servo.drive().currents[joint];
-        }
-        let sample = match &mut self.board {
-            Some(board) => board.tick(&mut self.world, &command),
-            None => self.world.tick(&command),
+        let output = if self.board.is_some() {
+            self.tick_board(request, gravity)
+        } else {
+            let output = self.leg.tick(&self.sample, request, gravity, self.evaluations);
+            let mut command = *output.servo.drive();
+            for (joint, &wired) in self.wiring.iter().enumerate() {
+                command.currents[wired] = output.servo.drive().currents[joint];
+            }
+            let sample = self.world.tick(&command);
+            self.sample.joints = self.wiring.map(|wired| sample.joints[wired]);
+            output
         };
-        self.sample.joints = self.wiring.map(|wired| sample.joints[wired]);
         self.ticks += 1;
         output
+    }
+
+    /// One servo tick of all levels of the board, and six periods of the plant.
+    fn tick_board(&mut self, request: Option<ControlRequest<N>>, gravity: [f32; 3]) -> ControlOutput<N> {
+        let Some(board) = &mut self.board else { unreachable!("called with a board") };
+        if let Some(request) = request {
+            board.ask(request);
+        }
+        let first = self.ticks * u64::from(PERIODS_PER_TICK);
+        for period in first..first + u64::from(PERIODS_PER_TICK) {
+            if Levels::<N>::is_round_due(period) {
+                board.housekeeping();
+            }
+            if core::mem::take(&mut board.registers.servo_due) {
+                self.output = board.servo(self.leg.halves().0, gravity).or(self.output);
+                board.identify(&mut self.leg, self.evaluations);
+            }
+            let mut commands = board.registers.commands;
+            for (joint, &wired) in self.wiring.iter().enumerate() {
+                commands[wired] = board.registers.commands[joint];
+            }
+            let samples = self.world.period(&commands, f64::from(board.registers.brake));
+            for (joint, &wired) in self.wiring.iter().enumerate() {
+                board.current(joint, period, &samples[wired], Conditions::SOUND);
+            }
+            board.watch(period);
+        }
+        if let Some(joints) = board.samples() {
+            self.sample = self.world.observe(&Sample { joints });
+            board.queues.set_samples(&self.sample.joints);
+        }
+        self.output.expect("a board that is ready ticks its leg at once")
     }
 
     /// Goes along the exciting motion, and no further than the record of it; `None` where the drive does not complete it.
@@ -215,7 +258,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
     /// Why the drive is no longer enabled, in words.
     #[must_use]
     pub fn stop_words(&self, leg: &LegFile) -> String {
-        let Some((joint, fault)) = self.board.as_ref().and_then(Board::fault) else {
+        let Some((joint, fault)) = self.board.as_ref().and_then(|board| board.fault()) else {
             return drive_stop(leg, self.leg.control().state());
         };
         let name = leg.joints.get(joint).map_or("?", |joint| joint.name.as_str());

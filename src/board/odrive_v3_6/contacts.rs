@@ -4,7 +4,8 @@
 //! the emergency stop, has no noise filter on the board: what is open for a microsecond stops, and only the operator starts again.
 //!
 //! The sense is looked at in each current tick. Besides, its opening is an interrupt above all others: it releases both bridges
-//! where the current loops hang or no longer come. A tick that it interrupts may let its bridge through once more, until its next.
+//! where the current loops hang or no longer come. A tick that it interrupts reads the inhibit word again, with interrupts masked, before it
+//! switches outputs on (`operation::CurrentLoops`).
 
 use super::bridge;
 use super::registers::{load, store};

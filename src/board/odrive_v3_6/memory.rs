@@ -1,7 +1,6 @@
 //! Where the identification lies: in the memory that only the processor reaches; its window of blocks, half of it all, in the other.
 #![expect(unsafe_code, reason = "a section of the linker's")]
 
-use heapless::spsc::Queue;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::leg::Filters;
@@ -9,8 +8,8 @@ use super::flash::Flash;
 use super::settings::flash::BYTES;
 use crate::task::bus;
 use crate::task::keep::Keeper;
-use crate::task::links::{TOLD as TOLD_LENGTH, Told};
-use crate::task::leg::{LEG, Leg, LegIdentification, LegWindow};
+use crate::operation::EventQueue;
+use crate::task::leg::{JOINTS, LEG, Leg, LegIdentification, LegWindow};
 
 #[unsafe(link_section = ".ccm.identification")]
 static IDENTIFICATION: StaticCell<LegIdentification> = StaticCell::new();
@@ -30,11 +29,11 @@ pub fn identification() -> Option<(&'static Leg, &'static mut LegIdentification)
 }
 
 #[unsafe(link_section = ".ccm.told")]
-static TOLD: StaticCell<Queue<Told, TOLD_LENGTH>> = StaticCell::new();
+static EVENTS: StaticCell<EventQueue<JOINTS>> = StaticCell::new();
 
 /// The queue from the servo to the identification, once.
-pub fn told() -> &'static mut Queue<Told, TOLD_LENGTH> {
-    TOLD.init_with(Queue::new)
+pub fn events() -> &'static mut EventQueue<JOINTS> {
+    EVENTS.init_with(EventQueue::new)
 }
 
 #[unsafe(link_section = ".ccm.station")]

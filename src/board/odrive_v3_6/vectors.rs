@@ -6,9 +6,10 @@ use embassy_stm32::interrupt::{
     ADC, CAN1_RX0, CAN1_TX, EXTI4, EXTI9_5, EXTI15_10, I2C3_EV, InterruptExt, OTG_HS,
 };
 
+use super::hardware::Odrive;
 use super::{can, contacts, encoder};
-use crate::task;
-use crate::task::interlock::Cause;
+use crate::safety::Cause;
+use crate::task::{self, SIGNALS};
 
 /// From now on the emergency stop, converters, index pulses and the servo interrupt; what they work on must be in its place.
 pub fn enable() {
@@ -28,13 +29,13 @@ fn ADC() {
 
 #[interrupt]
 fn OTG_HS() {
-    task::servo::interrupt();
+    task::servo::interrupt(&mut Odrive);
 }
 
 #[interrupt]
 fn EXTI4() {
     if contacts::stop_came() {
-        task::interlock::raise(Cause::EmergencyStop);
+        SIGNALS.inhibit.raise(Cause::EmergencyStop);
     }
 }
 
@@ -63,7 +64,7 @@ fn CAN1_RX0() {
 #[interrupt]
 fn CAN1_TX() {
     can::acknowledge();
-    task::bus::interrupt();
+    task::bus::interrupt(&mut Odrive);
 }
 
 /// The executor of the housekeeping.

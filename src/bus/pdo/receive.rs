@@ -1,6 +1,6 @@
 //! What the node receives as PDO.
 
-use super::super::frame::Frame;
+use crate::hal::Frame;
 use super::Parameters;
 
 /// What came of a frame, or of the time since.

@@ -133,7 +133,7 @@ fn an_event_is_told_once_per_inhibit_time_and_repeated_by_the_event_timer() {
 
 #[test]
 fn a_received_pdo_waits_for_the_sync_or_counts_at_once_and_is_missed() {
-    use super::super::frame::Frame;
+    use crate::hal::Frame;
     use receive::{Receive, Received};
     let mut parameters = Parameters::new(Mapping::Receive, 0x201, 1, 0, &[0x6040_0010]);
     assert_eq!(parameters.set_communication(5, 10), Ok(()));

@@ -1,6 +1,6 @@
 //! What the node sends as PDO.
 
-use super::super::frame::Frame;
+use crate::hal::Frame;
 use super::super::heartbeat::Clock;
 use super::Parameters;
 

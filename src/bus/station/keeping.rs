@@ -2,7 +2,7 @@
 
 use super::{Keeping, Station};
 use crate::bus::drive::{Axis, USUAL_KBIT};
-use crate::bus::frame::NodeId;
+use crate::bus::node_id::NodeId;
 use crate::bus::kept::{KeptNode, kept_bit_rate, kept_node_id};
 use crate::bus::nmt::{NmtState, Reset};
 use crate::bus::node::{Node, Storing};

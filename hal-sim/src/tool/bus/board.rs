@@ -1,30 +1,32 @@
-//! A leg on the bus: the whole firmware and plant behind two nodes, put together by the board's own `Station`.
+//! A leg on the bus: the whole firmware and plant behind two nodes, level by level as on the board.
 //!
 //! ```text
-//! each servo tick   leg --LegTold--> station,  station --LegOrder--> leg,  six PWM periods
-//! any time          frame -> nodes; nodes -> mailboxes of three frames, as the controller of the STM32 has them
-//! each millisecond  a step of what hosts want kept (`operation::Storing`)
+//! each servo tick   six PWM periods of the rig; a round of the bus (`operation::BusRound`) whenever the servo requests one
+//! any time          frame -> queue of the bus -> round; a mailbox of the controller is empty -> round
+//! each millisecond  a step of what hosts want stored (`operation::Storing`)
 //! ```
 //!
-//! While its flash is written the processor stands ([`super::storing`]): the plant goes on, nobody ticks, and of what hosts send the controller
-//! keeps three frames.
+//! While its flash is written the processor stands still ([`super::storing`]): the plant goes on, no level runs, and of what hosts send the
+//! controller holds three frames.
 //!
 //! The enabling switch stays a contact in the operator's hand, on the bus as without it: here a simulated operator holds it from the
-//! start, and what the hand asks for by closing it is over before the nodes say that they are there.
+//! start, and what closing it requests is over before the nodes send their boot-up messages.
 
 use scarab::bus::drive::{AxisConstants, Mode};
-use scarab::bus::station::{LegRequest, LegTold, Station};
-use scarab::bus::{Controller, Frame, Identity, KeptNode, Node, NodeId, Storing};
-use scarab::leg::{ControlRequest, Fault, JointStatus};
+use scarab::bus::station::Station;
+use scarab::bus::{Frame, Identity, Node, NodeId, Storing};
+use scarab::hal::{Contacts, Controller};
+use scarab::leg::ControlRequest;
+use scarab::operation::Slice;
 use scarab::safety::PowerRequest;
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::store::KeptModel;
 
 use super::memory::Memory;
-use super::storing::{Asked, Flashing};
+use super::storing::Flashing;
 use super::wire::Mailbox;
 use crate::tool::error::ToolError;
-use crate::tool::faults::rig::{Hand, Rig};
+use crate::tool::faults::rig::Rig;
 use crate::tool::leg_file::LegFile;
 use crate::tool::pair::Context;
 use crate::world::periods::PERIODS_PER_TICK;
@@ -33,16 +35,16 @@ use crate::world::periods::PERIODS_PER_TICK;
 pub const TICK_NS: u64 = 1_000_000_000 / SERVO_RATE_HZ as u64;
 /// Samples of the log that wait for a host: 4 s, 48 KB; what a board has room for is another matter.
 pub const LOG: usize = 2000;
-/// Transmit mailboxes of the STM32's controller.
-const MAILBOXES: usize = 3;
+/// Length of a PWM period.
+const PERIOD_NS: u64 = TICK_NS / PERIODS_PER_TICK as u64;
 /// A contact counts after 20 ms, and each of the three steps takes one of the operator's rounds.
 const CONTACT_TICKS: u32 = SERVO_RATE_HZ / 10;
-const HOLDS: Hand = Hand { enabling: true, start: false };
+const HOLDS: Contacts = Contacts { enabling: true, start: false };
 
 /// Both contacts open, then the enabling switch held. What closing it asks for, once, is to enable the leg: it holds its pose for some
 /// milliseconds and is taken off again, so that from then on only the bus asks.
 fn hold_the_switch<const N: usize, const B: usize>(rig: &mut Rig<N, B>) {
-    let mut run = |hand: Hand, ask: Option<PowerRequest>| {
+    let mut run = |hand: Contacts, ask: Option<PowerRequest>| {
         rig.hand = hand;
         if let Some(power) = ask {
             rig.ask(ControlRequest::Power(power));
@@ -53,7 +55,7 @@ fn hold_the_switch<const N: usize, const B: usize>(rig: &mut Rig<N, B>) {
             }
         }
     };
-    run(Hand::default(), None);
+    run(Contacts::default(), None);
     run(HOLDS, None);
     run(HOLDS, Some(PowerRequest::DisableVoltage));
 }
@@ -87,14 +89,10 @@ fn station<const N: usize, const B: usize>(context: &Context<N, B>, first: u8) -
 pub struct Board<const N: usize, const B: usize> {
     /// Firmware and plant.
     pub rig: Rig<N, B>,
-    /// What of each node's waits for the wire.
-    pub mailboxes: [Mailbox; N],
     station: Station<N, LOG>,
     memory: Memory,
     context: Context<N, B>,
     flashing: Flashing<N>,
-    /// How the controller does.
-    controller: Controller,
     /// Number of the first node, unless the memory says otherwise.
     first: u8,
 }
@@ -108,18 +106,15 @@ impl<const N: usize, const B: usize> Board<N, B> {
         first: u8,
         memory: Memory,
     ) -> Result<Self, ToolError> {
-        let mut rig = Rig::new(leg, &context, seed)?;
+        let mut rig = Rig::on_a_bus(leg, &context, seed)?;
         hold_the_switch(&mut rig);
         let station = station(&context, first);
-        let mailboxes = core::array::from_fn(|_| Mailbox::default());
         let mut board = Self {
             rig,
-            mailboxes,
             station,
             memory,
             context,
             flashing: Flashing::new(),
-            controller: Controller::Active,
             first,
         };
         for why in board.recall() {
@@ -132,8 +127,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
     pub fn power_on(&mut self) {
         self.rig.power_on();
         self.station = station(&self.context, self.first);
-        self.mailboxes.iter_mut().for_each(Mailbox::clear);
-        (self.controller, self.flashing) = (Controller::Active, Flashing::new());
+        self.flashing = Flashing::new();
         self.recall();
     }
 
@@ -160,14 +154,31 @@ impl<const N: usize, const B: usize> Board<N, B> {
         lost
     }
 
-    /// A frame on the bus; the node that sent it does not hear it.
-    pub fn hear(&mut self, frame: &Frame, now_ns: u64, sender: Option<usize>) {
-        if self.controller == Controller::Off {
+    /// A frame of another controller was on the bus until now.
+    pub fn hear(&mut self, frame: &Frame, now_ns: u64) {
+        if self.mailbox().is_off || !self.flashing.hear(frame, now_ns) {
             return;
         }
-        if sender.is_some() || self.flashing.hear(frame, now_ns) {
-            self.station.hear(frame, now_ns / 1000, sender, self.rig.leg.identification());
+        self.rig.board.receive(frame);
+        self.round(now_ns);
+    }
+
+    /// A frame of this board has left: its mailbox is empty.
+    pub fn sent(&mut self, now_ns: u64) {
+        if !self.flashing.stands(now_ns) {
+            self.round(now_ns);
         }
+    }
+
+    /// Frames of this board that wait for the wire.
+    pub fn mailbox(&mut self) -> &mut Mailbox {
+        &mut self.rig.board.registers.can.mailbox
+    }
+
+    /// Level 5.
+    fn round(&mut self, now_ns: u64) {
+        let Rig { board, leg, .. } = &mut self.rig;
+        board.bus_round(now_ns, &mut self.station, leg.identification());
     }
 
     /// Who keeps what hosts want kept.
@@ -175,30 +186,11 @@ impl<const N: usize, const B: usize> Board<N, B> {
         &mut self.flashing
     }
 
-    /// What the nodes have to say goes to their mailboxes.
-    pub fn speak(&mut self, now_ns: u64) {
-        if self.controller == Controller::Off || self.flashing.stands(now_ns) {
-            return;
-        }
-        for (joint, mailbox) in self.mailboxes.iter_mut().enumerate() {
-            while mailbox.len() < MAILBOXES {
-                match self.station.poll(joint, now_ns / 1000, self.rig.leg.identification()) {
-                    Some(frame) => mailbox.push(frame, now_ns),
-                    None => break,
-                }
-            }
-        }
-    }
-
-    /// What the controller does from now on, and whether the nodes are told; one that is off the bus neither hears nor speaks.
-    pub fn set_controller(&mut self, controller: Controller, told: bool) {
-        self.controller = controller;
-        if controller == Controller::Off {
-            self.mailboxes.iter_mut().for_each(Mailbox::clear);
-        }
-        if told {
-            self.station.on_controller(controller, self.rig.leg.identification());
-        }
+    /// State of the controller from now on, and whether the firmware can read it. A controller off the bus neither hears nor sends.
+    pub fn set_controller(&mut self, controller: Controller, readable: bool) {
+        let can = &mut self.rig.board.registers.can;
+        can.mailbox.is_off = controller == Controller::Off;
+        can.state = if readable { controller } else { Controller::Active };
     }
 
     /// One servo tick of the leg; each of its PWM periods is shown when it is over.
@@ -207,93 +199,37 @@ impl<const N: usize, const B: usize> Board<N, B> {
             return self.rig.stand_still(u64::from(PERIODS_PER_TICK));
         }
         self.wake(now_ns);
-        self.station.watch(now_ns / 1000, self.rig.leg.identification());
         self.keep(now_ns);
-        self.exchange();
-        for _ in 0..PERIODS_PER_TICK {
+        for period in 0..u64::from(PERIODS_PER_TICK) {
             self.rig.advance();
+            if let Slice::Judged(Some(model)) = core::mem::replace(&mut self.rig.slice, Slice::Idle) {
+                let (identification, seed) = (self.rig.leg.identification(), self.rig.board.seed());
+                let model = KeptModel::of(&self.context.configuration, identification, &model, 0, seed);
+                self.flashing.accept(model);
+            }
+            if self.rig.board.registers.bus_due {
+                self.round(now_ns + period * PERIOD_NS);
+            }
             show(&self.rig);
         }
-        if let Some(logged) = self.rig.output.as_ref().and_then(|output| output.logged) {
-            self.station.log(&logged);
-        }
     }
 
-    /// What crosses the seam, once per tick.
-    fn exchange(&mut self) {
-        let (drive, control) = (self.rig.state(), self.rig.leg.control());
-        let output = self.rig.output.as_ref();
-        let status = |joint| output.and_then(|output| self.rig.leg.joint_status(joint, output));
-        self.station.told(&LegTold {
-            joints: core::array::from_fn(|joint| {
-                status(joint).unwrap_or(JointStatus { drive, ..JointStatus::NONE })
-            }),
-            activity: control.activity(),
-            change: [control.change().is_some(), control.is_update_offered()],
-            refused: output.is_some_and(|output| output.servo.decision.refused.is_some()),
-            held: self.rig.hand.enabling,
-            blocked: self.rig.causes() != 0,
-            rests: output.is_none(),
-        });
-        let order = self.station.order();
-        for (joint, code) in order.faults.into_iter().enumerate() {
-            if let Some(code) = code {
-                self.rig.leg.report(Fault { code, joint: joint as u8 });
-            }
-        }
-        match order.request {
-            Some(LegRequest::Power(power)) => self.rig.ask(ControlRequest::Power(power)),
-            Some(LegRequest::Identify { plan, seed }) => {
-                self.rig.leg.prepare(plan, seed);
-                self.flashing.model_kept = false;
-                self.rig.ask(ControlRequest::Identify);
-            }
-            Some(LegRequest::Cancel) => self.rig.leg.cancel(),
-            Some(LegRequest::TakeUpdate) => self.rig.ask(ControlRequest::TakeUpdate),
-            None => {}
-        }
-        match &order.commands {
-            Some(commands) => self.rig.leg.command(commands),
-            None => self.rig.leg.let_go(),
-        }
-    }
-
-    /// What came while the processor stood is heard: the frames that the controller had room for, and that others are lost.
+    /// After the processor stood still: the controller's frames are received, and a loss is seen.
     fn wake(&mut self, now_ns: u64) {
-        let results = self.rig.leg.identification();
-        if self.flashing.recovers() {
-            self.station.on_controller(self.controller, results);
-        }
         let (frames, lost) = self.flashing.take_heard();
-        if lost {
-            self.station.on_controller(Controller::Overrun, results);
+        self.rig.board.registers.can.overrun |= lost;
+        for frame in &frames {
+            self.rig.board.receive(frame);
         }
-        for frame in frames {
-            self.station.hear(&frame, now_ns / 1000, None, results);
+        if lost || !frames.is_empty() {
+            self.round(now_ns);
         }
     }
 
-    /// Takes what hosts want kept a step further.
+    /// Takes what hosts want stored a step further.
     fn keep(&mut self, now_ns: u64) {
-        let mut objects = [KeptNode::NOTHING; N];
-        if !self.flashing.is_under_way()
-            && let Some(what) = self.station.take_store(&mut objects)
-        {
-            self.station.storing(Storing::Busy);
-            let (leg, generation) = (&self.rig.leg, self.station.generation() + 1);
-            let is_accepted = leg.control().verdict().is_some_and(|verdict| verdict.is_accepted());
-            let model =
-                leg.control().model().filter(|_| is_accepted && !self.flashing.model_kept).map(|model| {
-                    let (leg, seed) = (leg.identification(), self.station.seed());
-                    KeptModel::of(&self.context.configuration, leg, model, generation, seed)
-                });
-            self.flashing.ask(Asked { what, objects, model });
-        }
-        let Some((done, asked)) = self.flashing.step(now_ns, &mut self.rig, &mut self.memory) else { return };
-        if let Some(generation) = asked.generation().filter(|_| done) {
-            self.station.set_generation(generation);
-        }
-        self.station.stored(done, &asked.objects);
+        self.flashing.step(now_ns, &mut self.rig, &mut self.memory);
+        self.rig.write_watchdog();
     }
 
     /// The image of the memory.

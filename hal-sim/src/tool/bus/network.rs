@@ -67,18 +67,20 @@ impl<const N: usize, const B: usize> Network<N, B> {
         let end_ns = now_ns + TICK_NS;
         let mut now_ns = now_ns;
         loop {
-            self.boards.iter_mut().for_each(|board| board.speak(now_ns));
-            let nodes = self.boards.iter_mut().flat_map(|board| &mut board.mailboxes);
             if let Some(frame) = self.babble.filter(|_| self.babbler.is_empty()) {
                 self.babbler.push(frame, now_ns);
             }
+            let nodes = self.boards.iter_mut().map(Board::mailbox);
             let mut mailboxes: Vec<&mut Mailbox> = core::iter::once(&mut self.host).chain(nodes).collect();
             mailboxes.push(&mut self.babbler);
             let Some(sent) = self.wire.advance(end_ns, &mut mailboxes) else { break };
             now_ns = now_ns.max(sent.end_ns);
             for (place, board) in self.boards.iter_mut().enumerate() {
-                let own = sent.sender.checked_sub(1 + place * N).filter(|joint| *joint < N);
-                board.hear(&sent.frame, sent.end_ns, own);
+                if sent.sender == 1 + place {
+                    board.sent(sent.end_ns);
+                } else {
+                    board.hear(&sent.frame, sent.end_ns);
+                }
             }
             show(&sent);
         }

@@ -7,13 +7,12 @@
 
 use scarab::bus::station::Keeping;
 use scarab::bus::{Frame, KeptNode};
-use scarab::leg::Permission;
-use scarab::operation::{Storing, StoringBoard};
-use scarab::safety::Cause;
+use scarab::operation::{Inhibit, Storing};
 use scarab::store::KeptModel;
 
 use super::board::TICK_NS;
 use super::memory::{Memory, SECTOR};
+use crate::tool::board::levels::Levels;
 use crate::tool::faults::rig::Rig;
 
 /// A step of `Storing`.
@@ -23,8 +22,6 @@ const WORD_NS: u64 = 16_000;
 const ERASING_NS: u64 = 1_000_000_000;
 /// Of the controller's receiving queue.
 const QUEUE: usize = 3;
-/// The watchdog's 8 s instead of 16 ms.
-const STRETCHED: u64 = 500;
 
 /// What a host wants kept.
 #[derive(Clone, Copy, Debug)]
@@ -53,8 +50,8 @@ impl<const N: usize> Asked<N> {
 pub struct Flashing<const N: usize> {
     storing: Storing,
     asked: Option<Asked<N>>,
-    /// The accepted model is in the memory, or was forgotten with it.
-    pub model_kept: bool,
+    /// Model that was accepted and is not stored yet.
+    accepted: Option<KeptModel<N>>,
     /// Something was kept or forgotten.
     has_kept: bool,
     /// The next step.
@@ -64,12 +61,11 @@ pub struct Flashing<const N: usize> {
     /// What the controller heard meanwhile, and that it lost something; told once, it is over with the next tick.
     heard: Vec<Frame>,
     lost: bool,
-    recovers: bool,
     /// A sector is erased in this time.
     pub erasing_ns: u64,
-    /// For campaigns that are blind: the interlock is not told.
+    /// For campaigns that are blind: the inhibit word of the firmware is not raised, but this one.
     pub unannounced: bool,
-    raised: bool,
+    unseen: Inhibit,
 }
 
 impl<const N: usize> Flashing<N> {
@@ -79,16 +75,15 @@ impl<const N: usize> Flashing<N> {
         Self {
             storing: Storing::new(),
             asked: None,
-            model_kept: false,
+            accepted: None,
             has_kept: false,
             due_ns: 0,
             until_ns: 0,
             heard: Vec::new(),
             lost: false,
-            recovers: false,
             erasing_ns: ERASING_NS,
             unannounced: false,
-            raised: false,
+            unseen: Inhibit::new(),
         }
     }
 
@@ -98,8 +93,9 @@ impl<const N: usize> Flashing<N> {
         self.asked.is_some()
     }
 
-    pub(super) fn ask(&mut self, asked: Asked<N>) {
-        self.asked = Some(asked);
+    /// A model that may be stored from now on, in the place of one that was not.
+    pub(super) fn accept(&mut self, model: KeptModel<N>) {
+        self.accepted = Some(model);
     }
 
     /// The processor stands.
@@ -121,13 +117,7 @@ impl<const N: usize> Flashing<N> {
 
     /// What came while the processor stood, and whether something of it was lost.
     pub(super) fn take_heard(&mut self) -> (Vec<Frame>, bool) {
-        self.recovers = self.lost;
         (core::mem::take(&mut self.heard), core::mem::take(&mut self.lost))
-    }
-
-    /// A loss was told and is over.
-    pub(super) fn recovers(&mut self) -> bool {
-        core::mem::take(&mut self.recovers)
     }
 
     /// Whether something was kept or forgotten since this was asked.
@@ -135,24 +125,33 @@ impl<const N: usize> Flashing<N> {
         core::mem::take(&mut self.has_kept)
     }
 
-    /// A step, where one is due; how a change ended, and what was asked.
+    /// A step, where one is due.
     pub(super) fn step<const B: usize>(
         &mut self,
         now_ns: u64,
         rig: &mut Rig<N, B>,
         memory: &mut Memory,
-    ) -> Option<(bool, Asked<N>)> {
+    ) {
         if now_ns < self.due_ns {
-            return None;
+            return;
         }
         self.due_ns = now_ns + STEP_NS;
         let (before, state) = (memory.worked(), rig.state());
-        let mut board = Ports { rig, unannounced: self.unannounced, raised: &mut self.raised };
-        let Some(asked) = &self.asked else {
-            self.storing.look_after(&mut board);
-            return None;
+        let Levels { signals, registers, bus, .. } = &mut *rig.board;
+        let inhibit = if self.unannounced { &self.unseen } else { &signals.inhibit };
+        let Some(storage) = bus.as_ref().map(|bus| &bus.storage) else { return };
+        let Some(mut keep) = storage.given() else {
+            return self.storing.look_after(inhibit, registers);
         };
-        let done = self.storing.step(&mut board, || {
+        if self.asked.is_none() {
+            let model = self.accepted.map(|mut model| {
+                model.provenance.generation = keep.generation + 1;
+                model
+            });
+            self.asked = Some(Asked { what: keep.what, objects: keep.objects, model });
+        }
+        let Some(asked) = &self.asked else { return };
+        let done = self.storing.step(inhibit, signals.permission(), registers, || {
             self.has_kept = true;
             memory.change(state, asked)
         });
@@ -163,55 +162,23 @@ impl<const N: usize> Flashing<N> {
         if after != before {
             self.until_ns = now_ns + TICK_NS + words * WORD_NS + sectors * self.erasing_ns;
         }
-        let asked = done.and_then(|_| self.asked.take())?;
-        let done = done?;
-        self.model_kept |= done && asked.generation().is_some();
-        Some((done, asked))
+        let Some(done) = done else { return };
+        if let Some(generation) = asked.generation().filter(|_| done) {
+            keep.generation = generation;
+            self.accepted = None;
+            if asked.what == Keeping::Defaults {
+                signals.forget_stored();
+            }
+        }
+        self.asked = None;
+        keep.done = done;
+        drop(keep);
+        storage.give_back();
     }
 }
 
 impl<const N: usize> Default for Flashing<N> {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-/// A rig, as a change of the flash has it.
-struct Ports<'a, const N: usize, const B: usize> {
-    rig: &'a mut Rig<N, B>,
-    unannounced: bool,
-    raised: &'a mut bool,
-}
-
-impl<const N: usize, const B: usize> StoringBoard for Ports<'_, N, B> {
-    fn permission(&self) -> Permission {
-        self.rig.state().permission()
-    }
-
-    fn causes(&self) -> u32 {
-        let unseen = if self.unannounced && *self.raised { Cause::Storing.bit() } else { 0 };
-        self.rig.causes() | unseen
-    }
-
-    fn raise(&mut self, cause: Cause) {
-        *self.raised = true;
-        if !self.unannounced {
-            self.rig.raise(cause);
-        }
-    }
-
-    fn stored(&mut self) {
-        *self.raised = false;
-        self.rig.stored();
-    }
-
-    fn stretch(&mut self) -> bool {
-        self.rig.stretch(STRETCHED);
-        true
-    }
-
-    fn tighten(&mut self) -> bool {
-        self.rig.stretch(1);
-        true
     }
 }

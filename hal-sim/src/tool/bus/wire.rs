@@ -45,24 +45,48 @@ pub fn bits(frame: &Frame) -> u32 {
     bits.len() as u32 + stuffed + TAIL_BITS
 }
 
+/// A frame that waits: what, since when, and in which mailbox of its controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Waiting {
+    frame: Frame,
+    asked_ns: u64,
+    slot: u32,
+}
+
 /// Frames of one controller that wait for the wire.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Mailbox {
-    waiting: VecDeque<(Frame, u64)>,
-    /// In the order in which they came, as an adapter of a host sends them; else by their identifiers, as a controller does.
+    waiting: VecDeque<Waiting>,
+    /// Frames leave in the order in which they came, as from a host's adapter; else by their identifiers, as from a controller.
     in_order: bool,
+    /// Slot of the frame that is on the wire.
+    leaving: Option<u32>,
+    /// The controller is off the bus: nothing leaves.
+    pub is_off: bool,
 }
 
 impl Mailbox {
-    /// Of an adapter.
+    /// Mailbox of a host's adapter.
     #[must_use]
     pub fn in_order() -> Self {
-        Self { waiting: VecDeque::new(), in_order: true }
+        Self { in_order: true, ..Self::default() }
     }
 
-    /// A frame to be sent, from this instant on.
+    /// A frame to be sent from this instant on.
     pub fn push(&mut self, frame: Frame, now_ns: u64) {
-        self.waiting.push_back((frame, now_ns));
+        self.put(0, frame, now_ns);
+    }
+
+    /// A frame to be sent from this instant on, in one of the controller's mailboxes.
+    pub fn put(&mut self, slot: u32, frame: Frame, asked_ns: u64) {
+        self.waiting.push_back(Waiting { frame, asked_ns, slot });
+    }
+
+    /// Mailboxes of the controller that are not empty, one bit each; the frame on the wire is still in its own.
+    #[must_use]
+    pub fn slots(&self) -> u32 {
+        let slots = self.waiting.iter().map(|waiting| waiting.slot).chain(self.leaving);
+        slots.fold(0, |bits, slot| bits | 1 << slot)
     }
 
     /// Frames that wait.
@@ -77,15 +101,25 @@ impl Mailbox {
         self.waiting.is_empty()
     }
 
-    /// Nothing waits any more.
+    /// Aborts what waits; a frame on the wire still leaves.
     pub fn clear(&mut self) {
         self.waiting.clear();
     }
 
-    /// Place and identifier of the frame that it puts on the wire.
-    fn first(&self) -> Option<(usize, u16)> {
-        let named = self.waiting.iter().enumerate().map(|(place, (frame, _))| (place, frame.id()));
-        if self.in_order { named.into_iter().next() } else { named.min_by_key(|(_, id)| *id) }
+    /// When the first frame may leave.
+    fn earliest_ns(&self) -> Option<u64> {
+        self.waiting.iter().map(|waiting| waiting.asked_ns).min().filter(|_| !self.is_off)
+    }
+
+    /// Place of the frame that it puts on the wire at an instant.
+    fn first(&self, now_ns: u64) -> Option<usize> {
+        let places = self.waiting.iter().enumerate();
+        let first = if self.in_order {
+            places.map(|(place, _)| place).next()
+        } else {
+            places.min_by_key(|(_, waiting)| waiting.frame.id()).map(|(place, _)| place)
+        };
+        first.filter(|place| !self.is_off && self.waiting[*place].asked_ns <= now_ns)
     }
 }
 
@@ -127,28 +161,24 @@ impl Wire {
         }
         let sent = self.moving.take_if(|sent| sent.end_ns <= until_ns)?;
         self.free_ns = sent.end_ns;
+        if let Some(mailbox) = mailboxes.get_mut(sent.sender) {
+            mailbox.leaving = None;
+        }
         Some(sent)
     }
 
     fn arbitrate(&mut self, until_ns: u64, mailboxes: &mut [&mut Mailbox]) -> Option<Sent> {
-        // The instant at which anybody may begin.
-        let earliest = mailboxes
-            .iter()
-            .filter_map(|mailbox| mailbox.waiting.iter().map(|(_, asked)| *asked).min())
-            .min()?
-            .max(self.free_ns);
+        // The instant at which any controller may begin.
+        let earliest = mailboxes.iter().filter_map(|mailbox| mailbox.earliest_ns()).min()?.max(self.free_ns);
         if earliest >= until_ns {
             return None;
         }
-        let ready = |mailbox: &&mut Mailbox| {
-            mailbox.first().filter(|(place, _)| mailbox.waiting[*place].1 <= earliest)
-        };
-        let (sender, (place, _)) = mailboxes
-            .iter()
-            .enumerate()
-            .filter_map(|(sender, mailbox)| Some((sender, ready(mailbox)?)))
-            .min_by_key(|(_, (_, id))| *id)?;
-        let (frame, asked_ns) = mailboxes[sender].waiting.remove(place)?;
+        let ready = mailboxes.iter().enumerate();
+        let ready = ready.filter_map(|(sender, mailbox)| Some((sender, mailbox.first(earliest)?)));
+        let (sender, place) =
+            ready.min_by_key(|(sender, place)| mailboxes[*sender].waiting[*place].frame.id())?;
+        let Waiting { frame, asked_ns, slot } = mailboxes[sender].waiting.remove(place)?;
+        mailboxes[sender].leaving = Some(slot);
         let length = u64::from(bits(&frame)) * self.bit_ns;
         self.busy_ns += length;
         Some(Sent { frame, sender, asked_ns, end_ns: earliest + length })

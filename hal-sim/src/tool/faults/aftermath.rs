@@ -3,28 +3,29 @@
 //! States are written out here a second time, apart from the firmware's own table (`scarab::safety::FaultCode::reaction`): who leads a fault
 //! elsewhere has to say so in both, or every run that meets it fails.
 
+use scarab::hal::Contacts;
 use scarab::safety::FaultCode;
 
-use super::rig::{Hand, PERIODS_PER_S};
+use super::rig::{PERIODS_PER_S};
 
 /// Of so many seeds one is reset and enabled again after its safe state.
 pub const RESET_EVERY: u64 = 8;
 
 /// Both contacts open; the button held until a reset is taken and over; open again; the switch held until what may be enabled is.
-const STEPS: [(u64, Hand); 4] = [
+const STEPS: [(u64, Contacts); 4] = [
     (PERIODS_PER_S / 10, OPEN),
-    (PERIODS_PER_S * 22 / 10, Hand { enabling: false, start: true }),
+    (PERIODS_PER_S * 22 / 10, Contacts { enabling: false, start: true }),
     (PERIODS_PER_S / 10, OPEN),
-    (PERIODS_PER_S * 4 / 10, Hand { enabling: true, start: false }),
+    (PERIODS_PER_S * 4 / 10, Contacts { enabling: true, start: false }),
 ];
-const OPEN: Hand = Hand { enabling: false, start: false };
+const OPEN: Contacts = Contacts { enabling: false, start: false };
 
 /// Periods of a reset, from the contacts' opening to a drive that has been enabled for a while, if it was.
 pub const RESET: u64 = STEPS[0].0 + STEPS[1].0 + STEPS[2].0 + STEPS[3].0;
 
 /// What the operator's hand does so many periods after it began to reset.
 #[must_use]
-pub fn hand(since: u64) -> Hand {
+pub fn hand(since: u64) -> Contacts {
     let mut left = since;
     for (periods, hand) in STEPS {
         if left < periods {
@@ -86,11 +87,11 @@ mod tests {
 
     #[test]
     fn a_reset_opens_both_contacts_before_and_after_the_button_and_ends_enabling() {
-        let hands: Vec<Hand> = (0..RESET + 10).map(hand).collect();
+        let hands: Vec<Contacts> = (0..RESET + 10).map(hand).collect();
         assert_eq!(hands[0], OPEN);
         assert!(hands.iter().all(|hand| !(hand.enabling && hand.start)));
         let pressed = hands.iter().filter(|hand| hand.start).count() as u64;
         assert!(pressed > 2 * PERIODS_PER_S, "the operator's two seconds, a bounce and the reset itself");
-        assert_eq!(hands.last(), Some(&Hand { enabling: true, start: false }));
+        assert_eq!(hands.last(), Some(&Contacts { enabling: true, start: false }));
     }
 }

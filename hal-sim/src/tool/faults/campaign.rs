@@ -5,6 +5,7 @@
 //! forked and its even ones on its bench.
 
 use rayon::prelude::*;
+use scarab::hal::Contacts;
 use scarab::leg::{Activity, ControlRequest};
 use scarab::safety::DriveState;
 
@@ -16,7 +17,7 @@ use super::detectors::views;
 use super::dice::Dice;
 use super::emulated::emulated;
 use super::entry::Entry;
-use super::rig::{Hand, PERIODS_PER_S, Rig};
+use super::rig::{PERIODS_PER_S, Rig};
 use super::run::{Blind, Manner, Outcome, run};
 use super::trial::Trial;
 use crate::faults::{Channel, Form, Injection, Timing};
@@ -290,22 +291,21 @@ impl Setting<'_> {
     }
 
     fn flush(&self, batch: &mut Vec<(Rig<JOINTS, BASE>, Job)>, campaign: &mut Campaign) {
-        let of = |(rig, job): &(Rig<JOINTS, BASE>, Job)| match job {
+        let of = |(rig, job): (Rig<JOINTS, BASE>, Job)| match job {
             Job::Row { row, scenario, seed, manner } => {
-                let outcome = run(self.leg, row, scenario, *seed, *manner, rig);
+                let outcome = run(self.leg, row, &scenario, seed, manner, &rig);
                 // Nobody may take its period for a seed that draws another run.
-                (Some(manner.blind), Outcome { seed: if manner.brief { 0 } else { *seed }, ..outcome })
+                (Some(manner.blind), Outcome { seed: if manner.brief { 0 } else { seed }, ..outcome })
             }
-            Job::Trial { trial, seed } => (None, trial.run(self.leg, *seed, self.manner.recorded, rig)),
+            Job::Trial { trial, seed } => (None, trial.run(self.leg, seed, self.manner.recorded, &rig)),
         };
-        for (blind, outcome) in batch.par_iter().map(of).collect::<Vec<_>>() {
+        for (blind, outcome) in core::mem::take(batch).into_par_iter().map(of).collect::<Vec<_>>() {
             match blind {
                 None => campaign.trials.push(outcome),
                 Some(blind) if blind == self.manner.blind => campaign.outcomes.push(outcome),
                 Some(blind) => campaign.singly.push((blind, outcome)),
             }
         }
-        batch.clear();
     }
 }
 
@@ -321,7 +321,7 @@ pub(super) fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), To
             break;
         }
     }
-    rig.hand = Hand { enabling: true, start: true };
+    rig.hand = Contacts { enabling: true, start: true };
     for _ in 0..ENABLED {
         rig.advance();
         if matches!(rig.leg.control().activity(), Activity::Identify(_)) {

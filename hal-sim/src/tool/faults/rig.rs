@@ -1,40 +1,29 @@
-//! The whole firmware against the whole plant, one PWM period at a time, with faults on the ports between.
+//! The whole firmware against the whole plant, one PWM period at a time, with faults on the registers between.
 //!
-//! What runs is the board's: current loops, housekeeping and what stands around the servo (`scarab::operation`), the leg, and who waits
-//! for the watchdog. Only registers and queues are others (`ports.rs`). Level by level in one period:
+//! The firmware is the board's own composition of levels ([`Levels`]); only registers are others. Level by level in one period:
 //!
 //! ```text
-//! every 48th period   housekeeper: contacts -> requests; calibration, reference, resets; registers and temperatures when due
-//! when it is due      servo: samples, request -> leg -> target currents; due after the last axis' sixth tick
+//! every 48th period   housekeeping: contacts -> requests; calibration, reference, resets; registers and temperatures when due
+//! when it is due      servo: samples, request -> leg -> targets; then the identification
 //! every period        plant -> samples -> faults -> current loops -> bridges
 //! ```
 //!
 //! The watchdog looks on at the end of each period (`watchdog.rs`).
 
-use core::num::NonZeroU32;
-use std::sync::Arc;
+use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, Contacts, Sample};
+use scarab::leg::{ControlOutput, Following, axis_code};
+use scarab::operation::{Outcome, Slice, Stage};
+use scarab::safety::{Cause, FaultCode};
 
-use scarab::board::odrive_v3_6::settings::analog::HOTTEST_C;
-use scarab::board::odrive_v3_6::settings::drives;
-use scarab::hal::{AxisCommand, CURRENT_RATE_HZ, Sample};
-use scarab::leg::{ControlOutput, DriveState, axis_code, permitted};
-use scarab::motor::SenseScale;
-use scarab::operation::{
-    CurrentLoops, Gate, Housekeeper, HousekeepingSettings, RATE_HZ, ServoRound, Stage, Tick,
-};
-use scarab::safety::{Fault, FaultCode};
-use scarab::trace::words;
-
-mod ports;
 #[cfg(test)]
 mod tests;
 mod view;
 mod watchdog;
 
-use self::ports::{Ports, WARM_CODE};
 use self::watchdog::Watchdog;
 use crate::faults::{Channel, Injector};
-use crate::tool::board::{axis_configuration, calibration_settings};
+use crate::tool::board::levels::{Conditions, Levels};
+use crate::tool::board::registers::WARM_CODE;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 use crate::tool::pair::{Context, DeviceLeg, EVALUATIONS_PER_TICK, Pair};
@@ -44,21 +33,6 @@ use crate::world::World;
 pub const PERIODS_PER_S: u64 = CURRENT_RATE_HZ as u64;
 /// One of them, ms.
 pub const PERIOD_MS: f64 = 1e3 / PERIODS_PER_S as f64;
-const PERIODS_PER_ROUND: u64 = PERIODS_PER_S / RATE_HZ as u64;
-
-/// Of the processor in one period; the second axis is a quarter of it later.
-const CYCLES: NonZeroU32 = NonZeroU32::new(7000).expect("more than one");
-/// Of the bus voltage, on the board of 56 V.
-const DIVIDER: f32 = 19.0;
-
-/// What the operator's hand does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Hand {
-    /// Holds the enabling switch.
-    pub enabling: bool,
-    /// Presses the start button.
-    pub start: bool,
-}
 
 /// What an operator did that may lead to an enabled drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,112 +43,110 @@ pub struct Edges {
     pub closed: Option<u64>,
 }
 
-/// Firmware, plant and what is spoilt between them.
+/// Firmware, plant and what is faulted between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig<const N: usize, const B: usize> {
-    /// The firmware above the current loops.
+    /// The leg, both halves.
     pub leg: Box<DeviceLeg<N, B>>,
     /// The plant.
     pub world: World<N>,
-    /// What is spoilt.
+    /// The injected faults.
     pub injector: Injector,
-    /// The operator's.
-    pub hand: Hand,
-    /// What the last servo tick gave.
+    /// The operator's contacts.
+    pub hand: Contacts,
+    /// Output of the last servo tick.
     pub output: Option<ControlOutput<N>>,
+    /// Slice of the identification after the last servo tick.
+    pub slice: Slice<N>,
     /// PWM periods since the beginning.
     pub period: u64,
-    /// Of everything that crossed the ports so far.
+    /// Hash of everything that crossed the registers so far.
     pub hash: u64,
-    /// What the firmware must not see: its detectors are switched off, for the test of the tests.
+    /// Faults whose detectors are switched off, for the test of the tests.
     pub blind: &'static [FaultCode],
-    loops: CurrentLoops<N>,
-    keeper: Housekeeper<N>,
-    round: ServoRound,
-    ports: Ports<N>,
-    cold: Arc<Cold<N, B>>,
-    watchdog: Watchdog<N>,
-    /// By the watchdog.
+    /// All levels of the board.
+    pub board: Box<Levels<N>>,
+    /// Leg as it starts.
+    cold: Box<DeviceLeg<N, B>>,
+    watchdog: Watchdog,
+    /// The watchdog has reset the board.
     restarted: bool,
+    edges: Edges,
     bus_code: u16,
-    /// What the housekeeper was told of last.
-    told: Option<DriveState>,
-    sample: Sample<N>,
+    /// First fault that an axis reported since the last reset.
+    axis_fault: Option<FaultCode>,
     gravity: [f32; 3],
 }
 
-/// The firmware as it starts.
-#[derive(Debug, PartialEq)]
-struct Cold<const N: usize, const B: usize> {
-    leg: Box<DeviceLeg<N, B>>,
-    loops: CurrentLoops<N>,
-    keeper: Housekeeper<N>,
-    round: ServoRound,
-}
-
 impl<const N: usize, const B: usize> Rig<N, B> {
-    /// A board that is ready, its leg at rest, drive off, nobody at the contacts.
+    /// A board that is ready, its leg at rest, drive off, contacts open.
     pub fn new(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
         let pair = Pair::new(leg, context, seed)?;
-        let unfit = || ToolError::input("faults need complete drives");
-        let (axes, chopper) = pair.board.ok_or_else(unfit)?.into_parts();
-        let settings = settings(context.complete.as_deref().unwrap_or(leg))?;
-        let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
-        let loops = |stages| CurrentLoops::new(stages, CYCLES, Some(chopper), volt_per_code);
-        let cold = Cold {
-            leg: pair.leg.clone(),
-            loops: loops([Stage::OFF; N]),
-            keeper: Housekeeper::new(settings),
-            round: ServoRound::new(pair.leg.control().checksum(), drives::derating(DIVIDER)),
-        };
-        let mut ports = Ports::new(pair.sample.joints);
-        (ports.begun, ports.servo_due) = (true, true);
+        let board = pair.board.ok_or_else(|| ToolError::input("faults need complete drives"))?;
         Ok(Self {
             world: pair.world,
             injector: Injector::new(seed),
-            hand: Hand::default(),
+            hand: Contacts::default(),
             output: None,
+            slice: Slice::Idle,
             period: 0,
             hash: FNV_BASIS,
             blind: &[],
-            loops: loops(axes.map(Stage::running)),
-            keeper: Housekeeper::ready(settings),
-            round: cold.round.clone(),
-            cold: Arc::new(cold),
-            ports,
+            board,
+            cold: pair.leg.clone(),
             watchdog: Watchdog::new(),
             restarted: false,
-            // 48 V, until it is read.
-            bus_code: 3136,
-            told: None,
-            sample: pair.sample,
+            edges: Edges::default(),
+            bus_code: 0,
+            axis_fault: None,
             gravity: context.gravity,
             leg: pair.leg,
         })
     }
 
+    /// The same on a bus.
+    pub fn on_a_bus(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
+        let mut rig = Self::new(leg, context, seed)?;
+        rig.board.join_bus(&rig.leg, Following::new(&context.configuration));
+        Ok(rig)
+    }
+
     /// One PWM period.
     pub fn advance(&mut self) {
-        (self.ports.period, self.ports.blind) = (self.period, self.blind);
-        if self.ports.hand.enabling != self.hand.enabling && self.hand.enabling {
-            self.ports.edges.closed = Some(self.period);
+        self.hide();
+        if self.board.registers.contacts.enabling != self.hand.enabling && self.hand.enabling {
+            self.edges.closed = Some(self.period);
         }
-        self.ports.hand = self.hand;
-        if self.period.is_multiple_of(PERIODS_PER_ROUND) {
+        self.board.registers.contacts = self.hand;
+        if Levels::<N>::is_round_due(self.period) {
             self.housekeeping();
         }
-        if core::mem::take(&mut self.ports.servo_due) {
+        if core::mem::take(&mut self.board.registers.servo_due) {
             self.servo();
         }
         self.current();
         self.period += 1;
-        if self.ports.servo_due {
-            for (joint, sample) in self.ports.samples.iter_mut().enumerate() {
+        if self.board.registers.servo_due
+            && let Some(mut joints) = self.board.samples()
+        {
+            for (joint, sample) in joints.iter_mut().enumerate() {
                 self.injector.joint(joint, self.period, sample);
             }
-            self.sample = self.world.observe(&Sample { joints: self.ports.samples });
+            let observed = self.world.observe(&Sample { joints });
+            self.board.queues.set_samples(&observed.joints);
         }
         self.watch();
+    }
+
+    fn is_blind(&self, code: Option<FaultCode>) -> bool {
+        code.is_some_and(|code| self.blind.contains(&code))
+    }
+
+    /// Hides the causes whose detectors are switched off.
+    fn hide(&mut self) {
+        let hidden = Cause::ALL.into_iter().filter(|cause| self.is_blind(cause.code()));
+        let bits = hidden.fold(0, |bits, cause| bits | cause.bit());
+        self.board.signals.inhibit.hide(bits);
     }
 
     fn housekeeping(&mut self) {
@@ -182,74 +154,51 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         if injector.happens(Channel::Housekeeping, 0, now) {
             return;
         }
-        self.watchdog.rounds = self.watchdog.rounds.wrapping_add(1);
         for joint in 0..N {
-            self.ports.gates[joint] = !injector.happens(Channel::GateRegisters, joint, now);
-            self.ports.thermistors[joint] = injector.thermistor(joint, now, WARM_CODE);
+            let registers = &mut self.board.registers;
+            registers.gates[joint] = !injector.happens(Channel::GateRegisters, joint, now);
+            registers.thermistors[joint] = injector.thermistor(joint, now, WARM_CODE);
         }
-        self.keeper.round(&mut self.ports);
+        self.board.housekeeping();
+        if core::mem::take(&mut self.board.registers.configured) {
+            self.axis_fault = None;
+            self.edges.reset = Some(now);
+        }
     }
 
     fn servo(&mut self) {
         if self.injector.happens(Channel::Servo, 0, self.period) {
             return;
         }
-        self.ports.servo_ticks = self.ports.servo_ticks.wrapping_add(1);
-        self.ports.counts = self.sample.joints.map(|sample| sample.encoder_counts);
-        match self.round.gate(self.ports.begun) {
-            Gate::Closed => {
-                self.ports.targets.enabled = false;
-                self.output = None;
-                self.ports.requests.pop_front();
-                return;
-            }
-            Gate::Anew => {
-                self.leg.restart();
-                self.told = None;
-            }
-            Gate::Open => {}
-        }
-        for (code, joint) in core::mem::take(&mut self.ports.reported) {
-            self.leg.report(Fault { code, joint: joint as u8 });
-        }
-        let bus = SenseScale::ODRIVE_3_6.bus(self.bus_code);
-        let control = self.leg.control();
-        let found = self.round.look(|| control.checksum(), bus, self.ports.hottest_c);
-        for code in [found.parameters, found.supply].into_iter().flatten() {
-            if !self.ports.is_blind(Some(code)) {
-                self.leg.report(Fault { code, joint: 0 });
-            }
-        }
-        self.leg.derate(&found.derating);
-        let state = self.leg.control().state();
-        let request = permitted(self.ports.requests.pop_front(), self.ports.causes == 0, state);
-        let seeing = (!self.blind.is_empty()).then(|| self.leg.clone());
-        let output = self.leg.tick(&self.sample, request, self.gravity, EVALUATIONS_PER_TICK);
-        if let Some(before) = seeing
-            && self.ports.is_blind(self.leg.control().state().fault().map(|fault| fault.code))
+        // A fault that must not be seen has not been found: leg and levels go on as they were.
+        let before = (!self.blind.is_empty()).then(|| (self.leg.clone(), self.board.clone()));
+        let output = self.board.servo(self.leg.halves().0, self.gravity);
+        if let Some((leg, board)) = before
+            && self.is_blind(self.leg.control().state().fault().map(|fault| fault.code))
         {
-            // As if it had not been seen: the leg goes on with what it was told before.
-            self.leg = before;
+            let ticks = self.board.signals.statistics.servo_ticks.get();
+            (self.leg, self.board) = (leg, board);
+            self.board.signals.statistics.servo_ticks.set(ticks);
             return;
         }
-        self.ports.targets = *output.servo.drive();
-        for (joint, target) in self.ports.targets.currents.iter_mut().enumerate() {
-            *target = self.injector.target(joint, self.period, *target);
+        self.slice = self.board.identify(&mut self.leg, EVALUATIONS_PER_TICK);
+        self.output = output;
+        if let Some(output) = &output {
+            let mut targets = *output.servo.drive();
+            for (joint, target) in targets.currents.iter_mut().enumerate() {
+                *target = self.injector.target(joint, self.period, *target);
+            }
+            self.board.signals.set_targets(&targets);
         }
-        let state = output.servo.decision.state;
-        if self.told.is_none_or(|told| words::drive(told) != words::drive(state)) {
-            self.ports.drive.push_back(state);
-        }
-        self.told = Some(state);
-        self.output = Some(output);
     }
 
     /// Level 0, both axes.
     fn current(&mut self) {
         let now = self.period;
-        let brake = self.injector.brake(now, self.ports.brake);
+        let registers = &self.board.registers;
+        let brake = self.injector.brake(now, registers.brake);
         // Without their supply the gate drivers open every switch, whatever the timers do.
-        let commands = if self.ports.gates_on { self.ports.commands } else { [AxisCommand::RELEASED; N] };
+        let commands = if registers.gates_on { registers.commands } else { [AxisCommand::RELEASED; N] };
         let mut samples = self.world.period(&commands, brake);
         let emergency_stop = self.injector.happens(Channel::EmergencyStop, 0, now);
         let gate_fault = self.injector.happens(Channel::GateFault, 0, now);
@@ -258,23 +207,17 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             if self.injector.happens(Channel::Tick, joint, now) {
                 continue;
             }
-            self.ports.ticks[joint] = self.ports.ticks[joint].wrapping_add(1);
             let supply = !self.injector.happens(Channel::SupplyConversion, 0, now);
             if !supply {
                 sample.bus_code = self.bus_code;
             }
-            (self.bus_code, self.ports.encoders[joint]) = (sample.bus_code, sample.encoder_count);
-            let tick = Tick {
-                now: (now as u32).wrapping_mul(CYCLES.get()).wrapping_add(joint as u32 * CYCLES.get() / 4),
-                emergency_stop,
-                gate_fault,
-                complete: !self.injector.happens(Channel::Conversion, joint, now),
-                supply,
-                sample: *sample,
-            };
-            self.tick(joint, &tick);
+            self.bus_code = sample.bus_code;
+            let complete = !self.injector.happens(Channel::Conversion, joint, now);
+            let conditions = Conditions { emergency_stop, gate_fault, complete, supply };
+            self.tick(joint, sample, conditions);
         }
-        self.hash = samples.iter().zip(&self.ports.commands).fold(self.hash, |hash, (sample, command)| {
+        let commands = &self.board.registers.commands;
+        self.hash = samples.iter().zip(commands).fold(self.hash, |hash, (sample, command)| {
             let [b, c] = sample.shunt_codes.map(u64::from);
             let seen = u64::from(sample.encoder_count) << 48 | b << 32 | c << 16 | u64::from(sample.bus_code);
             let duties = command
@@ -283,29 +226,41 @@ impl<const N: usize, const B: usize> Rig<N, B> {
                 .fold(mixed(hash, seen), |hash, duty| mixed(hash, u64::from(duty.to_bits())));
             mixed(duties, u64::from(command.enabled))
         });
-        self.hash = mixed(self.hash, u64::from(self.ports.causes));
+        self.hash = mixed(self.hash, u64::from(self.causes()));
     }
 
     /// One tick of one axis; a fault that must not be seen has not been found, and what followed from it did not happen.
-    fn tick(&mut self, joint: usize, tick: &Tick) {
-        if self.blind.is_empty() {
-            return self.loops.tick(joint, tick, &mut self.ports);
-        }
-        let (stage, ports) = (self.loops.stage_mut(joint).copied(), self.ports.clone());
-        self.loops.tick(joint, tick, &mut self.ports);
-        if let (Some(now), Some(before)) = (self.loops.stage_mut(joint), stage)
-            && self.ports.is_blind(now.fault().map(axis_code))
+    fn tick(&mut self, joint: usize, sample: &AxisSample, conditions: Conditions) {
+        let reported = self.board.queues.outcomes(joint).count();
+        let before = (!self.blind.is_empty()).then(|| self.board.clone());
+        self.board.current(joint, self.period, sample, conditions);
+        let fault = self.board.loops.stage(joint).and_then(Stage::fault).map(axis_code);
+        if let Some(before) = before
+            && self.is_blind(fault)
         {
-            *now = before;
-            let (samples, servo_due) = (self.ports.samples, self.ports.servo_due);
-            self.ports = Ports { samples, servo_due, ..ports };
+            let mut board = before;
+            core::mem::swap(&mut board.loops, &mut self.board.loops);
+            if let (Some(now), Some(old)) = (board.loops.stage_mut(joint), self.board.loops.stage(joint)) {
+                *now = *old;
+            }
+            board.signals.statistics = self.board.signals.statistics.clone();
+            board.registers.servo_due |= self.board.registers.servo_due;
+            if let Some(samples) = self.board.samples() {
+                board.queues.set_samples(&samples);
+            }
+            self.board = board;
+            return;
+        }
+        let newest = self.board.queues.outcomes(joint).skip(reported).last();
+        if let Some(Outcome::Fault { fault, .. }) = newest {
+            self.axis_fault = self.axis_fault.or(Some(axis_code(*fault)));
         }
     }
 
     /// Flips a bit of an axis' numbers (`Axis::upset`), or of those of the servo's joint.
     pub fn upset(&mut self, of_axis: bool, joint: usize, number: u8, bit: u8) {
         if of_axis {
-            if let Some(axis) = self.loops.stage_mut(joint).and_then(Stage::axis_mut) {
+            if let Some(axis) = self.board.loops.stage_mut(joint).and_then(Stage::axis_mut) {
                 axis.upset(number, bit);
             }
         } else {
@@ -313,35 +268,18 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         }
     }
 
-    /// What an axis modulates with is no number any more.
+    /// Turns the numbers that an axis modulates with into NaN.
     pub fn spoil_modulation(&mut self, joint: usize) {
-        if let Some(axis) = self.loops.stage_mut(joint).and_then(Stage::axis_mut) {
+        if let Some(axis) = self.board.loops.stage_mut(joint).and_then(Stage::axis_mut) {
             axis.spoil_modulation();
         }
     }
-}
-
-/// What the housekeeper of this leg is built from.
-fn settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSettings<N>, ToolError> {
-    let unfit = || ToolError::input("a motor for every joint is needed");
-    let mut parts = Vec::with_capacity(N);
-    for joint in leg.joints.iter().take(N) {
-        let motor = joint.motor.as_ref().ok_or_else(unfit)?;
-        let configuration = axis_configuration(joint, motor);
-        parts.push((configuration, calibration_settings(&configuration, motor)));
-    }
-    let parts: [_; N] = parts.try_into().map_err(|_| unfit())?;
-    Ok(HousekeepingSettings {
-        axes: parts.map(|(axis, _)| axis),
-        calibration: parts.map(|(_, calibration)| calibration),
-        hottest_c: HOTTEST_C,
-    })
 }
 
 const fn mixed(hash: u64, word: u64) -> u64 {
     (hash ^ word).wrapping_mul(FNV_PRIME)
 }
 
-/// Fowler, Noll and Vo's hash 1a, on words.
+/// Basis and prime of the hash 1a of Fowler, Noll and Vo, on words.
 const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;

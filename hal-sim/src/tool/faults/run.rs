@@ -2,6 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use scarab::hal::Contacts;
 use scarab::safety::FaultCode;
 
 use super::aftermath::{RESET, RESET_EVERY, hand};
@@ -11,7 +12,7 @@ use super::event::apply;
 use super::invariants::{Invariants, Scope};
 pub use super::outcome::{Blind, Manner, Outcome};
 use super::recording::Recording;
-use super::rig::{Hand, PERIOD_MS, PERIODS_PER_S, Rig};
+use super::rig::{PERIOD_MS, PERIODS_PER_S, Rig};
 use crate::faults::{Channel, Injector};
 use crate::tool::leg_file::LegFile;
 use crate::world::periods::PERIODS_PER_TICK;
@@ -249,10 +250,10 @@ impl<'a, const B: usize> Watched<'a, B> {
         }
         let choice = self.dice.below(6);
         let hand = match choice {
-            0 | 1 => Hand { enabling: true, start: false },
-            2 => Hand { enabling: true, start: true },
-            3 => Hand { enabling: false, start: true },
-            _ => Hand::default(),
+            0 | 1 => Contacts { enabling: true, start: false },
+            2 => Contacts { enabling: true, start: true },
+            3 => Contacts { enabling: false, start: true },
+            _ => Contacts::default(),
         };
         // Long enough for a reset now and then.
         let longest = if choice == 3 { 3 * PERIODS_PER_S } else { PERIODS_PER_S / 2 };
@@ -368,7 +369,7 @@ impl<'a, const B: usize> Watched<'a, B> {
         for period in 0..periods {
             // Somebody lets go of the enabling switch and closes it anew, which must not enable.
             if seen == Some("Refuse") && period.is_multiple_of(REFUSED / 2) {
-                self.rig.hand = Hand { enabling: period > 0, start: false };
+                self.rig.hand = Contacts { enabling: period > 0, start: false };
             }
             self.step();
         }

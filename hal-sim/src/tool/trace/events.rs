@@ -68,6 +68,10 @@ pub fn of(line: &Line<'_>, servo_hz: f64) -> Read<Option<Event>> {
             );
             event(None, Weight::Fault, words)
         }
+        "gate_driver" => {
+            let status: u32 = hex(line, "status")?;
+            event(None, Weight::Fault, format!("gate driver of {}: status {status:#010x}", joint(line)?))
+        }
         "state" => {
             let state = State::read(line)?;
             let stopped = ["fault", "fault_reaction_active"].contains(&state.drive.as_str());

@@ -4,11 +4,13 @@
 //! What has to follow: the image boots without calibration and zeros, so it stays disabled (not ready to switch on) whatever host and hand do,
 //! and what was kept is there, whole. Blind, half of the runs boot as a board that knows everything still, the others with an empty memory.
 
+use std::sync::Mutex;
+
 use scarab::hal::AxisCommand;
 
 use super::super::catalogue::JOINTS;
 use super::super::entry::Head;
-use super::super::rig::Hand;
+use scarab::hal::Contacts;
 use super::super::run::Outcome;
 use super::Bench;
 use super::hosted::{Fork, forked, started};
@@ -49,13 +51,13 @@ fn cut(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Out
     host.write(1, 0x1010, 1, SAVE, 4)?;
     host.run(400);
     host.move_leg(leg)?;
-    let ready = host.clone();
+    let ready = Mutex::new(host.clone());
     forked(head, leg, host, seeds, |mut fork| {
         let remembers = blind && fork.seed.is_multiple_of(2);
         if blind && !remembers {
             *fork.host.board().memory() = Memory::new(None);
         }
-        let board = remembers.then(|| ready.clone());
+        let board = remembers.then(|| ready.lock().expect("cloning does not panic").clone());
         one(fork, board.map(|mut host| host.board().clone()))
     })
 }
@@ -97,7 +99,7 @@ fn one(mut fork: Fork<'_>, remembers: Option<Board>) -> Result<Outcome, ToolErro
     let mut enabled = false;
     for tick in 0..2 * HANDS + OPEN {
         // Held on, let go, held again.
-        fork.host.rig().hand = Hand { enabling: !(HANDS..HANDS + OPEN).contains(&tick), start: false };
+        fork.host.rig().hand = Contacts { enabling: !(HANDS..HANDS + OPEN).contains(&tick), start: false };
         if tick % 100 == 0 {
             fork.host.network.send(scarab::bus::Frame::new(0, &[1, 0]));
             for word in [6, 7, 15] {

@@ -3,6 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rayon::prelude::*;
+use scarab::hal::Contacts;
 use scarab::leg::Permission;
 
 use super::super::campaign::{BASE, begin};
@@ -10,7 +11,7 @@ use super::super::catalogue::JOINTS;
 use super::super::dice::Dice;
 use super::super::entry::Head;
 use super::super::invariants::{Invariants, Scope};
-use super::super::rig::{Hand, Rig};
+use super::super::rig::{Rig};
 use super::super::run::Outcome;
 use super::outcome;
 use crate::tool::bus::board::Board;
@@ -53,7 +54,7 @@ pub(super) fn hosted(leg: &LegFile) -> Result<Host, ToolError> {
 pub(super) fn identifying(leg: &LegFile) -> Result<Host, ToolError> {
     let mut host = Host::new(board(leg)?);
     // It was held all the time.
-    host.rig().hand = Hand::default();
+    host.rig().hand = Contacts::default();
     host.run(LET_GO);
     begin(leg, host.rig())?;
     Ok(host)

@@ -17,7 +17,7 @@ use scarab::safety::FaultCode;
 
 use super::super::dice::Dice;
 use super::super::entry::Head;
-use super::super::rig::Hand;
+use scarab::hal::Contacts;
 use super::super::run::Outcome;
 use super::Bench;
 use super::hosted::{Fork, forked, hosted, identifying, started};
@@ -136,7 +136,7 @@ fn flood(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<O
     let of = |way: u64| seeds.iter().copied().filter(|seed| seed % 3 == way).collect::<Vec<_>>();
     let mut base = started(leg)?;
     // Blind, the operator's hand permits what frames ask for.
-    base.rig().hand = Hand { enabling: blind, start: false };
+    base.rig().hand = Contacts { enabling: blind, start: false };
     base.run(400);
     let moved = hosted(leg)?;
     let mut outcomes = forked(head, leg, base, &of(0), |fork| flooded(fork, true))?;

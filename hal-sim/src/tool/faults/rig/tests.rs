@@ -3,7 +3,9 @@
 use scarab::leg::DriveState;
 use scarab::safety::{Cause, FaultCode};
 
-use super::{Hand, PERIODS_PER_S, Rig};
+use scarab::hal::Contacts;
+
+use super::{PERIODS_PER_S, Rig};
 use crate::faults::{Channel, Form, Injection, Injector, Timing};
 use crate::tool::faults::aftermath;
 use crate::tool::faults::campaign::BASE;
@@ -13,9 +15,9 @@ use crate::tool::simulate::{DriveModel, SimulationOptions};
 
 type TestRig = Rig<2, BASE>;
 
-const OPEN: Hand = Hand { enabling: false, start: false };
-const HELD: Hand = Hand { enabling: true, start: false };
-const PRESSED: Hand = Hand { enabling: false, start: true };
+const OPEN: Contacts = Contacts { enabling: false, start: false };
+const HELD: Contacts = Contacts { enabling: true, start: false };
+const PRESSED: Contacts = Contacts { enabling: false, start: true };
 
 fn ready() -> TestRig {
     // Without weight: a leg that hangs pulls at its rotor, by more in one place than in another, and is not calibrated while it does.
@@ -30,7 +32,7 @@ fn ready() -> TestRig {
 }
 
 /// A hand at the contacts for so many seconds; whether the drive was enabled meanwhile.
-fn hold(rig: &mut TestRig, hand: Hand, seconds: f64) -> bool {
+fn hold(rig: &mut TestRig, hand: Contacts, seconds: f64) -> bool {
     rig.hand = hand;
     let mut enabled = false;
     for _ in 0..(seconds * PERIODS_PER_S as f64) as u64 {
@@ -82,7 +84,7 @@ fn an_axis_that_lost_its_place_moves_again_only_after_a_calibration_and_a_refere
         assert_eq!((rig.causes(), rig.state()), (0, DriveState::NotReadyToSwitchOn));
         // The leg hangs until it stands, then the axis is measured.
         hold(&mut rig, OPEN, 10.0);
-        let moved = hold(&mut rig, Hand { enabling: true, start: true }, 0.2);
+        let moved = hold(&mut rig, Contacts { enabling: true, start: true }, 0.2);
         assert!(!moved && !hold(&mut rig, HELD, 20.0), "no reference");
         hold(&mut rig, OPEN, 10.0);
         hold(&mut rig, PRESSED, 0.3);
@@ -113,7 +115,7 @@ fn a_place_that_is_lost_while_the_joints_are_referenced_ends_the_reference() {
     hold(&mut rig, HELD, 0.01);
     reset(&mut rig);
     hold(&mut rig, OPEN, 10.0);
-    hold(&mut rig, Hand { enabling: true, start: true }, 0.2);
+    hold(&mut rig, Contacts { enabling: true, start: true }, 0.2);
     hold(&mut rig, HELD, 20.0);
     hold(&mut rig, OPEN, 10.0);
     hold(&mut rig, PRESSED, 0.3);
@@ -133,7 +135,7 @@ fn a_calibration_ends_with_the_switch_and_with_the_emergency_stop() {
         hold(&mut rig, HELD, 0.01);
         reset(&mut rig);
         hold(&mut rig, OPEN, 1.0);
-        hold(&mut rig, Hand { enabling: true, start: true }, 0.2);
+        hold(&mut rig, Contacts { enabling: true, start: true }, 0.2);
         hold(&mut rig, HELD, 0.2);
         assert!(rig.is_switching(), "it is measured");
         if stop {
@@ -155,14 +157,14 @@ fn ticks_that_do_not_come_while_the_flash_is_written_are_nobody_s_fault() {
     // Words take less than 2 ms; what an erasure lasts through, the joints' zeros do not: a reference has to be taken again.
     for (storing, periods, enabled) in [(false, 40, false), (true, 40, true), (true, 100, false)] {
         let mut rig = ready();
-        rig.ports.causes |= if storing { Cause::Storing.bit() } else { 0 };
+        rig.board.signals.inhibit.raise_bits(if storing { Cause::Storing.bit() } else { 0 });
         for joint in 0..2 {
             // The watchdog is stretched on the board and not here.
             let timing = Timing::lasting(rig.period, periods);
             rig.injector.add(Injection { channel: Channel::Tick, joint, form: Form::Off, timing });
         }
         assert!(!hold(&mut rig, HELD, 0.4) || !storing, "nothing is enabled meanwhile");
-        rig.ports.causes &= !Cause::Storing.bit();
+        rig.board.signals.inhibit.end_storing();
         assert_eq!(rig.causes() == 0, storing);
         assert_eq!(hold(&mut rig, OPEN, 0.1) || hold(&mut rig, HELD, 0.4), enabled, "{storing} {periods}");
     }

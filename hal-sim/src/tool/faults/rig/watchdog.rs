@@ -1,8 +1,7 @@
 //! The watchdog, and what is left of a machine that it reset.
 //!
 //! ```text
-//! every 0.5 ms axes' ticks -> `TickGuard` -> released
-//! every 4 ms   axes' ticks, servo's ticks, housekeeping's rounds -> `CheckIns` -> fed
+//! every 0.5 ms axes' ticks -> released; every eighth time axes' ticks, servo's ticks, housekeeping's rounds -> fed (`operation::Watch`)
 //! 512 cycles of its oscillator (32 kHz nominal: 16 ms) without that: reset
 //! ```
 //!
@@ -10,45 +9,29 @@
 //! [`Cause::Watchdog`], and its servo does not begin before it was calibrated and referenced, so nothing of the leg runs on here.
 
 use scarab::hal::AxisCommand;
-use scarab::safety::{Cause, CheckIns, FaultCode, GUARD_RATE_HZ, TickGuard};
+use scarab::safety::{Cause, FaultCode};
 
-use super::ports::Ports;
 use super::{PERIODS_PER_S, Rig};
 use crate::faults::Injector;
 
-/// Between two looks at who has checked in.
-const PERIODS_PER_LOOK: u64 = PERIODS_PER_S / 250;
-/// Between two looks at the current ticks.
-const PERIODS_PER_GUARD: u64 = PERIODS_PER_S / GUARD_RATE_HZ as u64;
 /// Of the oscillator, from being fed to the reset: a divider of 4, 128 steps.
 const CYCLES: f64 = 512.0;
 /// Of the oscillator, Hz.
 const NOMINAL_HZ: f64 = 32_000.0;
 
-/// The watchdog and those that it waits for.
+/// The watchdog.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Watchdog<const N: usize> {
-    /// Of the housekeeping.
-    pub(super) rounds: u32,
-    check_ins: CheckIns<4>,
-    guard: TickGuard<N>,
+pub(super) struct Watchdog {
     /// Period in which it was fed, and those that it then waits.
     fed: u64,
     patience: u64,
-    /// How many times as long as usual that is.
+    /// How many times its usual time that is.
     stretched: u64,
 }
 
-impl<const N: usize> Watchdog<N> {
+impl Watchdog {
     pub(super) fn new() -> Self {
-        Self {
-            rounds: 0,
-            check_ins: CheckIns::new([0; 4]),
-            guard: TickGuard::new(),
-            fed: 0,
-            patience: patience(NOMINAL_HZ),
-            stretched: 1,
-        }
+        Self { fed: 0, patience: patience(NOMINAL_HZ), stretched: 1 }
     }
 }
 
@@ -62,11 +45,13 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         self.watchdog.patience = patience(hz) * self.watchdog.stretched;
     }
 
-    /// So many times as long until it bites, counted from now; 1 is the usual.
-    pub fn stretch(&mut self, times: u64) {
-        let dog = &mut self.watchdog;
-        dog.patience = dog.patience / dog.stretched * times;
-        (dog.stretched, dog.fed) = (times, self.period);
+    /// Takes over what the firmware wrote into the watchdog's registers.
+    pub fn write_watchdog(&mut self) {
+        if let Some(times) = self.board.registers.stretched.take() {
+            let dog = &mut self.watchdog;
+            dog.patience = dog.patience / dog.stretched * times;
+            (dog.stretched, dog.fed) = (times, self.period);
+        }
     }
 
     /// The processor stands for so many periods, its flash being written: the plant goes on with every switch open, and the watchdog counts.
@@ -82,23 +67,15 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// At the end of a period.
     pub(super) fn watch(&mut self) {
-        if self.period.is_multiple_of(PERIODS_PER_GUARD)
-            && self.watchdog.guard.look(self.ports.ticks)
-            && self.ports.causes & Cause::Storing.bit() == 0
-            && !self.ports.is_blind(Some(FaultCode::CurrentTicks))
-        {
-            self.ports.causes |= Cause::CurrentTicks.bit();
-            self.ports.commands = [AxisCommand::RELEASED; N];
+        let commands = self.board.registers.commands;
+        self.board.watch(self.period);
+        if self.is_blind(Some(FaultCode::CurrentTicks)) {
+            self.board.registers.commands = commands;
         }
-        let blind = self.ports.is_blind(Some(FaultCode::Watchdog));
-        let dog = &mut self.watchdog;
-        if self.period.is_multiple_of(PERIODS_PER_LOOK) {
-            let [first, .., last] = self.ports.ticks.as_slice() else { return };
-            if dog.check_ins.all([*first, *last, self.ports.servo_ticks, dog.rounds]) || blind {
-                dog.fed = self.period;
-            }
+        if core::mem::take(&mut self.board.registers.fed) || self.is_blind(Some(FaultCode::Watchdog)) {
+            self.watchdog.fed = self.period;
         }
-        if self.period - dog.fed >= dog.patience {
+        if self.period - self.watchdog.fed >= self.watchdog.patience {
             self.restart();
         }
     }
@@ -114,16 +91,14 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         self.boot(0);
     }
 
-    /// The image from its beginning, with what forbids to enable from the start.
+    /// The image starts again, with these causes that forbid to enable.
     fn boot(&mut self, causes: u32) {
-        let samples = self.sample.joints;
-        self.ports = Ports { causes, period: self.period, ..Ports::new(samples) };
-        let cold = &self.cold;
-        (self.leg, self.loops) = (cold.leg.clone(), cold.loops);
-        (self.keeper, self.round) = (cold.keeper.clone(), cold.round.clone());
-        (self.output, self.told) = (None, None);
+        self.leg = self.cold.clone();
+        self.board.boot(&self.leg);
+        self.board.signals.inhibit.raise_bits(causes);
+        (self.output, self.axis_fault, self.edges) = (None, None, super::Edges::default());
         self.injector = Injector::new(0);
-        (self.watchdog.fed, self.watchdog.guard) = (self.period, TickGuard::new());
+        self.watchdog.fed = self.period;
     }
 
     /// It was reset by its watchdog.

@@ -10,6 +10,10 @@
 
 use crate::units::Ampere;
 
+mod can;
+
+pub use can::{Controller, Frame};
+
 /// PWM periods per second, and so samples and commands of one axis.
 pub const CURRENT_RATE_HZ: u32 = 24_000;
 
@@ -82,4 +86,69 @@ pub trait LegDrives<const N: usize> {
     fn sample(&mut self) -> Sample<N>;
     /// Hands over targets; they act until the next call.
     fn command(&mut self, command: &DriveCommand<N>);
+}
+
+/// The operator's two contacts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Contacts {
+    /// The enabling switch is held.
+    pub enabling: bool,
+    /// The start button is pressed.
+    pub start: bool,
+}
+
+/// What only a board of `N` axes can do: registers, no decisions. Every method returns at once.
+///
+/// The levels of `operation` decide over this trait and over plain queues and words, so that the board and the simulated hardware
+/// run the same decisions.
+pub trait Hardware<const N: usize> {
+    /// Runs `step` while no interrupt can come in between, the emergency stop's included. Only for a few instructions.
+    fn masked(&mut self, step: impl FnOnce(&mut Self));
+    /// Switches the outputs of all bridges off, now.
+    fn release_all(&mut self);
+    /// Switches the outputs of one bridge off, now, and sets its duties to no voltage.
+    fn release(&mut self, axis: usize);
+    /// Sets the duties of one bridge for its next period; its outputs stay as they are.
+    fn set_duty(&mut self, axis: usize, duty: &[f32; 3]);
+    /// Switches the outputs of one bridge on.
+    fn enable(&mut self, axis: usize);
+    /// Sets the brake resistor's share of time.
+    fn set_brake(&mut self, duty: f32);
+    /// Requests the servo's tick as soon as the current tick ends.
+    fn pend_servo(&mut self);
+    /// Requests a round of the bus as soon as the levels above it are done.
+    fn pend_bus(&mut self);
+
+    /// Reads the operator's contacts.
+    fn contacts(&self) -> Contacts;
+    /// Quadrature counter of an axis.
+    fn encoder_count(&self, axis: usize) -> u16;
+    /// Temperature of a bridge, degrees Celsius; `None` if its thermistor is open or shorted.
+    fn temperature(&self, axis: usize) -> Option<f32>;
+    /// Whether a gate driver still holds its configuration.
+    fn gate_holds(&mut self, axis: usize) -> bool;
+    /// Status registers of a gate driver, the first in the upper half; all ones if it does not answer.
+    fn gate_status(&mut self, axis: usize) -> u32;
+    /// Switches the supply of all gate drivers.
+    fn switch_gates(&mut self, on: bool);
+    /// Writes the configuration of all gate drivers; whether they hold it.
+    fn configure_gates(&mut self) -> bool;
+
+    /// Time since the start, microseconds.
+    fn now_us(&self) -> u64;
+    /// State of the bus controller; a lost frame is reported once.
+    fn controller(&mut self) -> Controller;
+    /// Transmit mailboxes in which a frame waits, one bit each.
+    fn mailboxes_waiting(&self) -> u32;
+    /// Puts a frame into an empty mailbox.
+    fn send(&mut self, mailbox: u32, frame: &Frame);
+    /// Aborts the transmission of every frame that waits.
+    fn abort_transmission(&mut self);
+
+    /// Restarts the watchdog's time.
+    fn feed_watchdog(&mut self);
+    /// Asks the watchdog for the time that a flash write may take; whether it has it now.
+    fn stretch_watchdog(&mut self) -> bool;
+    /// Asks the watchdog for its usual time; whether it has it now.
+    fn tighten_watchdog(&mut self) -> bool;
 }

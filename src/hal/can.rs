@@ -1,4 +1,4 @@
-//! A frame of classic CAN with an 11-bit identifier: all that a node sees of the bus.
+//! A frame of classic CAN with an 11-bit identifier, and the state of the controller that sends and receives it.
 
 /// Identifier and up to eight bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,28 +48,17 @@ impl Frame {
     }
 }
 
-/// A node's number on the bus, 1 to 127.
+/// State of the bus controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NodeId(u8);
-
-impl NodeId {
-    /// The number, if it is one.
-    #[must_use]
-    pub const fn new(number: u8) -> Option<Self> {
-        if matches!(number, 1..=127) { Some(Self(number)) } else { None }
-    }
-
-    /// The number.
-    #[must_use]
-    pub const fn number(self) -> u8 {
-        self.0
-    }
-
-    /// An identifier of the predefined connection set: its function's base and the number.
-    #[must_use]
-    pub const fn on(self, base: u16) -> u16 {
-        base + self.0 as u16
-    }
+pub enum Controller {
+    /// Takes part.
+    Active,
+    /// Error passive: too many errors to disturb others.
+    Passive,
+    /// Bus off.
+    Off,
+    /// Frames came faster than they were read. Reported once.
+    Overrun,
 }
 
 #[cfg(test)]
@@ -84,13 +73,5 @@ mod tests {
         // 1 + 11 + 1 + 1 + 1 + 4 + 15 + 1 + 1 + 1 + 7 + 3: start, id, RTR, IDE, r0, DLC, CRC, its delimiter, ACK, its
         // delimiter, end, intermission.
         assert_eq!((Frame::new(0, &[]).bits(), Frame::new(0, &[0; 8]).bits()), ([47, 55], [111, 135]));
-    }
-
-    #[test]
-    fn node_numbers_are_one_to_127() {
-        for number in 0..=255 {
-            assert_eq!(NodeId::new(number).is_some(), (1..=127).contains(&number));
-        }
-        assert_eq!(NodeId::new(5).map(|node| node.on(0x600)), Some(0x605));
     }
 }

@@ -1,0 +1,279 @@
+//! The firmware's levels put together as on the board, over simulated registers.
+//!
+//! Fault campaign, `serve` and complete drives run this one composition. It holds no decisions: each method runs one level of
+//! `scarab::operation`, and whoever owns the plant calls them in the board's order:
+//!
+//! ```text
+//! every 48th period   housekeeping
+//! when requested      servo, then thread level; the servo is requested after the last axis' sixth tick
+//! when requested      bus (`tool::bus::board`)
+//! every period        current tick of each axis
+//! every 12th period   watch
+//! ```
+
+use core::num::NonZeroU32;
+
+use scarab::board::odrive_v3_6::settings::drives;
+use scarab::bus::identification::Results;
+use scarab::bus::station::Station;
+use scarab::hal::{AxisSample, CURRENT_RATE_HZ, Frame, JointSample};
+use scarab::leg::{AxisFault, Control, ControlOutput, ControlRequest, Following};
+use scarab::motor::{Chopper, SenseScale};
+use scarab::operation::{
+    BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper, HousekeepingSettings, IdentificationLevel, Keep, Queues, RATE_HZ,
+    ServoLevel, Signals, Slice, Stage, Tick, Watch,
+};
+use scarab::safety::GUARD_RATE_HZ;
+
+use super::registers::Registers;
+use super::{DIVIDER, housekeeping_settings, ready};
+use crate::drive::description::CompleteDescription;
+use crate::tool::error::ToolError;
+use crate::tool::leg_file::LegFile;
+use crate::tool::pair::DeviceLeg;
+use crate::world::World;
+
+/// PWM periods between two rounds of the housekeeping, and between two looks of the watch.
+const PERIODS_PER_ROUND: u64 = (CURRENT_RATE_HZ / RATE_HZ) as u64;
+const PERIODS_PER_LOOK: u64 = (CURRENT_RATE_HZ / GUARD_RATE_HZ) as u64;
+/// Processor cycles of one period; the second axis is a quarter of it later.
+const CYCLES: NonZeroU32 = NonZeroU32::new(7000).expect("more than one");
+/// Code of a bus of 48 V, until it is read.
+const BUS_CODE: u16 = 3136;
+
+/// The part of the bus that is not registers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BusLevel<const N: usize> {
+    queues: BusQueues<N>,
+    round: BusRound,
+    /// What a host wants stored.
+    pub storage: Handover<Keep<N>>,
+}
+
+/// Contacts of the board and missing parts of a tick, as they are in one period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conditions {
+    /// The emergency stop's contact is open.
+    pub emergency_stop: bool,
+    /// A gate driver reports a fault.
+    pub gate_fault: bool,
+    /// Both shunts of the axis were converted.
+    pub complete: bool,
+    /// The bus voltage was converted.
+    pub supply: bool,
+}
+
+impl Conditions {
+    /// Nothing is wrong.
+    pub const SOUND: Self = Self { emergency_stop: false, gate_fault: false, complete: true, supply: true };
+}
+
+/// All levels of a board of `N` axes, but the leg, which they work on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Levels<const N: usize> {
+    /// Registers, contacts and pins.
+    pub registers: Registers<N>,
+    /// Words that all levels share.
+    pub signals: Signals<N>,
+    /// Queues between the levels.
+    pub queues: Queues<N>,
+    /// Level 0.
+    pub loops: CurrentLoops<N>,
+    /// The bus, where the board is on one.
+    pub bus: Option<Box<BusLevel<N>>>,
+    events: EventQueue<N>,
+    servo: ServoLevel<N>,
+    housekeeper: Housekeeper<N>,
+    identification: IdentificationLevel,
+    watch: Watch<N>,
+    settings: HousekeepingSettings<N>,
+    chopper: Chopper,
+    following: Option<Following<N>>,
+}
+
+impl<const N: usize> Levels<N> {
+    /// A board that is ready: motors calibrated on a stand, counts those of the pose in which the world's leg stands. `believed` is
+    /// the leg as the firmware has it, `description` what is simulated.
+    pub fn ready<const B: usize>(
+        believed: &LegFile,
+        description: &CompleteDescription<N>,
+        leg: &DeviceLeg<N, B>,
+        world: &mut World<N>,
+        seed: u64,
+    ) -> Result<Self, ToolError> {
+        let (axes, chopper) = ready(believed, description, world, seed)?;
+        let settings = housekeeping_settings(believed)?;
+        let mut levels = Self::cold(settings, chopper, leg, None);
+        levels.signals.begin_servo();
+        levels.signals.statistics.see_bus(BUS_CODE);
+        levels.registers.servo_due = true;
+        levels.loops = loops(axes.map(Stage::running), chopper);
+        levels.housekeeper = Housekeeper::ready(settings);
+        Ok(levels)
+    }
+
+    /// A board that starts: nothing calibrated, nothing begun.
+    fn cold<const B: usize>(
+        settings: HousekeepingSettings<N>,
+        chopper: Chopper,
+        leg: &DeviceLeg<N, B>,
+        following: Option<Following<N>>,
+    ) -> Self {
+        let signals = Signals::new();
+        let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
+        Self {
+            registers: Registers::new(),
+            watch: Watch::new(&signals),
+            signals,
+            queues: Queues::new(),
+            loops: loops([Stage::OFF; N], chopper),
+            bus: following.is_some().then(Box::default),
+            events: EventQueue::new(),
+            servo: ServoLevel::new(leg.control(), drives::derating(DIVIDER), volt_per_code, following.clone()),
+            housekeeper: Housekeeper::new(settings),
+            identification: IdentificationLevel::new(leg.identification().swarm_seed()),
+            settings,
+            chopper,
+            following,
+        }
+    }
+
+    /// The image starts again. Contacts, pins and the controller of the bus stay as they are.
+    pub fn boot<const B: usize>(&mut self, leg: &DeviceLeg<N, B>) {
+        let mut registers = Registers::new();
+        registers.contacts = self.registers.contacts;
+        registers.gates = self.registers.gates;
+        registers.thermistors = self.registers.thermistors;
+        registers.encoders = self.registers.encoders;
+        *self = Self { registers, ..Self::cold(self.settings, self.chopper, leg, self.following.take()) };
+    }
+
+    /// Puts the board on a bus, before it ticks.
+    pub fn join_bus<const B: usize>(&mut self, leg: &DeviceLeg<N, B>, following: Following<N>) {
+        let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
+        let derating = drives::derating(DIVIDER);
+        self.servo = ServoLevel::new(leg.control(), derating, volt_per_code, Some(following.clone()));
+        (self.bus, self.following) = (Some(Box::default()), Some(following));
+    }
+
+    /// Exchanges two axes, calibrations included: their motors hang on each other's connectors.
+    pub fn exchange(&mut self, one: usize, other: usize) {
+        if let (Some(first), Some(second)) = (self.loops.stage(one).copied(), self.loops.stage(other).copied()) {
+            for (axis, stage) in [(one, second), (other, first)] {
+                if let Some(place) = self.loops.stage_mut(axis) {
+                    *place = stage;
+                }
+            }
+        }
+    }
+
+    /// Level 6, in the periods in which it is due.
+    pub fn housekeeping(&mut self) {
+        let mut ends = self.queues.split(&mut self.events).housekeeping;
+        self.housekeeper.round(&mut ends, &self.signals, &mut self.registers);
+    }
+
+    /// A round of the housekeeping is due in this period.
+    #[must_use]
+    pub fn is_round_due(period: u64) -> bool {
+        period.is_multiple_of(PERIODS_PER_ROUND)
+    }
+
+    /// Level 1; `None` while the joints' samples are invalid.
+    pub fn servo(&mut self, control: &mut Control<N>, gravity: [f32; 3]) -> Option<ControlOutput<N>> {
+        let mut ends = self.queues.split(&mut self.events).servo;
+        ends.host = self.bus.as_mut().map(|bus| bus.queues.split().1);
+        let output = self.servo.tick(control, gravity, &mut ends, &self.signals, &mut self.registers);
+        self.signals.statistics.servo_ticks.add();
+        output
+    }
+
+    /// Thread level: what the servo sent, then a slice of the search.
+    pub fn identify<const B: usize>(&mut self, leg: &mut DeviceLeg<N, B>, evaluations: u32) -> Slice<N> {
+        let mut ends = self.queues.split(&mut self.events).identification;
+        let (_, identification) = leg.halves();
+        self.identification.hear(identification, &mut ends, |_| {}, |_| {});
+        while ends.notes.dequeue().is_some() {}
+        // Results are read where they are: nothing is published.
+        self.identification.published();
+        self.identification.work(identification, evaluations, &mut ends, &self.signals, |_| {})
+    }
+
+    /// Seed of the search of this identification.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.identification.seed()
+    }
+
+    /// Level 0: one tick of one axis in a period.
+    pub fn current(&mut self, axis: usize, period: u64, sample: &AxisSample, conditions: Conditions) {
+        let Conditions { emergency_stop, gate_fault, complete, supply } = conditions;
+        let now = (period as u32).wrapping_mul(CYCLES.get()).wrapping_add(axis as u32 * CYCLES.get() / 4);
+        let tick = Tick { now, emergency_stop, gate_fault, complete, supply, sample: *sample };
+        self.registers.encoders[axis] = sample.encoder_count;
+        let mut ends = self.queues.current();
+        self.loops.tick(axis, &tick, &mut ends, &self.signals, &mut self.registers);
+    }
+
+    /// Level 6, at the end of each period: guard of the current ticks, and the watchdog's check.
+    pub fn watch(&mut self, period: u64) {
+        if period.is_multiple_of(PERIODS_PER_LOOK) {
+            self.watch.look(&self.signals, &mut self.registers);
+        }
+    }
+
+    /// Newest samples of the joints that wait for the servo.
+    #[must_use]
+    pub fn samples(&self) -> Option<[JointSample; N]> {
+        let mut samples = [JointSample::default(); N];
+        for (joint, sample) in samples.iter_mut().enumerate() {
+            *sample = self.queues.newest_sample(joint)?;
+        }
+        Some(samples)
+    }
+
+    /// Asks the servo for something that the operator's contacts do not.
+    pub fn ask(&mut self, request: ControlRequest<N>) {
+        let _ = self.queues.requests().enqueue(request);
+    }
+
+    /// The first axis that released itself, and why.
+    #[must_use]
+    pub fn fault(&self) -> Option<(usize, AxisFault)> {
+        (0..N).find_map(|axis| Some((axis, self.loops.stage(axis)?.fault()?)))
+    }
+
+    /// Level 4: a frame came; one without room is lost.
+    pub fn receive(&mut self, frame: &Frame) {
+        let Some(bus) = &mut self.bus else { return };
+        if bus.queues.split().0.enqueue(*frame).is_err() {
+            self.registers.can.overrun = true;
+        }
+        self.registers.bus_due = true;
+    }
+
+    /// Level 5 at this time: a round of the bus.
+    pub fn bus_round<R: Results, const LOG: usize>(
+        &mut self,
+        now_ns: u64,
+        station: &mut Station<N, LOG>,
+        results: &R,
+    ) {
+        let Some(bus) = &mut self.bus else { return };
+        self.registers.bus_due = false;
+        self.registers.set_time(now_ns);
+        let BusLevel { queues, round, storage } = &mut **bus;
+        let (_, _, mut ends) = queues.split();
+        round.round(station, &mut ends, storage, &self.signals, &mut self.registers, results);
+    }
+}
+
+impl<const N: usize> Default for BusLevel<N> {
+    fn default() -> Self {
+        Self { queues: BusQueues::new(), round: BusRound::new(), storage: Handover::new(Keep::NOTHING) }
+    }
+}
+
+fn loops<const N: usize>(stages: [Stage; N], chopper: Chopper) -> CurrentLoops<N> {
+    CurrentLoops::new(stages, CYCLES, Some(chopper), SenseScale::ODRIVE_3_6.volt_per_code)
+}

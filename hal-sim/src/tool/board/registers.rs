@@ -1,0 +1,201 @@
+//! What lies beneath the firmware's levels in place of a board's registers.
+
+use core::cell::Cell;
+
+use scarab::board::odrive_v3_6::settings::analog::temperature_c;
+use scarab::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
+
+use crate::tool::bus::wire::Mailbox;
+
+/// Code of the thermistor of a bridge at 41 degrees Celsius.
+pub const WARM_CODE: u16 = 1500;
+/// What the dearest common frame of the bus takes the processor, 2,403 instructions under the levels above it. Each reading of the
+/// clock within a round of the bus is so much later than the one before.
+const FRAME_US: u64 = 20;
+/// The watchdog's time during a flash write over its usual time: 8 s, 16 ms.
+pub const STRETCHED: u64 = 500;
+
+/// Bus controller: its state, and the frames that wait in its three mailboxes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CanController {
+    /// Transmit mailboxes.
+    pub mailbox: Mailbox,
+    /// State that the firmware reads.
+    pub state: Controller,
+    /// A frame was lost and the firmware has not read it yet.
+    pub overrun: bool,
+    /// Time, nanoseconds.
+    pub now_ns: u64,
+}
+
+/// Registers, contacts and pins of a board of `N` axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Registers<const N: usize> {
+    /// The operator's contacts.
+    pub contacts: Contacts,
+    /// What each bridge does in its next period.
+    pub commands: [AxisCommand; N],
+    /// The brake resistor's share of time.
+    pub brake: f32,
+    /// Encoder counters.
+    pub encoders: [u16; N],
+    /// The gate drivers hold their configuration.
+    pub gates: [bool; N],
+    /// The gate drivers have their supply.
+    pub gates_on: bool,
+    /// The gate drivers were configured since this was cleared: a reset has ended.
+    pub configured: bool,
+    /// Codes of the thermistors.
+    pub thermistors: [u16; N],
+    /// The servo was requested.
+    pub servo_due: bool,
+    /// A round of the bus was requested.
+    pub bus_due: bool,
+    /// The bus controller.
+    pub can: CanController,
+    /// The watchdog was fed since this was cleared.
+    pub fed: bool,
+    /// How many times its usual time the watchdog has, if that changed.
+    pub stretched: Option<u64>,
+    /// Readings of the clock in this round of the bus.
+    readings: Cell<u64>,
+}
+
+impl<const N: usize> Registers<N> {
+    /// As after the start: bridges off, contacts open.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            contacts: Contacts::default(),
+            commands: [AxisCommand::RELEASED; N],
+            brake: 0.0,
+            encoders: [0; N],
+            gates: [true; N],
+            gates_on: true,
+            configured: false,
+            thermistors: [WARM_CODE; N],
+            servo_due: false,
+            bus_due: false,
+            can: CanController {
+                mailbox: Mailbox::default(),
+                state: Controller::Active,
+                overrun: false,
+                now_ns: 0,
+            },
+            fed: false,
+            stretched: None,
+            readings: Cell::new(0),
+        }
+    }
+
+    /// Sets the time, nanoseconds; a round of the bus begins.
+    pub fn set_time(&mut self, now_ns: u64) {
+        self.can.now_ns = now_ns;
+        self.readings.set(0);
+    }
+}
+
+impl<const N: usize> Default for Registers<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const N: usize> Hardware<N> for Registers<N> {
+    fn masked(&mut self, step: impl FnOnce(&mut Self)) {
+        step(self);
+    }
+
+    fn release_all(&mut self) {
+        self.commands = [AxisCommand::RELEASED; N];
+    }
+
+    fn release(&mut self, axis: usize) {
+        self.commands[axis] = AxisCommand::RELEASED;
+    }
+
+    fn set_duty(&mut self, axis: usize, duty: &[f32; 3]) {
+        self.commands[axis].duty = *duty;
+    }
+
+    fn enable(&mut self, axis: usize) {
+        self.commands[axis].enabled = true;
+    }
+
+    fn set_brake(&mut self, duty: f32) {
+        self.brake = duty;
+    }
+
+    fn pend_servo(&mut self) {
+        self.servo_due = true;
+    }
+
+    fn pend_bus(&mut self) {
+        self.bus_due = true;
+    }
+
+    fn contacts(&self) -> Contacts {
+        self.contacts
+    }
+
+    fn encoder_count(&self, axis: usize) -> u16 {
+        self.encoders[axis]
+    }
+
+    fn temperature(&self, axis: usize) -> Option<f32> {
+        temperature_c(self.thermistors[axis])
+    }
+
+    fn gate_holds(&mut self, axis: usize) -> bool {
+        self.gates[axis]
+    }
+
+    fn gate_status(&mut self, _: usize) -> u32 {
+        0
+    }
+
+    fn switch_gates(&mut self, on: bool) {
+        self.gates_on = on;
+    }
+
+    fn configure_gates(&mut self) -> bool {
+        self.configured = true;
+        self.gates.iter().all(|holds| *holds)
+    }
+
+    fn now_us(&self) -> u64 {
+        let readings = self.readings.get();
+        self.readings.set(readings + 1);
+        self.can.now_ns / 1000 + readings * FRAME_US
+    }
+
+    fn controller(&mut self) -> Controller {
+        if core::mem::take(&mut self.can.overrun) { Controller::Overrun } else { self.can.state }
+    }
+
+    fn mailboxes_waiting(&self) -> u32 {
+        self.can.mailbox.slots()
+    }
+
+    fn send(&mut self, mailbox: u32, frame: &Frame) {
+        self.can.mailbox.put(mailbox, *frame, self.can.now_ns);
+    }
+
+    fn abort_transmission(&mut self) {
+        self.can.mailbox.clear();
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.fed = true;
+    }
+
+    fn stretch_watchdog(&mut self) -> bool {
+        self.stretched = Some(STRETCHED);
+        true
+    }
+
+    fn tighten_watchdog(&mut self) -> bool {
+        self.stretched = Some(1);
+        true
+    }
+}

@@ -1,0 +1,133 @@
+//! The board as the levels see it: every method is a few register accesses.
+
+use embassy_time::Instant;
+use spin::Mutex;
+
+use super::gate_driver::GateDrivers;
+use super::settings::analog::temperature_c;
+use super::{brake, bridge, can, contacts, converter, encoder, interrupts, watchdog};
+use crate::hal::{Contacts, Controller, Frame, Hardware};
+
+/// The gate drivers' bus, from the start on; only the housekeeping uses it.
+static GATE_DRIVERS: Mutex<Option<GateDrivers>> = Mutex::new(None);
+
+/// The registers of this board. One value at each level.
+#[derive(Clone, Copy, Debug)]
+pub struct Odrive;
+
+impl Odrive {
+    /// The board, with its gate drivers.
+    #[must_use]
+    pub fn new(gate_drivers: GateDrivers) -> Self {
+        if let Some(mut home) = GATE_DRIVERS.try_lock() {
+            *home = Some(gate_drivers);
+        }
+        Self
+    }
+}
+
+/// Asks the gate drivers; `None` before the start has set them.
+fn gates<R>(ask: impl FnOnce(&mut GateDrivers) -> R) -> Option<R> {
+    GATE_DRIVERS.try_lock()?.as_mut().map(ask)
+}
+
+impl Hardware<2> for Odrive {
+    #[inline(always)]
+    fn masked(&mut self, step: impl FnOnce(&mut Self)) {
+        cortex_m::interrupt::free(|_| step(self));
+    }
+
+    #[inline(always)]
+    fn release_all(&mut self) {
+        bridge::release_all();
+    }
+
+    #[inline(always)]
+    fn release(&mut self, axis: usize) {
+        bridge::release(axis);
+    }
+
+    #[inline(always)]
+    fn set_duty(&mut self, axis: usize, duty: &[f32; 3]) {
+        bridge::set_duty(axis, duty);
+    }
+
+    #[inline(always)]
+    fn enable(&mut self, axis: usize) {
+        bridge::enable(axis);
+    }
+
+    #[inline(always)]
+    fn set_brake(&mut self, duty: f32) {
+        brake::set(duty);
+    }
+
+    #[inline(always)]
+    fn pend_servo(&mut self) {
+        interrupts::pend_servo();
+    }
+
+    fn pend_bus(&mut self) {
+        can::pend();
+    }
+
+    fn contacts(&self) -> Contacts {
+        Contacts { enabling: contacts::enabling(), start: contacts::start() }
+    }
+
+    fn encoder_count(&self, axis: usize) -> u16 {
+        encoder::count(axis)
+    }
+
+    fn temperature(&self, axis: usize) -> Option<f32> {
+        converter::thermistors().get(axis).copied().and_then(temperature_c)
+    }
+
+    fn gate_holds(&mut self, axis: usize) -> bool {
+        gates(|gates| gates.holds(axis)).unwrap_or(false)
+    }
+
+    fn gate_status(&mut self, axis: usize) -> u32 {
+        gates(|gates| gates.status(axis)).unwrap_or(u32::MAX)
+    }
+
+    fn switch_gates(&mut self, on: bool) {
+        gates(|gates| if on { gates.on() } else { gates.off() });
+    }
+
+    fn configure_gates(&mut self) -> bool {
+        gates(GateDrivers::configure) == Some([true; 2])
+    }
+
+    fn now_us(&self) -> u64 {
+        Instant::now().as_micros()
+    }
+
+    fn controller(&mut self) -> Controller {
+        can::status()
+    }
+
+    fn mailboxes_waiting(&self) -> u32 {
+        can::waiting()
+    }
+
+    fn send(&mut self, mailbox: u32, frame: &Frame) {
+        can::send(mailbox, frame);
+    }
+
+    fn abort_transmission(&mut self) {
+        can::give_up();
+    }
+
+    fn feed_watchdog(&mut self) {
+        watchdog::feed();
+    }
+
+    fn stretch_watchdog(&mut self) -> bool {
+        watchdog::stretch()
+    }
+
+    fn tighten_watchdog(&mut self) -> bool {
+        watchdog::tighten()
+    }
+}

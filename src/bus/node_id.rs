@@ -1,0 +1,38 @@
+//! Number of a node and the identifiers that follow from it.
+
+/// A node's number on the bus, 1 to 127.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeId(u8);
+
+impl NodeId {
+    /// The number, if it is one.
+    #[must_use]
+    pub const fn new(number: u8) -> Option<Self> {
+        if matches!(number, 1..=127) { Some(Self(number)) } else { None }
+    }
+
+    /// The number.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        self.0
+    }
+
+    /// An identifier of the predefined connection set: its function's base and the number.
+    #[must_use]
+    pub const fn on(self, base: u16) -> u16 {
+        base + self.0 as u16
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn node_numbers_are_one_to_127() {
+        for number in 0..=255 {
+            assert_eq!(NodeId::new(number).is_some(), (1..=127).contains(&number));
+        }
+        assert_eq!(NodeId::new(5).map(|node| node.on(0x600)), Some(0x605));
+    }
+}

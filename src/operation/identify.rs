@@ -1,0 +1,197 @@
+//! Thread level: the identification, fed by the servo's events.
+//!
+//! **Gaps.** Samples come with their tick. One that is missing would bend every row that it belongs to, so the identification is
+//! cancelled, and control gets a verdict that refuses for its input.
+
+use core::borrow::BorrowMut;
+
+use super::queues::{EVENTS, IdentificationEnds, LegEvent};
+use super::signals::Signals;
+use crate::leg::{
+    Activity, Finding, Identification, IdentifiedModel, IdentifyPhase, LoggedSample, MotionWindow, Reason, SearchState,
+    Segment, Verdict,
+};
+use crate::servo::TICKS_PER_LOG;
+use crate::trace::{Record, judged, words};
+
+/// What is known between two slices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IdentificationLevel {
+    activity: Activity,
+    /// Tick and segment of the newest sample.
+    last: Option<(u32, Segment)>,
+    /// A sample was lost in this identification.
+    gap: bool,
+    /// Seed of this identification's search.
+    seed: u64,
+    /// Results that changed and were not published yet; no verdict where an identification begins.
+    publish: Option<Option<Verdict>>,
+}
+
+/// What came of a slice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Slice<const N: usize> {
+    /// There is nothing to do.
+    Idle,
+    /// The search goes on.
+    Busy,
+    /// A result was judged; with the model if it was accepted.
+    Judged(Option<IdentifiedModel<N>>),
+}
+
+impl IdentificationLevel {
+    /// Nothing received yet; `seed` of the search if no host gives another.
+    #[must_use]
+    pub const fn new(seed: u64) -> Self {
+        Self { activity: Activity::Idle, last: None, gap: false, seed, publish: None }
+    }
+
+    /// Takes what the servo sent; whether there was anything. `sample` sees each sample of the log, `record` each record.
+    #[inline(never)]
+    pub fn hear<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>(
+        &mut self,
+        identification: &mut Identification<N, B, TAPS, PENDING, W>,
+        ends: &mut IdentificationEnds<'_, N>,
+        mut record: impl FnMut(&Record<N>),
+        mut sample: impl FnMut(&LoggedSample<N>),
+    ) -> bool
+    where
+        W: BorrowMut<MotionWindow<f32, N, B>>,
+    {
+        let mut heard = false;
+        // No more than fits the queue at once, so that newer events do not starve the search.
+        for _ in 0..EVENTS {
+            let Some(event) = ends.events.dequeue() else { break };
+            heard = true;
+            match event {
+                LegEvent::Sample(logged) => {
+                    sample(&logged);
+                    self.take(&logged, identification);
+                }
+                LegEvent::Begun(prepared) => {
+                    identification.cancel();
+                    if let Some((plan, seed)) = prepared {
+                        identification.prepare(plan, seed);
+                        self.seed = seed;
+                    }
+                    (self.gap, self.publish) = (false, Some(None));
+                }
+                LegEvent::Activity(activity) => {
+                    self.activity = activity;
+                    if !matches!(activity, Activity::Identify(_)) {
+                        identification.cancel();
+                    }
+                }
+                LegEvent::TookUpdate => identification.take_update(),
+                LegEvent::Record(one) => record(&one),
+            }
+        }
+        heard
+    }
+
+    fn take<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>(
+        &mut self,
+        logged: &LoggedSample<N>,
+        identification: &mut Identification<N, B, TAPS, PENDING, W>,
+    ) where
+        W: BorrowMut<MotionWindow<f32, N, B>>,
+    {
+        let tick = logged.sample.tick;
+        if let (Some((before, segment)), Some(now)) = (self.last, logged.segment)
+            && segment == now
+            && tick.wrapping_sub(before) != TICKS_PER_LOG
+        {
+            self.gap = true;
+        }
+        self.last = logged.segment.map(|segment| (tick, segment));
+        if !self.gap {
+            identification.push(logged);
+        }
+    }
+
+    /// One slice of at most `evaluations` of the search.
+    #[inline(never)]
+    pub fn work<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>(
+        &mut self,
+        identification: &mut Identification<N, B, TAPS, PENDING, W>,
+        evaluations: u32,
+        ends: &mut IdentificationEnds<'_, N>,
+        signals: &Signals<N>,
+        mut record: impl FnMut(&Record<N>),
+    ) -> Slice<N>
+    where
+        W: BorrowMut<MotionWindow<f32, N, B>>,
+    {
+        use IdentifyPhase::{Judge, Settle, Solve};
+        if self.gap {
+            if let Activity::Identify(Settle | Solve | Judge) = self.activity {
+                self.gap = false;
+                identification.cancel();
+                let verdict = Verdict::refused(Reason::Input);
+                record(&Record::Refused { why: "samples_lost", value: signals.statistics.samples_lost.get() });
+                let _ = ends.findings.enqueue(Finding::Judged { verdict, model: None });
+                self.publish = Some(Some(verdict));
+            }
+            return Slice::Idle;
+        }
+        let Some(finding) = identification.advance(evaluations) else {
+            let Some(solver) = identification.solver() else { return Slice::Idle };
+            let search = solver.search();
+            let [iterations, done] = &signals.statistics.search;
+            iterations.set(search.iterations());
+            done.set(search.evaluations());
+            return if search.state() == SearchState::Running { Slice::Busy } else { Slice::Idle };
+        };
+        let mut slice = Slice::Busy;
+        match &finding {
+            Finding::Solved => {}
+            Finding::Judged { verdict, model } => {
+                self.publish = Some(Some(*verdict));
+                slice = Slice::Judged(*model);
+            }
+            Finding::Changed(change) => record(&Record::Change {
+                since_s: change.since_s,
+                joints: change.joints,
+                statistic: change.statistic,
+                limit: change.limit,
+            }),
+            Finding::Updated { cause, verdict, model } => {
+                let (cause, link) = words::cause(*cause);
+                let verdict = judged(verdict.is_accepted());
+                record(&Record::Update { cause, link, verdict, offered: model.is_some() });
+            }
+        }
+        // Control takes one in every tick.
+        let _ = ends.findings.enqueue(finding);
+        slice
+    }
+
+    /// Results that changed since they were published; see [`Self::published`].
+    #[must_use]
+    pub const fn unpublished(&self) -> Option<Option<Verdict>> {
+        self.publish
+    }
+
+    /// The results were published.
+    pub const fn published(&mut self) {
+        self.publish = None;
+    }
+
+    /// What the leg does, as far as its events have come.
+    #[must_use]
+    pub const fn activity(&self) -> Activity {
+        self.activity
+    }
+
+    /// Tick of the newest sample.
+    #[must_use]
+    pub fn tick(&self) -> u32 {
+        self.last.map_or(0, |(tick, _)| tick)
+    }
+
+    /// Seed of this identification's search.
+    #[must_use]
+    pub const fn seed(&self) -> u64 {
+        self.seed
+    }
+}

@@ -1,0 +1,286 @@
+//! Queues between the levels, as plain values with one producer and one consumer each.
+//!
+//! The board splits them once, from statics; a simulation owns them, clones them, and splits them for each level that it runs. No
+//! level waits for another: a queue that is full takes nothing more.
+//!
+//! | from | to | what |
+//! | --- | --- | --- |
+//! | housekeeping | current | [`Order`] |
+//! | current | housekeeping | [`Outcome`] |
+//! | current | servo | joint samples, one in six periods |
+//! | housekeeping | servo | requests of the operator |
+//! | servo | housekeeping | drive states |
+//! | servo | identification | [`LegEvent`], in their order |
+//! | identification | servo | findings |
+//! | housekeeping | identification | records |
+//! | housekeeping | storage | calibrations that passed |
+//! | bus interrupt | bus | received frames |
+//! | bus | servo | [`LegOrder`] |
+//! | servo | bus | [`LegTold`], logged samples |
+
+use heapless::spsc::{Consumer, Producer, Queue};
+
+use super::stage::{Order, Outcome};
+use crate::bus::station::{LegOrder, LegTold};
+use crate::hal::{Frame, JointSample};
+use crate::leg::{Activity, ControlRequest, DriveState, Finding, LoggedSample, Plan, StoredCalibration};
+use crate::trace::Record;
+
+/// An axis that passed its calibration, and what of it can be stored.
+pub type Calibrated = (usize, Option<StoredCalibration>);
+
+/// What the servo sends to the identification, in its order.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "queues hold values, and there is no heap to box them on")]
+pub enum LegEvent<const N: usize> {
+    /// A sample of the log.
+    Sample(LoggedSample<N>),
+    /// The leg does something else from now on.
+    Activity(Activity),
+    /// An identification begins; with this plan and seed if a host gave them.
+    Begun(Option<(Plan, u64)>),
+    /// The update that was offered is in use now.
+    TookUpdate,
+    /// A record for the trace.
+    Record(Record<N>),
+}
+
+/// Room for events, 190 ms of the log. Closing a motion takes 11 million instructions in one call, 89 ms of a processor that does
+/// nothing else.
+pub const EVENTS: usize = 104;
+/// Places of it that samples leave free for the other events.
+pub const RESERVED: usize = 8;
+/// Room for received frames: 1.5 ms of the shortest at 1 Mbit/s.
+pub const FRAMES: usize = 33;
+
+/// Queue from the servo to the identification. Apart from [`Queues`], because of its size.
+pub type EventQueue<const N: usize> = Queue<LegEvent<N>, EVENTS>;
+
+/// All queues of a board of `N` axes but the events' and the bus'.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Queues<const N: usize> {
+    orders: [Queue<Order, 3>; N],
+    outcomes: [Queue<Outcome, 4>; N],
+    samples: [Queue<JointSample, 4>; N],
+    requests: Queue<ControlRequest<N>, 3>,
+    findings: Queue<Finding<N>, 3>,
+    drive: Queue<DriveState, 8>,
+    notes: Queue<Record<N>, 16>,
+    calibrated: Queue<Calibrated, 4>,
+}
+
+/// Ends of the current loops.
+pub struct CurrentEnds<'a, const N: usize> {
+    pub(super) orders: [Consumer<'a, Order>; N],
+    pub(super) outcomes: [Producer<'a, Outcome>; N],
+    pub(super) samples: [Producer<'a, JointSample>; N],
+}
+
+/// Ends of the servo; those of the bus where there is one.
+pub struct ServoEnds<'a, const N: usize> {
+    /// Samples of each joint.
+    pub samples: [Consumer<'a, JointSample>; N],
+    pub(super) requests: Consumer<'a, ControlRequest<N>>,
+    pub(super) findings: Consumer<'a, Finding<N>>,
+    pub(super) drive: Producer<'a, DriveState>,
+    pub(super) events: Producer<'a, LegEvent<N>>,
+    /// Ends towards the bus.
+    pub host: Option<HostEnds<'a, N>>,
+}
+
+/// Ends of the housekeeping.
+pub struct HousekeepingEnds<'a, const N: usize> {
+    pub(super) orders: [Producer<'a, Order>; N],
+    pub(super) outcomes: [Consumer<'a, Outcome>; N],
+    /// Requests to the servo.
+    pub requests: Producer<'a, ControlRequest<N>>,
+    pub(super) drive: Consumer<'a, DriveState>,
+    /// Records for the trace.
+    pub notes: Producer<'a, Record<N>>,
+    pub(super) calibrated: Producer<'a, Calibrated>,
+}
+
+/// Ends of the identification.
+pub struct IdentificationEnds<'a, const N: usize> {
+    pub(super) events: Consumer<'a, LegEvent<N>>,
+    pub(super) findings: Producer<'a, Finding<N>>,
+    /// Records of the housekeeping.
+    pub notes: Consumer<'a, Record<N>>,
+}
+
+/// Both ends of every queue.
+pub struct Ends<'a, const N: usize> {
+    /// Level 0.
+    pub current: CurrentEnds<'a, N>,
+    /// Level 1.
+    pub servo: ServoEnds<'a, N>,
+    /// Level 6.
+    pub housekeeping: HousekeepingEnds<'a, N>,
+    /// Thread level.
+    pub identification: IdentificationEnds<'a, N>,
+    /// Calibrations for the storage, thread level.
+    pub calibrated: Consumer<'a, Calibrated>,
+}
+
+/// Both halves of queues, each in an array of its own.
+fn split_all<'a, T, const L: usize, const N: usize>(
+    queues: &'a mut [Queue<T, L>; N],
+) -> ([Producer<'a, T>; N], [Consumer<'a, T>; N]) {
+    let mut consumers = [const { None }; N];
+    let mut places = consumers.iter_mut();
+    let producers = queues.each_mut().map(|queue| {
+        let (producer, consumer) = queue.split();
+        if let Some(place) = places.next() {
+            *place = Some(consumer);
+        }
+        producer
+    });
+    (producers, consumers.map(|consumer| consumer.expect("as many places as queues")))
+}
+
+impl<const N: usize> Queues<N> {
+    /// All empty.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            orders: [const { Queue::new() }; N],
+            outcomes: [const { Queue::new() }; N],
+            samples: [const { Queue::new() }; N],
+            requests: Queue::new(),
+            findings: Queue::new(),
+            drive: Queue::new(),
+            notes: Queue::new(),
+            calibrated: Queue::new(),
+        }
+    }
+
+    /// Splits every queue; the servo's ends towards the bus are set by whoever has a bus.
+    #[must_use]
+    pub fn split<'a>(&'a mut self, events: &'a mut EventQueue<N>) -> Ends<'a, N> {
+        let (give_orders, take_orders) = split_all(&mut self.orders);
+        let (give_outcomes, take_outcomes) = split_all(&mut self.outcomes);
+        let (give_samples, take_samples) = split_all(&mut self.samples);
+        let (give_request, take_request) = self.requests.split();
+        let (give_finding, take_finding) = self.findings.split();
+        let (give_drive, take_drive) = self.drive.split();
+        let (give_note, take_note) = self.notes.split();
+        let (give_calibrated, calibrated) = self.calibrated.split();
+        let (give_event, take_event) = events.split();
+        Ends {
+            current: CurrentEnds { orders: take_orders, outcomes: give_outcomes, samples: give_samples },
+            servo: ServoEnds {
+                samples: take_samples,
+                requests: take_request,
+                findings: take_finding,
+                drive: give_drive,
+                events: give_event,
+                host: None,
+            },
+            housekeeping: HousekeepingEnds {
+                orders: give_orders,
+                outcomes: take_outcomes,
+                requests: give_request,
+                drive: take_drive,
+                notes: give_note,
+                calibrated: give_calibrated,
+            },
+            identification: IdentificationEnds { events: take_event, findings: give_finding, notes: take_note },
+            calibrated,
+        }
+    }
+
+    /// Ends of the current loops, for a simulation.
+    #[cfg(not(target_os = "none"))]
+    #[must_use]
+    pub fn current(&mut self) -> CurrentEnds<'_, N> {
+        CurrentEnds {
+            orders: self.orders.each_mut().map(|queue| queue.split().1),
+            outcomes: self.outcomes.each_mut().map(|queue| queue.split().0),
+            samples: self.samples.each_mut().map(|queue| queue.split().0),
+        }
+    }
+
+    /// Replaces the samples that wait for the servo: what a simulation adds between the current loops and the servo.
+    #[cfg(not(target_os = "none"))]
+    pub fn set_samples(&mut self, samples: &[JointSample; N]) {
+        for (queue, sample) in self.samples.iter_mut().zip(samples) {
+            while queue.dequeue().is_some() {}
+            let _ = queue.enqueue(*sample);
+        }
+    }
+
+    /// Newest sample of a joint that waits for the servo.
+    #[cfg(not(target_os = "none"))]
+    #[must_use]
+    pub fn newest_sample(&self, joint: usize) -> Option<JointSample> {
+        self.samples.get(joint).and_then(|queue| queue.iter().last().copied())
+    }
+
+    /// Outcomes of an axis that wait for the housekeeping.
+    #[cfg(not(target_os = "none"))]
+    pub fn outcomes(&self, axis: usize) -> impl Iterator<Item = &Outcome> {
+        self.outcomes.get(axis).into_iter().flat_map(Queue::iter)
+    }
+
+    /// Requests that wait for the servo's tick.
+    #[cfg(not(target_os = "none"))]
+    #[must_use]
+    pub fn requests(&mut self) -> &mut Queue<ControlRequest<N>, 3> {
+        &mut self.requests
+    }
+}
+
+impl<const N: usize> Default for Queues<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Queues of the bus.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BusQueues<const N: usize> {
+    frames: Queue<Frame, FRAMES>,
+    told: Queue<LegTold<N>, 2>,
+    orders: Queue<LegOrder<N>, 2>,
+    logged: Queue<LoggedSample<N>, 8>,
+}
+
+/// The servo's ends towards the bus.
+pub struct HostEnds<'a, const N: usize> {
+    pub(super) orders: Consumer<'a, LegOrder<N>>,
+    pub(super) told: Producer<'a, LegTold<N>>,
+    pub(super) logged: Producer<'a, LoggedSample<N>>,
+}
+
+/// Ends of the bus, level 5.
+pub struct BusEnds<'a, const N: usize> {
+    pub(super) frames: Consumer<'a, Frame>,
+    pub(super) orders: Producer<'a, LegOrder<N>>,
+    pub(super) told: Consumer<'a, LegTold<N>>,
+    pub(super) logged: Consumer<'a, LoggedSample<N>>,
+}
+
+impl<const N: usize> BusQueues<N> {
+    /// All empty.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { frames: Queue::new(), told: Queue::new(), orders: Queue::new(), logged: Queue::new() }
+    }
+
+    /// Splits every queue; the end of received frames is level 4's.
+    #[must_use]
+    pub fn split(&mut self) -> (Producer<'_, Frame>, HostEnds<'_, N>, BusEnds<'_, N>) {
+        let (frames_in, frames) = self.frames.split();
+        let (give_told, told) = self.told.split();
+        let (orders, take_order) = self.orders.split();
+        let (give_logged, logged) = self.logged.split();
+        let servo = HostEnds { orders: take_order, told: give_told, logged: give_logged };
+        (frames_in, servo, BusEnds { frames, orders, told, logged })
+    }
+}
+
+impl<const N: usize> Default for BusQueues<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

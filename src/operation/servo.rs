@@ -1,0 +1,271 @@
+//! Level 1: the leg's tick and all that stands around it, 4 kHz, requested by the current loop of the last axis.
+//!
+//! ```text
+//! samples     newest of each joint
+//! gate        without a calibration and a zero of each joint nothing ticks: released, requests dropped
+//! findings    of the identification
+//! faults      reported by the board's other levels; gains and limits (every 64 ms); supply; derating
+//! request     of the operator, else of a host; only what the inhibit word and the enabling switch allow
+//! leg         -> current targets, permission
+//! out         report to the bus; limits, requests, states, samples as events for the identification and the trace
+//! ```
+
+use super::host_side::HostSide;
+use super::queues::{LegEvent, RESERVED, ServoEnds};
+use super::signals::Signals;
+use crate::checksum::Checksum;
+use crate::hal::{Hardware, JointSample, Sample};
+use crate::leg::{
+    Activity, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes, Permission, Plan, permitted,
+};
+use crate::safety::{DeratingRamps, Fault, FaultCode, SupplyWatch};
+use crate::servo::SERVO_RATE_HZ;
+use crate::trace::{Record, words};
+use crate::units::Volt;
+
+/// Ticks between two checksums of gains and limits, less one: 64 ms.
+const CHECKSUM_MASK: u32 = 0xFF;
+
+/// What level 1 knows between two ticks, beside the leg's control.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ServoLevel<const N: usize> {
+    sample: [JointSample; N],
+    /// State and activity at the last report.
+    state: Option<DriveState>,
+    activity: Activity,
+    /// Limits that were reported in this second.
+    limits: [LimitCodes; N],
+    ticking: bool,
+    tick: u32,
+    /// Checksum of gains and limits as they were made.
+    checksum: Checksum,
+    supply: SupplyWatch,
+    ramps: DeratingRamps,
+    volt_per_code: Volt,
+    /// The bus, where there is one.
+    host: Option<HostSide<N>>,
+    /// Plan and seed of a host's identification.
+    prepared: Option<(Plan, u64)>,
+}
+
+impl<const N: usize> ServoLevel<N> {
+    /// Nothing begun. `following` is what a host's commands need; `None` without a bus.
+    #[must_use]
+    pub fn new(
+        control: &Control<N>,
+        ramps: DeratingRamps,
+        volt_per_code: Volt,
+        following: Option<Following<N>>,
+    ) -> Self {
+        Self {
+            sample: [JointSample::default(); N],
+            state: None,
+            activity: Activity::Idle,
+            limits: [LimitCodes::default(); N],
+            ticking: false,
+            tick: 0,
+            checksum: control.checksum(),
+            supply: SupplyWatch::default(),
+            ramps,
+            volt_per_code,
+            host: following.map(HostSide::new),
+            prepared: None,
+        }
+    }
+
+    /// One tick of the leg; `None` while the joints' samples are invalid. `gravity` in the base frame, m/s^2.
+    pub fn tick<H: Hardware<N>>(
+        &mut self,
+        control: &mut Control<N>,
+        gravity: [f32; 3],
+        ends: &mut ServoEnds<'_, N>,
+        signals: &Signals<N>,
+        hardware: &mut H,
+    ) -> Option<ControlOutput<N>> {
+        for (slot, samples) in self.sample.iter_mut().zip(&mut ends.samples) {
+            while let Some(sample) = samples.dequeue() {
+                *slot = sample;
+            }
+        }
+        for (count, sample) in signals.statistics.counts.iter().zip(&self.sample) {
+            count.set(sample.encoder_counts.cast_unsigned());
+        }
+        let begun = signals.has_begun();
+        let begins = !core::mem::replace(&mut self.ticking, begun) && begun;
+        if !begun {
+            self.rest(ends, signals, hardware);
+            return None;
+        }
+        if begins {
+            control.restart();
+            self.state = None;
+            if let Some(host) = &mut self.host {
+                host.begin();
+            }
+        }
+        if let Some(finding) = ends.findings.dequeue() {
+            control.receive(finding);
+        }
+        self.look_around(control, signals);
+        let request = self.next_request(control, ends, signals, hardware);
+        let asked = permitted(request, signals.inhibit.is_clear(), control.state());
+        let sample = Sample { joints: self.sample };
+        let commands = self.host.as_mut().and_then(HostSide::commands);
+        let output = control.tick_with(&sample, asked, gravity, commands);
+        signals.set_targets(output.servo.drive());
+        signals.set_permission(output.servo.decision.state.permission());
+        if let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) {
+            host.report(control, &sample, &output, ends, signals, hardware);
+        }
+        self.report_limits(control, &output, ends, signals);
+        self.report(control, request.as_ref(), asked.as_ref(), &output, ends, signals);
+        Some(output)
+    }
+
+    /// Ticks since the start in which the joints' samples were valid.
+    #[must_use]
+    pub const fn ticks(&self) -> u32 {
+        self.tick
+    }
+
+    /// No tick: what is requested now is requested of a leg without zeros.
+    fn rest<H: Hardware<N>>(&mut self, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>, hardware: &mut H) {
+        signals.release();
+        signals.set_permission(Permission::Released);
+        let _ = ends.requests.dequeue();
+        if let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) {
+            host.rest(ends, signals, hardware);
+        }
+    }
+
+    /// The operator's request before the host's.
+    fn next_request<H: Hardware<N>>(
+        &mut self,
+        control: &mut Control<N>,
+        ends: &mut ServoEnds<'_, N>,
+        signals: &Signals<N>,
+        hardware: &H,
+    ) -> Option<ControlRequest<N>> {
+        let by_hand = ends.requests.dequeue();
+        let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) else {
+            return by_hand;
+        };
+        host.hear(ends, |fault| control.report(fault));
+        let (request, prepared) = host.request(by_hand).unzip();
+        if let Some(prepared) = prepared {
+            self.prepared = prepared;
+        }
+        host.held(request, control.state(), signals, hardware)
+    }
+
+    /// Reports what the rest of the board saw: faults, bus voltage, temperature.
+    fn look_around(&mut self, control: &mut Control<N>, signals: &Signals<N>) {
+        for joint in 0..N {
+            for fault in signals.take_reported(joint) {
+                control.report(Fault { code: fault.code(), joint: joint as u8 });
+            }
+        }
+        self.tick = self.tick.wrapping_add(1);
+        if self.tick & CHECKSUM_MASK == 0 && control.checksum() != self.checksum {
+            control.report(Fault { code: FaultCode::Parameters, joint: 0 });
+        }
+        let bus = self.volt_per_code * signals.statistics.bus[0].get() as f32;
+        if self.supply.look(bus) {
+            control.report(Fault { code: FaultCode::SupplyLost, joint: 0 });
+        }
+        control.derate(&self.ramps.at(signals.hottest_c(), bus));
+    }
+
+    /// Reports limits that act and were not reported in this second, one in a tick.
+    fn report_limits(
+        &mut self,
+        control: &Control<N>,
+        output: &ControlOutput<N>,
+        ends: &mut ServoEnds<'_, N>,
+        signals: &Signals<N>,
+    ) {
+        if self.tick.is_multiple_of(SERVO_RATE_HZ) {
+            self.limits = [LimitCodes::default(); N];
+        }
+        let codes = control.limit_codes(output);
+        for (joint, (codes, reported)) in codes.iter().zip(&mut self.limits).enumerate() {
+            if let Some(code) = codes.without(*reported).first() {
+                *reported = reported.with(true, code);
+                let (tick, joint) = (self.tick, joint as u8 + 1);
+                let record = Record::Limit { tick, code: code as u8, name: code.name(), joint };
+                send(LegEvent::Record(record), ends, signals);
+                return;
+            }
+        }
+    }
+
+    /// Reports what changed, and the sample of the log.
+    fn report(
+        &mut self,
+        control: &Control<N>,
+        request: Option<&ControlRequest<N>>,
+        asked: Option<&ControlRequest<N>>,
+        output: &ControlOutput<N>,
+        ends: &mut ServoEnds<'_, N>,
+        signals: &Signals<N>,
+    ) {
+        let tick = self.tick;
+        let mut record = |record| send(LegEvent::Record(record), ends, signals);
+        let accepted = asked.is_some() && !output.refused;
+        let name = match request {
+            None | Some(ControlRequest::Power(_)) => None,
+            Some(ControlRequest::Identify) => Some("identify"),
+            Some(ControlRequest::Track { .. }) => Some("track"),
+            Some(ControlRequest::TakeUpdate) => Some("take_update"),
+        };
+        if let Some(name) = name {
+            record(Record::Request { tick, name, accepted });
+        }
+        if accepted && asked == Some(&ControlRequest::Identify) {
+            send(LegEvent::Begun(self.prepared), ends, signals);
+        }
+        let mut record = |record| send(LegEvent::Record(record), ends, signals);
+        let decision = &output.servo.decision;
+        let activity = control.activity();
+        let changed = self.state.is_none_or(|before| words::drive(before) != words::drive(decision.state));
+        if changed && let Some(fault) = decision.fault {
+            // A fault before the state that follows from it.
+            let (code, name) = (fault.code.number(), words::fault(fault.code));
+            record(Record::Fault { tick, code, name, joint: fault.joint.saturating_add(1) });
+        }
+        if let Some(refused) = decision.refused {
+            let why = words::refusal(refused.reason);
+            record(Record::NotEnabled { tick, joint: refused.joint.saturating_add(1), why });
+        }
+        if changed || activity != self.activity {
+            let (name, phase, motion) = words::activity(activity);
+            let drive = words::drive(decision.state);
+            record(Record::State { tick, drive, activity: name, phase, motion });
+        }
+        if changed {
+            let _ = ends.drive.enqueue(decision.state);
+        }
+        self.state = Some(decision.state);
+        if output.took_update {
+            send(LegEvent::TookUpdate, ends, signals);
+        }
+        // A sample belongs to the ticks before it, so it goes before what begins now.
+        if let Some(logged) = output.logged {
+            let is_full = ends.events.len() + RESERVED >= ends.events.capacity();
+            if is_full || ends.events.enqueue(LegEvent::Sample(logged)).is_err() {
+                signals.statistics.samples_lost.add();
+            }
+        }
+        if activity != self.activity {
+            self.activity = activity;
+            send(LegEvent::Activity(activity), ends, signals);
+        }
+    }
+}
+
+/// Sends an event; one that finds no room is counted.
+fn send<const N: usize>(event: LegEvent<N>, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>) {
+    if ends.events.enqueue(event).is_err() {
+        signals.statistics.records_lost.add();
+    }
+}

@@ -1,0 +1,426 @@
+//! Words that all levels share: the inhibit word, current targets, permission, counters.
+//!
+//! Each is one atomic word, so no level waits for another. The board keeps one [`Signals`] in a static; a simulation owns one as a
+//! plain value that it can clone and compare.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use crate::hal::DriveCommand;
+use crate::leg::Permission;
+use crate::motor::AxisRequest;
+use crate::safety::{BoardFault, Cause};
+use crate::units::Ampere;
+
+/// A word that is read and written atomically.
+#[derive(Debug)]
+pub struct Word(AtomicU32);
+
+impl Word {
+    /// Starts with this value.
+    #[must_use]
+    pub const fn new(value: u32) -> Self {
+        Self(AtomicU32::new(value))
+    }
+
+    /// Reads it.
+    #[inline(always)]
+    pub fn get(&self) -> u32 {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// Overwrites it.
+    #[inline(always)]
+    pub fn set(&self, value: u32) {
+        self.0.store(value, Ordering::Relaxed);
+    }
+
+    /// Adds one, wrapping.
+    #[inline(always)]
+    pub fn add(&self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Keeps the larger of this value and its own; for words that one level writes.
+    #[inline(always)]
+    pub fn raise(&self, value: u32) {
+        if value > self.get() {
+            self.set(value);
+        }
+    }
+
+    /// Keeps the smaller of this value and its own; for words that one level writes.
+    #[inline(always)]
+    pub fn lower(&self, value: u32) {
+        if value < self.get() {
+            self.set(value);
+        }
+    }
+
+    /// Overwrites it and returns what it was.
+    pub fn swap(&self, value: u32) -> u32 {
+        self.0.swap(value, Ordering::Relaxed)
+    }
+
+    fn set_bits(&self, bits: u32) {
+        self.0.fetch_or(bits, Ordering::Relaxed);
+    }
+
+    fn keep_bits(&self, bits: u32) {
+        self.0.fetch_and(bits, Ordering::Relaxed);
+    }
+}
+
+impl Clone for Word {
+    fn clone(&self) -> Self {
+        Self::new(self.get())
+    }
+}
+
+impl PartialEq for Word {
+    fn eq(&self, other: &Self) -> bool {
+        self.get() == other.get()
+    }
+}
+
+/// Why the drive must not be enabled: one bit per [`Cause`].
+///
+/// While it is not zero the current loops release or brake both bridges in every tick, and the servo keeps its drive off. A cause
+/// stays until the operator resets it; one that still holds is raised again in the next tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inhibit {
+    causes: Word,
+    /// Causes that a campaign hides, to see that it notices their absence.
+    #[cfg(not(target_os = "none"))]
+    hidden: u32,
+}
+
+impl Inhibit {
+    /// Nothing forbids to enable.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            causes: Word::new(0),
+            #[cfg(not(target_os = "none"))]
+            hidden: 0,
+        }
+    }
+
+    /// Ignores these causes from now on; on the host alone.
+    #[cfg(not(target_os = "none"))]
+    pub fn hide(&mut self, bits: u32) {
+        self.hidden = bits;
+    }
+
+    /// Raises one cause.
+    pub fn raise(&self, cause: Cause) {
+        self.raise_bits(cause.bit());
+    }
+
+    /// Raises all causes with these bits; none for 0.
+    #[inline(always)]
+    pub fn raise_bits(&self, bits: u32) {
+        #[cfg(not(target_os = "none"))]
+        let bits = bits & !self.hidden;
+        if bits != 0 {
+            self.causes.set_bits(bits);
+        }
+    }
+
+    /// All causes.
+    #[inline(always)]
+    #[must_use]
+    pub fn causes(&self) -> u32 {
+        self.causes.get()
+    }
+
+    /// Nothing forbids to enable.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_clear(&self) -> bool {
+        self.causes() == 0
+    }
+
+    /// The flash is being written: everything may stand still for seconds.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_storing(&self) -> bool {
+        self.causes() & Cause::Storing.bit() != 0
+    }
+
+    /// Forgets what the operator's reset may forget: not what is permanent, nor a flash write under way.
+    pub fn reset(&self) {
+        self.causes.keep_bits(Cause::for_ever() | Cause::Storing.bit());
+    }
+
+    /// Ends [`Cause::Storing`].
+    pub fn end_storing(&self) {
+        self.causes.keep_bits(!Cause::Storing.bit());
+    }
+}
+
+impl Default for Inhibit {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Counters of the levels, reported from the lowest priority.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Statistics<const N: usize> {
+    /// Longest current tick, processor cycles.
+    pub current_worst: Word,
+    /// Current ticks that came late.
+    pub current_missed: Word,
+    /// Current ticks of each axis.
+    pub current_ticks: [Word; N],
+    /// Longest servo tick, processor cycles, current ticks in it included.
+    pub servo_worst: Word,
+    /// Servo ticks that came late.
+    pub servo_missed: Word,
+    /// Servo ticks.
+    pub servo_ticks: Word,
+    /// Rounds of the housekeeping.
+    pub rounds: Word,
+    /// Samples that found no room on their way to the identification.
+    pub samples_lost: Word,
+    /// Records that found no room on their way to the trace.
+    pub records_lost: Word,
+    /// Code of the bus voltage: newest, lowest, highest.
+    pub bus: [Word; 3],
+    /// Encoder counts of each joint at the servo's last tick.
+    pub counts: [Word; N],
+    /// Iterations and evaluations of the search under way.
+    pub search: [Word; 2],
+}
+
+impl<const N: usize> Statistics<N> {
+    const fn new() -> Self {
+        Self {
+            current_worst: Word::new(0),
+            current_missed: Word::new(0),
+            current_ticks: [const { Word::new(0) }; N],
+            servo_worst: Word::new(0),
+            servo_missed: Word::new(0),
+            servo_ticks: Word::new(0),
+            rounds: Word::new(0),
+            samples_lost: Word::new(0),
+            records_lost: Word::new(0),
+            bus: [Word::new(0), Word::new(u32::MAX), Word::new(0)],
+            counts: [const { Word::new(0) }; N],
+            search: [const { Word::new(0) }; 2],
+        }
+    }
+
+    /// Records the code of the bus voltage.
+    #[inline(always)]
+    pub fn see_bus(&self, code: u16) {
+        let [newest, lowest, highest] = &self.bus;
+        newest.set(code.into());
+        lowest.lower(code.into());
+        highest.raise(code.into());
+    }
+}
+
+/// Bits of a target that release an axis: a NaN pattern that no computation makes.
+const RELEASED: u32 = u32::MAX;
+
+/// All words that the levels of a board of `N` axes share.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Signals<const N: usize> {
+    /// Why the drive must not be enabled.
+    pub inhibit: Inhibit,
+    /// What the levels count.
+    pub statistics: Statistics<N>,
+    /// Current target of each axis as bits, or [`RELEASED`].
+    targets: [Word; N],
+    /// Each joint has a calibration and a zero.
+    begun: Word,
+    /// Faults of each joint that the servo has not seen yet, one bit per [`BoardFault`].
+    reported: [Word; N],
+    /// Temperature of the hottest bridge, degrees Celsius, as bits.
+    hottest_c: Word,
+    permission: Word,
+    hosted: Word,
+    permits: Word,
+    forgotten: Word,
+}
+
+impl<const N: usize> Signals<N> {
+    /// Everything released, nothing begun.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            inhibit: Inhibit::new(),
+            statistics: Statistics::new(),
+            targets: [const { Word::new(RELEASED) }; N],
+            begun: Word::new(0),
+            reported: [const { Word::new(0) }; N],
+            hottest_c: Word::new(0),
+            permission: Word::new(0),
+            hosted: Word::new(0),
+            permits: Word::new(0),
+            forgotten: Word::new(0),
+        }
+    }
+
+    /// Current target of an axis.
+    #[inline(always)]
+    #[must_use]
+    pub fn target(&self, axis: usize) -> AxisRequest {
+        match self.targets.get(axis).map(Word::get) {
+            None | Some(RELEASED) => AxisRequest::RELEASED,
+            Some(bits) => AxisRequest { enabled: true, current: Ampere(f32::from_bits(bits)) },
+        }
+    }
+
+    /// Sets the current targets of all axes.
+    pub fn set_targets(&self, command: &DriveCommand<N>) {
+        for (target, current) in self.targets.iter().zip(command.currents) {
+            target.set(if command.enabled { current.0.to_bits() } else { RELEASED });
+        }
+    }
+
+    /// Releases all axes.
+    pub fn release(&self) {
+        self.set_targets(&DriveCommand::RELEASED);
+    }
+
+    /// The joints' samples are valid from now on.
+    pub fn begin_servo(&self) {
+        self.begun.set(1);
+    }
+
+    /// The joints' samples are no longer valid: all axes are released.
+    pub fn end_servo(&self) {
+        self.begun.set(0);
+        self.release();
+    }
+
+    /// Whether the joints' samples are valid.
+    #[must_use]
+    pub fn has_begun(&self) -> bool {
+        self.begun.get() != 0
+    }
+
+    /// Reports a fault that the servo reacts to at its next tick.
+    pub fn report(&self, fault: BoardFault, joint: usize) {
+        if let Some(reported) = self.reported.get(joint) {
+            reported.set_bits(fault.bit());
+        }
+    }
+
+    /// Takes the faults reported of a joint since the last call.
+    pub fn take_reported(&self, joint: usize) -> impl Iterator<Item = BoardFault> + use<N> {
+        let bits = self.reported.get(joint).map_or(0, |reported| if reported.get() == 0 { 0 } else { reported.swap(0) });
+        BoardFault::ALL.into_iter().filter(move |fault| bits & fault.bit() != 0)
+    }
+
+    /// Temperature of the hottest bridge, degrees Celsius; NaN leaves no torque.
+    #[must_use]
+    pub fn hottest_c(&self) -> f32 {
+        f32::from_bits(self.hottest_c.get())
+    }
+
+    /// Sets the temperature of the hottest bridge, degrees Celsius.
+    pub fn set_hottest_c(&self, degrees_c: f32) {
+        self.hottest_c.set(degrees_c.to_bits());
+    }
+
+    /// What the drive may do since the servo's last tick; released before its first.
+    #[must_use]
+    pub fn permission(&self) -> Permission {
+        match self.permission.get() {
+            0 => Permission::Released,
+            1 => Permission::Follow,
+            _ => Permission::Damp,
+        }
+    }
+
+    /// Sets what the drive may do.
+    pub fn set_permission(&self, permission: Permission) {
+        self.permission.set(match permission {
+            Permission::Released => 0,
+            Permission::Follow => 1,
+            Permission::Damp => 2,
+        });
+    }
+
+    /// A host has the drive: closing the enabling switch permits, and no longer asks.
+    #[must_use]
+    pub fn is_hosted(&self) -> bool {
+        self.hosted.get() != 0
+    }
+
+    /// Sets whether a host has the drive.
+    pub fn set_hosted(&self, hosted: bool) {
+        self.hosted.set(hosted.into());
+    }
+
+    /// The operator's switch as the housekeeping sees it, debounced, and not during a reset.
+    #[must_use]
+    pub fn permits(&self) -> bool {
+        self.permits.get() != 0
+    }
+
+    /// Sets whether the operator lets the leg be enabled.
+    pub fn set_permits(&self, permits: bool) {
+        self.permits.set(permits.into());
+    }
+
+    /// All stored parameters were erased.
+    pub fn forget_stored(&self) {
+        self.forgotten.set(1);
+    }
+
+    /// Whether all stored parameters were erased since the last call.
+    #[must_use]
+    pub fn take_forgotten(&self) -> bool {
+        self.forgotten.get() != 0 && self.forgotten.swap(0) != 0
+    }
+}
+
+impl<const N: usize> Default for Signals<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::safety::FaultCode;
+
+    #[test]
+    fn a_reported_fault_keeps_its_code_and_joint() {
+        let signals = Signals::<2>::new();
+        for fault in BoardFault::ALL {
+            signals.report(fault, 1);
+            assert_eq!(signals.take_reported(0).count(), 0);
+            assert!(signals.take_reported(1).eq([fault]));
+            assert_eq!(signals.take_reported(1).count(), 0, "once");
+        }
+        assert_eq!(BoardFault::Thermistor.code(), FaultCode::Thermistor);
+    }
+
+    #[test]
+    fn a_target_is_followed_only_while_the_drive_is_enabled() {
+        let signals = Signals::<2>::new();
+        assert_eq!(signals.target(1), AxisRequest::RELEASED);
+        signals.set_targets(&DriveCommand { enabled: true, currents: [Ampere(1.0), Ampere(-2.0)] });
+        assert_eq!(signals.target(1), AxisRequest { enabled: true, current: Ampere(-2.0) });
+        signals.begin_servo();
+        signals.end_servo();
+        assert_eq!((signals.target(0), signals.has_begun()), (AxisRequest::RELEASED, false));
+        assert_eq!(signals.target(2), AxisRequest::RELEASED);
+    }
+
+    #[test]
+    fn a_reset_forgets_neither_permanent_causes_nor_a_flash_write() {
+        let inhibit = Inhibit::new();
+        Cause::ALL.into_iter().for_each(|cause| inhibit.raise(cause));
+        inhibit.reset();
+        assert_eq!(inhibit.causes(), Cause::for_ever() | Cause::Storing.bit());
+        inhibit.end_storing();
+        assert_eq!(inhibit.causes(), Cause::for_ever());
+    }
+}

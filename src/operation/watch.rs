@@ -1,0 +1,49 @@
+//! Level 6: releases bridges whose current ticks stop, and feeds the watchdog while every level runs.
+//!
+//! A level that hangs ends in a reset, after which the drive is refused.
+
+use super::signals::{Signals, Word};
+use crate::hal::Hardware;
+use crate::safety::{Cause, CheckIns, GUARD_RATE_HZ, TickGuard};
+
+/// Looks at the ticks for one look at who has checked in: 4 ms.
+const LOOKS: u32 = GUARD_RATE_HZ / 250;
+
+/// What is known between two looks, [`GUARD_RATE_HZ`] a second.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Watch<const N: usize> {
+    guard: TickGuard<N>,
+    /// Ticks of the axes; servo ticks and rounds of the housekeeping.
+    check_ins: CheckIns<N, 2>,
+    looks: u32,
+}
+
+impl<const N: usize> Watch<N> {
+    /// Starts from the counts as they are.
+    #[must_use]
+    pub fn new(signals: &Signals<N>) -> Self {
+        Self { guard: TickGuard::new(), check_ins: CheckIns::new(counts(signals)), looks: 0 }
+    }
+
+    /// One look.
+    pub fn look(&mut self, signals: &Signals<N>, hardware: &mut impl Hardware<N>) {
+        let counts = counts(signals);
+        if self.guard.look(counts.0) {
+            hardware.release_all();
+            // During a flash write the ticks stand still.
+            if !signals.inhibit.is_storing() {
+                signals.inhibit.raise(Cause::CurrentTicks);
+            }
+        }
+        self.looks = (self.looks + 1) % LOOKS;
+        if self.looks == 0 && self.check_ins.all(counts) {
+            hardware.feed_watchdog();
+        }
+    }
+}
+
+fn counts<const N: usize>(signals: &Signals<N>) -> ([u32; N], [u32; 2]) {
+    let statistics = &signals.statistics;
+    let levels = [statistics.servo_ticks.get(), statistics.rounds.get()];
+    (statistics.current_ticks.each_ref().map(Word::get), levels)
+}
