@@ -196,13 +196,13 @@ impl TickWatch {
             self.missed = 0;
             return (0, false);
         }
-        self.look_closer(now)
+        self.look_closer(*now)
     }
 
     /// The tick of which something is wrong.
     #[cold]
     #[inline(never)]
-    fn look_closer(&mut self, now: &TickState) -> (u32, bool) {
+    fn look_closer(&mut self, now: TickState) -> (u32, bool) {
         let before = self.missed;
         self.missed = if now.missed > 0 { self.missed.saturating_add(now.missed) } else { 0 };
         let bit = |holds: bool, cause: Cause| if holds { cause.bit() } else { 0 };
