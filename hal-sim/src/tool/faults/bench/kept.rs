@@ -283,7 +283,8 @@ impl Rotting {
 }
 
 fn rots(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    let rotting = Rotting::new(leg)?;
+    // On the heap: each of rayon's splits holds one.
+    let rotting = Box::new(Rotting::new(leg)?);
     seeds.par_iter().map_with(rotting, |rotting, seed| rot(head, rotting, *seed, blind)).collect()
 }
 

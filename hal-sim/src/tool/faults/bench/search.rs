@@ -98,7 +98,8 @@ fn go(pair: &mut Pair<JOINTS, BASE>, gravity: [f32; 3], there: fn(&Pair<JOINTS, 
 }
 
 fn interrupt(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    let searching = Searching::new(leg)?;
+    // On the heap: each of rayon's splits holds one.
+    let searching = Box::new(Searching::new(leg)?);
     Ok(seeds.par_iter().map_with(searching, |searching, seed| one(head, searching, *seed, blind)).collect())
 }
 
