@@ -73,7 +73,8 @@ pub struct Queues<const N: usize> {
 pub struct CurrentEnds<'a, const N: usize> {
     pub(super) orders: [Consumer<'a, Order>; N],
     pub(super) outcomes: [Producer<'a, Outcome>; N],
-    pub(super) samples: [Producer<'a, JointSample>; N],
+    /// Samples of each joint for the servo.
+    pub samples: [Producer<'a, JointSample>; N],
 }
 
 /// Ends of the servo; those of the bus where there is one.
@@ -94,7 +95,8 @@ pub struct HousekeepingEnds<'a, const N: usize> {
     pub(super) outcomes: [Consumer<'a, Outcome>; N],
     /// Requests to the servo.
     pub requests: Producer<'a, ControlRequest<N>>,
-    pub(super) drive: Consumer<'a, DriveState>,
+    /// Drive states of the servo.
+    pub drive: Consumer<'a, DriveState>,
     /// Records for the trace.
     pub notes: Producer<'a, Record<N>>,
     pub(super) calibrated: Producer<'a, Calibrated>,
@@ -184,7 +186,11 @@ impl<const N: usize> Queues<N> {
                 notes: give_note,
                 calibrated: give_calibrated,
             },
-            identification: IdentificationEnds { events: take_event, findings: give_finding, notes: take_note },
+            identification: IdentificationEnds {
+                events: take_event,
+                findings: give_finding,
+                notes: take_note,
+            },
             calibrated,
         }
     }

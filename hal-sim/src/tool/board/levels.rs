@@ -20,8 +20,8 @@ use scarab::hal::{AxisSample, CURRENT_RATE_HZ, Frame, JointSample};
 use scarab::leg::{AxisFault, Control, ControlOutput, ControlRequest, Following};
 use scarab::motor::{Chopper, SenseScale};
 use scarab::operation::{
-    BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper, HousekeepingSettings, IdentificationLevel, Keep, Queues, RATE_HZ,
-    ServoLevel, Signals, Slice, Stage, Tick, Watch,
+    BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper, HousekeepingSettings,
+    IdentificationLevel, Keep, Queues, RATE_HZ, ServoLevel, Signals, Slice, Stage, Tick, Watch,
 };
 use scarab::safety::GUARD_RATE_HZ;
 
@@ -129,7 +129,12 @@ impl<const N: usize> Levels<N> {
             loops: loops([Stage::OFF; N], chopper),
             bus: following.is_some().then(Box::default),
             events: EventQueue::new(),
-            servo: ServoLevel::new(leg.control(), drives::derating(DIVIDER), volt_per_code, following.clone()),
+            servo: ServoLevel::new(
+                leg.control(),
+                drives::derating(DIVIDER),
+                volt_per_code,
+                following.clone(),
+            ),
             housekeeper: Housekeeper::new(settings),
             identification: IdentificationLevel::new(leg.identification().swarm_seed()),
             settings,
@@ -158,7 +163,9 @@ impl<const N: usize> Levels<N> {
 
     /// Exchanges two axes, calibrations included: their motors hang on each other's connectors.
     pub fn exchange(&mut self, one: usize, other: usize) {
-        if let (Some(first), Some(second)) = (self.loops.stage(one).copied(), self.loops.stage(other).copied()) {
+        if let (Some(first), Some(second)) =
+            (self.loops.stage(one).copied(), self.loops.stage(other).copied())
+        {
             for (axis, stage) in [(one, second), (other, first)] {
                 if let Some(place) = self.loops.stage_mut(axis) {
                     *place = stage;

@@ -10,13 +10,13 @@ use scarab::hal::AxisCommand;
 
 use super::super::catalogue::JOINTS;
 use super::super::entry::Head;
-use scarab::hal::Contacts;
 use super::super::run::Outcome;
 use super::Bench;
 use super::hosted::{Fork, forked, started};
 use crate::tool::bus::memory::Memory;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
+use scarab::hal::Contacts;
 
 /// Servo ticks until the bus has to be gone; a quarter of a second of hands at the contacts, and of a switch that is opened.
 const PATIENCE: u64 = 2 * 4000;

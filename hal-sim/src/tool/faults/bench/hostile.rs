@@ -17,7 +17,6 @@ use scarab::safety::FaultCode;
 
 use super::super::dice::Dice;
 use super::super::entry::Head;
-use scarab::hal::Contacts;
 use super::super::run::Outcome;
 use super::Bench;
 use super::hosted::{Fork, forked, hosted, identifying, started};
@@ -26,6 +25,7 @@ use crate::tool::bus::board::TICK_NS;
 use crate::tool::bus::host::Host;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
+use scarab::hal::Contacts;
 
 /// Servo ticks of hostile frames, and frames in each: more than the wire carries.
 const FLOOD: u64 = 400;
