@@ -4,8 +4,6 @@
 //! What has to follow: the image boots without calibration and zeros, so it stays disabled (not ready to switch on) whatever host and hand do,
 //! and what was kept is there, whole. Blind, half of the runs boot as a board that knows everything still, the others with an empty memory.
 
-use std::sync::Mutex;
-
 use scarab::hal::AxisCommand;
 
 use super::super::catalogue::JOINTS;
@@ -51,13 +49,13 @@ fn cut(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Out
     host.write(1, 0x1010, 1, SAVE, 4)?;
     host.run(400);
     host.move_leg(leg)?;
-    let ready = Mutex::new(host.clone());
+    let ready = host.clone();
     forked(head, leg, host, seeds, |mut fork| {
         let remembers = blind && fork.seed.is_multiple_of(2);
         if blind && !remembers {
             *fork.host.board().memory() = Memory::new(None);
         }
-        let board = remembers.then(|| ready.lock().expect("cloning does not panic").clone());
+        let board = remembers.then(|| ready.clone());
         one(fork, board.map(|mut host| host.board().clone()))
     })
 }

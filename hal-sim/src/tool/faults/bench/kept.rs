@@ -229,7 +229,6 @@ fn cut(head: &Head, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
 }
 
 /// A board whose memory holds older and newer objects and models, and the models that may be used.
-#[derive(Clone)]
 struct Rotting {
     board: Board<JOINTS, BASE>,
     /// Of each node, all that were kept.
@@ -283,9 +282,8 @@ impl Rotting {
 }
 
 fn rots(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
-    // On the heap: each of rayon's splits holds one.
-    let rotting = Box::new(Rotting::new(leg)?);
-    seeds.par_iter().map_with(rotting, |rotting, seed| rot(head, rotting, *seed, blind)).collect()
+    let rotting = Rotting::new(leg)?;
+    seeds.par_iter().map(|seed| rot(head, &rotting, *seed, blind)).collect()
 }
 
 /// Blind, one of two checks is not made: another leg's model is taken as if it were this one's, or what rotted as if its check sum held.

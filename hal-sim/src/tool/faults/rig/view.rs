@@ -15,7 +15,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     /// A request waits for the servo's next tick.
     #[must_use]
     pub fn is_asked(&mut self) -> bool {
-        !self.board.queues.requests().is_empty()
+        !self.board.queues().requests().is_empty()
     }
 
     /// What forbids to enable, as the interlock's bits.
