@@ -3,9 +3,9 @@
 use super::abort::Abort;
 use super::dictionary::{Mapping, Object};
 use super::emergency::{Emergency, Source};
-use super::node_id::NodeId;
 use super::heartbeat::{Clock, Consumer, WATCHED};
 use super::nmt::NmtState;
+use super::node_id::NodeId;
 use super::pdo::receive::Receive;
 use super::pdo::transmit::Transmit;
 use super::pdo::{ABSENT, PDOS, Parameters, is_assignable};

@@ -11,8 +11,8 @@
 //! Source: CiA 301, emergency object. Four messages wait at most; further ones are in the history only.
 
 use super::abort::Abort;
-use crate::hal::Frame;
 use super::pdo::PDOS;
+use crate::hal::Frame;
 
 /// Entries of the history.
 pub const HISTORY: usize = 8;

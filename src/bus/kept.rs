@@ -11,9 +11,9 @@
 use super::abort::Abort;
 use super::access::{Dictionary, PROFILE};
 use super::dictionary::{Access, Object, Row, find};
-use super::node_id::NodeId;
 use super::nmt::Reset;
 use super::node::Node;
+use super::node_id::NodeId;
 use super::objects::Objects;
 use super::table::ROWS;
 

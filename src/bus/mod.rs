@@ -33,14 +33,14 @@ mod sdo;
 pub mod station;
 pub mod table;
 
+pub use crate::hal::{Controller, Frame};
 pub use abort::Abort;
 pub use communication::Identity;
 pub use emergency::ErrorReport;
-pub use crate::hal::{Controller, Frame};
-pub use node_id::NodeId;
 pub use kept::{KeptNode, LONGEST, kept_bit_rate, kept_entries, kept_node_id, kept_objects, write_kept};
 pub use nmt::{NmtState, Reset};
 pub use node::{Heard, Node, Storing};
+pub use node_id::NodeId;
 pub use objects::{Lost, Objects};
 
 #[cfg(test)]

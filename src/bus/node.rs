@@ -15,14 +15,14 @@
 use super::access::Dictionary;
 use super::communication::{Communication, Identity};
 use super::emergency::{ErrorReport, Source};
-use super::node_id::NodeId;
-use crate::hal::{Controller, Frame};
 use super::heartbeat::Change;
 use super::nmt::{self, Command, NmtState, Reset};
+use super::node_id::NodeId;
 use super::objects::{Lost, Objects};
 use super::pdo::PDOS;
 use super::pdo::receive::Received;
 use super::sdo::Server;
+use crate::hal::{Controller, Frame};
 
 impl Controller {
     fn error(self) -> Option<ErrorReport> {

@@ -19,12 +19,12 @@
 
 use super::communication::Identity;
 use super::drive::{Axis, AxisConstants, BLOCKED, Coupling, HELD, RESTS};
-use super::node_id::NodeId;
-use crate::hal::{Controller, Frame};
 use super::identification::{Ask, JointObjects, LegObjects, Results};
 use super::kept::KeptNode;
 use super::nmt::Reset;
 use super::node::{Heard, Node, Storing};
+use super::node_id::NodeId;
+use crate::hal::{Controller, Frame};
 use crate::leg::{
     Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, Permission, Plan, PowerRequest,
 };

@@ -7,8 +7,8 @@ use super::signals::Signals;
 use crate::bus::station::{LegRequest, LegTold};
 use crate::hal::{Hardware, Sample};
 use crate::leg::{
-    Activity, Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand, JointStatus,
-    Plan, PowerRequest,
+    Activity, Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand,
+    JointStatus, Plan, PowerRequest,
 };
 
 /// Ticks between two reports to the bus: 2 kHz, twice the fastest cycle that fits the wire.
@@ -46,7 +46,12 @@ impl<const N: usize> HostSide<N> {
     }
 
     /// No tick of the leg: orders of this time are for a leg without zeros, and are dropped.
-    pub fn rest(&mut self, ends: &mut HostEnds<'_, N>, signals: &Signals<N>, hardware: &mut impl Hardware<N>) {
+    pub fn rest(
+        &mut self,
+        ends: &mut HostEnds<'_, N>,
+        signals: &Signals<N>,
+        hardware: &mut impl Hardware<N>,
+    ) {
         while ends.orders.dequeue().is_some() {}
         (self.commands, self.request, self.cancel) = (None, None, false);
         if self.is_due(ends, hardware) {
@@ -138,8 +143,9 @@ impl<const N: usize> HostSide<N> {
         let mut joints = [JointStatus::NONE; N];
         for (joint, slot) in joints.iter_mut().enumerate() {
             let torque = control.torque(joint, sample);
-            let status = torque
-                .and_then(|torque| self.following.status(joint, torque, activity == Activity::Follow, output));
+            let status = torque.and_then(|torque| {
+                self.following.status(joint, torque, activity == Activity::Follow, output)
+            });
             *slot = status.unwrap_or(JointStatus::NONE);
         }
         let told = LegTold {

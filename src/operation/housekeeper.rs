@@ -156,7 +156,8 @@ impl<const N: usize> Housekeeper<N> {
         Situation {
             enabling,
             start,
-            blocked: !level.signals.inhibit.is_clear() || matches!(self.drive, Some(DriveState::Fault { .. })),
+            blocked: !level.signals.inhibit.is_clear()
+                || matches!(self.drive, Some(DriveState::Fault { .. })),
             calibrated: self.is_calibrated(),
             calibrating: self.calibrating.is_some(),
             referenced: level.signals.has_begun(),
@@ -269,7 +270,12 @@ impl<const N: usize> Housekeeper<N> {
     }
 
     /// An axis that passed runs from now on, released; then the next one is measured.
-    fn run_axis(&mut self, axis: usize, calibration: &Calibration, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
+    fn run_axis(
+        &mut self,
+        axis: usize,
+        calibration: &Calibration,
+        level: &mut Level<'_, '_, N, impl Hardware<N>>,
+    ) {
         let encoder_count = level.hardware.encoder_count(axis);
         let sample = AxisSample { encoder_count, ..AxisSample::default() };
         let running =
@@ -377,7 +383,8 @@ impl<const N: usize> Housekeeper<N> {
         let Some(mut poses) = self.reference else { return };
         let mut standing = true;
         for (joint, (pose, found)) in poses.iter_mut().enumerate() {
-            let counts = level.signals.statistics.counts.get(joint).map_or(0, |count| count.get().cast_signed());
+            let counts =
+                level.signals.statistics.counts.get(joint).map_or(0, |count| count.get().cast_signed());
             let sample = JointSample { encoder_counts: counts, ..JointSample::default() };
             match pose.tick(&sample) {
                 ReferenceStep::Running(_) => {}

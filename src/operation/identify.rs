@@ -8,8 +8,8 @@ use core::borrow::BorrowMut;
 use super::queues::{EVENTS, IdentificationEnds, LegEvent};
 use super::signals::Signals;
 use crate::leg::{
-    Activity, Finding, Identification, IdentifiedModel, IdentifyPhase, LoggedSample, MotionWindow, Reason, SearchState,
-    Segment, Verdict,
+    Activity, Finding, Identification, IdentifiedModel, IdentifyPhase, LoggedSample, MotionWindow, Reason,
+    SearchState, Segment, Verdict,
 };
 use crate::servo::TICKS_PER_LOG;
 use crate::trace::{Record, judged, words};
@@ -128,7 +128,10 @@ impl IdentificationLevel {
                 self.gap = false;
                 identification.cancel();
                 let verdict = Verdict::refused(Reason::Input);
-                record(&Record::Refused { why: "samples_lost", value: signals.statistics.samples_lost.get() });
+                record(&Record::Refused {
+                    why: "samples_lost",
+                    value: signals.statistics.samples_lost.get(),
+                });
                 let _ = ends.findings.enqueue(Finding::Judged { verdict, model: None });
                 self.publish = Some(Some(verdict));
             }

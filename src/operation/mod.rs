@@ -46,8 +46,8 @@ pub use housekeeper::{Housekeeper, HousekeepingSettings};
 pub use identify::{IdentificationLevel, Slice};
 pub use mailboxes::Speaker;
 pub use queues::{
-    BusEnds, BusQueues, Calibrated, CurrentEnds, Ends, EventQueue, HostEnds, HousekeepingEnds, IdentificationEnds, LegEvent,
-    Queues, ServoEnds,
+    BusEnds, BusQueues, Calibrated, CurrentEnds, Ends, EventQueue, HostEnds, HousekeepingEnds,
+    IdentificationEnds, LegEvent, Queues, ServoEnds,
 };
 pub use servo::ServoLevel;
 pub use signals::{Inhibit, Signals, Statistics, Word};

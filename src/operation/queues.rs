@@ -75,7 +75,7 @@ pub struct CurrentEnds<'a, const N: usize> {
     pub orders: [Consumer<'a, Order>; N],
     /// Outcomes of each axis.
     pub outcomes: [Producer<'a, Outcome>; N],
-    /// Samples of each joint.
+    /// Samples of each joint for the servo.
     pub samples: [Producer<'a, JointSample>; N],
 }
 
@@ -97,7 +97,8 @@ pub struct HousekeepingEnds<'a, const N: usize> {
     pub(super) outcomes: [Consumer<'a, Outcome>; N],
     /// Requests to the servo.
     pub requests: Producer<'a, ControlRequest<N>>,
-    pub(super) drive: Consumer<'a, DriveState>,
+    /// Drive states of the servo.
+    pub drive: Consumer<'a, DriveState>,
     /// Records for the trace.
     pub notes: Producer<'a, Record<N>>,
     pub(super) calibrated: Producer<'a, Calibrated>,
@@ -187,7 +188,11 @@ impl<const N: usize> Queues<N> {
                 notes: give_note,
                 calibrated: give_calibrated,
             },
-            identification: IdentificationEnds { events: take_event, findings: give_finding, notes: take_note },
+            identification: IdentificationEnds {
+                events: take_event,
+                findings: give_finding,
+                notes: take_note,
+            },
             calibrated,
         }
     }

@@ -16,7 +16,8 @@ use super::signals::Signals;
 use crate::checksum::Checksum;
 use crate::hal::{Hardware, JointSample, Sample};
 use crate::leg::{
-    Activity, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes, Permission, Plan, permitted,
+    Activity, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes, Permission, Plan,
+    permitted,
 };
 use crate::safety::{DeratingRamps, Fault, FaultCode, SupplyWatch};
 use crate::servo::SERVO_RATE_HZ;

@@ -317,7 +317,10 @@ impl<const N: usize> Signals<N> {
 
     /// Takes the faults reported of a joint since the last call.
     pub fn take_reported(&self, joint: usize) -> impl Iterator<Item = BoardFault> + use<N> {
-        let bits = self.reported.get(joint).map_or(0, |reported| if reported.get() == 0 { 0 } else { reported.swap(0) });
+        let bits = self
+            .reported
+            .get(joint)
+            .map_or(0, |reported| if reported.get() == 0 { 0 } else { reported.swap(0) });
         BoardFault::ALL.into_iter().filter(move |fault| bits & fault.bit() != 0)
     }
 

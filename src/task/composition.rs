@@ -55,9 +55,7 @@ pub fn run(board: Board) -> ! {
 
 /// Everything in its place; apart from [`run`], whose frame stays on the stack for ever.
 #[inline(never)]
-fn hand_out(
-    board: Board,
-) -> (Option<identify::Thread>, Housekeeping, Option<&'static mut keep::Keeper>) {
+fn hand_out(board: Board) -> (Option<identify::Thread>, Housekeeping, Option<&'static mut keep::Keeper>) {
     judge(&board);
     let divider = analog::divider(board.identity.version).unwrap_or(LARGEST_DIVIDER);
     let surroundings = Surroundings {
@@ -74,8 +72,13 @@ fn hand_out(
     identify::introduce(&introduction(&board), board.clock_hz);
     let built = memory::identification();
     static QUEUES: ConstStaticCell<Queues<JOINTS>> = ConstStaticCell::new(Queues::new());
-    let Ends { current, servo: mut servo_ends, housekeeping: mut housekeeping_ends, identification, calibrated } =
-        QUEUES.take().split(memory::events());
+    let Ends {
+        current,
+        servo: mut servo_ends,
+        housekeeping: mut housekeeping_ends,
+        identification,
+        calibrated,
+    } = QUEUES.take().split(memory::events());
     static LOOPS: StaticCell<current::Current> = StaticCell::new();
     place(&current::LOOPS, LOOPS.init(current::Current::new(current, divider)));
 

@@ -23,7 +23,11 @@ pub async fn watch() -> ! {
 
 /// Runs everything else of this level.
 #[embassy_executor::task]
-pub async fn run(mut keeper: Housekeeper<JOINTS>, mut ends: HousekeepingEnds<'static, JOINTS>, mut board: Odrive) -> ! {
+pub async fn run(
+    mut keeper: Housekeeper<JOINTS>,
+    mut ends: HousekeepingEnds<'static, JOINTS>,
+    mut board: Odrive,
+) -> ! {
     let mut ticker = Ticker::every(Duration::from_hz(u64::from(RATE_HZ)));
     loop {
         ticker.next().await;

@@ -183,7 +183,9 @@ impl Thread {
                 }
             }
         }
-        if now >= state.next_progress && matches!(state.level.activity(), Activity::Identify(IdentifyPhase::Solve)) {
+        if now >= state.next_progress
+            && matches!(state.level.activity(), Activity::Identify(IdentifyPhase::Solve))
+        {
             state.next_progress = now + PROGRESS;
             return self.tell_progress(state);
         }

@@ -1,7 +1,7 @@
 //! Level 1 on the board: the interrupt around `operation::ServoLevel`.
 
-use super::leg::{JOINTS, LEG};
 use super::SIGNALS;
+use super::leg::{JOINTS, LEG};
 use crate::hal::Hardware;
 use crate::leg::Control;
 use crate::operation::{ServoEnds, ServoLevel};

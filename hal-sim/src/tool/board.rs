@@ -8,6 +8,7 @@
 //! would swing for the half second that `StatedPose` waits).
 
 pub mod levels;
+mod locked;
 pub mod registers;
 pub mod words;
 

@@ -162,7 +162,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         let board = match believed.zip(drives.as_ref()) {
             Some((believed, drives)) => {
                 let mut board = Levels::ready(believed, drives, &device, &mut world, seed)?;
-                board.queues.set_samples(&sample.joints);
+                board.queues().set_samples(&sample.joints);
                 Some(Box::new(board))
             }
             None => None,
@@ -185,7 +185,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         self.sample.joints.swap(one, other);
         if let Some(board) = &mut self.board {
             board.exchange(one, other);
-            board.queues.set_samples(&self.sample.joints);
+            board.queues().set_samples(&self.sample.joints);
         }
     }
 
@@ -234,7 +234,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         }
         if let Some(joints) = board.samples() {
             self.sample = self.world.observe(&Sample { joints });
-            board.queues.set_samples(&self.sample.joints);
+            board.queues().set_samples(&self.sample.joints);
         }
         self.output.expect("a board that is ready ticks its leg at once")
     }

@@ -1,7 +1,7 @@
 //! What the node receives as PDO.
 
-use crate::hal::Frame;
 use super::Parameters;
+use crate::hal::Frame;
 
 /// What came of a frame, or of the time since.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! What the node sends as PDO.
 
-use crate::hal::Frame;
 use super::super::heartbeat::Clock;
 use super::Parameters;
+use crate::hal::Frame;
 
 /// One PDO that is sent.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,10 +2,10 @@
 
 use super::{Keeping, Station};
 use crate::bus::drive::{Axis, USUAL_KBIT};
-use crate::bus::node_id::NodeId;
 use crate::bus::kept::{KeptNode, kept_bit_rate, kept_node_id};
 use crate::bus::nmt::{NmtState, Reset};
 use crate::bus::node::{Node, Storing};
+use crate::bus::node_id::NodeId;
 
 impl<const N: usize, const LOG: usize> Station<N, LOG> {
     /// What a memory holds of a node, as after the start.

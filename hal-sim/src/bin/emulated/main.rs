@@ -7,6 +7,7 @@
 //! | --- | --- |
 //! | [`clock`] | the timers: SysTick at 24 kHz, the executors' time, a clock that counts instructions |
 //! | [`axes`] | converters and bridges: two axes that are ticked with what they would see, their answer goes nowhere |
+//! | [`machine`] | registers: only the servo can be requested |
 //! | [`plant`] | the leg: `hal_sim::world` with ideal drives, one step per servo tick, in time that is not the firmware's |
 //! | [`vectors`] | interrupts and their levels |
 //! | [`bridges`] | the bridges' main outputs, which only a crash writes |
@@ -20,6 +21,7 @@
 mod axes;
 mod bridges;
 mod clock;
+mod machine;
 #[path = "../count-instructions/motor.rs"]
 mod motor;
 mod plant;
@@ -31,14 +33,14 @@ use core::panic::PanicInfo;
 use cortex_m_semihosting::{debug, heprintln};
 use defmt_semihosting as _;
 use embassy_executor::{SpawnToken, raw};
-use heapless::spsc::Queue;
 use rehearsal::Start;
-use scarab::board::odrive_v3_6::settings::analog;
+use scarab::board::odrive_v3_6::settings::{analog, drives};
 use scarab::board::{crash, stack};
 use scarab::leg::{Control, Filters};
-use scarab::task::interlock::{self, Cause};
+use scarab::operation::{Ends, EventQueue, Queues, ServoLevel};
+use scarab::safety::Cause;
 use scarab::task::surroundings::{Introduction, Surroundings, crashed};
-use scarab::task::{identify, leg, links, servo, statistics};
+use scarab::task::{SIGNALS, identify, leg, servo};
 use scarab::trace::Record;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -48,14 +50,14 @@ fn main() -> ! {
     let found = crash::take();
     let start = rehearsal::start(found.is_some());
     if found.is_some() {
-        interlock::raise(Cause::Crash);
+        SIGNALS.inhibit.raise(Cause::Crash);
     }
     let crash = found.map(crashed);
     let introduction = Introduction { unique: [0; 3], version: [0; 3], reset: start.name(), crash };
     identify::introduce(&introduction, SURROUNDINGS.clock_hz);
     let thread = hand_out(start);
     vectors::enable();
-    servo::begin();
+    SIGNALS.begin_servo();
     clock::start();
     if let Ok(task) = identify::run(thread) {
         spin(task);
@@ -115,39 +117,25 @@ fn halves() -> (Control<{ leg::JOINTS }>, &'static mut leg::LegIdentification) {
 #[inline(never)]
 fn hand_out(start: Start) -> identify::Thread {
     let (control, identification) = halves();
-    static TOLD: ConstStaticCell<Queue<links::Told, { links::TOLD }>> = ConstStaticCell::new(Queue::new());
-    let links::Links { samples, requests, findings, drive, told, mut notes, .. } =
-        links::Links::new(TOLD.take());
-    let [(sample_1, sampled_1), (sample_2, sampled_2)] = samples;
+    static EVENTS: ConstStaticCell<EventQueue<{ leg::JOINTS }>> = ConstStaticCell::new(EventQueue::new());
+    static QUEUES: ConstStaticCell<Queues<{ leg::JOINTS }>> = ConstStaticCell::new(Queues::new());
+    let Ends { current, servo: ends, mut housekeeping, identification: identification_ends, .. } =
+        QUEUES.take().split(EVENTS.take());
+    let volt_per_code = analog::sense(DIVIDER).volt_per_code;
+    let level = ServoLevel::new(&control, drives::derating(DIVIDER), volt_per_code, None);
     static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
-    let servo = SERVO.init(servo::ServoLoop::new(
-        control,
-        [sampled_1, sampled_2],
-        requests.1,
-        findings.1,
-        drive.0,
-        told.0,
-        DIVIDER,
-        SURROUNDINGS.clock,
-        None,
-    ));
-    // The ideal drives need no supply; the leg is shown one that neither derates nor dies.
-    statistics::BUS[0].set((BUS_V / analog::sense(DIVIDER).volt_per_code.0) as u32);
+    let servo = SERVO.init(servo::ServoLoop { control, level, ends, clock: SURROUNDINGS.clock });
+    // The ideal drives need no supply; the leg is shown one that neither derates nor fails.
+    SIGNALS.statistics.see_bus((BUS_V / volt_per_code.0) as u16);
     if let Some(mut home) = servo::SERVO.try_lock() {
         *home = Some(servo);
     }
-    if !interlock::is_clear() {
-        let _ = notes.0.enqueue(Record::Refused { why: Cause::Crash.name(), value: interlock::causes() });
+    let causes = SIGNALS.inhibit.causes();
+    if causes != 0 {
+        let _ = housekeeping.notes.enqueue(Record::Refused { why: Cause::Crash.name(), value: causes });
     }
-    plant::prepare([sample_1, sample_2], requests.0, drive.1, start);
-    identify::Thread {
-        identification,
-        told: told.1,
-        findings: findings.0,
-        notes: notes.1,
-        surroundings: SURROUNDINGS,
-        bus: None,
-    }
+    plant::prepare(current.samples, housekeeping.requests, housekeeping.drive, start);
+    identify::Thread { identification, ends: identification_ends, surroundings: SURROUNDINGS, bus: None }
 }
 
 /// Ends the emulator.

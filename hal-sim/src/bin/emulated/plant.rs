@@ -7,8 +7,8 @@ use heapless::spsc::{Consumer, Producer};
 use scarab::hal::{AxisSample, CURRENT_RATE_HZ, DriveCommand, JointSample, LegDrives, Sample};
 use scarab::leg::{ControlRequest, DriveState, PowerRequest};
 use scarab::servo::SERVO_RATE_HZ;
+use scarab::task::SIGNALS;
 use scarab::task::leg::JOINTS;
-use scarab::task::{interlock, servo, statistics};
 use scarab::units::Ampere;
 
 use super::axes::Axes;
@@ -97,16 +97,17 @@ impl Plant {
         }
         if let Some(samples) = self.ahead.get(place as usize) {
             let begun = clock::instructions();
-            self.axes.tick(samples, [servo::target(0), servo::target(1)]);
-            statistics::CURRENT_TICKS.iter().for_each(statistics::Count::add);
-            statistics::CURRENT_WORST.raise(clock::instructions().wrapping_sub(begun));
+            self.axes.tick(samples, [SIGNALS.target(0), SIGNALS.target(1)]);
+            let statistics = &SIGNALS.statistics;
+            statistics.current_ticks.iter().for_each(|ticks| ticks.add());
+            statistics.current_worst.raise(clock::instructions().wrapping_sub(begun));
         }
     }
 
     /// Between two servo ticks the rotors turn evenly.
     fn look_ahead(&mut self, before: &Sample<JOINTS>) {
         // Without the noise that a leg file adds to what is logged: it is not the shunts'.
-        let currents = core::array::from_fn(|joint| servo::target(joint).current.0);
+        let currents = core::array::from_fn(|joint| SIGNALS.target(joint).current.0);
         for (samples, way) in self.ahead.iter_mut().zip(1..) {
             let counts = core::array::from_fn(|joint| {
                 let (from, to) =
@@ -120,7 +121,7 @@ impl Plant {
     /// To the next servo tick.
     fn advance(&mut self) {
         if self.servo_ticks > 0 {
-            let requests = [servo::target(0), servo::target(1)];
+            let requests = [SIGNALS.target(0), SIGNALS.target(1)];
             let enabled = requests.iter().all(|request| request.enabled);
             let currents =
                 requests.map(|request| if request.enabled { request.current } else { Ampere::ZERO });
@@ -150,7 +151,7 @@ impl Plant {
     /// What the operator does in this tick.
     fn operate(&mut self) {
         if self.start.resets(self.servo_ticks) {
-            interlock::reset();
+            SIGNALS.inhibit.reset();
             let _ = self.requests.enqueue(ControlRequest::Power(PowerRequest::ResetFault));
             self.began = self.servo_ticks;
         } else if let Some(index) = (self.servo_ticks - self.began).checked_sub(1)
@@ -162,9 +163,9 @@ impl Plant {
     }
 
     fn call_servo(&mut self) {
-        let answered = statistics::SERVO_TICKS.get();
+        let answered = SIGNALS.statistics.servo_ticks.get();
         if answered == self.answered && self.servo_ticks > 1 {
-            statistics::SERVO_MISSED.add();
+            SIGNALS.statistics.servo_missed.add();
         }
         self.answered = answered;
         vectors::pend_servo();

@@ -23,7 +23,7 @@ use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::{NVIC, SCB};
 use cortex_m_semihosting::{heprintln, syscall};
 use scarab::servo::SERVO_RATE_HZ;
-use scarab::task::statistics;
+use scarab::task::SIGNALS;
 use stm32_metapac::Interrupt;
 
 use super::{clock, end};
@@ -158,7 +158,7 @@ fn begin() {
 
 /// At thread level, between two steps of the identification.
 pub fn in_thread() {
-    if statistics::SERVO_TICKS.get() < DUE_IN_THREAD.load(Ordering::Relaxed) {
+    if SIGNALS.statistics.servo_ticks.get() < DUE_IN_THREAD.load(Ordering::Relaxed) {
         return;
     }
     match KIND.load(Ordering::Relaxed) {
@@ -174,7 +174,7 @@ pub fn in_thread() {
 /// In the servo's interrupt.
 #[inline(always)]
 pub fn in_servo() {
-    if statistics::SERVO_TICKS.get() >= DUE_IN_SERVO.load(Ordering::Relaxed) {
+    if SIGNALS.statistics.servo_ticks.get() >= DUE_IN_SERVO.load(Ordering::Relaxed) {
         read_nowhere();
     }
 }

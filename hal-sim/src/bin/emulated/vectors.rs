@@ -11,9 +11,10 @@ use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::{NVIC, SCB};
 use cortex_m_rt::exception;
-use scarab::task::{servo, statistics};
+use scarab::task::{SIGNALS, servo};
 use stm32_metapac::{Interrupt, interrupt};
 
+use super::machine::Machine;
 use super::{clock, plant, rehearsal};
 
 /// Interrupt priority registers of the processor, a byte for each of 82 vectors.
@@ -48,13 +49,13 @@ pub fn pend_servo() {
 fn SysTick() {
     plant::interrupt();
     if SCB::is_pendst_pending() {
-        statistics::CURRENT_MISSED.add();
+        SIGNALS.statistics.current_missed.add();
     }
 }
 
 #[interrupt]
 fn OTG_HS() {
-    servo::interrupt();
+    servo::interrupt(&mut Machine);
     rehearsal::in_servo();
 }
 

@@ -20,11 +20,12 @@ use scarab::hal::{AxisSample, CURRENT_RATE_HZ, Frame, JointSample};
 use scarab::leg::{AxisFault, Control, ControlOutput, ControlRequest, Following};
 use scarab::motor::{Chopper, SenseScale};
 use scarab::operation::{
-    BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper, HousekeepingSettings, IdentificationLevel, Keep, Queues, RATE_HZ,
-    ServoLevel, Signals, Slice, Stage, Tick, Watch,
+    BusQueues, BusRound, CurrentLoops, EventQueue, Handover, Housekeeper, HousekeepingSettings,
+    IdentificationLevel, Keep, Queues, RATE_HZ, ServoLevel, Signals, Slice, Stage, Tick, Watch,
 };
 use scarab::safety::GUARD_RATE_HZ;
 
+use super::locked::Locked;
 use super::registers::Registers;
 use super::{DIVIDER, housekeeping_settings, ready};
 use crate::drive::description::CompleteDescription;
@@ -44,7 +45,7 @@ const BUS_CODE: u16 = 3136;
 /// The part of the bus that is not registers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BusLevel<const N: usize> {
-    queues: BusQueues<N>,
+    queues: Locked<BusQueues<N>>,
     round: BusRound,
     /// What a host wants stored.
     pub storage: Handover<Keep<N>>,
@@ -75,13 +76,12 @@ pub struct Levels<const N: usize> {
     pub registers: Registers<N>,
     /// Words that all levels share.
     pub signals: Signals<N>,
-    /// Queues between the levels.
-    pub queues: Queues<N>,
+    queues: Locked<Queues<N>>,
     /// Level 0.
     pub loops: CurrentLoops<N>,
     /// The bus, where the board is on one.
     pub bus: Option<Box<BusLevel<N>>>,
-    events: EventQueue<N>,
+    events: Locked<EventQueue<N>>,
     servo: ServoLevel<N>,
     housekeeper: Housekeeper<N>,
     identification: IdentificationLevel,
@@ -125,11 +125,16 @@ impl<const N: usize> Levels<N> {
             registers: Registers::new(),
             watch: Watch::new(&signals),
             signals,
-            queues: Queues::new(),
+            queues: Locked::new(Queues::new()),
             loops: loops([Stage::OFF; N], chopper),
             bus: following.is_some().then(Box::default),
-            events: EventQueue::new(),
-            servo: ServoLevel::new(leg.control(), drives::derating(DIVIDER), volt_per_code, following.clone()),
+            events: Locked::new(EventQueue::new()),
+            servo: ServoLevel::new(
+                leg.control(),
+                drives::derating(DIVIDER),
+                volt_per_code,
+                following.clone(),
+            ),
             housekeeper: Housekeeper::new(settings),
             identification: IdentificationLevel::new(leg.identification().swarm_seed()),
             settings,
@@ -158,7 +163,9 @@ impl<const N: usize> Levels<N> {
 
     /// Exchanges two axes, calibrations included: their motors hang on each other's connectors.
     pub fn exchange(&mut self, one: usize, other: usize) {
-        if let (Some(first), Some(second)) = (self.loops.stage(one).copied(), self.loops.stage(other).copied()) {
+        if let (Some(first), Some(second)) =
+            (self.loops.stage(one).copied(), self.loops.stage(other).copied())
+        {
             for (axis, stage) in [(one, second), (other, first)] {
                 if let Some(place) = self.loops.stage_mut(axis) {
                     *place = stage;
@@ -167,9 +174,14 @@ impl<const N: usize> Levels<N> {
         }
     }
 
+    /// Queues between the levels.
+    pub fn queues(&mut self) -> &mut Queues<N> {
+        self.queues.get()
+    }
+
     /// Level 6, in the periods in which it is due.
     pub fn housekeeping(&mut self) {
-        let mut ends = self.queues.split(&mut self.events).housekeeping;
+        let mut ends = self.queues.get().split(self.events.get()).housekeeping;
         self.housekeeper.round(&mut ends, &self.signals, &mut self.registers);
     }
 
@@ -181,8 +193,8 @@ impl<const N: usize> Levels<N> {
 
     /// Level 1; `None` while the joints' samples are invalid.
     pub fn servo(&mut self, control: &mut Control<N>, gravity: [f32; 3]) -> Option<ControlOutput<N>> {
-        let mut ends = self.queues.split(&mut self.events).servo;
-        ends.host = self.bus.as_mut().map(|bus| bus.queues.split().1);
+        let mut ends = self.queues.get().split(self.events.get()).servo;
+        ends.host = self.bus.as_mut().map(|bus| bus.queues.get().split().1);
         let output = self.servo.tick(control, gravity, &mut ends, &self.signals, &mut self.registers);
         self.signals.statistics.servo_ticks.add();
         output
@@ -190,7 +202,7 @@ impl<const N: usize> Levels<N> {
 
     /// Thread level: what the servo sent, then a slice of the search.
     pub fn identify<const B: usize>(&mut self, leg: &mut DeviceLeg<N, B>, evaluations: u32) -> Slice<N> {
-        let mut ends = self.queues.split(&mut self.events).identification;
+        let mut ends = self.queues.get().split(self.events.get()).identification;
         let (_, identification) = leg.halves();
         self.identification.hear(identification, &mut ends, |_| {}, |_| {});
         while ends.notes.dequeue().is_some() {}
@@ -211,7 +223,7 @@ impl<const N: usize> Levels<N> {
         let now = (period as u32).wrapping_mul(CYCLES.get()).wrapping_add(axis as u32 * CYCLES.get() / 4);
         let tick = Tick { now, emergency_stop, gate_fault, complete, supply, sample: *sample };
         self.registers.encoders[axis] = sample.encoder_count;
-        let mut ends = self.queues.current();
+        let mut ends = self.queues.get().current();
         self.loops.tick(axis, &tick, &mut ends, &self.signals, &mut self.registers);
     }
 
@@ -225,16 +237,17 @@ impl<const N: usize> Levels<N> {
     /// Newest samples of the joints that wait for the servo.
     #[must_use]
     pub fn samples(&self) -> Option<[JointSample; N]> {
+        let queues = self.queues.lock();
         let mut samples = [JointSample::default(); N];
         for (joint, sample) in samples.iter_mut().enumerate() {
-            *sample = self.queues.newest_sample(joint)?;
+            *sample = queues.newest_sample(joint)?;
         }
         Some(samples)
     }
 
     /// Asks the servo for something that the operator's contacts do not.
     pub fn ask(&mut self, request: ControlRequest<N>) {
-        let _ = self.queues.requests().enqueue(request);
+        let _ = self.queues().requests().enqueue(request);
     }
 
     /// The first axis that released itself, and why.
@@ -246,7 +259,7 @@ impl<const N: usize> Levels<N> {
     /// Level 4: a frame came; one without room is lost.
     pub fn receive(&mut self, frame: &Frame) {
         let Some(bus) = &mut self.bus else { return };
-        if bus.queues.split().0.enqueue(*frame).is_err() {
+        if bus.queues.get().split().0.enqueue(*frame).is_err() {
             self.registers.can.overrun = true;
         }
         self.registers.bus_due = true;
@@ -263,14 +276,18 @@ impl<const N: usize> Levels<N> {
         self.registers.bus_due = false;
         self.registers.set_time(now_ns);
         let BusLevel { queues, round, storage } = &mut **bus;
-        let (_, _, mut ends) = queues.split();
+        let (_, _, mut ends) = queues.get().split();
         round.round(station, &mut ends, storage, &self.signals, &mut self.registers, results);
     }
 }
 
 impl<const N: usize> Default for BusLevel<N> {
     fn default() -> Self {
-        Self { queues: BusQueues::new(), round: BusRound::new(), storage: Handover::new(Keep::NOTHING) }
+        Self {
+            queues: Locked::new(BusQueues::new()),
+            round: BusRound::new(),
+            storage: Handover::new(Keep::NOTHING),
+        }
     }
 }
 

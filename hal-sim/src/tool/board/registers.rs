@@ -1,6 +1,6 @@
 //! What lies beneath the firmware's levels in place of a board's registers.
 
-use core::cell::Cell;
+use core::sync::atomic::{AtomicU64, Ordering};
 
 use scarab::board::odrive_v3_6::settings::analog::temperature_c;
 use scarab::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
@@ -14,6 +14,22 @@ pub const WARM_CODE: u16 = 1500;
 const FRAME_US: u64 = 20;
 /// The watchdog's time during a flash write over its usual time: 8 s, 16 ms.
 pub const STRETCHED: u64 = 500;
+
+/// How often the clock was read in a round of the bus.
+#[derive(Debug, Default)]
+struct Readings(AtomicU64);
+
+impl Clone for Readings {
+    fn clone(&self) -> Self {
+        Self(AtomicU64::new(self.0.load(Ordering::Relaxed)))
+    }
+}
+
+impl PartialEq for Readings {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.load(Ordering::Relaxed) == other.0.load(Ordering::Relaxed)
+    }
+}
 
 /// Bus controller: its state, and the frames that wait in its three mailboxes.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +74,7 @@ pub struct Registers<const N: usize> {
     /// How many times its usual time the watchdog has, if that changed.
     pub stretched: Option<u64>,
     /// Readings of the clock in this round of the bus.
-    readings: Cell<u64>,
+    readings: Readings,
 }
 
 impl<const N: usize> Registers<N> {
@@ -84,14 +100,14 @@ impl<const N: usize> Registers<N> {
             },
             fed: false,
             stretched: None,
-            readings: Cell::new(0),
+            readings: Readings::default(),
         }
     }
 
     /// Sets the time, nanoseconds; a round of the bus begins.
     pub fn set_time(&mut self, now_ns: u64) {
         self.can.now_ns = now_ns;
-        self.readings.set(0);
+        self.readings = Readings::default();
     }
 }
 
@@ -164,9 +180,7 @@ impl<const N: usize> Hardware<N> for Registers<N> {
     }
 
     fn now_us(&self) -> u64 {
-        let readings = self.readings.get();
-        self.readings.set(readings + 1);
-        self.can.now_ns / 1000 + readings * FRAME_US
+        self.can.now_ns / 1000 + self.readings.0.fetch_add(1, Ordering::Relaxed) * FRAME_US
     }
 
     fn controller(&mut self) -> Controller {

@@ -109,14 +109,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
         let mut rig = Rig::on_a_bus(leg, &context, seed)?;
         hold_the_switch(&mut rig);
         let station = station(&context, first);
-        let mut board = Self {
-            rig,
-            station,
-            memory,
-            context,
-            flashing: Flashing::new(),
-            first,
-        };
+        let mut board = Self { rig, station, memory, context, flashing: Flashing::new(), first };
         for why in board.recall() {
             eprintln!("warning: {why}");
         }

@@ -126,12 +126,7 @@ impl<const N: usize> Flashing<N> {
     }
 
     /// A step, where one is due.
-    pub(super) fn step<const B: usize>(
-        &mut self,
-        now_ns: u64,
-        rig: &mut Rig<N, B>,
-        memory: &mut Memory,
-    ) {
+    pub(super) fn step<const B: usize>(&mut self, now_ns: u64, rig: &mut Rig<N, B>, memory: &mut Memory) {
         if now_ns < self.due_ns {
             return;
         }

@@ -6,7 +6,7 @@
 use scarab::hal::Contacts;
 use scarab::safety::FaultCode;
 
-use super::rig::{PERIODS_PER_S};
+use super::rig::PERIODS_PER_S;
 
 /// Of so many seeds one is reset and enabled again after its safe state.
 pub const RESET_EVERY: u64 = 8;

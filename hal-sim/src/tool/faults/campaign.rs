@@ -291,21 +291,22 @@ impl Setting<'_> {
     }
 
     fn flush(&self, batch: &mut Vec<(Rig<JOINTS, BASE>, Job)>, campaign: &mut Campaign) {
-        let of = |(rig, job): (Rig<JOINTS, BASE>, Job)| match job {
+        let of = |(rig, job): &(Rig<JOINTS, BASE>, Job)| match job {
             Job::Row { row, scenario, seed, manner } => {
-                let outcome = run(self.leg, row, &scenario, seed, manner, &rig);
+                let outcome = run(self.leg, row, scenario, *seed, *manner, rig);
                 // Nobody may take its period for a seed that draws another run.
-                (Some(manner.blind), Outcome { seed: if manner.brief { 0 } else { seed }, ..outcome })
+                (Some(manner.blind), Outcome { seed: if manner.brief { 0 } else { *seed }, ..outcome })
             }
-            Job::Trial { trial, seed } => (None, trial.run(self.leg, seed, self.manner.recorded, &rig)),
+            Job::Trial { trial, seed } => (None, trial.run(self.leg, *seed, self.manner.recorded, rig)),
         };
-        for (blind, outcome) in core::mem::take(batch).into_par_iter().map(of).collect::<Vec<_>>() {
+        for (blind, outcome) in batch.par_iter().map(of).collect::<Vec<_>>() {
             match blind {
                 None => campaign.trials.push(outcome),
                 Some(blind) if blind == self.manner.blind => campaign.outcomes.push(outcome),
                 Some(blind) => campaign.singly.push((blind, outcome)),
             }
         }
+        batch.clear();
     }
 }
 

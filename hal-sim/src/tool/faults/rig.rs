@@ -133,7 +133,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
                 self.injector.joint(joint, self.period, sample);
             }
             let observed = self.world.observe(&Sample { joints });
-            self.board.queues.set_samples(&observed.joints);
+            self.board.queues().set_samples(&observed.joints);
         }
         self.watch();
     }
@@ -231,7 +231,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
 
     /// One tick of one axis; a fault that must not be seen has not been found, and what followed from it did not happen.
     fn tick(&mut self, joint: usize, sample: &AxisSample, conditions: Conditions) {
-        let reported = self.board.queues.outcomes(joint).count();
+        let reported = self.board.queues().outcomes(joint).count();
         let before = (!self.blind.is_empty()).then(|| self.board.clone());
         self.board.current(joint, self.period, sample, conditions);
         let fault = self.board.loops.stage(joint).and_then(Stage::fault).map(axis_code);
@@ -246,12 +246,12 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             board.signals.statistics = self.board.signals.statistics.clone();
             board.registers.servo_due |= self.board.registers.servo_due;
             if let Some(samples) = self.board.samples() {
-                board.queues.set_samples(&samples);
+                board.queues().set_samples(&samples);
             }
             self.board = board;
             return;
         }
-        let newest = self.board.queues.outcomes(joint).skip(reported).last();
+        let newest = self.board.queues().outcomes(joint).skip(reported).last();
         if let Some(Outcome::Fault { fault, .. }) = newest {
             self.axis_fault = self.axis_fault.or(Some(axis_code(*fault)));
         }

@@ -4,19 +4,17 @@
 //! What has to follow: the image boots without calibration and zeros, so it stays disabled (not ready to switch on) whatever host and hand do,
 //! and what was kept is there, whole. Blind, half of the runs boot as a board that knows everything still, the others with an empty memory.
 
-use std::sync::Mutex;
-
 use scarab::hal::AxisCommand;
 
 use super::super::catalogue::JOINTS;
 use super::super::entry::Head;
-use scarab::hal::Contacts;
 use super::super::run::Outcome;
 use super::Bench;
 use super::hosted::{Fork, forked, started};
 use crate::tool::bus::memory::Memory;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
+use scarab::hal::Contacts;
 
 /// Servo ticks until the bus has to be gone; a quarter of a second of hands at the contacts, and of a switch that is opened.
 const PATIENCE: u64 = 2 * 4000;
@@ -51,13 +49,13 @@ fn cut(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Out
     host.write(1, 0x1010, 1, SAVE, 4)?;
     host.run(400);
     host.move_leg(leg)?;
-    let ready = Mutex::new(host.clone());
+    let ready = host.clone();
     forked(head, leg, host, seeds, |mut fork| {
         let remembers = blind && fork.seed.is_multiple_of(2);
         if blind && !remembers {
             *fork.host.board().memory() = Memory::new(None);
         }
-        let board = remembers.then(|| ready.lock().expect("cloning does not panic").clone());
+        let board = remembers.then(|| ready.clone());
         one(fork, board.map(|mut host| host.board().clone()))
     })
 }

@@ -11,7 +11,7 @@ use super::super::catalogue::JOINTS;
 use super::super::dice::Dice;
 use super::super::entry::Head;
 use super::super::invariants::{Invariants, Scope};
-use super::super::rig::{Rig};
+use super::super::rig::Rig;
 use super::super::run::Outcome;
 use super::outcome;
 use crate::tool::bus::board::Board;

@@ -17,7 +17,6 @@ use scarab::safety::FaultCode;
 
 use super::super::dice::Dice;
 use super::super::entry::Head;
-use scarab::hal::Contacts;
 use super::super::run::Outcome;
 use super::Bench;
 use super::hosted::{Fork, forked, hosted, identifying, started};
@@ -26,6 +25,7 @@ use crate::tool::bus::board::TICK_NS;
 use crate::tool::bus::host::Host;
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
+use scarab::hal::Contacts;
 
 /// Servo ticks of hostile frames, and frames in each: more than the wire carries.
 const FLOOD: u64 = 400;
@@ -250,7 +250,7 @@ fn instead_of_a_host(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolErr
     let patience = watched(&mut fork, [true; 2], blind)?;
     fork.host.network.babble(Some(Frame::new(1 + fork.dice.below(0x7F) as u16, &[0x55; 8])));
     let (state, after_ms) = until_safe(&mut fork, &patience);
-    let in_time = after_ms.is_some_and(|after| (0.0..=super::lost::TICK_MS + 1e-9).contains(&after));
+    let in_time = after_ms.is_some_and(|after| (0.0..=super::lost::BUS_MS + 1e-9).contains(&after));
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     let found = fork.ended(state, alarm);
     Ok(Outcome { detected: in_time && state == Some("Damp"), after_ms, ..found })

@@ -229,7 +229,6 @@ fn cut(head: &Head, filled: &[Filled], seed: u64, blind: bool) -> Outcome {
 }
 
 /// A board whose memory holds older and newer objects and models, and the models that may be used.
-#[derive(Clone)]
 struct Rotting {
     board: Board<JOINTS, BASE>,
     /// Of each node, all that were kept.
@@ -284,7 +283,7 @@ impl Rotting {
 
 fn rots(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let rotting = Rotting::new(leg)?;
-    seeds.par_iter().map_with(rotting, |rotting, seed| rot(head, rotting, *seed, blind)).collect()
+    seeds.par_iter().map(|seed| rot(head, &rotting, *seed, blind)).collect()
 }
 
 /// Blind, one of two checks is not made: another leg's model is taken as if it were this one's, or what rotted as if its check sum held.

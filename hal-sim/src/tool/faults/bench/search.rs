@@ -40,7 +40,6 @@ pub(super) const BENCH: Bench = Bench {
 };
 
 /// A leg with an accepted model at the first tick of another search, and how many ticks that takes.
-#[derive(Clone)]
 struct Searching {
     pair: Pair<JOINTS, BASE>,
     old: IdentifiedModel<JOINTS>,
@@ -99,7 +98,7 @@ fn go(pair: &mut Pair<JOINTS, BASE>, gravity: [f32; 3], there: fn(&Pair<JOINTS, 
 
 fn interrupt(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let searching = Searching::new(leg)?;
-    Ok(seeds.par_iter().map_with(searching, |searching, seed| one(head, searching, *seed, blind)).collect())
+    Ok(seeds.par_iter().map(|seed| one(head, &searching, *seed, blind)).collect())
 }
 
 /// Blind, nobody tells the search of anything: it goes on to its end.

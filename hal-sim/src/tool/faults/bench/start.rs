@@ -51,7 +51,7 @@ pub(super) fn ready(leg: &LegFile) -> Result<Rig<JOINTS, BASE>, ToolError> {
 
 fn arm(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Outcome>, ToolError> {
     let ready = ready(leg)?;
-    Ok(seeds.par_iter().map_with(ready, |ready, seed| one(head, leg, ready, *seed, blind)).collect())
+    Ok(seeds.par_iter().map(|seed| one(head, leg, &ready, *seed, blind)).collect())
 }
 
 fn one(head: &Head, leg: &LegFile, ready: &Rig<JOINTS, BASE>, seed: u64, blind: bool) -> Outcome {

@@ -54,16 +54,16 @@ fn stop(head: &Head, leg: &LegFile, seeds: &[u64], blind: bool) -> Result<Vec<Ou
     let ready = ready(leg)?;
     // How long a calibration takes that nobody stops.
     let length = calibrated(leg, 0, 1, None, false)?.0;
-    let run = |ready: &mut Rig<JOINTS, BASE>, seed: &u64| {
+    let run = |seed: &u64| {
         let mut dice = Dice::new("X1 at rest", *seed);
         // Even seeds only come here where the odd ones are forks.
         if dice.coin() {
-            Ok(boot(head, leg, ready, *seed, &mut dice, blind))
+            Ok(boot(head, leg, &ready, *seed, &mut dice, blind))
         } else {
             calibration(head, leg, length, *seed, &mut dice, blind)
         }
     };
-    seeds.par_iter().map_with(ready, run).collect()
+    seeds.par_iter().map(run).collect()
 }
 
 fn boot(

@@ -15,7 +15,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     /// A request waits for the servo's next tick.
     #[must_use]
     pub fn is_asked(&mut self) -> bool {
-        !self.board.queues.requests().is_empty()
+        !self.board.queues().requests().is_empty()
     }
 
     /// What forbids to enable, as the interlock's bits.
@@ -51,7 +51,11 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     /// Where the drive stands.
     #[must_use]
     pub fn state(&self) -> DriveState {
-        if self.board.signals.has_begun() { self.leg.control().state() } else { DriveState::NotReadyToSwitchOn }
+        if self.board.signals.has_begun() {
+            self.leg.control().state()
+        } else {
+            DriveState::NotReadyToSwitchOn
+        }
     }
 
     /// What the firmware says is wrong: an axis' fault, another cause, or the leg's fault.
