@@ -13,7 +13,7 @@
 //! | [`exp`], [`ln`], [`atan2`] | `libm` | 1 ulp |
 //!
 //! `f64` is `libm` throughout. [`fast_sin_cos`] is `micromath`'s, wrong by up to 1.1e-3, offered for the current loop's Park
-//! angle and nothing else. It is not faster: [`sin_cos_of_turns`] takes 49 instructions where it takes 60
+//! angle and nothing else. It is not faster: [`sin_cos_of_turns`] takes 44 instructions where it takes 81
 //! (`scripts/count-instructions`).
 
 use nalgebra::RealField;

@@ -254,6 +254,42 @@ mod tests {
     }
 
     #[test]
+    fn duties_are_those_of_each_phase_limited_by_itself_to_the_last_bit() {
+        let band = Ampere(0.5);
+        let modulator =
+            Modulator::new(BridgeTiming::ODRIVE_3_6, DeadTime::Compensated { band }).expect("usual");
+        let limit = modulator.voltage_limit(Volt(48.0)).0;
+        let (mut limited, mut free) = (0, 0);
+        for share in [0.0, 0.5, 0.99, 1.0, 1.003, 1.2, 30.0] {
+            for degrees in 0..720 {
+                let target = at(0.7, 7 * degrees);
+                let target = Stationary { alpha: Ampere(target.alpha.0), beta: Ampere(target.beta.0) };
+                let voltage = at(share * limit, degrees);
+                let duties = modulator.duties(voltage, 1.0 / 48.0, target);
+                let per_bus = 1.0 / 48.0;
+                let wanted = Stationary { alpha: voltage.alpha.0 * per_bus, beta: voltage.beta.0 * per_bus }
+                    .to_phases();
+                let in_bands =
+                    Stationary { alpha: target.alpha.0 * 2.0, beta: target.beta.0 * 2.0 }.to_phases();
+                let (low, high) =
+                    (wanted.a.min(wanted.b).min(wanted.c), wanted.a.max(wanted.b).max(wanted.c));
+                let room = modulator.greatest_duty - modulator.dead_duty - high;
+                let shift = (0.5 - 0.5 * (low + high)).min(room);
+                let expected = [(wanted.a, in_bands.a), (wanted.b, in_bands.b), (wanted.c, in_bands.c)].map(
+                    |(wanted, current)| {
+                        let duty = wanted + shift + modulator.dead_duty * current.clamp(-1.0, 1.0);
+                        limited += u32::from(duty != duty.clamp(0.0, modulator.greatest_duty));
+                        free += u32::from(duty == duty.clamp(0.0, modulator.greatest_duty));
+                        duty.clamp(0.0, modulator.greatest_duty)
+                    },
+                );
+                assert_eq!(duties, expected, "{share} at {degrees}");
+            }
+        }
+        assert!(limited > 1000 && free > 1000, "{limited} {free}");
+    }
+
+    #[test]
     fn the_circle_touches_the_hexagon() {
         let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, PLAIN).expect("usual");
         let limit = modulator.voltage_limit(Volt(48.0)).0;

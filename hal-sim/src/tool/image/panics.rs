@@ -14,8 +14,14 @@
 //! Source: Armv7-M Architecture Reference Manual (DDI 0403), A7.7.12, A7.7.18. Words between code are known by the mapping symbols
 //! `$t` and `$d` (Arm ELF, IHI 0044, 4.5.5).
 //!
-//! Known limits: calls by a pointer are counted and not followed; a division by zero is told and not refused, since the remainders of
-//! queues (`REMAINDER`) are as many as the compiler makes of them.
+//! The name of a panic does not say which one it is: the image's handler ignores messages, so the compiler merges all panics without arguments
+//! into one function. What tells them apart is the place in the source that they are given, loaded by the two instructions before the branch:
+//!
+//! ```text
+//! MOVW r0, MOVT r0    11110 i 10 s100 imm4 | 0 imm3 0000 imm8     r0 = address of the file's name, its length, line, column
+//! ```
+//!
+//! Known limits: calls by a pointer are counted and not followed; remainders by the capacity of a queue (`QUEUE`) are reported and not refused.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -37,9 +43,9 @@ const PANICS: [&str; 8] = [
     "_defmt_panic",
     "__defmt_default_panic",
 ];
-/// The one that interrupts may have: a queue of `heapless` keeps its capacity as a value and takes the remainder of an index by
-/// it, and the compiler does not see that every capacity is a constant above zero.
-const REMAINDER: &str = "core::panicking::panic_const::panic_const_div_by_zero";
+/// The file whose panics interrupts may have: a queue of `heapless` keeps its capacity as a value and takes the remainder of an index by it, and
+/// the compiler does not see that every capacity is a constant above zero.
+const QUEUE: [&str; 2] = ["heapless-", "/src/spsc.rs"];
 
 /// A branch to a panic.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,6 +54,16 @@ pub struct Place {
     pub within: String,
     /// Which panic.
     pub panic: String,
+    /// File of the source in which it is; empty where the image does not say.
+    pub file: String,
+}
+
+impl Place {
+    /// It is a queue's remainder by its capacity.
+    fn is_of_a_queue(&self) -> bool {
+        let [begin, end] = QUEUE;
+        self.file.starts_with(begin) && self.file.ends_with(end)
+    }
 }
 
 /// Places of an image.
@@ -67,9 +83,16 @@ pub struct Panics {
 struct Function {
     name: String,
     end: u32,
-    /// Where its branches go.
-    targets: Vec<u32>,
+    branches: Vec<Branch>,
     by_pointer: usize,
+}
+
+/// One branch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Branch {
+    to: u32,
+    /// What the two instructions before it load into the first register.
+    argument: Option<u32>,
 }
 
 impl Panics {
@@ -86,20 +109,21 @@ impl Panics {
             let begin = symbol.address() as u32 & !1;
             let end = begin + symbol.size() as u32;
             let name = format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or("?")));
-            let (targets, by_pointer) = words.branches(begin, end);
+            let (branches, by_pointer) = words.branches(begin, end);
             // Of several names for one place a vector's is kept.
             let known = functions.get(&begin).is_some_and(|known: &Function| VECTORS.contains(&&*known.name));
             if !known {
-                functions.insert(begin, Function { name, end, targets, by_pointer });
+                functions.insert(begin, Function { name, end, branches, by_pointer });
             }
         }
         if VECTORS.iter().any(|vector| functions.values().all(|function| function.name != *vector)) {
             return Err(wrong(&format!("lacks one of the vectors {}", VECTORS.join(", "))));
         }
-        Ok(Self::within(&functions))
+        Ok(Self::within(&functions, |location| source_file(&file, location)))
     }
 
-    fn within(functions: &BTreeMap<u32, Function>) -> Self {
+    /// `file_of` has the name of the file to which a place in the source belongs.
+    fn within(functions: &BTreeMap<u32, Function>, file_of: impl Fn(u32) -> Option<String>) -> Self {
         let mut reached: BTreeSet<u32> = BTreeSet::new();
         let mut open: Vec<u32> = functions
             .iter()
@@ -108,15 +132,17 @@ impl Panics {
             .collect();
         while let Some(begin) = open.pop() {
             if reached.insert(begin) {
-                open.extend(callees(functions, begin).filter(|callee| !is_panic(functions, *callee)));
+                let callees = callees(functions, begin).map(|(callee, _)| callee);
+                open.extend(callees.filter(|callee| !is_panic(functions, *callee)));
             }
         }
         let mut panics = Self { reached: reached.len(), ..Self::default() };
         for (begin, function) in functions.iter().filter(|(begin, _)| !is_panic(functions, **begin)) {
-            let places = callees(functions, *begin).filter(|callee| is_panic(functions, *callee));
-            let places = places.map(|callee| Place {
+            let places = callees(functions, *begin).filter(|(callee, _)| is_panic(functions, *callee));
+            let places = places.map(|(callee, argument)| Place {
                 within: function.name.clone(),
                 panic: functions.get(&callee).map_or_else(String::new, |callee| callee.name.clone()),
+                file: argument.and_then(&file_of).unwrap_or_default(),
             });
             let places: Vec<Place> = places.collect();
             if reached.contains(begin) {
@@ -131,8 +157,11 @@ impl Panics {
     /// What interrupts may not have, in words.
     #[must_use]
     pub fn missed(&self) -> Vec<String> {
-        let others = self.interrupts.iter().filter(|place| !place.panic.starts_with(REMAINDER));
-        others.map(|place| format!("an interrupt can panic: {} in {}", place.panic, place.within)).collect()
+        let others = self.interrupts.iter().filter(|place| !place.is_of_a_queue());
+        let text = |place: &Place| {
+            format!("an interrupt can panic: {} in {} ({})", place.panic, place.within, place.file)
+        };
+        others.map(text).collect()
     }
 
     /// Some lines.
@@ -149,21 +178,32 @@ impl Panics {
             self.by_pointer
         );
         for place in &self.interrupts {
-            text += &format!("  {} in {}\n", place.panic, place.within);
+            text += &format!("  {} in {} ({})\n", place.panic, place.within, place.file);
         }
         text
     }
 }
 
-/// Functions that a function's branches lead to, itself not among them; one for each branch.
-fn callees(functions: &BTreeMap<u32, Function>, begin: u32) -> impl Iterator<Item = u32> {
+/// Functions that a function's branches lead to, itself not among them, and the first argument of each; one for each branch.
+fn callees(functions: &BTreeMap<u32, Function>, begin: u32) -> impl Iterator<Item = (u32, Option<u32>)> {
     let function = functions.get(&begin);
-    let targets = function.map_or(&[][..], |function| &function.targets);
+    let branches = function.map_or(&[][..], |function| &function.branches);
     let end = function.map_or(begin, |function| function.end);
-    targets.iter().filter(move |target| !(begin..end).contains(target)).filter_map(|target| {
-        let (callee, function) = functions.range(..=target).next_back()?;
-        (*target < function.end).then_some(*callee)
+    branches.iter().filter(move |branch| !(begin..end).contains(&branch.to)).filter_map(|branch| {
+        let (callee, function) = functions.range(..=branch.to).next_back()?;
+        (branch.to < function.end).then_some((*callee, branch.argument))
     })
+}
+
+/// Name of the file of a `core::panic::Location`, which begins with the name's address and length.
+fn source_file(file: &object::File<'_>, location: u32) -> Option<String> {
+    let bytes = |address: u32, length: u32| {
+        file.sections().find_map(|section| {
+            section.data_range(address.into(), length.into()).ok().flatten().map(<[u8]>::to_vec)
+        })
+    };
+    let word = |address| Some(u32::from_le_bytes(bytes(address, 4)?.try_into().ok()?));
+    String::from_utf8(bytes(word(location)?, word(location.checked_add(4)?)?)?).ok()
 }
 
 fn is_panic(functions: &BTreeMap<u32, Function>, begin: u32) -> bool {
@@ -201,9 +241,14 @@ impl Code<'_> {
         Some(u32::from(u16::from_le_bytes([pair[0], pair[1]])))
     }
 
-    /// Where the branches of a function go, and how many calls by a pointer it has.
-    fn branches(&self, begin: u32, end: u32) -> (Vec<u32>, usize) {
-        let (mut targets, mut by_pointer, mut place) = (Vec::new(), 0, begin);
+    /// Branches of a function, and how many calls by a pointer it has.
+    fn branches(&self, begin: u32, end: u32) -> (Vec<Branch>, usize) {
+        let (mut branches, mut by_pointer, mut place) = (Vec::new(), 0, begin);
+        let mut add = |place: u32, way: Option<i32>| {
+            let branch =
+                |way: i32| Branch { to: place.wrapping_add_signed(4 + way), argument: self.argument(place) };
+            branches.extend(way.map(branch));
+        };
         while place < end {
             let after = self.data.partition_point(|(first, _)| *first <= place);
             if let Some((_, last)) = after.checked_sub(1).and_then(|range| self.data.get(range))
@@ -215,18 +260,33 @@ impl Code<'_> {
             let Some(first) = self.half(place) else { break };
             if first >> 11 >= 0b11101 {
                 if let Some(second) = self.half(place + 2) {
-                    targets.extend(wide(first, second).map(|way| place.wrapping_add_signed(4 + way)));
+                    add(place, wide(first, second));
                 }
                 place += 4;
             } else {
-                targets.extend(narrow(first).map(|way| place.wrapping_add_signed(4 + way)));
+                add(place, narrow(first));
                 // BLX to what a register holds.
                 by_pointer += usize::from(first & 0xFF87 == 0x4780);
                 place += 2;
             }
         }
-        (targets, by_pointer)
+        (branches, by_pointer)
     }
+
+    /// What MOVW and MOVT right before an address load into the first register.
+    fn argument(&self, address: u32) -> Option<u32> {
+        let half = |before: u32| self.half(address.checked_sub(before)?);
+        let low = immediate(half(8)?, half(6)?, 0xF240)?;
+        let high = immediate(half(4)?, half(2)?, 0xF2C0)?;
+        Some(high << 16 | low)
+    }
+}
+
+/// Constant of a MOVW (0xF240) or MOVT (0xF2C0) to the first register.
+fn immediate(first: u32, second: u32, code: u32) -> Option<u32> {
+    let part = first >> 10 & 1;
+    let is_one = first & 0xFBF0 == code && second & 0x8F00 == 0;
+    is_one.then(|| (first & 0xF) << 12 | part << 11 | (second >> 12 & 7) << 8 | second & 0xFF)
 }
 
 /// Sign of a field of so many bits.
@@ -281,26 +341,50 @@ mod tests {
         );
     }
 
-    fn function(name: &str, begin: u32, targets: &[u32]) -> (u32, Function) {
-        (begin, Function { name: name.into(), end: begin + 10, targets: targets.to_vec(), by_pointer: 0 })
+    #[test]
+    fn a_location_is_what_the_disassembler_says_was_loaded() {
+        // 80042c2: f24c 4028   movw r0, #50216
+        // 80042c6: f6c0 0003   movt r0, #2051
+        let halves: [u16; 6] = [0xF24C, 0x4028, 0xF6C0, 0x0003, 0xF7FC, 0xF839];
+        let bytes = halves.map(u16::to_le_bytes);
+        let code = Code { base: 100, bytes: bytes.as_flattened(), data: Vec::new() };
+        assert_eq!(code.argument(108), Some(50_216 | 2051 << 16));
+        assert_eq!((code.argument(104), code.argument(100)), (None, None));
+        // movw r1, #50216: another register.
+        assert_eq!(immediate(0xF24C, 0x4128, 0xF240), None);
+    }
+
+    const IN_A_QUEUE: u32 = 1;
+    const ELSEWHERE: u32 = 2;
+
+    fn function(name: &str, begin: u32, branches: &[(u32, u32)]) -> (u32, Function) {
+        let branches = branches.iter().map(|(to, location)| Branch { to: *to, argument: Some(*location) });
+        let branches = branches.collect();
+        (begin, Function { name: name.into(), end: begin + 10, branches, by_pointer: 0 })
     }
 
     #[test]
-    fn what_an_interrupt_reaches_may_only_take_remainders() {
-        let functions = |callee: u32| {
+    fn an_interrupt_may_reach_no_panic_but_those_of_queues() {
+        let functions = |location: u32| {
             BTreeMap::from([
-                function("ADC", 100, &[200]),
-                function("loops", 200, &[105, callee]),
-                function("thread", 300, &[400]),
-                function("core::panicking::panic_bounds_check", 400, &[600]),
-                function(REMAINDER, 500, &[600]),
+                function("ADC", 100, &[(200, 0)]),
+                function("loops", 200, &[(105, 0), (400, location)]),
+                function("thread", 300, &[(400, ELSEWHERE)]),
+                function("core::cell::panic_already_borrowed", 400, &[(600, 0)]),
                 function("core::panicking::panic_fmt", 600, &[]),
             ])
         };
-        let kept = Panics::within(&functions(500));
-        assert_eq!((kept.all.len(), kept.interrupts.len(), kept.reached), (2, 1, 2));
-        assert!(kept.missed().is_empty());
-        let missed = Panics::within(&functions(400)).missed();
-        assert_eq!(missed, ["an interrupt can panic: core::panicking::panic_bounds_check in loops"]);
+        let file_of = |location: u32| match location {
+            IN_A_QUEUE => Some("heapless-0.9.3/src/spsc.rs".to_owned()),
+            ELSEWHERE => Some("src/motor/axis.rs".to_owned()),
+            _ => None,
+        };
+        let accepted = Panics::within(&functions(IN_A_QUEUE), file_of);
+        assert_eq!((accepted.all.len(), accepted.interrupts.len(), accepted.reached), (2, 1, 2));
+        assert!(accepted.missed().is_empty());
+        let missed = |location| Panics::within(&functions(location), file_of).missed();
+        let panic = "an interrupt can panic: core::cell::panic_already_borrowed in loops";
+        assert_eq!(missed(ELSEWHERE), [format!("{panic} (src/motor/axis.rs)")]);
+        assert_eq!(missed(3), [format!("{panic} ()")]);
     }
 }
