@@ -30,6 +30,7 @@ impl<const B: usize> Watched<'_, B> {
         let timed = self.row.deadline_ms.is_finite() && state.is_some();
         let after_ms = timed.then_some(longest as f64 * PERIOD_MS);
         let in_time = after_ms.is_none_or(|after| after <= self.deadline_ms());
+        let intermittent_ms = self.intermittent_ms();
         let broken = self.invariants.into_broken();
         Outcome {
             fault: self.row.id,
@@ -40,6 +41,7 @@ impl<const B: usize> Watched<'_, B> {
             undetectable: state.is_none() && broken.is_empty(),
             false_alarm: !known,
             after_ms,
+            intermittent_ms,
             state,
             alarm: alarm.map(FaultCode::name),
             magnitude: self.scenario.magnitude,
