@@ -54,6 +54,7 @@ pub fn sin_cos<T: Real>(angle: T) -> (T, T) {
 ///
 /// By the wrapper type, not by the trait: where `std` is linked its inherent methods would win over the trait's.
 #[must_use]
+#[inline(never)]
 pub fn fast_sin_cos(angle: f32) -> (f32, f32) {
     let (sine, cosine) = micromath::F32(angle).sin_cos();
     (sine.0, cosine.0)
@@ -61,6 +62,7 @@ pub fn fast_sin_cos(angle: f32) -> (f32, f32) {
 
 /// Sine and cosine of an angle in units of 2^-32 turns, wrong by up to 1.2e-7 each: nothing is left to reduce.
 #[must_use]
+#[inline(always)]
 pub fn sin_cos_of_turns(units: u32) -> (f32, f32) {
     const RADIAN_PER_UNIT: f32 = core::f32::consts::TAU / 4_294_967_296.0;
     // The nearest quarter turn, and the way from there.
@@ -256,7 +258,7 @@ fn sin_cos_single(angle: f32) -> (f32, f32) {
 
 /// Sine and cosine of an angle within pi/4 of zero.
 #[expect(clippy::excessive_precision, reason = "coefficients as published")]
-#[inline]
+#[inline(always)]
 fn eighth_of_a_turn(x: f32) -> (f32, f32) {
     let z = x * x;
     let sine = ((-1.951_529_589e-4 * z + 8.332_160_873e-3) * z - 1.666_665_461e-1) * z * x + x;

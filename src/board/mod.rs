@@ -2,6 +2,8 @@
 //!
 //! What a board must provide, and how to port: docs/board.md.
 
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub mod copy;
 #[cfg(all(feature = "tasks", target_os = "none"))]
 pub mod crash;
 #[cfg(all(feature = "tasks", target_os = "none"))]

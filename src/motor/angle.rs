@@ -89,6 +89,7 @@ impl ElectricalAngle {
 
     /// Sine and cosine.
     #[must_use]
+    #[inline(always)]
     pub fn rotation(self, sine: Sine) -> Rotation {
         let (sine, cosine) = match sine {
             Sine::Fast => fast_sin_cos(self.0.cast_signed() as f32 * RADIAN_PER_UNIT),

@@ -164,12 +164,17 @@ impl Axis {
             (_, Some(AxisFault::EncoderFrozen | AxisFault::Encoder)) => Wish::Brake,
             _ => Wish::Released,
         };
-        self.last = self.step(sample, wish).unwrap_or_else(|fault| {
-            self.found(fault);
-            self.current_loop.reset();
-            AxisCommand::RELEASED
-        });
-        self.last
+        // Field by field: a copy of the whole would carry the bytes between the fields, one by one.
+        let AxisCommand { enabled, duty } = match self.step(sample, wish) {
+            Ok(command) => command,
+            Err(fault) => {
+                self.found(fault);
+                self.current_loop.reset();
+                AxisCommand::RELEASED
+            }
+        };
+        self.last = AxisCommand { enabled, duty };
+        AxisCommand { enabled, duty }
     }
 
     #[cold]
@@ -183,6 +188,7 @@ impl Axis {
             doubted || matches!(fault, AxisFault::Encoder | AxisFault::EncoderFrozen | AxisFault::Parameters);
     }
 
+    #[inline(always)]
     fn step(&mut self, sample: &AxisSample, wish: Wish) -> Result<AxisCommand, AxisFault> {
         let constants = &self.constants;
         let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
@@ -202,10 +208,13 @@ impl Axis {
         }
         let angle = self.angle();
         self.speed.track(angle);
+        // Both rotations of a tick side by side: they share their polynomials' constants.
+        let [rotor, acting] =
+            [angle, self.speed.ahead(angle, DELAY_PERIODS)].map(|angle| angle.rotation(constants.sine));
         let currents = constants.sense.currents(sample.shunt_codes, constants.zeros);
         let switching = wish != Wish::Released;
         self.measured = match currents {
-            Some(currents) => currents.to_rotating(angle.rotation(constants.sine)),
+            Some(currents) => currents.to_rotating(rotor),
             None if switching => self.measured,
             None => Rotating::default(),
         };
@@ -274,7 +283,6 @@ impl Axis {
         if !is_finite(voltage.d.0 + voltage.q.0) {
             return Err(AxisFault::NotANumber);
         }
-        let acting = self.speed.ahead(angle, DELAY_PERIODS).rotation(constants.sine);
         let target = Rotating { d: Ampere::ZERO, q: target }.to_stationary(acting);
         if self.shunt_watch.is_stuck(sample.shunt_codes, target, constants.stuck_asked) {
             return Err(AxisFault::StuckConversion);

@@ -138,6 +138,7 @@ impl CurrentLoop {
 
     /// The voltage for a quadrature current `target`, with a direct one of zero, no longer than `limit`;
     /// `speed` electrical, rad/s.
+    #[inline(always)]
     pub fn voltage(
         &mut self,
         gains: &CurrentGains,
@@ -172,12 +173,18 @@ impl CurrentLoop {
     }
 }
 
-/// Direct voltage first, the quadrature voltage in what is left of the circle.
+/// The wanted voltage where it is no longer than the limit.
+#[inline(always)]
 fn limited(wanted: Rotating<f32>, limit: f32) -> Rotating<f32> {
     let square = limit * limit;
-    if wanted.d * wanted.d + wanted.q * wanted.q <= square {
-        return wanted;
-    }
+    if wanted.d * wanted.d + wanted.q * wanted.q <= square { wanted } else { shortened(wanted, limit) }
+}
+
+/// Direct voltage first, the quadrature voltage in what is left of the circle. A function of its own, so that a tick within the limit does not
+/// carry its registers.
+#[inline(never)]
+fn shortened(wanted: Rotating<f32>, limit: f32) -> Rotating<f32> {
+    let square = limit * limit;
     let most = DIRECT_SHARE * limit;
     let d = clamp(wanted.d, -most, most);
     let left = sqrt(square - d * d);

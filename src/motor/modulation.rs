@@ -148,7 +148,14 @@ impl Modulator {
         let current =
             Stationary { alpha: target.alpha.0 * self.per_band, beta: target.beta.0 * self.per_band };
         let current = current.to_phases();
-        [self.duty(a + shift, current.a), self.duty(b + shift, current.b), self.duty(c + shift, current.c)]
+        let given = |wanted: f32, current_in_bands: f32| {
+            wanted + shift + self.dead_duty * clamp(current_in_bands, -1.0, 1.0)
+        };
+        let duties = [given(a, current.a), given(b, current.b), given(c, current.c)];
+        // No sum is below that of the smallest with the whole dead time, none above that of the largest: mostly all three are within.
+        let within =
+            low + shift - self.dead_duty >= 0.0 && high + shift + self.dead_duty <= self.greatest_duty;
+        if within { duties } else { duties.map(|duty| self.limited(duty)) }
     }
 
     /// None of the numbers is one any more; on the host alone, row N1 of docs/safety.md.
@@ -157,10 +164,9 @@ impl Modulator {
         self.dead_duty = f32::NAN;
     }
 
+    /// Within 0 and the greatest duty; one that is not a number stays so, for the caller's check.
     #[inline(always)]
-    fn duty(&self, wanted: f32, current_in_bands: f32) -> f32 {
-        let duty = wanted + self.dead_duty * clamp(current_in_bands, -1.0, 1.0);
-        // One that is no number stays so, for who asked to see.
+    fn limited(&self, duty: f32) -> f32 {
         if duty < 0.0 {
             0.0
         } else if duty > self.greatest_duty {

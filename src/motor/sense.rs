@@ -41,6 +41,7 @@ impl SenseScale {
 
     /// Current vector of the codes of B and C, with their zeros; `None` where one is at a rail.
     #[must_use]
+    #[inline(always)]
     pub fn currents(&self, codes: [u16; 2], zeros: [f32; 2]) -> Option<Stationary<Ampere>> {
         let [b, c] = codes;
         let width = self.rails[1].wrapping_sub(self.rails[0]);

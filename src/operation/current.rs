@@ -182,7 +182,7 @@ impl<const N: usize> CurrentLoops<N> {
             }
         }
         if let Some(ticks) = signals.statistics.current_ticks.get(axis) {
-            ticks.add();
+            ticks.count();
         }
         signals.statistics.see_bus(tick.sample.bus_code);
     }

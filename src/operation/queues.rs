@@ -71,8 +71,10 @@ pub struct Queues<const N: usize> {
 
 /// Ends of the current loops.
 pub struct CurrentEnds<'a, const N: usize> {
-    pub(super) orders: [Consumer<'a, Order>; N],
-    pub(super) outcomes: [Producer<'a, Outcome>; N],
+    /// Orders to each axis.
+    pub orders: [Consumer<'a, Order>; N],
+    /// Outcomes of each axis.
+    pub outcomes: [Producer<'a, Outcome>; N],
     /// Samples of each joint for the servo.
     pub samples: [Producer<'a, JointSample>; N],
 }
@@ -253,8 +255,10 @@ pub struct BusQueues<const N: usize> {
 
 /// The servo's ends towards the bus.
 pub struct HostEnds<'a, const N: usize> {
-    pub(super) orders: Consumer<'a, LegOrder<N>>,
-    pub(super) told: Producer<'a, LegTold<N>>,
+    /// Orders of the bus.
+    pub orders: Consumer<'a, LegOrder<N>>,
+    /// Reports of the leg.
+    pub told: Producer<'a, LegTold<N>>,
     pub(super) logged: Producer<'a, LoggedSample<N>>,
 }
 

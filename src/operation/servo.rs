@@ -228,7 +228,10 @@ impl<const N: usize> ServoLevel<N> {
         let mut record = |record| send(LegEvent::Record(record), ends, signals);
         let decision = &output.servo.decision;
         let activity = control.activity();
-        let changed = self.state.is_none_or(|before| words::drive(before) != words::drive(decision.state));
+        // Words are compared letter by letter, and mostly the state is the same.
+        let changed = self.state.is_none_or(|before| {
+            before != decision.state && words::drive(before) != words::drive(decision.state)
+        });
         if changed && let Some(fault) = decision.fault {
             // A fault before the state that follows from it.
             let (code, name) = (fault.code.number(), words::fault(fault.code));

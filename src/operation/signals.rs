@@ -40,6 +40,12 @@ impl Word {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// Adds one, wrapping; for words that one level writes.
+    #[inline(always)]
+    pub fn count(&self) {
+        self.set(self.get().wrapping_add(1));
+    }
+
     /// Keeps the larger of this value and its own; for words that one level writes.
     #[inline(always)]
     pub fn raise(&self, value: u32) {

@@ -192,6 +192,17 @@ impl TickWatch {
     /// Bits of what forbids to enable from this tick on, and whether so many ticks are missing now that the servo has to damp.
     #[inline(always)]
     pub fn look(&mut self, now: &TickState) -> (u32, bool) {
+        if now.missed == 0 && now.complete && !now.emergency_stop && !now.gate_fault {
+            self.missed = 0;
+            return (0, false);
+        }
+        self.look_closer(*now)
+    }
+
+    /// The tick of which something is wrong.
+    #[cold]
+    #[inline(never)]
+    fn look_closer(&mut self, now: TickState) -> (u32, bool) {
         let before = self.missed;
         self.missed = if now.missed > 0 { self.missed.saturating_add(now.missed) } else { 0 };
         let bit = |holds: bool, cause: Cause| if holds { cause.bit() } else { 0 };

@@ -3,26 +3,22 @@
 use core::hint::black_box;
 
 use cortex_m_semihosting::hprintln;
-use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ};
+use scarab::hal::{AxisCommand, AxisSample};
 use scarab::motor::{
     Axis, AxisConfiguration, AxisRequest, Calibration, CalibrationSettings, CalibrationStep, Calibrator, Sine,
 };
 use scarab::units::{Ampere, Volt};
 
-use crate::account::{Account, percent};
 use crate::axis_parts;
 use crate::counter::{Tally, count, heading};
 use crate::motor::{CONFIGURATION, Motor};
 
 /// Design: one axis' tick.
 const MOST_INSTRUCTIONS: u32 = 700;
-/// Design: both axes' share of the processor, per cent.
-const MOST_PERCENT: f32 = 35.0;
-const AXES: u32 = 2;
 
 /// Mechanical speeds and target currents: nearly at rest (a rotor that a current of either sign does not move has an encoder that is
 /// frozen), a joint's greatest behind 50:1, and near the voltage limit.
-const SPEEDS: [(f32, f32); 4] = [(1.0, 10.0), (225.0, 30.0), (-225.0, 30.0), (820.0, 40.0)];
+pub const SPEEDS: [(f32, f32); 4] = [(1.0, 10.0), (225.0, 30.0), (-225.0, 30.0), (820.0, 40.0)];
 /// Ticks counted at each speed; an electrical turn at the slowest moving speed is 96.
 const TICKS: u32 = 1200;
 
@@ -32,47 +28,40 @@ fn tick(axis: &mut Axis, sample: &AxisSample, request: AxisRequest) -> AxisComma
 }
 
 /// Prints the tables; whether the bounds are kept.
-pub fn report(account: &mut Account) -> bool {
+pub fn report() -> bool {
     let mut kept = true;
     for (name, sine) in [("exact sine", Sine::Exact), ("micromath's sine", Sine::Fast)] {
         let configuration = AxisConfiguration { sine, ..CONFIGURATION };
         let mut motor = Motor::at_rest();
         hprintln!("\nOne axis, 24 kHz, {}", name);
         heading("instructions");
-        let Some(calibration) = calibrated(&mut motor, &configuration) else { return false };
+        let mut tally = Tally::default();
+        let Some(calibration) = calibrated(&mut motor, &configuration, &mut tally) else { return false };
+        tally.print("calibration, a tick");
         let Some(all) = ticks(&mut motor, &configuration, &calibration) else { return false };
         kept &= all.print_against("axis tick, all of them", MOST_INSTRUCTIONS);
-        kept &= share(&all);
         if sine == CONFIGURATION.sine {
             axis_parts::report(&all);
-            account.add("axis tick, both axes", all, MOST_INSTRUCTIONS, AXES * CURRENT_RATE_HZ);
         }
     }
     kept
 }
 
-fn share(all: &Tally) -> bool {
-    let [mean, most] = [all.mean(), all.most()].map(|one| percent(one, AXES * CURRENT_RATE_HZ));
-    let word = if most <= MOST_PERCENT { "kept" } else { "MISSED" };
-    let name = "both axes, % of the processor";
-    hprintln!("{:<48} {:>8.1} {:>8.1}   goal {:.0}: {}", name, mean, most, MOST_PERCENT, word);
-    most <= MOST_PERCENT
-}
-
-fn calibrated(motor: &mut Motor, configuration: &AxisConfiguration) -> Option<Calibration> {
+/// A calibration of a motor, and what its ticks take; `None` where it is refused.
+pub fn calibrated(
+    motor: &mut Motor,
+    configuration: &AxisConfiguration,
+    tally: &mut Tally,
+) -> Option<Calibration> {
     let settings = CalibrationSettings { current: Ampere(20.0), voltage: Volt(4.0), turns_per_s: 16.0 };
     let mut calibrator = Calibrator::new(configuration, settings).ok()?;
     let mut sample = motor.sample(None);
-    let mut tally = Tally::default();
     loop {
         let (instructions, step) = count(|| calibrator.tick(&sample));
         tally.push(instructions);
         match step {
             CalibrationStep::Running(command) => sample = motor.period(command),
-            CalibrationStep::Done(found) => {
-                tally.print("calibration, a tick");
-                return Some(found);
-            }
+            CalibrationStep::Done(found) => return Some(found),
             CalibrationStep::Refused(reason) => {
                 hprintln!("calibration refused: {:?}", reason);
                 return None;

@@ -1,4 +1,4 @@
-//! What a board's round of the bus costs while the wire is full: the interrupt of level 5 without its queues.
+//! What a board's round of the bus costs while the wire is full: the interrupt of level 5 with its queues, without the controller's registers.
 //!
 //! Each frame that comes raises a round, each that has left another one, and every second tick of the servo a third. A wire at 1 Mbit/s carries at most
 //! so many: frames without data have 47 bits, of eight bytes 111, stuffed bits not counted. A round that takes its time is followed by the frames of
@@ -7,19 +7,19 @@
 use core::hint::black_box;
 
 use cortex_m_semihosting::hprintln;
-use heapless::Deque;
+use heapless::spsc::Producer;
 
 use scarab::bus::drive::{AxisConstants, Mode};
 use scarab::bus::identification::Found;
-use scarab::bus::station::{LegOrder, LegTold, Station};
-use scarab::bus::{Controller, Frame, Identity, LONGEST, NmtState, NodeId, kept_objects, write_kept};
-use scarab::leg::{DriveState, JointStatus, LoggedSample, Plan};
-use scarab::operation::{BusBoard, BusRound, Keep, Mailboxes};
+use scarab::bus::station::{LegTold, Station};
+use scarab::bus::{Frame, Identity, LONGEST, NmtState, NodeId, kept_objects, write_kept};
+use scarab::leg::{DriveState, JointStatus, Plan};
+use scarab::operation::{BusEnds, BusQueues, BusRound, Handover, HostEnds, Keep, Signals};
 use scarab::units::{Ampere, NewtonMetre};
-use static_cell::StaticCell;
 
-use crate::account::{CYCLES_PER_INSTRUCTION, PROCESSOR_HZ, percent};
+use crate::account::percent;
 use crate::counter::{self, Tally, count, heading};
+use crate::machine::{Machine, bits};
 
 /// Frames of each kind.
 const COUNT: usize = 2000;
@@ -27,114 +27,47 @@ const COUNT: usize = 2000;
 const START_US: u64 = 10_000;
 /// The servo tells in every second tick.
 const TOLD_US: u64 = 500;
-/// Of the board's queue.
-const FRAMES: usize = 32;
 /// With it the rest of the firmware keeps a fifth of the processor for its housekeeping and the search.
 const MOST_PERCENT: f32 = 43.0;
-/// While the levels above take a third of the processor.
-const US_PER_INSTRUCTION: f32 = 1e6 / PROCESSOR_HZ * CYCLES_PER_INSTRUCTION / (1.0 - 0.33);
-
-/// Queues of one; what is sent leaves before the next round.
-struct Board {
-    frames: Deque<Frame, FRAMES>,
-    told: Option<LegTold<2>>,
-    sent: u32,
-    bits: u32,
-    lost: u32,
-    /// For one store.
-    memory: Option<&'static mut Keep<2>>,
-    /// When the round began, and the counter then.
-    now_us: u64,
-    begun: u32,
-}
-
-/// Bits of a frame on the wire, and of the pause after it.
-fn bits(frame: &Frame) -> u32 {
-    47 + 8 * frame.data().len() as u32
-}
-
-impl Mailboxes for Board {
-    fn waiting(&self) -> u32 {
-        0
-    }
-    fn send(&mut self, _: u32, frame: &Frame) {
-        self.sent += 1;
-        self.bits += bits(frame);
-    }
-    fn give_up(&mut self) {}
-}
-
-impl BusBoard<2> for Board {
-    fn now_us(&self) -> u64 {
-        self.now_us + u64::from((counter::now().wrapping_sub(self.begun) as f32 * US_PER_INSTRUCTION) as u32)
-    }
-    fn status(&mut self) -> Controller {
-        Controller::Active
-    }
-    fn frame(&mut self) -> Option<Frame> {
-        self.frames.pop_front()
-    }
-    fn logged(&mut self) -> Option<LoggedSample<2>> {
-        None
-    }
-    fn is_told(&self) -> bool {
-        self.told.is_some()
-    }
-    fn told(&mut self) -> Option<LegTold<2>> {
-        self.told.take()
-    }
-    fn takes_order(&self) -> bool {
-        true
-    }
-    fn order(&mut self, order: LegOrder<2>) {
-        black_box(order);
-    }
-    fn held(&self) -> bool {
-        true
-    }
-    fn set_hosted(&mut self, hosted: bool) {
-        black_box(hosted);
-    }
-    fn kept(&mut self) -> Option<&Keep<2>> {
-        None
-    }
-    fn lent(&mut self) -> Option<&mut Keep<2>> {
-        self.memory.as_deref_mut()
-    }
-    fn keep(&mut self) {
-        self.memory = None;
-    }
-}
-
-struct Bench {
+/// A station with its queues; the servo at their other end takes what it is given, and reports when it is told to.
+struct Bench<'a> {
     station: Station<2, 16>,
     found: Found<2, 1>,
     round: BusRound,
-    board: Board,
+    frames: Producer<'a, Frame>,
+    ends: BusEnds<'a, 2>,
+    servo: HostEnds<'a, 2>,
+    storage: Handover<Keep<2>>,
+    signals: Signals<2>,
+    machine: Machine,
+    lost: u32,
     now_us: u64,
     tally: Tally,
     may_lose: bool,
 }
 
-impl Bench {
-    fn new() -> Option<Self> {
+impl<'a> Bench<'a> {
+    fn new(queues: &'a mut BusQueues<2>) -> Option<Self> {
         let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
         let constants = AxisConstants { rated_torque: NewtonMetre(40.0), rated_current: Ampere(20.0), modes };
         let own = [NodeId::new(1)?, NodeId::new(2)?];
         let station = Station::new(own, Identity::scarab(1, "emulated"), [constants; 2], Plan::OneTime, 1);
-        let board = Board {
-            frames: Deque::new(),
-            told: None,
-            sent: 0,
-            bits: 0,
+        let (frames, servo, ends) = queues.split();
+        let mut bench = Self {
+            station,
+            found: Found::nothing(),
+            round: BusRound::new(),
+            frames,
+            ends,
+            servo,
+            storage: Handover::new(Keep::NOTHING),
+            signals: Signals::new(),
+            machine: Machine::default(),
             lost: 0,
-            memory: None,
-            now_us: 0,
-            begun: 0,
+            now_us: START_US,
+            tally: Tally::default(),
+            may_lose: false,
         };
-        let (round, tally) = (BusRound::new(), Tally::default());
-        let mut bench =
-            Self { station, found: Found::nothing(), round, board, now_us: START_US, tally, may_lose: false };
         bench.hear(None);
         bench.hear(Some(Frame::new(0, &[1, 0])));
         let operational = bench.station.nodes().iter().all(|node| node.state() == NmtState::Operational);
@@ -143,48 +76,45 @@ impl Bench {
 
     /// One round; whether something was sent.
     fn hear(&mut self, frame: Option<Frame>) -> bool {
-        self.board.sent = 0;
+        self.machine.sent = 0;
         if let Some(frame) = frame {
-            self.board.lost += u32::from(self.board.frames.push_back(frame).is_err());
+            self.lost += u32::from(self.frames.enqueue(frame).is_err());
         }
-        (self.board.now_us, self.board.begun) = (self.now_us, counter::now());
-        let Self { station, found, round, board, .. } = self;
-        let (instructions, ()) = count(|| round.round(FRAMES, station, board, &*found));
+        (self.machine.now_us, self.machine.begun) = (self.now_us, counter::now());
+        let Self { station, found, round, ends, storage, signals, machine, .. } = self;
+        let (instructions, ()) = count(|| round.round(station, ends, storage, signals, machine, &*found));
         self.tally.push(instructions);
-        self.board.sent > 0
+        black_box(self.servo.orders.dequeue());
+        self.machine.sent > 0
     }
 
     /// These frames, one after the other, on a wire on which nothing else has room; what is sent raises rounds of its own.
     fn run(&mut self, name: &str, frames: &[Frame]) -> bool {
-        (self.tally, self.board.bits, self.board.lost) = (Tally::default(), 0, 0);
+        (self.tally, self.machine.bits, self.lost) = (Tally::default(), 0, 0);
         let (begun_us, mut bits_heard, mut half_ms) = (self.now_us, 0, 0);
         let joint = JointStatus { drive: DriveState::OperationEnabled, ..JointStatus::NONE };
         let mut number = 0;
         for frame in frames.iter().cycle().take(COUNT) {
             bits_heard += bits(frame);
-            self.now_us = begun_us + u64::from(bits_heard + self.board.bits);
+            self.now_us = begun_us + u64::from(bits_heard + self.machine.bits);
             let mut sends = self.hear(Some(*frame));
             while sends {
-                self.now_us = begun_us + u64::from(bits_heard + self.board.bits);
+                self.now_us = begun_us + u64::from(bits_heard + self.machine.bits);
                 sends = self.hear(None);
             }
             number += 1;
             if self.now_us / TOLD_US > half_ms {
                 half_ms = self.now_us / TOLD_US;
-                self.board.told = Some(LegTold {
-                    joints: [joint; 2],
-                    held: true,
-                    blocked: false,
-                    rests: false,
-                    ..LegTold::NONE
-                });
+                let told =
+                    LegTold { joints: [joint; 2], held: true, blocked: false, rests: false, ..LegTold::NONE };
+                let _ = self.servo.told.enqueue(told);
                 self.hear(None);
             }
         }
         let seconds = (self.now_us - begun_us) as f32 * 1e-6;
         let per_second = |count: u32| (count as f32 / seconds) as u32;
         let share = percent(self.tally.mean(), per_second(self.tally.number()));
-        let kept = share <= MOST_PERCENT && (self.board.lost == 0 || self.may_lose);
+        let kept = share <= MOST_PERCENT && (self.lost == 0 || self.may_lose);
         hprintln!(
             "{:<40} {:>8} {:>8} {:>6.1}  {}",
             name,
@@ -218,28 +148,28 @@ pub fn report() -> Option<bool> {
     ];
     let mut kept = true;
     for (name, frame) in all {
-        kept &= Bench::new()?.run(name, &[frame]);
+        kept &= Bench::new(&mut BusQueues::new())?.run(name, &[frame]);
     }
     let mixed = [all[2].1, all[4].1, Frame::new(0x302, &[1, 2, 3, 4]), all[8].1];
-    kept &= Bench::new()?.run("SYNC, targets, SDO", &mixed);
-    let mut bench = Bench::new()?;
+    kept &= Bench::new(&mut BusQueues::new())?.run("SYNC, targets, SDO", &mixed);
+    let mut queues = BusQueues::new();
+    let mut bench = Bench::new(&mut queues)?;
     full(&mut bench);
     // A millisecond and more without an ear: what finds no room is told (8110).
     bench.may_lose = true;
     kept &= bench.run("reset, records of 400 bytes", &[all[7].1]);
 
     heading("a round that keeps both nodes' objects");
-    static MEMORY: StaticCell<Keep<2>> = StaticCell::new();
-    let mut bench = Bench::new()?;
-    bench.board.memory = Some(MEMORY.init_with(|| Keep::NOTHING));
+    let mut queues = BusQueues::new();
+    let mut bench = Bench::new(&mut queues)?;
     bench.tally = Tally::default();
     bench.hear(Some(Frame::new(0x601, &[0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'])));
     bench.tally.print("save");
-    Some(kept & bench.board.memory.is_none())
+    Some(kept & bench.storage.given().is_some())
 }
 
 /// Both nodes keep as much as a record has room for, of any values.
-fn full(bench: &mut Bench) {
+fn full(bench: &mut Bench<'_>) {
     let mut record = [0; LONGEST];
     let mut length = 0;
     for (object, row) in kept_objects() {

@@ -1,5 +1,5 @@
 //! Counts instructions on the emulated microcontroller: one axis' tick, its parts, the same steps of the crate `foc`, the
-//! 4 kHz tick of a leg, the steps of its identification, the iterations of the default swarm and the frames of the bus.
+//! whole current interrupt, the 4 kHz tick of a leg, the steps of its identification, the iterations of the default swarm and the frames of the bus.
 //!
 //! Why instructions: the emulator executes them exactly and in the same number every time, and models neither flash wait
 //! states nor pipeline. `scripts/count-instructions` builds and runs this image (`qemu-system-arm -M netduinoplus2 -icount
@@ -12,10 +12,13 @@ mod axis_parts;
 mod axis_tick;
 mod bus;
 mod bus_round;
+mod copies;
 mod counter;
 mod identification;
+mod interrupt;
 mod leg;
 mod leg_tick;
+mod machine;
 mod motor;
 #[path = "../../../../examples/damped_oscillation/objective.rs"]
 mod objective;
@@ -29,7 +32,7 @@ use cortex_m_semihosting::{debug, hprintln};
 fn main() -> ! {
     let kept = counter::start() && {
         let mut account = account::Account::default();
-        let axis = axis_tick::report(&mut account);
+        let axis = copies::report() & axis_tick::report() & interrupt::report(&mut account);
         peers::report();
         let search = leg::model().and_then(|model| {
             leg_tick::report(&model, &mut account)?;

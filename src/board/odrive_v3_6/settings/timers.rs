@@ -123,5 +123,6 @@ pub const fn repetition(axis: usize) -> Write {
 #[must_use]
 pub fn compare(duty: f32) -> u16 {
     let high = duty * f32::from(TOP) + 0.5;
-    TOP - (high as u16).min(TOP)
+    // One instruction converts to 32 bits and limits; to 16 bits the limits would be compared one by one.
+    TOP - (high as u32).min(u32::from(TOP)) as u16
 }
