@@ -6,7 +6,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-pub use crate::safety::Cause;
+pub use crate::safety::{Cause, stays_active};
 
 static CAUSES: AtomicU32 = AtomicU32::new(0);
 
