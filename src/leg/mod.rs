@@ -58,8 +58,8 @@ pub use crate::motor::{
     Refusal as CalibrationRefusal, StoredCalibration,
 };
 pub use crate::safety::{
-    DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, Permission,
-    PowerRequest, RefusalReason,
+    DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, NO_ERROR,
+    NoticeCode, Permission, PowerRequest, RefusalReason,
 };
 pub use crate::servo::LogSample;
 

@@ -300,7 +300,7 @@ fn one_store_is_under_way_and_how_it_ended_is_told() {
     (bench.board.memory.done, bench.board.ended) = (false, true);
     bench.run(8);
     let codes: Vec<u16> = bench.told().iter().filter(|(id, _)| *id == 0x81).map(|(_, code)| *code).collect();
-    assert_eq!((codes.first(), codes.last()), (Some(&0xFF01), Some(&0x5530)), "{codes:x?}");
+    assert_eq!((codes.first(), codes.last()), (Some(&0xFF0D), Some(&0x5530)), "{codes:x?}");
     assert!(!bench.board.is_lent);
     // The second was refused by the flash: a reset brings back the first.
     bench.send(0, &[129, 0]);

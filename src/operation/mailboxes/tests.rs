@@ -225,7 +225,7 @@ fn an_emergency_that_waited_in_a_mailbox_is_told_whatever_the_controller_becomes
         let code = if controller == Controller::Off { 0x8140 } else { 0x8120 };
         let mut told = [1, 2].map(|node| bench.told(node));
         told.iter_mut().for_each(|codes| codes.truncate(2));
-        assert_eq!(told, [[0xFF01, code]; 2].map(Vec::from), "{controller:?}");
+        assert_eq!(told, [[0xFF0D, code]; 2].map(Vec::from), "{controller:?}");
     }
 }
 
@@ -264,6 +264,6 @@ fn what_is_told_again_is_told_in_its_order_whatever_mailboxes_it_was_in() {
     for node in [1, 2] {
         let told = bench.told(node);
         let told: Vec<u16> = told.into_iter().filter(|code| *code != 0x8120).collect();
-        assert_eq!(told, [0xFF01, 0], "{node}");
+        assert_eq!(told, [0xFF0D, 0], "{node}");
     }
 }

@@ -268,8 +268,10 @@ impl<'a, const B: usize> Watched<'a, B> {
     }
 
     fn finish(mut self) -> Outcome {
-        if self.scenario.expected == Expected::Kept {
-            return self.keep();
+        match self.scenario.expected {
+            Expected::Kept => return self.keep(),
+            Expected::Ignored => return self.ignore(),
+            _ => {}
         }
         let before = *self.rig.commands();
         let limit = self.begun + self.scenario.patience;
