@@ -136,6 +136,32 @@ fn only_the_doors_name_the_maths_library_and_unsafe_code() {
     assert_none(&offences);
 }
 
+/// Elsewhere an output could be an input of the same command, or be left half written.
+#[test]
+fn only_one_module_of_the_tool_writes_files() {
+    const WRITERS: [[&str; 3]; 8] = [
+        ["fs", "::", "write"],
+        ["fs", "::", "rename"],
+        ["fs", "::", "copy"],
+        ["fs", "::", "create_dir"],
+        ["fs", "::", "create_dir_all"],
+        ["File", "::", "create"],
+        ["File", "::", "options"],
+        ["OpenOptions", "::", "new"],
+    ];
+    let mut offences = Vec::new();
+    for file in source_files("hal-sim/src") {
+        let all = tokens(&file.text);
+        for three in all.windows(3).filter(|_| !file.path.starts_with("hal-sim/src/tool/files/")) {
+            let names = [three[0].text, three[1].text, three[2].text];
+            if WRITERS.contains(&names) {
+                offences.push(format!("{}:{}: {} outside files/", file.path, three[0].line, names.concat()));
+            }
+        }
+    }
+    assert_none(&offences);
+}
+
 #[test]
 fn no_file_but_the_list_writes_a_fault_or_emergency_code() {
     let faults = FaultCode::ALL.map(FaultCode::number).into_iter();

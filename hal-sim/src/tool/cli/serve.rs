@@ -1,13 +1,14 @@
 //! `serve`: legs on a CANopen bus behind a port that host software speaks to.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::Path;
 
 use clap::Args;
 
 use super::leg_options::LegOptions;
 use crate::tool::bus::serve::{ServeOptions, serve};
 use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::files::Updated;
 use crate::tool::setup::DEFAULT_SEED;
 use crate::with_leg_size;
 
@@ -27,7 +28,7 @@ pub struct ServeArguments {
     speed: f64,
     /// The boards' flash; it is made where there is none.
     #[arg(long, value_name = "FILE")]
-    flash: Option<PathBuf>,
+    flash: Option<Updated>,
     /// Of noise.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
@@ -43,7 +44,7 @@ pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
         address: arguments.slcan,
         legs: arguments.legs.into(),
         speed: arguments.speed,
-        flash: arguments.flash.clone(),
+        flash: arguments.flash.as_deref().map(Path::to_owned),
         seed: arguments.seed,
         bits_per_s: 1_000_000,
     };
