@@ -71,6 +71,7 @@ impl<const B: usize> Watched<'_, B> {
             undetectable: ignored,
             false_alarm: !ignored,
             after_ms: None,
+            intermittent_ms: None,
             state: None,
             alarm: alarm.map(FaultCode::name),
             magnitude: self.scenario.magnitude,
