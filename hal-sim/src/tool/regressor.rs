@@ -63,7 +63,7 @@ fn table_of<const N: usize>(
         if !row.is_finite() {
             return Err(states.out_of_range(k).into());
         }
-        out += &row.from_chain(&to_chain).line(k);
+        out += &row.turned(&to_chain).line(k);
     }
     Ok(out)
 }
@@ -124,7 +124,7 @@ struct Row<const N: usize> {
 
 impl<const N: usize> Row<N> {
     /// Torques, and what they are made of, in the sign of the angles that were given.
-    fn from_chain(mut self, to_chain: &[AnatomicalJoint<f64>; N]) -> Self {
+    fn turned(mut self, to_chain: &[AnatomicalJoint<f64>; N]) -> Self {
         for (joint, anatomy) in to_chain.iter().enumerate() {
             let turn = |number: &mut f64| *number = anatomy.from_chain(*number);
             self.torques.iter_mut().for_each(|torques| turn(&mut torques[joint]));

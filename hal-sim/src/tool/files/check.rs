@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use clap::{Arg, ArgMatches, Command};
 
 use super::role::{Input, LegName, Output, OutputFolder, Updated};
-use super::write::can_write_in;
+use super::write::{can_write_in, can_write_over};
 use super::{folder_of, is_device, resolved};
 use crate::tool::error::ToolError;
 
@@ -172,6 +172,7 @@ fn check_writable(file: &Named, files: &[Named]) -> Result<(), ToolError> {
         Ok(found) if !is_folder && found.permissions().readonly() => {
             return Err(cannot("it is write-protected"));
         }
+        Ok(_) if !is_folder => can_write_over(place).map_err(|error| cannot(&error.to_string()))?,
         _ => {}
     }
     // Folders that the command makes need not exist.

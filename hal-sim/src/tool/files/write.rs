@@ -103,7 +103,12 @@ pub(super) fn can_write_in(folder: &Path) -> io::Result<()> {
     std::fs::remove_file(temporary)
 }
 
-/// A new file that nobody else has.
+/// Whether a file that exists can be written: it is opened, and left as it is.
+pub(super) fn can_write_over(file: &Path) -> io::Result<()> {
+    OpenOptions::new().append(true).open(file).map(drop)
+}
+
+/// A new file under a name that is not taken.
 fn temporary_in(folder: &Path) -> io::Result<(PathBuf, File)> {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
     let number = NUMBER.fetch_add(1, Ordering::Relaxed);
