@@ -30,6 +30,8 @@ mod permitted;
 mod results;
 mod stored;
 mod succession;
+#[cfg(test)]
+pub(crate) mod testing;
 mod upkeep;
 
 pub use activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
