@@ -204,11 +204,15 @@ mod tests {
             assert!(!rotor.look());
         }
         assert!(!rotor.pulse(300, 0) && !rotor.is_suspicious());
-        // Neither is one believed that comes where a suspect was.
+        // Neither is one believed that comes where a suspect was. The pulse's own look is the last of 16, or of 15.
         let mut rotor = Turning::new();
-        assert!(!rotor.turn(300) && !rotor.pulse(300, 0) && !rotor.turn(TURN));
-        assert!((0..i32::from(REST_SAMPLES)).all(|_| !rotor.look()));
-        assert!(!rotor.pulse(300, 0));
+        for (looks, lost) in [(REST_SAMPLES - 1, false), (REST_SAMPLES - 2, true)] {
+            rotor = Turning::new();
+            assert!(!rotor.turn(300) && !rotor.pulse(300, 0) && !rotor.turn(TURN));
+            assert!((0..looks).all(|_| !rotor.look()));
+            assert_eq!(rotor.pulse(300, 0), lost, "{looks}");
+        }
+        assert!((0..REST_SAMPLES).all(|_| !rotor.look()) && !rotor.pulse(300, 0));
         // Two counts on it turns again.
         rotor.counts += 2;
         assert!(rotor.pulse(300, 0));
