@@ -165,6 +165,19 @@ fn time_that_does_not_increase_is_refused() {
 }
 
 #[test]
+fn half_of_the_steps_may_not_be_longer_than_a_tenth_of_a_second() {
+    let sampled = |rate_hz: f64| {
+        let rows: Vec<String> = (0..60).map(|k| format!("{},0,0,0,{k}", f64::from(k) / rate_hz)).collect();
+        Recording::parse(Path::new("walk.csv"), &text(HEADER, &rows), 2).map_err(|error| error.to_string())
+    };
+    assert!(sampled(10.0).is_ok());
+    let message = sampled(9.9).expect_err("too slow");
+    assert!(message.contains("which is 9.9 Hz; at least 10 Hz are needed"), "{message}");
+    // A gap takes no median's place.
+    assert!(sampled(1.0).expect_err("too slow").contains("1 Hz"));
+}
+
+#[test]
 fn a_gap_is_refused_where_it_ends() {
     let mut rows = rows();
     rows.drain(100..125);

@@ -5,21 +5,45 @@ Needs the packages `canopen`, `python-can` and `pyserial`; any CAN adapter that 
 """
 
 import math
+import select
 import struct
 import threading
 import time
 
+import can
 import canopen
+from can.interfaces.slcan import slcanBus
 
 HOST = 80
 MICRO = 1e-6
 PDO_OFF = 0x80000000
 
 
+class Adapter(slcanBus):
+    """python-can's slcan adapter on TCP, read in blocks.
+
+    python-can reads a socket byte by byte, with a `select` and a `recv` for each of the 22 bytes of a frame: three quarters of a
+    core for the 500 Hz log. On a busy machine it falls behind and samples are lost.
+    """
+
+    def _read(self, timeout):
+        port = self.serialPortOrig._socket
+        while (end := self._buffer.find(self._OK)) < 0:
+            if not select.select([port], [], [], timeout)[0]:
+                return None
+            received = port.recv(1 << 16)
+            if not received:
+                raise can.CanOperationError("the adapter closed the connection")
+            self._buffer += received.replace(self._ERROR, self._ERROR + self._OK)
+        line = self._buffer[:end + 1].decode()
+        del self._buffer[:end + 1]
+        return line
+
+
 def connect(address):
     """The bus behind an slcan adapter on TCP, `host:port`."""
-    network = canopen.Network()
-    network.connect(interface="slcan", channel=f"socket://{address}", bitrate=1_000_000, sleep_after_open=0)
+    network = canopen.Network(Adapter(f"socket://{address}", bitrate=1_000_000, sleep_after_open=0))
+    network.connect()
     return network
 
 

@@ -2,7 +2,7 @@
 //!
 //! Why by source: an error that ends must be told to have ended without hiding one that goes on. Each source has at most
 //! one error; a message leaves when it begins, when it becomes another one, and when it ends (code 0, with the register of
-//! what is left).
+//! what is left). Codes: `safety::fault`.
 //!
 //! ```text
 //! message = error code, 2 bytes | error register, 1 byte | information, 5 bytes          identifier: 1014
@@ -13,6 +13,7 @@
 use super::abort::Abort;
 use super::pdo::PDOS;
 use crate::hal::Frame;
+use crate::leg::NO_ERROR;
 
 /// Entries of the history.
 pub const HISTORY: usize = 8;
@@ -117,7 +118,7 @@ impl Emergency {
         }
         *place = error;
         let register = self.register();
-        let ErrorReport { code, information } = error.unwrap_or(ErrorReport::code(0));
+        let ErrorReport { code, information } = error.unwrap_or(ErrorReport::code(NO_ERROR));
         let [low, high] = code.to_le_bytes();
         let [a, b, c, d, e] = information;
         if let Some(free) = self.waiting.iter_mut().find(|message| message.is_none()) {
@@ -199,6 +200,28 @@ mod tests {
         assert_eq!((emergency.history(2), emergency.history(3)), (Ok(0x8130), Err(Abort::NoData)));
         assert_eq!((emergency.forget(1), emergency.forget(0)), (Err(Abort::Range), Ok(())));
         assert_eq!(emergency.history(1), Err(Abort::NoData));
+    }
+
+    #[test]
+    fn each_class_of_codes_has_its_bit_of_the_error_register() {
+        let bits = [
+            (0x2000, 1),
+            (0x2310, 1),
+            (0x3220, 2),
+            (0x4210, 3),
+            (0x8130, 4),
+            (0x8250, 4),
+            (0x5410, 5),
+            (0x7305, 5),
+            (0x8400, 5),
+            (0xFF02, 7),
+        ];
+        for (code, bit) in bits {
+            assert_eq!(ErrorReport::code(code).register(), 1 | 1 << bit, "{code:04X}");
+        }
+        for code in [0x1000, 0x6100, 0x9000] {
+            assert_eq!(ErrorReport::code(code).register(), 1, "{code:04X}");
+        }
     }
 
     #[test]

@@ -125,6 +125,14 @@ mod tests {
     }
 
     #[test]
+    fn a_setting_is_read_as_it_was_written_and_a_refused_one_changes_nothing() {
+        let mut consumer = Consumer::default();
+        assert_eq!((consumer.setting(), consumer.set(127 << 16 | 0xFFFF)), (0, Ok(())));
+        assert_eq!(consumer.set(0x0080_0064), Err(Abort::Range));
+        assert_eq!(consumer.setting(), 0x007F_FFFF);
+    }
+
+    #[test]
     fn a_clock_keeps_its_period_and_does_not_make_up_for_what_it_missed() {
         let mut clock = Clock::default();
         let times = [0, 400, 1000, 1001, 2100, 3000, 9500, 9600, 10_500].map(|now| clock.is_due(1000, now));

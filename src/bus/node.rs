@@ -23,14 +23,15 @@ use super::pdo::PDOS;
 use super::pdo::receive::Received;
 use super::sdo::Server;
 use crate::hal::{Controller, Frame};
+use crate::leg::{FaultCode, NoticeCode};
 
 impl Controller {
     fn error(self) -> Option<ErrorReport> {
         let code = match self {
             Self::Active => return None,
-            Self::Overrun => 0x8110,
-            Self::Passive => 0x8120,
-            Self::Off => 0x8140,
+            Self::Overrun => NoticeCode::Overrun.number(),
+            Self::Passive => FaultCode::BusPassive.number(),
+            Self::Off => FaultCode::BusOff.number(),
         };
         Some(ErrorReport::code(code))
     }
@@ -48,14 +49,13 @@ pub enum Storing {
 }
 
 impl Storing {
-    /// FF01 is the maker's own; 5530 is data storage.
     fn error(self) -> Option<ErrorReport> {
         let code = match self {
             Self::Done => return None,
-            Self::Busy => 0xFF01,
-            Self::Failed => 0x5530,
+            Self::Busy => NoticeCode::Storing,
+            Self::Failed => NoticeCode::StoreFailed,
         };
-        Some(ErrorReport::code(code))
+        Some(ErrorReport::code(code.number()))
     }
 }
 
@@ -270,8 +270,8 @@ impl Node {
             return Heard::Nothing;
         };
         let received = receive.take(frame, now_us);
-        // 8210: PDO not processed, too short.
-        let error = (received == Received::TooShort).then_some(ErrorReport::code(0x8210));
+        let too_short = ErrorReport::code(NoticeCode::ShortPdo.number());
+        let error = (received == Received::TooShort).then_some(too_short);
         self.communication.emergency.set(Source::Receive(place as u8), error);
         if received == Received::Now {
             self.write_received(place, objects);
@@ -334,10 +334,8 @@ impl Node {
         }
         for place in 0..PDOS {
             if self.communication.receive.get_mut(place).is_some_and(|pdo| pdo.is_missed(now_us)) {
-                // 8250: RPDO timeout.
-                self.communication
-                    .emergency
-                    .set(Source::Receive(place as u8), Some(ErrorReport::code(0x8250)));
+                let late = ErrorReport::code(FaultCode::LatePdo.number());
+                self.communication.emergency.set(Source::Receive(place as u8), Some(late));
                 self.fail(Lost::ReceivedPdo, objects);
             }
         }
@@ -353,8 +351,8 @@ impl Node {
 
     fn watch<O: Objects>(&mut self, consumer: u8, change: Option<Change>, objects: &mut O) {
         let Some(change) = change else { return };
-        // 8130: heartbeat error.
-        let error = (change == Change::Lost).then_some(ErrorReport::code(0x8130));
+        let lost = ErrorReport::code(FaultCode::Heartbeat.number());
+        let error = (change == Change::Lost).then_some(lost);
         self.communication.emergency.set(Source::Heartbeat(consumer), error);
         if change == Change::Lost {
             self.fail(Lost::Heartbeat, objects);

@@ -351,6 +351,12 @@ where
         }
     }
 
+    /// A search is under way; one that was cancelled is not.
+    #[must_use]
+    pub fn is_searching(&self) -> bool {
+        self.work == Work::Solving
+    }
+
     /// The solver of the last training motion.
     #[must_use]
     pub fn solver(&self) -> Option<&Solver<f32, N, B>> {

@@ -30,6 +30,8 @@ mod permitted;
 mod results;
 mod stored;
 mod succession;
+#[cfg(test)]
+pub(crate) mod testing;
 mod upkeep;
 
 pub use activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
@@ -58,8 +60,8 @@ pub use crate::motor::{
     Refusal as CalibrationRefusal, StoredCalibration,
 };
 pub use crate::safety::{
-    DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, Permission,
-    PowerRequest, RefusalReason,
+    DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, NO_ERROR,
+    NoticeCode, Permission, PowerRequest, RefusalReason,
 };
 pub use crate::servo::LogSample;
 

@@ -15,8 +15,8 @@
 //! every other tick. A single step that was not believed is
 //! told with the joint's sample, and three of them in 10 ms are the servo's fault (`safety::Monitor`). A code that stays while its
 //! phase is asked for something else, and shunts that do not begin at zero, release as well ([`ShuntWatch`]). Released stays released
-//! until [`Axis::clear_fault`]. An index pulse further from its place than 4 counts and the way of 10 us releases, switching or not, and so do two turns without any: looked at with the
-//! joint's sample.
+//! until [`Axis::clear_fault`]. Two wrong index pulses at one place, or more than two turns without a right one, release, switching or not
+//! (`index.rs`): looked at with the joint's sample.
 //!
 //! Once per joint sample the voltages are held against currents and speed ([`ModelWatch`]): an open phase and a drifted zero
 //! release, a frozen counter makes the motor a passive brake ([`Axis::brake`]), since a leg whose encoder is gone should not drop.
@@ -33,7 +33,6 @@
 //!
 //! Cost: `scripts/count-instructions`.
 
-use super::calibration::INDEX_WIDTH;
 use super::configuration::{AxisConfiguration, AxisError, Constants};
 use super::current_loop::DELAY_PERIODS;
 use super::model_watch::Shown;
@@ -44,20 +43,20 @@ use crate::real::{abs, clamp, is_finite};
 use crate::units::Ampere;
 
 mod asked;
+mod index;
 mod told;
 #[cfg(not(target_os = "none"))]
 mod upset;
 mod window;
 
 pub use asked::{AxisFault, AxisRequest, Wish};
+use index::IndexWatch;
 use window::Window;
 
 /// What a reading of shunts or bus that is not believed adds to the doubts; each that is believed takes one away. Beyond so many it is a fault:
 /// the third of three in every other tick, or the sixth of one in four.
 const DOUBT: u8 = 4;
 const MOST_DOUBTS: u8 = 8;
-/// A count that is taken by an interrupt at the index may be late by one part in so many of a period: 10 us.
-const INDEX_LATENCY: i32 = 4;
 
 /// One axis; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,10 +68,7 @@ pub struct Axis {
     counter: u16,
     /// Of the counter, to that sample.
     step: i32,
-    /// Where the index came since the last joint sample, as a place, and how far the counter went in that period.
-    index: Option<(i32, i32)>,
-    /// Counts when it came last.
-    indexed_at: i32,
+    index: IndexWatch,
     /// Within one turn, in the electrical sense.
     place: i32,
     /// Unwrapped, in the joint's sense.
@@ -117,8 +113,7 @@ impl Axis {
             speed: SpeedTracker::at(constants.scale.angle(place).plus(constants.offset)),
             counter: sample.encoder_count,
             step: 0,
-            index: None,
-            indexed_at: 0,
+            index: IndexWatch::at(0),
             place,
             counts: 0,
             measured: Rotating::default(),
@@ -139,7 +134,7 @@ impl Axis {
 
     /// States that the joint now stands at `counts`.
     pub fn set_counts(&mut self, counts: i32) {
-        self.indexed_at = self.indexed_at.wrapping_add(counts.wrapping_sub(self.counts));
+        self.index.shift(counts.wrapping_sub(self.counts));
         self.counts = counts;
         self.window = Window::EMPTY;
     }
@@ -203,7 +198,7 @@ impl Axis {
             if let Some(at) = sample.index_count {
                 let since =
                     constants.counter_sign * i32::from(sample.encoder_count.wrapping_sub(at).cast_signed());
-                self.index = Some((self.place - since, step.abs()));
+                self.index.came(self.place - since, step);
             }
         }
         let angle = self.angle();
@@ -301,16 +296,10 @@ impl Axis {
         self.constants.scale.angle(self.place).plus(self.constants.offset)
     }
 
-    /// Whether the index came away from its place since the last call, or has not come for too long.
+    /// Whether index pulses say that the place is lost.
     fn is_off_the_index(&mut self) -> bool {
-        let Some((place, step)) = self.index.take() else {
-            return self.counts.wrapping_sub(self.indexed_at).unsigned_abs() > self.constants.unindexed;
-        };
-        self.indexed_at = self.counts;
-        let scale = &self.constants.scale;
-        let distance = scale.within_turn(place);
-        let distance = distance.min(scale.counts_per_turn() - distance);
-        self.constants.indexed && distance > INDEX_WIDTH + step / INDEX_LATENCY
+        let Constants { indexed, unindexed, scale, .. } = &self.constants;
+        *indexed && self.index.is_lost(self.counts, scale, *unindexed)
     }
 
     /// Means of count and current since the last call, in the joint's sense; both of the same ticks, so that they belong to one

@@ -9,7 +9,7 @@ use super::queues::{EVENTS, IdentificationEnds, LegEvent};
 use super::signals::Signals;
 use crate::leg::{
     Activity, Finding, Identification, IdentifiedModel, IdentifyPhase, LoggedSample, MotionWindow, Reason,
-    SearchState, Segment, Verdict,
+    Segment, Verdict,
 };
 use crate::servo::TICKS_PER_LOG;
 use crate::trace::{Record, judged, words};
@@ -143,7 +143,7 @@ impl IdentificationLevel {
             let [iterations, done] = &signals.statistics.search;
             iterations.set(search.iterations());
             done.set(search.evaluations());
-            return if search.state() == SearchState::Running { Slice::Busy } else { Slice::Idle };
+            return if identification.is_searching() { Slice::Busy } else { Slice::Idle };
         };
         let mut slice = Slice::Busy;
         match &finding {
@@ -198,3 +198,6 @@ impl IdentificationLevel {
         self.seed
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -125,4 +125,4 @@ impl Speaker {
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+mod tests;

@@ -273,3 +273,6 @@ fn send<const N: usize>(event: LegEvent<N>, ends: &mut ServoEnds<'_, N>, signals
         signals.statistics.records_lost.add();
     }
 }
+
+#[cfg(test)]
+mod tests;

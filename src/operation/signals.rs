@@ -395,41 +395,4 @@ impl<const N: usize> Default for Signals<N> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::safety::FaultCode;
-
-    #[test]
-    fn a_reported_fault_keeps_its_code_and_joint() {
-        let signals = Signals::<2>::new();
-        for fault in BoardFault::ALL {
-            signals.report(fault, 1);
-            assert_eq!(signals.take_reported(0).count(), 0);
-            assert!(signals.take_reported(1).eq([fault]));
-            assert_eq!(signals.take_reported(1).count(), 0, "once");
-        }
-        assert_eq!(BoardFault::Thermistor.code(), FaultCode::Thermistor);
-    }
-
-    #[test]
-    fn a_target_is_followed_only_while_the_drive_is_enabled() {
-        let signals = Signals::<2>::new();
-        assert_eq!(signals.target(1), AxisRequest::RELEASED);
-        signals.set_targets(&DriveCommand { enabled: true, currents: [Ampere(1.0), Ampere(-2.0)] });
-        assert_eq!(signals.target(1), AxisRequest { enabled: true, current: Ampere(-2.0) });
-        signals.begin_servo();
-        signals.end_servo();
-        assert_eq!((signals.target(0), signals.has_begun()), (AxisRequest::RELEASED, false));
-        assert_eq!(signals.target(2), AxisRequest::RELEASED);
-    }
-
-    #[test]
-    fn a_reset_forgets_neither_permanent_causes_nor_a_flash_write() {
-        let inhibit = Inhibit::new();
-        Cause::ALL.into_iter().for_each(|cause| inhibit.raise(cause));
-        inhibit.reset();
-        assert_eq!(inhibit.causes(), Cause::for_ever() | Cause::Storing.bit());
-        inhibit.end_storing();
-        assert_eq!(inhibit.causes(), Cause::for_ever());
-    }
-}
+mod tests;

@@ -5,7 +5,7 @@
 //! ```text
 //! refused         unless the drive is off and nothing forbids to enable
 //! interlock       `storing`: both bridges released by the next current tick, the servo keeps its drive off, a calibration ends
-//! hosts           told by an emergency message (FF01): heartbeats may pause; 20 ms for it to leave
+//! hosts           told by an emergency message (FF0D): heartbeats may pause; 20 ms for it to leave
 //! refused         unless the drive is off still: it may have been enabled between the first look and the interlock
 //! watchdog        8 s instead of 16 ms, read back; refused where it does not take them
 //! flash           changed; it looks at the bridges' and the brake resistor's registers itself

@@ -1,1 +1,357 @@
+//! The hardware of this module's unit tests: registers as public fields, no decisions.
+//!
+//! One value serves every level, so tests of single levels and of several together see the same board. An emergency stop can be
+//! placed before any access of a tick ([`Stop`]), as the interrupt of its contact may come.
 
+extern crate std;
+
+use core::cell::RefCell;
+use std::boxed::Box;
+use std::collections::VecDeque;
+use std::rc::Rc;
+use std::vec::Vec;
+
+use heapless::spsc::Producer;
+
+use super::{BusEnds, BusQueues, Ends, HostEnds, Queues, Signals};
+use crate::bus::drive::{AxisConstants, Mode};
+use crate::bus::identification::Found;
+use crate::bus::station::{LegTold, Station};
+use crate::bus::{Identity, NodeId};
+use crate::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
+use crate::leg::{DriveState, JointCommand, JointStatus, Plan};
+use crate::safety::Cause;
+use crate::units::{Ampere, NewtonMetre};
+
+/// A watchdog whose new time counts after a while. A write while one is under way is ignored.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct TestWatchdog {
+    pub stretched: bool,
+    /// Milliseconds until what was written counts, and what that is.
+    pub under_way: Option<(u64, bool)>,
+    /// Duration of a write [ms]; `None` for ever.
+    pub takes_ms: Option<u64>,
+    /// How often it was fed.
+    pub fed: u32,
+}
+
+impl TestWatchdog {
+    fn ask(&mut self, stretched: bool) -> bool {
+        if self.under_way.is_none() && self.stretched != stretched {
+            self.under_way = Some((self.takes_ms.unwrap_or(u64::MAX), stretched));
+        }
+        self.under_way.is_none() && self.stretched == stretched
+    }
+
+    pub fn pass(&mut self, milliseconds: u64) {
+        self.under_way = self.under_way.and_then(|(left, value)| {
+            if left > milliseconds {
+                return Some((left - milliseconds, value));
+            }
+            self.stretched = value;
+            None
+        });
+    }
+}
+
+/// Bus controller with three mailboxes. They leave in the order in which they were filled, at once where the plug is in.
+#[derive(Debug)]
+pub(super) struct TestCan {
+    pub controller: Controller,
+    /// A frame was lost since the state was read.
+    pub overrun: bool,
+    /// Mailbox, frame, and time at which it was given [us].
+    pub waiting: Vec<(u32, Frame, u64)>,
+    pub unplugged: bool,
+    /// Frames that left, when they were given and when they left [us].
+    pub sent: Vec<(Frame, u64, u64)>,
+    /// How often transmission was aborted.
+    pub aborted: u32,
+    /// Most mailboxes that were full at once.
+    pub most: usize,
+}
+
+/// Interrupt of received frames: fills the queue whenever the clock is read, and lets hearing a frame take time.
+pub(super) struct Reception {
+    queue: Producer<'static, Frame>,
+    /// Frames on the wire.
+    pub arriving: VecDeque<Frame>,
+    /// Time that hearing one frame takes [us].
+    pub frame_us: u64,
+    /// Time that all frames so far took [us].
+    spent_us: u64,
+    /// Frames in the queue at the last look.
+    queued: usize,
+}
+
+impl Reception {
+    fn new(queue: Producer<'static, Frame>) -> Self {
+        Self { queue, arriving: VecDeque::new(), frame_us: 0, spent_us: 0, queued: 0 }
+    }
+
+    /// Frames that nobody heard yet.
+    pub fn unheard(&self) -> usize {
+        self.queue.len() + self.arriving.len()
+    }
+
+    fn look(&mut self) -> u64 {
+        self.spent_us += (self.queued - self.queue.len()) as u64 * self.frame_us;
+        while self.queue.ready()
+            && let Some(frame) = self.arriving.pop_front()
+        {
+            let _ = self.queue.enqueue(frame);
+        }
+        self.queued = self.queue.len();
+        self.spent_us
+    }
+}
+
+/// An emergency stop whose interrupt comes before an access of the hardware: releases, then raises its cause.
+pub(super) struct Stop<const N: usize> {
+    pub signals: Rc<Signals<N>>,
+    /// Accesses before it.
+    pub after: u32,
+    /// It waits for the end of a masked step.
+    pub pending: bool,
+    /// It was handled.
+    pub handled: bool,
+    /// Bridges were switched on after that.
+    pub enabled_since: bool,
+}
+
+impl<const N: usize> Stop<N> {
+    pub fn new(signals: &Rc<Signals<N>>, after: u32) -> Self {
+        let signals = Rc::clone(signals);
+        Self { signals, after, pending: false, handled: false, enabled_since: false }
+    }
+}
+
+/// All registers of a board of `N` axes.
+pub(super) struct TestHardware<const N: usize> {
+    /// Outputs and duties of each bridge.
+    pub bridges: [AxisCommand; N],
+    pub brake: f32,
+    pub servo_pended: u32,
+    pub bus_pended: u32,
+    pub contacts: Contacts,
+    pub encoder_counts: [u16; N],
+    pub temperatures: [Option<f32>; N],
+    pub gates_hold: [bool; N],
+    pub gate_status: [u32; N],
+    /// The gate drivers take their configuration.
+    pub gates_configure: bool,
+    /// Each switching of the gate drivers' supply.
+    pub gates_switched: Vec<bool>,
+    pub now_us: u64,
+    pub can: TestCan,
+    pub reception: Option<RefCell<Reception>>,
+    pub watchdog: TestWatchdog,
+    pub stop: Option<Stop<N>>,
+    /// Accesses that a tick makes, counted for [`Stop`].
+    pub accesses: u32,
+    masked: bool,
+}
+
+impl<const N: usize> TestHardware<N> {
+    /// A sound board at rest, both contacts open, bridges at 30 degrees Celsius.
+    pub fn new() -> Self {
+        let can = TestCan {
+            controller: Controller::Active,
+            overrun: false,
+            waiting: Vec::new(),
+            unplugged: false,
+            sent: Vec::new(),
+            aborted: 0,
+            most: 0,
+        };
+        Self {
+            bridges: [AxisCommand::RELEASED; N],
+            brake: 0.0,
+            servo_pended: 0,
+            bus_pended: 0,
+            contacts: Contacts::default(),
+            encoder_counts: [0; N],
+            temperatures: [Some(30.0); N],
+            gates_hold: [true; N],
+            gate_status: [0; N],
+            gates_configure: true,
+            gates_switched: Vec::new(),
+            now_us: 0,
+            can,
+            reception: None,
+            watchdog: TestWatchdog { takes_ms: Some(48), ..TestWatchdog::default() },
+            stop: None,
+            accesses: 0,
+            masked: false,
+        }
+    }
+
+    /// Frames that are under way leave where the plug is in.
+    pub fn empty_mailboxes(&mut self) {
+        if !self.can.unplugged {
+            let now_us = self.now_us();
+            let waiting = self.can.waiting.drain(..);
+            self.can.sent.extend(waiting.map(|(_, frame, given_us)| (frame, given_us, now_us)));
+        }
+    }
+
+    /// Reception of frames.
+    pub fn reception(&self) -> core::cell::RefMut<'_, Reception> {
+        self.reception.as_ref().expect("a bus").borrow_mut()
+    }
+
+    /// Whether any outputs are on.
+    pub fn is_enabled(&self) -> bool {
+        self.bridges.iter().any(|bridge| bridge.enabled)
+    }
+
+    /// Counts an access; the stop's interrupt comes before it where its turn is.
+    fn access(&mut self) {
+        if let Some(stop) = &mut self.stop {
+            stop.pending |= stop.after == self.accesses;
+        }
+        self.accesses += 1;
+        self.interrupt();
+    }
+
+    fn interrupt(&mut self) {
+        if let Some(stop) = &mut self.stop
+            && !self.masked
+            && core::mem::take(&mut stop.pending)
+        {
+            self.bridges = [AxisCommand::RELEASED; N];
+            stop.signals.inhibit.raise(Cause::EmergencyStop);
+            stop.handled = true;
+        }
+    }
+}
+
+impl<const N: usize> Hardware<N> for TestHardware<N> {
+    fn masked(&mut self, step: impl FnOnce(&mut Self)) {
+        self.access();
+        self.masked = true;
+        step(self);
+        self.masked = false;
+        self.interrupt();
+    }
+    fn release_all(&mut self) {
+        self.access();
+        self.bridges = [AxisCommand::RELEASED; N];
+    }
+    fn release(&mut self, axis: usize) {
+        self.access();
+        self.bridges[axis] = AxisCommand::RELEASED;
+    }
+    fn set_duty(&mut self, axis: usize, duty: &[f32; 3]) {
+        self.access();
+        self.bridges[axis].duty = *duty;
+    }
+    fn enable(&mut self, axis: usize) {
+        self.access();
+        self.bridges[axis].enabled = true;
+        if let Some(stop) = &mut self.stop {
+            stop.enabled_since |= stop.handled;
+        }
+    }
+    fn set_brake(&mut self, duty: f32) {
+        self.access();
+        self.brake = duty;
+    }
+    fn pend_servo(&mut self) {
+        self.access();
+        self.servo_pended += 1;
+    }
+    fn pend_bus(&mut self) {
+        self.access();
+        self.bus_pended += 1;
+    }
+    fn contacts(&self) -> Contacts {
+        self.contacts
+    }
+    fn encoder_count(&self, axis: usize) -> u16 {
+        self.encoder_counts[axis]
+    }
+    fn temperature(&self, axis: usize) -> Option<f32> {
+        self.temperatures[axis]
+    }
+    fn gate_holds(&mut self, axis: usize) -> bool {
+        self.gates_hold[axis]
+    }
+    fn gate_status(&mut self, axis: usize) -> u32 {
+        self.gate_status[axis]
+    }
+    fn switch_gates(&mut self, on: bool) {
+        self.gates_switched.push(on);
+    }
+    fn configure_gates(&mut self) -> bool {
+        self.gates_configure
+    }
+    fn now_us(&self) -> u64 {
+        self.now_us + self.reception.as_ref().map_or(0, |reception| reception.borrow_mut().look())
+    }
+    fn controller(&mut self) -> Controller {
+        if core::mem::take(&mut self.can.overrun) { Controller::Overrun } else { self.can.controller }
+    }
+    fn mailboxes_waiting(&self) -> u32 {
+        self.can.waiting.iter().fold(0, |bits, (mailbox, _, _)| bits | 1 << mailbox)
+    }
+    fn send(&mut self, mailbox: u32, frame: &Frame) {
+        assert!(mailbox < 3 && self.mailboxes_waiting() & 1 << mailbox == 0, "dropped");
+        let now_us = self.now_us();
+        self.can.waiting.push((mailbox, *frame, now_us));
+        self.can.most = self.can.most.max(self.can.waiting.len());
+    }
+    fn abort_transmission(&mut self) {
+        self.can.aborted += 1;
+        self.can.waiting.clear();
+    }
+    fn feed_watchdog(&mut self) {
+        self.watchdog.fed += 1;
+    }
+    fn stretch_watchdog(&mut self) -> bool {
+        self.watchdog.ask(true)
+    }
+    fn tighten_watchdog(&mut self) -> bool {
+        self.watchdog.ask(false)
+    }
+}
+
+/// Hardware that receives frames, and the ends of its bus' queues.
+pub(super) fn on_a_bus() -> (TestHardware<2>, HostEnds<'static, 2>, BusEnds<'static, 2>) {
+    let queues = Box::leak(Box::new(BusQueues::new()));
+    let (frames, host, bus) = queues.split();
+    let mut hardware = TestHardware::new();
+    hardware.reception = Some(RefCell::new(Reception::new(frames)));
+    (hardware, host, bus)
+}
+
+/// Ends of queues that are never freed.
+pub(super) fn ends() -> Ends<'static, 2> {
+    Box::leak(Box::new(Queues::new())).split(Box::leak(Box::default()))
+}
+
+/// Results of an identification that was never made.
+pub(super) const NOTHING: Found<2, 1> = Found::nothing();
+
+/// Two nodes with the numbers 1 and 2.
+pub(super) fn station() -> Station<2, 4> {
+    let constants = AxisConstants {
+        rated_torque: NewtonMetre(40.0),
+        rated_current: Ampere(20.0),
+        modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+    };
+    let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));
+    Station::new(own, Identity::scarab(1, "test"), [constants; 2], Plan::OneTime, 1)
+}
+
+/// What a host commands that has the drive.
+pub(super) fn commanded() -> [JointCommand; 2] {
+    let mut station = station();
+    // Its boot-up message goes first.
+    assert!(station.poll(0, 0, &NOTHING).is_some());
+    station.hear(&Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 6, 0, 0, 0]), 0, None, &NOTHING);
+    assert!(station.poll(0, 0, &NOTHING).is_some());
+    let joint = JointStatus { drive: DriveState::SwitchOnDisabled, ..JointStatus::NONE };
+    station.told(&LegTold { joints: [joint; 2], rests: false, ..LegTold::NONE });
+    station.order().commands.expect("a host")
+}

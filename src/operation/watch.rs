@@ -47,3 +47,6 @@ fn counts<const N: usize>(signals: &Signals<N>) -> ([u32; N], [u32; 2]) {
     let levels = [statistics.servo_ticks.get(), statistics.rounds.get()];
     (statistics.current_ticks.each_ref().map(Word::get), levels)
 }
+
+#[cfg(test)]
+mod tests;

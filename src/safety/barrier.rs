@@ -287,6 +287,25 @@ mod tests {
     }
 
     #[test]
+    fn a_torque_at_a_bound_is_not_limited_and_one_beyond_it_is() {
+        let wide = JointLimits { high: Radian(6.0), low: Radian(-6.0), ..HIP };
+        let barrier = Barrier::new(&wide);
+        for sign in [1.0, -1.0] {
+            let velocity = sign * (HIP.speed.0 - 0.125);
+            let bound = sign * barrier.damping_nm_s_per_rad * (barrier.speed_rad_per_s - velocity.abs());
+            assert!(bound.abs() < barrier.cap_nm, "{bound}");
+            let at = |wanted| barrier.bound(Radian::ZERO, RadianPerSecond(velocity), NewtonMetre(wanted));
+            assert_eq!(at(bound), (NewtonMetre(bound), Limited::default()));
+            let (torque, limited) = at(bound * 1.001);
+            assert_eq!((torque.0, limited), (bound, Limited { speed: true, ..Limited::default() }));
+            // The cap itself may be asked for.
+            let cap = NewtonMetre(sign * barrier.cap_nm);
+            let (torque, limited) = barrier.bound(Radian::ZERO, RadianPerSecond::ZERO, cap);
+            assert_eq!((torque, limited), (cap, Limited::default()));
+        }
+    }
+
+    #[test]
     fn what_is_derated_is_what_is_asked_and_not_what_stops_a_joint() {
         let mut barrier = Barrier::new(&HIP);
         barrier.derate([0.5, 0.2]);

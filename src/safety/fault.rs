@@ -1,7 +1,8 @@
 //! What can go wrong: numbers that never change, the safe state of each, the catalogue's row it belongs to.
 //!
 //! Why one table: monitor, axes, interlock, bus and records speak of the same faults, and a campaign that injects them
-//! (docs/safety.md) asks here what has to follow. There is no second list.
+//! (docs/safety.md) asks here what has to follow. There is no second list. What a node reports on the bus without a fault of
+//! the leg ([`NoticeCode`]) has its numbers here as well, so that no code means two things.
 //!
 //! Numbers are the error codes of CiA 402 where it has one, else CiA 301's for manufacturers (FFxx), so a host that reads
 //! object 603F understands them. The safe state is chosen per fault: an exoskeleton that goes limp may drop its wearer, one
@@ -152,6 +153,42 @@ impl FaultCode {
     }
 }
 
+/// Code of an emergency message which reports that an error has ended.
+pub const NO_ERROR: u16 = 0;
+
+macro_rules! notices {
+    ($( $(#[doc = $doc:literal])* $code:ident = $number:literal; )*) => {
+        /// Emergency code of a node's own, without a fault of the leg. A number is never used again.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u16)]
+        pub enum NoticeCode {
+            $( $(#[doc = $doc])* $code = $number, )*
+        }
+
+        impl NoticeCode {
+            /// All of them, in the table's order.
+            pub const ALL: [Self; [$( $number, )*].len()] = [$( Self::$code, )*];
+
+            /// The number on the bus.
+            #[must_use]
+            pub const fn number(self) -> u16 {
+                self as u16
+            }
+        }
+    };
+}
+
+notices! {
+    /// Received frames were lost (8110: CAN overrun).
+    Overrun = 0x8110;
+    /// A received PDO was shorter than its mapping (8210: PDO not processed).
+    ShortPdo = 0x8210;
+    /// Objects were not stored, or cannot be read back (5530: data storage).
+    StoreFailed = 0x5530;
+    /// The flash is about to be written: the node may be silent for seconds, heartbeats included.
+    Storing = 0xFF0D;
+}
+
 /// A fault and the joint it was seen at; it stops the whole leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
@@ -205,6 +242,16 @@ mod tests {
         assert_eq!(numbers.map(|(code, _)| code), FaultCode::ALL);
         for (code, number) in numbers {
             assert_eq!(code.number(), number, "{code:?}");
+        }
+        assert_eq!(NoticeCode::ALL.map(NoticeCode::number), [0x8110, 0x8210, 0x5530, 0xFF0D]);
+    }
+
+    #[test]
+    fn no_code_has_two_meanings() {
+        let faults = FaultCode::ALL.into_iter().map(FaultCode::number);
+        let all = || faults.clone().chain(NoticeCode::ALL.map(NoticeCode::number)).chain([NO_ERROR]);
+        for code in all() {
+            assert_eq!(all().filter(|other| *other == code).count(), 1, "{code:04X} means two things");
         }
     }
 

@@ -12,9 +12,28 @@
 //! | [`TickWatch`] | current ticks missed, at once or with none in time between | three: the servo is told and damps; 24 (1 ms): Off |
 //! | [`ServoWatch`] | a servo that did not tick since it was last called | three calls in a row |
 //!
-//! Cost: some 12 instructions per axis and tick.
+//! **How often a line is read.** Off drops the leg's hold, so a spike on a wire must not lead there. A line is believed where
+//! [`READS`] reads in a row agree, 1 us on the board ([`stays_active`]); a single read would believe any spike that it meets.
+//!
+//! | line | reads | why |
+//! | --- | --- | --- |
+//! | emergency stop | 16, 1 us | The input has no filter on the board, and the bridges' edges ring for less. A contact that opens stays open for milliseconds, so no stop is lost; each comes 1 us later. The poll and the interrupt (EXTI4) use this one rule. |
+//! | gate drivers' nFAULT | 16, 1 us | An open drain with a weak pull-up beside the gate lines. No fault is that short: overcurrent is latched until the enable pin is cycled, a lost supply holds the line for 8 ms, and the driver has shut its gates by then. Warnings are pulses on another pin (nOCTW), which no input of the board reads. Reads within one tick keep the deadline of one period. |
+//! | missing conversion | 1 | A flag of the converter, no wire. |
+//! | encoder's index | 2 pulses | One wrong pulse is noise: `motor::axis`. At rest the interrupt reads the pin again. |
+//!
+//! Cost: some 12 instructions per axis and tick, and the reads of an active line.
 
 use super::fault::FaultCode;
+
+/// Reads of a line that have to agree, of some 60 ns each on the board.
+pub const READS: u32 = 16;
+
+/// Whether a line is active in [`READS`] reads in a row; the first read that is not ends them.
+#[inline(always)]
+pub fn stays_active(mut is_active: impl FnMut() -> bool) -> bool {
+    (0..READS).all(|_| is_active())
+}
 
 /// Missed ticks, or unanswered ones of the servo, in a row that are too many.
 const PATIENCE: u8 = 3;
@@ -250,6 +269,22 @@ mod tests {
             let mut watch = TickWatch::default();
             assert_eq!((watch.look(&GOOD), watch.look(&state)), ((0, false), (cause.bit(), false)));
         }
+    }
+
+    #[test]
+    fn a_spike_is_no_stop_and_a_line_that_stays_active_is_one() {
+        // The line is active for so many reads from the first on.
+        let read = |active: u32| {
+            let mut reads = 0;
+            let believed = stays_active(|| {
+                reads += 1;
+                reads <= active
+            });
+            (believed, reads)
+        };
+        assert_eq!(read(0), (false, 1), "an inactive line costs one read");
+        assert_eq!([read(1), read(READS - 1)], [(false, 2), (false, READS)]);
+        assert_eq!([read(READS), read(u32::MAX)], [(true, READS); 2]);
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | [`Limits`] | what each joint may do; absurd ones are refused by name |
 //! | [`DriveState`] | the states of CiA 402, one for the whole leg, and their transitions |
-//! | [`FaultCode`], [`Fault`] | what can go wrong, with fixed numbers and the safe state each leads to |
+//! | [`FaultCode`], [`Fault`], [`NoticeCode`] | what can go wrong, with fixed numbers and the safe state each leads to |
 //! | [`StepGate`] | encoder steps that no joint can make |
 //! | [`Barrier`] | torque bounds that stop a joint before its range and speed end |
 //! | [`DeratingRamps`], [`LimitCode`] | less before nothing, by temperature and bus voltage; codes that are no faults |
@@ -42,8 +42,8 @@ pub mod upkeep;
 pub use barrier::{Barrier, Limited};
 pub use check_in::{CheckIns, GUARD_RATE_HZ, TickGuard};
 pub use derating::{Derating, DeratingRamps, LimitCode, LimitCodes, Ramp, SupplyWatch};
-pub use fault::{Fault, FaultCode, Reaction};
-pub use interlock::{Bridges, Cause, ServoWatch, TickState, TickWatch};
+pub use fault::{Fault, FaultCode, NO_ERROR, NoticeCode, Reaction};
+pub use interlock::{Bridges, Cause, ServoWatch, TickState, TickWatch, stays_active};
 pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
 pub use monitor::{Decision, Monitor, Observation, Refusal, RefusalReason, Request};
 pub use state::{DriveState, Event, Permission, PowerRequest};

@@ -55,10 +55,13 @@ pub struct KeptModel<const N: usize> {
     pub provenance: Provenance<N>,
 }
 
-/// Of the firmware: major, minor, patch.
-const VERSION: [u8; 3] = {
+/// Firmware version: major, minor, patch.
+const VERSION: [u8; 3] = version_of(env!("CARGO_PKG_VERSION").as_bytes());
+
+/// Numbers of a version, up to 255 each; what follows the third is ignored.
+const fn version_of(text: &[u8]) -> [u8; 3] {
     let mut version = [0; 3];
-    let (text, mut place, mut part) = (env!("CARGO_PKG_VERSION").as_bytes(), 0, 0);
+    let (mut place, mut part) = (0, 0);
     while place < text.len() && part < version.len() {
         match text[place] {
             digit @ b'0'..=b'9' => version[part] = 10 * version[part] + (digit - b'0'),
@@ -67,7 +70,7 @@ const VERSION: [u8; 3] = {
         place += 1;
     }
     version
-};
+}
 
 impl<const N: usize> KeptModel<N> {
     /// A model that was just accepted, with what its identification tells of it; generation and seed are its own.
@@ -238,5 +241,18 @@ impl<const N: usize> Kept for KeptModel<N> {
                 }),
             },
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::version_of;
+
+    #[test]
+    fn a_version_is_read_number_by_number() {
+        assert_eq!(version_of(b"0.1.0"), [0, 1, 0]);
+        assert_eq!(version_of(b"12.205.39"), [12, 205, 39]);
+        assert_eq!(version_of(b"1.2.3-rc.4"), [1, 2, 3]);
+        assert_eq!(version_of(b"7"), [7, 0, 0]);
     }
 }

@@ -52,7 +52,7 @@ impl Current {
             sample: AxisSample {
                 shunt_codes: converter::shunts(axis),
                 bus_code: converter::bus(),
-                encoder_count: encoder::count(axis),
+                encoder_count: encoder::sample(axis),
                 index_count: encoder::index(axis),
             },
         };

@@ -16,6 +16,9 @@
 
 use self::leg::JOINTS;
 use crate::operation::Signals;
+use crate::safety::Cause;
+
+pub use crate::safety::stays_active;
 
 pub mod bus;
 #[cfg(feature = "board-odrive-v3-6")]
@@ -36,3 +39,8 @@ pub use composition::run;
 
 /// Words that all levels share.
 pub static SIGNALS: Signals<JOINTS> = Signals::new();
+
+/// The emergency stop's contact opened: nothing is enabled from now on.
+pub fn stop() {
+    SIGNALS.inhibit.raise(Cause::EmergencyStop);
+}

@@ -9,6 +9,7 @@ mod tokens;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use scarab::safety::{FaultCode, NoticeCode};
 use tokens::{Token, tokens};
 
 /// Each room and the rooms it may use beside itself and the open ones.
@@ -56,6 +57,9 @@ const UNSAFE_ALLOWED: [&str; 5] = [
 /// Absolute folders that no other machine has; split, so that this file does not name one itself.
 const FOLDERS_OF_ONE_MACHINE: [&str; 4] =
     [concat!("/", "tmp/"), concat!("/", "work/"), concat!("/", "root/"), concat!("/", "home/")];
+
+/// The list of all fault and emergency codes.
+const CODE_LIST: &str = "src/safety/fault.rs";
 
 /// Longer files are split by meaning.
 const LARGEST_LINE_COUNT: usize = 400;
@@ -130,6 +134,66 @@ fn only_the_doors_name_the_maths_library_and_unsafe_code() {
         }
     }
     assert_none(&offences);
+}
+
+/// Elsewhere an output could be an input of the same command, or be left half written.
+#[test]
+fn only_one_module_of_the_tool_writes_files() {
+    const WRITERS: [[&str; 3]; 8] = [
+        ["fs", "::", "write"],
+        ["fs", "::", "rename"],
+        ["fs", "::", "copy"],
+        ["fs", "::", "create_dir"],
+        ["fs", "::", "create_dir_all"],
+        ["File", "::", "create"],
+        ["File", "::", "options"],
+        ["OpenOptions", "::", "new"],
+    ];
+    let mut offences = Vec::new();
+    for file in source_files("hal-sim/src") {
+        let all = tokens(&file.text);
+        for three in all.windows(3).filter(|_| !file.path.starts_with("hal-sim/src/tool/files/")) {
+            let names = [three[0].text, three[1].text, three[2].text];
+            if WRITERS.contains(&names) {
+                offences.push(format!("{}:{}: {} outside files/", file.path, three[0].line, names.concat()));
+            }
+        }
+    }
+    assert_none(&offences);
+}
+
+#[test]
+fn no_file_but_the_list_writes_a_fault_or_emergency_code() {
+    let faults = FaultCode::ALL.map(FaultCode::number).into_iter();
+    let codes: Vec<u16> = faults.chain(NoticeCode::ALL.map(NoticeCode::number)).collect();
+    let mut offences = Vec::new();
+    for file in source_files("src").into_iter().chain(source_files("hal-sim/src")) {
+        if file.path == CODE_LIST || file.path.contains("/tests/") || file.path.ends_with("/tests.rs") {
+            continue;
+        }
+        let sources = file.text.split("#[cfg(test)]").next().unwrap_or_default();
+        for (number, line) in hexadecimals(sources) {
+            if u16::try_from(number).is_ok_and(|number| codes.contains(&number)) {
+                offences.push(format!("{}:{line}: the code {number:04X} outside {CODE_LIST}", file.path));
+            }
+        }
+    }
+    assert_none(&offences);
+}
+
+/// Hexadecimal numbers of a source and the lines they stand on.
+fn hexadecimals(source: &str) -> Vec<(u32, usize)> {
+    let digits = |pair: &[Token<'_>]| {
+        let text = pair[1].text.strip_prefix('x').filter(|_| pair[0].text == "0")?;
+        let number: String = text.chars().filter(|c| *c != '_').take_while(char::is_ascii_hexdigit).collect();
+        Some((u32::from_str_radix(&number, 16).ok()?, pair[1].line))
+    };
+    tokens(source).windows(2).filter_map(digits).collect()
+}
+
+#[test]
+fn a_hexadecimal_number_is_seen_with_its_line() {
+    assert_eq!(hexadecimals("let a = 0x8130;\n// 0x2310\nf(0xFF_01_u16, x81)"), [(0x8130, 1), (0xFF01, 3)]);
 }
 
 #[test]

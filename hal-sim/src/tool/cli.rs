@@ -19,13 +19,15 @@ mod predict;
 mod regressor;
 mod replay;
 mod serve;
+mod states;
 mod trace;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use super::error::EXIT_REFUSED;
+use super::error::{EXIT_REFUSED, ToolError};
+use super::files;
 
 /// Identifies legs, simulated or recorded. Exit codes: 0 accepted, 3 refused, 2 bad input.
 #[derive(Parser, Debug)]
@@ -88,25 +90,10 @@ pub fn main() -> ExitCode {
         }
         Some(_) => {}
     }
-    let outcome = match Cli::parse_from(words).command {
-        Command::Excite(arguments) => excite::run(&arguments),
-        Command::Faults(arguments) => faults::run(&arguments),
-        Command::Replay(arguments) => replay::run(&arguments),
-        Command::Trace(arguments) => trace::run(&arguments),
-        Command::Predict(arguments) => predict::run(&arguments),
-        Command::Export(arguments) => export::run(&arguments),
-        Command::Eds(arguments) => eds::run(&arguments),
-        Command::Serve(arguments) => serve::run(&arguments),
-        Command::Kept(arguments) => kept::run(&arguments),
-        Command::Monitor(arguments) => monitor::run(&arguments),
-        Command::Motor(arguments) => motor::run(&arguments),
-        Command::Paper(arguments) => paper::run(&arguments),
-        Command::Regressor(arguments) => regressor::run(&arguments),
-        Command::Emulate(arguments) => emulate::emulate(&arguments),
-        Command::Fw(arguments) => image::firmware(&arguments),
-        Command::FlashLeg(arguments) => image::flash_leg(&arguments),
-        Command::Identify(arguments) => identify::run(&arguments),
-    };
+    let description = Cli::command();
+    let matches = description.clone().get_matches_from(words);
+    let command = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit()).command;
+    let outcome = files::check(&description, &matches).and_then(|()| run(&command));
     match outcome {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
@@ -114,5 +101,57 @@ pub fn main() -> ExitCode {
             eprintln!("{kind}: {error}");
             ExitCode::from(error.exit_code())
         }
+    }
+}
+
+/// Runs one command; its exit code.
+fn run(command: &Command) -> Result<u8, ToolError> {
+    match command {
+        Command::Excite(arguments) => excite::run(arguments),
+        Command::Faults(arguments) => faults::run(arguments),
+        Command::Replay(arguments) => replay::run(arguments),
+        Command::Trace(arguments) => trace::run(arguments),
+        Command::Predict(arguments) => predict::run(arguments),
+        Command::Export(arguments) => export::run(arguments),
+        Command::Eds(arguments) => eds::run(arguments),
+        Command::Serve(arguments) => serve::run(arguments),
+        Command::Kept(arguments) => kept::run(arguments),
+        Command::Monitor(arguments) => monitor::run(arguments),
+        Command::Motor(arguments) => motor::run(arguments),
+        Command::Paper(arguments) => paper::run(arguments),
+        Command::Regressor(arguments) => regressor::run(arguments),
+        Command::Emulate(arguments) => emulate::emulate(arguments),
+        Command::Fw(arguments) => image::firmware(arguments),
+        Command::FlashLeg(arguments) => image::flash_leg(arguments),
+        Command::Identify(arguments) => identify::run(arguments),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::{Cli, files};
+
+    /// An argument that names a file has a type that says what is done with it, or the check would not see it.
+    #[test]
+    fn every_path_on_the_command_line_has_a_role() {
+        let mut paths = 0;
+        let mut commands = vec![Cli::command()];
+        while let Some(command) = commands.pop() {
+            for argument in command.get_arguments() {
+                let kind = argument.get_value_parser().type_id();
+                let has_role = files::check::has_role(argument);
+                assert!(
+                    kind != std::any::TypeId::of::<std::path::PathBuf>(),
+                    "{} {}: a path without a role",
+                    command.get_name(),
+                    argument.get_id()
+                );
+                paths += usize::from(has_role);
+            }
+            commands.extend(command.get_subcommands().cloned());
+        }
+        assert!(paths > 40, "{paths} arguments with a role");
     }
 }

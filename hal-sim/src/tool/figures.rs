@@ -34,6 +34,7 @@ mod trajectories;
 use std::path::Path;
 
 use super::error::ToolError;
+use super::files;
 use super::report::RunReport;
 use super::series::{Role, Series};
 use super::spread::Spread;
@@ -144,10 +145,8 @@ type Draw<'d> = &'d dyn Fn(&Area<'_>) -> Result<(), DrawingError>;
 
 /// Writes figures into a directory, which is made if need be.
 pub fn write(directory: &Path, figures: &[Figure]) -> Result<(), ToolError> {
-    std::fs::create_dir_all(directory).map_err(|error| ToolError::cannot_write(directory, &error))?;
     for figure in figures {
-        let path = directory.join(&figure.file);
-        std::fs::write(&path, &figure.svg).map_err(|error| ToolError::cannot_write(&path, &error))?;
+        files::write(&directory.join(&figure.file), &figure.svg)?;
     }
     Ok(())
 }

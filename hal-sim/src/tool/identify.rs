@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::consistent_runs;
 use super::error::ToolError;
+use super::files::NewFile;
 use super::leg_file::LegFile;
 use super::recording::{JointSeries, Recording};
 use super::report::{RunReport, SCHEMA};
@@ -89,12 +90,9 @@ pub fn write_log<const N: usize>(
             series.torque_nm.push(direction * f64::from(logged.sample.torque_nm[joint]));
         }
     }
-    let write = || -> std::io::Result<()> {
-        let mut out = std::io::BufWriter::new(std::fs::File::create(path)?);
-        recording.write(&mut out)?;
-        std::io::Write::flush(&mut out)
-    };
-    write().map_err(|error| ToolError::cannot_write(path, &error))
+    let mut out = NewFile::create(path)?;
+    recording.write(&mut out).map_err(|error| ToolError::cannot_write(path, &error))?;
+    out.finish()
 }
 
 /// Root mean square.

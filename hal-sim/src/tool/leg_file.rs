@@ -37,6 +37,7 @@
 mod check;
 mod convert;
 mod error;
+mod image;
 mod motor;
 mod segments;
 mod switch;
@@ -357,15 +358,21 @@ impl LegFile {
 
     /// A shipped leg by name, or the file at a path.
     pub fn load(name_or_path: &str) -> Result<Self, LegFileError> {
+        let (text, file) = Self::text(name_or_path)?;
+        Self::parse(&text, &file)
+    }
+
+    /// The text of a shipped leg or of a file, and the name that faults are reported under.
+    fn text(name_or_path: &str) -> Result<(String, String), LegFileError> {
         if let Some((name, text)) = SHIPPED_LEGS.iter().find(|(name, _)| *name == name_or_path) {
-            return Self::parse(text, &format!("{name} (shipped)"));
+            return Ok(((*text).to_owned(), format!("{name} (shipped)")));
         }
         let text = std::fs::read_to_string(name_or_path).map_err(|fault| {
             let names = SHIPPED_LEGS.map(|(name, _)| name).join(", ");
             let reason = format!("cannot be read ({fault}), and no shipped leg is called so ({names})");
             LegFileError::of_file(name_or_path, reason)
         })?;
-        Self::parse(&text, name_or_path)
+        Ok((text, name_or_path.to_owned()))
     }
 
     /// A leg from TOML text; `file` is what faults are reported under.

@@ -22,12 +22,13 @@
 //! | [`placed_mass`], [`scale`] | known masses: torque constants and loads |
 //! | [`eds`] | the electronic data sheet of a node of the bus |
 //! | [`model_file`], [`predict`], [`urdf`] | what was found, kept; its torque; the same for other programs |
-//! | [`regressor`] | torques and regressor of given states |
+//! | [`states`], [`regressor`] | given states of motion; their torques and regressor |
 //! | [`consistent`], [`consistent_runs`] | legs that can exist: both searches and their optimum |
 //! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
 //! | [`bus`] | legs on a CANopen bus, for host software that exists |
 //! | [`kept_file`] | what a board remembers over the power, as TOML and back |
 //! | [`image`] | the flash image: its leg, its build, its size |
+//! | [`files`] | files of a command: checked before it computes, written whole |
 //! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
 
 #![expect(
@@ -49,6 +50,7 @@ pub mod error;
 pub mod excite;
 pub mod faults;
 pub mod figures;
+pub mod files;
 pub mod findings;
 pub mod html;
 pub mod identify;
@@ -78,6 +80,7 @@ pub mod setup;
 pub mod simulate;
 pub mod size;
 pub mod spread;
+pub mod states;
 pub mod tables;
 pub mod temperature;
 pub mod trace;

@@ -10,34 +10,23 @@
 //!
 //! | | columns |
 //! | --- | --- |
-//! | in, found by name, others ignored | `q1..` (or `q1_rad`) rad, `qd1..` (`qd1_radps`) rad/s, `qdd1..` (`qdd1_radps2`) rad/s2: D-H angles, as `regressor` takes them, or anatomical ones; `t_s` if there |
+//! | in | states of motion ([`super::states`]); `t_s` if there |
 //! | out | `t_s` if there, else `k` from 0; per joint `tau1_Nm`, `tau1_sigma_Nm`, and the parts whose sum it is: `tau1_rigid_Nm` (bodies, gravity, rotor), `tau1_friction_Nm`, `tau1_offset_Nm` |
 //!
 //! A difference of Coulomb friction between the directions (`FCA1`) is friction, an offset is not.
 //! Torques have the sign of the angles that were given. At a speed of exactly 0 Coulomb friction is undetermined and
 //! counts as 0. All states are read and computed before anything is written.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use csv::StringRecord;
 use nalgebra::Vector3;
-use scarab::model::{AnatomicalJoint, Chain, JointState, Parameter, regressor};
+use scarab::model::{Chain, JointState, Parameter, regressor};
 use scarab::real::sign;
 
 use super::error::ToolError;
 use super::model_file::ModelFile;
-use super::recording::columns::{Column, for_each_row, line_at, read_text, refuse};
-use super::recording::{Fault, RecordingError};
-use super::setup::{anatomy, chain};
-
-/// What to predict.
-#[derive(Clone, Debug)]
-pub struct PredictOptions {
-    /// States of motion.
-    pub states: PathBuf,
-    /// Angles in and torques out are anatomical instead of D-H.
-    pub anatomical: bool,
-}
+use super::setup::chain;
+use super::states::{Angles, States};
 
 /// Torque of one joint, N m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,7 +54,6 @@ impl Prediction {
 pub struct Predictor<'a, const N: usize> {
     model: &'a ModelFile,
     chain: Chain<f64, N>,
-    anatomy: [AnatomicalJoint<f64>; N],
     gravity: Vector3<f64>,
     carriers: Vec<(usize, Parameter)>,
     /// Of each carrier: it acts only while its joint moves.
@@ -80,7 +68,6 @@ impl<'a, const N: usize> Predictor<'a, N> {
         Ok(Self {
             model,
             chain: chain(&leg)?,
-            anatomy: anatomy(&leg)?,
             gravity: Vector3::from(leg.gravity),
             carriers: carriers.collect(),
             moving_only: (model.base_set.parameters.iter())
@@ -140,29 +127,21 @@ impl<'a, const N: usize> Predictor<'a, N> {
         }
         torques
     }
-
-    fn to_chain(&self, [q, qd, qdd]: [[f64; N]; 3]) -> JointState<f64, N> {
-        JointState {
-            q: core::array::from_fn(|joint| self.anatomy[joint].angle_to_chain(q[joint])),
-            qd: core::array::from_fn(|joint| self.anatomy[joint].to_chain(qd[joint])),
-            qdd: core::array::from_fn(|joint| self.anatomy[joint].to_chain(qdd[joint])),
-        }
-    }
 }
 
 /// The table of a model of any size, as CSV text.
-pub fn table(model: &ModelFile, options: &PredictOptions) -> Result<String, ToolError> {
+pub fn table(model: &ModelFile, states: &Path, angles: Angles) -> Result<String, ToolError> {
     match model.leg.joints.len() {
-        1 => table_of::<1>(model, options),
-        2 => table_of::<2>(model, options),
-        _ => table_of::<3>(model, options),
+        1 => table_of::<1>(model, states, angles),
+        2 => table_of::<2>(model, states, angles),
+        _ => table_of::<3>(model, states, angles),
     }
 }
 
-fn table_of<const N: usize>(model: &ModelFile, options: &PredictOptions) -> Result<String, ToolError> {
+fn table_of<const N: usize>(model: &ModelFile, states: &Path, angles: Angles) -> Result<String, ToolError> {
     let predictor = Predictor::<N>::new(model)?;
-    let text = read_text(&options.states)?;
-    let states = read_states::<N>(&options.states, &text)?;
+    let to_chain = angles.to_chain::<N>(&model.leg.to_leg_file())?;
+    let states = States::read(states, &to_chain)?;
     let timed = states.rows.first().is_some_and(|row| row.time.is_some());
     let mut out = String::from(if timed { "t_s" } else { "k" });
     for joint in 1..=N {
@@ -172,22 +151,14 @@ fn table_of<const N: usize>(model: &ModelFile, options: &PredictOptions) -> Resu
     }
     out.push('\n');
     for (k, row) in states.rows.iter().enumerate() {
-        let state = if options.anatomical {
-            predictor.to_chain(row.numbers)
-        } else {
-            let [q, qd, qdd] = row.numbers;
-            JointState { q, qd, qdd }
-        };
-        let torques = predictor.torques(&state);
         out += &row.time.clone().unwrap_or_else(|| k.to_string());
-        for (torque, anatomy) in torques.iter().zip(&predictor.anatomy) {
+        for (torque, joint) in predictor.torques(&row.motion).iter().zip(&to_chain) {
             if !(torque.total().is_finite() && torque.sigma.is_finite()) {
-                let line = states.offsets.get(k).map(|&offset| line_at(&text, offset));
-                return Err(refuse(&options.states, line, Fault::OutOfRange).into());
+                return Err(states.out_of_range(k).into());
             }
-            let signed = |part: f64| if options.anatomical { anatomy.from_chain(part) } else { part };
             let [total, rigid, friction, offset] =
-                [torque.total(), torque.rigid, torque.friction, torque.offset].map(signed);
+                [torque.total(), torque.rigid, torque.friction, torque.offset]
+                    .map(|part| joint.from_chain(part));
             for number in [total, torque.sigma, rigid, friction, offset] {
                 // Adding 0 turns -0 into 0.
                 out += &format!(",{:e}", number + 0.0);
@@ -196,55 +167,4 @@ fn table_of<const N: usize>(model: &ModelFile, options: &PredictOptions) -> Resu
         out.push('\n');
     }
     Ok(out)
-}
-
-struct Row<const N: usize> {
-    /// As it stands in the file.
-    time: Option<String>,
-    /// Angles, speeds, accelerations.
-    numbers: [[f64; N]; 3],
-}
-
-struct States<const N: usize> {
-    rows: Vec<Row<N>>,
-    /// Where each stands in the text.
-    offsets: Vec<usize>,
-}
-
-fn read_states<const N: usize>(file: &Path, text: &str) -> Result<States<N>, RecordingError> {
-    let mut rows = Vec::new();
-    let offsets = for_each_row(
-        file,
-        text,
-        |header| {
-            let group = |symbol: &str, unit: &str| {
-                (1..=N).map(|joint| find(header, &format!("{symbol}{joint}"), unit)).collect()
-            };
-            let groups: [Result<Vec<_>, _>; 3] =
-                [group("q", "rad"), group("qd", "radps"), group("qdd", "radps2")];
-            let [q, qd, qdd] = groups;
-            let time = header.iter().any(|name| name == "t_s");
-            let time = time.then(|| Column::find(header, "t_s".into())).transpose()?;
-            Ok(([q?, qd?, qdd?], time))
-        },
-        |(columns, time), row| {
-            let mut numbers = [[0.0; N]; 3];
-            for (group, columns) in numbers.iter_mut().zip(columns) {
-                for (number, column) in group.iter_mut().zip(columns) {
-                    *number = column.number(row, f64::INFINITY)?;
-                }
-            }
-            let time = time.as_ref().map(|column| column.number(row, f64::INFINITY)).transpose()?;
-            rows.push(Row { time: time.map(|time| time.to_string()), numbers });
-            Ok(())
-        },
-    )?;
-    Ok(States { rows, offsets })
-}
-
-/// The column of this name, with the unit behind it or without.
-fn find(header: &StringRecord, name: &str, unit: &str) -> Result<Column, Fault> {
-    let with_unit = format!("{name}_{unit}");
-    let with_unit_only = header.iter().any(|present| present == with_unit);
-    Column::find(header, if with_unit_only { with_unit } else { name.to_owned() })
 }

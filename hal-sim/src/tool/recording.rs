@@ -8,7 +8,7 @@
 //!
 //! | column | unit | range |
 //! | --- | --- | --- |
-//! | `t_s` | s, strictly increasing, within +-1e10 s | a step of at most 0.1 s or 20 median steps, whichever is longer |
+//! | `t_s` | s, strictly increasing, within +-1e10 s | at least 10 Hz by the median step; a step of at most 0.1 s or 20 median steps, whichever is longer |
 //! | `q1_rad`, `q2_rad`, .. | rad, proximal joint first | within +-1000 rad |
 //! | `tau1_Nm`, `tau2_Nm`, .. | N m at the joint | within +-100 kN m |
 //!
@@ -30,6 +30,10 @@ pub use fault::{Fault, RecordingError};
 pub const MINIMUM_SAMPLES: usize = 50;
 /// ...over at least this time, s.
 pub const MINIMUM_DURATION_S: f64 = 1.0;
+/// Half of the steps in time are at most one over this long, Hz.
+pub const MINIMUM_RATE_HZ: f64 = 10.0;
+/// Rounded stamps may make a recording that much slower than it is.
+const RATE_TOLERANCE: f64 = 1.001;
 /// A step in time up to this long is never a gap, s.
 pub const LARGEST_STEP_S: f64 = 0.1;
 /// A step in time of up to this many median steps is never a gap either.
@@ -89,6 +93,7 @@ impl Recording {
             |columns, row| recording.push(columns, row),
         )?;
         recording.joints_in_file = joints_in_file;
+        recording.check_rate()?;
         recording.check_gaps().map_err(|(sample, fault)| {
             let line = offsets.get(sample).map(|&offset| line_at(text, offset));
             refuse(file, line, fault)
@@ -163,6 +168,16 @@ impl Recording {
             joint.torque_nm.push(torque.number(row, LARGEST_TORQUE_NM)?);
         }
         Ok(())
+    }
+
+    /// Refuses stamps that are in another unit before they are put on a grid of seconds, which would take gigabytes.
+    fn check_rate(&self) -> Result<(), RecordingError> {
+        let step_s = self.median_step_s();
+        if step_s * MINIMUM_RATE_HZ <= RATE_TOLERANCE {
+            return Ok(());
+        }
+        let counts = self.time_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
+        Err(refuse(&self.file, None, Fault::TooSlow { step_s, counts }))
     }
 
     /// The first gap, with the number of the sample after it.

@@ -6,58 +6,64 @@
 //!
 //! | | columns |
 //! | --- | --- |
-//! | in, found by name, others ignored | `q1..qN` rad, `qd1..qdN` rad/s, `qdd1..qddN` rad/s2: D-H angles |
+//! | in | states of motion ([`super::states`]) |
 //! | out | `k` from 0; `tau1..tauN` N m; `y1_XX1..y1_M1, y1_XX2..`: row of torque 1, then of torque 2 |
 //!
-//! Numbers are written with the digits that restore the f64 exactly; in the device's arithmetic, the f64 that
+//! Torques and rows have the sign of the angles that were given; the parameters stay those of the D-H frames, so that
+//! torque = row times parameters either way. Numbers are written with the digits that restore the f64 exactly; in the device's arithmetic, the f64 that
 //! equals the f32. All states are read and computed before anything is written.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::Vector3;
 use scarab::ident::prior_parameters;
-use scarab::model::{Chain, JointState, LegParameters, Parameter, regressor, rigid_body_torques};
+use scarab::model::{
+    AnatomicalJoint, Chain, JointState, LegParameters, Parameter, regressor, rigid_body_torques,
+};
 use scarab::real::Real;
 
 use super::error::ToolError;
 use super::leg_file::LegFile;
-use super::recording::columns::{Column, for_each_row, line_at, read_text, refuse};
-use super::recording::{Fault, RecordingError};
 use super::setup::{chain, links};
+use super::states::{Angles, States};
 
 /// Parameters of a rigid body; the first of a joint's fourteen.
 const INERTIAL: usize = 10;
 
 /// What to compute.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct RegressorOptions {
-    /// States of motion.
-    pub states: PathBuf,
+    /// How angles in and torques out are counted.
+    pub angles: Angles,
     /// In the device's arithmetic.
     pub single_precision: bool,
 }
 
 /// The table for a leg of any size, as CSV text.
-pub fn table(leg: &LegFile, options: &RegressorOptions) -> Result<String, ToolError> {
+pub fn table(leg: &LegFile, states: &Path, options: &RegressorOptions) -> Result<String, ToolError> {
     match leg.joints.len() {
-        1 => table_of::<1>(leg, options),
-        2 => table_of::<2>(leg, options),
-        _ => table_of::<3>(leg, options),
+        1 => table_of::<1>(leg, states, options),
+        2 => table_of::<2>(leg, states, options),
+        _ => table_of::<3>(leg, states, options),
     }
 }
 
-fn table_of<const N: usize>(leg: &LegFile, options: &RegressorOptions) -> Result<String, ToolError> {
-    let text = read_text(&options.states)?;
+fn table_of<const N: usize>(
+    leg: &LegFile,
+    states: &Path,
+    options: &RegressorOptions,
+) -> Result<String, ToolError> {
     let bodies = Bodies::<N>::of(leg)?;
-    let (states, offsets) = read_states::<N>(&options.states, &text)?;
+    let to_chain = options.angles.to_chain::<N>(leg)?;
+    let states = States::read(states, &to_chain)?;
     let mut out = header::<N>();
-    for (k, state) in states.iter().enumerate() {
+    for (k, state) in states.rows.iter().enumerate() {
+        let state = &state.motion;
         let row = if options.single_precision { bodies.row::<f32>(state) } else { bodies.row::<f64>(state) };
         if !row.is_finite() {
-            let line = offsets.get(k).map(|&offset| line_at(&text, offset));
-            return Err(refuse(&options.states, line, Fault::OutOfRange).into());
+            return Err(states.out_of_range(k).into());
         }
-        out += &row.line(k);
+        out += &row.turned(&to_chain).line(k);
     }
     Ok(out)
 }
@@ -74,37 +80,6 @@ fn header<const N: usize>() -> String {
     }
     text.push('\n');
     text
-}
-
-/// States in double precision and where each stands in the text.
-type States<const N: usize> = (Vec<JointState<f64, N>>, Vec<usize>);
-
-fn read_states<const N: usize>(file: &Path, text: &str) -> Result<States<N>, RecordingError> {
-    let mut states = Vec::new();
-    let offsets = for_each_row(
-        file,
-        text,
-        |header| {
-            let group = |symbol: &str| {
-                (1..=N)
-                    .map(|joint| Column::find(header, format!("{symbol}{joint}")))
-                    .collect::<Result<Vec<_>, _>>()
-            };
-            Ok([group("q")?, group("qd")?, group("qdd")?])
-        },
-        |columns, row| {
-            let mut numbers = [[0.0; N]; 3];
-            for (group, columns) in numbers.iter_mut().zip(columns) {
-                for (number, column) in group.iter_mut().zip(columns) {
-                    *number = column.number(row, f64::INFINITY)?;
-                }
-            }
-            let [q, qd, qdd] = numbers;
-            states.push(JointState { q, qd, qdd });
-            Ok(())
-        },
-    )?;
-    Ok((states, offsets))
 }
 
 /// Geometry, gravity and, where the leg file has them for every joint, parameters.
@@ -148,6 +123,16 @@ struct Row<const N: usize> {
 }
 
 impl<const N: usize> Row<N> {
+    /// Torques, and what they are made of, in the sign of the angles that were given.
+    fn turned(mut self, to_chain: &[AnatomicalJoint<f64>; N]) -> Self {
+        for (joint, anatomy) in to_chain.iter().enumerate() {
+            let turn = |number: &mut f64| *number = anatomy.from_chain(*number);
+            self.torques.iter_mut().for_each(|torques| turn(&mut torques[joint]));
+            self.elements[joint].as_flattened_mut().iter_mut().for_each(turn);
+        }
+        self
+    }
+
     fn is_finite(&self) -> bool {
         let elements = self.elements.as_flattened().as_flattened();
         self.torques.iter().flatten().chain(elements).all(|number| number.is_finite())

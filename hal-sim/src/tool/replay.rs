@@ -240,8 +240,7 @@ pub fn replay<const N: usize, const B: usize>(
         &mut |piece| findings.push(FindingReport::new(piece, &["recording"])),
     );
     if let Some(path) = &options.csv {
-        write_predictions(path, &predictions, &anatomy)
-            .map_err(|error| ToolError::cannot_write(path, &error))?;
+        write_predictions(path, &predictions, &anatomy)?;
     }
     let motion = |record| Motion { name: "recording".into(), record, truth: None };
     let circumstances = Circumstances {

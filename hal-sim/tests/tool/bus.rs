@@ -297,7 +297,7 @@ fn what_is_stored_is_there_after_a_reset_of_the_node_and_its_number_is_the_new_o
         let told = bus.sent.iter().filter(|sent| sent.frame.id() == id);
         told.map(|sent| u16::from_le_bytes([sent.frame.data()[0], sent.frame.data()[1]])).collect()
     };
-    assert_eq!(codes(&bus, 0x81), [0xFF01, 0x8110, 0, 0]);
+    assert_eq!(codes(&bus, 0x81), [0xFF0D, 0x8110, 0, 0]);
     assert!(codes(&bus, 0x83).is_empty());
     let answers = bus.sent.iter().filter(|sent| sent.frame.id() == 0x581).count();
     // The request to forget, and the last of the three that waited: they come at once, and a server answers one.

@@ -314,3 +314,29 @@ fn options_that_make_no_sense_are_refused_in_words() {
         assert!(message.contains(reason), "{arguments}: {message}");
     }
 }
+
+#[test]
+fn no_sigma_is_expected_where_no_noise_is_stated() {
+    for arguments in ["", "--torque-noise-nm 0", "--torque-noise 0", "--excitation"] {
+        let folder = Folder::new();
+        let json = folder.path("report.json");
+        let mut line = vec![Path::new("--json"), &json];
+        // A leg with a motion of its own that states no noise.
+        let mut silent = LegFile::load("x2-wearer-75kg").expect("shipped");
+        silent.torque_noise_percent = 0.0;
+        let silent = folder.write("silent.toml", &silent.to_toml());
+        let leg = if arguments == "--excitation" { silent.as_path() } else { Path::new("sp") };
+        line.extend([Path::new("--leg"), leg]);
+        line.extend(arguments.split_whitespace().map(Path::new));
+        if arguments == "--excitation" {
+            line.push(Path::new(SHIPPED));
+        }
+        let message = scarab("excite", &line).refusal();
+        for word in
+            ["is not stated", "`current_noise_a`", "`torque_noise_percent`", "--torque-noise-nm", "joint `"]
+        {
+            assert!(message.contains(word), "{arguments}: no {word} in {message}");
+        }
+        assert!(!json.exists());
+    }
+}

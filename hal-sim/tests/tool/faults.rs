@@ -38,7 +38,7 @@ fn the_json_is_that_of_the_interface_and_its_numbers_add_up() {
     }
     let ids: Vec<_> = rows.iter().map(|row| row["fault"].as_str().expect("a word")).collect();
     assert!(ids.iter().all(|id| ids.iter().filter(|other| *other == id).count() == 1), "{ids:?}");
-    assert_eq!(report["diagnostic_coverage"].as_f64(), Some(1.0));
+    assert_eq!(report["detected_of_detectable"].as_f64(), Some(1.0));
     for (trials, kind) in report["trials"].as_array().expect("a list").iter().zip(["sweep", "pairs"]) {
         assert_eq!((&trials["kind"], &trials["runs"]), (&kind.into(), &20.into()));
         assert_eq!(trials["invariants_broken"], 0);

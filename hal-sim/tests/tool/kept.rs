@@ -39,8 +39,8 @@ pub fn text() -> String {
 pub const STATES: &str =
     "t_s,q1,q2,qd1,qd2,qdd1,qdd2\n0.0,0.3,-0.9,0.7,-1.1,4.0,-6.0\n0.5,0.8,-0.2,-1.3,0.4,-2.0,9.0\n";
 
-/// Predicts the torque of [`STATES`] after a model.
+/// Predicts the torque of [`STATES`], which are D-H, after a model.
 pub fn predict(folder: &Folder, model: &str, more: &str) -> Run {
     let (model, states) = (folder.write("model.toml", model), folder.write("states.csv", STATES));
-    scarab(&format!("predict {more} --model"), &[&model, "--states".as_ref(), &states])
+    scarab(&format!("predict --dh {more} --model"), &[&model, "--states".as_ref(), &states])
 }

@@ -135,7 +135,7 @@ fn friction_of_two_directions_is_kept_exported_and_predicted_as_such() {
     let states = "q1,q2,qd1,qd2,qdd1,qdd2\n0.3,-0.9,0,1.0,0,0\n0.3,-0.9,0,-1.0,0,0\n0.3,-0.9,0,0,0,0\n";
     let states = folder.write("states.csv", states);
     let out = folder.path("torque.csv");
-    let arguments = format!("predict --states {} --out {} --model", states.display(), out.display());
+    let arguments = format!("predict --dh --states {} --out {} --model", states.display(), out.display());
     scarab(&arguments, &[&model]).ends_with(0);
     let table = folder.table("torque.csv");
     let friction = table.column("tau2_friction_Nm");

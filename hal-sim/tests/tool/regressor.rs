@@ -80,7 +80,7 @@ fn errors(table: &Table) -> (f64, f64) {
 fn torque_and_regressor_are_those_of_the_reference_without_rotor_friction_and_offset() {
     let folder = Folder::new();
     let file = folder.write("leg.toml", &leg("truth"));
-    let arguments = format!("regressor --states {} --leg", states());
+    let arguments = format!("regressor --dh --states {} --leg", states());
     let run = scarab(&arguments, &[&file]).ends_with(0);
     assert_eq!(run.errors, "");
     let table = Table::parse(&run.printed);
@@ -91,10 +91,40 @@ fn torque_and_regressor_are_those_of_the_reference_without_rotor_friction_and_of
     assert!(torque < 1e-12 && elements < 1e-12, "torque {torque:e}, regressor {elements:e}");
 
     // The device's arithmetic rounds ten times or so, at 6e-8; that it is seen at all shows it is another one.
-    let run = scarab(&format!("regressor --f32 --states {} --leg", states()), &[&file]).ends_with(0);
+    let run = scarab(&format!("regressor --dh --f32 --states {} --leg", states()), &[&file]).ends_with(0);
     let (torque, elements) = errors(&Table::parse(&run.printed));
     assert!((1e-9..1e-6).contains(&torque), "torque {torque:e}");
     assert!((1e-9..1e-6).contains(&elements), "regressor {elements:e}");
+}
+
+#[test]
+fn angles_are_anatomical_unless_they_are_said_to_be_dh() {
+    let folder = Folder::new();
+    // Direction -1, zero at 20 degrees.
+    let file = folder.write("leg.toml", &leg("truth"));
+    let zero = 20.0_f64.to_radians();
+    let anatomical = [[0.4, 1.1], [-0.7, 0.9], [3.0, -5.0]];
+    let [angles, speeds, accelerations] = anatomical;
+    let chain = [angles.map(|angle| zero - angle), speeds.map(|v| -v), accelerations.map(|a| -a)];
+    let printed = |option: &str, header: &str, numbers: [[f64; 2]; 3]| {
+        let numbers: Vec<String> =
+            numbers.as_flattened().iter().map(|number| format!("{number:e}")).collect();
+        let states = folder.write("states.csv", &format!("{header}\n{}\n", numbers.join(",")));
+        let run = scarab(&format!("regressor {option} --leg"), &[&file, "--states".as_ref(), &states]);
+        Table::parse(&run.ends_with(0).printed)
+    };
+    let short = "q1,q2,qd1,qd2,qdd1,qdd2";
+    let dh = printed("--dh", short, chain);
+    // The names of a recording's columns are known too.
+    for header in [short, "q1_rad,q2_rad,qd1_radps,qd2_radps,qdd1_radps2,qdd2_radps2"] {
+        let own = printed("", header, anatomical);
+        assert_eq!(own.header, dh.header);
+        for (name, (own, dh)) in own.header.iter().zip(own.rows[0].iter().zip(&dh.rows[0])).skip(1) {
+            // Torque and regressor row turn with the angle; the angle is the same but for its last bit.
+            assert!((own + dh).abs() < 1e-12 * 60.0, "{name}: {own} {dh}");
+        }
+        assert!(own.column("tau1")[0].abs() > 1.0);
+    }
 }
 
 #[test]
@@ -116,7 +146,7 @@ fn torque_comes_from_the_truth_else_from_the_prior_else_stays_empty() {
     let states = states();
     let printed = |name: &str, text: &str| {
         let file = folder.write(name, text);
-        scarab(&format!("regressor --states {states} --leg"), &[&file]).ends_with(0).printed
+        scarab(&format!("regressor --dh --states {states} --leg"), &[&file]).ends_with(0).printed
     };
     let truth = printed("truth.toml", &leg("truth"));
     assert_eq!(printed("prior.toml", &leg("prior")), truth);

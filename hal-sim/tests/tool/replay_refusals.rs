@@ -84,6 +84,31 @@ fn absurd_options_are_refused_with_what_is_possible() {
 }
 
 #[test]
+fn a_replay_without_a_leg_is_refused_and_shown_how() {
+    let message = scarab("replay", &[Path::new(MUJOCO)]).refusal();
+    assert!(message.contains("--leg is missing"), "{message}");
+    assert!(message.contains("cargo sim replay run.csv --leg my-leg.toml"), "{message}");
+    assert!(message.contains("x2-wearer-75kg, x2-rough, mujoco-leg"), "{message}");
+}
+
+#[test]
+fn time_in_another_unit_is_refused_by_the_rate_with_the_likely_unit() {
+    let motion = Motion::default().samples();
+    let refused = |factor: f64| {
+        let samples: Vec<[f64; 3]> = motion.iter().map(|[t, q, tau]| [factor * t, *q, *tau]).collect();
+        refusal(&crate::pendulum::csv(&samples))
+    };
+    assert_eq!(
+        refused(1e3),
+        "error: walk.csv: the median step of `t_s` is 2 s, which is 0.5 Hz; at least 10 Hz are needed. `t_s` is in \
+         seconds: are these milliseconds? In milliseconds it would be 500 Hz\n"
+    );
+    assert!(refused(1e6).ends_with("are these microseconds? In microseconds it would be 500 Hz\n"));
+    // Sample numbers.
+    assert!(refused(500.0).contains("are these milliseconds or sample numbers?"));
+}
+
+#[test]
 fn legs_that_do_not_exist_or_cannot_be_are_refused() {
     let folder = Folder::new();
     let recording = folder.write("walk.csv", &Motion::default().csv());

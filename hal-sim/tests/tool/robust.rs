@@ -197,7 +197,7 @@ fn the_band_of_a_prediction_counts_what_is_not_known_of_stribeck_friction() {
     let (sigma, speed) = (of("surplus_sigma_nm"), of("speed_rad_s"));
     let states =
         folder.write("s.csv", "q1,q2,qd1,qd2,qdd1,qdd2\n0.5,-0.8,0.02,0.5,0,0\n0.5,-0.8,1.5,0.5,0,0\n");
-    let run = scarab("predict --model", &[&model, Path::new("--states"), &states]).ends_with(0);
+    let run = scarab("predict --dh --model", &[&model, Path::new("--states"), &states]).ends_with(0);
     let band = Table::parse(&run.printed).column("tau1_sigma_Nm");
     println!("surplus +- {sigma:.3} N m: band {:.3} N m at 0.02 rad/s, {:.3} at 1.5", band[0], band[1]);
     let ratio = 0.02 / speed;

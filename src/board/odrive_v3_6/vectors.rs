@@ -8,8 +8,7 @@ use embassy_stm32::interrupt::{
 
 use super::hardware::Odrive;
 use super::{can, contacts, encoder};
-use crate::safety::Cause;
-use crate::task::{self, SIGNALS};
+use crate::task;
 
 /// From now on the emergency stop, converters, index pulses and the servo interrupt; what they work on must be in its place.
 pub fn enable() {
@@ -35,7 +34,7 @@ fn OTG_HS() {
 #[interrupt]
 fn EXTI4() {
     if contacts::stop_came() {
-        SIGNALS.inhibit.raise(Cause::EmergencyStop);
+        task::stop();
     }
 }
 

@@ -6,6 +6,7 @@ use crate::bus::abort::Abort;
 use crate::bus::dictionary::Object;
 use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::{Lost, Objects};
+use crate::leg::NO_ERROR;
 
 /// The low bytes of a signed number.
 macro_rules! bits {
@@ -33,7 +34,7 @@ impl Objects for Axis {
             (0x2100..=0x2198, _) => return Err(Abort::NoData),
             (0x219A | 0x60FD, _) => status.inputs,
             (0x6007, _) => bits!(settings.connection_option),
-            (0x603F, _) => self.own.fault().map_or(0, |fault| u32::from(fault.code.number())),
+            (0x603F, _) => u32::from(self.own.fault().map_or(NO_ERROR, |fault| fault.code.number())),
             (0x6040, _) => u32::from(self.controlword),
             (0x6041, _) => u32::from(self.statusword()),
             (0x605A, _) => bits!(settings.quick_stop_option),

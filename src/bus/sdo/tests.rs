@@ -194,3 +194,15 @@ fn a_client_that_goes_silent_is_told_once_and_an_abort_is_not_answered() {
     assert_eq!(board.ask([0x80, 0x0A, 0x10, 0, 0, 0, 4, 5]), None);
     assert_eq!(code(board.ask([0x60, 0, 0, 0, 0, 0, 0, 0])), Some(0x0504_0001));
 }
+
+#[test]
+fn a_client_has_its_whole_time_again_after_the_board_stood_still() {
+    let mut board = Board::started(1);
+    board.ask(request(0x40, 0x100A, [0; 4]));
+    board.now_us += 10 * TIMEOUT_US;
+    board.nodes[0].stood_still(board.now_us);
+    board.now_us += TIMEOUT_US - 1;
+    assert_eq!(board.frames(), []);
+    board.now_us += 1;
+    assert_eq!(board.frames().len(), 1, "and no more than that");
+}

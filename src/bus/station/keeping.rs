@@ -62,7 +62,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     }
 
     /// What a host wants kept, once, and each node's objects for the store: until [`Self::stored`] says so nothing of it counts. Neither more
-    /// than fits nor one number for two nodes is kept, and hosts are told (FF01, then 5530).
+    /// than fits nor one number for two nodes is kept, and hosts are told (FF0D, then 5530).
     pub fn take_store(&mut self, into: &mut [KeptNode; N]) -> Option<Keeping> {
         self.recall_reset();
         let defaults = self.leg.take_store()?;

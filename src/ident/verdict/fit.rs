@@ -137,3 +137,38 @@ impl<T: Real> Thresholds<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ident::factor::Factor;
+    use crate::ident::outliers::Outliers;
+    use crate::ident::record::TorqueSize;
+    use crate::ident::selection::Selection;
+
+    #[test]
+    fn the_error_allowed_is_that_of_noise_and_the_harmless_share_together() {
+        let record = |row_information| Record::<f64, 1, 2> {
+            factors: [Factor::new()],
+            torque: [TorqueSize { mean_absolute: 5.0, root_mean_square: 6.0, speed: 1.0 }],
+            rows: [400],
+            rejected: 0,
+            row_information,
+            noise: [0.0],
+            outliers: Outliers::none(),
+            stribeck: [None],
+            selection: Selection::all(),
+        };
+        // 400 rows worth 0.25 independent ones each: 100 degrees of freedom; chi-square's 0.999 quantile is 149.449.
+        let thresholds = Thresholds { noise_quantile: 3.090_2, ..Thresholds::<f64>::default() };
+        let allowed = |information, harmless| thresholds.allowed(&record(information), 0, 0.04, harmless);
+        let noise = 0.04 * 1.494_49;
+        // Wilson and Hilferty's approximation is good to 0.6 % of the square.
+        assert!((allowed(0.25, 0.0) / real::sqrt(noise) - 1.0).abs() < 4e-3);
+        // A harmless 2 % of 6 N m.
+        let both = real::sqrt(noise + 0.12 * 0.12);
+        assert!((allowed(0.25, 0.02) / both - 1.0).abs() < 4e-3);
+        // No row is worth more than one.
+        assert_eq!(allowed(3.0, 0.0).to_bits(), allowed(1.0, 0.0).to_bits());
+    }
+}

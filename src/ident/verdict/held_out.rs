@@ -86,3 +86,45 @@ impl<T: Real> Thresholds<T> {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Value, limit and whether it passed, of a link's length found alone and beside the other directions.
+    fn judged(alone: [f64; 2], beside: Option<[f64; 2]>, noise_is_known: bool) -> (f64, f64, bool) {
+        let thresholds =
+            Thresholds { noise_quantile: 5.0, largest_length_error: 0.03, ..Thresholds::default() };
+        let [delta, sigma] = alone;
+        let found = Misalignment {
+            direction: Direction::Length,
+            joint: 1,
+            delta,
+            sigma,
+            beside: beside.map(|[delta, sigma]| (delta, sigma)),
+        };
+        let mut seen = None;
+        let mut note = |evidence: &Evidence<f64>| seen = Some(*evidence);
+        thresholds.judge_alignment(&found, noise_is_known, &mut Docket::new(&mut note));
+        let evidence = seen.expect("one piece of evidence");
+        assert_eq!((evidence.test, evidence.joint), (Test::LinkLength, Some(1)));
+        (evidence.value, evidence.limit, evidence.passed)
+    }
+
+    #[test]
+    fn of_a_length_alone_and_beside_the_others_the_one_that_says_more_is_judged() {
+        // In shares of its limit: 0.5 alone, 2 beside; 0.8 alone, 0.5 beside; a tie is judged alone.
+        assert_eq!(judged([0.015, 0.001], Some([-0.06, 0.002]), true), (-0.06, 0.03, false));
+        assert_eq!(judged([0.024, 0.001], Some([0.05, 0.02]), true), (0.024, 0.03, true));
+        assert_eq!(judged([0.015, 0.0], Some([-0.015, 0.0]), true), (0.015, 0.03, true));
+        assert_eq!(judged([0.04, 0.001], None, true), (0.04, 0.03, false));
+    }
+
+    #[test]
+    fn noise_widens_the_limit_of_a_length() {
+        // Five sigmas of 0.01; three times the tolerance where the noise is not known.
+        assert_eq!(judged([0.04, 0.01], None, true), (0.04, 0.05, true));
+        let (_, limit, passed) = judged([0.08, 0.001], None, false);
+        assert!((limit - 0.09).abs() < 1e-12 && passed);
+    }
+}

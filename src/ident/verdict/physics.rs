@@ -170,3 +170,31 @@ fn energy_weights<T: Real, const N: usize, const B: usize>(
     }
     weights
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_negative_direction_has_the_energy_that_is_told_and_a_positive_matrix_has_none() {
+        // L D L' with ones on the diagonal of L: the first pivot that is not positive is D's.
+        let lower = SMatrix::<f64, 3, 3>::new(1.0, 0.0, 0.0, 0.5, 1.0, 0.0, -2.0, 3.0, 1.0);
+        for (pivots, expected) in [
+            ([2.0, 0.5, 4.0], None),
+            ([2.0, 0.5, -0.25], Some(-0.25)),
+            ([2.0, -0.5, 4.0], Some(-0.5)),
+            ([-3.0, 0.5, 4.0], Some(-3.0)),
+            ([2.0, 0.0, 4.0], Some(0.0)),
+        ] {
+            let matrix = lower * SMatrix::from_diagonal(&Vector3::from(pivots)) * lower.transpose();
+            let found = negative_direction(&matrix);
+            assert_eq!(found.map(|(_, energy)| energy), expected);
+            if let Some((direction, energy)) = found {
+                let direction = Vector3::from(direction);
+                let own = direction.dot(&(matrix * direction));
+                assert!((own - energy).abs() < 1e-12, "{own} {energy}");
+                assert!(direction.norm() >= 1.0);
+            }
+        }
+    }
+}

@@ -25,8 +25,8 @@ pub enum AxisFault {
     Overcurrent,
     /// Bus voltage out of its range, as above.
     BusVoltage,
-    /// Two encoder steps in a row that no motor makes, or an index pulse away from the index's place. The place is lost: only a
-    /// new calibration helps.
+    /// Two encoder steps in a row that no motor makes, two index pulses at one wrong place, or none at the right one. The
+    /// place is lost: only a new calibration helps.
     Encoder,
     /// Target, voltage or duty not a number.
     NotANumber,

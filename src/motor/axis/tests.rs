@@ -4,6 +4,7 @@ use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::motor::{AxisConfiguration, DeadTime, Direction, Sine};
 use crate::units::{Volt, Weber};
 
+mod index;
 mod watches;
 
 const fn ask(current: f32) -> AxisRequest {
@@ -242,45 +243,6 @@ fn one_bad_sample_alone_is_survived_and_a_lost_place_is_not_cleared() {
     assert_eq!(bench.run(ask(5.0), 10), AxisCommand::BRAKE);
     assert_eq!(bench.run(AxisRequest::RELEASED, 1), AxisCommand::RELEASED);
     assert!(!bench.axis.clear_fault());
-}
-
-#[test]
-fn an_index_away_from_its_place_is_a_lost_place() {
-    for (missed, lost) in [(3, false), (-3, false), (6, true), (-6, true), (300, true)] {
-        for request in [ask(5.0), AxisRequest::RELEASED] {
-            for speed in [50.0, -50.0] {
-                let mut bench = Bench::at(speed, &CONFIGURATION);
-                bench.run(request, 100);
-                bench.motor.encoder_zero += f64::from(missed) / 8192.0;
-                // The index stays where it is on the shaft: three turns.
-                bench.run_sampled(request, 9048, |sample| {
-                    sample.index_count = sample.index_count.map(|at| at.wrapping_add(missed as u16));
-                });
-                assert_eq!(bench.axis.fault(), lost.then_some(AxisFault::Encoder), "{missed} {speed}");
-                assert_eq!(bench.axis.clear_fault(), !lost);
-            }
-        }
-    }
-}
-
-#[test]
-fn two_turns_without_an_index_are_a_lost_place_where_there_was_one() {
-    // A turn takes 3,016 ticks.
-    for (speed, ticks, lost) in [(50.0, 5000, false), (50.0, 9000, true), (-50.0, 9000, true)] {
-        for request in [ask(5.0), AxisRequest::RELEASED] {
-            let mut bench = Bench::at(speed, &CONFIGURATION);
-            bench.run_sampled(request, ticks, |sample| sample.index_count = None);
-            assert_eq!(bench.axis.fault(), lost.then_some(AxisFault::Encoder), "{speed} {ticks}");
-            assert_eq!(bench.axis.clear_fault(), !lost);
-        }
-    }
-    // Moved to and fro within a turn there is nothing to miss.
-    let mut bench = Bench::at(50.0, &CONFIGURATION);
-    for way in 0..40 {
-        bench.motor.speed = if way % 2 == 0 { 50.0 } else { -50.0 };
-        bench.run_sampled(ask(0.0), 2000, |sample| sample.index_count = None);
-    }
-    assert_eq!(bench.axis.fault(), None);
 }
 
 #[test]

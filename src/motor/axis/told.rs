@@ -1,6 +1,6 @@
 //! What an axis tells of itself, and forgets when it is told to.
 
-use super::{Axis, AxisFault, Rotating, SpeedTracker, Window};
+use super::{Axis, AxisFault, IndexWatch, Rotating, SpeedTracker, Window};
 use crate::hal::AxisSample;
 use crate::units::{Ampere, RadianPerSecond};
 
@@ -47,7 +47,7 @@ impl Axis {
         self.place = constants.scale.within_turn(self.place + constants.counter_sign * step);
         self.counts = self.counts.wrapping_add(constants.flexion_sign * step);
         (self.counter, self.step) = (sample.encoder_count, 0);
-        (self.index, self.indexed_at) = (None, self.counts);
+        self.index = IndexWatch::at(self.counts);
         self.speed = SpeedTracker::at(self.angle());
         self.window = Window::EMPTY;
         (self.doubtful, self.doubts, self.disbelieved) = (false, 0, false);

@@ -138,3 +138,43 @@ impl InductanceStage {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motor::ElectricalAngle;
+
+    /// What is found of a swing that a resistance and an inductance make at an amplitude.
+    fn found(resistance: f64, inductance: f64, amplitude: f64) -> Result<Henry, Refusal> {
+        let seconds = 2.0 / 24_000.0;
+        let tangent = |y: f64| 1.0 - 2.0 / (crate::real::exp(2.0 * y) + 1.0);
+        let swing = 2.0 * amplitude / resistance * tangent(resistance * seconds / (2.0 * inductance));
+        let stage = InductanceStage {
+            amplitude: amplitude as f32,
+            swing_sum: (swing * f64::from(MEAN_WAVES)) as f32,
+            ..InductanceStage::new(Hold::along(ElectricalAngle::ZERO))
+        };
+        stage.inductance(Ohm(resistance as f32))
+    }
+
+    #[test]
+    fn the_inductance_is_that_of_the_swing_whatever_the_resistance_takes() {
+        for (resistance, inductance, amplitude) in
+            [(0.05, 25e-6, 1.0), (0.2, 60e-6, 3.0), (1.0, 150e-6, 12.0), (0.01, 10e-6, 0.2)]
+        {
+            let found = f64::from(found(resistance, inductance, amplitude).expect("usual").0);
+            let x: f64 = resistance * 2.0 / 24_000.0 / (2.0 * inductance);
+            // What the series leaves out, and single precision.
+            let error = x * x * x * x / 5.0 + 1e-5;
+            assert!((found / inductance - 1.0).abs() < error, "{found} for {inductance}, x {x}");
+        }
+    }
+
+    #[test]
+    fn a_swing_that_is_mostly_resistance_is_refused() {
+        // x is 0.5 where the exponential has come to three quarters of its way.
+        assert!(found(1.0, 100e-6, 1.0).is_ok());
+        assert_eq!(found(1.0, 50e-6, 1.0), Err(Refusal::MotorConstants));
+        assert_eq!(found(1e-6, 20e-3, 1.0), Err(Refusal::MotorConstants), "beyond the range of a motor");
+    }
+}

@@ -1,99 +1,28 @@
 extern crate std;
 
-use std::collections::VecDeque;
 use std::vec::Vec;
 
-use super::super::mailboxes::tests::{NOTHING, Wire, station};
+use super::super::testing::{NOTHING, TestHardware, on_a_bus, station};
+use super::super::{HostEnds, Signals};
 use super::*;
-use crate::bus::station::LegRequest;
+use crate::bus::station::{LegOrder, LegRequest, LegTold};
+use crate::hal::Frame;
 use crate::leg::{DriveEvent, DriveState, JointStatus, PowerRequest};
 
 mod flood;
 
-/// Queues of one, as the board's.
-struct Board {
-    wire: Wire,
-    status: Controller,
-    /// One was lost since the last round.
-    lost: bool,
-    frames: VecDeque<Frame>,
-    /// What hearing one takes.
-    frame_us: u64,
-    told: Option<LegTold<2>>,
-    order: Option<LegOrder<2>>,
-    held: bool,
-    hosted: bool,
-    memory: Keep<2>,
-    is_lent: bool,
-    ended: bool,
-}
-
-impl Mailboxes for Board {
-    fn waiting(&self) -> u32 {
-        self.wire.waiting()
-    }
-    fn send(&mut self, mailbox: u32, frame: &Frame) {
-        self.wire.send(mailbox, frame);
-    }
-    fn give_up(&mut self) {
-        self.wire.give_up();
-    }
-}
-
-impl BusBoard<2> for Board {
-    fn now_us(&self) -> u64 {
-        self.wire.now_us
-    }
-    fn status(&mut self) -> Controller {
-        if core::mem::take(&mut self.lost) { Controller::Overrun } else { self.status }
-    }
-    fn frame(&mut self) -> Option<Frame> {
-        let frame = self.frames.pop_front()?;
-        self.wire.now_us += self.frame_us;
-        Some(frame)
-    }
-    fn logged(&mut self) -> Option<LoggedSample<2>> {
-        None
-    }
-    fn is_told(&self) -> bool {
-        self.told.is_some()
-    }
-    fn told(&mut self) -> Option<LegTold<2>> {
-        self.told.take()
-    }
-    fn takes_order(&self) -> bool {
-        self.order.is_none()
-    }
-    fn order(&mut self, order: LegOrder<2>) {
-        assert!(self.order.is_none(), "overwritten");
-        self.order = Some(order);
-    }
-    fn held(&self) -> bool {
-        self.held
-    }
-    fn set_hosted(&mut self, hosted: bool) {
-        self.hosted = hosted;
-    }
-    fn kept(&mut self) -> Option<&Keep<2>> {
-        core::mem::take(&mut self.ended).then(|| {
-            self.is_lent = false;
-            &self.memory
-        })
-    }
-    fn lent(&mut self) -> Option<&mut Keep<2>> {
-        (!self.is_lent).then_some(&mut self.memory)
-    }
-    fn keep(&mut self) {
-        assert!(!self.is_lent, "lent twice");
-        self.is_lent = true;
-    }
-}
-
 struct Bench {
     station: Station<2, 4>,
     round: BusRound,
-    board: Board,
+    hardware: TestHardware<2>,
+    signals: Signals<2>,
+    /// The leg's ends.
+    host: HostEnds<'static, 2>,
+    bus: BusEnds<'static, 2>,
+    storage: Handover<Keep<2>>,
     drive: DriveState,
+    /// The operator holds the enabling switch.
+    held: bool,
     /// The leg takes its orders.
     takes: bool,
     requests: Vec<LegRequest>,
@@ -101,32 +30,36 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let board = Board {
-            wire: Wire::default(),
-            status: Controller::Active,
-            lost: false,
-            frames: VecDeque::new(),
-            frame_us: 0,
-            told: None,
-            order: None,
+        let (hardware, host, bus) = on_a_bus();
+        let mut bench = Self {
+            station: station(),
+            round: BusRound::new(),
+            hardware,
+            signals: Signals::new(),
+            host,
+            bus,
+            storage: Handover::new(Keep::NOTHING),
+            drive: DriveState::SwitchOnDisabled,
             held: true,
-            hosted: false,
-            memory: Keep::NOTHING,
-            is_lent: false,
-            ended: false,
+            takes: true,
+            requests: Vec::new(),
         };
-        let (drive, round) = (DriveState::SwitchOnDisabled, BusRound::new());
-        let mut bench = Self { station: station(), round, board, drive, takes: true, requests: Vec::new() };
         bench.run(4);
         bench.send(0, &[1, 0]);
         bench
+    }
+
+    /// A round and nothing else.
+    fn round(&mut self) {
+        let Self { station, bus, storage, signals, hardware, .. } = self;
+        self.round.round(station, bus, storage, signals, hardware, &NOTHING);
     }
 
     /// A leg's tick, a round, and what is in the mailboxes leaves.
     fn run(&mut self, rounds: u32) {
         for _ in 0..rounds {
             if self.takes
-                && let Some(request) = self.board.order.take().and_then(|order| order.request)
+                && let Some(request) = self.host.orders.dequeue().and_then(|order| order.request)
             {
                 self.requests.push(request);
                 if let LegRequest::Power(power) = request {
@@ -135,20 +68,32 @@ impl Bench {
             }
             self.drive = self.drive.after(DriveEvent::Tick, 4);
             let joint = JointStatus { drive: self.drive, ..JointStatus::NONE };
-            self.board.told.get_or_insert(LegTold {
+            let told = LegTold {
                 joints: [joint; 2],
+                held: self.held,
                 blocked: false,
                 rests: false,
                 ..LegTold::NONE
-            });
-            self.board.wire.now_us += 500;
-            self.round.round(33, &mut self.station, &mut self.board, &NOTHING);
-            self.board.wire.empty();
+            };
+            // The report before may still wait.
+            let _ = self.host.told.enqueue(told);
+            self.hardware.now_us += 500;
+            self.round();
+            self.hardware.empty_mailboxes();
         }
     }
 
+    /// Frames come with the next round.
+    fn arrive(&mut self, frames: &[Frame]) {
+        self.hardware.reception().arriving.extend(frames);
+    }
+
+    fn unheard(&self) -> usize {
+        self.hardware.reception().unheard()
+    }
+
     fn send(&mut self, id: u16, data: &[u8]) {
-        self.board.frames.push_back(Frame::new(id, data));
+        self.arrive(&[Frame::new(id, data)]);
         self.run(8);
     }
 
@@ -162,7 +107,7 @@ impl Bench {
 
     /// Codes of both nodes' emergency messages since this was asked, the first node's first.
     fn told(&mut self) -> Vec<(u16, u16)> {
-        let sent = core::mem::take(&mut self.board.wire.sent).into_iter().map(|(frame, _, _)| frame);
+        let sent = core::mem::take(&mut self.hardware.can.sent).into_iter().map(|(frame, _, _)| frame);
         let emergencies = sent.filter(|frame| matches!(frame.id(), 0x81..=0xFF));
         let code = |frame: Frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]]);
         let mut told: Vec<(u16, u16)> = emergencies.map(|frame| (frame.id(), code(frame))).collect();
@@ -177,7 +122,7 @@ const CANCEL: [u8; 8] = [0x2F, 0x00, 0x21, 1, 2, 0, 0, 0];
 fn an_order_that_was_not_taken_is_not_overwritten_and_no_request_is_lost() {
     let mut bench = Bench::new();
     bench.enable();
-    assert_eq!((bench.drive, bench.board.hosted), (DriveState::OperationEnabled, true));
+    assert_eq!((bench.drive, bench.signals.is_hosted()), (DriveState::OperationEnabled, true));
     bench.requests.clear();
     bench.run(2);
     bench.takes = false;
@@ -204,15 +149,15 @@ fn a_leg_that_tells_nothing_is_ordered_what_frames_say_and_otherwise_nothing() {
     let mut bench = Bench::new();
     bench.enable();
     let quiet = |bench: &mut Bench| {
-        bench.board.wire.now_us += 500;
-        bench.board.order = None;
-        bench.round.round(33, &mut bench.station, &mut bench.board, &NOTHING);
-        bench.board.order
+        bench.hardware.now_us += 500;
+        bench.host.orders.dequeue();
+        bench.round();
+        bench.host.orders.dequeue()
     };
     quiet(&mut bench);
     assert_eq!(quiet(&mut bench), None);
     // A torque that the controlword of node 1 halts.
-    bench.board.frames.push_back(Frame::new(0x201, &[0x0F, 0x01]));
+    bench.arrive(&[Frame::new(0x201, &[0x0F, 0x01])]);
     let order = quiet(&mut bench).expect("an order");
     assert_eq!(order.commands.expect("a host has the drive").map(|command| command.halt), [true, false]);
     assert_eq!(quiet(&mut bench), None);
@@ -224,7 +169,7 @@ fn an_overrun_is_told_and_stops_a_hosted_leg() {
     bench.enable();
     bench.told();
     bench.requests.clear();
-    bench.board.lost = true;
+    bench.hardware.can.overrun = true;
     bench.run(8);
     assert_eq!(bench.requests, [LegRequest::Power(PowerRequest::QuickStop)]);
     assert_eq!(bench.told(), [(0x81, 0x8110), (0x81, 0), (0x82, 0x8110), (0x82, 0)]);
@@ -234,13 +179,13 @@ fn an_overrun_is_told_and_stops_a_hosted_leg() {
 fn a_frame_that_is_lost_while_the_controller_is_passive_fills_no_mailboxes() {
     let mut bench = Bench::new();
     bench.enable();
-    bench.board.status = Controller::Passive;
+    bench.hardware.can.controller = Controller::Passive;
     bench.run(1);
-    bench.board.wire.unplugged = true;
+    bench.hardware.can.unplugged = true;
     for round in 0..40 {
-        bench.board.lost = round % 3 == 0;
+        bench.hardware.can.overrun = round % 3 == 0;
         bench.run(1);
-        assert!(bench.board.wire.waiting().count_ones() <= 1);
+        assert!(bench.hardware.mailboxes_waiting().count_ones() <= 1);
     }
 }
 
@@ -250,10 +195,10 @@ fn a_controller_that_is_off_is_told_once_and_has_nothing_to_send() {
     bench.enable();
     bench.told();
     bench.requests.clear();
-    bench.board.status = Controller::Off;
+    bench.hardware.can.controller = Controller::Off;
     bench.run(50);
-    assert_eq!(bench.board.wire.sent, []);
-    bench.board.status = Controller::Active;
+    assert_eq!(bench.hardware.can.sent, []);
+    bench.hardware.can.controller = Controller::Active;
     bench.run(8);
     assert_eq!(bench.requests, [LegRequest::Power(PowerRequest::QuickStop)]);
     assert_eq!(bench.told(), [(0x81, 0x8140), (0x81, 0), (0x82, 0x8140), (0x82, 0)]);
@@ -262,10 +207,10 @@ fn a_controller_that_is_off_is_told_once_and_has_nothing_to_send() {
 #[test]
 fn an_open_switch_lets_no_step_towards_enabled_reach_the_leg() {
     let mut bench = Bench::new();
-    bench.board.held = false;
+    bench.held = false;
     bench.enable();
     assert_eq!((bench.requests.len(), bench.drive), (0, DriveState::SwitchOnDisabled));
-    bench.board.held = true;
+    bench.held = true;
     bench.enable();
     assert_eq!(bench.drive, DriveState::OperationEnabled);
 }
@@ -273,9 +218,9 @@ fn an_open_switch_lets_no_step_towards_enabled_reach_the_leg() {
 #[test]
 fn of_many_frames_so_many_are_heard_in_a_round() {
     let mut bench = Bench::new();
-    bench.board.frames.extend([Frame::new(0x80, &[]); 40]);
+    bench.arrive(&[Frame::new(0x80, &[]); 40]);
     bench.run(1);
-    assert_eq!(bench.board.frames.len(), 7);
+    assert_eq!(bench.unheard(), 7);
 }
 
 #[test]
@@ -285,27 +230,34 @@ fn one_store_is_under_way_and_how_it_ended_is_told() {
         bench.send(0x601, &[0x23, 0x65, 0x60, 0, value, 0, 0, 0]);
         bench.send(0x602, &save);
     };
+    let given = |bench: &Bench| bench.storage.given().expect("a store").clone();
+    let end = |bench: &Bench, done: bool| {
+        let mut store = bench.storage.given().expect("a store");
+        (store.done, store.generation) = (done, 5);
+        drop(store);
+        bench.storage.give_back();
+    };
     let mut bench = Bench::new();
     bench.told();
     window(&mut bench, 11);
-    assert!(bench.board.is_lent && bench.board.memory.what == Keeping::All);
-    let first = bench.board.memory.objects;
+    let first = given(&bench);
+    assert_eq!(first.what, Keeping::All);
     // Another one waits until the first is over.
     window(&mut bench, 22);
-    assert_eq!(bench.board.memory.objects, first);
-    (bench.board.memory.done, bench.board.memory.generation, bench.board.ended) = (true, 5, true);
+    assert_eq!(given(&bench).objects, first.objects);
+    end(&bench, true);
     bench.run(1);
-    assert!(bench.board.is_lent && bench.board.memory.objects != first);
-    assert_eq!((bench.station.generation(), bench.board.memory.generation), (5, 5));
-    (bench.board.memory.done, bench.board.ended) = (false, true);
+    assert_ne!(given(&bench).objects, first.objects);
+    assert_eq!((bench.station.generation(), given(&bench).generation), (5, 5));
+    end(&bench, false);
     bench.run(8);
     let codes: Vec<u16> = bench.told().iter().filter(|(id, _)| *id == 0x81).map(|(_, code)| *code).collect();
-    assert_eq!((codes.first(), codes.last()), (Some(&0xFF01), Some(&0x5530)), "{codes:x?}");
-    assert!(!bench.board.is_lent);
+    assert_eq!((codes.first(), codes.last()), (Some(&0xFF0D), Some(&0x5530)), "{codes:x?}");
+    assert!(bench.storage.given().is_none() && bench.storage.idle().is_some());
     // The second was refused by the flash: a reset brings back the first.
     bench.send(0, &[129, 0]);
-    bench.board.wire.sent.clear();
+    bench.hardware.can.sent.clear();
     bench.send(0x601, &[0x40, 0x65, 0x60, 0, 0, 0, 0, 0]);
-    let answer = bench.board.wire.sent.iter().find(|(frame, _, _)| frame.id() == 0x581).expect("an answer");
+    let answer = bench.hardware.can.sent.iter().find(|(frame, _, _)| frame.id() == 0x581).expect("an answer");
     assert_eq!(answer.0.data()[4..], [11, 0, 0, 0]);
 }

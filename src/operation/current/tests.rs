@@ -1,12 +1,18 @@
 extern crate std;
 
+use std::boxed::Box;
 use std::vec::Vec;
 
+use super::super::testing::TestHardware;
+use super::super::{Ends, EventQueue, Queues};
 use super::*;
 use crate::leg::AxisFault;
 use crate::motor::calibration::tests::calibrate;
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::motor::{Axis, AxisConfiguration, SenseScale};
+
+mod requests;
+mod stop;
 
 /// Ticks of the clock in a period, as on the board.
 const PERIOD: NonZeroU32 = NonZeroU32::new(7000).expect("more than none");
@@ -15,66 +21,21 @@ const ERASED: u32 = 36_000;
 /// 0.1 ms and what was missed before.
 const WRITTEN: u32 = 3;
 
-#[derive(Debug, Default)]
-struct Board {
-    causes: u32,
-    brake: f32,
-    begun: bool,
-    damped: bool,
-    told: Vec<(usize, Outcome)>,
-    servo_ticks: u32,
-}
-
-impl CurrentBoard for Board {
-    fn causes(&self) -> u32 {
-        self.causes
-    }
-    fn raise(&mut self, bits: u32) {
-        self.causes |= bits;
-    }
-    fn release_all(&mut self) {}
-    fn drive(&mut self, _: usize, command: &AxisCommand) {
-        assert!(!command.enabled, "nothing is asked for");
-    }
-    fn set_brake(&mut self, duty: f32) {
-        self.brake = duty;
-    }
-    fn target(&self, _: usize) -> AxisRequest {
-        AxisRequest::RELEASED
-    }
-    fn end_servo(&mut self) {
-        self.begun = false;
-    }
-    fn damp(&mut self) {
-        self.damped = true;
-    }
-    fn has_order(&self, _: usize) -> bool {
-        false
-    }
-    fn order(&mut self, _: usize) -> Option<Order> {
-        None
-    }
-    fn tell(&mut self, axis: usize, outcome: Outcome) {
-        self.told.push((axis, outcome));
-    }
-    fn sample(&mut self, _: usize, _: JointSample) {}
-    fn servo_ticks(&self) -> u32 {
-        self.servo_ticks
-    }
-    fn call_servo(&mut self, _: bool) {
-        self.servo_ticks += 1;
-    }
-    fn count_missed(&mut self) {}
-}
-
 /// Two axes on motors that somebody turns, with the servo begun.
 struct Bench {
     loops: CurrentLoops<2>,
     motors: [TestMotor; 2],
-    board: Board,
+    hardware: TestHardware<2>,
+    signals: Signals<2>,
+    queues: Queues<2>,
+    events: Box<EventQueue<2>>,
     now: u32,
     /// An index pulse came, and its interrupt only now: the count it takes is that of now.
     late_index: bool,
+    /// Outcomes that were sent to the housekeeping.
+    outcomes: Vec<(usize, Outcome)>,
+    /// The servo was asked to damp.
+    damped: bool,
 }
 
 impl Bench {
@@ -87,30 +48,52 @@ impl Bench {
             Stage::running(Axis::new(configuration, &calibration, &motor.sample()).expect("usual"))
         });
         let chopper = Chopper::new(Volt(50.0), Volt(54.0));
-        let loops = CurrentLoops::new(stages, PERIOD, chopper, SenseScale::ODRIVE_3_6.volt_per_code);
         let mut bench = Self {
-            loops,
+            loops: CurrentLoops::new(stages, PERIOD, chopper, SenseScale::ODRIVE_3_6.volt_per_code),
             motors,
-            board: Board { begun: true, ..Board::default() },
+            hardware: TestHardware::new(),
+            signals: Signals::new(),
+            queues: Queues::new(),
+            events: Box::default(),
             now: 0,
             late_index: false,
+            outcomes: Vec::new(),
+            damped: false,
         };
+        bench.signals.begin_servo();
         bench.run(100);
         bench
+    }
+
+    fn causes(&self) -> u32 {
+        self.signals.inhibit.causes()
+    }
+
+    /// One tick of an axis, and the servo's where it is requested.
+    fn tick_axis(&mut self, axis: usize, tick: &Tick) {
+        let Ends { mut current, mut housekeeping, mut servo, .. } = self.queues.split(&mut self.events);
+        let requested = self.hardware.servo_pended;
+        self.loops.tick(axis, tick, &mut current, &self.signals, &mut self.hardware);
+        assert!(!self.hardware.is_enabled(), "nothing is asked for");
+        if self.hardware.servo_pended != requested {
+            self.signals.statistics.servo_ticks.add();
+        }
+        servo.samples.iter_mut().for_each(|samples| while samples.dequeue().is_some() {});
+        while let Some(outcome) = housekeeping.outcomes[axis].dequeue() {
+            self.outcomes.push((axis, outcome));
+        }
+        self.damped |= self.signals.take_reported(0).any(|fault| fault == BoardFault::CurrentTicks);
     }
 
     /// Periods in which every axis ticks; where `torn`, one shunt's conversion is not there.
     fn tick(&mut self, torn: bool) {
         self.now = self.now.wrapping_add(PERIOD.get());
-        for (axis, motor) in self.motors.iter_mut().enumerate() {
-            let mut sample = motor.period(AxisCommand::RELEASED);
+        for axis in 0..2 {
+            let mut sample = self.motors[axis].period(AxisCommand::RELEASED);
             if self.late_index {
                 sample.index_count = Some(sample.encoder_count);
             }
-            let now = self.now;
-            let tick =
-                Tick { now, emergency_stop: false, gate_fault: false, complete: !torn, supply: true, sample };
-            self.loops.tick(axis, &tick, &mut self.board);
+            self.tick_axis(axis, &Tick { complete: !torn, ..tick_at(self.now, sample) });
         }
     }
 
@@ -127,13 +110,13 @@ impl Bench {
     }
 
     fn store(&mut self) {
-        self.board.causes |= Cause::Storing.bit();
+        self.signals.inhibit.raise(Cause::Storing);
         self.run(480);
     }
 
     fn stored(&mut self) {
         self.run(24);
-        self.board.causes &= !Cause::Storing.bit();
+        self.signals.inhibit.end_storing();
         self.run(240);
     }
 
@@ -144,8 +127,13 @@ impl Bench {
         }
         self.run(2600);
         let faults = self.loops.axes.each_ref().map(|axis| axis.stage.fault());
-        faults == [None; 2] && self.board.causes == 0
+        faults == [None; 2] && self.causes() == 0
     }
+}
+
+/// A tick of a sound board.
+fn tick_at(now: u32, sample: AxisSample) -> Tick {
+    Tick { now, emergency_stop: false, gate_fault: false, complete: true, supply: true, sample }
 }
 
 #[test]
@@ -155,13 +143,13 @@ fn the_brake_resistor_has_no_duty_while_the_flash_is_written() {
         motor.bus = 53.0;
     }
     bench.run(3);
-    assert!(bench.board.brake > 0.7, "{}", bench.board.brake);
-    bench.board.causes |= Cause::Storing.bit();
+    assert!(bench.hardware.brake > 0.7, "{}", bench.hardware.brake);
+    bench.signals.inhibit.raise(Cause::Storing);
     bench.tick(false);
-    assert_eq!(bench.board.brake, 0.0);
-    bench.board.causes = 0;
+    assert_eq!(bench.hardware.brake, 0.0);
+    bench.signals.inhibit.end_storing();
     bench.tick(false);
-    assert!(bench.board.brake > 0.7, "{}", bench.board.brake);
+    assert!(bench.hardware.brake > 0.7, "{}", bench.hardware.brake);
 }
 
 #[test]
@@ -170,7 +158,7 @@ fn an_erasure_forgets_the_zeros_and_nothing_else() {
     for turns in [0.0, 0.125, -0.4, 4.0, 8.0, -8.0, 123.456] {
         let mut bench = Bench::new(&CONFIGURATION);
         bench.store();
-        assert!(bench.board.begun);
+        assert!(bench.signals.has_begun());
         bench.stand(ERASED, turns);
         // The first conversions after it may be torn, and the index's interrupt comes when the index is elsewhere.
         bench.late_index = true;
@@ -179,13 +167,13 @@ fn an_erasure_forgets_the_zeros_and_nothing_else() {
         bench.late_index = false;
         bench.stand(ERASED, turns);
         bench.stored();
-        assert!(!bench.board.begun && !bench.board.damped);
-        let told = [0, 1, 0, 1].map(|axis| (axis, Outcome::StoodStill));
-        assert_eq!(bench.board.told, told, "{turns}");
-        assert_eq!(bench.board.causes, 0);
+        assert!(!bench.signals.has_begun() && !bench.damped);
+        let expected = [0, 1, 0, 1].map(|axis| (axis, Outcome::StoodStill));
+        assert_eq!(bench.outcomes, expected, "{turns}");
+        assert_eq!(bench.causes(), 0);
         // The rotor's angle is still known: the index is found at its place.
         assert!(bench.is_at_its_place(), "{turns}");
-        assert_eq!(bench.board.told.len(), 4);
+        assert_eq!(bench.outcomes.len(), 4);
     }
 }
 
@@ -199,7 +187,7 @@ fn words_that_are_written_cost_nothing() {
         bench.tick(false);
     }
     bench.stored();
-    assert_eq!((bench.board.begun, bench.board.told.len(), bench.board.causes), (true, 0, 0));
+    assert_eq!((bench.signals.has_begun(), bench.outcomes.len(), bench.causes()), (true, 0, 0));
     assert!(bench.is_at_its_place());
 }
 
@@ -212,8 +200,8 @@ fn a_counter_whose_range_is_no_multiple_of_a_turn_is_not_believed_after_an_erasu
         bench.store();
         bench.stand(periods, 0.001);
         bench.stored();
-        assert_eq!(bench.board.told.contains(&(0, lost)), is_lost);
-        assert_eq!(bench.board.begun, !is_lost);
+        assert_eq!(bench.outcomes.contains(&(0, lost)), is_lost);
+        assert_eq!(bench.signals.has_begun(), !is_lost);
     }
 }
 
@@ -222,27 +210,20 @@ fn the_same_gap_is_a_fault_while_nothing_is_written() {
     let mut bench = Bench::new(&CONFIGURATION);
     bench.stand(ERASED, 0.4);
     bench.run(3);
-    assert!(bench.board.damped);
-    assert_eq!(bench.board.causes & Cause::CurrentTicks.bit(), Cause::CurrentTicks.bit());
+    assert!(bench.damped);
+    assert_eq!(bench.causes() & Cause::CurrentTicks.bit(), Cause::CurrentTicks.bit());
     let mut bench = Bench::new(&CONFIGURATION);
     bench.tick(true);
-    assert_eq!(bench.board.causes, Cause::Conversion.bit());
+    assert_eq!(bench.causes(), Cause::Conversion.bit());
 }
 
 #[test]
 fn the_emergency_stop_counts_while_the_flash_is_written() {
     let mut bench = Bench::new(&CONFIGURATION);
     bench.store();
-    let tick = Tick {
-        now: bench.now,
-        emergency_stop: true,
-        gate_fault: false,
-        complete: true,
-        supply: true,
-        sample: bench.motors[0].sample(),
-    };
-    bench.loops.tick(0, &tick, &mut bench.board);
-    assert_eq!(bench.board.causes, Cause::Storing.bit() | Cause::EmergencyStop.bit());
+    let tick = Tick { emergency_stop: true, ..tick_at(bench.now, bench.motors[0].sample()) };
+    bench.tick_axis(0, &tick);
+    assert_eq!(bench.causes(), Cause::Storing.bit() | Cause::EmergencyStop.bit());
 }
 
 #[test]
@@ -253,13 +234,12 @@ fn a_bus_voltage_that_is_no_longer_converted_releases_at_the_second_period() {
     let mut causes = Vec::new();
     for supply in [false, true, false, false] {
         let sample = bench.motors[0].sample();
-        let tick =
-            Tick { now: bench.now, emergency_stop: false, gate_fault: false, complete: true, supply, sample };
-        bench.loops.tick(0, &tick, &mut bench.board);
+        let tick = Tick { supply, ..tick_at(bench.now, sample) };
+        bench.tick_axis(0, &tick);
         bench.now += PERIOD.get();
-        causes.push(bench.board.causes);
+        causes.push(bench.causes());
     }
     // The first of all is not missed.
     assert_eq!(causes, [0, 0, 0, Cause::Conversion.bit()]);
-    assert_eq!(bench.board.brake, 0.0);
+    assert_eq!(bench.hardware.brake, 0.0);
 }

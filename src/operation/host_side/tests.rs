@@ -3,61 +3,108 @@ extern crate std;
 use std::collections::VecDeque;
 use std::vec::Vec;
 
-use super::super::mailboxes::tests::{NOTHING, station};
+use super::super::BusEnds;
+use super::super::testing::{TestHardware, commanded, on_a_bus};
 use super::*;
-use crate::bus::Frame;
-use crate::leg::{FaultCode, JointStatus};
+use crate::bus::station::LegOrder;
+use crate::hal::{Contacts, JointSample};
+use crate::leg::testing::{LEG, configuration, model};
+use crate::leg::{Cause, Change, FaultCode, Finding, Verdict};
+use crate::safety::{Refusal, RefusalReason};
 
-#[derive(Default)]
-struct Board {
+struct Bench {
+    side: HostSide<2>,
+    host: HostEnds<'static, 2>,
+    bus: BusEnds<'static, 2>,
+    hardware: TestHardware<2>,
+    signals: Signals<2>,
+    /// Orders that the bus has not given yet.
     orders: VecDeque<LegOrder<2>>,
+    /// Reports that the bus took.
     told: Vec<LegTold<2>>,
-    full: bool,
-    pended: u32,
-    open: bool,
-    blocked: bool,
+    /// The bus takes no report.
+    busy: bool,
 }
 
-impl HostBoard<2> for Board {
-    fn order(&mut self) -> Option<LegOrder<2>> {
-        self.orders.pop_front()
+impl Bench {
+    /// The operator holds the enabling switch.
+    fn new(orders: &[LegOrder<2>]) -> Self {
+        let (hardware, host, bus) = on_a_bus();
+        let mut bench = Self {
+            side: HostSide::new(Following::new(&configuration())),
+            host,
+            bus,
+            hardware,
+            signals: Signals::new(),
+            orders: orders.iter().copied().collect(),
+            told: Vec::new(),
+            busy: false,
+        };
+        bench.hold([true; 2]);
+        bench
     }
-    fn takes_told(&self) -> bool {
-        !self.full
+
+    /// Enabling contact, and the operator's permission as the housekeeping sees it.
+    fn hold(&mut self, [enabling, permits]: [bool; 2]) {
+        self.hardware.contacts = Contacts { enabling, start: false };
+        self.signals.set_permits(permits);
     }
-    fn tell(&mut self, told: LegTold<2>) {
-        assert!(!self.full);
-        self.told.push(told);
+
+    /// The bus gives its next order where there is room, as its round does.
+    fn give(&mut self) {
+        if self.bus.orders.ready()
+            && let Some(order) = self.orders.pop_front()
+        {
+            let _ = self.bus.orders.enqueue(order);
+        }
     }
-    fn pend(&mut self) {
-        self.pended += 1;
+
+    /// Orders that the servo did not take.
+    fn waiting(&self) -> usize {
+        self.orders.len() + usize::from(!self.bus.orders.ready())
     }
-    fn held(&self) -> bool {
-        !self.open
+
+    fn hear(&mut self, report: impl FnMut(Fault)) {
+        self.give();
+        self.side.hear(&mut self.host, report);
     }
-    fn is_clear(&self) -> bool {
-        !self.blocked
+
+    fn held(&self, request: Option<ControlRequest<2>>, state: DriveState) -> Option<ControlRequest<2>> {
+        self.side.held(request, state, &self.signals, &self.hardware)
+    }
+
+    /// What is commanded, and whether an identification is given up.
+    fn commands(&mut self) -> Option<([JointCommand; 2], bool)> {
+        self.side.commands().map(|host| (*host.commands, host.cancel))
+    }
+
+    fn report(&mut self, control: &Control<2>, output: &ControlOutput<2>) {
+        let Self { side, host, hardware, signals, .. } = self;
+        side.report(control, &SAMPLE, output, host, signals, hardware);
+        self.take_report();
+    }
+
+    fn rest(&mut self) {
+        self.side.rest(&mut self.host, &self.signals, &mut self.hardware);
+        self.take_report();
+    }
+
+    fn take_report(&mut self) {
+        if !self.busy
+            && let Some(told) = self.bus.told.dequeue()
+        {
+            self.told.push(told);
+        }
     }
 }
 
-/// What a host that has the drive commands.
-fn commanded() -> [JointCommand; 2] {
-    let mut station = station();
-    // Its boot-up message goes first.
-    assert!(station.poll(0, 0, &NOTHING).is_some());
-    station.hear(&Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 6, 0, 0, 0]), 0, None, &NOTHING);
-    assert!(station.poll(0, 0, &NOTHING).is_some());
-    let joint = JointStatus { drive: DriveState::SwitchOnDisabled, ..JointStatus::NONE };
-    station.told(&LegTold { joints: [joint; 2], rests: false, ..LegTold::NONE });
-    station.order().commands.expect("a host")
-}
+/// Both joints within their ranges.
+const SAMPLE: Sample<2> = Sample {
+    joints: [JointSample { encoder_counts: 30_000, current: crate::units::Ampere::ZERO, doubtful: false }; 2],
+};
 
 fn order(request: Option<LegRequest>) -> LegOrder<2> {
     LegOrder { commands: Some(commanded()), request, faults: [None; 2] }
-}
-
-fn side(orders: &[LegOrder<2>]) -> HostSide<Board, 2> {
-    HostSide::new(Board { orders: orders.iter().copied().collect(), ..Board::default() })
 }
 
 const UP: PowerRequest = PowerRequest::EnableOperation;
@@ -70,13 +117,14 @@ fn unreported(_: Fault) {
 #[test]
 fn a_request_waits_for_the_operators_hand_and_none_after_it_is_lost() {
     let identify = LegRequest::Identify { plan: Plan::Sequential, seed: 7 };
-    let mut side = side(&[order(Some(ENABLE)), order(Some(identify)), order(Some(LegRequest::TakeUpdate))]);
+    let mut bench =
+        Bench::new(&[order(Some(ENABLE)), order(Some(identify)), order(Some(LegRequest::TakeUpdate))]);
     let stop = ControlRequest::Power(PowerRequest::QuickStop);
     for _ in 0..3 {
-        side.hear(unreported);
+        bench.hear(unreported);
         // The hand goes first, and what it asks for begins with no host's plan.
-        assert_eq!(side.request(Some(stop)), Some((stop, None)));
-        assert_eq!(side.board.orders.len(), 2);
+        assert_eq!(bench.side.request(Some(stop)), Some((stop, None)));
+        assert_eq!(bench.waiting(), 2);
     }
     let expected = [
         (ControlRequest::Power(UP), None),
@@ -84,78 +132,113 @@ fn a_request_waits_for_the_operators_hand_and_none_after_it_is_lost() {
         (ControlRequest::TakeUpdate, None),
     ];
     for expected in expected {
-        side.hear(unreported);
-        assert_eq!(side.request(None), Some(expected));
-        assert_eq!(side.request(None), None, "once");
+        bench.hear(unreported);
+        assert_eq!(bench.side.request(None), Some(expected));
+        assert_eq!(bench.side.request(None), None, "once");
     }
 }
 
 #[test]
 fn the_newest_commands_count_a_cancel_is_passed_on_once_and_faults_are_reported() {
     let fault = LegOrder { faults: [None, Some(FaultCode::Heartbeat)], ..order(None) };
-    let mut side = side(&[order(Some(LegRequest::Cancel)), fault]);
-    assert!(side.commands().is_none());
+    let mut bench = Bench::new(&[order(Some(LegRequest::Cancel)), fault]);
+    assert!(bench.commands().is_none());
     let mut reported = Vec::new();
-    side.hear(|fault| reported.push(fault));
+    (0..2).for_each(|_| bench.hear(|fault| reported.push(fault)));
     assert_eq!(reported, [Fault { code: FaultCode::Heartbeat, joint: 1 }]);
     let commands = commanded();
-    assert_eq!(side.commands(), Some((&commands, true)));
-    assert_eq!(side.commands(), Some((&commands, false)));
+    assert_eq!(bench.commands(), Some((commands, true)));
+    assert_eq!(bench.commands(), Some((commands, false)));
     // A host that has the drive no longer commands nothing.
-    side.board.orders.push_back(LegOrder { commands: None, ..order(None) });
-    side.hear(unreported);
-    assert_eq!(side.commands(), None);
+    bench.orders.push_back(LegOrder { commands: None, ..order(None) });
+    bench.hear(unreported);
+    assert_eq!(bench.commands(), None);
 }
 
 #[test]
 fn an_open_switch_turns_requests_to_enable_away_and_stops_a_leg_that_is_enabled() {
-    let mut side = side(&[]);
+    let mut bench = Bench::new(&[]);
     let (up, stop, off) =
         [UP, PowerRequest::QuickStop, PowerRequest::DisableVoltage].map(ControlRequest::Power).into();
     let states = [DriveState::SwitchOnDisabled, DriveState::SwitchedOn, DriveState::OperationEnabled];
     for request in [None, Some(up), Some(off), Some(ControlRequest::Identify)] {
         for state in states {
-            assert_eq!(side.held(request, state), request);
+            assert_eq!(bench.held(request, state), request);
         }
     }
-    side.board.open = true;
-    for state in states {
-        let enabled = state == DriveState::OperationEnabled;
-        for turned_away in [None, Some(up), Some(ControlRequest::Identify), Some(ControlRequest::TakeUpdate)]
-        {
-            assert_eq!(side.held(turned_away, state), enabled.then_some(stop), "{state:?}");
+    // The contact counts at once; the housekeeping's permission waits for its bounce.
+    for open in [[false, true], [true, false], [false; 2]] {
+        bench.hold(open);
+        for state in states {
+            let enabled = state == DriveState::OperationEnabled;
+            let enabling = [up, ControlRequest::Identify, ControlRequest::TakeUpdate].map(Some);
+            for turned_away in [None].into_iter().chain(enabling) {
+                assert_eq!(bench.held(turned_away, state), enabled.then_some(stop), "{state:?}");
+            }
+            // What leads down is passed on.
+            assert_eq!(bench.held(Some(off), state), Some(off));
         }
-        // What leads down is passed on.
-        assert_eq!(side.held(Some(off), state), Some(off));
     }
 }
 
 #[test]
 fn the_bus_runs_after_every_second_tick_and_is_told_once_it_has_taken_what_it_had() {
-    let mut side = side(&[]);
-    side.board.full = true;
-    // A request for power was refused while the bus had no time.
-    (0..4).for_each(|tick| side.told(tick == 1, || LegTold::NONE));
-    assert_eq!((side.board.pended, side.board.told.len()), (2, 0));
-    side.board.full = false;
-    (0..4).for_each(|_| side.told(false, || LegTold { change: [true; 2], ..LegTold::NONE }));
-    let told: Vec<(bool, bool, [bool; 2])> =
-        side.board.told.iter().map(|told| (told.refused, told.blocked, told.change)).collect();
-    assert_eq!(
-        (side.board.pended, &told[..]),
-        (4, &[(true, false, [true; 2]), (false, false, [true; 2])][..])
-    );
+    let mut bench = Bench::new(&[]);
+    let mut control = Control::new(&configuration()).expect("a leg");
+    let plain = control.tick(&SAMPLE, None, LEG.gravity);
+    let mut refused = plain;
+    refused.servo.decision.refused = Some(Refusal { joint: 0, reason: RefusalReason::Moving });
+    // The bus has no time for what it was told before.
+    bench.busy = true;
+    (0..2).for_each(|_| bench.report(&control, &plain));
+    // A request for power was refused meanwhile.
+    (0..4).for_each(|tick| bench.report(&control, if tick == 1 { &refused } else { &plain }));
+    assert_eq!((bench.hardware.bus_pended, bench.told.len()), (3, 0));
+    bench.busy = false;
+    bench.take_report();
+    bench.told.clear();
+    let change = Change { since_s: 1.0, joints: [true; 2], statistic: [1.0; 2], limit: 0.5 };
+    control.receive(Finding::Changed(change));
+    let (cause, verdict) = (Cause::Friction, Verdict::ACCEPTED);
+    control.receive(Finding::Updated { cause, verdict, model: Some(model()) });
+    (0..4).for_each(|_| bench.report(&control, &plain));
+    let told: Vec<(bool, bool, bool, [bool; 2])> =
+        bench.told.iter().map(|told| (told.refused, told.blocked, told.held, told.change)).collect();
+    let expected = [(true, false, true, [true; 2]), (false, false, true, [true; 2])];
+    assert_eq!((bench.hardware.bus_pended, &told[..]), (5, &expected[..]));
+}
+
+#[test]
+fn a_report_says_whether_the_switch_is_held_and_what_forbids_to_enable() {
+    let mut control = Control::new(&configuration()).expect("a leg");
+    let output = control.tick(&SAMPLE, None, LEG.gravity);
+    for (switch, blocked) in [([true; 2], false), ([false, true], false), ([true; 2], true)] {
+        let mut bench = Bench::new(&[]);
+        bench.hold(switch);
+        if blocked {
+            bench.signals.inhibit.raise(crate::safety::Cause::GateFault);
+        }
+        (0..2).for_each(|_| bench.report(&control, &output));
+        let told = bench.told[0];
+        assert_eq!((told.held, told.blocked, told.rests), (switch == [true; 2], blocked, false));
+        (0..2).for_each(|_| bench.rest());
+        assert_eq!(bench.told[1], LegTold { held: told.held, blocked, ..LegTold::NONE });
+    }
 }
 
 #[test]
 fn what_is_asked_of_a_leg_without_zeros_is_forgotten() {
-    let mut side = side(&[order(Some(ENABLE))]);
-    side.hear(unreported);
-    side.board.orders.extend([order(Some(ENABLE)), order(Some(LegRequest::Cancel))]);
-    side.board.blocked = true;
-    (0..2).for_each(|_| side.rest());
-    assert_eq!((side.board.orders.len(), side.board.told.len()), (0, 1));
-    assert_eq!(side.board.told[0], LegTold::NONE);
-    side.hear(unreported);
-    assert_eq!((side.request(None), side.commands()), (None, None));
+    let mut bench = Bench::new(&[order(Some(ENABLE))]);
+    bench.hear(unreported);
+    bench.orders.extend([order(Some(ENABLE)), order(Some(LegRequest::Cancel))]);
+    bench.signals.inhibit.raise(crate::safety::Cause::EmergencyStop);
+    bench.hold([false; 2]);
+    for _ in 0..2 {
+        bench.give();
+        bench.rest();
+    }
+    assert_eq!((bench.waiting(), bench.told.len()), (0, 1));
+    assert_eq!(bench.told[0], LegTold::NONE);
+    bench.hear(unreported);
+    assert_eq!((bench.side.request(None), bench.commands()), (None, None));
 }

@@ -1,8 +1,10 @@
 extern crate std;
 
-use std::collections::VecDeque;
+use std::boxed::Box;
 use std::vec::Vec;
 
+use super::super::testing::TestHardware;
+use super::super::{Ends, EventQueue, Queues};
 use super::*;
 use crate::hal::AxisCommand;
 use crate::leg::CalibrationRefusal;
@@ -10,106 +12,64 @@ use crate::motor::calibration::tests::{SETTINGS, calibrate};
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::operation::Stage;
 
-#[derive(Default)]
-struct Board {
-    contacts: (bool, bool),
-    causes: u32,
-    begun: bool,
-    orders: Vec<(usize, Order)>,
-    outcomes: [VecDeque<Outcome>; 2],
-    kept: Vec<(usize, Option<StoredCalibration>)>,
-    forgotten: bool,
-    said: Vec<Record<2>>,
-}
-
-impl HousekeepingBoard<2> for Board {
-    fn contacts(&self) -> (bool, bool) {
-        self.contacts
-    }
-    fn causes(&self) -> u32 {
-        self.causes
-    }
-    fn raise(&mut self, cause: Cause) {
-        self.causes |= cause.bit();
-    }
-    fn reset_interlock(&mut self) {
-        self.causes = 0;
-    }
-    fn gate_holds(&mut self, _: usize) -> bool {
-        true
-    }
-    fn gate_status(&mut self) -> u32 {
-        0
-    }
-    fn switch_gates(&mut self, _: bool) {}
-    fn configure_gates(&mut self) -> bool {
-        true
-    }
-    fn temperature(&self, _: usize) -> Option<f32> {
-        Some(30.0)
-    }
-    fn set_temperature(&mut self, _: f32) {}
-    fn report(&mut self, _: crate::safety::FaultCode, _: usize) {}
-    fn encoder_count(&self, _: usize) -> u16 {
-        0
-    }
-    fn joint_counts(&self, _: usize) -> i32 {
-        7
-    }
-    fn begin_servo(&mut self) {
-        self.begun = true;
-    }
-    fn end_servo(&mut self) {
-        self.begun = false;
-    }
-    fn has_begun(&self) -> bool {
-        self.begun
-    }
-    fn order(&mut self, axis: usize, order: Order) {
-        self.orders.push((axis, order));
-    }
-    fn outcome(&mut self, axis: usize) -> Option<Outcome> {
-        self.outcomes[axis].pop_front()
-    }
-    fn calibrated(&mut self, axis: usize, calibration: &Calibration) {
-        self.kept.push((axis, calibration.stored()));
-    }
-    fn take_forgotten(&mut self) -> bool {
-        core::mem::take(&mut self.forgotten)
-    }
-    fn request(&mut self, _: ControlRequest<2>) -> bool {
-        true
-    }
-    fn drive_state(&mut self) -> Option<DriveState> {
-        None
-    }
-    fn say(&mut self, record: Record<2>) {
-        self.said.push(record);
-    }
-}
+mod reports;
 
 const HOUSE: HousekeepingSettings<2> =
     HousekeepingSettings { axes: [CONFIGURATION; 2], calibration: [SETTINGS; 2], hottest_c: 100.0 };
 
 struct Bench {
     keeper: Housekeeper<2>,
-    board: Board,
+    hardware: TestHardware<2>,
+    signals: Signals<2>,
+    queues: Queues<2>,
+    events: Box<EventQueue<2>>,
+    orders: Vec<(usize, Order)>,
+    calibrated: Vec<(usize, Option<StoredCalibration>)>,
+    records: Vec<Record<2>>,
 }
 
 impl Bench {
     fn new(keeper: Housekeeper<2>) -> Self {
-        let mut bench = Self { keeper, board: Board::default() };
+        let mut bench = Self {
+            keeper,
+            hardware: TestHardware::new(),
+            signals: Signals::new(),
+            queues: Queues::new(),
+            events: Box::default(),
+            orders: Vec::new(),
+            calibrated: Vec::new(),
+            records: Vec::new(),
+        };
         bench.hold(false, false);
         bench
     }
 
+    /// A round, and what it sent.
+    fn round(&mut self) {
+        let Ends { mut current, mut servo, mut housekeeping, mut identification, mut calibrated } =
+            self.queues.split(&mut self.events);
+        self.keeper.round(&mut housekeeping, &self.signals, &mut self.hardware);
+        for (axis, orders) in current.orders.iter_mut().enumerate() {
+            while let Some(order) = orders.dequeue() {
+                self.orders.push((axis, order));
+            }
+        }
+        while let Some(one) = calibrated.dequeue() {
+            self.calibrated.push(one);
+        }
+        while let Some(record) = identification.notes.dequeue() {
+            self.records.push(record);
+        }
+        while servo.requests.dequeue().is_some() {}
+    }
+
     /// A tenth of a second, and what was ordered in it.
     fn hold(&mut self, enabling: bool, start: bool) -> Vec<(usize, Order)> {
-        self.board.contacts = (enabling, start);
+        self.hardware.contacts = Contacts { enabling, start };
         for _ in 0..RATE_HZ / 10 {
-            self.keeper.round(&mut self.board);
+            self.round();
         }
-        core::mem::take(&mut self.board.orders)
+        core::mem::take(&mut self.orders)
     }
 
     fn press(&mut self) -> Vec<(usize, Order)> {
@@ -120,7 +80,8 @@ impl Bench {
     }
 
     fn ends(&mut self, axis: usize, outcome: Outcome) -> Vec<(usize, Order)> {
-        self.board.outcomes[axis].push_back(outcome);
+        let mut ends = self.queues.split(&mut self.events);
+        ends.current.outcomes[axis].enqueue(outcome).expect("room");
         self.hold(true, false)
     }
 }
@@ -150,7 +111,7 @@ fn what_was_kept_is_checked_and_what_was_not_is_measured() {
     assert_eq!(orders[1].1, anew());
     // Either is told to whoever keeps it.
     bench.ends(1, Outcome::Calibrated(calibration));
-    assert_eq!(bench.board.kept, [(0, Some(stored)), (1, Some(stored))]);
+    assert_eq!(bench.calibrated, [(0, Some(stored)), (1, Some(stored))]);
     assert!(bench.keeper.is_calibrated());
 }
 
@@ -166,7 +127,7 @@ fn what_was_kept_and_is_not_found_again_is_refused_once_and_then_measured() {
         let mut bench = Bench::new(Housekeeper::new(HOUSE).with_stored([Some(stored); 2]));
         assert_eq!(bench.press(), [(0, checked(stored))]);
         assert_eq!(bench.ends(0, Outcome::Refused(refusal)), []);
-        let told = bench.board.said.iter().any(|record| {
+        let told = bench.records.iter().any(|record| {
             matches!(record, Record::Calibration { joint: 1, result, .. } if *result == words::calibration(refusal).0)
         });
         assert!(told && !bench.keeper.is_calibrated(), "{refusal:?}");
@@ -178,7 +139,7 @@ fn what_was_kept_and_is_not_found_again_is_refused_once_and_then_measured() {
 fn what_was_forgotten_or_is_of_another_configuration_is_not_used() {
     let stored = measured().stored().expect("an index");
     let mut bench = Bench::new(Housekeeper::new(HOUSE).with_stored([Some(stored); 2]));
-    bench.board.forgotten = true;
+    bench.signals.forget_stored();
     assert_eq!(bench.press(), [(0, anew())]);
     let mut other = stored;
     other.encoder.pole_pairs += 1;
@@ -228,13 +189,12 @@ fn a_motor_whose_encoder_was_turned_while_the_power_was_off_is_refused_and_then_
 #[test]
 fn after_an_erasure_a_reference_has_to_be_taken_again() {
     let mut bench = Bench::new(Housekeeper::ready(HOUSE));
-    bench.board.begun = true;
+    bench.signals.begin_servo();
     bench.ends(0, Outcome::StoodStill);
     bench.ends(1, Outcome::StoodStill);
     let told = |joint| Record::AxisFault { tick: 0, joint, name: "zero_forgotten" };
     let said: Vec<Record<2>> = bench
-        .board
-        .said
+        .records
         .iter()
         .filter_map(|record| match record {
             Record::AxisFault { joint, name, .. } => Some(Record::AxisFault { tick: 0, joint: *joint, name }),
@@ -243,7 +203,7 @@ fn after_an_erasure_a_reference_has_to_be_taken_again() {
         .collect();
     assert_eq!(said, [told(1), told(2)]);
     // No new calibration: the axes run on.
-    assert!(!bench.board.begun && bench.keeper.is_calibrated());
+    assert!(!bench.signals.has_begun() && bench.keeper.is_calibrated());
     bench.hold(false, false);
     bench.hold(false, true);
     let mut orders = bench.hold(false, false);
@@ -251,5 +211,5 @@ fn after_an_erasure_a_reference_has_to_be_taken_again() {
         orders.extend(bench.hold(false, false));
     }
     assert_eq!(orders, [(0, Order::Place(0)), (1, Order::Place(0))]);
-    assert!(bench.board.begun);
+    assert!(bench.signals.has_begun());
 }

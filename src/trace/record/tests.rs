@@ -109,7 +109,7 @@ fn registers_are_written_in_base_sixteen() {
 }
 
 /// One of each kind, in the order of the list.
-const EXAMPLES: [Record<2>; 28] = [
+const EXAMPLES: [Record<2>; 29] = [
     Record::Boot {
         grammar: 1,
         version: "0.1.0",
@@ -141,6 +141,7 @@ const EXAMPLES: [Record<2>; 28] = [
         kept: 2_000,
     },
     Record::Refused { why: "-", value: 0 },
+    Record::GateDriver { why: "-", joint: 1, status: 0x0400_0300 },
     Record::State { tick: 1, drive: "-", activity: "-", phase: "-", motion: 0 },
     Record::Request { tick: 1, name: "-", accepted: true },
     Record::NotEnabled { tick: 1, joint: 1, why: "-" },

@@ -323,7 +323,7 @@ mod tests {
             (codes, host.read(1, WINDOW, 0).expect("an answer"))
         };
         let (save, load) = ((0x1010, b"save"), (0x1011, b"load"));
-        let told = |code: u16| vec![0xFF01, 0xFF01, code, code];
+        let told = |code: u16| vec![0xFF0D, 0xFF0D, code, code];
         assert_eq!(ask(11_111, save, false), (told(0), 11_111));
         assert_eq!(ask(22_222, save, true), (told(0x5530), 11_111));
         assert_eq!(ask(33_333, load, true), (told(0x5530), 11_111));

@@ -12,6 +12,7 @@ use super::memory::{BYTES, Memory};
 use super::network::Network;
 use super::server::Server;
 use crate::tool::error::ToolError;
+use crate::tool::files;
 use crate::tool::leg_file::LegFile;
 use crate::tool::pair::Context;
 use crate::tool::simulate::{DriveModel, SimulationOptions};
@@ -140,13 +141,5 @@ fn write<const N: usize, const B: usize>(
     let Some(path) = path else { return Ok(()) };
     let bytes: Vec<u8> =
         network.boards().iter_mut().flat_map(|board| board.memory().bytes().to_vec()).collect();
-    replace(path, &bytes)
-}
-
-/// Beside the file first, then in its place: a file that is there is there as a whole.
-pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), ToolError> {
-    let beside = path.with_extension("new");
-    std::fs::write(&beside, bytes)
-        .and_then(|()| std::fs::rename(&beside, path))
-        .map_err(|error| ToolError::cannot_write(path, &error))
+    files::write(path, &bytes)
 }

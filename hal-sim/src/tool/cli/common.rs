@@ -1,12 +1,13 @@
 //! What several commands have in common.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use scarab::ident::{Estimator, Plan};
 
 use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::files::{self, Output, OutputFolder};
 use crate::tool::leg_file::LegFile;
 use crate::tool::replay::Source;
 use crate::tool::report::RunReport;
@@ -73,16 +74,16 @@ pub struct Common {
     temperature: Option<f64>,
     /// Write the report here, for exit codes 0 and 3.
     #[arg(long)]
-    pub json: Option<PathBuf>,
+    pub json: Option<Output>,
     /// Print all fourteen parameters of every joint with their status.
     #[arg(long)]
     pub parameters: bool,
     /// Draw the run into this directory, as SVG; a run without any arguments draws into target/sim.
     #[arg(long)]
-    pub figures: Option<PathBuf>,
+    pub figures: Option<OutputFolder>,
     /// Write the run as one HTML page here: figures, tables, verdict; needs no network, can be printed.
     #[arg(long)]
-    pub report: Option<PathBuf>,
+    pub report: Option<Output>,
 }
 
 impl Common {
@@ -131,7 +132,7 @@ pub fn draw_into(
     if let Some(path) = page {
         let circumstances = html::Circumstances::now(leg);
         let page = html::page(&circumstances, run, sources, &drawn)?;
-        std::fs::write(path, page).map_err(|error| ToolError::cannot_write(path, &error))?;
+        files::write(path, page)?;
         tables::print(&format!("report: {}\n", path.display()))?;
     }
     Ok(())
@@ -150,7 +151,7 @@ pub fn draw_runs(leg: &LegFile, common: &Common, runs: &[RunReport]) -> Result<(
     }
     if let Some(path) = &common.report {
         let page = html::seeds::page(&html::Circumstances::now(leg), runs, &spreads, &figure)?;
-        std::fs::write(path, page).map_err(|error| ToolError::cannot_write(path, &error))?;
+        files::write(path, page)?;
         tables::print(&format!("report: {}\n", path.display()))?;
     }
     Ok(())
@@ -173,5 +174,5 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), Tool
     let mut text =
         serde_json::to_string_pretty(value).map_err(|error| ToolError::cannot_write(path, &error))?;
     text.push('\n');
-    std::fs::write(path, text).map_err(|error| ToolError::cannot_write(path, &error))
+    files::write(path, text)
 }

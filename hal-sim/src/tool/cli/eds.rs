@@ -1,11 +1,10 @@
 //! `eds`: what host software of the bus wants to know of a node before it sees one.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use crate::tool::eds;
 use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::files::{self, OutputFolder};
 use crate::tool::tables;
 
 /// A node for each: hip and knee of a board.
@@ -16,16 +15,15 @@ const JOINTS: [&str; 2] = ["hip", "knee"];
 pub struct EdsArguments {
     /// Folder for the sheets, one per joint; it is made where there is none.
     #[arg(long)]
-    out: PathBuf,
+    out: OutputFolder,
 }
 
 /// Writes the files; the exit code.
 pub fn run(arguments: &EdsArguments) -> Result<u8, ToolError> {
     let folder = &arguments.out;
-    std::fs::create_dir_all(folder).map_err(|error| ToolError::cannot_write(folder, &error))?;
     for joint in JOINTS {
         let path = folder.join(format!("scarab-{joint}.eds"));
-        std::fs::write(&path, eds::text(joint)).map_err(|error| ToolError::cannot_write(&path, &error))?;
+        files::write(&path, eds::text(joint))?;
         tables::print(&format!("electronic data sheet: {}\n", path.display()))?;
     }
     Ok(EXIT_ACCEPTED)

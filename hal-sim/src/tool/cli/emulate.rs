@@ -1,6 +1,6 @@
 //! `emulate`: the whole firmware on an emulated microcontroller (`cargo emulate`).
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 
@@ -10,6 +10,7 @@ use crate::tool::emulate::crash::{CrashKind, CrashReport};
 use crate::tool::emulate::report::EmulationReport;
 use crate::tool::emulate::run::{build, crash, run};
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::files::Output;
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
 use crate::tool::trace::{log, run as told, run_report};
@@ -27,13 +28,13 @@ pub struct EmulateArguments {
     seed: u64,
     /// Keep the records here as the image sent them, for `cargo sim trace`.
     #[arg(long, value_name = "FILE")]
-    trace: Option<PathBuf>,
+    trace: Option<Output>,
     /// Write the report here, for exit codes 0 and 3.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Write the 500 Hz log of the motion identified from here, in the format that replay reads; the image then tells every sample.
     #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
+    csv: Option<Output>,
     /// Crash while the leg identifies, and show what comes of it: exit code 0 if the bridges were released first, the record
     /// survived and the next start refused to enable, else 1.
     #[arg(long, value_name = "KIND", conflicts_with_all = ["json", "csv"])]
@@ -45,9 +46,9 @@ pub struct EmulateArguments {
 
 /// Builds, runs, decodes; the exit code.
 pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
-    let leg = arguments.leg.load()?;
+    let leg = arguments.leg.load_for_image()?;
     let image = build(&leg, arguments.seed, arguments.csv.is_some())?;
-    let path = arguments.trace.clone().unwrap_or_else(|| image.with_extension("trace"));
+    let path = arguments.trace.as_deref().map_or_else(|| image.with_extension("trace"), Path::to_owned);
     if let Some(kind) = arguments.crash {
         return show(kind, arguments.crash_tick, &image, &path);
     }
@@ -83,12 +84,7 @@ pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
 
 /// Crashes the image and says what came of it.
 fn show(kind: CrashKind, tick: u32, image: &Path, trace: &Path) -> Result<u8, ToolError> {
-    let beside = |what: &str| {
-        let mut name = trace.as_os_str().to_owned();
-        name.push(what);
-        PathBuf::from(name)
-    };
-    let [log, lines] = [".log", ".txt"].map(beside);
+    let [log, lines] = ["log", "txt"].map(|kind| image.with_extension(kind));
     let begun = crash(image, trace, &log, kind, tick)?;
     tables::print(&told::preface(&told::read(trace, Some(image), Some(&lines))?))?;
     let text = |path: &Path| {
@@ -97,7 +93,7 @@ fn show(kind: CrashKind, tick: u32, image: &Path, trace: &Path) -> Result<u8, To
         Ok::<_, ToolError>(String::from_utf8_lossy(&bytes).into_owned())
     };
     let report = CrashReport::new(kind, &text(&lines)?, &text(&log)?, begun, image)?;
-    // Megabytes, and nobody's but ours.
+    // Megabytes.
     for file in [log, lines] {
         let _ = std::fs::remove_file(file);
     }

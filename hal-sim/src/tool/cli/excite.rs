@@ -1,7 +1,5 @@
 //! `excite`: designs an exciting motion and says what it will tell, before anything moves.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use super::common::write_json;
@@ -15,6 +13,7 @@ use crate::tool::excite::design::DesignOptions;
 use crate::tool::excite::file::{Excitation, LONGEST_S};
 use crate::tool::excite::run::excite;
 use crate::tool::excite::text;
+use crate::tool::files::{self, Input, Output};
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
 use crate::with_leg_size;
@@ -26,10 +25,10 @@ pub struct ExciteArguments {
     leg: LegOptions,
     /// Write the motion here, as TOML that identify takes.
     #[arg(long)]
-    out: Option<PathBuf>,
+    out: Option<Output>,
     /// Write the motion here, as Rust source with a constant for an image.
     #[arg(long = "const")]
-    constant: Option<PathBuf>,
+    constant: Option<Output>,
     /// Seconds of motion, blends included.
     #[arg(long, default_value_t = 22.0, allow_negative_numbers = true)]
     duration: f64,
@@ -43,7 +42,7 @@ pub struct ExciteArguments {
     assume_truth: bool,
     /// Look at this motion instead of designing one.
     #[arg(long)]
-    excitation: Option<PathBuf>,
+    excitation: Option<Input>,
     /// Of the swarm's random numbers.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
@@ -52,7 +51,7 @@ pub struct ExciteArguments {
     evaluations: u32,
     /// Write the report here.
     #[arg(long)]
-    json: Option<PathBuf>,
+    json: Option<Output>,
 }
 
 /// Some five seconds of one core for two joints.
@@ -71,7 +70,7 @@ pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
         return Err(ToolError::input(format!("--duration: above 0 and at most {LONGEST_S} s")));
     }
     let given = match &arguments.excitation {
-        Some(file) => Some((file.clone(), Excitation::load(file)?)),
+        Some(file) => Some((file.to_path_buf(), Excitation::load(file)?)),
         None => None,
     };
     let options = &ExciteOptions {
@@ -87,12 +86,12 @@ pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
         assumption: if arguments.assume_truth { Assumption::Truth } else { Assumption::Best },
     };
     let excited = with_leg_size!(leg, excite(leg, options))?;
-    let write = |path: &Option<PathBuf>, text: &dyn Fn() -> String| match path {
-        Some(path) => std::fs::write(path, text()).map_err(|error| ToolError::cannot_write(path, &error)),
-        None => Ok(()),
-    };
-    write(&arguments.out, &|| excited.motion.to_toml())?;
-    write(&arguments.constant, &|| constant::source(&excited.motion))?;
+    if let Some(path) = &arguments.out {
+        files::write(path, excited.motion.to_toml())?;
+    }
+    if let Some(path) = &arguments.constant {
+        files::write(path, constant::source(&excited.motion))?;
+    }
     if let Some(path) = &arguments.json {
         write_json(path, &excited.report)?;
     }

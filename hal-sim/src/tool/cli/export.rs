@@ -1,11 +1,10 @@
 //! `export`: a kept model for other rigid-body software.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::files::{self, Input, Output};
 use crate::tool::model_file::{ModelFile, refuse_another_leg};
 use crate::tool::tables;
 use crate::tool::urdf;
@@ -15,10 +14,10 @@ use crate::tool::urdf;
 pub struct ExportArguments {
     /// Written by --save-model.
     #[arg(long)]
-    model: PathBuf,
+    model: Input,
     /// Write a robot description (URDF) here.
     #[arg(long)]
-    urdf: PathBuf,
+    urdf: Output,
     /// With any of these a model that is not this leg's is refused.
     #[command(flatten)]
     leg: Option<LegOptions>,
@@ -34,7 +33,7 @@ pub fn run(arguments: &ExportArguments) -> Result<u8, ToolError> {
     }
     let text = urdf::text(&model, &file)?;
     let path = &arguments.urdf;
-    std::fs::write(path, text).map_err(|error| ToolError::cannot_write(path, &error))?;
+    files::write(path, text)?;
     tables::print(&format!("robot description: {}\n", path.display()))?;
     Ok(EXIT_ACCEPTED)
 }

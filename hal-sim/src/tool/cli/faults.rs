@@ -1,6 +1,5 @@
 //! `faults`: the fault catalogue injected into the whole firmware, and what it makes of each.
 
-use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
@@ -14,6 +13,7 @@ use crate::tool::faults::hours::hours;
 use crate::tool::faults::report::{CampaignReport, told};
 use crate::tool::faults::run::{Blind, Manner, Outcome};
 use crate::tool::faults::trial::KINDS;
+use crate::tool::files::{self, Output, Updated};
 use crate::tool::html::{self, Circumstances};
 use crate::tool::leg_file::LegFile;
 use crate::tool::paper::document;
@@ -63,13 +63,13 @@ pub struct FaultsArguments {
     seconds: Option<f64>,
     /// Write the table here, for exit codes 0 and 3.
     #[arg(long)]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Write table, failures and the runs of --replay with their curves as one HTML page here.
     #[arg(long, value_name = "FILE.html")]
-    report: Option<PathBuf>,
+    report: Option<Output>,
     /// Put the table into this document, between its markers.
     #[arg(long, conflicts_with_all = ["blind", "replay"])]
-    docs: Option<PathBuf>,
+    docs: Option<Updated>,
 }
 
 fn rows(names: &[String], full: bool) -> Result<Vec<Entry>, ToolError> {
@@ -114,14 +114,6 @@ const SEEDS: u64 = 20;
 impl FaultsArguments {
     fn names(&self, kind: &str) -> bool {
         self.fault.iter().any(|name| name == kind)
-    }
-
-    /// Before hours of runs that nobody could write down.
-    fn check_files(&self) -> Result<(), ToolError> {
-        for path in [&self.json, &self.report].into_iter().flatten() {
-            document::check_writable(path)?;
-        }
-        self.docs.as_ref().map_or(Ok(()), |path| document::check(path, DOCUMENT[0], DOCUMENT[1]))
     }
 
     fn options(&self) -> Result<CampaignOptions, ToolError> {
@@ -179,7 +171,10 @@ impl FaultsArguments {
 pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     let options = arguments.options()?;
     let leg = arguments.leg.load()?;
-    arguments.check_files()?;
+    // Before hours of runs whose table has no place.
+    if let Some(path) = &arguments.docs {
+        document::check(path, DOCUMENT[0], DOCUMENT[1])?;
+    }
     let started = Instant::now();
     let found = campaign(&leg, &options)?;
     let injected_s = started.elapsed().as_secs_f64();
@@ -212,7 +207,7 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     }
     if let Some(path) = &arguments.report {
         let page = page(&leg, &report, &found)?;
-        std::fs::write(path, page).map_err(|error| ToolError::cannot_write(path, &error))?;
+        files::write(path, page)?;
         tables::print(&format!("report: {}\n", path.display()))?;
     }
     if arguments.blind {

@@ -1,7 +1,5 @@
 //! `identify`: a simulated leg, from excitation to verdict.
 
-use std::path::PathBuf;
-
 use clap::{Args, ValueEnum};
 use scarab::model::Payload;
 
@@ -11,6 +9,7 @@ use super::noise::NoiseOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
 use crate::tool::excite::file::Excitation;
 use crate::tool::excite::run::check;
+use crate::tool::files::{Input, Output};
 use crate::tool::identify::{identify_many, identify_one, print_runs};
 use crate::tool::perturb::Perturbation;
 use crate::tool::placed_mass::PlacedMass;
@@ -48,10 +47,10 @@ pub struct IdentifyArguments {
     perturb: Vec<Perturbation>,
     /// Excite with this motion (from `excite`) instead of the default one.
     #[arg(long)]
-    excitation: Option<PathBuf>,
+    excitation: Option<Input>,
     /// Write the training motion here, in the format that replay reads.
     #[arg(long)]
-    log: Option<PathBuf>,
+    log: Option<Output>,
 }
 
 /// Which drives are simulated.

@@ -1,11 +1,11 @@
 //! `fw` and `flash-leg`: the flash image, its size, and the way onto a board.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
+use super::common::write_json;
 use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::files::{self, Output};
 use crate::tool::image::build::{Options, build, flash};
 use crate::tool::image::leg_source::{describe, source};
 use crate::tool::image::panics::Panics;
@@ -40,7 +40,7 @@ fn board_volts(text: &str) -> Result<u8, String> {
 impl ImageOptions {
     fn load(&self) -> Result<Options, ToolError> {
         Ok(Options {
-            leg: self.leg.load()?,
+            leg: self.leg.load_for_image()?,
             log: self.log,
             brake_resistor: self.brake_resistor,
             board_volts: self.board_volts,
@@ -55,10 +55,10 @@ pub struct FirmwareArguments {
     image: ImageOptions,
     /// Write the sizes here.
     #[arg(long)]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Only write the leg as the constant that an image holds, here.
     #[arg(long, value_name = "FILE.rs")]
-    source: Option<PathBuf>,
+    source: Option<Output>,
 }
 
 /// Onto the board.
@@ -76,7 +76,7 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     let options = arguments.image.load()?;
     if let Some(path) = &arguments.source {
         let (description, _) = describe(&options.leg, DEFAULT_SEED)?;
-        std::fs::write(path, source(&description)).map_err(|error| ToolError::cannot_write(path, &error))?;
+        files::write(path, source(&description))?;
         return Ok(EXIT_ACCEPTED);
     }
     let image = build(&options)?;
@@ -84,9 +84,7 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     let panics = Panics::of(&image)?;
     tables::print(&format!("{}\n\n{}\n{}", image.display(), size.text(), panics.text()))?;
     if let Some(path) = &arguments.json {
-        let text =
-            serde_json::to_string_pretty(&size).map_err(|error| ToolError::cannot_write(path, &error))?;
-        std::fs::write(path, text + "\n").map_err(|error| ToolError::cannot_write(path, &error))?;
+        write_json(path, &size)?;
     }
     let missed = size.missed();
     for goal in &missed {
@@ -101,6 +99,7 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
 
 /// Builds, checks the size, writes it onto the board and prints its records.
 pub fn flash_leg(arguments: &FlashArguments) -> Result<u8, ToolError> {
+    arguments.image.leg.require("cargo flash-leg --leg my-leg.toml")?;
     let image = build(&arguments.image.load()?)?;
     let missed = ImageSize::of(&image)?.missed();
     if !missed.is_empty() {

@@ -1,13 +1,13 @@
 //! `kept`: what a board remembers over the power, as TOML and back.
 
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::{Args, Subcommand};
 
 use crate::tool::bus::memory::{BYTES, Memory};
-use crate::tool::bus::serve::replace;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::files::{self, Input, Output, Updated};
 use crate::tool::kept_file::KeptFile;
 use crate::tool::tables;
 
@@ -28,20 +28,20 @@ enum Way {
     /// Read a board's flash and write what is kept in it as TOML; exit code 3 where something is damaged.
     Export {
         /// As `serve --flash` has it: 256 KB per board.
-        flash: PathBuf,
+        flash: Input,
         /// Which board of the file.
         #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=BOARDS as i64))]
         board: u8,
         /// Where to; standard output where it is not given.
         #[arg(long, value_name = "FILE.toml")]
-        out: Option<PathBuf>,
+        out: Option<Output>,
     },
     /// Write what a TOML file says into a board's flash, all of it or nothing; what the file does not name stays.
     Import {
         /// As `export` writes it.
-        file: PathBuf,
+        file: Input,
         /// As `serve --flash` has it; it is made where there is none.
-        flash: PathBuf,
+        flash: Updated,
         /// Which board of the file.
         #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=BOARDS as i64))]
         board: u8,
@@ -90,7 +90,7 @@ fn export(flash: &Path, board: usize, out: Option<&Path>) -> Result<u8, ToolErro
     }
     let text = found.file.to_toml();
     match out {
-        Some(path) => replace(path, text.as_bytes())?,
+        Some(path) => files::write(path, text)?,
         None => tables::print(&text)?,
     }
     Ok(if found.damaged.is_empty() { EXIT_ACCEPTED } else { EXIT_REFUSED })
@@ -114,7 +114,7 @@ fn import(file: &Path, flash: &Path, board: usize) -> Result<u8, ToolError> {
     kept.write_into(&mut memory)
         .map_err(|why| ToolError::Refused(format!("{}: board {board}: {why}", flash.display())))?;
     own.copy_from_slice(memory.bytes());
-    replace(flash, &bytes)?;
+    files::write(flash, &bytes)?;
     tables::print(&format!("flash: {}, board {board}\n", flash.display()))?;
     Ok(EXIT_ACCEPTED)
 }

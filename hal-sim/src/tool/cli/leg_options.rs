@@ -3,7 +3,8 @@
 use clap::{Args, ValueEnum};
 
 use crate::tool::error::ToolError;
-use crate::tool::leg_file::{BodySide, DEFAULT_LEG, LegFile};
+use crate::tool::files::LegName;
+use crate::tool::leg_file::{BodySide, DEFAULT_LEG, LegFile, SHIPPED_LEGS};
 use crate::tool::posture::{on_side, pitched};
 use crate::tool::size::{Person, Size};
 
@@ -19,9 +20,9 @@ pub enum SideArgument {
 /// A leg and how it is set.
 #[derive(Args, Clone, Debug)]
 pub struct LegOptions {
-    /// Name of a shipped leg, or a leg file.
-    #[arg(long, default_value = DEFAULT_LEG)]
-    pub leg: String,
+    /// Name of a shipped leg, or a leg file; x2-wearer-75kg unless given, but replay and flash-leg have to be given one.
+    #[arg(long)]
+    leg: Option<LegName>,
     /// Set the thigh to this length, m (0.402 to 0.505).
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     thigh: Option<f64>,
@@ -40,9 +41,33 @@ pub struct LegOptions {
 }
 
 impl LegOptions {
+    /// Refuses a command line without a leg; `example` shows one with it.
+    pub fn require(&self, example: &str) -> Result<(), ToolError> {
+        if self.leg.is_some() {
+            return Ok(());
+        }
+        let names = SHIPPED_LEGS.map(|(name, _)| name).join(", ");
+        Err(ToolError::input(format!(
+            "--leg is missing: of which leg? For example `{example}`, where my-leg.toml is a leg file (docs/leg-file.md); \
+             shipped legs go by their names: {names}"
+        )))
+    }
+
     /// The leg as it is set. What was changed is part of its name.
     pub fn load(&self) -> Result<LegFile, ToolError> {
-        let mut leg = LegFile::load(&self.leg)?;
+        self.set(LegFile::load(self.name())?)
+    }
+
+    /// The same for an image, whose leg file has to state what the machine is like.
+    pub fn load_for_image(&self) -> Result<LegFile, ToolError> {
+        self.set(LegFile::load_for_image(self.name(), self.side.is_some())?)
+    }
+
+    fn name(&self) -> &str {
+        self.leg.as_deref().unwrap_or(DEFAULT_LEG)
+    }
+
+    fn set(&self, mut leg: LegFile) -> Result<LegFile, ToolError> {
         let mut changes = Vec::new();
         let size = Size { thigh: self.thigh, shank: self.shank, wearer: self.wearer };
         leg = size.of(&leg)?;

@@ -1,10 +1,9 @@
 //! What `identify` and `replay` do with model files: compare with one, keep one.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use crate::tool::error::ToolError;
+use crate::tool::files::{Input, Output};
 use crate::tool::leg_file::LegFile;
 use crate::tool::model_file::{ModelFile, comparison, refuse_another_leg};
 use crate::tool::report::RunReport;
@@ -15,10 +14,10 @@ use crate::tool::tables;
 pub struct ModelArguments {
     /// Keep an accepted result here, for predict, export and comparison; a refused one is not written.
     #[arg(long)]
-    save_model: Option<PathBuf>,
+    save_model: Option<Output>,
     /// Compare the result with this model, which must be one of the same leg.
     #[arg(long)]
-    compare_model: Option<PathBuf>,
+    compare_model: Option<Input>,
 }
 
 impl ModelArguments {

@@ -1,13 +1,12 @@
 //! `monitor`: a leg is identified and walks, something changes, and what the firmware makes of it.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use rayon::prelude::*;
 
 use super::common::write_json;
 use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::files::Output;
 use crate::tool::leg_file::{LegFile, PushesFile};
 use crate::tool::monitor::{Disturbance, MonitorOptions, MonitorRun, MonitorRuns, print_runs, watch};
 use crate::tool::placed_mass::PlacedMass;
@@ -47,7 +46,7 @@ pub struct MonitorArguments {
     seeds: Option<(u64, u64)>,
     /// Write the report here, for exit codes 0 and 3.
     #[arg(long)]
-    json: Option<PathBuf>,
+    json: Option<Output>,
 }
 
 /// Far beyond what joints rub or people walk; beyond, the text was mistaken.

@@ -1,13 +1,12 @@
 //! `motor`: the board's current loop on one of a leg's motors.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use super::common::write_json;
 use super::leg_options::LegOptions;
 use crate::tool::error::{EXIT_ACCEPTED, ToolError};
 use crate::tool::figures;
+use crate::tool::files::{Output, OutputFolder};
 use crate::tool::motor::{measure, text};
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
@@ -25,10 +24,10 @@ pub struct MotorArguments {
     seed: u64,
     /// Write the report here, with the curves.
     #[arg(long)]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Draw into this directory, as SVG.
     #[arg(long)]
-    figures: Option<PathBuf>,
+    figures: Option<OutputFolder>,
 }
 
 /// Measures and prints; the exit code.

@@ -1,13 +1,12 @@
 //! `paper`: the paper's tables and figures, run again and put beside what it prints.
 
-use std::path::PathBuf;
-
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
 use super::common::write_json;
 use crate::tool::error::{EXIT_ACCEPTED, ToolError};
 use crate::tool::figures;
+use crate::tool::files::{Output, OutputFolder, Updated};
 use crate::tool::paper::contenders::Algorithm;
 use crate::tool::paper::{self, PaperOptions, Part, document};
 use crate::tool::tables;
@@ -64,13 +63,13 @@ pub struct PaperArguments {
     algorithm: Vec<Algorithm>,
     /// Draw into this directory, as SVG.
     #[arg(long)]
-    out: Option<PathBuf>,
+    out: Option<OutputFolder>,
     /// Write the rows here.
     #[arg(long)]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Put the tables into this document, each between its markers.
     #[arg(long)]
-    docs: Option<PathBuf>,
+    docs: Option<Updated>,
 }
 
 /// Searches by their names in the report.
@@ -108,13 +107,13 @@ impl PaperArguments {
 
 /// Runs, prints and keeps; the exit code.
 pub fn run(arguments: &PaperArguments) -> Result<u8, ToolError> {
-    if let Some(path) = &arguments.docs {
-        document::read(path)?;
-    }
     let options = PaperOptions { seeds: arguments.seeds, algorithms: arguments.algorithm.clone() };
     let parts = arguments.parts();
     if !arguments.algorithm.is_empty() && !parts.contains(&Part::TableFour) {
         return Err(ToolError::input("--algorithm: searches are chosen for table IV only"));
+    }
+    if let Some(path) = &arguments.docs {
+        parts.iter().try_for_each(|part| document::check(path, "paper", part.section_name()))?;
     }
     let sections = paper::run(&parts, &options)?;
     // First what cannot fail: runs take minutes.

@@ -1,13 +1,13 @@
 //! `predict`: torque of given states after a kept model.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use super::leg_options::LegOptions;
+use super::states::StatesOptions;
 use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::files::{self, Input, Output};
 use crate::tool::model_file::{ModelFile, refuse_another_leg};
-use crate::tool::predict::{self, PredictOptions};
+use crate::tool::predict;
 use crate::tool::{tables, temperature};
 
 /// Which model and which states.
@@ -15,19 +15,15 @@ use crate::tool::{tables, temperature};
 pub struct PredictArguments {
     /// Written by --save-model.
     #[arg(long)]
-    model: PathBuf,
-    /// States: columns q1.., qd1.., qdd1.. in rad and s, D-H angles; t_s is copied if there.
-    #[arg(long)]
-    states: PathBuf,
-    /// Angles and torques are anatomical (flexion positive) instead of D-H.
-    #[arg(long)]
-    anatomical: bool,
+    model: Input,
+    #[command(flatten)]
+    states: StatesOptions,
     /// With any of these a model that is not this leg's is refused.
     #[command(flatten)]
     leg: Option<LegOptions>,
     /// Write the table here instead of to standard output.
     #[arg(long)]
-    out: Option<PathBuf>,
+    out: Option<Output>,
 }
 
 /// Prints or writes the table; the exit code.
@@ -40,10 +36,9 @@ pub fn run(arguments: &PredictArguments) -> Result<u8, ToolError> {
             eprintln!("warning: {}: {words}", arguments.model.display());
         }
     }
-    let options = PredictOptions { states: arguments.states.clone(), anatomical: arguments.anatomical };
-    let table = predict::table(&model, &options)?;
+    let table = predict::table(&model, &arguments.states.states, arguments.states.angles())?;
     match &arguments.out {
-        Some(path) => std::fs::write(path, table).map_err(|error| ToolError::cannot_write(path, &error))?,
+        Some(path) => files::write(path, table)?,
         None => tables::print(&table)?,
     }
     Ok(EXIT_ACCEPTED)

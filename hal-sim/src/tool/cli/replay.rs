@@ -1,12 +1,13 @@
 //! `replay`: a leg identified from recordings.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::common::{Common, draw, finish};
 use super::model::ModelArguments;
 use crate::tool::error::ToolError;
+use crate::tool::files::{Input, Output};
 use crate::tool::replay::{ReplayOptions, replay};
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
@@ -17,14 +18,14 @@ use crate::with_leg_size;
 pub struct ReplayArguments {
     /// Recordings: t_s, q1_rad[, q2_rad..], tau1_Nm[, tau2_Nm..]; several are one training set.
     #[arg(required = true)]
-    files: Vec<PathBuf>,
+    files: Vec<Input>,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
     model: ModelArguments,
     /// Held-out recordings.
     #[arg(long, num_args = 1.., conflicts_with = "split")]
-    validate: Vec<PathBuf>,
+    validate: Vec<Input>,
     /// The first fraction of each file trains, the rest validates.
     #[arg(long, allow_negative_numbers = true)]
     split: Option<f64>,
@@ -33,25 +34,30 @@ pub struct ReplayArguments {
     bandwidth: Option<f64>,
     /// Write measured and predicted torque of the validation part here.
     #[arg(long)]
-    csv: Option<PathBuf>,
+    csv: Option<Output>,
+}
+
+fn paths(files: &[Input]) -> Vec<PathBuf> {
+    files.iter().map(|file| file.to_path_buf()).collect()
 }
 
 /// Identifies and reports; the exit code.
 pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
+    arguments.common.leg.require("cargo sim replay run.csv --leg my-leg.toml")?;
     let leg = &arguments.common.leg()?;
     if arguments.split.is_some_and(|fraction| !(fraction > 0.0 && fraction < 1.0)) {
         return Err(ToolError::input("--split: a fraction above 0 and below 1"));
     }
     let options = &ReplayOptions {
-        files: arguments.files.clone(),
-        validate: arguments.validate.clone(),
+        files: paths(&arguments.files),
+        validate: paths(&arguments.validate),
         split: arguments.split,
         bandwidth_hz: arguments.bandwidth.unwrap_or(leg.bandwidth_hz),
         plan: arguments.common.plan.into(),
         prior: arguments.common.prior.unwrap_or_default(),
         estimator: arguments.common.estimator.into(),
         swarm_seed: arguments.common.swarm_seed.unwrap_or(DEFAULT_SEED),
-        csv: arguments.csv.clone(),
+        csv: arguments.csv.as_deref().map(Path::to_owned),
     };
     let kept = arguments.model.kept(leg)?;
     let mut replayed = with_leg_size!(leg, replay(leg, options))?;

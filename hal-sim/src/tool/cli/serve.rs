@@ -1,13 +1,15 @@
 //! `serve`: legs on a CANopen bus behind a port that host software speaks to.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::Path;
 
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::leg_options::LegOptions;
 use crate::tool::bus::serve::{ServeOptions, serve};
 use crate::tool::error::{EXIT_ACCEPTED, ToolError};
+use crate::tool::files::Updated;
 use crate::tool::setup::DEFAULT_SEED;
 use crate::with_leg_size;
 
@@ -25,12 +27,20 @@ pub struct ServeArguments {
     /// Simulated seconds per second.
     #[arg(long, value_name = "K", default_value_t = 1.0)]
     speed: f64,
+    /// Bit rate of the wire, kbit/s.
+    #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates())]
+    bit_rate: u64,
     /// The boards' flash; it is made where there is none.
     #[arg(long, value_name = "FILE")]
-    flash: Option<PathBuf>,
+    flash: Option<Updated>,
     /// Of noise.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
+}
+
+/// Bit rates that the board's controller has, kbit/s (object 2002).
+fn bit_rates() -> impl TypedValueParser<Value = u64> {
+    PossibleValuesParser::new(["125", "250", "500", "1000"]).try_map(|rate| rate.parse::<u64>())
 }
 
 /// Serves until SIGTERM; the exit code.
@@ -43,9 +53,9 @@ pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
         address: arguments.slcan,
         legs: arguments.legs.into(),
         speed: arguments.speed,
-        flash: arguments.flash.clone(),
+        flash: arguments.flash.as_deref().map(Path::to_owned),
         seed: arguments.seed,
-        bits_per_s: 1_000_000,
+        bits_per_s: 1000 * arguments.bit_rate,
     };
     let (leg, options) = (&leg, &options);
     with_leg_size!(leg, serve(leg, options))?;

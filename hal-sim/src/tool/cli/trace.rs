@@ -1,12 +1,11 @@
 //! `trace`: what a board told, decoded and reported.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use super::common::{draw_into, write_json};
 use super::model::ModelArguments;
 use crate::tool::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::tool::files::{Input, LegName, Output, OutputFolder};
 use crate::tool::leg_file::LegFile;
 use crate::tool::tables;
 use crate::tool::trace::curves::curves;
@@ -16,31 +15,31 @@ use crate::tool::trace::{Trace, log, run as told, run_report};
 #[derive(Args, Debug)]
 pub struct TraceArguments {
     /// A recorded trace, or - for standard input: text as a debug probe prints it, or with --image a defmt stream.
-    file: PathBuf,
+    file: Input,
     /// The image (ELF) that sent the stream; it holds the texts of the records.
     #[arg(long, value_name = "ELF")]
-    image: Option<PathBuf>,
+    image: Option<Input>,
     /// Name of a shipped leg, or a leg file; the one the image names unless given.
     #[arg(long)]
-    leg: Option<String>,
+    leg: Option<LegName>,
     /// Write the report here, for exit codes 0 and 3.
     #[arg(long)]
-    json: Option<PathBuf>,
+    json: Option<Output>,
     /// Write the 500 Hz log of one motion here, in the format that replay reads.
     #[arg(long)]
-    csv: Option<PathBuf>,
+    csv: Option<Output>,
     /// Which one: 0 is the motion identified from, 1 and more are those that were only predicted.
     #[arg(long, value_name = "NUMBER", requires = "csv", default_value_t = log::TRAINING)]
     csv_motion: u8,
     /// Write the run as one HTML page here.
     #[arg(long)]
-    report: Option<PathBuf>,
+    report: Option<Output>,
     /// Draw what the trace tells into this directory, as SVG.
     #[arg(long)]
-    figures: Option<PathBuf>,
+    figures: Option<OutputFolder>,
     /// Write the records here as lines of text, which can be read without the image.
     #[arg(long)]
-    text: Option<PathBuf>,
+    text: Option<Output>,
     /// Print all fourteen parameters of every joint with their status.
     #[arg(long)]
     parameters: bool,

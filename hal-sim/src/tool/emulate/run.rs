@@ -1,6 +1,5 @@
 //! Builds the emulated image and runs it.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -9,6 +8,7 @@ use std::time::{Duration, Instant};
 use super::crash::CrashKind;
 use super::plant_source;
 use crate::tool::error::ToolError;
+use crate::tool::files::NewFile;
 use crate::tool::image::build::{firmware_build, target_directory, write_if_changed};
 use crate::tool::image::leg_source;
 use crate::tool::leg_file::LegFile;
@@ -83,9 +83,9 @@ pub fn crash(image: &Path, trace: &Path, log: &Path, kind: CrashKind, tick: u32)
 
 /// Waits for the emulator's end; what it said, where that is kept.
 fn wait(mut emulator: Command, trace: &Path) -> Result<String, ToolError> {
-    let output = File::create(trace).map_err(|error| ToolError::cannot_write(trace, &error))?;
+    let output = NewFile::create(trace)?;
     let started = Instant::now();
-    let mut emulator = emulator.stdin(Stdio::null()).stdout(output).spawn().map_err(|error| {
+    let mut emulator = emulator.stdin(Stdio::null()).stdout(output.handle()?).spawn().map_err(|error| {
         ToolError::input(format!(
             "{EMULATOR} cannot be started: {error}; it is installed by `apt-get install qemu-system-arm`, `brew install qemu` or \
              from qemu.org"
@@ -95,6 +95,7 @@ fn wait(mut emulator: Command, trace: &Path) -> Result<String, ToolError> {
         let ended = emulator.try_wait().map_err(|error| ToolError::input(format!("{EMULATOR}: {error}")))?;
         // What the image thinks of its end is in its records.
         if ended.is_some() {
+            output.finish()?;
             let mut said = String::new();
             if let Some(mut errors) = emulator.stderr.take() {
                 let _ = errors.read_to_string(&mut said);
@@ -104,6 +105,7 @@ fn wait(mut emulator: Command, trace: &Path) -> Result<String, ToolError> {
         if started.elapsed() > LONGEST {
             let _ = emulator.kill();
             let _ = emulator.wait();
+            output.finish()?;
             return Err(ToolError::input(format!(
                 "{EMULATOR}: no end after {} s; what it told is in {}",
                 LONGEST.as_secs(),

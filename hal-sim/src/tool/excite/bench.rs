@@ -115,6 +115,21 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         Ok(Self { leg, assumed: word, context, scorer, torque_limit, noise: origin })
     }
 
+    /// Refuses to expect a sigma where the noise that it follows from is not stated.
+    ///
+    /// # Errors
+    /// Names the joint, the keys and the option.
+    pub fn require_noise(&self) -> Result<(), ToolError> {
+        let silent = self.leg.joints.iter().zip(&self.context.noise).find(|(_, noise)| !(**noise > 0.0));
+        let Some((joint, _)) = silent else { return Ok(()) };
+        Err(ToolError::input(format!(
+            "{}: joint `{}`: the noise of its logged torque is not stated, and sigma follows from it. State its standard \
+             deviation at rest by --torque-noise-nm NM[,NM..] or by `current_noise_a` in the leg file, or a percentage by \
+             --torque-noise or `torque_noise_percent`",
+            self.leg.name, joint.name
+        )))
+    }
+
     /// What a design works within.
     #[must_use]
     pub fn frame(&self) -> Frame<'_, N, B> {
@@ -179,7 +194,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
     }
 }
 
-/// A leg file that states no noise still has a motion that tells more than another.
+/// Noise to weigh the joints with, N m; where a motion is only checked, none need be stated.
 fn reference_noise<const N: usize>(noise_nm: &[f64; N]) -> [f64; N] {
     noise_nm.map(|noise| if noise > 0.0 { noise } else { 1.0 })
 }

@@ -68,7 +68,12 @@ pub fn excite<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ExciteOptions,
 ) -> Result<Excited, ToolError> {
+    // Before the leg is asked for more: another leg's motion is the likeliest fault.
+    if let Some((file, given)) = &options.given {
+        given.table::<N>(leg).map_err(|reason| about(file, &reason))?;
+    }
     let bench = Bench::<N, B>::new(leg, options)?;
+    bench.require_noise()?;
     let found = match &options.given {
         Some((file, given)) => vec![bench.given(given).map_err(|reason| about(file, &reason))?],
         None => design(&bench, &options.design)?,

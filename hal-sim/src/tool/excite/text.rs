@@ -61,9 +61,6 @@ pub fn warnings(
                 joint.name
             ));
         }
-        if joint.torque_noise_nm == 0.0 {
-            warnings.push(format!("{}: the leg file states no torque noise; sigma counts none", joint.name));
-        }
     }
     if noise.of == "prior" && noise.percent > 0.0 {
         warnings.push(

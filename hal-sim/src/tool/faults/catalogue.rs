@@ -39,6 +39,8 @@ pub enum Expected {
     Brake,
     /// The reading is not believed, the motion goes on.
     Rejected,
+    /// Noise: the machine goes on to the bit as without it.
+    Ignored,
     /// The motion goes on within its limits, or is damped.
     Kept,
 }

@@ -7,6 +7,7 @@ use scarab::leg::{Activity, IdentifiedModel};
 use scarab::safety::FaultCode;
 
 use super::catalogue::Event;
+use super::catalogue::encoder::LOST_TURNS;
 use super::rig::{Edges, PERIODS_PER_S, Rig};
 use crate::faults::{Channel, Injection};
 use crate::tool::leg_file::{JointFile, LegFile};
@@ -71,7 +72,7 @@ pub struct Invariants<const N: usize> {
     /// The places are watched; periods for which a joint has been driven by a wrong one.
     watched: bool,
     astray: u64,
-    /// Where the joints were when they were enabled last, rad, and the way of a rotor's turn and a tenth.
+    /// Where the joints were when they were enabled last, rad, and the way in which lost counts are seen.
     enabled_at: [f64; N],
     turn: [f64; N],
     broken: Vec<String>,
@@ -97,7 +98,7 @@ impl<const N: usize> Invariants<N> {
             watched: false,
             astray: 0,
             enabled_at: [0.0; N],
-            turn: core::array::from_fn(|joint| 1.1 * TAU / leg.joints[joint].encoder.ratio),
+            turn: core::array::from_fn(|joint| LOST_TURNS * TAU / leg.joints[joint].encoder.ratio),
             broken: Vec::new(),
         }
     }

@@ -22,6 +22,8 @@ pub struct Outcome {
     pub false_alarm: bool,
     /// From the fault to the safe state's first command, ms.
     pub after_ms: Option<f64>,
+    /// Deadline of this run where it is longer than the row's, ms: a fault that comes and goes.
+    pub intermittent_ms: Option<f64>,
     /// `Off`, `Damp`, `Limit`; nothing where the motion simply went on.
     pub state: Option<&'static str>,
     /// What the firmware says is wrong.

@@ -16,7 +16,7 @@ use crate::tool::tables::headed;
 const MOST_FAILURES: usize = 100;
 /// Rows with runs in which a false alarm can be told: something harmless or a mere push happens, or a host's own time is not over yet. All
 /// others only ask what follows a fault.
-const JUDGED: [&str; 5] = ["E2", "J1", "J2", "H1", "B1"];
+const JUDGED: [&str; 6] = ["E2", "E4", "J1", "J2", "H1", "B1"];
 
 /// One row of the catalogue as it was run. The names are an interface.
 #[derive(Clone, Debug, Serialize)]
@@ -35,10 +35,14 @@ pub struct RowReport {
     pub false_alarms: usize,
     /// Whether there are runs in which that could have been.
     pub judges_false_alarms: bool,
-    /// Longest time from the fault to the safe state's first command, ms.
+    /// Longest time from a lasting fault to the safe state's first command, ms.
     pub worst_ms: Number,
     /// What it may take, ms.
     pub deadline_ms: Number,
+    /// Longest time from the first of the readings of an intermittent fault, ms.
+    pub worst_intermittent_ms: Number,
+    /// What it may take, ms; the longest of all runs.
+    pub intermittent_deadline_ms: Number,
     /// Where it leads: the catalogue's last column.
     pub state: &'static str,
     /// What the firmware does instead, by design: docs/safety.md says why.
@@ -61,8 +65,9 @@ pub struct RowReport {
     pub unit: &'static str,
     /// What the detector does not see yet.
     pub lacking: Option<&'static str>,
-    /// Seen over seen and missed, of these runs; unknown where nothing could be seen. Not that of ISO 13849-1, which weighs dangerous faults.
-    pub coverage: Number,
+    /// Seen over seen and missed, of these runs; unknown where nothing could be seen. Not the diagnostic coverage of ISO 13849-1, which
+    /// weighs dangerous faults and counts those that cannot be detected.
+    pub detected_of_detectable: Number,
 }
 
 /// Runs in which nothing has to be seen and nothing may be broken. The names are an interface.
@@ -90,7 +95,7 @@ pub struct CampaignReport {
     /// Runs that were missed, broke an invariant, or raised a false alarm; a hundred at most.
     pub failures: Vec<Outcome>,
     /// Seen over seen and missed, over all rows.
-    pub diagnostic_coverage: Number,
+    pub detected_of_detectable: Number,
     /// Runs of all rows.
     pub runs: usize,
     /// Of those, runs in which there was nothing that could be seen.
@@ -129,7 +134,7 @@ impl CampaignReport {
         });
         Self {
             schema: crate::tool::report::SCHEMA,
-            diagnostic_coverage: coverage(
+            detected_of_detectable: detected_of(
                 outcomes.iter().filter(|outcome| outcome.detected).count(),
                 outcomes.iter().filter(|outcome| !outcome.detected && !outcome.undetectable).count(),
             ),
@@ -195,7 +200,7 @@ const HEAD: [&str; 11] = [
     "not to be seen",
     "smallest seen",
     "false alarms",
-    "coverage",
+    "detected of detectable (not detectable)",
 ];
 
 fn number(value: Number, digits: usize) -> String {
@@ -207,6 +212,24 @@ impl RowReport {
     #[must_use]
     pub fn is_noticed(&self) -> bool {
         self.missed > 0 || self.detected > 0 && self.seen_by_own == 0
+    }
+
+    /// Share of the runs in which there was nothing that could be seen.
+    fn not_detectable(&self) -> Number {
+        (self.undetectable_by_design as f64 / self.runs as f64).into()
+    }
+
+    /// Worst time and deadline, of lasting faults and of intermittent ones.
+    fn times(&self) -> String {
+        let pair = |worst, deadline| format!("{} / {}", number(worst, 3), number(deadline, 3));
+        let lasting = pair(self.worst_ms, self.deadline_ms);
+        match self.intermittent_deadline_ms.known() {
+            None => lasting,
+            Some(_) => {
+                let intermittent = pair(self.worst_intermittent_ms, self.intermittent_deadline_ms);
+                format!("{lasting}; intermittent {intermittent}")
+            }
+        }
     }
 
     /// Its line of the table.
@@ -221,7 +244,7 @@ impl RowReport {
             self.what.into(),
             self.runs.to_string(),
             self.detected.to_string(),
-            format!("{} / {}", number(self.worst_ms, 3), number(self.deadline_ms, 3)),
+            self.times(),
             match self.state_instead {
                 None => format!("{} ({})", self.state, self.state_reached),
                 Some(instead) => format!("{}; here {instead} ({})", self.state, self.state_reached),
@@ -230,7 +253,7 @@ impl RowReport {
             self.undetectable_by_design.to_string(),
             smallest,
             if self.judges_false_alarms { self.false_alarms.to_string() } else { "-".into() },
-            percent(self.coverage),
+            format!("{} ({})", percent(self.detected_of_detectable), percent(self.not_detectable())),
         ]
     }
 }
@@ -241,7 +264,7 @@ fn percent(share: Number) -> String {
     share.known().map_or_else(|| "-".into(), digits)
 }
 
-fn coverage(detected: usize, missed: usize) -> Number {
+fn detected_of(detected: usize, missed: usize) -> Number {
     (detected as f64 / (detected + missed) as f64).into()
 }
 
@@ -268,7 +291,11 @@ fn row_report(row: &Head, outcomes: &[Outcome]) -> RowReport {
     };
     // What could not be seen may be noticed late by something else.
     let dangerous = of.iter().filter(|outcome| !outcome.undetectable);
-    let worst = dangerous.filter_map(|outcome| outcome.after_ms).fold(f64::NEG_INFINITY, f64::max);
+    let worst = |intermittent: bool| {
+        let of = dangerous.clone().filter(|outcome| outcome.intermittent_ms.is_some() == intermittent);
+        of.filter_map(|outcome| outcome.after_ms).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let longest = of.iter().filter_map(|outcome| outcome.intermittent_ms).fold(f64::NEG_INFINITY, f64::max);
     let codes = FaultCode::ALL.iter().map(|code| code.name());
     let raised = |name: &&str| of.iter().any(|outcome| outcome.alarm == Some(*name));
     RowReport {
@@ -282,8 +309,10 @@ fn row_report(row: &Head, outcomes: &[Outcome]) -> RowReport {
         missed: count(&|outcome| !outcome.detected && !outcome.undetectable),
         false_alarms: count(&|outcome| outcome.false_alarm),
         judges_false_alarms: JUDGED.contains(&row.id),
-        worst_ms: worst.into(),
+        worst_ms: worst(false).into(),
         deadline_ms: row.deadline_ms.into(),
+        worst_intermittent_ms: worst(true).into(),
+        intermittent_deadline_ms: longest.into(),
         state: row.state,
         state_instead: instead(row.id),
         state_reached: count(&|outcome| {
@@ -299,7 +328,7 @@ fn row_report(row: &Head, outcomes: &[Outcome]) -> RowReport {
         largest_unseen: magnitudes(false).fold(f64::NEG_INFINITY, f64::max).into(),
         unit: row.unit,
         lacking: row.lacking,
-        coverage: coverage(
+        detected_of_detectable: detected_of(
             count(&|outcome| outcome.detected),
             count(&|outcome| !outcome.detected && !outcome.undetectable),
         ),
@@ -332,15 +361,16 @@ impl CampaignReport {
             text.push_str(&hours.lines());
         }
         // Pooled it is that of the row with the most runs.
-        let covered = self.rows.iter().filter_map(|row| Some((row.coverage.known()?, row.fault)));
+        let covered = self.rows.iter().filter_map(|row| Some((row.detected_of_detectable.known()?, row.fault)));
         let least = covered.min_by(|one, other| one.0.total_cmp(&other.0));
         let least = least.map_or_else(String::new, |(share, row)| {
             format!(", least of a row {} ({row})", percent(share.into()))
         });
-        let unseen = format!("; of {} runs not to be seen: {}", self.runs, self.undetectable_by_design);
+        let share = percent((self.undetectable_by_design as f64 / self.runs as f64).into());
+        let (unseen, runs) = (self.undetectable_by_design, self.runs);
         text.push_str(&format!(
-            "diagnostic coverage: {}{least}{unseen}\n",
-            percent(self.diagnostic_coverage)
+            "detected of detectable: {}{least}; not detectable: {share} ({unseen} of {runs} runs)\n",
+            percent(self.detected_of_detectable)
         ));
         for alarm in &self.base_alarms {
             text.push_str(&format!("false alarm in undisturbed motion: {alarm}\n"));

@@ -48,6 +48,7 @@ pub fn run<const B: usize>(
             undetectable: false,
             false_alarm: false,
             after_ms: None,
+            intermittent_ms: None,
             state: None,
             alarm: None,
             magnitude: scenario.magnitude,
@@ -237,6 +238,11 @@ impl<'a, const B: usize> Watched<'a, B> {
         asked(&self.rig, self.joint())
     }
 
+    /// Deadline of this run where it is longer than the row's, ms.
+    fn intermittent_ms(&self) -> Option<f64> {
+        self.scenario.within_ms.filter(|within| *within > self.row.deadline_ms)
+    }
+
     /// Longest that this run may take, ms.
     fn deadline_ms(&self) -> f64 {
         self.scenario.within_ms.unwrap_or(self.row.deadline_ms)
@@ -262,8 +268,10 @@ impl<'a, const B: usize> Watched<'a, B> {
     }
 
     fn finish(mut self) -> Outcome {
-        if self.scenario.expected == Expected::Kept {
-            return self.keep();
+        match self.scenario.expected {
+            Expected::Kept => return self.keep(),
+            Expected::Ignored => return self.ignore(),
+            _ => {}
         }
         let before = *self.rig.commands();
         let limit = self.begun + self.scenario.patience;
@@ -317,6 +325,7 @@ impl<'a, const B: usize> Watched<'a, B> {
             undetectable,
             false_alarm,
             after_ms,
+            intermittent_ms: self.intermittent_ms(),
             state: seen,
             alarm,
             magnitude: self.scenario.magnitude,

@@ -230,6 +230,7 @@ impl Trial {
             undetectable: alarm.is_none(),
             false_alarm: false,
             after_ms: None,
+            intermittent_ms: None,
             state: None,
             alarm: alarm.map(FaultCode::name),
             magnitude: None,

@@ -7,6 +7,7 @@ use plotters::style::{RGBColor, ShapeStyle};
 
 use super::super::board::BUS;
 use super::super::error::ToolError;
+use super::super::files;
 use super::super::motor::MotorReport;
 use super::super::motor::step::response;
 use super::canvas::{
@@ -199,7 +200,6 @@ fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
 /// Draws all of them into a directory, which is made if need be.
 pub fn write(directory: &Path, report: &MotorReport) -> Result<(), ToolError> {
     type Drawing = fn(&Area<'_>, &MotorReport) -> Result<(), DrawingError>;
-    std::fs::create_dir_all(directory).map_err(|error| ToolError::cannot_write(directory, &error))?;
     let quiet = report.ripple.iter().filter(|ripple| !ripple.noise).count() as i32;
     let figures: [(&str, i32, Drawing); 4] = [
         ("current-steps.svg", HEAD + 2 * ROW, steps),
@@ -210,8 +210,7 @@ pub fn write(directory: &Path, report: &MotorReport) -> Result<(), ToolError> {
     for (file, height, draw) in figures {
         let svg = render(WIDTH, height.unsigned_abs(), &|area| draw(area, report))
             .map_err(|error| ToolError::input(format!("{file}: cannot be drawn: {error}")))?;
-        let path = directory.join(file);
-        std::fs::write(&path, svg).map_err(|error| ToolError::cannot_write(&path, &error))?;
+        files::write(&directory.join(file), svg)?;
     }
     Ok(())
 }

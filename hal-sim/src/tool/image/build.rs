@@ -7,6 +7,7 @@ use std::process::Command;
 
 use super::leg_source::{describe, source};
 use crate::tool::error::ToolError;
+use crate::tool::files;
 use crate::tool::leg_file::LegFile;
 use crate::tool::setup::DEFAULT_SEED;
 
@@ -70,12 +71,10 @@ pub fn build(options: &Options) -> Result<PathBuf, ToolError> {
 
 /// Untouched where nothing changed, so that nothing is compiled again; the whole path.
 pub fn write_if_changed(path: &Path, text: &str) -> Result<PathBuf, ToolError> {
-    let cannot = |error| ToolError::cannot_write(path, &error);
     if std::fs::read_to_string(path).ok().as_deref() != Some(text) {
-        let directory = path.parent().unwrap_or(Path::new("."));
-        std::fs::create_dir_all(directory).and_then(|()| std::fs::write(path, text)).map_err(cannot)?;
+        files::write(path, text)?;
     }
-    path.canonicalize().map_err(cannot)
+    path.canonicalize().map_err(|error| ToolError::cannot_write(path, &error))
 }
 
 /// The build for the microcontroller; `log`: the image tells every sample of the 500 Hz log.

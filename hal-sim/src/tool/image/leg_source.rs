@@ -11,7 +11,7 @@ use scarab::motion::{ExcitationTable, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::{Radian, Weber};
 
-use crate::tool::leg_file::{JointFile, LegFile};
+use crate::tool::leg_file::{JointFile, LegFile, Side};
 use crate::tool::setup::{PriorChoice, SetupError, background, base_rank, chain, configuration};
 
 /// Joints and base parameters of the legs an image can hold.
@@ -30,6 +30,12 @@ pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, SetupError>
     let background = background::<JOINTS, BASE>(leg, PriorChoice::Default, swarm_seed)?;
     let (configuration, _) = configuration(leg, &background, Plan::default(), swarm_seed)?;
     chain::<JOINTS>(leg)?;
+    let mut motors =
+        [MotorDescription { pole_pairs: 0, flux: Weber(0.0), counts_per_turn: 0, ratio: 0.0 }; JOINTS];
+    for (slot, joint) in motors.iter_mut().zip(&leg.joints) {
+        *slot = motor(joint)
+            .map_err(|reason| SetupError::new(leg, format!("joint `{}`: {reason}", joint.name)))?;
+    }
     let model = &configuration.model;
     let joints = core::array::from_fn(|index| {
         let (joint, file) = (&configuration.joints[index], &leg.joints[index]);
@@ -54,7 +60,7 @@ pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, SetupError>
             bandwidth: joint.bandwidth,
             drive: model.drive_choice[index],
             stribeck: model.stribeck_choice[index],
-            motor: motor(file),
+            motor: motors[index],
         }
     });
     let description = LegDescription {
@@ -72,17 +78,20 @@ pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, SetupError>
     Ok((description, configuration))
 }
 
-/// As the leg file has it; of one that says nothing of its motors the default leg's, with the torque constant it states.
-fn motor(joint: &JointFile) -> MotorDescription {
-    const POLE_PAIRS: u32 = 7;
-    let pole_pairs = joint.motor.as_ref().map_or(POLE_PAIRS, |motor| motor.pole_pairs);
-    MotorDescription {
-        pole_pairs: pole_pairs as u8,
-        // Joint torque per ampere = 3/2 pole pairs flux ratio.
-        flux: Weber((joint.torque_per_ampere / (1.5 * f64::from(pole_pairs) * joint.encoder.ratio)) as f32),
+/// The motor as the leg file states it; why it cannot be commutated where it does not.
+fn motor(joint: &JointFile) -> Result<MotorDescription, &'static str> {
+    let Some(motor) = &joint.motor else {
+        return Err("has no `[joint.motor]`: an image needs the motor's pole pairs and flux");
+    };
+    if joint.encoder.side != Side::Motor {
+        return Err("its encoder is at the joint: the board commutates the motor by an encoder at the motor");
+    }
+    Ok(MotorDescription {
+        pole_pairs: motor.pole_pairs as u8,
+        flux: Weber(motor.flux(joint) as f32),
         counts_per_turn: joint.encoder.counts,
         ratio: joint.encoder.ratio as f32,
-    }
+    })
 }
 
 fn link_description(link: &LinkPrior<f32>) -> LinkDescription {

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::tool::analysis::Background;
 use crate::tool::error::ToolError;
+use crate::tool::files;
 use crate::tool::leg_file::LegFile;
 use crate::tool::report::{FitReport, ModelDetail, RunReport};
 
@@ -109,7 +110,7 @@ impl ModelFile {
     /// # Errors
     /// Where it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), ToolError> {
-        std::fs::write(path, self.to_toml()).map_err(|error| ToolError::cannot_write(path, &error))
+        files::write(path, self.to_toml())
     }
 }
 

@@ -37,7 +37,7 @@ use super::chain::{LEG, median, run_all};
 use super::markdown::{Table, percent};
 use super::seeds::ReportSeed;
 use super::swarm_bench::{Bench, SHARE, Trial};
-use super::{PaperOptions, Section};
+use super::{PaperOptions, Part, Section};
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::{DEFAULT_LEG, LegFile, Switch};
 use crate::tool::motions::{EXCITATION_CYCLES, most_informative};
@@ -121,7 +121,7 @@ pub struct ConvergenceReport {
 /// Runs everything and tells it.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let report = report(options.seeds.unwrap_or(RUNS))?;
-    Section::of("convergence", "convergence", &report, words(&report), Vec::new())
+    Section::of(Part::Convergence, "convergence", &report, words(&report), Vec::new())
 }
 
 /// The runs and what they say.

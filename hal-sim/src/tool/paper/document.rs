@@ -3,11 +3,11 @@
 //! Why: what a document says was measured cannot go stale while one command writes it. A place begins with a line
 //! `<!-- KIND: NAME -->` and ends with `<!-- end of NAME -->`; what stands between is replaced, all else stays.
 
-use std::fs::OpenOptions;
 use std::path::Path;
 
 use super::Section;
 use crate::tool::error::ToolError;
+use crate::tool::files;
 
 /// Replaces these sections in a document; a section without a place in it is an error.
 pub fn update(path: &Path, sections: &[Section]) -> Result<(), ToolError> {
@@ -20,24 +20,12 @@ pub fn update(path: &Path, sections: &[Section]) -> Result<(), ToolError> {
 /// Replaces one place of a document; a document without it is an error.
 pub fn replace(path: &Path, kind: &str, name: &str, content: &str) -> Result<(), ToolError> {
     let text = replaced(&read(path)?, kind, name, content).ok_or_else(|| no_place(path, kind, name))?;
-    std::fs::write(path, text).map_err(|error| ToolError::cannot_write(path, &error))
+    files::write(path, text)
 }
 
-/// Whether a place could be replaced: a document that can be written and has it.
+/// Refuses a document that lacks the place to be replaced.
 pub fn check(path: &Path, kind: &str, name: &str) -> Result<(), ToolError> {
-    replaced(&read(path)?, kind, name, "").ok_or_else(|| no_place(path, kind, name))?;
-    check_writable(path)
-}
-
-/// Whether a file can be written: it is opened, and left as it was or absent.
-pub fn check_writable(path: &Path) -> Result<(), ToolError> {
-    let is_new = !path.exists();
-    let opened = OpenOptions::new().append(true).create(true).open(path);
-    opened.map_err(|error| ToolError::cannot_write(path, &error))?;
-    if is_new {
-        std::fs::remove_file(path).map_err(|error| ToolError::cannot_write(path, &error))?;
-    }
-    Ok(())
+    replaced(&read(path)?, kind, name, "").map(drop).ok_or_else(|| no_place(path, kind, name))
 }
 
 fn no_place(path: &Path, kind: &str, name: &str) -> ToolError {
@@ -45,7 +33,7 @@ fn no_place(path: &Path, kind: &str, name: &str) -> ToolError {
 }
 
 /// A document's text.
-pub fn read(path: &Path) -> Result<String, ToolError> {
+fn read(path: &Path) -> Result<String, ToolError> {
     std::fs::read_to_string(path)
         .map_err(|error| ToolError::input(format!("{}: cannot be read: {error}", path.display())))
 }

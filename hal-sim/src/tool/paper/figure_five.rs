@@ -12,7 +12,7 @@ use serde_json::Map;
 
 use super::contenders::{Algorithm, SWARM};
 use super::seeds::ReportSeed;
-use super::{PaperOptions, Section, table_three};
+use super::{PaperOptions, Part, Section, table_three};
 use crate::tool::error::ToolError;
 use crate::tool::figures::swarm::{self, Band, Convergence, Walk};
 
@@ -81,7 +81,7 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
         )?);
         markdown.push_str(&format!("\n![{title}](figures/paper/{file})\n"));
     }
-    Ok(Section { name: "figure-5", markdown, figures, json: Map::new() })
+    Ok(Section { name: Part::FigureFive.section_name(), markdown, figures, json: Map::new() })
 }
 
 fn way(algorithm: Algorithm, problem: &TestProblem, seed: ReportSeed) -> Result<Way, SwarmError> {

@@ -17,7 +17,7 @@ use super::markdown::{Table, number, percent};
 use super::printed::FIGURE_SEVEN;
 use super::seeds::ReportSeed;
 use super::verification::{self, ROTATION_DEG};
-use super::{PaperOptions, Section};
+use super::{PaperOptions, Part, Section};
 use crate::tool::analysis::plan_name;
 use crate::tool::error::ToolError;
 use crate::tool::figures::chain::{Curve, JointTorque, Level, drawn};
@@ -117,7 +117,7 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let levels: Vec<_> = report.lines.iter().filter_map(level).collect();
     let paper = report.paper.map(|paper| paper.percent);
     let figure = drawn(&curves, &levels, &paper)?;
-    Section::of("figure-7", "verification", &report, words(&report), vec![figure])
+    Section::of(Part::FigureSeven, "verification", &report, words(&report), vec![figure])
 }
 
 /// The runs and what they say.

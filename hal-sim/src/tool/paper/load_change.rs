@@ -21,7 +21,7 @@ use super::chain::{self, ChainOptions, ChainRun, JOINTS, NOISE_PERCENT, ROOM, me
 use super::markdown::{Table, number, percent};
 use super::printed::TABLE_FIVE;
 use super::seeds::ReportSeed;
-use super::{PaperOptions, Section};
+use super::{PaperOptions, Part, Section};
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::{LegFile, LinkParameters};
 use crate::tool::report::{BaseReport, Number};
@@ -96,7 +96,7 @@ pub struct LoadReport {
 /// Runs everything and tells it.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let report = report(options.seeds.unwrap_or(RUNS))?;
-    Section::of("load-change", "load_change", &report, words(&report), Vec::new())
+    Section::of(Part::LoadChange, "load_change", &report, words(&report), Vec::new())
 }
 
 /// One chain before and after.

@@ -73,6 +73,20 @@ impl Part {
         Self::FigureSeven,
         Self::LoadChange,
     ];
+
+    /// Name of its place in a document ([`document`]).
+    #[must_use]
+    pub const fn section_name(self) -> &'static str {
+        match self {
+            Self::TableThree => "table-iii",
+            Self::TableFour => "table-iv",
+            Self::FigureFive => "figure-5",
+            Self::TablesFiveSix => "tables-v-vi",
+            Self::FigureSeven => "figure-7",
+            Self::LoadChange => "load-change",
+            Self::Convergence => "convergence",
+        }
+    }
 }
 
 /// What holds for all parts.
@@ -100,7 +114,7 @@ pub struct Section {
 impl Section {
     /// A report in words, with its entry of the JSON report and what was drawn.
     fn of(
-        name: &'static str,
+        part: Part,
         entry: &str,
         report: &impl serde::Serialize,
         markdown: String,
@@ -108,7 +122,12 @@ impl Section {
     ) -> Result<Self, ToolError> {
         let value =
             serde_json::to_value(report).map_err(|error| ToolError::input(format!("no JSON: {error}")))?;
-        Ok(Self { name, markdown, figures, json: Map::from_iter([(entry.to_owned(), value)]) })
+        Ok(Self {
+            name: part.section_name(),
+            markdown,
+            figures,
+            json: Map::from_iter([(entry.to_owned(), value)]),
+        })
     }
 }
 

@@ -8,7 +8,7 @@ use super::markdown::Table;
 use super::problems::{CASES, Case, Reading};
 use super::searches::{self, TOLERANCES};
 use super::statistics::Row;
-use super::{PaperOptions, Section};
+use super::{PaperOptions, Part, Section};
 use crate::tool::error::ToolError;
 
 /// Runs of each row unless asked for otherwise.
@@ -48,7 +48,12 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let mut json = Map::new();
     let list = serde_json::to_value(&rows).map_err(|error| ToolError::input(error.to_string()))?;
     json.insert("rows".into(), list);
-    Ok(Section { name: "table-iv", markdown: parts.join("\n\n") + "\n", figures: Vec::new(), json })
+    Ok(Section {
+        name: Part::TableFour.section_name(),
+        markdown: parts.join("\n\n") + "\n",
+        figures: Vec::new(),
+        json,
+    })
 }
 
 fn headed(header: impl IntoIterator<Item = String>) -> Table {

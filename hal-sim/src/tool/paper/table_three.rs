@@ -12,8 +12,8 @@ use scarab::swarm::{Objective, TestFunction, TestProblem};
 use serde::Serialize;
 use serde_json::Map;
 
-use super::Section;
 use super::markdown::Table;
+use super::{Part, Section};
 use crate::tool::error::ToolError;
 
 /// Points of the grid along each axis.
@@ -128,7 +128,7 @@ pub fn section() -> Result<Section, ToolError> {
     let mut json = Map::new();
     let list = serde_json::to_value(&found).map_err(|error| ToolError::input(error.to_string()))?;
     json.insert("minima".into(), list);
-    Ok(Section { name: "table-iii", markdown, figures: Vec::new(), json })
+    Ok(Section { name: Part::TableThree.section_name(), markdown, figures: Vec::new(), json })
 }
 
 /// A number with so many decimals, zero without a sign.

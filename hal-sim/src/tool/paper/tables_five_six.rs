@@ -17,7 +17,7 @@ use super::markdown::{Table, number, percent};
 use super::printed::{Printed, TABLE_FIVE, TABLE_SIX};
 use super::ranks::Ranks;
 use super::seeds::ReportSeed;
-use super::{PaperOptions, Section};
+use super::{PaperOptions, Part, Section};
 use crate::tool::analysis::plan_name;
 use crate::tool::error::ToolError;
 use crate::tool::report::{Number, RunReport};
@@ -156,7 +156,7 @@ pub struct TablesReport {
 /// Runs everything and tells it.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let report = report(options.seeds.unwrap_or(RUNS))?;
-    Section::of("tables-v-vi", "tables_v_vi", &report, words(&report), Vec::new())
+    Section::of(Part::TablesFiveSix, "tables_v_vi", &report, words(&report), Vec::new())
 }
 
 /// The runs and what they say.

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-use super::{MINIMUM_DURATION_S, MINIMUM_SAMPLES};
+use super::{MINIMUM_DURATION_S, MINIMUM_RATE_HZ, MINIMUM_SAMPLES};
 
 /// Why a file is no recording, and where it shows. Displays as `file:line: reason`.
 #[derive(Debug, thiserror::Error)]
@@ -99,6 +99,17 @@ pub enum Fault {
         /// Longest accepted in this recording, s.
         limit: f64,
     },
+    /// Most samples are too far apart.
+    #[error(
+        "the median step of `t_s` is {} s, which is {} Hz; at least {MINIMUM_RATE_HZ} Hz are needed. `t_s` is in seconds{}",
+        Short(*.step_s), rounded(1.0 / .step_s), OtherUnit(*.step_s, *.counts)
+    )]
+    TooSlow {
+        /// Median distance of two samples, s.
+        step_s: f64,
+        /// Each stamp is one more than the one before.
+        counts: bool,
+    },
     /// Too little to identify anything.
     #[error(
         "too short: {samples} samples over {duration:.3} s, but at least {MINIMUM_SAMPLES} over {MINIMUM_DURATION_S} s are needed"
@@ -150,6 +161,28 @@ impl fmt::Display for Separator<'_> {
             Ok(())
         }
     }
+}
+
+/// Units of time that recorders use, in seconds.
+const UNITS: [(&str, f64); 3] = [("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)];
+
+/// The unit in which stamps so far apart would be a recording's, if there is one.
+struct OtherUnit(f64, bool);
+
+impl fmt::Display for OtherUnit {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rates = UNITS.map(|(unit, second)| (unit, 1.0 / (self.0 * second)));
+        let Some((unit, rate)) = rates.into_iter().find(|(_, rate)| *rate >= MINIMUM_RATE_HZ) else {
+            return Ok(());
+        };
+        let or_numbers = if self.1 { " or sample numbers" } else { "" };
+        write!(formatter, ": are these {unit}{or_numbers}? In {unit} it would be {} Hz", rounded(rate))
+    }
+}
+
+/// Four digits.
+fn rounded(rate: f64) -> f64 {
+    format!("{rate:.3e}").parse().unwrap_or(rate)
 }
 
 /// A number as one reads it, not with three hundred digits.

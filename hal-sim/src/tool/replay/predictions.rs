@@ -1,9 +1,12 @@
 //! The table of predicted torques that `--csv` writes.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
 use scarab::model::AnatomicalJoint;
+
+use crate::tool::error::ToolError;
+use crate::tool::files::NewFile;
 
 /// Measured and predicted torque of one instant, D-H.
 pub(super) struct Prediction<const N: usize> {
@@ -13,13 +16,22 @@ pub(super) struct Prediction<const N: usize> {
     pub predicted: [f32; N],
 }
 
-/// As a table of anatomical torques.
+/// Writes them as a table of anatomical torques.
 pub(super) fn write_predictions<const N: usize>(
     path: &Path,
     predictions: &[Prediction<N>],
     anatomy: &[AnatomicalJoint<f64>; N],
-) -> std::io::Result<()> {
-    let mut out = std::io::BufWriter::new(std::fs::File::create(path)?);
+) -> Result<(), ToolError> {
+    let mut out = NewFile::create(path)?;
+    write_table(&mut out, predictions, anatomy).map_err(|error| ToolError::cannot_write(path, &error))?;
+    out.finish()
+}
+
+fn write_table<const N: usize>(
+    out: &mut impl Write,
+    predictions: &[Prediction<N>],
+    anatomy: &[AnatomicalJoint<f64>; N],
+) -> io::Result<()> {
     write!(out, "t_s")?;
     for joint in 1..=N {
         write!(out, ",tau{joint}_measured_Nm,tau{joint}_predicted_Nm")?;
@@ -35,5 +47,5 @@ pub(super) fn write_predictions<const N: usize>(
         }
         writeln!(out, ",{}", prediction.file)?;
     }
-    out.flush()
+    Ok(())
 }

@@ -1,13 +1,14 @@
 //! All of a trace for the command line: read, told in words, reported.
 
 use std::fs::File;
-use std::io::{BufWriter, Read, Write};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use super::Decoder;
 use super::events::{Event, Weight};
 use super::read::Trace;
 use crate::tool::error::ToolError;
+use crate::tool::files::NewFile;
 
 /// Bytes read at a time.
 const PIECE: usize = 64 * 1024;
@@ -34,8 +35,7 @@ pub fn read(source: &Path, image: Option<&Path>, text: Option<&Path>) -> Result<
     };
     let mut reader = StreamReader::new(decoder);
     if let Some(path) = text {
-        let file = File::create(path).map_err(|error| ToolError::cannot_write(path, &error))?;
-        reader.text = Some((path.to_owned(), BufWriter::new(file)));
+        reader.text = Some((path.to_owned(), NewFile::create(path)?));
     }
     let mut piece = vec![0; PIECE];
     loop {
@@ -55,7 +55,7 @@ pub struct StreamReader {
     trace: Trace,
     line: Vec<u8>,
     zeros: u64,
-    text: Option<(PathBuf, BufWriter<File>)>,
+    text: Option<(PathBuf, NewFile)>,
 }
 
 impl StreamReader {
@@ -101,8 +101,8 @@ impl StreamReader {
         if !self.line.is_empty() {
             push(&mut self.trace, &mut self.text, &String::from_utf8_lossy(&self.line))?;
         }
-        if let Some((path, mut out)) = self.text.take() {
-            out.flush().map_err(|error| ToolError::cannot_write(&path, &error))?;
+        if let Some((_, out)) = self.text.take() {
+            out.finish()?;
         }
         let skipped = self.decoder.as_mut().map(Decoder::finish);
         let decoded = self.decoder.as_ref().map_or(0, Decoder::decoded);
@@ -126,11 +126,7 @@ impl StreamReader {
 }
 
 /// A line to the trace, and its record to the file of lines.
-fn push(
-    trace: &mut Trace,
-    text: &mut Option<(PathBuf, BufWriter<File>)>,
-    line: &str,
-) -> Result<(), ToolError> {
+fn push(trace: &mut Trace, text: &mut Option<(PathBuf, NewFile)>, line: &str) -> Result<(), ToolError> {
     trace.push(line);
     if let (Some((path, out)), Some(record)) = (text, super::text::record(line)) {
         writeln!(out, "{record}").map_err(|error| ToolError::cannot_write(path, &error))?;

@@ -29,3 +29,25 @@ pub const ENCODERS: [[Write; 5]; 2] = [
     encoder(BASES[0], ["TIM3_CCMR1", "TIM3_CCER", "TIM3_ARR", "TIM3_SMCR", "TIM3_CR1"]),
     encoder(BASES[1], ["TIM4_CCMR1", "TIM4_CCER", "TIM4_ARR", "TIM4_SMCR", "TIM4_CR1"]),
 ];
+
+/// Whether an index pulse is a glitch: the counts of the last two samples (the newest in the lower half) and of the
+/// interrupt are one, and the line is low again. At that speed an index, which is one count wide at least, lasts for
+/// 42 us, longer than the interrupt's latency. In motion the line of a true index may be low by then.
+#[must_use]
+pub const fn is_glitch(sampled: u32, count: u16, is_high: bool) -> bool {
+    !is_high && sampled as u16 == count && (sampled >> 16) as u16 == count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_glitch;
+
+    #[test]
+    fn an_index_line_that_is_low_again_is_a_glitch_at_rest_alone() {
+        assert!(is_glitch(0x1234_1234, 0x1234, false));
+        assert!(!is_glitch(0x1234_1234, 0x1234, true), "a rotor that stands on its index");
+        for (sampled, count) in [(0x1233_1234, 0x1234), (0x1234_1234, 0x1235), (0x1234_1233, 0x1233)] {
+            assert!(!is_glitch(sampled, count, false), "{sampled:x} {count:x}");
+        }
+    }
+}

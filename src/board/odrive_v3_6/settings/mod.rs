@@ -86,7 +86,7 @@ pub const DEBUG_FREEZE: [Write; 2] = [
 ];
 
 /// Clock security: a crystal that fails raises the non-maskable interrupt (RCC_CR CSSON), which releases the bridges; the timers run
-/// on, three times slower. Their break circuit, which would do it in hardware, needs BKE, and its pins are taken.
+/// on, 10.5 times slower. Their break circuit, which would do it in hardware, needs BKE, and its pins are taken.
 pub const CLOCK_SECURITY: [Write; 1] = [Write::bits("RCC_CR", RCC, 1 << 19, 1 << 19)];
 
 /// Clears the interrupt of clock security (RCC_CIR CSSC).

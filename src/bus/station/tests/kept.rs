@@ -89,7 +89,7 @@ fn what_does_not_fit_is_not_kept_and_hosts_are_told() {
         told.sort_by_key(|(id, _)| *id);
         told
     };
-    let failed = [(0x81, 0xFF01), (0x81, 0x5530), (0x82, 0xFF01), (0x82, 0x5530)];
+    let failed = [(0x81, 0xFF0D), (0x81, 0x5530), (0x82, 0xFF0D), (0x82, 0x5530)];
     assert_eq!(told(&mut bench), failed);
     // So is a second one that fails like the first.
     bench.save(1);
@@ -212,7 +212,7 @@ fn nothing_is_kept_while_something_blocks() {
 #[test]
 fn hosts_are_told_before_the_flash_is_written_and_how_it_ended() {
     let mut bench = Bench::new();
-    for (storing, code) in [(Storing::Busy, 0xFF01), (Storing::Failed, 0x5530), (Storing::Done, 0)] {
+    for (storing, code) in [(Storing::Busy, 0xFF0D), (Storing::Failed, 0x5530), (Storing::Done, 0)] {
         bench.station.storing(storing);
         bench.station.storing(storing);
         assert_eq!(codes_of(&bench.run(4)), [(0x81, code), (0x82, code)]);

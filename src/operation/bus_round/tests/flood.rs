@@ -4,10 +4,11 @@ use super::*;
 
 /// A round that nothing but frames raised.
 fn frames_alone(bench: &mut Bench, frames: &[Frame]) -> Option<LegOrder<2>> {
-    bench.board.frames.extend(frames);
-    (bench.board.told, bench.board.order) = (None, None);
-    bench.round.round(33, &mut bench.station, &mut bench.board, &NOTHING);
-    bench.board.order
+    bench.arrive(frames);
+    bench.bus.told.dequeue();
+    bench.host.orders.dequeue();
+    bench.round();
+    bench.host.orders.dequeue()
 }
 
 #[test]
@@ -16,7 +17,7 @@ fn a_frame_that_concerns_nobody_here_is_taken_and_nothing_else_is_done() {
     bench.enable();
     for frame in [Frame::new(0x7F0, &[1]), Frame::new(0x205, &[15, 0]), Frame::new(0x605, &[0x40; 8])] {
         assert_eq!(frames_alone(&mut bench, &[frame]), None, "{frame:?}");
-        assert!(bench.board.frames.is_empty());
+        assert_eq!(bench.unheard(), 0);
     }
     for frame in
         [Frame::new(0x80, &[]), Frame::new(0x201, &[15, 0]), Frame::new(0, &[1, 5]), Frame::new(0, &[1, 1])]
@@ -25,15 +26,15 @@ fn a_frame_that_concerns_nobody_here_is_taken_and_nothing_else_is_done() {
         assert_eq!(frames_alone(&mut bench, &[frame]).is_some(), concerns, "{frame:?}");
     }
     // Somebody may be missed all the same.
-    bench.board.wire.now_us += 1000;
+    bench.hardware.now_us += 1000;
     bench.send(0x601, &[0x23, 0x16, 0x10, 1, 2, 0, 0x70, 0]);
-    bench.board.frames.push_back(Frame::new(0x770, &[5]));
+    bench.arrive(&[Frame::new(0x770, &[5])]);
     bench.run(1);
     bench.told();
     for _ in 0..8 {
-        bench.board.wire.now_us += 500;
+        bench.hardware.now_us += 500;
         frames_alone(&mut bench, &[Frame::new(0x7F0, &[])]);
-        bench.board.wire.empty();
+        bench.hardware.empty_mailboxes();
     }
     assert_eq!(bench.told(), [(0x81, 0x8130)]);
 }
@@ -42,28 +43,30 @@ fn a_frame_that_concerns_nobody_here_is_taken_and_nothing_else_is_done() {
 fn frames_that_are_dear_get_half_of_the_time_and_the_leg_is_heard_all_the_same() {
     let mut bench = Bench::new();
     bench.enable();
-    bench.board.frame_us = 700;
-    let begin_us = bench.board.wire.now_us;
+    bench.hardware.reception().frame_us = 700;
+    let begin_us = bench.hardware.now_us();
     let (mut heard, mut rounds) = (0, 0);
-    while bench.board.wire.now_us < begin_us + 100_000 {
-        bench.board.frames.push_back(Frame::new(0x80, &[]));
-        let before = bench.board.frames.len();
+    while bench.hardware.now_us() < begin_us + 100_000 {
+        bench.arrive(&[Frame::new(0x80, &[])]);
+        let before = bench.unheard();
         bench.run(1);
-        heard += before - bench.board.frames.len();
+        heard += before - bench.unheard();
         rounds += 1;
         // Whoever hears nothing is still told and ordered, at every tick.
-        assert!(bench.board.order.is_some() && bench.board.told.is_none());
+        assert!(bench.host.orders.ready() && bench.host.told.ready());
     }
     let share = heard as f64 * 700.0 / 100_000.0;
     assert!((0.4..0.6).contains(&share), "{share}, {rounds} rounds");
     // All that came at once are heard, one after the other.
-    bench.board.frames.clear();
+    bench.hardware.reception().frame_us = 0;
     bench.run(40);
-    bench.board.frames.extend([Frame::new(0x80, &[]); 33]);
+    assert_eq!(bench.unheard(), 0);
+    bench.hardware.reception().frame_us = 700;
+    bench.arrive(&[Frame::new(0x80, &[]); 33]);
     bench.run(1);
-    assert!((30..33).contains(&bench.board.frames.len()));
+    assert!((30..33).contains(&bench.unheard()));
     bench.run(100);
-    assert!(bench.board.frames.is_empty());
+    assert_eq!(bench.unheard(), 0);
 }
 
 #[test]
@@ -71,16 +74,16 @@ fn a_host_whose_frames_wait_is_not_missed_and_one_that_is_gone_is() {
     let mut bench = Bench::new();
     // Its controlword is watched: 3 ms.
     bench.send(0x601, &[0x2B, 0x00, 0x14, 5, 3, 0, 0, 0]);
-    bench.board.frames.push_back(Frame::new(0x201, &[0, 0]));
+    bench.arrive(&[Frame::new(0x201, &[0, 0])]);
     bench.run(4);
     bench.told();
     // Something dear, and behind it what was sent in time.
-    bench.board.frame_us = 2_500;
-    bench.board.frames.push_back(Frame::new(0x80, &[]));
+    bench.hardware.reception().frame_us = 2_500;
+    bench.arrive(&[Frame::new(0x80, &[])]);
     bench.run(1);
-    bench.board.frame_us = 0;
+    bench.hardware.reception().frame_us = 0;
     for _ in 0..12 {
-        bench.board.frames.push_back(Frame::new(0x201, &[0, 0]));
+        bench.arrive(&[Frame::new(0x201, &[0, 0])]);
         bench.run(1);
     }
     assert_eq!(bench.told(), []);
@@ -88,12 +91,12 @@ fn a_host_whose_frames_wait_is_not_missed_and_one_that_is_gone_is() {
     assert_eq!(bench.told(), [(0x81, 0x8250)]);
     // However dear all the rest is.
     bench.send(0, &[1, 0]);
-    bench.board.frames.push_back(Frame::new(0x201, &[0, 0]));
+    bench.arrive(&[Frame::new(0x201, &[0, 0])]);
     bench.run(2);
     bench.told();
-    bench.board.frame_us = 900;
+    bench.hardware.reception().frame_us = 900;
     for _ in 0..80 {
-        bench.board.frames.push_back(Frame::new(0x80, &[]));
+        bench.arrive(&[Frame::new(0x80, &[])]);
         bench.run(1);
     }
     assert!(bench.told().contains(&(0x81, 0x8250)));

@@ -15,7 +15,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use scarab::bus::{LONGEST, kept_entries};
-use scarab::leg::{ControlRequest, DriveState, IdentifiedModel};
+use scarab::leg::{ControlRequest, DriveState, IdentifiedModel, NoticeCode};
 use scarab::store::{KeptModel, Key};
 
 use super::super::campaign::BASE;
@@ -47,7 +47,7 @@ const WINDOW: u16 = 0x6065;
 const WINDOWS: [u32; 2] = [20_000, 30_000];
 const UNTOUCHED: u32 = 87_266;
 /// What was kept cannot be read.
-const LOST: u16 = 0x5530;
+const LOST: u16 = NoticeCode::StoreFailed.number();
 
 const fn head(id: &'static str, fault: &'static str, detector: &'static str, state: &'static str) -> Head {
     Head { id, fault, detector, state, deadline_ms: f64::INFINITY, unit: "", codes: &[], lacking: None }

@@ -127,8 +127,9 @@ pub(super) fn until_safe(fork: &mut Fork<'_>, patience: &Patience) -> (Option<&'
 }
 
 /// Both nodes tell of it, soon.
-fn tells(fork: &mut Fork<'_>, state: Option<&str>, codes: [u16; 2]) {
+fn tells(fork: &mut Fork<'_>, state: Option<&str>, codes: [FaultCode; 2]) {
     fork.run(TOLD);
+    let codes = codes.map(FaultCode::number);
     let told = |node: &u16| fork.host.told().iter().any(|(from, code)| from == node && codes.contains(code));
     if state.is_some() && !NODES.iter().all(told) {
         fork.broken("no emergency message tells of it");
@@ -175,7 +176,7 @@ fn silent(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     }
     let (state, after_ms) = until_safe(&mut fork, &patience);
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
-    tells(&mut fork, state, [0x8130, 0x8250]);
+    tells(&mut fork, state, [FaultCode::Heartbeat, FaultCode::LatePdo]);
     comes_back(&mut fork, speaks, patience.faults);
     let early = after_ms.is_some_and(|after| after <= 0.0);
     let in_time = after_ms.is_some_and(|after| after <= BUS_MS + 1e-9);
@@ -215,7 +216,7 @@ fn left(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     let alarm = fork.host.rig().alarm().map(FaultCode::name);
     fork.run(lasts);
     fork.host.board().set_controller(Controller::Active, !blind);
-    tells(&mut fork, state, [0x8120, 0x8140]);
+    tells(&mut fork, state, [FaultCode::BusPassive, FaultCode::BusOff]);
     comes_back(&mut fork, speaks, option == FAULT);
     let in_time = after_ms.is_some_and(|after| after <= fork.head.deadline_ms);
     let found = fork.ended(state, alarm);

@@ -69,6 +69,7 @@ pub(super) fn outcome(head: &Head, seed: u64, state: Option<&'static str>) -> Ou
         undetectable: false,
         false_alarm: false,
         after_ms: None,
+        intermittent_ms: None,
         state,
         alarm: None::<FaultCode>.map(FaultCode::name),
         magnitude: None,

@@ -9,11 +9,11 @@
 //! | words only | 16 us for each four bytes | the host enables the leg as before |
 //! | a sector erased | 1 to 2 s each beside | joints have no zeros any more: nothing enables before a reference was taken |
 //!
-//! Neither is anybody's fault: nothing is raised, no watchdog bites. Hosts were told before (FF01) and are told after (0000), and, where they
+//! Neither is anybody's fault: nothing is raised, no watchdog bites. Hosts were told before (FF0D) and are told after (0000), and, where they
 //! went on sending, that frames were lost (8110, 0000); what was asked for is kept.
 
 use scarab::leg::DriveState;
-use scarab::safety::FaultCode;
+use scarab::safety::{FaultCode, NO_ERROR, NoticeCode};
 
 use super::super::entry::Head;
 use super::super::run::Outcome;
@@ -39,9 +39,9 @@ const SAVE: u32 = u32::from_le_bytes(*b"save");
 const WINDOW: u16 = 0x6065;
 const NODES: [u16; 2] = [1, 2];
 /// Emergency messages: the flash is about to be written; frames were lost; nothing is wrong.
-const STORING: u16 = 0xFF01;
-const LOST: u16 = 0x8110;
-const CLEAR: u16 = 0;
+const STORING: u16 = NoticeCode::Storing.number();
+const LOST: u16 = NoticeCode::Overrun.number();
+const CLEAR: u16 = NO_ERROR;
 
 /// A host whose leg is off, on a board whose flash has no room for one more save.
 fn full(leg: &LegFile) -> Result<Host, ToolError> {

@@ -1,8 +1,9 @@
-//! Runs in which nothing is broken: somebody pushes, and the limits have to hold.
+//! Runs in which nothing is broken: somebody pushes, and the limits have to hold; noise, and nothing may come of it.
 
 use scarab::safety::FaultCode;
 
 use super::{Outcome, Watched};
+use crate::faults::Injector;
 use crate::tool::faults::rig::PERIOD_MS;
 
 /// What zeros and gains of the shunts and the ripple leave at the cap: more than that is beyond it.
@@ -30,6 +31,7 @@ impl<const B: usize> Watched<'_, B> {
         let timed = self.row.deadline_ms.is_finite() && state.is_some();
         let after_ms = timed.then_some(longest as f64 * PERIOD_MS);
         let in_time = after_ms.is_none_or(|after| after <= self.deadline_ms());
+        let intermittent_ms = self.intermittent_ms();
         let broken = self.invariants.into_broken();
         Outcome {
             fault: self.row.id,
@@ -40,10 +42,40 @@ impl<const B: usize> Watched<'_, B> {
             undetectable: state.is_none() && broken.is_empty(),
             false_alarm: !known,
             after_ms,
+            intermittent_ms,
             state,
             alarm: alarm.map(FaultCode::name),
             magnitude: self.scenario.magnitude,
             broken,
+            hash: format!("{:016x}", self.rig.hash),
+            recording: self.recording,
+        }
+    }
+
+    /// The machine goes on to the bit like its twin without the noise: there is nothing to see, and all else is a false alarm.
+    pub(super) fn ignore(mut self) -> Outcome {
+        let mut twin = self.rig.clone();
+        twin.injector = Injector::new(self.seed);
+        let limit = self.begun + self.scenario.patience;
+        while self.rig.period < limit && !self.has_turned() {
+            self.step();
+            twin.advance();
+        }
+        let alarm = self.rig.alarm();
+        let ignored = alarm.is_none() && self.rig.hash == twin.hash && self.rig.counts() == twin.counts();
+        Outcome {
+            fault: self.row.id,
+            seed: self.seed,
+            period: self.begun,
+            detected: false,
+            undetectable: ignored,
+            false_alarm: !ignored,
+            after_ms: None,
+            intermittent_ms: None,
+            state: None,
+            alarm: alarm.map(FaultCode::name),
+            magnitude: self.scenario.magnitude,
+            broken: self.invariants.into_broken(),
             hash: format!("{:016x}", self.rig.hash),
             recording: self.recording,
         }

@@ -1,0 +1,79 @@
+//! Requests for the servo's tick, and what the levels above see of an axis.
+
+use super::*;
+use crate::hal::DriveCommand;
+use crate::units::Ampere;
+
+/// Ticks both axes until the servo was requested so often; where `answers`, it ticks after each request.
+fn request(signals: &Signals<2>, requests: u32, answers: bool) -> u32 {
+    let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
+    let mut loops = CurrentLoops::new([Stage::OFF; 2], PERIOD, None, volt_per_code);
+    let (mut hardware, mut queues) = (TestHardware::new(), Queues::new());
+    let mut periods = 0;
+    while hardware.servo_pended < requests {
+        periods += 1;
+        for axis in 0..2 {
+            let before = hardware.servo_pended;
+            let tick = tick_at(periods * PERIOD.get(), AxisSample::default());
+            loops.tick(axis, &tick, &mut queues.current(), signals, &mut hardware);
+            if answers && hardware.servo_pended != before {
+                signals.statistics.servo_ticks.add();
+            }
+        }
+    }
+    periods
+}
+
+#[test]
+fn no_request_after_the_start_counts_as_missed() {
+    let signals = Signals::new();
+    assert_eq!(request(&signals, 10, true), 60);
+    assert_eq!((signals.statistics.servo_missed.get(), signals.inhibit.causes()), (0, 0));
+    assert_eq!(signals.statistics.current_ticks.each_ref().map(|ticks| ticks.get()), [60; 2]);
+}
+
+#[test]
+fn a_servo_that_never_answers_is_counted_and_given_up() {
+    let signals = Signals::new();
+    request(&signals, 3, false);
+    assert_eq!((signals.statistics.servo_missed.get(), signals.inhibit.causes()), (2, 0));
+    let signals = Signals::new();
+    request(&signals, 4, false);
+    let given_up = Cause::ServoTicks.bit();
+    assert_eq!((signals.statistics.servo_missed.get(), signals.inhibit.causes()), (3, given_up));
+}
+
+#[test]
+fn the_state_of_each_axis_can_be_replaced() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    assert!(bench.loops.stage_mut(2).is_none());
+    let is_running =
+        |bench: &Bench| [0, 1].map(|axis| bench.loops.stage(axis).is_some_and(Stage::is_running));
+    *bench.loops.stage_mut(1).expect("two axes") = Stage::OFF;
+    assert_eq!(is_running(&bench), [true, false]);
+    // A target is followed only where all axes run: no tick switches a bridge on.
+    bench.signals.set_targets(&DriveCommand { enabled: true, currents: [Ampere(1.0); 2] });
+    bench.run(12);
+    bench.signals.release();
+    *bench.loops.stage_mut(0).expect("two axes") = Stage::OFF;
+    assert_eq!(is_running(&bench), [false; 2]);
+}
+
+#[test]
+fn one_sample_of_each_running_axis_goes_to_the_servo_in_six_periods() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    *bench.loops.stage_mut(1).expect("two axes") = Stage::OFF;
+    let mut samples = [0; 2];
+    for period in 1..=12 {
+        let now = bench.now.wrapping_add(period * PERIOD.get());
+        let Ends { mut current, mut servo, .. } = bench.queues.split(&mut bench.events);
+        for axis in 0..2 {
+            let sample = bench.motors[axis].period(AxisCommand::RELEASED);
+            bench.loops.tick(axis, &tick_at(now, sample), &mut current, &bench.signals, &mut bench.hardware);
+            while servo.samples[axis].dequeue().is_some() {
+                samples[axis] += 1;
+            }
+        }
+    }
+    assert_eq!(samples, [2, 0]);
+}

@@ -1,0 +1,125 @@
+//! What the housekeeping reports of each joint, up to the servo that reacts to it.
+
+use super::super::super::{ServoLevel, testing};
+use super::*;
+use crate::leg::testing::{LEG, configuration};
+use crate::leg::{Control, DeratingRamps, Fault, FaultCode};
+use crate::motor::SenseScale;
+use crate::units::Volt;
+
+const RAMPS: DeratingRamps =
+    DeratingRamps::new([80.0, 100.0], [Volt(24.0), Volt(21.0)], [Volt(55.0), Volt(57.5)]);
+
+/// The fault that ends the servo's tick after a tenth of a second of housekeeping.
+fn fault_of(bench: &mut Bench) -> Option<Fault> {
+    let mut control = Control::new(&configuration()).expect("a leg");
+    let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
+    let mut level = ServoLevel::new(&control, RAMPS, volt_per_code, None);
+    let mut ends = testing::ends();
+    bench.signals.statistics.see_bus((48.0 / volt_per_code.0) as u16);
+    bench.signals.begin_servo();
+    let mut tick = |bench: &mut Bench| {
+        level.tick(&mut control, LEG.gravity, &mut ends.servo, &bench.signals, &mut bench.hardware);
+        control.state()
+    };
+    assert_eq!(tick(bench), DriveState::SwitchOnDisabled);
+    bench.hold(false, false);
+    match tick(bench) {
+        DriveState::Fault { fault } => Some(fault),
+        _ => None,
+    }
+}
+
+#[test]
+fn a_hot_bridge_or_an_open_thermistor_is_the_fault_of_its_own_joint() {
+    assert_eq!(fault_of(&mut Bench::new(Housekeeper::new(HOUSE))), None);
+    for joint in 0..2 {
+        for (degrees, code) in [(Some(100.0), FaultCode::Temperature), (None, FaultCode::Thermistor)] {
+            let mut bench = Bench::new(Housekeeper::new(HOUSE));
+            bench.hardware.temperatures[joint] = degrees;
+            assert_eq!(fault_of(&mut bench), Some(Fault { code, joint: joint as u8 }));
+        }
+    }
+}
+
+#[test]
+fn the_hottest_bridge_derates_and_an_open_thermistor_leaves_nothing() {
+    for (temperatures, hottest_c) in [
+        ([Some(40.0), Some(85.0)], 85.0),
+        ([Some(90.0), Some(30.0)], 90.0),
+        ([Some(30.0), None], HOUSE.hottest_c),
+    ] {
+        let mut bench = Bench::new(Housekeeper::new(HOUSE));
+        bench.hardware.temperatures = temperatures;
+        bench.hold(false, false);
+        assert_eq!(bench.signals.hottest_c(), hottest_c);
+    }
+}
+
+#[test]
+fn each_gate_driver_is_recorded_with_its_own_status() {
+    let statuses = |bench: &Bench, cause: Cause| -> Vec<(u8, u32)> {
+        let status = |record: &Record<2>| match record {
+            Record::GateDriver { why, joint, status } if *why == cause.name() => Some((*joint, *status)),
+            _ => None,
+        };
+        bench.records.iter().filter_map(status).collect()
+    };
+    let mut bench = Bench::new(Housekeeper::new(HOUSE));
+    bench.hardware.gate_status = [0x0481_0300, 0x0402_0301];
+    bench.signals.inhibit.raise(Cause::GateFault);
+    bench.hold(false, false);
+    let expected = [(1, 0x0481_0300), (2, 0x0402_0301)];
+    assert_eq!(statuses(&bench, Cause::GateFault), expected, "once");
+    assert_eq!(statuses(&bench, Cause::GateConfiguration), []);
+    // The second driver loses its registers, and no longer answers.
+    bench.hardware.gates_hold[1] = false;
+    bench.hardware.gate_status[1] = u32::MAX;
+    bench.hold(false, false);
+    assert_eq!(statuses(&bench, Cause::GateConfiguration), [(1, 0x0481_0300), (2, u32::MAX)]);
+    assert_ne!(bench.signals.inhibit.causes() & Cause::GateConfiguration.bit(), 0);
+}
+
+#[test]
+fn a_reference_is_refused_while_a_joint_moves() {
+    for moving in [None, Some(0), Some(1)] {
+        let mut bench = Bench::new(Housekeeper::ready(HOUSE));
+        bench.hold(false, true);
+        bench.hardware.contacts = Contacts::default();
+        for round in 0..RATE_HZ {
+            if let Some(joint) = moving {
+                // 50 counts a second.
+                bench.signals.statistics.counts[joint].set(round / 10);
+            }
+            bench.round();
+        }
+        let answers: Vec<bool> = bench
+            .records
+            .iter()
+            .filter_map(|record| match record {
+                Record::Request { name: "reference", accepted, .. } => Some(*accepted),
+                _ => None,
+            })
+            .collect();
+        let stands = moving.is_none();
+        let expected: &[bool] = if stands { &[true] } else { &[true, false] };
+        assert_eq!((&answers[..], bench.signals.has_begun()), (expected, stands), "{moving:?}");
+        let places =
+            if stands { Vec::from([(0, Order::Place(0)), (1, Order::Place(0))]) } else { Vec::new() };
+        assert_eq!(bench.orders, places, "{moving:?}");
+    }
+}
+
+#[test]
+fn a_reset_switches_the_gate_drivers_off_and_on_and_forgets_what_is_gone() {
+    for (configures, causes) in [(true, 0), (false, Cause::GateConfiguration.bit())] {
+        let mut bench = Bench::new(Housekeeper::ready(HOUSE));
+        bench.hardware.gates_configure = configures;
+        bench.signals.inhibit.raise(Cause::GateFault);
+        for _ in 0..25 {
+            bench.hold(false, true);
+        }
+        assert_eq!(bench.hardware.gates_switched, [false, true]);
+        assert_eq!(bench.signals.inhibit.causes(), causes);
+    }
+}

@@ -1,0 +1,168 @@
+extern crate std;
+
+use std::boxed::Box;
+use std::vec::Vec;
+
+use super::super::testing;
+use super::super::{Ends, LegEvent};
+use super::*;
+use crate::leg::testing::{BASE, configuration};
+use crate::leg::{LogSample, Plan, Step};
+
+struct Bench {
+    level: IdentificationLevel,
+    identification: Box<Identification<2, BASE, 256, 26>>,
+    ends: Ends<'static, 2>,
+    signals: Signals<2>,
+    records: Vec<Record<2>>,
+    /// Ticks of the samples that were seen.
+    samples: Vec<u32>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let identification = Identification::new(&configuration()).expect("a leg");
+        Self {
+            level: IdentificationLevel::new(identification.swarm_seed()),
+            identification: Box::new(identification),
+            ends: testing::ends(),
+            signals: Signals::new(),
+            records: Vec::new(),
+            samples: Vec::new(),
+        }
+    }
+
+    /// Sends events and lets the level take them; whether there were any.
+    fn hear(&mut self, events: impl IntoIterator<Item = LegEvent<2>>) -> bool {
+        for event in events {
+            assert!(self.ends.servo.events.enqueue(event).is_ok(), "full");
+        }
+        let Self { level, identification, ends, records, samples, .. } = self;
+        let record = |record: &Record<2>| records.push(*record);
+        level
+            .hear(identification, &mut ends.identification, record, |logged| samples.push(logged.sample.tick))
+    }
+
+    fn work(&mut self) -> Slice<2> {
+        let Self { level, identification, ends, signals, records, .. } = self;
+        let record = |record: &Record<2>| records.push(*record);
+        level.work(identification, 4, &mut ends.identification, signals, record)
+    }
+
+    fn finding(&mut self) -> Option<Finding<2>> {
+        self.ends.servo.findings.dequeue()
+    }
+
+    fn lost(&self) -> usize {
+        let lost = |record: &&Record<2>| matches!(record, Record::Refused { why: "samples_lost", .. });
+        self.records.iter().filter(lost).count()
+    }
+}
+
+fn logged(tick: u32, segment: Option<Segment>) -> LegEvent<2> {
+    let sample = LogSample { position_rad: [0.1; 2], torque_nm: [1.0; 2], counts_sum: [0; 2], tick };
+    LegEvent::Sample(LoggedSample { sample, segment })
+}
+
+fn phase(phase: IdentifyPhase) -> LegEvent<2> {
+    LegEvent::Activity(Activity::Identify(phase))
+}
+
+/// Samples of the training motion at these ticks.
+fn training(ticks: &[u32]) -> impl Iterator<Item = LegEvent<2>> {
+    ticks.iter().map(|tick| logged(*tick, Some(Segment::Training)))
+}
+
+#[test]
+fn a_missing_sample_ends_the_identification_with_refused_input() {
+    for waits in [IdentifyPhase::Settle, IdentifyPhase::Solve, IdentifyPhase::Judge] {
+        let mut bench = Bench::new();
+        bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+        bench.level.published();
+        // The one at 24 found no room.
+        bench.signals.statistics.samples_lost.add();
+        bench.hear(training(&[8, 16, 32, 40]));
+        // While the leg moves there is nothing that waits for a verdict.
+        assert_eq!((bench.work(), bench.finding(), bench.lost()), (Slice::Idle, None, 0));
+        bench.hear([logged(48, None), phase(waits)]);
+        assert_eq!(bench.work(), Slice::Idle);
+        let verdict = Verdict::refused(Reason::Input);
+        assert_eq!(bench.finding(), Some(Finding::Judged { verdict, model: None }), "{waits:?}");
+        assert_eq!(bench.records, [Record::Refused { why: "samples_lost", value: 1 }]);
+        assert_eq!(bench.level.unpublished(), Some(Some(verdict)));
+        // Cancelled: nothing more comes of the motion that was recorded.
+        bench.hear([logged(56, None)]);
+        assert_eq!((bench.work(), bench.finding(), bench.lost()), (Slice::Idle, None, 1));
+        assert!(bench.identification.solver().is_none());
+    }
+}
+
+#[test]
+fn samples_of_several_motions_one_after_the_other_have_no_gap() {
+    let mut bench = Bench::new();
+    bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+    // Across the wrap of the tick.
+    bench.hear(training(&[u32::MAX - 11, u32::MAX - 3, 4, 12]));
+    let (first, second) = (Some(Segment::Validation(0)), Some(Segment::Validation(1)));
+    bench.hear([logged(20, None), logged(800, first), logged(808, first), logged(1600, second)]);
+    bench.hear([phase(IdentifyPhase::Settle)]);
+    bench.work();
+    assert!(!bench.level.gap && bench.lost() == 0);
+    assert_eq!(bench.samples, [u32::MAX - 11, u32::MAX - 3, 4, 12, 20, 800, 808, 1600]);
+    assert_eq!(bench.level.tick(), 1600);
+}
+
+#[test]
+fn a_new_identification_forgets_the_gap_of_the_one_before() {
+    let mut bench = Bench::new();
+    bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+    bench.hear(training(&[8, 24]));
+    assert!(bench.level.gap);
+    bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Settle)]);
+    bench.work();
+    assert_eq!((bench.level.gap, bench.finding(), bench.lost()), (false, None, 0));
+}
+
+#[test]
+fn a_hosts_identification_begins_with_its_plan_and_seed() {
+    let mut bench = Bench::new();
+    let seed = bench.identification.swarm_seed();
+    assert_eq!(bench.level.seed(), seed);
+    bench.hear([LegEvent::Begun(None)]);
+    assert_eq!((bench.level.seed(), bench.identification.swarm_seed()), (seed, seed));
+    for plan in [Plan::OneTime, Plan::Sequential] {
+        let mut expected = bench.identification.clone();
+        expected.prepare(plan, seed + 7);
+        bench.level.published();
+        bench.hear([LegEvent::Begun(Some((plan, seed + 7)))]);
+        assert!(*bench.identification == *expected, "{plan:?}");
+        assert_eq!((bench.level.seed(), bench.identification.swarm_seed()), (seed + 7, seed + 7));
+        // There are no results of it yet.
+        assert_eq!(bench.level.unpublished(), Some(None));
+    }
+}
+
+#[test]
+fn a_leg_that_stops_identifying_cancels_the_search() {
+    let is_searching = |activity: LegEvent<2>| {
+        let mut bench = Bench::new();
+        bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+        let ticks: Vec<u32> = (1..=80).map(|sample| 8 * sample).collect();
+        bench.hear(training(&ticks));
+        bench.hear([logged(648, None), activity]);
+        bench.work() != Slice::Idle || bench.finding().is_some()
+    };
+    assert!(is_searching(phase(IdentifyPhase::Solve)));
+    assert!(!is_searching(LegEvent::Activity(Activity::Idle)));
+    assert!(!is_searching(LegEvent::Activity(Activity::Track(Step::Run))));
+}
+
+#[test]
+fn records_pass_in_their_order_and_activity_is_known() {
+    let mut bench = Bench::new();
+    assert!(!bench.hear([]));
+    let records = [1, 2].map(|tick| Record::Request { tick, name: "identify", accepted: true });
+    assert!(bench.hear(records.map(LegEvent::Record).into_iter().chain([phase(IdentifyPhase::Approach)])));
+    assert_eq!(bench.records, records);
+    assert_eq!(bench.level.activity(), Activity::Identify(IdentifyPhase::Approach));
+}

@@ -1,0 +1,278 @@
+//! The servo's level around the control of the default leg, whose joints stand where they are.
+
+extern crate std;
+
+use std::vec::Vec;
+
+use super::super::testing::{TestHardware, commanded, ends, on_a_bus};
+use super::super::{BusEnds, Ends};
+use super::*;
+use crate::bus::station::{LegOrder, LegRequest, LegTold};
+use crate::hal::{Contacts, DriveCommand};
+use crate::leg::testing::{LEG, configuration};
+use crate::leg::{Finding, JointCommand, PowerRequest};
+use crate::motor::SenseScale;
+use crate::safety::BoardFault;
+use crate::units::Ampere;
+
+mod faults;
+mod reports;
+
+const VOLT_PER_CODE: Volt = SenseScale::ODRIVE_3_6.volt_per_code;
+const RAMPS: DeratingRamps =
+    DeratingRamps::new([80.0, 100.0], [Volt(24.0), Volt(21.0)], [Volt(55.0), Volt(57.5)]);
+/// Counts at which both joints are within their ranges.
+const COUNTS: i32 = 30_000;
+
+struct Bench {
+    control: Control<2>,
+    level: ServoLevel<2>,
+    hardware: TestHardware<2>,
+    signals: Signals<2>,
+    ends: Ends<'static, 2>,
+    bus: BusEnds<'static, 2>,
+    counts: [i32; 2],
+    /// The identification takes its events.
+    is_heard: bool,
+    events: Vec<LegEvent<2>>,
+    states: Vec<DriveState>,
+    /// Newest report to the bus.
+    told: Option<LegTold<2>>,
+}
+
+impl Bench {
+    /// A leg with a bus, whose joints have no zeros yet; the operator holds the enabling switch.
+    fn resting() -> Self {
+        let (mut hardware, host, bus) = on_a_bus();
+        let configuration = configuration();
+        let control = Control::new(&configuration).expect("a leg");
+        let level = ServoLevel::new(&control, RAMPS, VOLT_PER_CODE, Some(Following::new(&configuration)));
+        let mut ends = ends();
+        ends.servo.host = Some(host);
+        hardware.contacts = Contacts { enabling: true, start: false };
+        let signals = Signals::new();
+        signals.set_permits(true);
+        signals.set_hottest_c(30.0);
+        let mut bench = Self {
+            control,
+            level,
+            hardware,
+            signals,
+            ends,
+            bus,
+            counts: [COUNTS; 2],
+            is_heard: true,
+            events: Vec::new(),
+            states: Vec::new(),
+            told: None,
+        };
+        bench.set_bus(Volt(48.0));
+        bench
+    }
+
+    /// All joints have their zeros.
+    fn begun() -> Self {
+        let bench = Self::resting();
+        bench.signals.begin_servo();
+        bench
+    }
+
+    fn enabled() -> Self {
+        let mut bench = Self::begun();
+        bench.enable();
+        bench.clear();
+        bench
+    }
+
+    fn enable(&mut self) {
+        use PowerRequest::{EnableOperation, Shutdown, SwitchOn};
+        for power in [Shutdown, SwitchOn, EnableOperation] {
+            self.ask(ControlRequest::Power(power));
+            self.tick();
+        }
+        assert_eq!(self.control.state(), DriveState::OperationEnabled);
+    }
+
+    fn set_bus(&mut self, volt: Volt) {
+        self.signals.statistics.see_bus((volt.0 / VOLT_PER_CODE.0) as u16);
+    }
+
+    /// The operator asks.
+    fn ask(&mut self, request: ControlRequest<2>) {
+        assert!(self.ends.housekeeping.requests.enqueue(request).is_ok(), "full");
+    }
+
+    /// The bus orders.
+    fn order(&mut self, commands: Option<[JointCommand; 2]>, request: Option<LegRequest>) {
+        let order = LegOrder { commands, request, faults: [None; 2] };
+        assert!(self.bus.orders.enqueue(order).is_ok(), "full");
+    }
+
+    fn tick(&mut self) -> Option<ControlOutput<2>> {
+        for (samples, counts) in self.ends.current.samples.iter_mut().zip(self.counts) {
+            let sample = JointSample { encoder_counts: counts, ..JointSample::default() };
+            assert!(samples.enqueue(sample).is_ok(), "full");
+        }
+        let Self { level, control, ends, signals, hardware, .. } = self;
+        let output = level.tick(control, LEG.gravity, &mut ends.servo, signals, hardware);
+        while self.is_heard
+            && let Some(event) = self.ends.identification.events.dequeue()
+        {
+            self.events.push(event);
+        }
+        while let Some(state) = self.ends.housekeeping.drive.dequeue() {
+            self.states.push(state);
+        }
+        self.told = self.bus.told.dequeue().or(self.told);
+        output
+    }
+
+    fn run(&mut self, ticks: u32) {
+        (0..ticks).for_each(|_| {
+            self.tick();
+        });
+    }
+
+    fn clear(&mut self) {
+        self.events.clear();
+        self.states.clear();
+    }
+
+    /// Kinds of the events so far but samples: records by their kind and name.
+    fn names(&self) -> Vec<&'static str> {
+        let name = |event: &LegEvent<2>| {
+            Some(match event {
+                LegEvent::Sample(_) => return None,
+                LegEvent::Activity(_) => "activity",
+                LegEvent::Begun(_) => "begun",
+                LegEvent::TookUpdate => "took update",
+                LegEvent::Record(Record::Fault { .. }) => "fault",
+                LegEvent::Record(Record::State { .. }) => "state",
+                LegEvent::Record(Record::Limit { .. }) => "limit",
+                LegEvent::Record(Record::Request { .. }) => "request",
+                LegEvent::Record(Record::NotEnabled { .. }) => "not enabled",
+                LegEvent::Record(_) => "another record",
+            })
+        };
+        self.events.iter().filter_map(name).collect()
+    }
+}
+
+#[test]
+fn nothing_is_done_before_every_joint_has_a_zero() {
+    let mut bench = Bench::resting();
+    bench.signals.set_targets(&DriveCommand { enabled: true, currents: [Ampere(1.0); 2] });
+    bench.signals.set_permission(Permission::Follow);
+    bench.ask(ControlRequest::Power(PowerRequest::Shutdown));
+    bench.order(Some(commanded()), Some(LegRequest::Power(PowerRequest::Shutdown)));
+    for _ in 0..2 {
+        assert!(bench.tick().is_none());
+    }
+    assert_eq!((bench.signals.target(0).enabled, bench.signals.target(1).enabled), (false, false));
+    assert_eq!((bench.signals.permission(), bench.level.ticks()), (Permission::Released, 0));
+    // The bus is told that the leg rests; what was asked is dropped.
+    assert_eq!(bench.told, Some(LegTold { held: true, blocked: false, ..LegTold::NONE }));
+    assert!(bench.bus.orders.ready());
+    bench.signals.begin_servo();
+    assert!(bench.tick().is_some());
+    assert_eq!((bench.control.state(), bench.level.ticks()), (DriveState::SwitchOnDisabled, 1));
+    assert_eq!(bench.signals.statistics.counts.each_ref().map(|count| count.get()), [COUNTS as u32; 2]);
+}
+
+#[test]
+fn a_leg_that_begins_anew_is_off_and_targets_follow_only_an_enabled_one() {
+    let mut bench = Bench::enabled();
+    assert_eq!(bench.signals.permission(), Permission::Follow);
+    assert!(bench.signals.target(0).enabled && bench.signals.target(1).enabled);
+    bench.signals.end_servo();
+    bench.tick();
+    assert_eq!((bench.signals.permission(), bench.signals.target(0).enabled), (Permission::Released, false));
+    bench.signals.begin_servo();
+    bench.tick();
+    assert_eq!(bench.control.state(), DriveState::SwitchOnDisabled);
+    // The state is reported once more.
+    assert_eq!(bench.states, [DriveState::SwitchOnDisabled]);
+}
+
+#[test]
+fn a_leg_that_begins_anew_forgets_the_zeros_of_homing() {
+    let mut bench = Bench::enabled();
+    let position = |bench: &Bench| bench.told.expect("a report").joints.map(|joint| joint.position.0);
+    let hold = commanded();
+    bench.order(Some(hold), None);
+    bench.run(10);
+    let before = position(&bench);
+    let target = crate::leg::Target::Homing { offset: crate::units::Radian(0.3) };
+    let homing = hold.map(|command| JointCommand { target, asked: command.asked.wrapping_add(1), ..command });
+    bench.order(Some(homing), None);
+    bench.run(10);
+    // The zero is shifted by whole counts, 15 microradians each.
+    assert!(position(&bench).iter().all(|position| (position - 0.3).abs() < 1e-4), "{:?}", position(&bench));
+    bench.signals.end_servo();
+    bench.tick();
+    bench.signals.begin_servo();
+    bench.order(Some(hold), None);
+    bench.run(10);
+    let after = position(&bench);
+    assert!(
+        after.iter().zip(before).all(|(after, before)| (after - before).abs() < 1e-6),
+        "{after:?} {before:?}"
+    );
+}
+
+#[test]
+fn findings_reach_the_control_one_in_a_tick() {
+    let mut bench = Bench::begun();
+    let change = |since_s| {
+        let change = crate::leg::Change { since_s, joints: [true; 2], statistic: [1.0; 2], limit: 0.5 };
+        Finding::Changed(change)
+    };
+    for since_s in [1.0, 2.0] {
+        assert!(bench.ends.identification.findings.enqueue(change(since_s)).is_ok());
+    }
+    let seen = [1, 2].map(|_| {
+        bench.tick();
+        bench.control.change().map(|change| change.since_s)
+    });
+    assert_eq!(seen, [Some(1.0), Some(2.0)]);
+}
+
+#[test]
+fn the_operators_request_goes_before_the_hosts() {
+    let mut bench = Bench::begun();
+    bench.tick();
+    bench.ask(ControlRequest::Power(PowerRequest::Shutdown));
+    bench.order(None, Some(LegRequest::Power(PowerRequest::DisableVoltage)));
+    let states = [1, 2].map(|_| {
+        bench.tick();
+        bench.control.state()
+    });
+    assert_eq!(states, [DriveState::ReadyToSwitchOn, DriveState::SwitchOnDisabled]);
+}
+
+#[test]
+fn an_open_enabling_switch_stops_an_enabled_leg() {
+    for [enabling, permits] in [[false, true], [true, false]] {
+        let mut bench = Bench::enabled();
+        bench.hardware.contacts.enabling = enabling;
+        bench.signals.set_permits(permits);
+        bench.tick();
+        let state = bench.control.state();
+        assert!(matches!(state, DriveState::QuickStopActive { .. }), "{state:?}");
+        assert_eq!(bench.signals.permission(), Permission::Damp);
+    }
+}
+
+#[test]
+fn only_what_switches_off_is_asked_while_something_forbids_to_enable() {
+    let mut bench = Bench::enabled();
+    bench.signals.inhibit.raise(crate::safety::Cause::EmergencyStop);
+    bench.tick();
+    assert_eq!(
+        (bench.control.state(), bench.signals.target(0).enabled),
+        (DriveState::SwitchOnDisabled, false)
+    );
+    bench.ask(ControlRequest::Power(PowerRequest::Shutdown));
+    bench.tick();
+    assert_eq!(bench.control.state(), DriveState::SwitchOnDisabled);
+}

@@ -1,0 +1,114 @@
+//! What leaves the servo as events, and in which order.
+
+use super::super::super::queues::RESERVED;
+use super::*;
+use crate::leg::LimitCode;
+
+/// Tick and joint of every limit that was reported.
+fn limits(bench: &Bench) -> Vec<(u32, u8)> {
+    let limit = |event: &LegEvent<2>| match event {
+        LegEvent::Record(Record::Limit { tick, code, joint, .. }) => {
+            assert_eq!(*code, LimitCode::Temperature as u8);
+            Some((*tick, *joint))
+        }
+        _ => None,
+    };
+    bench.events.iter().filter_map(limit).collect()
+}
+
+#[test]
+fn limits_are_reported_once_a_second_and_one_in_a_tick() {
+    let mut bench = Bench::enabled();
+    // Nothing is left of the torque that draws the joints back to where they were.
+    bench.signals.set_hottest_c(100.0);
+    for _ in 0..60 {
+        bench.counts = bench.counts.map(|counts| counts + 1);
+        bench.tick();
+    }
+    while bench.level.ticks() < 8100 {
+        bench.tick();
+    }
+    let limits = limits(&bench);
+    let [(first, _), (second, _), later @ ..] = &limits[..] else { panic!("{limits:?}") };
+    assert!(first < second && *second < 100, "{limits:?}");
+    assert_eq!(later, [(4000, 1), (4001, 2), (8000, 1), (8001, 2)]);
+    // A cool leg has none.
+    let mut bench = Bench::enabled();
+    bench.counts = bench.counts.map(|counts| counts + 10);
+    bench.run(100);
+    assert!(!bench.names().contains(&"limit"));
+}
+
+#[test]
+fn a_fault_is_recorded_before_the_state_that_follows() {
+    let mut bench = Bench::enabled();
+    bench.signals.report(BoardFault::Thermistor, 1);
+    bench.tick();
+    assert_eq!(bench.names(), ["fault", "state"]);
+    let code = FaultCode::Thermistor.number();
+    let tick = bench.level.ticks();
+    let expected = Record::Fault { tick, code, name: FaultCode::Thermistor.name(), joint: 2 };
+    assert!(bench.events.contains(&LegEvent::Record(expected)));
+    assert_eq!(bench.states, [bench.control.state()]);
+    // Once.
+    bench.tick();
+    assert_eq!(bench.names(), ["fault", "state"]);
+}
+
+#[test]
+fn samples_leave_room_for_other_events() {
+    let mut bench = Bench::enabled();
+    bench.is_heard = false;
+    bench.run(2000);
+    let statistics = &bench.signals.statistics;
+    let room = bench.ends.servo.events.capacity() - RESERVED;
+    assert_eq!((bench.ends.servo.events.len(), statistics.records_lost.get()), (room, 0));
+    assert_eq!(statistics.samples_lost.get() as usize, 2000 / 8 - room);
+    bench.signals.report(BoardFault::Temperature, 0);
+    bench.tick();
+    assert_eq!(bench.ends.servo.events.len(), room + 2);
+    // Records that find no room are counted as well.
+    for _ in 0..RESERVED {
+        bench.ask(ControlRequest::Identify);
+        bench.tick();
+    }
+    assert_eq!(bench.ends.servo.events.len(), room + RESERVED);
+    assert_eq!(bench.signals.statistics.records_lost.get(), 2);
+}
+
+#[test]
+fn an_identification_begins_with_the_plan_and_seed_of_who_asked() {
+    let mut bench = Bench::enabled();
+    bench.ask(ControlRequest::Identify);
+    bench.tick();
+    assert_eq!(bench.names(), ["request", "begun", "state", "activity"]);
+    assert!(bench.events.contains(&LegEvent::Begun(None)));
+    let mut bench = Bench::enabled();
+    bench.order(None, Some(LegRequest::Identify { plan: Plan::Sequential, seed: 7 }));
+    bench.tick();
+    assert!(bench.events.contains(&LegEvent::Begun(Some((Plan::Sequential, 7)))));
+}
+
+#[test]
+fn a_refused_request_is_recorded_and_begins_nothing() {
+    let mut bench = Bench::begun();
+    bench.run(2);
+    bench.clear();
+    bench.ask(ControlRequest::Identify);
+    bench.tick();
+    let tick = bench.level.ticks();
+    let record = Record::Request { tick, name: "identify", accepted: false };
+    assert_eq!(bench.events, [LegEvent::Record(record)]);
+}
+
+#[test]
+fn every_sample_of_the_log_leaves_with_its_tick() {
+    let mut bench = Bench::enabled();
+    bench.run(80);
+    let tick = |event: &LegEvent<2>| match event {
+        LegEvent::Sample(logged) => Some(logged.sample.tick),
+        _ => None,
+    };
+    let ticks: Vec<u32> = bench.events.iter().filter_map(tick).collect();
+    assert_eq!(ticks, (1..=10).map(|sample| 8 * sample).collect::<Vec<u32>>());
+}

@@ -1,0 +1,69 @@
+use super::super::testing::TestHardware;
+use super::*;
+
+/// Counters that every level moves: axes, servo, housekeeping.
+fn counters(signals: &Signals<2>) -> [&Word; 4] {
+    let statistics = &signals.statistics;
+    let [first, second] = &statistics.current_ticks;
+    [first, second, &statistics.servo_ticks, &statistics.rounds]
+}
+
+/// Looks so often while all levels run but one.
+fn look(
+    watch: &mut Watch<2>,
+    signals: &Signals<2>,
+    hardware: &mut TestHardware<2>,
+    looks: u32,
+    hung: Option<usize>,
+) {
+    for _ in 0..looks {
+        for (place, counter) in counters(signals).into_iter().enumerate() {
+            if hung != Some(place) {
+                counter.add();
+            }
+        }
+        watch.look(signals, hardware);
+    }
+}
+
+#[test]
+fn the_watchdog_is_fed_only_while_axes_servo_and_housekeeping_run() {
+    for hung in [None, Some(0), Some(1), Some(2), Some(3)] {
+        let (signals, mut hardware) = (Signals::new(), TestHardware::new());
+        let mut watch = Watch::new(&signals);
+        look(&mut watch, &signals, &mut hardware, 10 * LOOKS, hung);
+        assert_eq!(hardware.watchdog.fed, if hung.is_some() { 0 } else { 10 }, "{hung:?}");
+        // A level that runs again is forgiven.
+        look(&mut watch, &signals, &mut hardware, LOOKS, None);
+        assert_eq!(hardware.watchdog.fed, if hung.is_some() { 1 } else { 11 }, "{hung:?}");
+    }
+}
+
+#[test]
+fn bridges_whose_current_ticks_stop_are_released() {
+    for hung in [None, Some(0), Some(1), Some(2), Some(3)] {
+        let (signals, mut hardware) = (Signals::new(), TestHardware::new());
+        let mut watch = Watch::new(&signals);
+        look(&mut watch, &signals, &mut hardware, 2, None);
+        (0..2).for_each(|axis| hardware.enable(axis));
+        look(&mut watch, &signals, &mut hardware, 1, hung);
+        let stops = matches!(hung, Some(0 | 1));
+        let causes = if stops { Cause::CurrentTicks.bit() } else { 0 };
+        assert_eq!((hardware.is_enabled(), signals.inhibit.causes()), (!stops, causes), "{hung:?}");
+    }
+}
+
+#[test]
+fn ticks_that_stand_still_during_a_flash_write_are_no_fault() {
+    let (signals, mut hardware) = (Signals::new(), TestHardware::new());
+    let mut watch = Watch::new(&signals);
+    look(&mut watch, &signals, &mut hardware, 2, None);
+    signals.inhibit.raise(Cause::Storing);
+    hardware.enable(0);
+    watch.look(&signals, &mut hardware);
+    // Released all the same.
+    assert_eq!((hardware.is_enabled(), signals.inhibit.causes()), (false, Cause::Storing.bit()));
+    signals.inhibit.end_storing();
+    watch.look(&signals, &mut hardware);
+    assert_eq!(signals.inhibit.causes(), Cause::CurrentTicks.bit());
+}
