@@ -1,7 +1,7 @@
 //! What runs on the board, at which priority, and how values pass from one to the other.
 //!
 //! ```text
-//! level 0  current     24 kHz, both axes a quarter of a period apart: converter, current loop, bridge       never masked
+//! level 0  current     24 kHz, both axes half a period apart: converter, current loop, bridge       never masked
 //! level 1  servo        4 kHz: both joints' samples, leg::Control, targets                                     never masked
 //! level 4  CAN1_RX0     frames out of the bus' controller                                                              masked
 //! level 5  bus          at every frame and 2 kHz: nodes, axes, what is kept                                       masked

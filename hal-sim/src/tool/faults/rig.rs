@@ -46,7 +46,7 @@ pub const PERIODS_PER_S: u64 = CURRENT_RATE_HZ as u64;
 pub const PERIOD_MS: f64 = 1e3 / PERIODS_PER_S as f64;
 const PERIODS_PER_ROUND: u64 = PERIODS_PER_S / RATE_HZ as u64;
 
-/// Of the processor in one period; the second axis is a quarter of it later.
+/// Processor cycles of one period; the second axis is half of it later.
 const CYCLES: NonZeroU32 = NonZeroU32::new(7000).expect("more than one");
 /// Of the bus voltage, on the board of 56 V.
 const DIVIDER: f32 = 19.0;
@@ -265,7 +265,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
             }
             (self.bus_code, self.ports.encoders[joint]) = (sample.bus_code, sample.encoder_count);
             let tick = Tick {
-                now: (now as u32).wrapping_mul(CYCLES.get()).wrapping_add(joint as u32 * CYCLES.get() / 4),
+                now: (now as u32).wrapping_mul(CYCLES.get()).wrapping_add(joint as u32 * CYCLES.get() / 2),
                 emergency_stop,
                 gate_fault,
                 complete: !self.injector.happens(Channel::Conversion, joint, now),
