@@ -17,8 +17,15 @@ pub use can::{Controller, Frame};
 /// PWM periods per second, and so samples and commands of one axis.
 pub const CURRENT_RATE_HZ: u32 = 24_000;
 
-/// What one axis' converter and counter say in one PWM period, of the same instant: the middle of the zero vector in which all
-/// low sides conduct. A board samples the shunts later than that by what their amplifiers lag (docs/motor.md).
+/// Clock of the timers that drive the bridges and trigger the shunts' converters [Hz].
+pub const BRIDGE_CLOCK_HZ: u32 = 168_000_000;
+
+/// Trigger of the shunts' converters [timer clocks after the middle of the lower zero vector, negative before it].
+/// The board's timers, the modulator and the simulated plant take it from here; docs/motor.md, section 1, says why.
+pub const SHUNT_TRIGGER_CLOCKS: i16 = 20;
+
+/// Reading of one axis' converter and counter in one PWM period, at the middle of the zero vector in which all low sides
+/// conduct. A board samples the shunts later by the lag of their amplifiers ([`SHUNT_TRIGGER_CLOCKS`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AxisSample {
     /// Codes of the shunt amplifiers of the phases B and C, 12 bits; half of the range is no current.

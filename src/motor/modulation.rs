@@ -19,7 +19,8 @@
 //! (1 - d_max) / (2 f) >= max(t_d + t_settle, t_adc)
 //! ```
 //!
-//! 119 ns + 1.2 us (assumed for the DRV8301 at 40 V/V to 1 % of 2 V, to be measured on the board: 0.3 us more would lower d_max by 0.0144, 1.5 % of the voltage), the trigger's delay (docs/motor.md) and 3 + 12 cycles of 21 MHz: 0.83 us;
+//! 119 ns + 1.2 us (assumed for the DRV8301 at 40 V/V to 1 % of 2 V, to be measured on the board: 0.3 us more would
+//! lower d_max by 0.0144, 1.5 % of the voltage); [`SHUNT_TRIGGER_CLOCKS`] and 3 + 12 cycles of 21 MHz: 0.83 us;
 //! so at 24 kHz d_max = 0.9367. Centred about one half and not about d_max / 2, because only equal zero vectors make the
 //! sample the mean of the ripple: by the shift the error is v s / (2 L f) at most, s the shift. It arises above
 //! 0.873 of the largest voltage only.
@@ -32,7 +33,7 @@
 //! the torque. Source: van der Broeck, Skudelny, Stanke (1988); dead time: Sukegawa et al. (1991).
 
 use super::{Phases, Stationary};
-use crate::hal::CURRENT_RATE_HZ;
+use crate::hal::{BRIDGE_CLOCK_HZ, CURRENT_RATE_HZ, SHUNT_TRIGGER_CLOCKS};
 use crate::real::clamp;
 use crate::units::{Ampere, Second, Volt};
 
@@ -45,19 +46,19 @@ pub struct BridgeTiming {
     pub dead_time: Second,
     /// From a phase current's change of path to a settled shunt amplifier.
     pub settling: Second,
-    /// Sampling and conversion after the middle of the lower zero vector.
+    /// From the middle of the lower zero vector to the end of the conversion.
     pub conversion: Second,
     /// Share of a period by which the timer can change a duty.
     pub duty_step: f32,
 }
 
 impl BridgeTiming {
-    /// ODrive v3.6: 20 cycles of 168 MHz, DRV8301 at 40 V/V, 20 cycles of 168 MHz to the trigger and 15 of 21 MHz from there,
-    /// 3,500 steps up and as many down.
+    /// ODrive v3.6: 20 cycles of 168 MHz, DRV8301 at 40 V/V, the trigger and 15 cycles of 21 MHz from there, 3,500 steps up
+    /// and as many down.
     pub const ODRIVE_3_6: Self = Self {
         dead_time: Second(119e-9),
         settling: Second(1.2e-6),
-        conversion: Second(0.833e-6),
+        conversion: Second(SHUNT_TRIGGER_CLOCKS as f32 / BRIDGE_CLOCK_HZ as f32 + 15.0 / 21e6),
         duty_step: 1.0 / 3500.0,
     };
 }

@@ -1,7 +1,7 @@
 //! Interrupts and tasks of the board around the levels of `operation`.
 //!
 //! ```text
-//! level 0  current      24 kHz, both axes: converter, current loop, bridge                                    never masked
+//! level 0  current      24 kHz, both axes half a period apart: converter, current loop, bridge                 never masked
 //! level 1  servo        4 kHz: both joints' samples, leg::Control, targets                                     never masked
 //! level 4  CAN1_RX0     frames out of the bus' controller                                                      masked
 //! level 5  bus          at every frame and 2 kHz: nodes, axes, what is stored                                  masked

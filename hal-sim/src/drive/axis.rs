@@ -57,6 +57,8 @@ pub struct Axis {
     cogging: f64,
     /// Change of the phases' currents at the end of the last step, A/s.
     slopes: [f64; 3],
+    /// Error of both shunts at the next sample [A].
+    disturbance: f64,
     /// Since the period began, J.
     heat: f64,
 }
@@ -83,6 +85,7 @@ impl Axis {
             speed: 0.0,
             cogging: 0.0,
             slopes: [0.0; 3],
+            disturbance: 0.0,
             heat: 0.0,
         }
     }
@@ -130,6 +133,18 @@ impl Axis {
         &self.description
     }
 
+    /// Rising less falling edges of the bridge between two instants within its period [s from now].
+    #[must_use]
+    pub fn edges(&self, from: f64, to: f64) -> i32 {
+        let now = f64::from(self.quarter) * QUARTER_S;
+        self.bridge.edges(now + from, now + to)
+    }
+
+    /// Falsifies both shunts at the next sample by so many amperes.
+    pub fn disturb(&mut self, ampere: f64) {
+        self.disturbance = ampere;
+    }
+
     /// The axis' own period begins: its sensors are read and a command acts.
     pub fn begin(
         &mut self,
@@ -151,6 +166,7 @@ impl Axis {
                 current: sign * currents[phase],
                 slope: sign * self.slopes[phase],
                 conducting: self.bridge.low_side_time(output, end).unwrap_or(by_diode),
+                disturbance: self.disturbance,
             };
             *code = shunts.code(channel, &state, generator);
         }
@@ -159,7 +175,7 @@ impl Axis {
         }
         let (encoder_count, index_count) = self.counter.read(self.angle);
         self.motor.warm(self.heat, PERIOD_S);
-        (self.heat, self.quarter) = (0.0, 0);
+        (self.heat, self.quarter, self.disturbance) = (0.0, 0, 0.0);
         self.bridge.begin(command);
         AxisSample { shunt_codes: codes, bus_code, encoder_count, index_count }
     }

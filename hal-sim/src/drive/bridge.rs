@@ -31,6 +31,8 @@ struct HalfBridge {
     rise: f64,
     /// The reference falls.
     fall: f64,
+    /// Both edges of the period, past ones too: rise and fall.
+    edges: [f64; 2],
 }
 
 /// Three half bridges and where they are in their period.
@@ -49,7 +51,9 @@ impl Bridge {
     /// Released, for a period of so many s.
     #[must_use]
     pub fn new(description: &BridgeDescription, period: f64) -> Self {
-        let leg = HalfBridge { high: false, conducts_from: -LONG, rise: f64::INFINITY, fall: f64::INFINITY };
+        let never = f64::INFINITY;
+        let leg =
+            HalfBridge { high: false, conducts_from: -LONG, rise: never, fall: never, edges: [never; 2] };
         Self { description: *description, period, enabled: false, legs: [leg; 3] }
     }
 
@@ -72,6 +76,7 @@ impl Bridge {
             } else {
                 (f64::INFINITY, f64::INFINITY)
             };
+            leg.edges = [leg.rise, leg.fall];
         }
     }
 
@@ -116,6 +121,15 @@ impl Bridge {
     pub fn low_side_time(&self, output: usize, now: f64) -> Option<f64> {
         let leg = self.legs.get(output)?;
         (self.enabled && !leg.high && leg.conducts_from <= now).then_some(now - leg.conducts_from)
+    }
+
+    /// Rising less falling edges between two instants of the period [s]. An edge takes as long as the dead time: which end
+    /// of it the output switches at depends on the current.
+    #[must_use]
+    pub fn edges(&self, from: f64, to: f64) -> i32 {
+        let within = |edge: f64| i32::from(edge <= to && edge + self.description.dead_time >= from);
+        let of_leg = |leg: &HalfBridge| within(leg.edges[0]) - within(leg.edges[1]);
+        if self.enabled { self.legs.iter().map(of_leg).sum() } else { 0 }
     }
 
     /// Resistance of a switch that is on, ohm.

@@ -3,21 +3,27 @@
 //! ```text
 //! one PWM period of the first axis
 //! | quarter 0          | quarter 1          | quarter 2          | quarter 3          |
-//!  axis 0 begins        axis 1 begins        axis 2 begins
+//!  axis 0 begins                             axis 1 begins
 //! ```
 //!
-//! An axis begins its own period a quarter after the one before, as on the board: their converters are shared, and their bus
-//! currents do not coincide. When an axis begins, its sensors are read and the command handed over acts; what is computed
-//! from the sample is handed over a period later. Held constant: speed of the rotors and brake duty within a period of the first axis, bus
-//! voltage within a quarter.
+//! An axis begins its own period half a period after the one before, as on the board, or by as many quarters as its
+//! description says. When an axis begins, its sensors are read and the command handed over acts; what is computed
+//! from the sample is handed over a period later. Held constant: speed of the rotors and brake duty within a period of the
+//! first axis, bus voltage within a quarter.
+//!
+//! **Coupling.** Where it is described, every edge of another axis' bridge in the window before an axis' converter holds
+//! falsifies both of its shunts. Known limit: an axis that begins at the same instant does not disturb.
 
 use super::axis::{Axis, AxisFlow, PERIOD_S, QUARTER_S, QUARTERS};
-use super::description::CompleteDescription;
+use super::description::{CompleteDescription, CouplingDescription};
 use super::supply::Supply;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::{AxisCommand, AxisSample};
+
+/// Quarters of a PWM period between the axes of the board.
+pub const SHIFT_QUARTERS: u32 = 2;
 
 /// Standard deviation of the bus voltage's code.
 const BUS_NOISE_CODES: f64 = 1.0;
@@ -36,6 +42,9 @@ pub struct Rotor {
 pub struct CompleteDrives<const N: usize> {
     axes: [Axis; N],
     supply: Supply,
+    /// Quarter in which each axis begins.
+    begins: [u32; N],
+    coupling: CouplingDescription,
     noise: Xoshiro256PlusPlus,
 }
 
@@ -43,11 +52,14 @@ impl<const N: usize> CompleteDrives<N> {
     /// Released, rotors at rest at these angles (rad).
     #[must_use]
     pub fn new(description: &CompleteDescription<N>, angles: &[f64; N], seed: u64) -> Self {
+        let begins = core::array::from_fn(|axis| axis as u32 * description.shift_quarters % QUARTERS);
         Self {
             axes: core::array::from_fn(|axis| {
-                Axis::new(&description.axes[axis], angles[axis], QUARTERS - axis as u32 % QUARTERS)
+                Axis::new(&description.axes[axis], angles[axis], QUARTERS - begins[axis])
             }),
             supply: Supply::new(&description.supply),
+            begins,
+            coupling: description.coupling,
             noise: Xoshiro256PlusPlus::seed_from_u64(seed),
         }
     }
@@ -67,12 +79,16 @@ impl<const N: usize> CompleteDrives<N> {
         for quarter in 0..QUARTERS {
             let (bus, mut charge) = (self.supply.voltage(), 0.0);
             for index in 0..N {
-                let axis = &mut self.axes[index];
-                if quarter == index as u32 % QUARTERS {
+                if quarter == self.begins[index] {
                     let noise: f64 = StandardNormal.sample(&mut self.noise);
                     let code = self.supply.code(BUS_NOISE_CODES * noise);
+                    let disturbance = self.disturbance(index);
+                    let axis = &mut self.axes[index];
+                    axis.disturb(disturbance);
                     samples[index] = axis.begin(&commands[index], code, &mut self.noise);
                 }
+            }
+            for (index, axis) in self.axes.iter_mut().enumerate() {
                 let AxisFlow { impulse, charge: drawn, .. } = axis.advance(bus);
                 torque[index] += impulse / PERIOD_S;
                 charge += drawn;
@@ -80,6 +96,17 @@ impl<const N: usize> CompleteDrives<N> {
             self.supply.advance(charge, brake, QUARTER_S);
         }
         (samples, torque)
+    }
+
+    /// Error of an axis' shunts by the edges of the others in the window before its converter holds, A.
+    fn disturbance(&self, axis: usize) -> f64 {
+        if self.coupling.ampere_per_edge == 0.0 {
+            return 0.0;
+        }
+        let hold = self.axes[axis].description().shunts.delay;
+        let others = self.axes.iter().zip(self.begins).filter(|(_, begins)| *begins != self.begins[axis]);
+        let edges: i32 = others.map(|(other, _)| other.edges(hold - self.coupling.window, hold)).sum();
+        self.coupling.ampere_per_edge * f64::from(edges)
     }
 
     /// Puts the rotors elsewhere, without current.

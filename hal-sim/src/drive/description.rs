@@ -1,8 +1,13 @@
 //! What a complete drive is made from, as plain numbers; nothing is checked here.
 //!
+//! The instant of the shunts' trigger is the firmware's constant, as the board's registers have it.
+//!
 //! Defaults are those of a board of the ODrive v3.6 class (48 V and more): 500 uOhm shunts, amplifiers at 40 V/V, 12 bits
 //! over 3.3 V, bus divider 19, dead time of 20 clocks at 168 MHz, 3,500 timer clocks per half period. Amplifier settling,
 //! rails, noise, diode drop and capacitance are typical values of such parts, not measurements.
+
+use super::complete::SHIFT_QUARTERS;
+use scarab::hal::{BRIDGE_CLOCK_HZ, SHUNT_TRIGGER_CLOCKS};
 
 /// A permanent-magnet synchronous motor, star connected.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,13 +80,37 @@ impl Default for ShuntDescription {
             resistance: 500e-6,
             gain: 40.0,
             settling: 0.26e-6,
-            // A trigger 20 timer clocks beyond the middle, 3 converter clocks of sampling.
-            delay: 20.0 / 168e6 + 3.0 / 21e6,
+            delay: Self::delay_of(f64::from(SHUNT_TRIGGER_CLOCKS)),
             rails: [0.15, 3.15],
             offset_codes: [12.0, -9.0],
             gain_error: [0.0; 2],
             noise_codes: 1.0,
         }
+    }
+}
+
+impl ShuntDescription {
+    /// From the middle of the lower zero vector to the hold [s], for a trigger so many timer clocks after that middle:
+    /// the converter samples for three of its clocks of 21 MHz.
+    #[must_use]
+    pub fn delay_of(trigger_clocks: f64) -> f64 {
+        trigger_clocks / f64::from(BRIDGE_CLOCK_HZ) + 3.0 / 21e6
+    }
+}
+
+/// Disturbance of an axis' shunts by the edges of other axes' bridges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CouplingDescription {
+    /// Added to the current that is read for each rising edge in the window, subtracted for each falling one [A].
+    pub ampere_per_edge: f64,
+    /// Time before the converter holds in which an edge disturbs [s].
+    pub window: f64,
+}
+
+impl Default for CouplingDescription {
+    /// No disturbance; the window is that in which an amplifier settles to 1 %.
+    fn default() -> Self {
+        Self { ampere_per_edge: 0.0, window: 1.2e-6 }
     }
 }
 
@@ -180,4 +209,16 @@ pub struct CompleteDescription<const N: usize> {
     pub axes: [AxisDescription; N],
     /// Common to all axes.
     pub supply: SupplyDescription,
+    /// Quarters of a PWM period by which each axis begins after the one before.
+    pub shift_quarters: u32,
+    /// Disturbance of each axis by the edges of the others.
+    pub coupling: CouplingDescription,
+}
+
+impl<const N: usize> CompleteDescription<N> {
+    /// Axes half a period apart, as on the board, without coupling.
+    #[must_use]
+    pub fn new(axes: [AxisDescription; N], supply: SupplyDescription) -> Self {
+        Self { axes, supply, shift_quarters: SHIFT_QUARTERS, coupling: CouplingDescription::default() }
+    }
 }

@@ -1,7 +1,7 @@
 //! Shunts under the low sides of B and C, their amplifiers and the converter.
 //!
 //! ```text
-//! seen    = (i + (delay - settling) di/dt) (1 - exp(-t / settling))        t since the low side began to conduct, else nothing
+//! seen    = (i + (delay - settling) di/dt) (1 - exp(-t / settling)) + disturbance     t since the low side began to conduct
 //! volt    = middle + gain (1 + error) shunt seen,                within the rails
 //! code    = nearest whole number of volt / 3.3 * 4096 + offset + noise,    0..=4095
 //! ```
@@ -29,8 +29,10 @@ pub struct ShuntState {
     pub current: f64,
     /// Its change, A/s.
     pub slope: f64,
-    /// For how long the low side has been conducting, s; 0 if it does not.
+    /// Time for which the low side has been conducting [s]; 0 if it does not.
     pub conducting: f64,
+    /// Added to what is seen by the edges of other bridges [A].
+    pub disturbance: f64,
 }
 
 /// A voltage at the converter as its code.
@@ -44,7 +46,7 @@ impl ShuntDescription {
     #[must_use]
     pub fn code(&self, channel: usize, state: &ShuntState, generator: &mut Xoshiro256PlusPlus) -> u16 {
         let settled = 1.0 - exp(-state.conducting / self.settling);
-        let seen = (state.current + (self.delay - self.settling) * state.slope) * settled;
+        let seen = (state.current + (self.delay - self.settling) * state.slope) * settled + state.disturbance;
         let gain = self.gain * (1.0 + self.gain_error.get(channel).copied().unwrap_or(0.0));
         let [low, high] = self.rails;
         let volt = (0.5 * CONVERTER_VOLT + gain * self.resistance * seen).clamp(low, high);
@@ -70,7 +72,7 @@ mod tests {
     }
 
     fn code(current: f64, conducting: f64) -> u16 {
-        let state = ShuntState { current, slope: 0.0, conducting };
+        let state = ShuntState { current, conducting, ..ShuntState::default() };
         quiet().code(1, &state, &mut Xoshiro256PlusPlus::seed_from_u64(1))
     }
 

@@ -53,7 +53,7 @@ impl Stand {
         angle: f64,
         seed: u64,
     ) -> Self {
-        let description = CompleteDescription { axes: [*axis], supply: *supply };
+        let description = CompleteDescription::new([*axis], *supply);
         Self {
             drives: CompleteDrives::new(&description, &[angle], seed),
             load,

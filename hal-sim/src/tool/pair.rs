@@ -15,6 +15,7 @@ use super::board::words::axis_fault;
 use super::error::ToolError;
 use super::leg_file::LegFile;
 use super::motions::Motions;
+use super::perturb::{self, Perturbation};
 use super::setup::{SetupError, background, configuration};
 use super::simulate::{DriveModel, SimulationOptions};
 use super::words::drive_stop;
@@ -52,11 +53,14 @@ pub struct Context<const N: usize, const B: usize> {
     pub noise: [f64; N],
     /// Where drives are complete: the leg that the current loops are configured for.
     pub complete: Option<Box<LegFile>>,
+    /// What is made wrong on purpose.
+    pub perturbations: Vec<Perturbation>,
 }
 
 impl<const N: usize, const B: usize> Context<N, B> {
     /// What a run of this leg, as the firmware believes it to be, is made from.
     pub fn new(leg: &LegFile, options: &SimulationOptions) -> Result<Self, ToolError> {
+        perturb::check_drives(options)?;
         let mut background = background::<N, B>(leg, options.prior, options.seed)?;
         background.use_estimator(options.estimator);
         let (mut configuration, mut motions) =
@@ -80,7 +84,18 @@ impl<const N: usize, const B: usize> Context<N, B> {
         });
         let gravity = leg.gravity.map(|element| element as f32);
         let complete = (options.drive == DriveModel::Full).then(|| Box::new(leg.clone()));
-        Ok(Self { background, configuration, motions, smoothing, low_pass, gravity, noise, complete })
+        let perturbations = options.perturbations.clone();
+        Ok(Self {
+            background,
+            configuration,
+            motions,
+            smoothing,
+            low_pass,
+            gravity,
+            noise,
+            complete,
+            perturbations,
+        })
     }
 }
 
@@ -148,7 +163,10 @@ impl<const N: usize, const B: usize> Pair<N, B> {
     /// A leg at rest a tenth into its range, drive off.
     pub fn new(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
         let (description, believed) = (leg.description()?, context.complete.as_deref());
-        let drives = believed.map(|_| leg.complete_description::<N>()).transpose()?;
+        let mut drives = believed.map(|_| leg.complete_description::<N>()).transpose()?;
+        if let Some(drives) = &mut drives {
+            perturb::drives(drives, &context.perturbations);
+        }
         let mut world = match &drives {
             Some(drives) => World::with_complete_drives(&description, drives, seed),
             None => World::new(&description, seed),

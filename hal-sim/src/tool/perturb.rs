@@ -15,6 +15,9 @@
 //! | `contact=2` | the foot stands on the floor for so many seconds in the middle of the excitation | plant |
 //! | `stuck=JOINT` | a joint is blocked where the leg stands at the start | plant |
 //! | `small-motion`, `small-motion=0.05` | the excitation with so small a share of its amplitude | firmware |
+//! | `trigger=-40` | converters triggered so many timer clocks after the middle of the zero vector (the board: 20) | complete drives |
+//! | `quarter-shift` | the bridges switch a quarter of a period apart (the board: half) | complete drives |
+//! | `coupling=0.5` | A by which each edge of the other bridge in the 1.2 us before the hold disturbs a sample | complete drives |
 
 use core::str::FromStr;
 
@@ -26,6 +29,8 @@ use scarab::units::{Radian, Second};
 use super::error::ToolError;
 use super::leg_file::LegFile;
 use super::pair::{Context, Pair};
+use super::simulate::{DriveModel, SimulationOptions};
+use crate::drive::description::{CompleteDescription, ShuntDescription};
 
 /// One thing that is wrong; see the module's table.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +57,12 @@ pub enum Perturbation {
     TorqueConstant(f64),
     /// Share of the excitation's amplitude.
     SmallMotion(f64),
+    /// Timer clocks from the middle of the lower zero vector to the converters' trigger.
+    Trigger(f64),
+    /// Bridges a quarter of a period apart.
+    QuarterShift,
+    /// A for each edge of the other bridge.
+    Coupling(f64),
 }
 
 /// A number from the text, within the range that makes sense.
@@ -92,10 +103,14 @@ impl FromStr for Perturbation {
             "stuck" => Self::Stuck(joint()?),
             "torque-constant" => Self::TorqueConstant(number(name, value, 1.2, 0.1, 10.0)?),
             "small-motion" => Self::SmallMotion(number(name, value, 0.05, 1e-4, 1.0)?),
+            "trigger" => Self::Trigger(number(name, value, -40.0, -200.0, 200.0)?),
+            "quarter-shift" if value.is_none() => Self::QuarterShift,
+            "quarter-shift" => return Err("quarter-shift takes no value".into()),
+            "coupling" => Self::Coupling(number(name, value, 0.5, -60.0, 60.0)?),
             _ => {
                 return Err(format!(
                     "`{name}` is none of inertia, com, length, swap, sign, zero, added-mass, contact, stuck, \
-                     torque-constant, small-motion"
+                     torque-constant, small-motion, trigger, quarter-shift, coupling"
                 ));
             }
         })
@@ -107,6 +122,39 @@ impl Perturbation {
     #[must_use]
     pub fn tampers(&self) -> bool {
         matches!(self, Self::Inertia(_) | Self::CentreOfMass(_))
+    }
+
+    /// Whether it changes something that only complete drives have.
+    fn needs_complete_drives(&self) -> bool {
+        matches!(self, Self::Trigger(_) | Self::QuarterShift | Self::Coupling(_))
+    }
+}
+
+/// Refuses what the simulated drives cannot have.
+pub fn check_drives(options: &SimulationOptions) -> Result<(), ToolError> {
+    let ideal = options.drive == DriveModel::Ideal;
+    if ideal && options.perturbations.iter().any(Perturbation::needs_complete_drives) {
+        return Err(ToolError::input(
+            "--perturb trigger, quarter-shift, coupling: ideal drives have no bridge and no converter; add --drive full",
+        ));
+    }
+    Ok(())
+}
+
+/// Changes the complete drives that are simulated.
+pub fn drives<const N: usize>(drives: &mut CompleteDescription<N>, perturbations: &[Perturbation]) {
+    for perturbation in perturbations {
+        match perturbation {
+            Perturbation::Trigger(clocks) => {
+                drives
+                    .axes
+                    .iter_mut()
+                    .for_each(|axis| axis.shunts.delay = ShuntDescription::delay_of(*clocks));
+            }
+            Perturbation::QuarterShift => drives.shift_quarters = 1,
+            Perturbation::Coupling(ampere) => drives.coupling.ampere_per_edge = *ampere,
+            _ => {}
+        }
     }
 }
 

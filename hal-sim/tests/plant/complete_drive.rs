@@ -5,7 +5,7 @@ use crate::common::worn_leg;
 use core::f64::consts::{PI, TAU};
 
 use hal_sim::drive::axis::{Axis, AxisFlow, PERIOD_S};
-use hal_sim::drive::complete::{CompleteDrives, Rotor};
+use hal_sim::drive::complete::{CompleteDrives, Rotor, SHIFT_QUARTERS};
 use hal_sim::drive::description::{
     AxisDescription, BridgeDescription, CompleteDescription, CounterDescription, MotorDescription,
     ShuntDescription, SupplyDescription, Wiring,
@@ -294,7 +294,7 @@ fn edges_alone_are_steps_fine_enough() {
 }
 
 fn board() -> CompleteDescription<2> {
-    CompleteDescription { axes: [axis(), axis()], supply: SupplyDescription::default() }
+    CompleteDescription::new([axis(); 2], SupplyDescription::default())
 }
 
 #[test]
@@ -325,14 +325,60 @@ fn braking_charges_the_capacitor_and_the_brake_resistor_discharges_it() {
 }
 
 #[test]
-fn an_axis_answers_a_command_a_quarter_after_the_one_before() {
+fn an_axis_answers_a_command_half_a_period_after_the_one_before() {
     let mut drives = CompleteDrives::new(&board(), &[0.0; 2], 1);
     let command = duties(3.0, 0.3);
     let bus = |drives: &CompleteDrives<2>| drives.axes().map(|axis| axis.currents()[0]);
     drives.period(&[Rotor::default(); 2], &[command; 2], 0.0);
     let first = bus(&drives);
-    // The second axis has had three of its four quarters, the last of the two equal pulses is not complete.
-    assert!(first[0] > 0.5 && first[1] > 0.3 && first[1] < 0.99 * first[0], "{first:?}");
+    // The second axis has had half of its period, one of two equal pulses; the other's has decayed by no more than a tenth.
+    assert!(first[0] > 0.5 && (0.5..0.56).contains(&(first[1] / first[0])), "{first:?}");
+}
+
+/// Codes of the shunts of both axes after some periods at this voltage along A in the second, none in the first.
+fn codes_beside(volt: f64, shift_quarters: u32, ampere_per_edge: f64) -> [[u16; 2]; 2] {
+    let mut description = board();
+    description.shift_quarters = shift_quarters;
+    description.coupling.ampere_per_edge = ampere_per_edge;
+    let mut drives = CompleteDrives::new(&description, &[0.0; 2], 1);
+    let commands = [duties(0.0, 0.0), duties(volt, 0.0)];
+    let mut samples = [AxisSample::default(); 2];
+    for _ in 0..6 {
+        samples = drives.period(&[Rotor::default(); 2], &commands, 0.0).0;
+    }
+    samples.map(|sample| sample.shunt_codes)
+}
+
+#[test]
+fn edges_of_the_other_bridge_disturb_a_sample_a_quarter_of_a_period_apart_and_not_half() {
+    let step = axis().shunts.ampere_per_code();
+    let errors = |volt: f64, shift: u32, ampere: f64| {
+        let [with, without] = [ampere, 0.0].map(|ampere| codes_beside(volt, shift, ampere));
+        [0, 1].map(|axis| {
+            [0, 1].map(|shunt| (f64::from(with[axis][shunt]) - f64::from(without[axis][shunt])) * step)
+        })
+    };
+    // Without a voltage all three outputs of the second fall at three quarters of its period, where the first samples; those of
+    // the first rise at a quarter of its own, where the second samples.
+    for (axis, sum) in errors(0.0, 1, 0.8).into_iter().zip([-2.4, 2.4]) {
+        assert!(axis.iter().all(|error| (error - sum).abs() < 0.6 * step), "{axis:?} {sum}");
+    }
+    // Output A of the second moves out of the window first: 12 V are a quarter of the bus.
+    let [first, _] = errors(12.0, 1, 0.8);
+    assert!(first.iter().all(|error| error.abs() < 1.0), "{first:?}");
+    for volt in [0.0, 3.0, 12.0, 20.0] {
+        assert_eq!(errors(volt, SHIFT_QUARTERS, 0.8), [[0.0; 2]; 2], "{volt} V");
+    }
+    // Off unless it is described.
+    assert_eq!(board().coupling.ampere_per_edge, 0.0);
+    // A pulse of 2.5 % about the middle of the second's period: its rising edge comes 0.52 us before the middle.
+    let mut narrow = Axis::new(&axis(), 0.0, 0);
+    let mut noise = Xoshiro256PlusPlus::seed_from_u64(1);
+    narrow.begin(&AxisCommand { enabled: true, duty: [0.025, 0.5, 0.5] }, 0, &mut noise);
+    for _ in 0..2 {
+        narrow.advance(BUS);
+    }
+    assert_eq!([narrow.edges(-0.938e-6, 0.262e-6), narrow.edges(-0.3e-6, 0.262e-6)], [1, 0]);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use super::identity::Identity;
 use super::registers::{apply, load, store};
 use super::settings::timers::{BASES, CNT, CR1, DOWN, SR, TOP};
 use super::settings::{
-    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, chopper, converters, encoders, external, pins, timers,
+    CACHES, CLOCK_HZ, CLOCK_SECURITY, CLOCKS, DEBUG_FREEZE, converters, external, pins, prepare, timers,
 };
 use super::{interrupts, watchdog};
 use crate::board::crash::{self, Crash};
@@ -30,12 +30,15 @@ pub struct Board {
     pub clock_hz: u32,
     /// Each axis' gate driver holds its configuration.
     pub gates_configured: [bool; 2],
-    /// Both bridges' timers run and take their values over where they should.
+    /// Both bridges' timers run half a period apart and take compare values over at zero.
     pub timers_in_phase: bool,
 }
 
 /// Longest wait for something of the timers: two of their periods, and then some.
 const PATIENCE: u32 = 100_000;
+
+/// Readings of the bridges' shift, one of which has to be right: an interrupt between the loads falsifies one.
+const SHIFT_READINGS: u32 = 4;
 
 /// Starts everything but the interrupts of the current loops; to be called once, first of all.
 pub fn start() -> Board {
@@ -53,18 +56,7 @@ pub fn start() -> Board {
     let identity = Identity::read();
     let crash = crash::take();
 
-    for axis in 0..2 {
-        apply(&timers::bridge(axis));
-    }
-    apply(&chopper::CHOPPER);
-    for list in &encoders::ENCODERS {
-        apply(list);
-    }
-    apply(&timers::ready());
-    for pin in &pins::PINS {
-        apply(&pin.writes());
-    }
-    apply(&converters::CONVERTERS);
+    prepare(apply);
 
     let spi = Spi::new_blocking(
         peripherals.SPI3,
@@ -111,7 +103,8 @@ fn configuration() -> embassy_stm32::Config {
     configuration
 }
 
-/// Starts both bridges' timers in one cycle and has them take compare values over at zero; whether they do.
+/// Starts both bridges' timers in one cycle, half a period apart, and has them take compare values over at zero.
+/// Returns whether they do both.
 fn start_timers() -> bool {
     apply(&timers::LOCK_AND_START);
     let running = wait(|| BASES.iter().all(|base| load(base + CR1) & 1 == 1));
@@ -123,7 +116,15 @@ fn start_timers() -> bool {
         apply(&[timers::repetition(axis)]);
         in_phase &= takes_over_at_zero(base);
     }
-    in_phase
+    in_phase && (0..SHIFT_READINGS).any(|_| half_a_period_apart())
+}
+
+/// Reads both counters while TIM1's falls in the middle of its range and TIM8's has to rise there.
+fn half_a_period_apart() -> bool {
+    let [first, second] = BASES;
+    let reached = wait(|| is_falling(first) && (TOP / 4..3 * (TOP / 4)).contains(&count(first)));
+    let counts = [count(first), count(second), count(first)];
+    reached && !is_falling(second) && timers::half_a_period_apart(counts)
 }
 
 /// An update flag that is cleared while the counter rises must not come at the top and must come at zero.

@@ -37,7 +37,7 @@ use crate::world::World;
 /// PWM periods between two rounds of the housekeeping, and between two looks of the watch.
 const PERIODS_PER_ROUND: u64 = (CURRENT_RATE_HZ / RATE_HZ) as u64;
 const PERIODS_PER_LOOK: u64 = (CURRENT_RATE_HZ / GUARD_RATE_HZ) as u64;
-/// Processor cycles of one period; the second axis is a quarter of it later.
+/// Processor cycles of one period; the second axis is half of it later.
 const CYCLES: NonZeroU32 = NonZeroU32::new(7000).expect("more than one");
 /// Code of a bus of 48 V, until it is read.
 const BUS_CODE: u16 = 3136;
@@ -220,7 +220,7 @@ impl<const N: usize> Levels<N> {
     /// Level 0: one tick of one axis in a period.
     pub fn current(&mut self, axis: usize, period: u64, sample: &AxisSample, conditions: Conditions) {
         let Conditions { emergency_stop, gate_fault, complete, supply } = conditions;
-        let now = (period as u32).wrapping_mul(CYCLES.get()).wrapping_add(axis as u32 * CYCLES.get() / 4);
+        let now = (period as u32).wrapping_mul(CYCLES.get()).wrapping_add(axis as u32 * CYCLES.get() / 2);
         let tick = Tick { now, emergency_stop, gate_fault, complete, supply, sample: *sample };
         self.registers.encoders[axis] = sample.encoder_count;
         let mut ends = self.queues.get().current();

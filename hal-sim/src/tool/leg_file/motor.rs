@@ -230,6 +230,6 @@ impl LegFile {
         }
         let count = axes.len();
         let axes = axes.try_into().map_err(|_| refused(format!("has {count} joints, not {N}")))?;
-        Ok(CompleteDescription { axes, supply: self.supply.description() })
+        Ok(CompleteDescription::new(axes, self.supply.description()))
     }
 }

@@ -18,13 +18,15 @@ pub const TOP: u32 = 4096;
 /// Counts of the timer that lie between the two sides at least: 0.48 us.
 pub const GAP: u32 = 40;
 
-/// Running in its off state; pins come afterwards.
-pub const CHOPPER: [Write; 6] = [
+/// Running in its off state; pins come afterwards. The buffered compare values are taken over before an output is let
+/// through: the zeros of a reset would keep the high side on until the counter's first end, 49 us later.
+pub const CHOPPER: [Write; 7] = [
     // PWM mode 2, compare values buffered.
     Write::whole("TIM2_CCMR2", BASE + 0x1C, 0x7878),
     Write::whole("TIM2_ARR", BASE + 0x2C, TOP),
     Write::whole("TIM2_CCR3", BASE + 0x3C, 0),
     Write::whole("TIM2_CCR4", BASE + 0x40, TOP + 1),
+    Write::whole("TIM2_EGR", BASE + 0x14, 1),
     // Channel 3 active low.
     Write::whole("TIM2_CCER", BASE + 0x20, 1 << 8 | 1 << 9 | 1 << 12),
     Write::whole("TIM2_CR1", BASE, 0b11 << 5 | 1),

@@ -59,8 +59,8 @@ impl Write {
 
 /// The processor's clock, Hz: 8 MHz / 4 * 168 / 2 (`Board/v3/Src/main.c:177-182`).
 pub const CLOCK_HZ: u32 = 168_000_000;
-/// Of the timers on APB2 (TIM1, TIM8), Hz.
-pub const FAST_TIMER_HZ: u32 = 168_000_000;
+/// Clock of the timers on APB2 (TIM1, TIM8) [Hz].
+pub const FAST_TIMER_HZ: u32 = crate::hal::BRIDGE_CLOCK_HZ;
 /// Of the timers on APB1 (TIM2 to TIM5), Hz.
 pub const SLOW_TIMER_HZ: u32 = 84_000_000;
 
@@ -94,3 +94,13 @@ pub const CLOCK_FAILURE_SEEN: Write = Write::bits("RCC_CIR", RCC + 0x0C, 1 << 23
 
 /// RCC_CSR, in which the reasons of the last reset stand from bit 25 on, and the bit that clears them (RMVF).
 pub const RESET_REASONS: Write = Write::bits("RCC_CSR", RCC + 0x74, 1 << 24, 1 << 24);
+
+/// Writes timers, pins and converters in the order of the start: a pin is connected only to a timer that holds it off.
+pub fn prepare(mut write: impl FnMut(&[Write])) {
+    (0..2).for_each(|axis| write(&timers::bridge(axis)));
+    write(&chopper::CHOPPER);
+    encoders::ENCODERS.iter().for_each(|list| write(list));
+    write(&timers::ready());
+    pins::PINS.iter().for_each(|pin| write(&pin.writes()));
+    write(&converters::CONVERTERS);
+}

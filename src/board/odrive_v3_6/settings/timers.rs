@@ -1,10 +1,13 @@
-//! TIM1 and TIM8: both bridges at 24 kHz, a quarter of a period apart.
+//! TIM1 and TIM8: both bridges at 24 kHz, half a period apart.
 //!
 //! ```text
 //! counter   0 -> 3500 -> 0, 168 MHz              f = 168 MHz / (2 * 3500) = 24 kHz
 //! high side on while counter >= compare          compare = (1 - duty) * 3500          PWM mode 2
-//! trigger   when the counter falls to 40         the converter samples from there: low sides on, 0.24 us before zero
+//! trigger   when the counter rises to 20         the converters sample from there: low sides on, 0.12 us after zero
 //! ```
+//!
+//! Why half a period: with centred duties the edges of a bridge lie around a quarter and three quarters of its period, and
+//! come to its middle, the other's sample, only near the voltage limit (docs/motor.md, section 1).
 //!
 //! Source: `Board/v3/Inc/main.h:69-75`, `Src/tim.c:77-143`, `board.cpp:388-397`; registers RM0090 17.4. ODrive takes every
 //! third update; here compare values are taken over once a period, at zero, by a repetition counter of 1.
@@ -12,17 +15,19 @@
 //! the counter falls, and the start checks it ([`crate::board`]).
 
 use super::Write;
+use crate::hal::SHUNT_TRIGGER_CLOCKS;
 
-/// Which of the two bridges: 0 is the hip's, 1 the knee's.
+/// Timer of each bridge: 0 is the hip's, 1 the knee's.
 pub const BASES: [u32; 2] = [0x4001_0000, 0x4001_0400];
 /// Top of the counter: half a period.
 pub const TOP: u16 = 3500;
 /// Dead time in cycles of the timer: 119 ns.
 pub const DEAD_TIME: u32 = 20;
-/// Counter at which the converter is triggered, falling.
-pub const TRIGGER: u16 = 40;
-/// Counters at the start: TIM1 leads by a quarter of a period.
-pub const START: [u16; 2] = [TOP / 2, 0];
+/// Counters at the start, half a period apart: TIM1 rises from zero, TIM8 falls from the top.
+/// The written top makes the counter fall, zero makes it rise (RM0090 17.3.10, hints on the centre-aligned mode).
+pub const START: [u16; 2] = [0, TOP];
+/// Largest deviation from half a period with which the start allows the bridges [timer clocks]: 0.19 us.
+pub const SHIFT_TOLERANCE: u16 = 32;
 
 /// Offset of the control register, 1 << 0 of which starts the counter.
 pub const CR1: u32 = 0x00;
@@ -45,10 +50,18 @@ const CR1_VALUE: u32 = 0b11 << 5 | 1 << 7;
 const BDTR_VALUE: u32 = DEAD_TIME | 1 << 10 | 1 << 11;
 /// PWM mode 2, compare value buffered.
 const MODE: u32 = 0b111 << 4 | 1 << 3;
-/// PWM mode 1, compare value buffered: high below the compare value.
-const TRIGGER_MODE: u32 = 0b110 << 4 | 1 << 3;
+/// Mode and compare value of channel 4, whose rising edge triggers the converters.
+const TRIGGER: (u32, u32) = trigger(SHUNT_TRIGGER_CLOCKS);
 /// Both outputs of channels 1 to 3, active high.
 const OUTPUTS: u32 = 0b0101_0101_0101;
+
+/// Mode and compare value of a channel whose output rises so many clocks after the counter's zero, or before it.
+/// PWM mode 2 rises at its compare value while the counter rises, mode 1 while it falls. Zero has no such edge.
+const fn trigger(clocks: i16) -> (u32, u32) {
+    assert!(clocks != 0 && clocks.unsigned_abs() < TOP);
+    let mode = if clocks > 0 { MODE } else { 0b110 << 4 | 1 << 3 };
+    (mode, clocks.unsigned_abs() as u32)
+}
 
 /// A bridge's timer, stopped, its main output off, every phase at one half.
 #[must_use]
@@ -71,14 +84,14 @@ pub const fn bridge(axis: usize) -> [Write; 15] {
         write!("SMCR", 0x08, 0),
         write!("DIER", 0x0C, 0),
         write!("CCMR1", 0x18, MODE | MODE << 8),
-        write!("CCMR2", 0x1C, MODE | TRIGGER_MODE << 8),
+        write!("CCMR2", 0x1C, MODE | TRIGGER.0 << 8),
         write!("PSC", 0x28, 0),
         write!("ARR", 0x2C, TOP as u32),
         write!("RCR", 0x30, 0),
         write!("CCR1", CCR1, half),
         write!("CCR2", CCR1 + 4, half),
         write!("CCR3", CCR1 + 8, half),
-        write!("CCR4", CCR1 + 12, TRIGGER as u32),
+        write!("CCR4", CCR1 + 12, TRIGGER.1),
         // The buffered values are taken over now.
         write!("EGR", 0x14, 1),
     ]
@@ -117,6 +130,14 @@ pub const fn repetition(axis: usize) -> Write {
     } else {
         Write::whole("TIM8_RCR", BASES[1] + 0x30, 1)
     }
+}
+
+/// Whether two counters run half a period apart, from three reads equally far apart: of the falling counter, of the
+/// rising one, of the falling one again.
+#[must_use]
+pub fn half_a_period_apart([before, rising, after]: [u16; 3]) -> bool {
+    let twice = u32::from(before) + u32::from(after) + 2 * u32::from(rising);
+    twice.abs_diff(2 * u32::from(TOP)) <= 2 * u32::from(SHIFT_TOLERANCE)
 }
 
 /// The compare value of a duty 0..=1; anything else, also what is no number, counts as the nearest (0 of NaN: low side on).
