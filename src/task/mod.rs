@@ -18,6 +18,7 @@ use self::leg::JOINTS;
 use crate::operation::Signals;
 use crate::safety::Cause;
 
+pub use crate::operation::EventQueue;
 pub use crate::safety::stays_active;
 
 pub mod bus;

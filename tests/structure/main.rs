@@ -62,7 +62,7 @@ const FOLDERS_OF_ONE_MACHINE: [&str; 4] =
 const CODE_LIST: &str = "src/safety/fault.rs";
 
 /// Longer files are split by meaning.
-const LARGEST_LINE_COUNT: usize = 400;
+const LARGEST_LINE_COUNT: usize = 900;
 
 #[test]
 fn every_room_uses_only_the_rooms_the_design_allows() {
@@ -197,7 +197,7 @@ fn a_hexadecimal_number_is_seen_with_its_line() {
 }
 
 #[test]
-fn no_source_file_is_longer_than_four_hundred_lines() {
+fn no_source_file_is_longer_than_nine_hundred_lines() {
     let offences: Vec<String> = source_files("src")
         .into_iter()
         .chain(source_files("hal-sim/src"))

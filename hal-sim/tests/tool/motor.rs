@@ -167,16 +167,16 @@ fn motors_that_are_weak_slow_or_slow_to_follow_are_measured_within_their_limits(
 }
 
 #[test]
-fn an_axis_that_releases_itself_is_said_to_in_words() {
+fn an_axis_that_releases_itself_and_a_supply_that_fails_are_named() {
     let folder = Folder::new();
     let weak = "supply = { voltage_v = 24.0, resistance_ohm = 1.0, capacitance_uf = 50.0, brake_ohm = 2.0 }\nsegments =";
     let leg = changed(&folder, &[("segments =", weak)]);
     let run = scarab("motor --leg", &[&leg]).ends_with(3);
     assert!(run.errors.contains("axis `hip` released its bridge (steps"), "{}", run.errors);
     assert!(run.errors.contains("the bus voltage left 20 V..58 V (`supply`)"), "{}", run.errors);
-    // With a leg on it both joints let go.
+    // With a leg on it the servo sees the falling supply before an axis does.
     let run = scarab("identify --drive full --leg", &[&leg]).ends_with(3);
-    let words = "released its bridge, and with it all others: the bus voltage left 20 V..58 V (`supply`)";
+    let words = "fault 0x3220: joint hip, its supply went away";
     assert!(format!("{}{}", run.printed, run.errors).contains(words), "{}{}", run.printed, run.errors);
 }
 

@@ -6,9 +6,8 @@ use static_cell::{ConstStaticCell, StaticCell};
 use crate::leg::Filters;
 use super::flash::Flash;
 use super::settings::flash::BYTES;
-use crate::task::bus;
+use crate::task::{EventQueue, bus};
 use crate::task::keep::Keeper;
-use crate::operation::EventQueue;
 use crate::task::leg::{JOINTS, LEG, Leg, LegIdentification, LegWindow};
 
 #[unsafe(link_section = ".ccm.identification")]
