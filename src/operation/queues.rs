@@ -31,7 +31,6 @@ pub type Calibrated = (usize, Option<StoredCalibration>);
 
 /// What the servo sends to the identification, in its order.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "queues hold values, and there is no heap to box them on")]
 pub enum LegEvent<const N: usize> {
     /// A sample of the log.
     Sample(LoggedSample<N>),
