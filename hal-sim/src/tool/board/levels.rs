@@ -129,12 +129,7 @@ impl<const N: usize> Levels<N> {
             loops: loops([Stage::OFF; N], chopper),
             bus: following.is_some().then(Box::default),
             events: Locked::new(EventQueue::new()),
-            servo: ServoLevel::new(
-                leg.control(),
-                drives::derating(DIVIDER),
-                volt_per_code,
-                following.clone(),
-            ),
+            servo: ServoLevel::new(leg.control(), drives::derating(DIVIDER), volt_per_code, following),
             housekeeper: Housekeeper::new(settings),
             identification: IdentificationLevel::new(leg.identification().swarm_seed()),
             settings,
@@ -157,7 +152,7 @@ impl<const N: usize> Levels<N> {
     pub fn join_bus<const B: usize>(&mut self, leg: &DeviceLeg<N, B>, following: Following<N>) {
         let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
         let derating = drives::derating(DIVIDER);
-        self.servo = ServoLevel::new(leg.control(), derating, volt_per_code, Some(following.clone()));
+        self.servo = ServoLevel::new(leg.control(), derating, volt_per_code, Some(following));
         (self.bus, self.following) = (Some(Box::default()), Some(following));
     }
 

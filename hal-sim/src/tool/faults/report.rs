@@ -361,7 +361,8 @@ impl CampaignReport {
             text.push_str(&hours.lines());
         }
         // Pooled it is that of the row with the most runs.
-        let covered = self.rows.iter().filter_map(|row| Some((row.detected_of_detectable.known()?, row.fault)));
+        let covered =
+            self.rows.iter().filter_map(|row| Some((row.detected_of_detectable.known()?, row.fault)));
         let least = covered.min_by(|one, other| one.0.total_cmp(&other.0));
         let least = least.map_or_else(String::new, |(share, row)| {
             format!(", least of a row {} ({row})", percent(share.into()))

@@ -286,7 +286,7 @@ impl Code<'_> {
 fn immediate(first: u32, second: u32, code: u32) -> Option<u32> {
     let part = first >> 10 & 1;
     let is_one = first & 0xFBF0 == code && second & 0x8F00 == 0;
-    is_one.then(|| (first & 0xF) << 12 | part << 11 | (second >> 12 & 7) << 8 | second & 0xFF)
+    is_one.then_some((first & 0xF) << 12 | part << 11 | (second >> 12 & 7) << 8 | second & 0xFF)
 }
 
 /// Sign of a field of so many bits.
