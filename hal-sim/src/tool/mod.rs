@@ -28,6 +28,7 @@
 //! | [`bus`] | legs on a CANopen bus, for host software that exists |
 //! | [`kept_file`] | what a board remembers over the power, as TOML and back |
 //! | [`image`] | the flash image: its leg, its build, its size |
+//! | [`precision`] | digits of reported numbers |
 //! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
 
 #![expect(
@@ -66,6 +67,7 @@ pub mod paper;
 pub mod perturb;
 pub mod placed_mass;
 pub mod posture;
+pub mod precision;
 pub mod predict;
 pub mod recording;
 pub mod regressor;
