@@ -1,8 +1,9 @@
 """An identification over the bus: `identify.py HOST:PORT [--json FILE] [--no-log] [--cancel]`.
 
-Sets plan and seed, enables the leg, starts the identification and reads the 500 Hz log in blocks while the leg moves. Then verdict,
-parameters with standard deviation and status, and fits are read. A log with holes is no log: lost samples end the script with exit
-code 1. `--no-log` leaves the log alone, for a wire or a host that cannot carry it. `--cancel` cancels while the leg moves.
+Sets plan and seed, enables the leg, starts the identification and reads the 500 Hz log in blocks while the leg
+moves. Then verdict, parameters with standard deviation and status, and fits are read. Lost samples end the script
+with exit code 1. `--no-log` does not read the log, for a wire or a host that cannot carry it. `--cancel` cancels
+while the leg moves.
 """
 
 import argparse
@@ -24,12 +25,13 @@ RATE_HZ, TICKS_PER_SAMPLE = 500, 8
 class Log:
     """The node's queue of samples: reads it in blocks and counts what was lost.
 
-    The queue drops new samples while it is full; object 2140:4 counts them. 2,000 samples fit in `serve` (4 s), 192 on the board (0.38 s).
+    The queue drops new samples while it is full; object 2140:4 counts them. It holds 2,000 samples in `serve` (4 s)
+    and 192 on the board (0.38 s).
     """
 
     def __init__(self, joint):
         self.joint, self.samples, self.longest = joint, [], 0
-        # What waits from before is discarded unread: while it is read the queue stays full, and every new sample is lost.
+        # Old samples are discarded unread: while they are read the queue stays full, and new samples are lost.
         joint.write(0x2140, 1, 1)
         joint.write(0x2140, 1, 0)
         self.lost_before = joint.read(0x2140, 4)
@@ -49,7 +51,7 @@ class Log:
         return self.joint.read(0x2140, 4) - self.lost_before
 
     def complaint(self, seconds):
-        """What is wrong with a log that was read in this time: the node's count of losses, or a gap between two ticks."""
+        """Says what is missing of a log that was read in this time: by the node's count, or by a gap of ticks."""
         lost = self.lost()
         ticks = [sample[0] for sample in self.samples]
         gaps = [(one, other) for one, other in zip(ticks, ticks[1:]) if other - one != TICKS_PER_SAMPLE]

@@ -22,8 +22,8 @@ PDO_OFF = 0x80000000
 class Adapter(slcanBus):
     """python-can's slcan adapter on TCP, read in blocks.
 
-    python-can reads a socket byte by byte, with a `select` and a `recv` for each of the 22 bytes of a frame: three quarters of a
-    core for the 500 Hz log. On a busy machine it falls behind and samples are lost.
+    python-can reads a socket byte by byte, with a `select` and a `recv` for each of the 22 bytes of a frame. That takes
+    three quarters of a core for the 500 Hz log. On a busy machine it falls behind and samples are lost.
     """
 
     def _read(self, timeout):

@@ -3,8 +3,8 @@
 use scarab::ident::{Record, StribeckFit};
 use serde::Serialize;
 
+use super::precision::{plain, sigma, value};
 use super::report::Number;
-use super::tables::number;
 
 /// What was set aside of the motion identified from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -101,11 +101,11 @@ impl StribeckReport {
             "Stribeck friction of joint {}: {} +- {} N m above Coulomb's at rest, fallen to 1/e at {} +- {} rad/s (explains {} \
              chi-square units)",
             self.joint,
-            number(self.surplus_nm),
-            number(self.surplus_sigma_nm),
-            number(self.speed_rad_s),
-            number(self.speed_sigma_rad_s),
-            number(self.gain_chi2),
+            value(self.surplus_nm, self.surplus_sigma_nm),
+            sigma(self.surplus_sigma_nm),
+            value(self.speed_rad_s, self.speed_sigma_rad_s),
+            sigma(self.speed_sigma_rad_s),
+            plain(self.gain_chi2),
         )
     }
 }

@@ -9,10 +9,10 @@
 //! | `search.svg` | the swarm's cost above the optimum in its box over its iterations |
 //! | `base-parameters.svg` | errors of the base parameters in reported standard deviations, or those of the value |
 //!
-//! Of many runs (`--seeds`) there is `spread.svg`: every base parameter about its truth.
+//! Many runs (`--seeds`) have `spread.svg`: every base parameter about its truth.
 //!
 //! More than four motions are continued in `motions-b.svg`, `torque-1-b.svg` and so on.
-//! `docs/figures/identify.svg` is this `identify.svg`: `cargo sim && cp target/sim/identify.svg docs/figures/`.
+//! `scripts/figures` draws those in `docs/figures`.
 //!
 //! Colours are those of Okabe and Ito (2008) or tints of them, which the colour-blind can tell apart; curves differ in
 //! lightness and width as well, so that they can be told apart in grey. Drawn at four times the size with a `viewBox`
@@ -134,8 +134,10 @@ pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figu
 /// Base parameters of many runs of one leg about their truth.
 pub fn spread(leg: &str, spreads: &[Spread]) -> Result<Figure, ToolError> {
     let file = "spread.svg".to_owned();
-    let svg = render(WIDTH, 60 + 26 * spreads.len() as u32, &|area| spread::whole(area, spreads))
-        .map_err(|error| ToolError::input(format!("{file}: cannot be drawn: {error}")))?;
+    let svg = render(WIDTH, spread::HEAD + 60 + 26 * spreads.len() as u32, &|area| {
+        spread::whole(area, leg, spreads)
+    })
+    .map_err(|error| ToolError::input(format!("{file}: cannot be drawn: {error}")))?;
     let title =
         format!("Base parameters of {leg} about their truth: runs, their mean and spread, in reported sigma");
     Ok(Figure { file, group: Group::BaseParameters, title, svg })

@@ -8,6 +8,7 @@
 //! What the page does not know by name, a key that a later report has, it shows as a table all the same
 //! (`html/generic.rs`).
 
+mod choices;
 pub mod faults;
 mod generic;
 mod head;
@@ -23,9 +24,9 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::error::ToolError;
 use super::figures::{Figure, Group};
 use super::leg_file::LegFile;
+use super::precision;
 use super::replay::Source;
 use super::report::{Number, RunReport};
-use super::tables;
 
 /// Colours, print rules, narrow screens.
 const STYLE: &str = include_str!("html/style.css");
@@ -44,10 +45,14 @@ pub struct Circumstances {
 }
 
 impl Circumstances {
-    /// This moment and this process's arguments.
+    /// This process's arguments and the time.
+    ///
+    /// `SOURCE_DATE_EPOCH` [s since 1970] replaces the time, for a page that is to be reproduced.
     #[must_use]
     pub fn now(leg: &LegFile) -> Self {
-        let now = Timestamp::now();
+        let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
+        let now =
+            stated.and_then(|seconds| Timestamp::from_second(seconds).ok()).unwrap_or_else(Timestamp::now);
         let words: Vec<String> = std::env::args().skip(1).map(quoted).collect();
         Self {
             time_utc: now.round(Unit::Second).unwrap_or(now).to_string(),
@@ -87,7 +92,7 @@ pub fn page(
                     (verdict::alarms(run))
                     (verdict::banner(run))
                     (head::facts(circumstances, run))
-                    section { h2 { "At a glance" } (head::numbers(run)) (group(Group::Summary)) }
+                    section { h2 { "At a glance" } (head::numbers(run, &circumstances.leg)) (group(Group::Summary)) }
                     @if !sources.is_empty() { (results::sources(sources)) }
                     section {
                         h2 { "Parameters" }
@@ -96,14 +101,17 @@ pub fn page(
                         (parameters::all(run, &circumstances.leg))
                     }
                     section { h2 { "Trajectories" } (results::trajectory_words(run)) (group(Group::Trajectories)) }
-                    section { h2 { "Torque" } (results::torque_words(run)) (group(Group::Torque)) (results::fits(run)) }
+                    section { h2 { "Torque" } (results::torque_words(run)) (group(Group::Torque)) (results::fits(run, &circumstances.leg)) }
                     section { h2 { "Residuals" } (results::residual_words()) (group(Group::Residuals)) }
                     section { h2 { "Search" } (results::search(run)) (group(Group::Search)) }
                     (results::consistent(run))
-                    @if !run.tracking.is_empty() { (results::tracking(run)) }
+                    (choices::model(run, &circumstances.leg))
+                    (choices::outliers(run, &circumstances.leg))
+                    (choices::comparison(run))
+                    @if !run.tracking.is_empty() { (results::tracking(run, &circumstances.leg)) }
                     (results::scale(run))
                     @for (name, value) in &rest { (generic::section(name, value)) }
-                    (verdict::tests(&run.findings))
+                    (verdict::tests(&run.findings, &circumstances.leg))
                     (limits::section(run))
                     (head::colophon(run))
                 }
@@ -126,12 +134,38 @@ fn drawing(figure: &Figure) -> Markup {
     }
 }
 
-/// Four significant digits with a true minus; a dash where nothing is known.
-fn number(value: Number) -> String {
-    match tables::number(value).as_str() {
+/// A number as the page writes it: a true minus, a dash where nothing is known.
+fn typeset(digits: &str) -> String {
+    match digits {
         "-" => "\u{2013}".into(),
         known => known.replace('-', "\u{2212}"),
     }
+}
+
+/// Three significant digits.
+fn number(value: Number) -> String {
+    typeset(&precision::plain(value))
+}
+
+/// Limit, or another number that is exact.
+fn exact(value: Number) -> String {
+    typeset(&precision::exact(value))
+}
+
+/// Value of a parameter, rounded by its standard deviation.
+fn measured(value: Number, sigma: Number) -> String {
+    typeset(&precision::value(value, sigma))
+}
+
+/// Standard deviation.
+fn sigma(value: Number) -> String {
+    typeset(&precision::sigma(value))
+}
+
+/// Name of a joint that is counted from 1.
+fn joint_name(leg: &LegFile, joint: usize) -> String {
+    let file = joint.checked_sub(1).and_then(|index| leg.joints.get(index));
+    file.map_or_else(|| format!("joint {joint}"), |file| file.name.clone())
 }
 
 /// A number with its sign.
@@ -171,7 +205,7 @@ mod tests {
     #[test]
     fn what_is_not_known_is_a_dash_and_a_minus_is_a_minus() {
         assert_eq!(number(Number::UNKNOWN), "\u{2013}");
-        assert_eq!(number((-0.79941).into()), "\u{2212}0.7994");
+        assert_eq!(number((-0.79941).into()), "\u{2212}0.799");
         assert_eq!(number(f64::NAN.into()), "\u{2013}");
     }
 

@@ -29,6 +29,7 @@
 //! | [`kept_file`] | what a board remembers over the power, as TOML and back |
 //! | [`image`] | the flash image: its leg, its build, its size |
 //! | [`files`] | files of a command: checked before it computes, written whole |
+//! | [`precision`] | digits of reported numbers |
 //! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
 
 #![expect(
@@ -68,6 +69,7 @@ pub mod paper;
 pub mod perturb;
 pub mod placed_mass;
 pub mod posture;
+pub mod precision;
 pub mod predict;
 pub mod recording;
 pub mod regressor;

@@ -17,8 +17,8 @@ use serde::Serialize;
 
 use super::analysis::Background;
 use super::leg_file::{JointFile, Switch};
+use super::precision::{plain, sigma, value};
 use super::report::Number;
-use super::tables::number;
 
 /// What a leg file asks of one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,9 +187,9 @@ impl<const N: usize, const B: usize> Background<N, B> {
         let why = if gain.is_nan() {
             if used { "the data tell it" } else { "the data do not tell it: held at zero" }.into()
         } else if used {
-            format!("explains {} chi-square units, {limit} are asked for", number(gain.into()))
+            format!("explains {} chi-square units, limit {limit}", plain(gain.into()))
         } else if gain > 0.0 {
-            format!("explains {} chi-square units, fewer than {limit}: held at zero", number(gain.into()))
+            format!("explains {} chi-square units, limit {limit}: held at zero", plain(gain.into()))
         } else {
             "not told apart from the others by this motion: held at zero".into()
         };
@@ -244,9 +244,9 @@ impl<const N: usize, const B: usize> Background<N, B> {
         }
         let share = 100.0 * surplus / f64::from(size);
         let why = format!(
-            "explains {} chi-square units, {limit} are asked for; {} % of the torque's rms, {} are asked for",
-            number(gain.into()),
-            number(share.into()),
+            "explains {} chi-square units, limit {limit}; {} % of the torque's rms, limit {} %",
+            plain(gain.into()),
+            plain(share.into()),
             100.0 * stribeck::SMALLEST_SURPLUS_SHARE
         );
         Decision { used, gain: Some(gain), limit: Some(limit), why }
@@ -298,10 +298,10 @@ pub fn lines(choices: &[ModelChoiceReport], directions: &[DirectionsReport]) -> 
         format!(
             "Coulomb friction of joint {}: {} +- {} N m while the D-H angle grows, {} +- {} N m while it falls",
             found.joint,
-            number(found.forward_nm),
-            number(found.forward_sigma_nm),
-            number(found.backward_nm),
-            number(found.backward_sigma_nm)
+            value(found.forward_nm, found.forward_sigma_nm),
+            sigma(found.forward_sigma_nm),
+            value(found.backward_nm, found.backward_sigma_nm),
+            sigma(found.backward_sigma_nm)
         )
     });
     open.chain(directions).collect()

@@ -6,6 +6,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, Table, presets};
 
 use super::disturbances::StribeckReport;
 use super::error::ToolError;
+use super::precision::{plain, sigma, value};
 use super::replay::Source;
 use super::report::{ConsistentSearchReport, FitReport, Number, RunReport};
 
@@ -72,8 +73,8 @@ pub fn base_parameters(run: &RunReport) -> String {
     let mut rows = headed(&["base parameter", "value", "sigma", "unit", "truth", "error/sigma", "= sum of"]);
     for base in &run.base_parameters {
         let off = match (base.value.known(), base.truth.known(), base.sigma.known()) {
-            (Some(value), Some(truth), Some(sigma)) if sigma > 0.0 => {
-                format!("{:+.1}", (value - truth) / sigma)
+            (Some(found), Some(truth), Some(deviation)) if deviation > 0.0 => {
+                format!("{:+.1}", (found - truth) / deviation)
             }
             _ => "-".into(),
         };
@@ -86,10 +87,10 @@ pub fn base_parameters(run: &RunReport) -> String {
                 .collect();
         rows.add_row(vec![
             base.name.clone(),
-            number(base.value),
-            number(base.sigma),
+            value(base.value, base.sigma),
+            sigma(base.sigma),
             base.unit.into(),
-            number(base.truth),
+            value(base.truth, base.sigma),
             off,
             if terms.len() > 1 { terms.join(" + ").replace("+ -", "- ") } else { String::new() },
         ]);
@@ -106,12 +107,12 @@ pub fn parameters(run: &RunReport) -> String {
     for parameter in &run.parameters {
         rows.add_row(vec![
             parameter.name.clone(),
-            number(parameter.value),
-            number(parameter.sigma),
+            value(parameter.value, parameter.sigma),
+            sigma(parameter.sigma),
             parameter.unit.into(),
             parameter.status.into(),
             parameter.grouped_with.join(" "),
-            number(parameter.truth),
+            value(parameter.truth, parameter.sigma),
         ]);
     }
     align_numbers(&mut rows, [1, 2, 6]);
@@ -273,14 +274,14 @@ fn consistent_line(run: &RunReport) -> String {
     let Some(full) = &found.full else {
         return format!(
             "legs that can exist: the result costs {} chi-square units more than least squares ({} steps)",
-            number(found.result_over_least_squares),
+            plain(found.result_over_least_squares),
             found.base.steps
         );
     };
     format!(
         "legs that can exist: the best of them costs {} chi-square units more than least squares. base values, completed \
          (the result): {}. whole legs: {}",
-        number(found.optimum_over_least_squares),
+        plain(found.optimum_over_least_squares),
         search(&found.base),
         search(full)
     )

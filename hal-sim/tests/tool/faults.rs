@@ -82,6 +82,8 @@ fn runs_of_the_sweep_and_of_two_faults_are_repeated_alone() {
         assert_eq!(all["trace_hash"], format!("{folded:016x}"));
         let page = std::fs::read_to_string(folder.path("run.html")).expect("written");
         assert!(page.contains("<svg") && page.contains(&format!("{kind}, seed 3")));
+        // Eleven columns are wider than a screen: their words may wrap, and the rest scrolls.
+        assert!(page.contains("<div class=\"wide\"><table class=\"any\">"));
     }
 }
 

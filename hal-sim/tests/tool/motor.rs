@@ -123,6 +123,33 @@ fn figures_are_drawn_and_wrong_joints_refused() {
     assert!(refusal.contains("sp: the joint has no `[joint.motor]`"), "{refusal}");
 }
 
+#[test]
+fn curves_of_one_frame_differ_in_colour_or_dashes_and_the_legend_has_each() {
+    let folder = Folder::new();
+    scarab("motor --figures", &[&folder.path("figures")]).ends_with(0);
+    for (file, frames, names) in [
+        ("current-steps", 4, &["q with feedforward", "q without", "d with feedforward", "d without"][..]),
+        ("voltage-limit", 2, &["48 V: quadrature", "12 V: quadrature", "48 V: direct", "12 V: direct"]),
+        ("regeneration", 2, &["with chopper", "without, until the outputs are off"]),
+    ] {
+        let svg = std::fs::read_to_string(folder.path(&format!("figures/{file}.svg"))).expect("drawn");
+        let document = roxmltree::Document::parse(&svg).expect("well-formed");
+        let words: Vec<_> = document.descendants().filter_map(|node| node.text().map(str::trim)).collect();
+        for name in names {
+            assert!(words.contains(name), "{file}: no {name} in the legend");
+        }
+        // Solid curves; a dash has few points.
+        let mut looks = std::collections::BTreeMap::new();
+        for node in document.descendants().filter(|node| node.has_tag_name("polyline")) {
+            let points = node.attribute("points").map_or(0, |points| points.split_whitespace().count());
+            if points > 20 {
+                *looks.entry((node.attribute("stroke"), node.attribute("stroke-width"))).or_insert(0) += 1;
+            }
+        }
+        assert!(!looks.is_empty() && looks.values().all(|curves| *curves <= frames), "{file}: {looks:?}");
+    }
+}
+
 /// The default leg with other words in it, in a folder of its own.
 fn changed(folder: &Folder, changes: &[(&str, &str)]) -> std::path::PathBuf {
     let mut text = include_str!("../../legs/x2-wearer-75kg.toml").to_owned();

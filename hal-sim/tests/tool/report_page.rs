@@ -84,6 +84,62 @@ fn a_page_shows_the_whole_run_and_fetches_nothing() {
 }
 
 #[test]
+fn counts_are_whole_numbers_and_values_have_the_digits_of_their_sigma() {
+    let (folder, _, page) = reported("identify --seed 1", 0);
+    let report = folder.json("run.json");
+    let replaced = &report["outliers"]["replaced"];
+    let rows = page.all("table.outliers tbody tr");
+    assert_eq!(rows.len(), 2);
+    for (row, (joint, count)) in rows.iter().zip([("hip", &replaced[0]), ("knee", &replaced[1])]) {
+        assert!(row.starts_with(&format!("{joint}{count}")), "{row}");
+    }
+    let cells = page.all("table td");
+    for cell in ["1.000", "2.000", "3.000"] {
+        assert!(!cells.iter().any(|found| found == cell), "a count is shown as {cell}");
+    }
+    // The rest of a zero of the prior.
+    let hidden = report["parameters"][2]["value"].as_f64().expect("XZ1");
+    assert!(hidden != 0.0 && hidden.abs() < 1e-12, "XZ1 of this run is rounding: {hidden}");
+    for row in page.all("table.parameters tbody tr") {
+        assert!(!row.contains("e\u{2212}1"), "rounding is shown as a value: {row}");
+    }
+    let row = |name: &str| {
+        let rows = page.all("table.parameters tbody tr");
+        rows.into_iter().find(|row| row.starts_with(name)).unwrap_or_else(|| panic!("no {name}"))
+    };
+    assert!(row("XZ1").starts_with("XZ10\u{2013}"), "{}", row("XZ1"));
+    // Two digits of sigma and the value to the same place; three digits without sigma.
+    let digits = |name: &str| row(name)[name.len()..].split_once(['k', 'N']).expect("a unit").0.to_owned();
+    let known = report["parameters"].as_array().expect("a list").iter().find(|one| one["name"] == "FC1");
+    let of = |key: &str| known.expect("FC1")[key].as_f64().expect("a number");
+    assert!((0.01..0.1).contains(&of("sigma")));
+    assert_eq!(digits("FC1"), format!("{:.3}{:.3}", of("value"), of("sigma")));
+    assert_eq!(digits("YY1").chars().filter(char::is_ascii_digit).count(), 4, "0.xxx: {}", digits("YY1"));
+}
+
+#[test]
+fn every_section_has_a_title_in_words_and_no_reason_is_cut_off() {
+    let (folder, _, page) = reported("identify --seed 1", 0);
+    let titles = page.all("h2");
+    for key in ["Validated", "Model choice", "Outliers", "Drive"] {
+        assert!(!titles.iter().any(|title| title == key), "{key} is a key of the JSON");
+    }
+    let facts = page.all(".facts div");
+    assert!(facts.iter().any(|fact| fact.starts_with("Drivesimulated; currents follow")), "{facts:?}");
+    let report = folder.json("run.json");
+    let choices = report["model_choice"].as_array().expect("a list");
+    let reasons = page.all("table.choices td.words");
+    assert_eq!(reasons.len(), choices.len());
+    for (reason, choice) in reasons.iter().zip(choices) {
+        assert_eq!(choice["why"], reason.as_str());
+    }
+    assert!(
+        page.text.contains(".words, .any td:not(.n) { white-space: normal; }"),
+        "reasons are one line each"
+    );
+}
+
+#[test]
 fn what_a_leg_is_called_is_text_and_nothing_else() {
     let folder = Folder::new();
     let hostile = "</title></svg><script>alert(1)</script><b>&\\\"'";
@@ -187,6 +243,8 @@ fn many_runs_are_a_page_of_how_they_lie_about_truth() {
     let mean = format!("{:+.1}", errors.sum::<f64>() / 6.0).replace('-', "\u{2212}");
     assert!(rows[0].contains(&mean), "{mean} in {}", rows[0]);
     assert!(page.all("figure svg").iter().all(|figure| figure.contains("mean") && figure.contains("spread")));
+    let title = "x2-wearer-75kg: errors of the base parameters in 6 runs";
+    assert!(page.all("figure svg").iter().all(|figure| figure.contains(title)), "the figure has no title");
     assert!(!page.text.contains("NaN") && !page.text.contains("<script"));
     let tests = page.all("table.tests tbody tr");
     assert!(tests.len() > 10 && tests.iter().any(|row| row.contains("36 of 36")), "{tests:?}");

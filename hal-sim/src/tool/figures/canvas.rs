@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
+use plotters::coord::ranged1d::{BoldPoints, Ranged};
 use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
-use plotters::element::{PathElement, Rectangle, Text};
+use plotters::element::{Circle, PathElement, Rectangle, Text};
 use plotters::prelude::{Cartesian2d, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{BLACK, Color, IntoFont, RGBColor, ShapeStyle, TextStyle, WHITE};
@@ -85,6 +86,11 @@ pub fn text(
     area.draw(&Text::new(words.into(), (px(x), px(y)), style))
 }
 
+/// Exponents of a unit raised: `kg m2` becomes `kg m\u{b2}`.
+pub fn unit(plain: &str) -> String {
+    plain.replace("m2", "m\u{b2}")
+}
+
 /// What a legend explains.
 pub enum Key {
     /// A curve.
@@ -93,6 +99,8 @@ pub enum Key {
     Dashes(ShapeStyle, i32, i32),
     /// A background.
     Field(RGBColor),
+    /// A dot of a radius in pixels.
+    Dot(RGBColor, i32),
 }
 
 /// Meanings from left to right, one below the other where the width ends; each takes the width of its words.
@@ -118,6 +126,9 @@ pub fn legend(
                     let dash = vec![(px(x + begin), px(y)), (px(x + end), px(y))];
                     area.draw(&PathElement::new(dash, *style))?;
                 }
+            }
+            Key::Dot(colour, radius) => {
+                area.draw(&Circle::new((px(x + 12), px(y)), px(*radius), colour.filled()))?;
             }
             Key::Field(colour) => {
                 area.draw(&Rectangle::new([(px(x), px(y - 5)), (px(x + 24), px(y + 5))], colour.filled()))?;
@@ -161,8 +172,8 @@ pub fn axes<'a, 'b>(area: &'a Area<'b>, axes: &Axes<'_>) -> Result<Chart<'a, 'b>
         .bold_line_style(line(GRID, 3))
         .axis_style(line(AXIS, 3))
         .set_all_tick_mark_size(px(3))
-        .x_labels(axes.x_ticks)
-        .y_labels(axes.y_ticks)
+        .x_labels(labels(&axes.x, axes.x_ticks))
+        .y_labels(labels(&axes.y, axes.y_ticks))
         .label_style(font(12))
         .axis_desc_style(font(12))
         .x_desc(axes.x_label)
@@ -171,6 +182,16 @@ pub fn axes<'a, 'b>(area: &'a Area<'b>, axes: &Axes<'_>) -> Result<Chart<'a, 'b>
         .y_label_formatter(&|value| short(*value))
         .draw()?;
     Ok(chart)
+}
+
+/// Fewer labels do not show the scale of an axis.
+const LEAST_LABELS: usize = 3;
+
+/// Labels to ask for on an axis: `most`, or more where plotters would draw fewer than [`LEAST_LABELS`].
+fn labels(range: &Range<f64>, most: usize) -> usize {
+    let axis = RangedCoordf64::from(range.clone());
+    let drawn = |count: &usize| axis.key_points(BoldPoints(*count)).len();
+    (most..=most + 2 * LEAST_LABELS).find(|count| drawn(count) >= LEAST_LABELS).unwrap_or(most)
 }
 
 /// A number on an axis, with a true minus and without the last digits of a sum of tenths.
@@ -196,4 +217,23 @@ pub fn symmetric(values: impl Iterator<Item = f64>, least: f64) -> Range<f64> {
     let largest = values.map(f64::abs).filter(|size| size.is_finite()).fold(least, f64::max);
     let end = if largest > 0.0 { 1.1 * largest } else { 1.0 };
     -end..end
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_axis_has_three_labels_and_at_most_four_more_than_asked_for() {
+        for asked in 3..=11 {
+            for step in 0..400 {
+                let end = 10_f64.powf(f64::from(step) / 50.0 - 4.0);
+                for range in [-end..end, 0.0..end, 48.0..48.0 + end, -0.3 * end..end] {
+                    let axis = RangedCoordf64::from(range.clone());
+                    let drawn = axis.key_points(BoldPoints(labels(&range, asked))).len();
+                    assert!((LEAST_LABELS..=asked + 4).contains(&drawn), "{asked} {range:?}: {drawn}");
+                }
+            }
+        }
+    }
 }

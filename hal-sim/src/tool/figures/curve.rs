@@ -3,9 +3,10 @@
 use std::ops::Range;
 
 use plotters::element::{PathElement, Rectangle};
+use plotters::series::DashedLineSeries;
 use plotters::style::{Color, RGBColor, ShapeStyle};
 
-use super::canvas::{Chart, DrawingError};
+use super::canvas::{Chart, DrawingError, px};
 
 /// Points of one curve: some three for each pixel of the widest frame.
 const MOST_POINTS: usize = 1200;
@@ -30,6 +31,17 @@ pub fn draw(
         chart.draw_series([PathElement::new(extremes(&piece, per_pair), style)])?;
     }
     Ok(())
+}
+
+/// Draws a short curve in dashes; lengths of a dash and of a gap in pixels.
+pub fn dashed(
+    chart: &mut Chart<'_, '_>,
+    points: impl Iterator<Item = (f64, f64)>,
+    style: ShapeStyle,
+    (length, gap): (i32, i32),
+) -> Result<(), DrawingError> {
+    let points: Vec<_> = points.filter(|(_, value)| value.is_finite()).collect();
+    chart.draw_series(DashedLineSeries::new(points, px(length), px(gap), style)).map(|_| ())
 }
 
 /// The least and the largest of every so many points, in their order.

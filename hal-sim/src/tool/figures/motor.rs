@@ -16,15 +16,42 @@ use super::canvas::{
 };
 use super::{WIDTH, curve};
 
-/// Of a row of frames, of title and legend; pixels.
+/// Heights of a row of frames, and of title and legend, pixels.
 const ROW: i32 = 210;
 const HEAD: i32 = 56;
+
+/// Lengths of a dash and of a gap, pixels.
+const DASHES: (i32, i32) = (5, 4);
+
+/// How a curve is drawn and what it shows. No two curves of a frame share colour, width and dashes.
+#[derive(Clone, Copy)]
+struct Line {
+    style: ShapeStyle,
+    dashes: Option<(i32, i32)>,
+}
+
+impl Line {
+    fn solid(style: ShapeStyle) -> Self {
+        Self { style, dashes: None }
+    }
+
+    fn dashed(style: ShapeStyle) -> Self {
+        Self { style, dashes: Some(DASHES) }
+    }
+
+    fn key(self) -> Key {
+        match self.dashes {
+            None => Key::Curve(self.style),
+            Some((length, gap)) => Key::Dashes(self.style, length, gap),
+        }
+    }
+}
 
 /// A curve over time.
 struct Trace<'a> {
     time: &'a [f64],
     values: &'a [f64],
-    style: ShapeStyle,
+    line: Line,
 }
 
 fn thin(colour: RGBColor) -> ShapeStyle {
@@ -54,21 +81,31 @@ fn frame(
         },
     )?;
     for trace in traces {
-        let shown =
-            trace.time.iter().zip(trace.values).map(|(time, value)| (*time <= end_ms).then_some(*value));
-        curve::draw(&mut chart, trace.time, shown, trace.style)?;
+        let points = trace.time.iter().copied().zip(trace.values.iter().copied());
+        let shown = points.filter(|(time, _)| *time <= end_ms);
+        match trace.line.dashes {
+            Some(dashes) => curve::dashed(&mut chart, shown, trace.line.style, dashes)?,
+            None => {
+                let (times, values): (Vec<_>, Vec<_>) = shown.unzip();
+                curve::draw(&mut chart, &times, values.into_iter().map(Some), trace.line.style)?;
+            }
+        }
     }
     Ok(())
 }
 
 fn steps(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
-    text(area, (12, 14), 13, HPos::Left, "Steps of the quadrature current against the designed loop")?;
-    let (with, without, design) = (thin(BLUE), thin(VERMILION), line(PALE, 18));
+    let title = "Steps of the quadrature current q against the designed loop, and the direct current d";
+    text(area, (12, 14), 13, HPos::Left, title)?;
+    let design = Line::solid(line(PALE, 18));
+    let quadrature = [Line::solid(thin(BLUE)), Line::dashed(thin(VERMILION))];
+    let direct = [Line::solid(line(GREEN, 5)), Line::dashed(line(DARK, 5))];
     let entries = [
-        ("designed", Key::Curve(design)),
-        ("with feedforward", Key::Curve(with)),
-        ("without feedforward", Key::Curve(without)),
-        ("direct current of both", Key::Curve(line(DARK, 3))),
+        ("q designed", design.key()),
+        ("q with feedforward", quadrature[0].key()),
+        ("q without", quadrature[1].key()),
+        ("d with feedforward", direct[0].key()),
+        ("d without", direct[1].key()),
     ];
     legend(area, (LEFT, 35), &entries)?;
     let (_, cells) = area.split_vertically(px(HEAD));
@@ -77,63 +114,58 @@ fn steps(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
         let (from, to) = (first.from_a, first.to_a);
         let ideal: Vec<f64> =
             response(report.bandwidth_hz).iter().map(|share| from + share * (to - from)).collect();
-        let mut traces = vec![Trace { time: &first.time_ms, values: &ideal, style: design }];
-        for (step, style) in pair.iter().zip([with, without]) {
-            traces.push(Trace { time: &step.time_ms, values: &step.quadrature_a, style });
-            traces.push(Trace { time: &step.time_ms, values: &step.direct_a, style: line(DARK, 3) });
+        let mut traces = vec![Trace { time: &first.time_ms, values: &ideal, line: design }];
+        for (step, line) in pair.iter().zip(quadrature) {
+            traces.push(Trace { time: &step.time_ms, values: &step.quadrature_a, line });
         }
-        frame(part, &format!("{:.0} rad/s", first.speed_rad_s), "current, A", 2.0, &traces)?;
+        for (step, line) in pair.iter().zip(direct) {
+            traces.push(Trace { time: &step.time_ms, values: &step.direct_a, line });
+        }
+        frame(part, &format!("rotor at {:.0} rad/s", first.speed_rad_s), "current, A", 2.0, &traces)?;
     }
     Ok(())
 }
 
 fn limit(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
-    text(
-        area,
-        (12, 14),
-        13,
-        HPos::Left,
-        "From a current that a weak supply cannot hold, back within the limit",
-    )?;
-    let (weak, strong, direct) = (thin(VERMILION), line(PALE, 18), line(DARK, 3));
+    let title = "From a current that a weak supply cannot hold, back within the limit";
+    text(area, (12, 14), 13, HPos::Left, title)?;
+    // The weak supply, then the strong one.
+    let quadrature = [Line::solid(thin(VERMILION)), Line::solid(line(PALE, 18))];
+    let direct = [Line::dashed(line(DARK, 5)), Line::solid(line(GREEN, 5))];
     let label = |index: usize, words: &str| {
         let supply = report.limit.get(index).map_or(0.0, |limit| limit.supply_v);
         format!("{supply:.0} V: {words}")
     };
-    let (limited, free) = (label(0, "limited before"), label(1, "nothing limited"));
-    let entries = [
-        (free.as_str(), Key::Curve(strong)),
-        (limited.as_str(), Key::Curve(weak)),
-        ("direct current of both", Key::Curve(direct)),
-    ];
+    let words = [label(1, "quadrature"), label(0, "quadrature"), label(1, "direct"), label(0, "direct")];
+    let lines = [quadrature[1], quadrature[0], direct[1], direct[0]];
+    let entries: Vec<_> = words.iter().zip(lines).map(|(words, line)| (words.as_str(), line.key())).collect();
     legend(area, (LEFT, 35), &entries)?;
     let (_, cells) = area.split_vertically(px(HEAD));
     for (part, pair) in cells.split_evenly((1, 2)).iter().zip(report.limit.chunks(2)) {
-        let mut traces: Vec<_> = pair
-            .iter()
-            .zip([weak, strong])
-            .rev()
-            .map(|(limit, style)| Trace { time: &limit.time_ms, values: &limit.quadrature_a, style })
-            .collect();
-        for limit in pair {
-            traces.push(Trace { time: &limit.time_ms, values: &limit.direct_current_a, style: direct });
+        let mut traces = Vec::new();
+        // The wide curve lies below the thin one.
+        for (limit, line) in pair.iter().zip(quadrature).rev() {
+            traces.push(Trace { time: &limit.time_ms, values: &limit.quadrature_a, line });
+        }
+        for (limit, line) in pair.iter().zip(direct).rev() {
+            traces.push(Trace { time: &limit.time_ms, values: &limit.direct_current_a, line });
         }
         let speed = pair.first().map_or(0.0, |limit| limit.speed_rad_s);
-        frame(part, &format!("{speed:.0} rad/s"), "current, A", 2.5, &traces)?;
+        frame(part, &format!("rotor at {speed:.0} rad/s"), "current, A", 2.5, &traces)?;
     }
     Ok(())
 }
 
 fn regeneration(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, "A joint's inertia is braked: bus voltage and speed")?;
-    let styles = [thin(BLUE), thin(VERMILION)];
-    let released = line(DARK, 3);
+    let lines = [Line::solid(thin(BLUE)), Line::dashed(thin(VERMILION))];
+    let limit = Line::solid(line(DARK, 3));
     let border = f64::from(BUS[1].0);
-    let words = format!("{border:.0} V: released");
+    let words = format!("upper limit, {border:.0} V: outputs off");
     let entries = [
-        ("with chopper", Key::Curve(styles[0])),
-        ("without", Key::Curve(styles[1])),
-        (words.as_str(), Key::Curve(released)),
+        ("with chopper", lines[0].key()),
+        ("without, until the outputs are off", lines[1].key()),
+        (words.as_str(), limit.key()),
     ];
     legend(area, (LEFT, 35), &entries)?;
     let (_, cells) = area.split_vertically(px(HEAD));
@@ -141,22 +173,15 @@ fn regeneration(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingErro
     let [left, right] = parts.as_slice() else { return Ok(()) };
     let end =
         report.regeneration.iter().filter_map(|braking| braking.time_ms.last()).copied().fold(1.0, f64::max);
-    let mut bus: Vec<_> = report
-        .regeneration
-        .iter()
-        .zip(styles)
-        .map(|(braking, style)| Trace { time: &braking.time_ms, values: &braking.bus_v, style })
-        .collect();
+    let both = || report.regeneration.iter().zip(lines);
     let (ends, borders) = ([0.0, end], [border; 2]);
-    bus.push(Trace { time: &ends, values: &borders, style: released });
-    frame(left, "bus", "V", end, &bus)?;
-    let speed: Vec<_> = report
-        .regeneration
-        .iter()
-        .zip(styles)
-        .map(|(braking, style)| Trace { time: &braking.time_ms, values: &braking.speed_rad_s, style })
+    let mut bus = vec![Trace { time: &ends, values: &borders, line: limit }];
+    bus.extend(both().map(|(braking, line)| Trace { time: &braking.time_ms, values: &braking.bus_v, line }));
+    frame(left, "supply", "bus voltage, V", end, &bus)?;
+    let speed: Vec<_> = both()
+        .map(|(braking, line)| Trace { time: &braking.time_ms, values: &braking.speed_rad_s, line })
         .collect();
-    frame(right, "rotor", "rad/s", end, &speed)
+    frame(right, "rotor", "speed, rad/s", end, &speed)
 }
 
 fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
@@ -169,6 +194,7 @@ fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     )?;
     let (rms, sixth) = (thin(BLUE), thin(GREEN));
     legend(area, (LEFT, 35), &[("rms", Key::Curve(rms)), ("sixth harmonic", Key::Curve(sixth))])?;
+    text(area, (790, 35), 12, HPos::Left, "rms")?;
     let (_, area) = area.split_vertically(px(HEAD));
     let quiet: Vec<_> = report.ripple.iter().filter(|ripple| !ripple.noise).collect();
     let largest =
@@ -184,7 +210,8 @@ fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     }
     for (index, ripple) in quiet.iter().enumerate() {
         let y = 14 + 20 * index as i32;
-        let compensated = if ripple.compensated { "dead time given back" } else { "not given back" };
+        let compensated =
+            if ripple.compensated { "dead time compensated" } else { "dead time not compensated" };
         let words = format!("{:.0} rad/s, {} sine, {compensated}", ripple.speed_rad_s, ripple.sine);
         text(&area, (12, y), 12, HPos::Left, words)?;
         for (value, style, offset) in [(ripple.torque_percent, rms, -3), (ripple.sixth_percent, sixth, 3)] {

@@ -10,9 +10,9 @@ use plotters::prelude::{Cartesian2d, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, RGBColor};
 
+use super::super::precision::{sigma, value};
 use super::super::report::{BaseReport, RunReport};
-use super::super::tables::number;
-use super::canvas::{Area, DARK, DrawingError, GRID, font, line, px, text};
+use super::canvas::{Area, DARK, DrawingError, GRID, font, line, px, text, unit};
 
 pub const ONE_SIGMA: RGBColor = RGBColor(190, 205, 225);
 pub const THREE_SIGMA: RGBColor = RGBColor(228, 235, 244);
@@ -25,10 +25,10 @@ pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
         if base.value.known().is_none() {
             return NOT_DETERMINED.into();
         }
-        let (value, sigma) = (number(base.value), number(base.sigma));
-        let truth =
-            base.truth.known().map_or(String::new(), |truth| format!(", truth {}", number(truth.into())));
-        format!("{value} \u{b1} {sigma} {}{truth}", base.unit)
+        let (found, deviation) = (value(base.value, base.sigma), sigma(base.sigma));
+        let truth = base.truth.known().map(|truth| value(truth.into(), base.sigma));
+        let truth = truth.map_or(String::new(), |truth| format!(", truth {truth}"));
+        format!("{found} \u{b1} {deviation} {}{truth}", unit(base.unit))
     })
 }
 
@@ -37,7 +37,7 @@ pub fn small(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, format!("Base parameters: {}", what(run)))?;
     let (_, area) = area.split_vertically(px(30));
     dots(&area, run, (56, 136), &|base| match base.value.known() {
-        Some(_) => format!("{} {}", number(base.value), base.unit),
+        Some(_) => format!("{} {}", value(base.value, base.sigma), unit(base.unit)),
         None => NOT_DETERMINED.into(),
     })
 }
@@ -56,8 +56,8 @@ fn truth_is_known(run: &RunReport) -> bool {
 
 /// Standard deviation in percent of the value.
 fn uncertainty(base: &BaseReport) -> Option<f64> {
-    let (value, sigma) = (base.value.known()?, base.sigma.known().filter(|sigma| *sigma > 0.0)?);
-    Some(100.0 * sigma / value.abs())
+    let (found, deviation) = (base.value.known()?, base.sigma.known().filter(|sigma| *sigma > 0.0)?);
+    Some(100.0 * deviation / found.abs())
 }
 
 fn error(base: &BaseReport) -> Option<f64> {

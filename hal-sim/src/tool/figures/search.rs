@@ -6,8 +6,8 @@ use plotters::element::PathElement;
 use plotters::series::LineSeries;
 use plotters::style::text_anchor::HPos;
 
+use super::super::precision::plain;
 use super::super::series::Series;
-use super::super::tables::number;
 use super::canvas::{Area, DARK, DrawingError, GRID, Key, VERMILION, font, legend, line, px, text};
 
 /// Excesses below are drawn here, chi-square units: single precision of the cost hides what is smaller.
@@ -21,12 +21,12 @@ const GOAL: f64 = 0.5;
 pub fn whole(area: &Area<'_>, series: &Series) -> Result<(), DrawingError> {
     let floor = match series.floor_chi2 {
         Some(above) if above > SMALLEST_FLOOR => {
-            format!(" (J_C lies {} chi-square units above least squares)", number(above.into()))
+            format!(", which lies {} chi-square units above least squares", plain(above.into()))
         }
-        Some(_) => " (which is that of least squares here)".into(),
+        Some(_) => ", which is that of least squares here".into(),
         None => String::new(),
     };
-    let title = format!("Beetle swarm: cost J of its best above the optimum J_C of its box{floor}");
+    let title = format!("Beetle swarm: cost of its best above the optimum of its box{floor}");
     text(area, (12, 14), 13, HPos::Left, title)?;
     let entries = [
         ("swarm, cold start", Key::Curve(line(DARK, 6))),
@@ -59,7 +59,7 @@ pub fn whole(area: &Area<'_>, series: &Series) -> Result<(), DrawingError> {
         .label_style(font(12))
         .axis_desc_style(font(12))
         .x_desc("iterations")
-        .y_desc("J \u{2212} J_C, chi-square units")
+        .y_desc("cost \u{2212} optimum, chi-square units")
         .x_label_formatter(&|value| format!("{value:.0}"))
         .y_label_formatter(&|value| format!("1e{:.0}", value.log10()).replace('-', "\u{2212}"))
         .draw()?;

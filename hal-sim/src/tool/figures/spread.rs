@@ -4,14 +4,35 @@ use plotters::element::{Circle, PathElement};
 use plotters::style::Color;
 
 use super::super::spread::Spread;
-use super::canvas::{Area, BLUE, DARK, DrawingError, line, px};
-use super::parameters::{frame, labels, sigma_axis};
+use plotters::style::text_anchor::HPos;
+
+use super::canvas::{Area, BLUE, DARK, DrawingError, Key, legend, line, px, text};
+use super::parameters::{ONE_SIGMA, THREE_SIGMA, frame, labels, sigma_axis};
 
 /// More dots are a blot; what is said in numbers counts all.
 pub const LARGEST_RUNS: usize = 500;
 
+/// Up to so many runs have larger dots.
+const FEW_RUNS: usize = 100;
+
+/// Height of title and legend, pixels.
+pub const HEAD: u32 = 50;
+
 /// One row for each parameter, errors about truth in reported sigma.
-pub fn whole(area: &Area<'_>, spreads: &[Spread]) -> Result<(), DrawingError> {
+pub fn whole(area: &Area<'_>, leg: &str, spreads: &[Spread]) -> Result<(), DrawingError> {
+    let runs = spreads.iter().map(|spread| spread.errors.len()).max().unwrap_or(0);
+    let radius = if runs > FEW_RUNS { 1 } else { 2 };
+    let title = format!("{leg}: errors of the base parameters in {runs} runs, in units of each run's sigma");
+    text(area, (12, 14), 13, HPos::Left, title)?;
+    let entries = [
+        ("a run", Key::Dot(BLUE, radius)),
+        ("mean \u{b1} standard deviation", Key::Curve(line(DARK, 8))),
+        ("one sigma", Key::Field(ONE_SIGMA)),
+        ("three sigma", Key::Field(THREE_SIGMA)),
+    ];
+    legend(area, (90, 36), &entries)?;
+    let (_, area) = area.split_vertically(px(HEAD as i32));
+    let area = &area;
     let (rows, margins) = (spreads.len().max(1) as f64, (90, 200));
     let all = spreads.iter().flat_map(|spread| &spread.errors);
     let end = all.fold(3.5_f64, |largest, error| largest.max(error.abs())).min(20.0) + 0.3;
@@ -23,7 +44,7 @@ pub fn whole(area: &Area<'_>, spreads: &[Spread]) -> Result<(), DrawingError> {
         let lane = |run: usize| middle + 0.2 * (run % 3) as f64 - 0.2;
         let dots = spread.errors.iter().take(LARGEST_RUNS).enumerate();
         chart.draw_series(dots.map(|(run, error)| {
-            Circle::new((error.clamp(-end, end), lane(run)), px(1), BLUE.mix(0.5).filled())
+            Circle::new((error.clamp(-end, end), lane(run)), px(radius), BLUE.mix(0.5).filled())
         }))?;
         let (mean, deviation) = (spread.mean(), spread.deviation());
         let ends = [mean - deviation, mean + deviation].map(|at| (at.clamp(-end, end), middle));

@@ -6,6 +6,11 @@ use super::super::faults::report::CampaignReport;
 use super::super::figures::Figure;
 use super::{Circumstances, drawing, page_head};
 
+/// A number, a share or two numbers, which stay on one line.
+fn is_number(cell: &str) -> bool {
+    cell.chars().all(|letter| letter.is_ascii_digit() || " -/.%".contains(letter))
+}
+
 /// The whole page; `told` are lines about single runs.
 #[must_use]
 pub fn page(
@@ -29,14 +34,14 @@ pub fn page(
                     section {
                         h2 { "What was run" }
                         p { code { (circumstances.command) } }
-                        table {
-                            thead { tr { @for name in report.head() { th { (name) } } } }
+                        div.wide { table.any {
+                            thead { tr { @for name in report.head() { th scope="col" { (name) } } } }
                             tbody {
                                 @for row in &report.rows {
-                                    tr { @for cell in row.cells() { td { (cell) } } }
+                                    tr { @for cell in row.cells() { td.n[is_number(&cell)] { (cell) } } }
                                 }
                             }
-                        }
+                        } }
                     }
                     section {
                         h2 { "Notes" }

@@ -1,16 +1,17 @@
 //! What the page has no words of its own for: any key of the report's JSON, as a table.
 //!
-//! A number becomes a number, a list of objects a table with a column for each key, an object a table of two columns.
+//! A count stays a whole number, another number gets three digits. A list of objects becomes a table with a
+//! column for each key, an object a table of two columns.
 
 use maud::{Markup, html};
 use serde_json::{Map, Value};
 
 use super::super::error::ToolError;
 use super::super::report::{Number, RunReport};
-use super::number;
+use super::{number, typeset};
 
 /// Keys that the page shows in sections of their own.
-const KNOWN: [&str; 27] = [
+const KNOWN: [&str; 34] = [
     "schema",
     "leg",
     "seed",
@@ -38,6 +39,13 @@ const KNOWN: [&str; 27] = [
     "wall_s",
     "findings",
     "consistent",
+    "validated",
+    "drive",
+    "model_choice",
+    "asymmetric_coulomb",
+    "stribeck",
+    "outliers",
+    "compared",
 ];
 /// Nothing is nested deeper than this on the page.
 const DEEPEST: usize = 3;
@@ -85,7 +93,7 @@ pub fn content(value: &Value, depth: usize) -> Markup {
     match value {
         Value::Array(items) if depth < DEEPEST && items.iter().any(Value::is_object) => rows(items, depth),
         Value::Object(keys) if depth < DEEPEST => html! {
-            div.wide { table {
+            div.wide { table.any {
                 @for (key, value) in keys {
                     tr { th scope="row" { (words(key)) } td { (content(value, depth + 1)) } }
                 }
@@ -98,7 +106,8 @@ pub fn content(value: &Value, depth: usize) -> Markup {
                 (content(item, DEEPEST))
             }
         },
-        Value::Number(value) => html! { (number(Number(value.as_f64()))) },
+        Value::Number(value) if value.is_f64() => html! { (number(Number(value.as_f64()))) },
+        Value::Number(count) => html! { (typeset(&count.to_string())) },
         Value::String(text) => html! { (text) },
         Value::Bool(true) => html! { "yes" },
         Value::Bool(false) => html! { "no" },
@@ -117,7 +126,7 @@ fn rows(items: &[Value], depth: usize) -> Markup {
     let is_number =
         |column: &str| items.iter().all(|item| item.get(column).is_none_or(|v| v.is_number() || v.is_null()));
     html! {
-        div.wide { table {
+        div.wide { table.any {
             thead { tr { @for column in &columns { th.n[is_number(column)] scope="col" { (words(column)) } } } }
             tbody { @for item in items {
                 tr { @for column in &columns {
@@ -137,7 +146,7 @@ mod tests {
     fn a_key_nobody_foresaw_is_shown_with_its_names_units_and_numbers() {
         let value = json!({"replaced": [3, 0], "longest_s": 0.25, "joints": [{"joint": 1, "note": "<b>"}, {"joint": 2}]});
         let shown = section("outliers", &value).into_string();
-        for part in ["<h2>Outliers</h2>", "Longest, s", "0.2500", "3.000, 0", "&lt;b&gt;", "\u{2013}"] {
+        for part in ["<h2>Outliers</h2>", "Longest, s", "0.250", "3, 0", ">1<", "&lt;b&gt;", "\u{2013}"] {
             assert!(shown.contains(part), "{part}: {shown}");
         }
         assert!(!shown.contains("<b>"));

@@ -2,8 +2,9 @@
 
 use maud::{Markup, html};
 
+use super::super::leg_file::LegFile;
 use super::super::report::{FitReport, RunReport};
-use super::{Circumstances, number, signed};
+use super::{Circumstances, exact, joint_name, number, signed};
 
 /// Name of the leg and date.
 pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
@@ -25,7 +26,7 @@ pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
 pub fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
     let leg = &circumstances.leg;
     let joints: Vec<&str> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
-    let gravity: Vec<String> = leg.gravity.iter().map(|element| number((*element).into())).collect();
+    let gravity: Vec<String> = leg.gravity.iter().map(|element| exact((*element).into())).collect();
     let rows = [
         ("Leg", format!("{}: {}", run.leg, joints.join(", "))),
         ("Gravity in the base frame", format!("{} m/s\u{b2}", gravity.join(", "))),
@@ -52,18 +53,29 @@ pub fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
         ),
         ("Version", format!("scarab {}, report schema {}", env!("CARGO_PKG_VERSION"), run.schema)),
     ];
+    let drives = run.drive.map(|name| ("Drive", drive(name)));
     html! {
         section {
             h2 { "What was run" }
             dl.facts {
-                @for (name, value) in rows { div { dt { (name) } dd { (value) } } }
+                @for (name, value) in rows.into_iter().chain(drives) { div { dt { (name) } dd { (value) } } }
                 div.command { dt { "Command" } dd { code { (circumstances.command) } } }
             }
         }
     }
 }
 
-fn prior(name: &str) -> String {
+/// Words for the simulated drives.
+pub fn drive(name: &str) -> String {
+    match name {
+        "ideal" => "simulated; currents follow their targets with a lag".into(),
+        "full" => "simulated with motors, inverters, current and angle sensors, supply".into(),
+        _ => name.into(),
+    }
+}
+
+/// Words for a prior.
+pub fn prior(name: &str) -> String {
     match (name, name.strip_prefix("wrong:")) {
         ("none", _) => "none".into(),
         ("file", _) => "the leg file's".into(),
@@ -73,12 +85,12 @@ fn prior(name: &str) -> String {
 }
 
 /// The worst of each kind, and its motion.
-pub fn numbers(run: &RunReport) -> Markup {
+pub fn numbers(run: &RunReport, leg: &LegFile) -> Markup {
     let worst = |value: &dyn Fn(&FitReport) -> Option<f64>| -> Option<(f64, String)> {
         let known = run
             .validation
             .iter()
-            .filter_map(|fit| Some((value(fit)?, format!("{}, joint {}", fit.motion, fit.joint))));
+            .filter_map(|fit| Some((value(fit)?, format!("{}, {}", fit.motion, joint_name(leg, fit.joint)))));
         known.max_by(|one, other| one.0.total_cmp(&other.0))
     };
     let percent = |found: Option<(f64, String)>| match found {

@@ -29,7 +29,7 @@ pub fn section(run: &RunReport) -> Markup {
                     li { strong { "Prior: " } (prior.join(", ")) ". Torque does not see them, or they were not estimated." }
                 }
                 @if !weak.is_empty() {
-                    li { strong { "Weak: " } (weak.join(", ")) ". Measured, but hardly told from the others on this motion." }
+                    li { strong { "Weak: " } (weak.join(", ")) ". Measured, but hardly distinguishable from the others on this motion." }
                 }
                 @if run.scale.scale == "absolute" {
                     li { strong { "Scale: " } "told by the known mass of a second run, not by this motion." }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::super::leg_file::LegFile;
 use super::super::report::{Number, ParameterReport, RunReport};
-use super::{number, signed, unit};
+use super::{exact, measured, sigma, signed, unit};
 
 /// Width and height of a bar, pixels.
 const BAR: (f64, f64) = (150.0, 16.0);
@@ -25,19 +25,19 @@ pub fn base(run: &RunReport) -> Markup {
                 th scope="col" { "sum of" }
             } }
             tbody { @for base in &run.base_parameters {
-                @let sigma = base.sigma.known().filter(|sigma| *sigma > 0.0);
-                @let off = base.value.known().zip(base.truth.known()).zip(sigma);
+                @let deviation = base.sigma.known().filter(|sigma| *sigma > 0.0);
+                @let off = base.value.known().zip(base.truth.known()).zip(deviation);
                 tr {
                     th scope="row" { (base.name) }
-                    td.n { (number(base.value)) } td.n { (number(base.sigma)) } td { (unit(base.unit)) }
+                    td.n { (measured(base.value, base.sigma)) } td.n { (sigma(base.sigma)) } td { (unit(base.unit)) }
                     @if known {
-                        td.n { (number(base.truth)) }
+                        td.n { (measured(base.truth, base.sigma)) }
                         td.n { @match off {
                             Some(((value, truth), sigma)) => { (signed((value - truth) / sigma)) },
                             None => { "\u{2013}" },
                         } }
                     }
-                    @if bounded { td.n { (number(Number(base.cramer_rao.known().filter(|bound| *bound > 0.0)))) } }
+                    @if bounded { td.n { (sigma(Number(base.cramer_rao.known().filter(|bound| *bound > 0.0)))) } }
                     td.terms { (terms(&base.terms)) }
                 }
             } }
@@ -57,7 +57,7 @@ fn terms(terms: &std::collections::BTreeMap<String, f64>) -> String {
         }
         // A factor of one that was computed is one to rounding.
         if (factor.abs() - 1.0).abs() > 1e-9 {
-            sum += &format!("{}\u{a0}", number(factor.abs().into()));
+            sum += &format!("{}\u{a0}", exact(factor.abs().into()));
         }
         sum += name;
     }
@@ -72,10 +72,10 @@ pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
         h3 { "All parameters" }
         p { span.badge.identified { "identified" } " measured alone. " span.badge.grouped { "grouped" }
             " only sums with the parameters beside it are measured, the prior splits them. " span.badge.weak { "weak" }
-            " measured, hardly told from others. " span.badge.prior { "prior" } " does not show in the torque." }
+            " measured, hardly distinguishable from others. " span.badge.prior { "prior" } " does not show in the torque." }
         p.note { "Bars, each row on its own scale: dot the value, thick one sigma, thin three; hollow where no sigma is known. "
             span.truth-key { "\u{25c6}" } " truth" @if !truth { " (not known here)" } ", "
-            span.prior-key { "\u{25b2}" } " prior, at the edge where it lies beyond." }
+            span.prior-key { "\u{25b2}" } " prior, at the edge where it lies beyond. Values have the digits that sigma supports, three without sigma." }
         @for joint in 1..=joints {
             h4 { "Joint " (joint) @if let Some(file) = leg.joints.get(joint - 1) { ": " (file.name) } }
             div.wide { table.parameters {
@@ -88,10 +88,10 @@ pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
                 tbody { @for parameter in run.parameters.iter().filter(|parameter| parameter.joint == joint) {
                     tr {
                         th scope="row" { (parameter.name) }
-                        td.n { (number(parameter.value)) } td.n { (number(parameter.sigma)) } td { (unit(parameter.unit)) }
+                        td.n { (measured(parameter.value, parameter.sigma)) } td.n { (sigma(parameter.sigma)) } td { (unit(parameter.unit)) }
                         td { span class={ "badge " (parameter.status) } { (parameter.status) } }
                         td.bar { (bar(parameter)) }
-                        @if truth { td.n { (number(parameter.truth)) } }
+                        @if truth { td.n { (measured(parameter.truth, parameter.sigma)) } }
                         td.terms { (parameter.grouped_with.join(", ")) }
                     }
                 } }
@@ -130,7 +130,12 @@ fn bar(parameter: &ParameterReport) -> Markup {
                 stroke-width=(thickness) {}
         } }
     };
-    let words = format!("{} {} \u{b1} {}", parameter.name, number(parameter.value), number(parameter.sigma));
+    let words = format!(
+        "{} {} \u{b1} {}",
+        parameter.name,
+        measured(parameter.value, parameter.sigma),
+        sigma(parameter.sigma)
+    );
     html! {
         svg.bar width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } role="img" aria-label=(words) {
             line.axis x1="0" x2=(width) y1=(middle) y2=(middle) {}

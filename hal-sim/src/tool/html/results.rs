@@ -2,10 +2,12 @@
 
 use maud::{Markup, html};
 
+use super::super::leg_file::LegFile;
 use super::super::replay::Source;
 use super::super::report::{ConsistentSearchReport, FitReport, Number, RunReport};
 use super::super::scale;
-use super::number;
+use super::super::series::Role;
+use super::{joint_name, number};
 
 /// Files of a replay.
 pub fn sources(sources: &[Source]) -> Markup {
@@ -63,12 +65,18 @@ pub fn residual_words() -> Markup {
 }
 
 /// How well every motion is explained.
-pub fn fits(run: &RunReport) -> Markup {
+pub fn fits(run: &RunReport, leg: &LegFile) -> Markup {
     let all = || run.training.iter().chain(&run.validation);
     let truth = all().any(|fit| fit.percent_of_mean_abs_vs_truth.known().is_some());
-    let row = |fit: &FitReport, role: &str| {
+    // Figures name the motion identified from like this, too.
+    let is_recorded = run.seed.is_none() && run.trace.is_none();
+    let motion = |fit: &FitReport, role: Role| match role {
+        Role::Training if !is_recorded => "excitation".to_owned(),
+        _ => fit.motion.clone(),
+    };
+    let row = |fit: &FitReport, role: Role| {
         html! { tr {
-            td { (fit.motion) } td { (role) } td.n { (fit.joint) }
+            td { (motion(fit, role)) } td { (role.name()) } td { (joint_name(leg, fit.joint)) }
             td.n { (number(fit.rms_nm)) } td.n { (number(fit.percent_of_mean_abs)) } td.n { (number(fit.percent_of_rms)) }
             td.n { (number(Number(fit.disturbed_share.known().map(|share| 100.0 * share)))) }
             @if truth {
@@ -81,14 +89,14 @@ pub fn fits(run: &RunReport) -> Markup {
         h3 { "Torque errors" }
         div.wide { table {
             thead { tr {
-                th scope="col" { "motion" } th scope="col" { "use" } th.n scope="col" { "joint" }
+                th scope="col" { "motion" } th scope="col" { "use" } th scope="col" { "joint" }
                 th.n scope="col" { "rms, N\u{a0}m" } th.n scope="col" { "% of mean abs" } th.n scope="col" { "% of rms" }
                 th.n scope="col" { "set aside, %" }
                 @if truth { th.n scope="col" { "% of mean abs, noise-free" } th.n scope="col" { "sticking, %" } }
             } }
             tbody {
-                @for fit in &run.training { (row(fit, "training")) }
-                @for fit in &run.validation { (row(fit, "validation")) }
+                @for fit in &run.training { (row(fit, Role::Training)) }
+                @for fit in &run.validation { (row(fit, Role::Validation)) }
             }
         } }
     }
@@ -140,7 +148,7 @@ pub fn consistent(run: &RunReport) -> Markup {
     };
     html! {
         section {
-            h2 { "Legs that can exist" }
+            h2 { "Physically consistent legs" }
             p { "Of all legs whose every link has a mass above zero and an inertia that some body has, within the prior's \
                 limits, the best costs " (number(found.optimum_over_least_squares)) " chi-square units more than least squares, \
                 the result " (number(found.result_over_least_squares)) "."
@@ -149,7 +157,7 @@ pub fn consistent(run: &RunReport) -> Markup {
                 thead { tr {
                     th scope="col" { "search" } th.n scope="col" { "iterations" } th.n scope="col" { "evaluations" }
                     th.n scope="col" { "completion steps" } th.n scope="col" { "excess, chi-square units" }
-                    th.n scope="col" { "iterations to half a unit" } th scope="col" { "can exist" }
+                    th.n scope="col" { "iterations to half a unit" } th scope="col" { "consistent" }
                 } }
                 tbody {
                     (row("base values, completed by the prior", "base", &found.base))
@@ -161,7 +169,7 @@ pub fn consistent(run: &RunReport) -> Markup {
 }
 
 /// What the model is worth to the servo.
-pub fn tracking(run: &RunReport) -> Markup {
+pub fn tracking(run: &RunReport, leg: &LegFile) -> Markup {
     html! {
         section {
             h2 { "Tracking" }
@@ -169,13 +177,13 @@ pub fn tracking(run: &RunReport) -> Markup {
                 feedforward." }
             div.wide { table {
                 thead { tr {
-                    th.n scope="col" { "joint" } th.n scope="col" { "without the model, deg rms" }
+                    th scope="col" { "joint" } th.n scope="col" { "without the model, deg rms" }
                     th.n scope="col" { "with it, deg rms" } th.n scope="col" { "smaller by" }
                 } }
                 tbody { @for tracking in &run.tracking {
                     @let ratio = tracking.rms_deg_without_model.known().zip(tracking.rms_deg_with_model.known());
                     tr {
-                        td.n { (tracking.joint) }
+                        td { (joint_name(leg, tracking.joint)) }
                         td.n { (number(tracking.rms_deg_without_model)) } td.n { (number(tracking.rms_deg_with_model)) }
                         td.n { @match ratio {
                             Some((without, with)) if with > 0.0 => { (format!("{:.1} times", without / with)) },

@@ -5,9 +5,13 @@ use maud::{DOCTYPE, Markup, html};
 use super::super::error::ToolError;
 use super::super::figures::Figure;
 use super::super::findings::FindingReport;
+use super::super::leg_file::LegFile;
 use super::super::report::RunReport;
 use super::super::spread::Spread;
-use super::{Circumstances, count, drawing, number, page_head, signed, unit, verdict};
+use super::{
+    Circumstances, count, drawing, head, joint_name, measured, number, page_head, sigma, signed, unit,
+    verdict,
+};
 
 /// The page of runs that differ in their seed.
 pub fn page(
@@ -34,14 +38,15 @@ pub fn page(
                         h2 { "What was run" }
                         dl.facts {
                             div { dt { "Noise seeds" } dd { (seeds(runs)) } }
-                            div { dt { "Prior" } dd { (first.prior) } }
+                            div { dt { "Prior" } dd { (head::prior(&first.prior)) } }
                             div { dt { "Plan" } dd { (first.plan) } }
+                            @if let Some(drive) = first.drive { div { dt { "Drive" } dd { (head::drive(drive)) } } }
                             div.command { dt { "Command" } dd { code { (circumstances.command) } } }
                         }
                     }
                     section { h2 { "Parameters" } (parameters(spreads)) (drawing(figure)) }
-                    section { h2 { "Torque on unused motions" } (torque(runs)) }
-                    (verdict::tests(&findings))
+                    section { h2 { "Torque on unused motions" } (torque(runs, &circumstances.leg)) }
+                    (verdict::tests(&findings, &circumstances.leg))
                     footer { p { "Made by Scarab " (env!("CARGO_PKG_VERSION")) ". Values are SI; sigma is one standard deviation, of \
                         the torque's noise alone." } }
                 }
@@ -103,17 +108,17 @@ fn parameters(spreads: &[Spread]) -> Markup {
             } }
             tbody { @for spread in spreads { tr {
                 th scope="row" { (spread.name) }
-                td.n { (number(spread.truth.into())) } td.n { (number(spread.sigma.into())) } td { (unit(spread.unit)) }
+                td.n { (measured(spread.truth.into(), spread.sigma.into())) } td.n { (sigma(spread.sigma.into())) } td { (unit(spread.unit)) }
                 td.n { (signed(spread.mean())) } td.n { (format!("{:.2}", spread.deviation())) }
                 td.n { (percent(spread.within(1.0))) } td.n { (percent(spread.within(3.0))) }
-                td.n { (number(spread.over_bound.into())) } td.n { (spread.errors.len()) }
+                td.n { @match spread.over_bound { Some(ratio) => { (format!("{ratio:.2}")) }, None => { "\u{2013}" } } } td.n { (spread.errors.len()) }
             } } }
         } }
     }
 }
 
 /// Median and worst of each joint on each motion, against the noise-free torque.
-fn torque(runs: &[RunReport]) -> Markup {
+fn torque(runs: &[RunReport], leg: &LegFile) -> Markup {
     let mut cases: Vec<(&str, usize)> = Vec::new();
     for fit in runs.iter().flat_map(|run| &run.validation) {
         if !cases.contains(&(fit.motion.as_str(), fit.joint)) {
@@ -131,12 +136,12 @@ fn torque(runs: &[RunReport]) -> Markup {
         p { "Error of the filtered torque against the noise-free one, percent of the motion's mean absolute torque." }
         div.wide { table {
             thead { tr {
-                th scope="col" { "motion" } th.n scope="col" { "joint" } th.n scope="col" { "median" } th.n scope="col" { "worst" }
+                th scope="col" { "motion" } th scope="col" { "joint" } th.n scope="col" { "median" } th.n scope="col" { "worst" }
             } }
             tbody { @for case in cases {
                 @let errors = errors(case);
                 tr {
-                    th scope="row" { (case.0) } td.n { (case.1) }
+                    th scope="row" { (case.0) } td { (joint_name(leg, case.1)) }
                     td.n { (number(errors.get(errors.len() / 2).copied().into())) } td.n { (number(errors.last().copied().into())) }
                 }
             } }

@@ -3,9 +3,10 @@
 use maud::{Markup, html};
 
 use super::super::findings::FindingReport;
+use super::super::leg_file::LegFile;
 use super::super::report::{Number, RunReport};
 use super::super::tables;
-use super::{count, number};
+use super::{count, exact, joint_name, number};
 
 /// The verdict, large and in words, with each reason and what it was measured against.
 pub fn banner(run: &RunReport) -> Markup {
@@ -93,11 +94,14 @@ fn meaning(test: &str) -> (bool, &str) {
         "link_length" => (false, "share by which the link before seems longer"),
         "encoder_zero" => (false, "angle by which the zero seems off, rad"),
         "common_disturbance" => (false, "time for which all joints missed together, s"),
-        "replaced_share" => (false, "share of samples that were wild and replaced"),
-        "disturbed_share" => (false, "share of rows that was set aside as disturbed"),
+        "replaced_share" => (false, "share of samples replaced as outliers"),
+        "disturbed_share" => (false, "share of rows set aside as disturbed"),
         _ => (false, ""),
     }
 }
+
+/// Tests whose value is 1 where they passed, else 0.
+const YES_OR_NO: [&str; 2] = ["search", "drive"];
 
 /// How near a test came to its limit: 1 at it.
 fn nearness(finding: &FindingReport) -> f64 {
@@ -109,7 +113,7 @@ fn nearness(finding: &FindingReport) -> f64 {
 }
 
 /// Every kind of test, with the case that came nearest to its limit.
-pub fn tests(findings: &[FindingReport]) -> Markup {
+pub fn tests(findings: &[FindingReport], leg: &LegFile) -> Markup {
     let mut kinds: Vec<(&str, &str)> = Vec::new();
     for finding in findings {
         if !kinds.contains(&(finding.reason, finding.test)) {
@@ -126,13 +130,13 @@ pub fn tests(findings: &[FindingReport]) -> Markup {
                     th scope="col" { "against" } th scope="col" { "what is tested" } th.n scope="col" { "value" }
                     th.n scope="col" { "limit" } th scope="col" { "where" } th.n scope="col" { "passed" }
                 } }
-                tbody { @for kind in kinds { (row(findings, kind)) } }
+                tbody { @for kind in kinds { (row(findings, kind, leg)) } }
             } }
         }
     } }
 }
 
-fn row(findings: &[FindingReport], (reason, test): (&str, &str)) -> Markup {
+fn row(findings: &[FindingReport], (reason, test): (&str, &str), leg: &LegFile) -> Markup {
     let of_kind = || findings.iter().filter(|finding| (finding.reason, finding.test) == (reason, test));
     let (all, passed) = (of_kind().count(), of_kind().filter(|finding| finding.passed).count());
     let nearest = of_kind().max_by(|one, other| {
@@ -145,8 +149,12 @@ fn row(findings: &[FindingReport], (reason, test): (&str, &str)) -> Markup {
     html! { @if let Some(nearest) = nearest {
         tr.failed[passed < all] {
             td { (reason.replace('_', " ")) } td.what { (words) }
-            td.n { (whole(nearest.value)) } td.n { (if least { "\u{2265}\u{a0}" } else { "\u{2264}\u{a0}" }) (whole(nearest.limit)) }
-            td { (place(nearest)) }
+            @if YES_OR_NO.contains(&test) {
+                td.n { (if nearest.passed { "yes" } else { "no" }) } td.n { "yes" }
+            } @else {
+                td.n { (whole(nearest.value)) } td.n { (if least { "\u{2265}\u{a0}" } else { "\u{2264}\u{a0}" }) (exact(nearest.limit)) }
+            }
+            td { (place(nearest, leg)) }
             td.n { (passed) " of " (all) }
         }
     } }
@@ -163,8 +171,8 @@ fn whole(value: Number) -> String {
     }
 }
 
-fn place(finding: &FindingReport) -> String {
-    let joint = finding.joint.map(|joint| format!("joint {joint}"));
+fn place(finding: &FindingReport, leg: &LegFile) -> String {
+    let joint = finding.joint.map(|joint| joint_name(leg, joint));
     let parts: Vec<String> = joint.into_iter().chain(finding.motion.clone()).collect();
     parts.join(", ")
 }

@@ -5,8 +5,8 @@ use scarab::model::Payload;
 use serde::Serialize;
 
 use super::super::pair::Context;
+use super::super::precision::{exact, sigma, value};
 use super::super::report::{Number, RunReport};
-use super::super::tables::number;
 use super::Scale;
 
 /// What the parameters of a run are measured in, and what the leg carried.
@@ -129,13 +129,13 @@ pub fn lines(run: &RunReport) -> Vec<String> {
 }
 
 fn constant(joint: &TorqueConstantReport) -> String {
-    let used = number(joint.used);
+    let used = exact(joint.used);
     match (joint.identified.known(), joint.consistent) {
         (Some(_), Some(consistent)) => format!(
             "joint {} used {used}, identified {} +- {}{}",
             joint.joint,
-            number(joint.identified),
-            number(joint.sigma),
+            value(joint.identified, joint.sigma),
+            sigma(joint.sigma),
             match (consistent, joint.told) {
                 (false, _) => " (contradicted)",
                 (true, false) => " (too light a mass to tell)",
@@ -159,19 +159,19 @@ pub fn summary(runs: &[RunReport]) -> Vec<String> {
                 .iter()
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| (least.min(*value), most.max(*value)));
             let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-            let sigma = found.iter().filter_map(|joint| joint.sigma.known()).sum::<f64>() / values.len().max(1) as f64;
+            let deviation = found.iter().filter_map(|joint| joint.sigma.known()).sum::<f64>() / values.len().max(1) as f64;
             let contradicted = found.iter().filter(|joint| joint.consistent == Some(false)).count();
             (!values.is_empty()).then(|| {
                 format!(
                     "torque constant of joint {}, N m/A: identified {} on average ({} to {} in {} runs), sigma {}; used \
                      {}; contradicted in {contradicted}",
                     joint + 1,
-                    number(mean.into()),
-                    number(least.into()),
-                    number(most.into()),
+                    value(mean.into(), deviation.into()),
+                    value(least.into(), deviation.into()),
+                    value(most.into(), deviation.into()),
                     values.len(),
-                    number(sigma.into()),
-                    number(found.first().map_or(Number::UNKNOWN, |joint| joint.used)),
+                    sigma(deviation.into()),
+                    exact(found.first().map_or(Number::UNKNOWN, |joint| joint.used)),
                 )
             })
         })
