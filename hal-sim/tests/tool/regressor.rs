@@ -1,6 +1,7 @@
 //! `scarab-sim regressor` against torques and regressors of an independent rigid-body library.
 
 use crate::command::{Folder, Table, scarab};
+use scarab::real::sin_cos;
 use serde_json::Value;
 use std::io::Read;
 use std::process::{Command, Stdio};
@@ -115,6 +116,9 @@ fn angles_are_anatomical_unless_they_are_said_to_be_dh() {
     };
     let short = "q1,q2,qd1,qd2,qdd1,qdd2";
     let dh = printed("--dh", short, chain);
+    // A moment of mass along the first link hangs straight down where its D-H angle is 0.
+    let gravity = 9.81 * sin_cos(zero - angles[0]).0;
+    assert!((dh.column("y1_HX1")[0] - gravity).abs() < 1e-12, "{gravity}");
     // The names of a recording's columns are known too.
     for header in [short, "q1_rad,q2_rad,qd1_radps,qd2_radps,qdd1_radps2,qdd2_radps2"] {
         let own = printed("", header, anatomical);
