@@ -17,7 +17,7 @@ pub use can::{Controller, Frame};
 /// PWM periods per second, and so samples and commands of one axis.
 pub const CURRENT_RATE_HZ: u32 = 24_000;
 
-/// Clock of the timers that drive the bridges and trigger the shunts' converters [Hz].
+/// Clock of the timers that drive the bridges and trigger the shunts' converters, Hz.
 pub const BRIDGE_CLOCK_HZ: u32 = 168_000_000;
 
 /// Trigger of the shunts' converters [timer clocks after the middle of the lower zero vector, negative before it].

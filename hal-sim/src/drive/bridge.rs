@@ -123,7 +123,7 @@ impl Bridge {
         (self.enabled && !leg.high && leg.conducts_from <= now).then_some(now - leg.conducts_from)
     }
 
-    /// Rising less falling edges between two instants of the period [s]. An edge takes as long as the dead time: which end
+    /// Rising less falling edges between two instants of the period, s. An edge takes as long as the dead time: which end
     /// of it the output switches at depends on the current.
     #[must_use]
     pub fn edges(&self, from: f64, to: f64) -> i32 {

@@ -90,7 +90,7 @@ impl Default for ShuntDescription {
 }
 
 impl ShuntDescription {
-    /// From the middle of the lower zero vector to the hold [s], for a trigger so many timer clocks after that middle:
+    /// From the middle of the lower zero vector to the hold, s, for a trigger so many timer clocks after that middle:
     /// the converter samples for three of its clocks of 21 MHz.
     #[must_use]
     pub fn delay_of(trigger_clocks: f64) -> f64 {
@@ -101,9 +101,9 @@ impl ShuntDescription {
 /// Disturbance of an axis' shunts by the edges of other axes' bridges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingDescription {
-    /// Added to the current that is read for each rising edge in the window, subtracted for each falling one [A].
+    /// Added to the current that is read for each rising edge in the window, subtracted for each falling one, A.
     pub ampere_per_edge: f64,
-    /// Time before the converter holds in which an edge disturbs [s].
+    /// Time before the converter holds in which an edge disturbs, s.
     pub window: f64,
 }
 

@@ -29,9 +29,9 @@ pub struct ShuntState {
     pub current: f64,
     /// Its change, A/s.
     pub slope: f64,
-    /// Time for which the low side has been conducting [s]; 0 if it does not.
+    /// Time for which the low side has been conducting, s; 0 if it does not.
     pub conducting: f64,
-    /// Added to what is seen by the edges of other bridges [A].
+    /// Added to what is seen by the edges of other bridges, A.
     pub disturbance: f64,
 }
 

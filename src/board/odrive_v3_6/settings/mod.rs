@@ -59,7 +59,7 @@ impl Write {
 
 /// The processor's clock, Hz: 8 MHz / 4 * 168 / 2 (`Board/v3/Src/main.c:177-182`).
 pub const CLOCK_HZ: u32 = 168_000_000;
-/// Clock of the timers on APB2 (TIM1, TIM8) [Hz].
+/// Clock of the timers on APB2 (TIM1, TIM8), Hz.
 pub const FAST_TIMER_HZ: u32 = crate::hal::BRIDGE_CLOCK_HZ;
 /// Of the timers on APB1 (TIM2 to TIM5), Hz.
 pub const SLOW_TIMER_HZ: u32 = 84_000_000;
