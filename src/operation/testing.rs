@@ -111,9 +111,9 @@ pub(super) struct Stop<const N: usize> {
     pub signals: Rc<Signals<N>>,
     /// Accesses before it.
     pub after: u32,
-    /// It waits for the end of a masked step.
+    /// The stop waits for the end of a masked step.
     pub pending: bool,
-    /// It was handled.
+    /// The stop was handled.
     pub handled: bool,
     /// Bridges were switched on after that.
     pub enabled_since: bool,

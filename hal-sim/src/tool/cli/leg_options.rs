@@ -58,7 +58,7 @@ impl LegOptions {
         self.set(LegFile::load(self.name())?)
     }
 
-    /// The same for an image, whose leg file has to state what the machine is like.
+    /// Loads the leg of an image; its file has to state every key of the machine.
     pub fn load_for_image(&self) -> Result<LegFile, ToolError> {
         self.set(LegFile::load_for_image(self.name(), self.side.is_some())?)
     }

@@ -104,7 +104,7 @@ impl<const N: usize, const B: usize> Rig<N, B> {
         })
     }
 
-    /// The same on a bus.
+    /// A board as [`Self::new`] makes it, on a bus.
     pub fn on_a_bus(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
         let mut rig = Self::new(leg, context, seed)?;
         rig.board.join_bus(&rig.leg, Following::new(&context.configuration));

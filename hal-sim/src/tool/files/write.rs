@@ -49,7 +49,7 @@ impl NewFile {
         let folder = folder_of(&place);
         std::fs::create_dir_all(&folder).map_err(cannot)?;
         let (temporary, file) = temporary_in(&folder).map_err(cannot)?;
-        // Who could read the file before can read it afterwards.
+        // The permissions of the file stay as they were.
         if let Ok(metadata) = place.metadata() {
             let _ = file.set_permissions(metadata.permissions());
         }

@@ -59,7 +59,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// It is a queue's remainder by its capacity.
+    /// Remainder of a queue's index by its capacity.
     fn is_of_a_queue(&self) -> bool {
         let [begin, end] = QUEUE;
         self.file.starts_with(begin) && self.file.ends_with(end)

@@ -82,7 +82,7 @@ impl Scene {
         scene
     }
 
-    /// The same board once more; `stop` is placed so many accesses from now.
+    /// A copy of the board; `stop` is placed so many accesses from now.
     fn with_stop(&self, after: u32) -> Self {
         let signals = Rc::new(Signals::clone(&self.signals));
         let mut hardware = TestHardware::new();
