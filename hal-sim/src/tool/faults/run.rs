@@ -296,6 +296,8 @@ impl<'a, const B: usize> Watched<'a, B> {
         }
         let safe = self.rig.period;
         let alarm = self.rig.alarm();
+        // What comes to be a fault while the machine is only watched on is not this run's.
+        let onset = self.onset;
         if let (Some(state), Some(code)) = (seen, alarm) {
             self.judge(state, code);
         }
@@ -306,14 +308,14 @@ impl<'a, const B: usize> Watched<'a, B> {
         }
         // What came before there was anything to see is only this row's if its own detectors spoke.
         let own = alarm.is_none_or(|code| self.row.codes.contains(&code));
-        let early = self.onset.is_none() && !own;
+        let early = onset.is_none() && !own;
         let elsewhere = !early && seen.is_some_and(|state| !self.leads_to(state));
         false_alarm |= self.is_only_pushed() && alarm.is_some_and(|code| !self.tells_of_a_push(code));
         let alarm = alarm.map(FaultCode::name);
-        let onset = self.onset.map_or(safe, |onset| onset.min(safe));
-        let after_ms = seen.map(|_| (safe - onset) as f64 * PERIOD_MS);
+        let begun = onset.map_or(safe, |onset| onset.min(safe));
+        let after_ms = seen.map(|_| (safe - begun) as f64 * PERIOD_MS);
         let in_time = after_ms.is_some_and(|after| after <= self.deadline_ms() + 1e-9);
-        let nothing_came = self.onset.is_none() && (seen.is_none() || early);
+        let nothing_came = onset.is_none() && (seen.is_none() || early);
         let stood = self.row.deadline_ms.is_infinite() && !self.has_turned();
         let in_time = in_time && !early && !elsewhere;
         let undetectable = !in_time && !elsewhere && (self.scenario.by_design || nothing_came || stood);

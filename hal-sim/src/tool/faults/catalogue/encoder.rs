@@ -149,4 +149,28 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_run_whose_fault_begins_after_its_end_is_not_missed() {
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let [.., mut moving] = machines(&leg);
+        let speed = |rig: &Rig<JOINTS, BASE>| rig.world.velocity()[0].abs();
+        // A joint that gets faster: 20 ms later it passes the speed from which this fault is one.
+        let (slow, fast) = loop {
+            let slow = moving.clone();
+            (0..PERIODS_PER_S / 50).for_each(|_| moving.advance());
+            if speed(&moving) > speed(&slow) + 0.02 {
+                break (slow, speed(&moving));
+            }
+        };
+        let scenario = |patience| Scenario {
+            onset: Onset::Driven { speed: fast - 0.01, per_ampere: 0.0, current: 0.0 },
+            patience,
+            ..one(at(Channel::Index, 0, Form::Off, Timing::from(u64::MAX)), Expected::Brake)
+        };
+        for (patience, undetectable) in [(1, true), (PERIODS_PER_S / 20, false)] {
+            let outcome = run(&leg, &ROWS[0], &scenario(patience), 1, Manner::default(), &slow);
+            assert_eq!((outcome.detected, outcome.undetectable), (false, undetectable), "{patience}");
+        }
+    }
 }
