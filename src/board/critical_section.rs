@@ -1,7 +1,7 @@
 //! Critical sections that mask everything but the current loops and the servo.
 //!
 //! Why not the processor's global mask: one record to the probe holds a critical section for up to 5,000 instructions, and
-//! the current loop runs every 10 us. With a floor under the priorities it never waits. The price is a rule: what runs
+//! a current tick comes every 20.8 us. With a floor under the priorities it never waits. The price is a rule: what runs
 //! at levels 0 and 1, and above, must not use anything that relies on critical sections (records, executors, their mutexes). It uses
 //! lock-free queues, atomics and registers. A debug build checks it.
 #![expect(unsafe_code, reason = "the trait is unsafe, and so is writing the mask")]

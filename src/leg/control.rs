@@ -290,8 +290,10 @@ impl<const N: usize> Control<N> {
         }
     }
 
-    /// Takes what the other half found.
-    pub fn receive(&mut self, finding: Finding<N>) {
+    /// Takes what the other half found. Returns whether the result of an identification was taken: one that was
+    /// cancelled while it was judged is dropped.
+    #[must_use]
+    pub fn receive(&mut self, finding: Finding<N>) -> bool {
         match finding {
             Finding::Solved => {
                 if let (Activity::Identify(IdentifyPhase::Settle | IdentifyPhase::Solve), Some(first)) =
@@ -311,6 +313,7 @@ impl<const N: usize> Control<N> {
                         self.models.accept(model);
                     }
                     self.rest(Activity::Idle);
+                    return true;
                 }
             }
             // About a motion before the identification, and the model that this one may replace.
@@ -328,6 +331,7 @@ impl<const N: usize> Control<N> {
                 self.cause = Some(cause);
             }
         }
+        false
     }
 
     /// Takes a restored model into use instead of the one that was there, from the next tick on; refused (`false`)

@@ -302,13 +302,22 @@ where
         let verdict = self.judge_with(&mut |_| {});
         self.verdict = Some(verdict);
         let estimate = self.solver.as_ref().map(Solver::estimate).filter(|_| verdict.is_accepted());
-        let model = estimate.as_ref().map(|estimate| IdentifiedModel::new(&self.model, &estimate.values));
-        if let (Some(estimate), Some(solver)) = (estimate, self.solver.as_ref()) {
-            let others = self.validation.iter().flatten();
-            self.upkeep.accept(Baseline::new(estimate, solver.record(), others));
-            self.accepted_stribeck = self.model.stribeck;
-        }
+        let model = estimate.map(|estimate| IdentifiedModel::new(&self.model, &estimate.values));
         Finding::Judged { verdict, model }
+    }
+
+    /// Control took the result: from now on tracked motions are compared with it. Returns the model if it was accepted.
+    ///
+    /// Apart from the verdict, because the operator may stop the identification while it is judged; the model that is
+    /// in use then stays the one that is watched and stored.
+    pub fn took_result(&mut self) -> Option<IdentifiedModel<N>> {
+        let solver = self.solver.as_ref().filter(|_| self.verdict.is_some_and(Verdict::is_accepted))?;
+        let estimate = solver.estimate();
+        let model = IdentifiedModel::new(&self.model, &estimate.values);
+        let others = self.validation.iter().flatten();
+        self.upkeep.accept(Baseline::new(estimate, solver.record(), others));
+        self.accepted_stribeck = self.model.stribeck;
+        Some(model)
     }
 
     /// The verdict on what was recorded so far; every piece of evidence goes to `hand_on`.

@@ -118,8 +118,10 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         if output.took_update {
             self.identification.take_update();
         }
-        if let Some(finding) = self.identification.advance(evaluations) {
-            self.control.receive(finding);
+        if let Some(finding) = self.identification.advance(evaluations)
+            && self.control.receive(finding)
+        {
+            let _ = self.identification.took_result();
         }
         output
     }

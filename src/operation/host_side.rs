@@ -73,6 +73,10 @@ impl<const N: usize> HostSide<N> {
                 }
             }
             match order.request {
+                // Without the drive a host cannot bring joints to rest along its profile; it can still stop them.
+                Some(LegRequest::Cancel) if order.commands.is_none() => {
+                    self.request = Some(LegRequest::Power(PowerRequest::QuickStop));
+                }
                 Some(LegRequest::Cancel) => self.cancel = true,
                 Some(request) => self.request = Some(request),
                 None => {}

@@ -342,6 +342,9 @@ impl<const N: usize> Housekeeper<N> {
                 self.reference.is_some()
             }
             Ask::Reset => {
+                // Motors that brake are released first: drivers that restart measure currents with another gain.
+                level.signals.inhibit.raise(Cause::GateConfiguration);
+                level.hardware.release_all();
                 level.hardware.switch_gates(false);
                 self.resetting = Some(0);
                 return;

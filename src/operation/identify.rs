@@ -24,6 +24,10 @@ pub struct IdentificationLevel {
     gap: bool,
     /// Seed of this identification's search.
     seed: u64,
+    /// Verdict that control has not taken yet.
+    verdict: Option<Verdict>,
+    /// Control took the result.
+    taken: bool,
     /// Results that changed and were not published yet; no verdict where an identification begins.
     publish: Option<Option<Verdict>>,
 }
@@ -35,7 +39,7 @@ pub enum Slice<const N: usize> {
     Idle,
     /// The search goes on.
     Busy,
-    /// A result was judged; with the model if it was accepted.
+    /// Control took a result; with the model if it was accepted.
     Judged(Option<IdentifiedModel<N>>),
 }
 
@@ -43,7 +47,15 @@ impl IdentificationLevel {
     /// Nothing received yet; `seed` of the search if no host gives another.
     #[must_use]
     pub const fn new(seed: u64) -> Self {
-        Self { activity: Activity::Idle, last: None, gap: false, seed, publish: None }
+        Self {
+            activity: Activity::Idle,
+            last: None,
+            gap: false,
+            seed,
+            verdict: None,
+            taken: false,
+            publish: None,
+        }
     }
 
     /// Takes what the servo sent; whether there was anything. `sample` sees each sample of the log, `record` each record.
@@ -74,15 +86,21 @@ impl IdentificationLevel {
                         identification.prepare(plan, seed);
                         self.seed = seed;
                     }
-                    (self.gap, self.publish) = (false, Some(None));
+                    (self.gap, self.verdict, self.publish) = (false, None, Some(None));
                 }
                 LegEvent::Activity(activity) => {
                     self.activity = activity;
                     if !matches!(activity, Activity::Identify(_)) {
                         identification.cancel();
+                        self.verdict = None;
                     }
                 }
                 LegEvent::TookUpdate => identification.take_update(),
+                LegEvent::TookResult => {
+                    self.taken = true;
+                    // The next slice reads the result before a newer event can change it.
+                    break;
+                }
                 LegEvent::Record(one) => record(&one),
             }
         }
@@ -123,6 +141,14 @@ impl IdentificationLevel {
         W: BorrowMut<MotionWindow<f32, N, B>>,
     {
         use IdentifyPhase::{Judge, Settle, Solve};
+        if core::mem::take(&mut self.taken)
+            && let Some(verdict) = self.verdict.take()
+        {
+            self.publish = Some(Some(verdict));
+            // The verdict on lost samples is this level's own: the identification was cancelled without one.
+            let model = if verdict.is_accepted() { identification.took_result() } else { None };
+            return Slice::Judged(model);
+        }
         if self.gap {
             if let Activity::Identify(Settle | Solve | Judge) = self.activity {
                 self.gap = false;
@@ -133,7 +159,7 @@ impl IdentificationLevel {
                     value: signals.statistics.samples_lost.get(),
                 });
                 let _ = ends.findings.enqueue(Finding::Judged { verdict, model: None });
-                self.publish = Some(Some(verdict));
+                self.verdict = Some(verdict);
             }
             return Slice::Idle;
         }
@@ -145,13 +171,9 @@ impl IdentificationLevel {
             done.set(search.evaluations());
             return if identification.is_searching() { Slice::Busy } else { Slice::Idle };
         };
-        let mut slice = Slice::Busy;
         match &finding {
             Finding::Solved => {}
-            Finding::Judged { verdict, model } => {
-                self.publish = Some(Some(*verdict));
-                slice = Slice::Judged(*model);
-            }
+            Finding::Judged { verdict, .. } => self.verdict = Some(*verdict),
             Finding::Changed(change) => record(&Record::Change {
                 since_s: change.since_s,
                 joints: change.joints,
@@ -166,7 +188,7 @@ impl IdentificationLevel {
         }
         // Control takes one in every tick.
         let _ = ends.findings.enqueue(finding);
-        slice
+        Slice::Busy
     }
 
     /// Results that changed since they were published; see [`Self::published`].

@@ -40,6 +40,8 @@ pub enum LegEvent<const N: usize> {
     Begun(Option<(Plan, u64)>),
     /// The update that was offered is in use now.
     TookUpdate,
+    /// The result of the identification was taken: an accepted model is in use now.
+    TookResult,
     /// A record for the trace.
     Record(Record<N>),
 }

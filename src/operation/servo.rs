@@ -104,8 +104,10 @@ impl<const N: usize> ServoLevel<N> {
                 host.begin();
             }
         }
-        if let Some(finding) = ends.findings.dequeue() {
-            control.receive(finding);
+        if let Some(finding) = ends.findings.dequeue()
+            && control.receive(finding)
+        {
+            send(LegEvent::TookResult, ends, signals);
         }
         self.look_around(control, signals);
         let request = self.next_request(control, ends, signals, hardware);

@@ -44,7 +44,7 @@ enum Stage {
 }
 
 /// What is known between two steps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Storing {
     stage: Stage,
     /// The watchdog has not taken its usual time again.
@@ -52,10 +52,10 @@ pub struct Storing {
 }
 
 impl Storing {
-    /// Nothing changed yet.
+    /// Nothing changed yet. The watchdog may still have the start's time, until [`Self::look_after`] has asked it.
     #[must_use]
     pub const fn new() -> Self {
-        Self { stage: Stage::Idle, loose: false }
+        Self { stage: Stage::Idle, loose: true }
     }
 
     /// One step of a change, to be called every millisecond until it returns whether the change was made. `change` is called at most

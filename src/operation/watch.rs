@@ -30,6 +30,8 @@ impl<const N: usize> Watch<N> {
         let counts = counts(signals);
         if self.guard.look(counts.0) {
             hardware.release_all();
+            // Masked, because the tick that was late would set the two sides of its half bridge in between.
+            hardware.masked(|hardware| hardware.set_brake(0.0));
             // During a flash write the ticks stand still.
             if !signals.inhibit.is_storing() {
                 signals.inhibit.raise(Cause::CurrentTicks);

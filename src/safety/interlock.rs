@@ -1,6 +1,6 @@
 //! Why nothing may be enabled, and what every current tick looks at before an axis is asked.
 //!
-//! Why here: a board holds the reasons in one word that every level raises into (`task::interlock`), but what raises them is
+//! Why here: a board holds the reasons in one word that every level raises into (`operation::Inhibit`), but what raises them is
 //! decided by values only, so the same code is tested against every fault on the host.
 //!
 //! A reason is raised once and stays until the operator resets; one that still holds is raised again in the next tick. While

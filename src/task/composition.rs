@@ -34,7 +34,8 @@ pub fn run(board: Board) -> ! {
     let (thread, keeping, keeper) = hand_out(board);
     vectors::enable();
     if !watchdog::tighten_at_once() {
-        SIGNALS.inhibit.raise(Cause::Watchdog);
+        // The keeper asks again until the watchdog has its time; without a keeper nothing does.
+        SIGNALS.inhibit.raise(if keeper.is_some() { Cause::Watchdog } else { Cause::Configuration });
     }
     let housekeeping = vectors::HOUSEKEEPING.start(vectors::HOUSEKEEPING_VECTOR);
     let (housekeeper, ends, board) = keeping;

@@ -31,6 +31,8 @@ pub async fn run(
     let mut ticker = Ticker::every(Duration::from_hz(u64::from(RATE_HZ)));
     loop {
         ticker.next().await;
+        // A late round is not made up for: the waits of a gate drivers' reset are counted in rounds.
+        ticker.reset();
         keeper.round(&mut ends, &SIGNALS, &mut board);
     }
 }

@@ -43,7 +43,7 @@ pub fn index(axis: usize) -> Option<u16> {
 }
 
 /// The index pulse of an axis came: takes the count. It is late by the interrupts' latency, and by a current tick at worst:
-/// about 6 us, 2 counts at 36 turns per second of 8192. A glitch at rest is dropped.
+/// up to 10 us, 3 counts at 36 turns per second of 8192. A glitch at rest is dropped.
 pub(super) fn index_came(axis: usize) {
     if let (Some(slot), Some(sampled), Some(line)) =
         (INDEX.get(axis), SAMPLED.get(axis), INDEX_LINES.get(axis))

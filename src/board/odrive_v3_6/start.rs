@@ -86,6 +86,8 @@ fn configuration() -> embassy_stm32::Config {
     let mut configuration = embassy_stm32::Config::default();
     // No DMA is used; its vectors would be at level 0 otherwise.
     configuration.dma_interrupt_priority = Priority::P6;
+    // Missed current ticks are counted in cycles, and the cycle counter stands in sleep without DBG_SLEEP.
+    configuration.enable_debug_during_sleep = true;
     let rcc = &mut configuration.rcc;
     rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Oscillator });
     rcc.pll_src = PllSource::HSE;

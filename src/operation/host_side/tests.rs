@@ -198,9 +198,9 @@ fn the_bus_runs_after_every_second_tick_and_is_told_once_it_has_taken_what_it_ha
     bench.take_report();
     bench.told.clear();
     let change = Change { since_s: 1.0, joints: [true; 2], statistic: [1.0; 2], limit: 0.5 };
-    control.receive(Finding::Changed(change));
+    assert!(!control.receive(Finding::Changed(change)));
     let (cause, verdict) = (Cause::Friction, Verdict::ACCEPTED);
-    control.receive(Finding::Updated { cause, verdict, model: Some(model()) });
+    assert!(!control.receive(Finding::Updated { cause, verdict, model: Some(model()) }));
     (0..4).for_each(|_| bench.report(&control, &plain));
     let told: Vec<(bool, bool, bool, [bool; 2])> =
         bench.told.iter().map(|told| (told.refused, told.blocked, told.held, told.change)).collect();
@@ -241,4 +241,13 @@ fn what_is_asked_of_a_leg_without_zeros_is_forgotten() {
     assert_eq!(bench.told[0], LegTold::NONE);
     bench.hear(unreported);
     assert_eq!((bench.side.request(None), bench.commands()), (None, None));
+}
+
+#[test]
+fn a_host_without_the_drive_cancels_by_a_quick_stop() {
+    let mut bench = Bench::new(&[LegOrder { commands: None, ..order(Some(LegRequest::Cancel)) }]);
+    bench.hear(unreported);
+    assert_eq!(bench.commands(), None);
+    assert_eq!(bench.side.request(None), Some((ControlRequest::Power(PowerRequest::QuickStop), None)));
+    assert_eq!(bench.side.request(None), None, "once");
 }

@@ -11,6 +11,7 @@ use crate::leg::CalibrationRefusal;
 use crate::motor::calibration::tests::{SETTINGS, calibrate};
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::operation::Stage;
+use crate::safety::Bridges;
 
 mod reports;
 
@@ -153,8 +154,7 @@ fn carried_out(motor: &mut TestMotor, order: Order) -> Outcome {
     stage.obey(order);
     let mut sample = motor.sample();
     for _ in 0..240_000 {
-        let (command, told) =
-            stage.tick(&sample, crate::safety::Bridges::Follow, crate::motor::AxisRequest::RELEASED);
+        let (command, told) = stage.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::RELEASED);
         if let Some((outcome, _)) = told {
             motor.period(AxisCommand::RELEASED);
             return outcome;
@@ -212,4 +212,31 @@ fn after_an_erasure_a_reference_has_to_be_taken_again() {
     }
     assert_eq!(orders, [(0, Order::Place(0)), (1, Order::Place(0))]);
     assert!(bench.signals.has_begun());
+}
+
+#[test]
+fn a_reset_releases_motors_that_brake_until_the_gate_drivers_are_configured() {
+    for gates_configure in [true, false] {
+        let mut bench = Bench::new(Housekeeper::ready(HOUSE));
+        bench.hardware.gates_configure = gates_configure;
+        bench.signals.inhibit.raise(Cause::EncoderFrozen);
+        bench.hardware.bridges = [AxisCommand::BRAKE; 2];
+        for _ in 0..19 {
+            bench.hold(false, true);
+        }
+        assert_eq!((bench.hardware.is_enabled(), bench.hardware.gates_switched.len()), (true, 0));
+        bench.hardware.contacts = Contacts { enabling: false, start: true };
+        while bench.hardware.gates_switched.is_empty() {
+            bench.round();
+        }
+        // The drivers' supply is off, and a current tick would release as well.
+        assert!(!bench.hardware.is_enabled());
+        while bench.orders.is_empty() {
+            assert_eq!(Bridges::of(bench.signals.inhibit.causes()), Bridges::Release);
+            bench.round();
+        }
+        assert_eq!(bench.hardware.gates_switched, [false, true]);
+        let left = if gates_configure { 0 } else { Cause::GateConfiguration.bit() };
+        assert_eq!(bench.signals.inhibit.causes(), left);
+    }
 }

@@ -7,7 +7,7 @@ use super::super::testing;
 use super::super::{Ends, LegEvent};
 use super::*;
 use crate::leg::testing::{BASE, configuration};
-use crate::leg::{LogSample, Plan, Step};
+use crate::leg::{LogSample, Plan, Step, VALIDATION_MOTIONS};
 
 struct Bench {
     level: IdentificationLevel,
@@ -89,7 +89,9 @@ fn a_missing_sample_ends_the_identification_with_refused_input() {
         let verdict = Verdict::refused(Reason::Input);
         assert_eq!(bench.finding(), Some(Finding::Judged { verdict, model: None }), "{waits:?}");
         assert_eq!(bench.records, [Record::Refused { why: "samples_lost", value: 1 }]);
-        assert_eq!(bench.level.unpublished(), Some(Some(verdict)));
+        assert_eq!(bench.level.unpublished(), None, "control did not take it yet");
+        bench.hear([LegEvent::TookResult]);
+        assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Judged(None), Some(Some(verdict))));
         // Cancelled: nothing more comes of the motion that was recorded.
         bench.hear([logged(56, None)]);
         assert_eq!((bench.work(), bench.finding(), bench.lost()), (Slice::Idle, None, 1));
@@ -165,4 +167,47 @@ fn records_pass_in_their_order_and_activity_is_known() {
     assert!(bench.hear(records.map(LegEvent::Record).into_iter().chain([phase(IdentifyPhase::Approach)])));
     assert_eq!(bench.records, records);
     assert_eq!(bench.level.activity(), Activity::Identify(IdentifyPhase::Approach));
+}
+
+#[test]
+fn a_result_counts_only_once_control_took_it() {
+    let ticks: Vec<u32> = (1..=80).map(|sample| 8 * sample).collect();
+    let judged = || {
+        let mut bench = Bench::new();
+        bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
+        bench.level.published();
+        bench.hear(training(&ticks));
+        bench.hear([logged(648, None), phase(IdentifyPhase::Solve)]);
+        let find = |bench: &mut Bench| {
+            let slices = (0..100_000).find_map(|_| {
+                assert!(!matches!(bench.work(), Slice::Judged(_)));
+                bench.finding()
+            });
+            slices.expect("a finding")
+        };
+        let mut finding = find(&mut bench);
+        if finding == Finding::Solved {
+            for motion in 0..VALIDATION_MOTIONS as u8 {
+                let at = 1000 * (1 + u32::from(motion));
+                let samples =
+                    (0..80).map(|sample| logged(at + 8 * sample, Some(Segment::Validation(motion))));
+                bench.hear(samples.chain([logged(at + 640, None), phase(IdentifyPhase::Judge)]));
+            }
+            finding = find(&mut bench);
+        }
+        let Finding::Judged { verdict, .. } = finding else { panic!("{finding:?}") };
+        assert!(!verdict.is_accepted(), "hardly any rows");
+        (bench, verdict)
+    };
+    let (mut bench, verdict) = judged();
+    assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Idle, None));
+    // Taken, and the leg goes on to something else, before the thread looks again.
+    bench.hear([LegEvent::TookResult, LegEvent::Activity(Activity::Idle)]);
+    assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Judged(None), Some(Some(verdict))));
+    bench.hear([]);
+    assert_eq!(bench.work(), Slice::Idle, "once");
+    // The operator let go while the verdict was made: control never takes it.
+    let (mut bench, _) = judged();
+    bench.hear([LegEvent::Activity(Activity::Idle)]);
+    assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Idle, None));
 }

@@ -146,6 +146,7 @@ impl Bench {
                 LegEvent::Activity(_) => "activity",
                 LegEvent::Begun(_) => "begun",
                 LegEvent::TookUpdate => "took update",
+                LegEvent::TookResult => "took result",
                 LegEvent::Record(Record::Fault { .. }) => "fault",
                 LegEvent::Record(Record::State { .. }) => "state",
                 LegEvent::Record(Record::Limit { .. }) => "limit",

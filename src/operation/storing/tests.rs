@@ -83,9 +83,32 @@ fn change_with(storing: &mut Storing, bench: &mut Bench, says: bool) -> (bool, u
     panic!("it does not end");
 }
 
+/// The watchdog took its usual time at the start.
+fn settled() -> Storing {
+    let mut storing = Storing::new();
+    Bench::off().look_after(&mut storing);
+    storing
+}
+
+#[test]
+fn a_watchdog_with_the_starts_time_keeps_the_drive_off_after_a_reset_as_well() {
+    let (mut storing, mut bench) = (Storing::new(), Bench::with_watchdog(None));
+    bench.hardware.watchdog.stretched = true;
+    for _ in 0..3 {
+        bench.look_after(&mut storing);
+        assert_eq!(bench.causes(), Cause::Watchdog.bit());
+        // The operator's reset.
+        bench.inhibit = Inhibit::new();
+        assert_eq!(change(&mut storing, &mut bench), (false, 0));
+    }
+    bench.hardware.watchdog = TestWatchdog { takes_ms: Some(3), ..TestWatchdog::default() };
+    bench.look_after(&mut storing);
+    assert_eq!((bench.causes(), change(&mut storing, &mut bench)), (0, (true, 1)));
+}
+
 #[test]
 fn the_flash_is_changed_between_a_watchdog_that_is_stretched_and_one_that_is_tight_again() {
-    let (mut storing, mut bench) = (Storing::new(), Bench::off());
+    let (mut storing, mut bench) = (settled(), Bench::off());
     assert_eq!(change(&mut storing, &mut bench), (true, 1));
     assert_eq!(
         (bench.hardware.watchdog.stretched, bench.hardware.watchdog.under_way, bench.causes()),
@@ -97,7 +120,7 @@ fn the_flash_is_changed_between_a_watchdog_that_is_stretched_and_one_that_is_tig
 
 #[test]
 fn what_is_not_done_is_said() {
-    let (mut storing, mut bench) = (Storing::new(), Bench::off());
+    let (mut storing, mut bench) = (settled(), Bench::off());
     assert_eq!(change_with(&mut storing, &mut bench, false), (false, 1));
     assert_eq!((bench.causes(), bench.hardware.watchdog.stretched), (0, false));
 }
@@ -113,7 +136,7 @@ fn nothing_is_touched_while_the_drive_is_on_or_something_forbids_to_enable() {
     ] {
         let mut bench = Bench { permission, ..Bench::off() };
         bench.inhibit.raise_bits(causes);
-        assert_eq!(change(&mut Storing::new(), &mut bench), (false, 0), "{permission:?} {causes:#x}");
+        assert_eq!(change(&mut settled(), &mut bench), (false, 0), "{permission:?} {causes:#x}");
         // Nobody is released for it either.
         assert_eq!((bench.causes(), bench.storing), (causes, Vec::new()));
     }
@@ -123,7 +146,7 @@ fn nothing_is_touched_while_the_drive_is_on_or_something_forbids_to_enable() {
 fn a_drive_that_was_enabled_in_the_last_moment_is_seen_after_the_announcement() {
     for later in [(1, Permission::Damp, 0), (20, Permission::Follow, 0), (7, Permission::Released, 1)] {
         let mut bench = Bench { later: Some(later), ..Bench::off() };
-        assert_eq!(change(&mut Storing::new(), &mut bench), (false, 0), "{later:?}");
+        assert_eq!(change(&mut settled(), &mut bench), (false, 0), "{later:?}");
         assert_eq!(bench.storing, [(0, true), (21, false)]);
         assert_eq!(bench.hardware.watchdog.under_way, None);
     }
@@ -131,7 +154,7 @@ fn a_drive_that_was_enabled_in_the_last_moment_is_seen_after_the_announcement() 
 
 #[test]
 fn a_watchdog_that_does_not_take_its_time_keeps_the_flash_as_it_is_and_the_drive_off() {
-    let (mut storing, mut bench) = (Storing::new(), Bench::off());
+    let (mut storing, mut bench) = (settled(), Bench::off());
     bench.hardware.watchdog.takes_ms = None;
     assert_eq!(change(&mut storing, &mut bench), (false, 0));
     // Nobody knows which time it has: enabled again only once that is known.
@@ -143,13 +166,13 @@ fn a_watchdog_that_does_not_take_its_time_keeps_the_flash_as_it_is_and_the_drive
     assert_eq!(change(&mut storing, &mut bench), (false, 0));
     bench.hardware.watchdog = TestWatchdog { takes_ms: Some(3), ..TestWatchdog::default() };
     bench.look_after(&mut storing);
-    assert_eq!((bench.causes(), storing), (0, Storing::new()));
+    assert_eq!((bench.causes(), storing), (0, settled()));
     assert_eq!(change(&mut storing, &mut bench), (true, 1));
 }
 
 #[test]
 fn a_watchdog_that_was_stretched_and_does_not_come_back_keeps_the_drive_off_until_it_does() {
-    let (mut storing, mut bench) = (Storing::new(), Bench::off());
+    let (mut storing, mut bench) = (settled(), Bench::off());
     bench.hardware.watchdog.takes_ms = Some(150);
     assert_eq!(change(&mut storing, &mut bench), (true, 1));
     bench.hardware.watchdog.takes_ms = Some(190);
@@ -158,10 +181,10 @@ fn a_watchdog_that_was_stretched_and_does_not_come_back_keeps_the_drive_off_unti
     // Asked in every round of the keeper from then on.
     let mut stuck = Bench::with_watchdog(None);
     stuck.hardware.watchdog.stretched = true;
-    let mut storing = Storing { loose: true, ..Storing::new() };
+    let mut storing = Storing::new();
     stuck.look_after(&mut storing);
     assert_eq!(stuck.causes(), Cause::Watchdog.bit());
     stuck.hardware.watchdog.pass(u64::MAX);
     stuck.look_after(&mut storing);
-    assert_eq!(storing, Storing::new());
+    assert_eq!(storing, settled());
 }

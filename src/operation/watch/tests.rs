@@ -67,3 +67,15 @@ fn ticks_that_stand_still_during_a_flash_write_are_no_fault() {
     watch.look(&signals, &mut hardware);
     assert_eq!(signals.inhibit.causes(), Cause::CurrentTicks.bit());
 }
+
+#[test]
+fn the_brake_resistor_is_off_where_current_ticks_stop() {
+    for hung in [None, Some(0), Some(1), Some(2)] {
+        let (signals, mut hardware) = (Signals::new(), TestHardware::new());
+        let mut watch = Watch::new(&signals);
+        look(&mut watch, &signals, &mut hardware, 2, None);
+        hardware.brake = 0.5;
+        look(&mut watch, &signals, &mut hardware, 1, hung);
+        assert_eq!(hardware.brake > 0.0, !matches!(hung, Some(0 | 1)), "{hung:?}");
+    }
+}

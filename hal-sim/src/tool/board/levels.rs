@@ -1,15 +1,20 @@
 //! The firmware's levels put together as on the board, over simulated registers.
 //!
 //! Fault campaign, `serve` and complete drives run this one composition. It holds no decisions: each method runs one level of
-//! `scarab::operation`, and whoever owns the plant calls them in the board's order:
+//! `scarab::operation`, and the owner of the plant calls them in this order:
 //!
 //! ```text
 //! every 48th period   housekeeping
 //! when requested      servo, then thread level; the servo is requested after the last axis' sixth tick
-//! when requested      bus (`tool::bus::board`)
 //! every period        current tick of each axis
 //! every 12th period   watch
+//! when requested      bus (`tool::bus::board`)
 //! ```
+//!
+//! On the board higher levels interrupt lower ones instead: a level never runs to its end between two current ticks only
+//! because it was called. Not simulated therefore: a housekeeping round or a slice of the search that is interrupted
+//! by the servo, an emergency stop between two instructions (unit tests of `operation::current`), a watchdog that takes
+//! its new time later than at once (unit tests of `operation::storing`).
 
 use core::num::NonZeroU32;
 
@@ -138,7 +143,7 @@ impl<const N: usize> Levels<N> {
         }
     }
 
-    /// The image starts again. Contacts, pins and the controller of the bus stay as they are.
+    /// The image starts again. Contacts and pins stay as they are; the controller of the bus starts again as well.
     pub fn boot<const B: usize>(&mut self, leg: &DeviceLeg<N, B>) {
         let mut registers = Registers::new();
         registers.contacts = self.registers.contacts;

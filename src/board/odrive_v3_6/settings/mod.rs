@@ -78,10 +78,11 @@ pub const CLOCKS: [Write; 3] = [
     Write::bits("RCC_APB2ENR", RCC + 0x44, 0x4703, 0x4703),
 ];
 
-/// While a debugger holds the processor, the bridges' timers stand with their outputs off, and so does the watchdog
-/// (RM0090 38.16: DBG_TIM1_STOP, DBG_TIM8_STOP, DBG_IWDG_STOP).
+/// While a debugger holds the processor, the bridges' timers stand with their outputs off (RM0090 38.16:
+/// DBG_TIM1_STOP, DBG_TIM8_STOP). The watchdog runs on and ends the halt after 16 ms (DBG_IWDG_STOP = 0): the brake
+/// resistor's timer would hold its last duty for as long as the halt lasts.
 pub const DEBUG_FREEZE: [Write; 2] = [
-    Write::bits("DBGMCU_APB1_FZ", DEBUG + 0x08, 1 << 12, 1 << 12),
+    Write::bits("DBGMCU_APB1_FZ", DEBUG + 0x08, 1 << 12, 0),
     Write::bits("DBGMCU_APB2_FZ", DEBUG + 0x0C, 0b11, 0b11),
 ];
 
