@@ -10,11 +10,11 @@ pub(super) struct Sum<T> {
 }
 
 impl<T: Real> Sum<T> {
-    /// No term yet.
+    /// Starts at zero.
     pub(super) fn zero() -> Self {
         Self { total: T::zero(), lost: T::zero() }
     }
-    /// Takes a term.
+    /// Adds a term.
     pub(super) fn add(&mut self, term: T) {
         let total = self.total + term;
         self.lost += if real::abs(self.total) >= real::abs(term) {
@@ -24,7 +24,7 @@ impl<T: Real> Sum<T> {
         };
         self.total = total;
     }
-    /// The sum.
+    /// Current value of the sum.
     pub(super) fn value(&self) -> T {
         self.total + self.lost
     }
