@@ -6,14 +6,14 @@
 //!
 //! ```text
 //! fingerprint = CRC-64/XZ of  version, N, then per joint from the base:
-//!               sin alpha, cos alpha in steps of 2^-16;  a, d, direction, zero offset, torque per ampere as f32
-//!               bits, the last negative where the drive is mounted mirrored, as on a left leg
+//!               sin alpha, cos alpha in steps of 2^-16; a, d, direction, zero offset, torque per ampere
+//!               as f32 bits, the last negative where the drive is mounted mirrored, as on a left leg
 //! ```
 //!
 //! | covered | not covered |
 //! | --- | --- |
 //! | number and order of the joints, axes and lengths | gravity: an argument of every torque |
-//! | sense and zero of each joint's angle, side of the body | encoder counts and gear ratio: scale the angle |
+//! | sense and zero of each joint's angle, side of the body | encoder counts, gear ratio |
 //! | torque constants: all parameters are in their units | limits, gains, prior, names, estimated columns |
 //!
 //! Sines are in steps because a board may compute them in `f32` and the host in `f64`. All other numbers are

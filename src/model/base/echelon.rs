@@ -7,8 +7,8 @@
 //! ```text
 //! collect: | R |  rotated to | R' |        column by column in the order of preference
 //!          | y |             | 0  |
-//! reduce:  each column's part below the kept rows is rotated into one; kept if its share of the column exceeds the
-//!          tolerance; then back-substitution makes the kept columns unit vectors
+//! reduce:  each column's part below the kept rows is rotated into one; kept if its share of the column
+//!          exceeds the tolerance; then back-substitution makes the kept columns unit vectors
 //! ```
 //!
 //! Source: G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed. 2013, sections 5.1.8 and 5.2.
