@@ -19,9 +19,9 @@
 //! only beside each other. The motion used for the identification takes no part: while it streams by, the
 //! parameters and hence z are unknown.
 //!
-//! A push by the wearer is no geometry error, but z'r would read it as one. Rows within [`HELD`] rows of an
-//! unexpectedly large residual are therefore excluded. A wrong length or zero misses by a few per cent of the
-//! torque, never by that much.
+//! A push by the wearer is not a geometry error, but z'r would read it as one. Rows within [`HELD`] rows of
+//! an unexpectedly large residual are therefore excluded. A wrong length or zero misses by a few per cent of
+//! the torque, never by that much.
 //!
 //! Known limits: the zero of the last joint turns that link's own frame, and its first moments absorb it
 //! exactly. The lengths before the first joint have no effect on torque. Neither is tested.

@@ -11,7 +11,7 @@
 //! ```
 //!
 //! The largest, because an accepted model has some misfit beyond noise (friction that depends on more than
-//! speed), and that misfit is no change. The motion identified from contributes its unbiased variance, see
+//! speed), and that misfit is not a change. The motion identified from contributes its unbiased variance, see
 //! [`super::estimate`].
 //! Cost of a row: `B^2 + 2 B` multiplications. Memory: `B^2 + B + N + 1` numbers and `B` flags.
 

@@ -26,17 +26,17 @@
 //! two joints.
 //!
 //! **Persistence.** One block adds at most h/P, so an alarm needs P disturbed blocks, and more to make up for
-//! the calm ones between them (`nu/2 (ln rho - 1 + 1/rho)` each, 1.7 of 20 at 16 Hz). A push of 0.3 s touches
-//! three blocks; 6 s of persistence ask for twelve. A wearer who pushes half of the time has changed the
-//! load.
+//! calm ones between them. A calm block takes off `nu/2 (ln rho - 1 + 1/rho)`, 1.7 of 20 at 16 Hz. A push of
+//! 0.3 s touches three blocks; 6 s of persistence ask for twelve. A wearer who pushes half of the time has
+//! changed the load.
 //!
 //! **Delay.** `h / min(nu/2 (E (1 - 1/rho) - ln rho), h/P)` blocks for an energy E. No energy below `E = rho
 //! ln rho / (rho - 1)` is noticed: 1.39 for rho = 2, a torque error of 0.62 standard deviations of a row.
 //!
 //! Sources: E. S. Page, Continuous inspection schemes, 1954; G. Lorden, Procedures for reacting to a change
-//! in distribution, 1971; D. Siegmund, Sequential Analysis, 1985; nu: Satterthwaite 1946. Cost: beside the
-//! baseline's, some 10 operations a row. Memory: `4 N + 4` numbers. Limits: a joint at rest gives no usable
-//! rows, so a load hung on a resting leg is noticed once it moves.
+//! in distribution, 1971; D. Siegmund, Sequential Analysis, 1985; nu: Satterthwaite 1946.
+//! Cost: beside the baseline's, some 10 operations a row. Memory: `4 N + 4` numbers.
+//! Limits: a joint at rest gives no usable rows, so a load hung on a resting leg is noticed once it moves.
 
 use super::baseline::Baseline;
 use super::kernel::LowPass;

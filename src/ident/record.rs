@@ -38,8 +38,8 @@ pub const SMOOTHING_BANDWIDTHS: f64 = 2.0;
 pub const SAMPLE_RATE_HZ: f64 = 500.0;
 
 /// Smoothed speed below which a joint may stick, rad/s. One flickering count of a resting 14-bit encoder at
-/// the joint gives at most 0.0096 rad/s of the speed smoothed at 8 Hz. The noise grows with the bandwidth:
-/// 0.019 with rows at 8 Hz.
+/// the joint gives at most 0.0096 rad/s of the speed smoothed at 8 Hz. The noise is in proportion to the
+/// bandwidth: 0.019 with rows at 8 Hz.
 pub const STILL_SPEED: f64 = 0.03;
 /// Largest share of standstill in a row's window for the row to be used. Friction at rest takes any value up
 /// to breakaway, so a row beyond it is unreliable. On the MuJoCo leg, whose hip sticks a fifth of the time,
@@ -206,7 +206,7 @@ where
         Some(self.advance(model, &position, &torque))
     }
 
-    /// Ends a continuous stretch of samples: windows start anew, rows already taken stay. Returns the number
+    /// Ends a continuous stretch of samples: windows restart, rows already taken stay. Returns the number
     /// of rows that the cut windows at the end gave.
     pub fn break_off(&mut self) -> u32 {
         self.smoother.clear();

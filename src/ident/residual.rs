@@ -84,7 +84,7 @@ impl<T: Real> JointResidual<T> {
     }
 
     /// Statistics to judge by. Disturbed blocks are excluded where they are `forgiven` and outlier rows are a
-    /// minority. An error that is everywhere is no disturbance.
+    /// minority. An error that is everywhere is not a disturbance.
     fn judged(&self, forgiven: bool) -> &Neighbours<T> {
         let minority = u64::from(self.wild) * LARGEST_WILD_PART <= u64::from(self.rows);
         if forgiven && minority { &self.undisturbed } else { &self.all }

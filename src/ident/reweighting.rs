@@ -13,16 +13,17 @@
 //! ```
 //!
 //! s^2 is the median of `r_b^2 / n_b`, so up to half of the blocks may be disturbed. The spread of u is its
-//! median absolute deviation over 0.6745. Where a model has a small error everywhere (a real machine), blocks
-//! differ by more than chance, and only an excess over *that* is a disturbance. Only too large residuals lose
+//! median absolute deviation over 0.6745. A model of a real machine has a small error everywhere, so blocks
+//! differ by more than chance. Only an excess over *that* is a disturbance. Only too large residuals lose
 //! weight. In clean data 0.6 % of the blocks lie beyond 2.5, so the efficiency lost is below one per cent.
 //! Beside a block with zero weight the limits are 0.5 and 2: the tail of a push lies there.
 //!
 //! Sources: iteratively reweighted least squares, redescending weights: Huber and Ronchetti, Robust
-//! Statistics, 2009; the cube root: Wilson and Hilferty (1931). Cost: at most twelve times blocks times
-//! columns row rotations and solutions of each joint, once per motion. Limits: a disturbance below the noise
-//! of a block stays. One that lasts for more than half of the motion counts as normal (the verdict sees the
-//! residual). A block is excluded as a whole.
+//! Statistics, 2009; the cube root: Wilson and Hilferty (1931).
+//! Cost: at most twelve times blocks times columns row rotations and solutions of each joint, once per
+//! motion.
+//! Limits: a disturbance below the noise of a block stays. One that lasts for more than half of the motion
+//! counts as normal (the verdict sees the residual). A block is excluded as a whole.
 
 use super::packed::{self, LARGEST_SIZE};
 use super::window::{LARGEST_BLOCKS, Window};

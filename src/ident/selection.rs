@@ -22,11 +22,12 @@
 //! | --- | --- | --- |
 //! | J, beta, Cov | cost, least squares and its covariance over the remaining columns | chi-square, SI |
 //!
-//! Source: backward elimination, Draper and Smith, Applied Regression Analysis, ch. 15. Cost: one restricted
-//! factor and its inverse each step, about `2 B^3` multiplications; at most `2 N + 1` steps. Limits: a
-//! dropped value counts as exactly zero afterwards. The other parameters' sigma lose the part that resembled
-//! it, although up to three of its standard deviations may be real. Where the truth is neither zero nor
-//! clearly visible, the others are biased by that part, and their sigma does not show it.
+//! Source: backward elimination, Draper and Smith, Applied Regression Analysis, ch. 15.
+//! Cost: one restricted factor and its inverse each step, about `2 B^3` multiplications; at most `2 N + 1`
+//! steps.
+//! Limits: a dropped value counts as exactly zero afterwards. The other parameters' sigma lose the part that
+//! resembled it, although up to three of its standard deviations may be real. Where the truth is neither zero
+//! nor clearly visible, the others are biased by that part, and their sigma does not show it.
 
 use super::choice::Choice;
 use super::estimate::Problem;
@@ -85,7 +86,7 @@ impl<T: Real, const N: usize, const B: usize> Selection<T, N, B> {
 }
 
 /// Base parameters that may be dropped: those of one parameter alone. A parameter measured only in a sum has
-/// no column of its own, and the sum is needed anyway (the first joint's rotor, with its link's ZZ).
+/// no column of its own, for example the first joint's rotor with its link's ZZ. The sum is needed anyway.
 pub fn candidates<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
 ) -> impl Iterator<Item = usize> + '_ {

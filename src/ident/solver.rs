@@ -347,7 +347,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
             thresholds.judge_whole(&self.record.outliers, docket);
         }
         if !docket.verdict().has(Reason::Validation) {
-            // Pushes and a wrong mass ask for changes that are no geometry errors.
+            // Pushes and a wrong mass ask for changes that are not geometry errors.
             for found in asked.iter().flatten() {
                 thresholds.judge_alignment(found, noise_is_known, docket);
             }

@@ -11,10 +11,10 @@
 //! gain(vs)   = max(0, u z)^2 / (u u),   u = R w(vs)                                                 (S3)
 //! ```
 //!
-//! R and z are the last three rows of the factor of all joints with every other parameter eliminated, so the
-//! search over vs works on three numbers. All later steps use the factor with S and ln vs *eliminated*, not
-//! held. Its cost is the least over both, and the covariance of all other parameters includes their
-//! estimation.
+//! R and z are the last three rows of the factor of all joints, with every other parameter eliminated. The
+//! search over vs therefore works on three numbers. All later steps use the factor with S and ln vs
+//! *eliminated*, not held. Its cost is the least over both, and the covariance of all other parameters
+//! includes their estimation.
 //!
 //! | symbol | meaning | unit |
 //! | --- | --- | --- |
@@ -27,7 +27,8 @@
 //! Coulomb and viscous friction and make the error orthogonal to these columns. Without them 1.7 % of the
 //! surplus went into Coulomb friction, two of its standard deviations on the simulated leg; with them 0.2 %.
 //! Cost: one exponential per joint and sample; the search about 50 small solutions per joint, once per
-//! motion. Limits: the rows contain no speeds below 0.03 rad/s (standstill rule), so a vs below 0.05 rad/s is
+//! motion.
+//! Limits: the rows contain no speeds below 0.03 rad/s (standstill rule), so a vs below 0.05 rad/s is
 //! reported as 0.05.
 
 mod curve;

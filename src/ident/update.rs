@@ -27,8 +27,9 @@
 //! identification is needed.
 //!
 //! Cost: some `2 B^3 + 20 B^2` multiplications, once after an alarm. Memory: N + 1 hypotheses and an
-//! estimate. Limits: payloads on two links, or one together with other friction, are not among the hypotheses
-//! and are refused. For a payload on the first link torque determines the moment but not the mass. A payload
+//! estimate.
+//! Limits: payloads on two links, or one together with other friction, are not among the hypotheses and are
+//! refused. For a payload on the first link torque determines the moment but not the mass. A payload
 //! parameter that the motion did not excite (its inertia, in slow gait) has a large sigma.
 
 pub mod hypothesis;

@@ -13,11 +13,12 @@
 //! ```
 //!
 //! Memory: `ROOM` numbers and about 1 kB. For the default leg (9 + 3 and 7 + 3 columns) a block takes 161
-//! numbers, so 8192 numbers hold 50 blocks: 22 s of motion in pieces of 0.32 and 0.64 s. Cost: a row is
-//! rotated into a factor of its joint's columns. Every eighth output two blocks are merged, one joint per
-//! call of [`Window::tidy`], so that no sample bears the whole cost. The sums over blocks stay the same
-//! meanwhile. Limits: with three joints and 28 columns only 10 blocks fit. A chain with a joint that depends
-//! on more than 32 columns is rejected.
+//! numbers, so 8192 numbers hold 50 blocks: 22 s of motion in pieces of 0.32 and 0.64 s.
+//! Cost: a row is rotated into a factor of its joint's columns. Every eighth output two blocks are merged,
+//! one joint per call of [`Window::tidy`], so that no sample bears the whole cost. The sums over blocks stay
+//! the same meanwhile.
+//! Limits: with three joints and 28 columns only 10 blocks fit. A chain with a joint that depends on more
+//! than 32 columns is rejected.
 
 use super::packed::{self, LARGEST_COLUMNS, Row};
 use super::record::RowModel;

@@ -20,7 +20,8 @@
 //! | R, p | frame i seen from frame i-1; p does not depend on q | -, m |
 //!
 //! Source: J. J. Craig, Introduction to Robotics, 3rd ed. 2005, Eq. (3.6); W. Khalil and J.-F.
-//! Kleinfinger, 1986. Cost: sine and cosine of alpha are computed once, here; 24 bytes per joint in `f32`.
+//! Kleinfinger, 1986.
+//! Cost: sine and cosine of alpha are computed once, here; 24 bytes per joint in `f32`.
 //! Limits: revolute joints only, one branch, fixed base.
 
 use nalgebra::Vector3;

@@ -16,7 +16,8 @@
 //! | R, p | frame i seen from the frame before, see [`super::chain`] | -, m |
 //!
 //! Source: J. Y. S. Luh, M. W. Walker and R. P. C. Paul, 1980; link frames as in Craig 2005, Eqs
-//! (6.45)-(6.47). Cost: about 70 multiplications and additions per link.
+//! (6.45)-(6.47).
+//! Cost: about 70 multiplications and additions per link.
 
 use nalgebra::Vector3;
 

@@ -1,9 +1,8 @@
 //! Position and velocity of a joint from its encoder counts: a second-order tracking loop.
 //!
 //! Why not differences of counts: at 4 kHz one count of the default leg's encoder is 0.06 rad/s, of a 14-bit
-//! joint encoder 1.5 rad/s. The loop runs a model of constant velocity (plus a commanded acceleration, if
-//! given) and pulls the model to every reading, with both poles at `beta = exp(-w T)`, w = 2 pi times the
-//! bandwidth:
+//! joint encoder 1.5 rad/s. The loop runs a model of constant velocity, plus a commanded acceleration if
+//! given, and pulls it to every reading. Both poles are at `beta = exp(-w T)`, w = 2 pi times the bandwidth:
 //!
 //! ```text
 //! predict   position += velocity T + a T^2 / 2,   velocity += a T

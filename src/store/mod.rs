@@ -28,8 +28,9 @@
 //! measured in `tests/store.rs`.
 //!
 //! Cost: the crate `sequential-storage` (its wear levelling and repair are tested by fuzzing there) and
-//! `zerocopy` (layouts). Known limits: if the newest copy of a record has decayed, the copy before it is
-//! returned, as after a power cut. There is no clock, so records carry a generation instead of a date.
+//! `zerocopy` (layouts).
+//! Known limits: if the newest copy of a record has decayed, the copy before it is returned, as after a power
+//! cut. There is no clock, so records carry a generation instead of a date.
 
 mod calibration;
 mod keeper;

@@ -5,8 +5,8 @@
 //!   x = x - delta d sgn(f(x_l) - f(x_r))               (Eq. 24)
 //!   delta = e1 delta + e0                              (Eq. 25)
 //!   l = delta / e2                                     (Eq. 26; replaces Eq. 22, which contradicts it)
-//! Symbols: delta step length, l whisker length, both in the unit of the coordinates, as in the paper (a step
-//! of 1 in a box of plus or minus 100); e1 decay, e0 offset of the step length, e2 ratio of step to whisker.
+//! Symbols: delta step length, l whisker length, both in the unit of the coordinates (in the paper a step of
+//! 1 in a box of plus or minus 100); e1 decay, e0 offset of the step length, e2 ratio of step to whisker.
 //!
 //! Source: beetle antennae search (Jiang, Li, 2017); the paper, Eqs (21)-(26), constants of its section 4.1.
 //! Cost: 3 evaluations and about 10 D operations per iteration; memory 5 D scalars.

@@ -10,7 +10,7 @@ use core::str::FromStr;
 pub enum LineError<'a> {
     /// The line does not begin with a kind.
     Kind,
-    /// The text is no `key=value`, or a list without an end.
+    /// The text is not a `key=value` pair, or is a list without an end.
     Pair(&'a str),
     /// The line has no such key.
     Missing(&'a str),

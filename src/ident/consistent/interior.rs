@@ -52,7 +52,7 @@ pub(super) fn merit<T: Real, const N: usize>(
 pub(super) struct Step {
     /// `place` minimises `G`, within what matters or can be resolved.
     pub settled: bool,
-    /// False where the start has no finite merit: outside, or overflow. Such a step is no valid end.
+    /// False where the start has no finite merit: outside, or overflow. Such a step is not a valid end.
     pub inside: bool,
 }
 

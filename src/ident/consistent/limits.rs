@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Every line but the first is linear in the 14 parameters. `k` is the prior's radius of gyration about the
-//! centre of mass (twice the trace of the inertia over mass), at least a tenth of the length.
+//! centre of mass, at least a tenth of the length. Twice its square is the trace of the inertia over mass.
 //!
 //! Without a prior the limits come from geometry and torque. The centre of mass is within a segment's length
 //! of the joint. The last segment counts as long as the longest known one, 1 m where none is known. Masses

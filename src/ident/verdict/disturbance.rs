@@ -1,7 +1,7 @@
 //! Tests for a disturbed motion: for long and in all joints at once, or too often.
 //!
 //! Rows that robust identification excluded ([`Outliers`]) do not corrupt the result. But data with many
-//! exclusions are not trusted, and a leg that stood on the floor was no open chain.
+//! exclusions are not trusted, and a leg that stood on the floor was not an open chain.
 
 use super::{Docket, Evidence, Reason, Test, Thresholds};
 use crate::ident::outliers::Outliers;

@@ -43,7 +43,7 @@ impl<T: Real> Thresholds<T> {
             .joints
             .iter()
             .fold((0_u32, 0_u32), |(wild, rows), joint| (wild + joint.wild, rows + joint.rows));
-        // A wrong model has errors everywhere: that is no contact.
+        // A wrong model has errors everywhere: that is not contact.
         let elsewhere = T::of(f64::from(rows)) * T::of(0.5) < T::of(f64::from(wild));
         let value = residual.longest_common_s;
         let limit = self.longest_disturbance_s;

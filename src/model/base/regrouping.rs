@@ -22,9 +22,9 @@
 //!
 //! Source: M. Gautier and W. Khalil, Direct calculation of minimum set of inertial parameters of serial
 //! robots, 1990; the paper's Eqs (8)-(17) with three corrections: 2 d HZ + d^2 M in (8) and (11)-(13), the
-//! minus sign in (10), XX - YY in (7). Cost: about 40 flops per joint. Limits: gravity and parallel axes are
-//! ignored. A first axis parallel to gravity hides HX1 and HY1, and parallel axes hide more;
-//! [`super::analysis`] finds those.
+//! minus sign in (10), XX - YY in (7). Cost: about 40 flops per joint.
+//! Limits: gravity and parallel axes are ignored. A first axis parallel to gravity hides HX1 and HY1, and
+//! parallel axes hide more; [`super::analysis`] finds those.
 
 use super::super::chain::Chain;
 use super::super::parameter::{LegParameters, Parameter};

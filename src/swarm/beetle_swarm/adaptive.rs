@@ -24,7 +24,7 @@
 //! the rest. Up to five square roots per direction are the only calls into `libm`.
 //! Known limits: the search exploits fast. Only leaps and restarts search globally: it fails on Rastrigin's
 //! function, rotated in 10 dimensions and unrotated in 30. On a quadratic cost least squares is exact and
-//! instant. A noise of 1e-4 of the cost's value spoils the last digits: the search is meant for fixed data.
+//! instant. A noise of 1e-4 of the cost's value corrupts the last digits: the search is meant for fixed data.
 
 use crate::real::{Real, abs, clamp, max, min};
 

@@ -12,9 +12,9 @@
 //! (Wang, Yang, Liu, 2018) has psi. The order is that of the paper's Table II: psi uses the velocity before
 //! Eq. (19).
 //!
-//! Source: the paper, section 3.3.2. Cost: 3 N evaluations and 20 N D operations per iteration. Known limits:
-//! velocities collapse into the span of P - x and G - x, and the whiskers with them: no success in 30
-//! dimensions.
+//! Source: the paper, section 3.3.2. Cost: 3 N evaluations and 20 N D operations per iteration.
+//! Known limits: velocities collapse into the span of P - x and G - x, and the whiskers with them: no success
+//! in 30 dimensions.
 
 use crate::real::{Real, sign};
 
