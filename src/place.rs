@@ -20,8 +20,8 @@ macro_rules! fill {
         let whole = slot.as_mut_ptr();
         $(
             #[expect(unsafe_code, reason = "see `place`")]
-            // SAFETY: `whole` points to memory for a `Self` with no other reference to it, so to that of its
-            // field.
+            // SAFETY: `whole` points to memory for a `Self` with no other reference
+            // to it, so to that of its field.
             unsafe {
                 $crate::place::write(&raw mut (*whole).$field, || $value);
             }
@@ -140,8 +140,8 @@ impl<T> Slot<T> {
 pub fn empty_slot<T>(slot: &mut MaybeUninit<Slot<T>>) -> &mut Slot<T> {
     const { assert!(!core::mem::needs_drop::<T>(), "a value that is overwritten is not dropped") };
     let whole = slot.as_mut_ptr();
-    // SAFETY: `whole` points to memory for a `Slot`; its other field may be uninitialised while this one is
-    // false.
+    // SAFETY: `whole` points to memory for a `Slot`; its other field may be
+    // uninitialised while this one is false.
     unsafe {
         (&raw mut (*whole).full).write(false);
         slot.assume_init_mut()

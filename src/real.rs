@@ -1,5 +1,4 @@
-//! The only access to `libm` and `micromath`: scalars in single or double precision, and the functions in
-//! use.
+//! The only access to `libm` and `micromath`: scalars in both precisions and their functions.
 //!
 //! Why one access: std's inherent `f32::sqrt` silently replaces any trait method of that name in tests. The
 //! host would then test other code than the board runs. Also, `libm::sinf` and `libm::cosf` compute in double
@@ -56,8 +55,8 @@ pub fn sin_cos<T: Real>(angle: T) -> (T, T) {
 
 /// Sine and cosine of an angle in rad, -32..=32, wrong by up to 1.1e-3 each (parabolas, `micromath` 2.1).
 ///
-/// Calls the wrapper type, not the trait: where `std` is linked its inherent methods would win over the
-/// trait's.
+/// Calls the wrapper type, not the trait: where `std` is linked its inherent
+/// methods would win over the trait's.
 #[must_use]
 #[inline(never)]
 pub fn fast_sin_cos(angle: f32) -> (f32, f32) {

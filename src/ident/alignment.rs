@@ -1,8 +1,8 @@
 //! Test of link lengths and encoder zeros: does the held-out torque ask for values other than the model's?
 //!
-//! Why: with a link assumed ten per cent too long, the identified model still predicts the torque within two
-//! per cent. Masses and moments make up for most of the error. The rest is small but points in a known
-//! direction:
+//! Why: with a link assumed ten per cent too long, the identified model still predicts the torque
+//! within two per cent. Masses and moments make up for most of the error. The rest is small but
+//! points in a known direction:
 //!
 //! ```text
 //! z_j = d tau / d ln a_j,   d tau / d q0_j               at the model's parameters, by a difference quotient
@@ -25,11 +25,11 @@
 //!
 //! Known limits: the zero of the last joint turns that link's own frame, and its first moments absorb it
 //! exactly. The lengths before the first joint have no effect on torque. Neither is tested.
-//! z is taken at the row's centre without filtering, because rigid-body derivatives lie in the filter's
-//! passband.
-//! Cost: one torque evaluation for each of 2 (N - 1) directions and one row rotated into B + 4 columns for
-//! each joint, 50 times a second. Memory: 561 numbers, N (B + 6) for each of [`HELD`] rows and a queue of row
-//! centres.
+//! z is taken at the row's centre without filtering, because rigid-body derivatives
+//! lie in the filter's passband.
+//! Cost: one torque evaluation for each of 2 (N - 1) directions and one row rotated into B + 4
+//! columns for each joint, 50 times a second. Memory: 561 numbers, N (B + 6) for each of [`HELD`]
+//! rows and a queue of row centres.
 
 use super::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE};
 use super::record::{LARGEST_STILL_SHARE, RowModel};
@@ -44,9 +44,9 @@ pub const DIRECTIONS: usize = 4;
 /// Rows held back, and rows excluded on either side of an unexpectedly large residual: 0.3 s. That is the
 /// longer half of a push plus the filter's reach.
 pub const HELD: usize = 15;
-/// Smallest share of a direction's power that the parameters must leave, or the direction is not reported.
-/// Single precision leaves 6e-7 of a wholly absorbed direction. The first joint's zero, mostly gravity,
-/// leaves 6e-5.
+/// Smallest share of a direction's power that the parameters must leave, or the direction is not
+/// reported. Single precision leaves 6e-7 of a wholly absorbed direction. The first joint's zero,
+/// mostly gravity, leaves 6e-5.
 const SEEN_SHARE: f64 = 1e-5;
 /// Step of the difference quotients: relative for a length, rad for a zero.
 const STEP: f64 = 1e-2;
@@ -143,9 +143,9 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         self.factor.fill(T::zero());
     }
 
-    /// Starts another motion. A residual above `wild` (N m) marks a row as disturbed; `noise` is the standard
-    /// deviation of an independent row of each joint, N m. Columns that were `dropped` are not free to
-    /// follow.
+    /// Starts another motion. A residual above `wild` (N m) marks a row as disturbed; `noise` is
+    /// the standard deviation of an independent row of each joint, N m. Columns that were
+    /// `dropped` are not free to follow.
     pub fn begin(&mut self, wild: &[T; N], noise: &[T; N], dropped: &[bool; B]) {
         self.break_off();
         (self.wild, self.weight, self.dropped) = (*wild, noise.map(|noise| T::one() / noise), *dropped);

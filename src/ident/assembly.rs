@@ -156,8 +156,8 @@ fn sums<T: Real, const N: usize, const B: usize, const ROOM: usize>(
     (rows, absolute)
 }
 
-/// Error of all rows of one joint with the weighted solution, over the torque of all rows; zero without
-/// torque.
+/// Error of all rows of one joint with the weighted solution, over the torque of
+/// all rows; zero without torque.
 fn whole_error_share<T: Real, const N: usize, const B: usize, const ROOM: usize>(
     window: &Window<T, N, B, ROOM>,
     joint: usize,

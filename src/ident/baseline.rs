@@ -1,5 +1,4 @@
-//! Reference that an accepted identification leaves for monitoring later motion: values, covariance, noise of
-//! a row.
+//! Reference from an accepted identification to monitor later motion: values, covariance, noise of a row.
 //!
 //! Why not the model alone: a residual is too large only relative to the noise at the time of acceptance, and
 //! to the model's own uncertainty.

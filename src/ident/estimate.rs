@@ -304,8 +304,8 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
         estimate
     }
 
-    /// Covariance of a stage's parameters: their own, plus the errors of the held ones by `p_u = R_uu^-1 (z -
-    /// R_uf p_f)`.
+    /// Covariance of a stage's parameters: their own, plus the errors of the held ones by
+    /// `p_u = R_uu^-1 (z - R_uf p_f)`.
     fn carry_errors(&self, plan: Plan, index: usize, stage: &Stage<T, B>, estimate: &mut Estimate<T, B>) {
         let inverse = stage.factor.inverse(stage.count);
         let mut gain = [[T::zero(); B]; B]; // d p_u / d p_f, row = index in the stage, column = base parameter

@@ -12,11 +12,11 @@
 //! outlier  |x - p| > L  and  x outside [third smallest - L, third largest + L] of neighbours; then x := p
 //! ```
 //!
-//! The second condition spares real steps, ramps and jittered recordings: where a signal moves steadily, each
-//! sample lies within the range of its neighbours. Past neighbours are already clean, so of the four to come
-//! two may be outliers: up to three in a row are found. A longer run is not isolated and passes; reweighting
-//! handles it later. At the ends of a motion neighbours are missing; there the range is widened by its own
-//! width.
+//! The second condition spares real steps, ramps and jittered recordings: where a signal moves steadily,
+//! each sample lies within the range of its neighbours. Past neighbours are already clean, so of the
+//! four to come two may be outliers: up to three in a row are found. A longer run is not isolated and
+//! passes; reweighting handles it later. At the ends of a motion neighbours are missing; there the range
+//! is widened by its own width.
 //!
 //! | symbol | meaning | here |
 //! | --- | --- | --- |
@@ -36,8 +36,8 @@ pub const REACH: usize = 4;
 const WINDOW: usize = 2 * REACH + 1;
 const FACTOR: f64 = 6.0;
 const STEP: f64 = 0.02;
-/// Smallest limit for an angle, rad. A smaller error in speed is below the uncertainty that a reversal
-/// leaves.
+/// Smallest limit for an angle, rad. A smaller error in speed is below the
+/// uncertainty that a reversal leaves.
 const ANGLE_FLOOR_RAD: f64 = 5e-4;
 /// Smallest limit for a torque, as a share of the running mean size.
 const TORQUE_FLOOR_SHARE: f64 = 0.1;

@@ -1,7 +1,7 @@
 //! Checks held-out motions while they stream by: residual in order of time, and geometry errors.
 //!
-//! Fed beside the recorder with the progress of each sample; see [`Residual`] and [`Alignment`] for the
-//! results.
+//! Fed beside the recorder with the progress of each sample; see [`Residual`] and
+//! [`Alignment`] for the results.
 
 use super::alignment::Alignment;
 use super::record::{Progress, RowModel};

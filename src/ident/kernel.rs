@@ -18,8 +18,8 @@
 //! derivative is exact but for the aliased stopband. Normalisation removes the remaining 1e-5 of a constant,
 //! a ramp and a parabola.
 //!
-//! Cost: built once; about 60 flops for each tap. Memory: `TAPS` numbers for [`LowPass`], three times as many
-//! for [`Kernel`].
+//! Cost: built once; about 60 flops for each tap. Memory: `TAPS` numbers for [`LowPass`], three
+//! times as many for [`Kernel`].
 
 use crate::real::{self, Real};
 
@@ -136,8 +136,8 @@ pub struct Kernel<T, const TAPS: usize> {
 }
 
 impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
-    /// Builds the low-pass that is 3 dB down at `bandwidth_hz`, for samples at `sample_rate_hz`, and its
-    /// derivatives.
+    /// Builds the low-pass that is 3 dB down at `bandwidth_hz`, for samples at
+    /// `sample_rate_hz`, and its derivatives.
     ///
     /// # Errors
     /// [`KernelError`] when the bandwidth is invalid or does not fit `TAPS`.

@@ -1,8 +1,8 @@
 //! Detects that an accepted model no longer fits: load, wearer or friction changed.
 //!
-//! Each joint has a cumulative sum of log-likelihood ratios (Page 1954) over blocks of n = 25 moving rows
-//! (half a second). The hypotheses: "the residual's energy is rho times its value at acceptance" against
-//! "unchanged":
+//! Each joint has a cumulative sum of log-likelihood ratios (Page 1954) over blocks of n = 25 moving
+//! rows (half a second). The hypotheses: "the residual's energy is rho times its value at
+//! acceptance" against "unchanged":
 //!
 //! ```text
 //! E = mean of e^2 over the block                        1 while nothing has changed, see [`super::baseline`]
@@ -12,18 +12,18 @@
 //! rho_k = sum_j h_j h_(j + m k) / sum_j h_j^2                    their correlation, m the decimation
 //! ```
 //!
-//! **Limit.** The time between false alarms of (W2) is at least `exp(t h)` blocks, with t the positive root
-//! of `E0 exp(t l) = 1` (Lorden 1971 for t = 1; Siegmund 1985 for the tilt). Assume `nu E / kappa` has a
-//! chi-square distribution; kappa >= 1 is the factor by which the noise may have been underestimated. Then t
-//! is the root of
+//! **Limit.** The time between false alarms of (W2) is at least `exp(t h)` blocks, with t the positive
+//! root of `E0 exp(t l) = 1` (Lorden 1971 for t = 1; Siegmund 1985 for the tilt). Assume `nu E / kappa`
+//! has a chi-square distribution; kappa >= 1 is the factor by which the noise may have been
+//! underestimated. Then t is the root of
 //!
 //! ```text
 //! t ln rho + ln(1 - t kappa (1 - 1/rho)) = 0,     h = ln(N gamma) / t                                   (W3)
 //! ```
 //!
-//! for any nu (t = 1 for kappa = 1). Here gamma is the wanted time in blocks and N the number of charts.
-//! Clipping at h/P only makes the time longer. `rho = 2`, `kappa = 1.1` and 100 h give t = 0.70, h = 20.3 for
-//! two joints.
+//! for any nu (t = 1 for kappa = 1). Here gamma is the wanted time in blocks and N the number of
+//! charts. Clipping at h/P only makes the time longer. `rho = 2`, `kappa = 1.1` and 100 h give t =
+//! 0.70, h = 20.3 for two joints.
 //!
 //! **Persistence.** One block adds at most h/P, so an alarm needs P disturbed blocks, and more to make up for
 //! calm ones between them. A calm block takes off `nu/2 (ln rho - 1 + 1/rho)`, 1.7 of 20 at 16 Hz. A push of
@@ -60,8 +60,8 @@ pub struct MonitorSettings<T> {
     pub time_between_false_alarms_s: T,
     /// rho: energy of the residual over that at acceptance, for which the sum is optimal; above 1.
     pub energy_ratio: T,
-    /// kappa: factor by which the noise variance may have been underestimated; from 1 to below `rho ln rho /
-    /// (rho - 1)`.
+    /// kappa: factor by which the noise variance may have been underestimated; from 1 to
+    /// below `rho ln rho / (rho - 1)`.
     pub noise_margin: T,
     /// Time that even the largest change must last, s.
     pub persistence_s: T,

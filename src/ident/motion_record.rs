@@ -32,8 +32,8 @@ pub struct Record<T, const N: usize, const B: usize> {
     pub rejected: u32,
     /// Information of one row in units of independent ones, `m sum h^2`: below one because rows overlap.
     pub row_information: T,
-    /// Standard deviation of the torque noise of one 500 Hz sample, from its own scatter, N m; zero if
-    /// unknown.
+    /// Standard deviation of the torque noise of one 500 Hz sample, from its own
+    /// scatter, N m; zero if unknown.
     pub noise: [T; N],
     /// Statistics of replaced samples and disturbed rows.
     pub outliers: Outliers<T, N>,
@@ -72,8 +72,8 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
         self.noise.get(joint).filter(|&&noise| noise > T::zero()).map(|&noise| noise * real::sqrt(energy))
     }
 
-    /// Root mean square torque error of one joint that the parameters' covariance explains, N m: `tr(R Cov
-    /// R') / rows`.
+    /// Root mean square torque error of one joint that the parameters' covariance
+    /// explains, N m: `tr(R Cov R') / rows`.
     #[must_use]
     #[inline(never)]
     pub fn uncertainty(&self, joint: usize, estimate: &Estimate<T, B>) -> T {

@@ -178,8 +178,8 @@ mod tests {
                 10_000,
                 seed,
             );
-            // The median of 10,000 correlated differences scatters by 1.6 %; 8 % of outliers raise it by 10
-            // %.
+            // The median of 10,000 correlated differences scatters by 1.6 %; 8 %
+            // of outliers raise it by 10 %.
             assert!(found > 1.45 && found < 1.75, "{found}");
             let clean = level(|_, normal| 1.5 * normal, 10_000, seed);
             assert!((clean / 1.5 - 1.0).abs() < 0.06, "{clean}");
@@ -188,8 +188,8 @@ mod tests {
 
     #[test]
     fn a_marker_that_goes_back_beside_a_steep_tail_comes_down_towards_its_neighbour() {
-        // The parabola through 0, 1 and 100 leads below 0, so the line to the neighbour two positions before
-        // counts.
+        // The parabola through 0, 1 and 100 leads below 0, so the line to the
+        // neighbour two positions before counts.
         let mut median =
             Median::<f64> { heights: [0.0, 0.0, 1.0, 100.0, 200.0], positions: [0, 1, 3, 4, 8], seen: 5 };
         median.adjust(2);

@@ -1,5 +1,4 @@
-//! Statistics of excluded data in one motion: samples replaced before the filter, disturbed stretches after
-//! it.
+//! Statistics of excluded data in one motion: replaced samples and disturbed stretches.
 //!
 //! Silent cleaning would hide what a result rests on. The record of a motion therefore says how many samples
 //! were replaced ([`super::hampel`]) and how much of the motion got less weight ([`super::reweighting`]).

@@ -5,9 +5,9 @@
 //! sum over rows (y p - t)^2 = |R p - z|^2 + residual
 //! ```
 //!
-//! A variant of [`super::factor`] without the zeros below the diagonal, with only the columns present. A
-//! window of many small factors needs less than half of the memory. A row is `n` columns and the right-hand
-//! side.
+//! A variant of [`super::factor`] without the zeros below the diagonal, with only the columns
+//! present. A window of many small factors needs less than half of the memory. A row is `n`
+//! columns and the right-hand side.
 //!
 //! Memory: `n (n + 3) / 2 + 1` numbers. Cost of one row: about `2 n^2` multiplications and `n` square roots.
 

@@ -50,8 +50,8 @@ pub const LARGEST_STILL_SHARE: f64 = 0.05;
 /// Window of the blocks of one motion, with the device's size.
 pub type MotionWindow<T, const N: usize, const B: usize> = Window<T, N, B, { window::ROOM }>;
 
-/// Accumulates one motion after the other. The recorder owns its window, or `W` refers to one elsewhere in
-/// memory.
+/// Accumulates one motion after the other. The recorder owns its window, or `W`
+/// refers to one elsewhere in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recorder<
     T,
@@ -167,8 +167,8 @@ where
         self.low_pass.reach()
     }
 
-    /// Gives all rows of the current motion equal weight: without a known noise level disturbances cannot be
-    /// detected.
+    /// Gives all rows of the current motion equal weight: without a known noise level
+    /// disturbances cannot be detected.
     pub fn count_disturbances(&mut self) {
         self.reweights = false;
     }

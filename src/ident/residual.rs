@@ -96,8 +96,8 @@ impl<T: Real> JointResidual<T> {
         self.judged(forgiven).pairs
     }
 
-    /// Root mean square of the residual slower than half a second, N m; zero without correlation of
-    /// neighbours.
+    /// Root mean square of the residual slower than half a second, N m; zero
+    /// without correlation of neighbours.
     #[must_use]
     pub fn slow(&self, forgiven: bool) -> T {
         let judged = self.judged(forgiven);

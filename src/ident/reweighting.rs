@@ -20,8 +20,8 @@
 //!
 //! Sources: iteratively reweighted least squares, redescending weights: Huber and Ronchetti, Robust
 //! Statistics, 2009; the cube root: Wilson and Hilferty (1931).
-//! Cost: at most twelve times blocks times columns row rotations and solutions of each joint, once per
-//! motion.
+//! Cost: at most twelve times blocks times columns row rotations and solutions of
+//! each joint, once per motion.
 //! Limits: a disturbance below the noise of a block stays. One that lasts for more than half of the motion
 //! counts as normal (the verdict sees the residual). A block is excluded as a whole.
 
@@ -31,9 +31,9 @@ use crate::real::{self, Real};
 
 /// Fewest blocks for a credible majority.
 const FEWEST_BLOCKS: usize = 8;
-/// Fewest independent rows for each column. With fewer a block that a poorly known parameter explains easily
-/// looks like a disturbance. The simple pendulum's 3 s, 22 independent rows for 6 columns, were predicted 1.5
-/// times worse.
+/// Fewest independent rows for each column. With fewer a block that a poorly known parameter explains
+/// easily looks like a disturbance. The simple pendulum's 3 s, 22 independent rows for 6 columns,
+/// were predicted 1.5 times worse.
 const INDEPENDENT_ROWS_PER_COLUMN: f64 = 10.0;
 const NORM_ROUNDS: usize = 6;
 const ROUNDS: usize = 12;

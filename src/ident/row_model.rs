@@ -1,5 +1,4 @@
-//! Model that turns a motion into regressor rows: geometry, gravity, estimated columns, known friction
-//! curves.
+//! Model that turns a motion into regressor rows: geometry, gravity, columns, friction curves.
 
 use nalgebra::Vector3;
 

@@ -98,8 +98,8 @@ impl<T: Real, const N: usize, const B: usize> Open<T, N, B> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowFilter<T, const N: usize, const B: usize, const PENDING: usize> {
     open: [Open<T, N, B>; PENDING],
-    /// Samples since the start of the window of the output that will be finished next; `None` before the
-    /// first.
+    /// Samples since the start of the window of the output that will be finished
+    /// next; `None` before the first.
     age: Option<usize>,
     /// Index of that output in `open`.
     oldest: usize,
@@ -124,8 +124,8 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
         *self = Self::new(self.ends);
     }
 
-    /// Takes the rows of one 500 Hz sample; every tenth call returns a finished output once the window is
-    /// full.
+    /// Takes the rows of one 500 Hz sample; every tenth call returns a finished
+    /// output once the window is full.
     ///
     /// An output needs `outputs_needed(low_pass.taps()) <= PENDING`; the recorder that owns both checks it.
     pub fn push<const TAPS: usize>(

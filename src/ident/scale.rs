@@ -19,9 +19,9 @@
 //! geometry between them. A mass on the knee's link loads both joints. On the hip's link it loads the hip
 //! alone, and the knee's constant stays unknown.
 //!
-//! The last line tests whether the two runs differ by this mass at this position. A wrong *position* bends
-//! `delta` and shows. A wrong *mass* only scales it: an error of 10 % in the stated mass gives 10 % in c,
-//! undetected.
+//! The last line tests whether the two runs differ by this mass at this position. A wrong
+//! *position* bends `delta` and shows. A wrong *mass* only scales it: an error of 10 % in the
+//! stated mass gives 10 % in c, undetected.
 //!
 //! With the constants known, [`Record::corrected`] converts a record to right constants without the load.
 //! Solving it again gives absolute parameters, and [`widen`] adds the effect of the constants' own errors.

@@ -71,8 +71,8 @@ pub struct SwarmSearch<T: Real, const B: usize> {
 }
 
 impl<T: Real, const B: usize> SwarmSearch<T, B> {
-    /// Builds a cold search in place. The first [`Self::advance`] scatters the beetles uniformly over the
-    /// box.
+    /// Builds a cold search in place. The first [`Self::advance`] scatters the
+    /// beetles uniformly over the box.
     pub fn place<'a, const N: usize>(
         slot: &'a mut MaybeUninit<Self>,
         problem: &Problem<'_, T, N, B>,
@@ -110,8 +110,8 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
         (self.watched_value, self.watched_iteration) = (T::LARGEST, 0);
     }
 
-    /// Starts the first stage with open columns. The swarm is large, so it is built in its slot, not by
-    /// `new`.
+    /// Starts the first stage with open columns. The swarm is large, so it is
+    /// built in its slot, not by `new`.
     #[inline(never)]
     fn start<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
         if self.stage.columns().is_empty() {

@@ -23,8 +23,8 @@
 //! | J, beta, Cov | cost, least squares and its covariance over the remaining columns | chi-square, SI |
 //!
 //! Source: backward elimination, Draper and Smith, Applied Regression Analysis, ch. 15.
-//! Cost: one restricted factor and its inverse each step, about `2 B^3` multiplications; at most `2 N + 1`
-//! steps.
+//! Cost: one restricted factor and its inverse each step, about `2 B^3`
+//! multiplications; at most `2 N + 1` steps.
 //! Limits: a dropped value counts as exactly zero afterwards. The other parameters' sigma lose the part that
 //! resembled it, although up to three of its standard deviations may be real. Where the truth is neither zero
 //! nor clearly visible, the others are biased by that part, and their sigma does not show it.

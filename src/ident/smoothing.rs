@@ -105,8 +105,8 @@ mod tests {
             let sample = [0.7 + 0.4 * real::sin_cos(omega * time).0];
             let Some(smoothed) = smoother.push(&kernel, &sample, &[index as f32]) else { continue };
             let (sine, cosine) = real::sin_cos(omega * (index - kernel.reach()) as f32 / 500.0);
-            // The passband is flat to 1.6e-4; single precision adds 1e-7 of 1 rad through a curvature gain of
-            // 1e4.
+            // The passband is flat to 1.6e-4; single precision adds 1e-7 of 1 rad
+            // through a curvature gain of 1e4.
             assert!((smoothed.position[0] - 0.7 - 0.4 * sine).abs() < 1.6e-4 * 0.4 + 1e-6);
             assert!((smoothed.velocity[0] - 0.4 * omega * cosine).abs() < 1.6e-4 * 0.4 * omega + 1e-5);
             assert!(

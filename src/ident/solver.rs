@@ -280,8 +280,8 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         self.completed.is_some().then(|| self.completion.parameters())
     }
 
-    /// Loss of fit of the consistent leg against the plan's least squares, over all rows; `None` until it is
-    /// complete.
+    /// Loss of fit of the consistent leg against the plan's least squares, over all rows;
+    /// `None` until it is complete.
     #[must_use]
     pub fn consistency(&self) -> Option<Consistency<T>> {
         self.completed.as_ref().map(|(_, consistency)| *consistency)

@@ -26,8 +26,8 @@
 //! most 3.2 % of the surplus within 0.06..0.24 rad/s. The constant and the line come from the columns of
 //! Coulomb and viscous friction and make the error orthogonal to these columns. Without them 1.7 % of the
 //! surplus went into Coulomb friction, two of its standard deviations on the simulated leg; with them 0.2 %.
-//! Cost: one exponential per joint and sample; the search about 50 small solutions per joint, once per
-//! motion.
+//! Cost: one exponential per joint and sample; the search about 50 small
+//! solutions per joint, once per motion.
 //! Limits: the rows contain no speeds below 0.03 rad/s (standstill rule), so a vs below 0.05 rad/s is
 //! reported as 0.05.
 

@@ -26,8 +26,8 @@
 //! sqrt(2 k)`. The alarm was then false, or its cause has passed. Without any explanation a full
 //! identification is needed.
 //!
-//! Cost: some `2 B^3 + 20 B^2` multiplications, once after an alarm. Memory: N + 1 hypotheses and an
-//! estimate.
+//! Cost: some `2 B^3 + 20 B^2` multiplications, once after an alarm. Memory: N +
+//! 1 hypotheses and an estimate.
 //! Limits: payloads on two links, or one together with other friction, are not among the hypotheses and are
 //! refused. For a payload on the first link torque determines the moment but not the mass. A payload
 //! parameter that the motion did not excite (its inertia, in slow gait) has a large sigma.
@@ -174,8 +174,8 @@ impl<T: Real, const N: usize, const B: usize> Update<T, N, B> {
     }
 }
 
-/// FC and FV of the joints, up to the array's length. Spare entries repeat the first and drop out as
-/// dependent.
+/// FC and FV of the joints, up to the array's length. Spare entries repeat the
+/// first and drop out as dependent.
 fn friction_parameters<const N: usize>() -> [(usize, Parameter); DIRECTIONS] {
     core::array::from_fn(|index| {
         let parameter = if index % 2 == 0 { Parameter::FC } else { Parameter::FV };
@@ -195,8 +195,8 @@ fn energy<T: Real, const N: usize, const B: usize>(
     })
 }
 
-/// True unless `M ZZ - HX^2 - HY^2` is negative beyond the allowed standard deviations, with all four
-/// determined.
+/// True unless `M ZZ - HX^2 - HY^2` is negative beyond the allowed standard
+/// deviations, with all four determined.
 fn payload_can_exist<T: Real, const B: usize>(
     explanation: &Explanation<T, B>,
     thresholds: &Thresholds<T>,

@@ -198,8 +198,8 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         usize::from(self.order[place.min(LARGEST_BLOCKS - 1)])
     }
 
-    /// Takes one output of the row filter; `taken` marks the joints whose row is used. False without
-    /// capacity.
+    /// Takes one output of the row filter; `taken` marks the joints whose row is
+    /// used. False without capacity.
     pub fn insert(&mut self, rows: &FilteredRows<T, N, B>, taken: &[bool; N]) -> bool {
         if self.capacity < 2 {
             return false;

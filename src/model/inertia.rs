@@ -40,8 +40,8 @@ pub struct RigidBody<T> {
 }
 
 impl<T: Real> RigidBody<T> {
-    /// Computes the ten parameters about the joint frame's origin. Parameters of bodies fixed to one another
-    /// add up.
+    /// Computes the ten parameters about the joint frame's origin. Parameters of bodies
+    /// fixed to one another add up.
     #[must_use]
     pub fn to_parameters(&self) -> InertialParameters<T> {
         let h = self.centre_of_mass * self.mass;

@@ -15,8 +15,8 @@
 //! | a | acceleration of its frame's origin, less gravity | m/s2 |
 //! | R, p | frame i seen from the frame before, see [`super::chain`] | -, m |
 //!
-//! Source: J. Y. S. Luh, M. W. Walker and R. P. C. Paul, 1980; link frames as in Craig 2005, Eqs
-//! (6.45)-(6.47).
+//! Source: J. Y. S. Luh, M. W. Walker and R. P. C. Paul, 1980; link frames as in
+//! Craig 2005, Eqs (6.45)-(6.47).
 //! Cost: about 70 multiplications and additions per link.
 
 use nalgebra::Vector3;
@@ -29,8 +29,8 @@ pub(super) fn cross<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
     Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 }
 
-/// Sum a + b by component. In a size-optimised build `nalgebra`'s own is a loop over memory: 45 instructions
-/// instead of 3.
+/// Sum a + b by component. In a size-optimised build `nalgebra`'s own is a loop over memory:
+/// 45 instructions instead of 3.
 #[inline(always)]
 pub(super) fn sum<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
     Vector3::new(a.x + b.x, a.y + b.y, a.z + b.z)
@@ -120,8 +120,8 @@ impl<T: Real> LinkMotion<T> {
     }
 }
 
-/// Velocity of a link per unit speed of one joint before it: a column of the link's Jacobian, in the link's
-/// frame.
+/// Velocity of a link per unit speed of one joint before it: a column of the link's
+/// Jacobian, in the link's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct JointAxis<T> {
     /// Direction of the joint's axis.

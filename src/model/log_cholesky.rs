@@ -1,8 +1,8 @@
 //! Physical consistency: a test for possible bodies, and coordinates in which every body is possible.
 //!
-//! Ten parameters belong to a body (positive density somewhere, negative nowhere) exactly if their
-//! pseudo-inertia is positive definite. A search in log-Cholesky coordinates cannot leave that set, whatever
-//! the data.
+//! Ten parameters belong to a body (positive density somewhere, negative nowhere) exactly if
+//! their pseudo-inertia is positive definite. A search in log-Cholesky coordinates cannot leave
+//! that set, whatever the data.
 //!
 //! ```text
 //! J = | S   h |      S = tr(I)/2 E - I                    (integral of x x' dm)
@@ -21,10 +21,10 @@
 //! | s12 s23 s13 | shear of that extent | m | +-1000 |
 //! | t1 t2 t3 | centre of mass | m | +-1000 |
 //!
-//! Source: C. Rucker and P. M. Wensing, Smooth Parameterization of Rigid-Body Inertia, 2022, Eqs (9)-(11);
-//! the criterion P. M. Wensing, S. Kim and J.-J. E. Slotine, 2018. Cost: four exponentials and about 40 flops
-//! one way, 390 instructions in `f32` on a Cortex-M4F (emulated); three square roots and four logarithms the
-//! other.
+//! Source: C. Rucker and P. M. Wensing, Smooth Parameterization of Rigid-Body Inertia, 2022, Eqs
+//! (9)-(11); the criterion P. M. Wensing, S. Kim and J.-J. E. Slotine, 2018. Cost: four exponentials
+//! and about 40 flops one way, 390 instructions in `f32` on a Cortex-M4F (emulated); three square roots
+//! and four logarithms the other.
 //! Limits: the ranges keep every product below 1e18, so that `f32` never overflows. In `f32` the conversion
 //! from parameters loses the digits that the shift to the centre of mass cancels. A body of radius r at
 //! distance c has a relative error of about 1e-7 (c/r)^2.

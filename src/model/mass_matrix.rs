@@ -13,8 +13,8 @@
 //! | I, h, m | inertia, first moment, mass of link j about its frame's origin | kg m2, kg m, kg |
 //!
 //! Source: R. Featherstone, Rigid Body Dynamics Algorithms, 2008, Eq. (6.5), with the Jacobian written out.
-//! Cost: about 60 flops per link and pair of joints before it; 210 instructions for two joints (Cortex-M4F,
-//! `f32`).
+//! Cost: about 60 flops per link and pair of joints before it; 210 instructions for
+//! two joints (Cortex-M4F, `f32`).
 
 use nalgebra::SMatrix;
 

@@ -2,8 +2,8 @@
 //!
 //! Every module that predicts or explains torque uses this one, so the conventions are fixed once:
 //!
-//! - **Frames**: modified Denavit-Hartenberg (Khalil, Craig), see [`chain`]. Joint i turns about z of frame
-//!   i.
+//! - **Frames**: modified Denavit-Hartenberg (Khalil, Craig), see [`chain`]. Joint
+//!   i turns about z of frame i.
 //! - **Parameters**: 14 per joint in the order of [`Parameter`]. The ten inertial ones are about the origin
 //!   of the joint's frame, in that frame, and inertias are ELEMENTS of the tensor (XY = -integral of x y dm).
 //! - **Gravity** is an argument: the acceleration vector in the base frame, m/s2. It turns with the trunk.

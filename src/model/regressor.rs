@@ -22,8 +22,8 @@
 //! | u, v | axis of joint i seen from link j | -, m |
 //! | I, h, M | inertia tensor, first moment, mass of link j | kg m2, kg m, kg |
 //!
-//! Source: C. G. Atkeson, C. H. An and J. M. Hollerbach 1986 (linear form); the axes are the Jacobian's
-//! columns.
+//! Source: C. G. Atkeson, C. H. An and J. M. Hollerbach 1986 (linear form); the
+//! axes are the Jacobian's columns.
 //! Cost: about 90 flops per pair (i, j) and 90 per link; 1,550 instructions for two joints in `f32` on a
 //! Cortex-M4F (emulated), 95 for a row times the parameters. Memory: 56 N^2 bytes in `f32`. Numbers that are
 //! not finite pass through.
@@ -107,8 +107,8 @@ mod tests {
     use super::super::testing::{Dice, rounded_state};
     use super::*;
 
-    /// Largest difference of regressor times parameters and Newton-Euler over random legs, over the largest
-    /// torque.
+    /// Largest difference of regressor times parameters and Newton-Euler over random
+    /// legs, over the largest torque.
     fn identity_error<T: Real, const N: usize>(seed: u64) -> f64 {
         let mut dice = Dice::new(seed);
         let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
@@ -126,8 +126,8 @@ mod tests {
 
     #[test]
     fn regressor_times_parameters_equals_newton_euler() {
-        // 42 products and three frames of rounding: a few tens of units in the last place of the largest
-        // torque.
+        // 42 products and three frames of rounding: a few tens of units in the
+        // last place of the largest torque.
         for error in [identity_error::<f64, 1>(1), identity_error::<f64, 2>(2), identity_error::<f64, 3>(3)] {
             assert!(error < 1e-14, "{error:e}");
         }
@@ -152,8 +152,8 @@ mod tests {
                 largest = largest.max(other.abs());
             }
         }
-        // Angles up to pi are off by 1.2e-7; centripetal terms square and add the errors that three frames
-        // carry.
+        // Angles up to pi are off by 1.2e-7; centripetal terms square and add the
+        // errors that three frames carry.
         assert!(worst < 2e-6 * largest, "{:e}", worst / largest);
     }
 

@@ -52,8 +52,8 @@ impl Dice {
         Vector3::new(self.within(9.81), self.within(9.81), self.within(9.81))
     }
 
-    /// Coordinates of a body of 0.4 to 20 kg, a few centimetres to decimetres wide, up to 0.3 m from the
-    /// origin.
+    /// Coordinates of a body of 0.4 to 20 kg, a few centimetres to decimetres wide,
+    /// up to 0.3 m from the origin.
     pub fn body(&mut self) -> LogCholesky<f64> {
         let mut body = [0.0; 10];
         body[0] = 0.5 + self.within(1.0);

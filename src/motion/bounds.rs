@@ -1,8 +1,8 @@
 //! Proven bounds of a motion from its coefficients, and the proof that they lie within limits.
 //!
-//! Sampling a curve misses its peaks; summing its amplitudes overstates them. Both together are tight and
-//! certain. At a peak of f the slope vanishes, and the nearest of M points of a grid is at most pi/M away, so
-//! by Taylor
+//! Sampling a curve misses its peaks; summing its amplitudes overstates them. Both together are
+//! tight and certain. At a peak of f the slope vanishes, and the nearest of M points of a grid is at
+//! most pi/M away, so by Taylor
 //!
 //! ```text
 //! max f <= max over the grid + (pi/M)^2 / 2 * sum_k k^2 A_k            A_k = sqrt(s_k^2 + c_k^2)

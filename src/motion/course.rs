@@ -1,8 +1,8 @@
 //! Course of one joint, tick by tick, towards a target that may change at any time.
 //!
-//! Why beside [`Motion`](super::Motion): a host that commands every tick gives no motion that could be proven
-//! in advance. Each tick therefore extends the course from its present state, with bounded speed and
-//! acceleration.
+//! Why beside [`Motion`](super::Motion): a host that commands every tick gives no motion that could
+//! be proven in advance. Each tick therefore extends the course from its present state, with
+//! bounded speed and acceleration.
 //!
 //! ```text
 //! to a position   v' = v moved towards +-min(speed, s(d), |d| / T), by at most acceleration T,

@@ -205,14 +205,14 @@ pub(super) mod tests {
                 let turn = f64::from(turn);
                 for joint in 0..2 {
                     let position = |turn| position_in_double(&curve, joint, turn);
-                    // Central differences of h = 1e-4 turns err by h^2/6 q''' (1e-6 here) and 1e-16/h^2
-                    // (1e-8).
+                    // Central differences of h = 1e-4 turns err by h^2/6 q'''
+                    // (1e-6 here) and 1e-16/h^2 (1e-8).
                     let h = 1e-4;
                     let velocity = (position(turn + h) - position(turn - h)) / (2.0 * h * period);
                     let acceleration = (position(turn + h) - 2.0 * position(turn) + position(turn - h))
                         / (h * h * period * period);
-                    // Rounding in f32: 6 harmonics of up to 0.3 rad, orders squared up to 36: a few units of
-                    // 1e-6.
+                    // Rounding in f32: 6 harmonics of up to 0.3 rad, orders squared
+                    // up to 36: a few units of 1e-6.
                     assert!((f64::from(state.position_rad[joint]) - position(turn)).abs() < 2e-6);
                     assert!((f64::from(state.velocity_rad_per_s[joint]) - velocity).abs() < 1e-5);
                     assert!((f64::from(state.acceleration_rad_per_s2[joint]) - acceleration).abs() < 3e-5);

@@ -16,9 +16,9 @@
 //!    (hip -15.0, knee -8.6 degrees). No point moves by more than half of the jump.
 //! 3. Take the Fourier series of the closed curve up to the sixth harmonic. The series stays within 0.70
 //!    (hip) and 0.72 degrees (knee) of the closed curve, farthest at the kink where the cycle closes.
-//! 4. Add an offset, 25.0 and 23.7 degrees, that puts each joint into the middle of the paper's working range
-//!    of 2.17..50.18 (hip) and 6.85..95.53 degrees (knee). The joints then span 15.0..37.4 and 14.3..88.2
-//!    degrees.
+//! 4. Add an offset, 25.0 and 23.7 degrees, that puts each joint into the middle of the paper's
+//!    working range of 2.17..50.18 (hip) and 6.85..95.53 degrees (knee). The joints then span
+//!    15.0..37.4 and 14.3..88.2 degrees.
 //!
 //! The coefficients below are the result of these steps; a test derives them again from the equations. Angles
 //! are anatomical: flexion positive at both joints.

@@ -1,5 +1,4 @@
-//! Commanded motion of a leg: motions between two rests that are proven to stay within limits, and the course
-//! of a host's tick-by-tick commands.
+//! Commanded motion of a leg: motions proven to stay within limits, and a host's tick-by-tick commands.
 //!
 //! Why a separate module: identification needs exact derivatives of the command. A wearer must be safe before
 //! the first tick: a motion stays in range. Every motion here is therefore closed-form with analytic

@@ -12,9 +12,9 @@
 //! ```
 //!
 //! The end mirrors the start in time: the motion starts at the curve's turn -B/2P and ends at +B/2P, two
-//! different poses. Position, velocity and acceleration are continuous throughout; velocity and acceleration
-//! are zero at both ends. Period and blend are rounded to whole ticks, so the phase is exact after any number
-//! of cycles.
+//! different poses. Position, velocity and acceleration are continuous throughout; velocity and
+//! acceleration are zero at both ends. Period and blend are rounded to whole ticks, so the phase is
+//! exact after any number of cycles.
 //! Cost: some 10 multiplications and one integer division beside the curve's evaluation.
 
 use super::{Fourier, HARMONICS, JointEnvelope, MotionError, MotionState, whole_ticks};
@@ -199,8 +199,8 @@ mod tests {
 
     #[test]
     fn the_bound_of_acceleration_covers_a_quick_blend_and_is_tight_there() {
-        // A sine is fastest where the blend ends, and a blend of 0.2 s in a period of 10 s outweighs its
-        // curvature.
+        // A sine is fastest where the blend ends, and a blend of 0.2 s in a period of
+        // 10 s outweighs its curvature.
         let sine = Fourier::<1, 1>::new(Second(10.0), [0.0], [[0.5]], [[0.0]]).expect("finite");
         let motion = Periodic::new(sine, Second(0.2), 1, RATE_HZ).expect("positive times");
         let peak = (0..motion.duration_ticks())

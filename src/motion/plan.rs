@@ -77,8 +77,8 @@ impl<const N: usize, const H: usize> Motion<N, H> {
         }
     }
 
-    /// Proves that the whole motion stays within limits; the error names the first joint and quantity that
-    /// may not.
+    /// Proves that the whole motion stays within limits; the error names the first
+    /// joint and quantity that may not.
     pub fn prove(&self, limits: &[JointEnvelope; N]) -> Result<Proof<N>, LimitViolation> {
         bounds::prove(self.envelope(), limits)
     }

@@ -18,9 +18,9 @@
 //! Hz): -3 dB at 6.3 Hz without and 40 Hz with the commanded velocity; crossover 19.5 Hz with a phase margin
 //! of 47 degrees, 42 degrees at three quarters and 29 at half of the inertia.
 //!
-//! The integral stops while the monitor limits the torque and the error would increase it. Its magnitude
-//! never exceeds the torque cap, and it is zero whenever the drive does not follow. Cost: about 15 operations
-//! per joint.
+//! The integral stops while the monitor limits the torque and the error would increase it. Its
+//! magnitude never exceeds the torque cap, and it is zero whenever the drive does not follow. Cost:
+//! about 15 operations per joint.
 
 use super::TICK_S;
 use crate::checksum::Checksum;

@@ -1,9 +1,9 @@
 //! Means of eight ticks of angle and torque, 500 Hz, for identification.
 //!
-//! Why means: eight readings of the encoder and the current carry more information than one. The mean of
-//! eight (its first zero is at 500 Hz) is the first anti-alias filter of the chain that follows. Angles are
-//! averaged as integers relative to the first of the eight. The mean resolves an eighth of a count, and no
-//! digit is lost.
+//! Why means: eight readings of the encoder and the current carry more information than one. The mean
+//! of eight (its first zero is at 500 Hz) is the first anti-alias filter of the chain that follows.
+//! Angles are averaged as integers relative to the first of the eight. The mean resolves an eighth of a
+//! count, and no digit is lost.
 //!
 //! A mean belongs to the middle of its ticks, 3.5 ticks (0.875 ms) before [`LogSample::tick`], for angle and
 //! torque alike. The mean includes readings that the step gate rejects: the outlier filter has the

@@ -18,9 +18,9 @@
 //! | noise of velocity per noise of reading | sqrt(2 ((1-beta)/(1+beta))^3) / T | 124 1/s |
 //!
 //! The observer follows a constant velocity without error, and a constant acceleration too if it is given.
-//! Source: N. Morrison, Introduction to Sequential Smoothing and Prediction (1969), the fading-memory filter
-//! of degree one; critically damped g-h filter in E. Brookner, Tracking and Kalman Filtering Made Easy
-//! (1998).
+//! Source: N. Morrison, Introduction to Sequential Smoothing and Prediction (1969), the
+//! fading-memory filter of degree one; critically damped g-h filter in E. Brookner, Tracking and
+//! Kalman Filtering Made Easy (1998).
 //!
 //! The state is relative to the last reading, so counts may wrap and `f32` keeps its digits anywhere.
 //! Cost: 10 multiplications and additions per joint.
@@ -121,8 +121,8 @@ mod tests {
     const RATE_HZ: f64 = 4000.0;
     const POLE_RAD_PER_S: f64 = TAU * 100.0;
 
-    /// Runs a position in counts (rounded down to readings) and shows position and velocity errors of late
-    /// ticks.
+    /// Runs a position in counts (rounded down to readings) and shows position and
+    /// velocity errors of late ticks.
     fn run(ticks: u32, from: u32, path: impl Fn(f64) -> f64, mut see: impl FnMut(f64, f64, f64)) {
         let gains = ObserverGains::new(OBSERVER_BANDWIDTH);
         let mut observer = Observer::default();

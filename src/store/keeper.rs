@@ -1,5 +1,4 @@
-//! Manager of one board's stored parameters: the store's content, and new results that wait for a host's
-//! "save".
+//! Manager of one board's stored parameters and of new results that wait for a host's "save".
 //!
 //! ```text
 //! found       accept(model), calibrated(axis, ..)       pending: stored only when a host asks
@@ -8,8 +7,8 @@
 //! "load"      forget()                                  erases the store, discards pending results
 //! ```
 //!
-//! After "load", the next "save" stores nothing found before it: a model that a host discarded must not come
-//! back.
+//! After "load", the next "save" stores nothing found before it: a model that a host
+//! discarded must not come back.
 
 use embedded_storage_async::nor_flash::NorFlash;
 
@@ -83,8 +82,8 @@ impl<F: NorFlash, const N: usize> Keeper<F, N> {
         Some(model.provenance.generation)
     }
 
-    /// Erases everything. Returns the number of models stored so far, zero; `None` if the store could not be
-    /// erased.
+    /// Erases everything. Returns the number of models stored so far, zero; `None` if
+    /// the store could not be erased.
     pub async fn forget(&mut self, permit: &Permit) -> Option<u32> {
         self.store.forget_all(permit).await.ok()?;
         (self.accepted, self.calibrations) = (None, [None; N]);

@@ -73,8 +73,8 @@ const fn version_of(text: &[u8]) -> [u8; 3] {
 }
 
 impl<const N: usize> KeptModel<N> {
-    /// Builds the stored form of a newly accepted model from its identification, with the given generation
-    /// and seed.
+    /// Builds the stored form of a newly accepted model from its identification, with
+    /// the given generation and seed.
     pub fn of<const B: usize, const TAPS: usize, const PENDING: usize, W>(
         configuration: &LegConfiguration<N, B>,
         identification: &Identification<N, B, TAPS, PENDING, W>,
@@ -201,8 +201,8 @@ impl<const N: usize> Kept for KeptModel<N> {
         }
     }
 
-    /// Checks only the closed lists: `LegConfiguration::restore`, the only way into use, checks numbers and
-    /// curves.
+    /// Checks only the closed lists: `LegConfiguration::restore`, the only way into
+    /// use, checks numbers and curves.
     fn from_layout(layout: &ModelLayout<N>) -> Result<Self, RecordError> {
         let worn = match layout.worn {
             0 => Some(false),

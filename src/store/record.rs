@@ -29,8 +29,8 @@ pub enum RecordError {
 
 /// A value that can be stored.
 pub trait Kept: Sized {
-    /// Layout in the flash: plain bytes, little-endian, without gaps. Its default fills fields that older
-    /// schemas lack.
+    /// Layout in the flash: plain bytes, little-endian, without gaps. Its default fills
+    /// fields that older schemas lack.
     type Layout: FromBytes + IntoBytes + Immutable + KnownLayout + Unaligned + Default;
     /// Length of each schema's layout in bytes, from schema 1 on; the last is that of `Layout`.
     const LENGTHS: &'static [usize];

@@ -25,8 +25,8 @@ macro_rules! on_every_search {
     }};
 }
 
-/// Function with ripples everywhere: the adaptive swarm is scattered several times within a few thousand
-/// evaluations.
+/// Function with ripples everywhere: the adaptive swarm is scattered several times
+/// within a few thousand evaluations.
 const RIPPLES: TestProblem = TestProblem::new(TestFunction::Rastrigin, 5);
 
 fn slices_leave_equal_searches<T: Real, S: Search<T> + Clone + PartialEq>(new: &impl Fn(u64) -> S) {
@@ -144,8 +144,8 @@ fn a_run_cancelled_anywhere_has_the_best_of_all_its_evaluations() {
     on_every_search!(f32, watched, knows_its_best);
 }
 
-/// Badly scaled bowl with four slabs of NaN, infinity, minus infinity and the largest number; the minimum is
-/// between them.
+/// Badly scaled bowl with four slabs of NaN, infinity, minus infinity and the largest number;
+/// the minimum is between them.
 struct Holes;
 
 impl<T: Real> Objective<T> for Holes {
@@ -177,8 +177,8 @@ fn costs_that_are_not_finite_do_not_poison_the_adaptive_search() {
     fn run<T: Real>() {
         for seed in 0..20 {
             let mut swarm = Bso::<T, 20, CAPACITY>::new(&Holes, BsoSettings::default(), seed).unwrap();
-            // Half as many iterations again as the slowest of these seeds needs, 97. A corrupted metric never
-            // gets there.
+            // Half as many iterations again as the slowest of these seeds needs, 97. A
+            // corrupted metric never gets there.
             assert!(swarm.reach(&Holes, T::of(1e-3), 150), "seed {seed}: {:?}", swarm.best());
             assert!(swarm.best().is_some_and(|best| best.value >= T::zero()), "minus infinity is no best");
         }

@@ -26,9 +26,9 @@
 //!                            + (u_last - 1)^2 (1 + sin^2(2 pi u_last))
 //! ```
 //!
-//! The paper prints its f2, f3 and f4 differently (x^(4/3) for x^4 / 3, x and y exchanged and 5 for 5.1,
-//! without e). These forms exist as `...AsPrinted` to show the difference: minima -941.37, 0.397887,
-//! -2.718282.
+//! The paper prints its f2, f3 and f4 differently (x^(4/3) for x^4 / 3, x and y exchanged and 5
+//! for 5.1, without e). These forms exist as `...AsPrinted` to show the difference: minima
+//! -941.37, 0.397887, -2.718282.
 //!
 //! Source: Table III of the paper; standard collections (Hansen et al., 2009). Cost: D to 30 D operations.
 

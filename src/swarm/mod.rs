@@ -1,8 +1,8 @@
 //! Optimisers over a box: beetle antennae search, particle swarm and beetle swarm.
 //!
-//! Why a separate module: the searches are independent of the leg. Their input is a cost over a box
-//! ([`Objective`]). Test functions with a known minimum ([`TestProblem`]) judge them before they are applied
-//! to a leg.
+//! Why a separate module: the searches are independent of the leg. Their input is a cost over
+//! a box ([`Objective`]). Test functions with a known minimum ([`TestProblem`]) judge them
+//! before they are applied to a leg.
 //!
 //! | search | source | evaluations per iteration |
 //! | --- | --- | --- |

@@ -63,8 +63,8 @@ mod tests {
 
     #[test]
     fn moments_are_those_of_the_named_distributions() {
-        // 100,000 draws: standard error of a mean is 0.0009 (uniform) and 0.0018 (bell); five of them
-        // allowed.
+        // 100,000 draws: standard error of a mean is 0.0009 (uniform) and 0.0018
+        // (bell); five of them allowed.
         let mut random = Random::new(11);
         let count = 100_000;
         let (mut uniform, mut signed, mut bell, mut bell_square) = (0.0, 0.0, 0.0, 0.0);

@@ -38,9 +38,9 @@ pub trait Search<T: Real> {
     /// Number of evaluations so far.
     fn evaluations(&self) -> u32;
 
-    /// Advances by whole iterations until the best is at most `goal` or `iterations` are complete; true if
-    /// the goal was reached. The last iteration is completed, so that searches can be compared by their
-    /// counts.
+    /// Advances by whole iterations until the best is at most `goal` or `iterations` are
+    /// complete; true if the goal was reached. The last iteration is completed, so that searches
+    /// can be compared by their counts.
     fn reach(&mut self, objective: &impl Objective<T>, goal: T, iterations: u32) -> bool {
         while self.iterations() < iterations {
             let before = self.iterations();

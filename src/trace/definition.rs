@@ -1,5 +1,4 @@
-//! Macro that turns a list of kinds, each with its format and fields, into the type, its writer and its
-//! sender.
+//! Macro that turns a list of kinds, with formats and fields, into the type, its writer and its sender.
 
 macro_rules! records {
     ($(
@@ -28,8 +27,8 @@ macro_rules! records {
                 }
             }
 
-            /// Sends the record without waiting; not for use inside a tick. The host needs the image to
-            /// decode it.
+            /// Sends the record without waiting; not for use inside a tick. The host
+            /// needs the image to decode it.
             #[cfg(feature = "defmt")]
             pub fn emit(&self, number: u32) {
                 match self {

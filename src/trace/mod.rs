@@ -15,8 +15,8 @@
 //!   board never waits for a listener.
 //! - Joints, motions and links are counted from 1; 0 means all, or none in particular. Motion 0 is the one
 //!   identified from.
-//! - Units are in the key (`rms_nm`) or beside the value (`unit=`, with `_` for a space). Words are those of
-//!   the JSON.
+//! - Units are in the key (`rms_nm`) or beside the value (`unit=`, with `_` for a space).
+//!   Words are those of the JSON.
 //! - Numbers are written so that reading them gives the same bits again.
 //!
 //! | part | what it is |

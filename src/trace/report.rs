@@ -102,8 +102,8 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>
 where
     W: BorrowMut<MotionWindow<f32, N, B>>,
 {
-    /// Record at `index` of this section. `None` at the section's end; `Some(None)` for an index without a
-    /// record.
+    /// Record at `index` of this section. `None` at the section's end; `Some(None)`
+    /// for an index without a record.
     fn record(&self, report: &mut Report) -> Option<Option<Record<N>>> {
         let index = report.index;
         match report.part {

@@ -119,8 +119,8 @@ pub const fn unit(parameter: Parameter) -> &'static str {
     }
 }
 
-/// Word for the refusal of a calibration, and its number: a phase from 1, or pole pairs or counts that would
-/// fit.
+/// Word for the refusal of a calibration, and its number: a phase from 1, or pole
+/// pairs or counts that would fit.
 #[must_use]
 pub const fn calibration(refusal: CalibrationRefusal) -> (&'static str, u32) {
     use CalibrationRefusal as Why;

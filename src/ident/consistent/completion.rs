@@ -1,5 +1,4 @@
-//! Full parameters of every link from base values: closed form where physically consistent, else interior
-//! points.
+//! Full parameters of every link from base values: closed form where consistent, else interior points.
 //!
 //! ```text
 //! closed form allowed -> done (no step, base values untouched)
@@ -8,11 +7,11 @@
 //!
 //! Every iterate is strictly inside the allowed set, so a result read at any time is physically consistent.
 //!
-//! Cost: 30 to 60 steps ([`super::interior`]) where the closed form is inconsistent. Memory, two joints: 4.0
-//! kB.
-//! Limits: at most [`LARGEST_STEPS`] steps. Where the data contradict every consistent leg, the prior's pull
-//! on hidden directions has some effect. Chi-square then comes out up to twice its least value, which changes
-//! no verdict.
+//! Cost: 30 to 60 steps ([`super::interior`]) where the closed form is
+//! inconsistent. Memory, two joints: 4.0 kB.
+//! Limits: at most [`LARGEST_STEPS`] steps. Where the data contradict every consistent leg, the
+//! prior's pull on hidden directions has some effect. Chi-square then comes out up to twice its least
+//! value, which changes no verdict.
 
 use super::super::bounds::LinkPrior;
 use super::super::completion::complete_within;

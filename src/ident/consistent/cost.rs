@@ -6,9 +6,9 @@
 //! N = E - Q Q'                                              Q: orthonormal rows of K W^1/2 (determined ones)
 //! ```
 //!
-//! With the projector `N` instead of the identity the prior has no influence on what is measured. The minimum
-//! of `F` is `p0 + W K' (K W K')^-1 (beta - K p0)` for any `pull`. Columns not estimated are held at `p0`,
-//! which is 0.
+//! With the projector `N` instead of the identity the prior has no influence on what is measured.
+//! The minimum of `F` is `p0 + W K' (K W K')^-1 (beta - K p0)` for any `pull`. Columns not estimated
+//! are held at `p0`, which is 0.
 //!
 //! Cost: `28 + rank` rows into a factor of 28 columns (two joints), about 70,000 multiplications once; an
 //! evaluation 400. Memory: `14 N (14 N + 3)` scalars.
@@ -50,8 +50,8 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         }
     }
 
-    /// Takes the data's rows (`stage`, about the base values `centre`) and the prior's rows with weight
-    /// `pull`.
+    /// Takes the data's rows (`stage`, about the base values `centre`) and the
+    /// prior's rows with weight `pull`.
     #[inline(never)]
     pub fn fill<const B: usize>(
         &mut self,

@@ -1,5 +1,4 @@
-//! Beetle swarm over physically consistent legs: log-Cholesky coordinates of links, logarithms of drive
-//! parameters.
+//! Beetle swarm over physically consistent legs, in log-Cholesky coordinates and logarithms.
 //!
 //! Every point of the box is physically consistent, so the swarm cannot leave the set. It minimises the cost
 //! of [`super::Completion`] from a cold start, uniform in the box that the prior allows. The search exists
@@ -14,8 +13,8 @@
 //! OFF          linear
 //! ```
 //!
-//! Every body includes a ball of the smallest extent: shear alone could make it thinner than single precision
-//! resolves.
+//! Every body includes a ball of the smallest extent: shear alone could make it thinner
+//! than single precision resolves.
 //!
 //! Cost: an evaluation 1,200 multiplications and 11 exponentials (two joints). Memory: a `Bso` of 14 N
 //! dimensions, 21.1 kB for two joints.

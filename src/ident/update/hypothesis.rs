@@ -1,5 +1,4 @@
-//! One explanation of a change: few free parameters, the rest held; its chi-square includes the model's
-//! uncertainty.
+//! One explanation of a change: few free parameters, a chi-square with the model's uncertainty.
 //!
 //! The rows after the change, weighted and triangularised, read `R beta = z + e` with `e` of unit covariance.
 //! The model gives beta_0 with covariance C, so
@@ -277,8 +276,8 @@ fn times<T: Real, const B: usize>(matrix: &[[T; B]; B], vector: &[T; B]) -> [T; 
     product
 }
 
-/// Cholesky's lower factor in place; the upper half becomes zero. S is at least the identity, so no pivot
-/// vanishes.
+/// Cholesky's lower factor in place; the upper half becomes zero. S is at least the
+/// identity, so no pivot vanishes.
 fn factorise<T: Real, const B: usize>(matrix: &mut [[T; B]; B]) {
     for column in 0..B {
         for row in column..B {

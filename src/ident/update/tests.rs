@@ -37,8 +37,8 @@ impl Dice {
     }
 }
 
-/// Independent rows of random states: `speed` and `acceleration` bound them, `bias` is a torque beyond the
-/// model.
+/// Independent rows of random states: `speed` and `acceleration` bound them, `bias`
+/// is a torque beyond the model.
 fn record<T: Real>(
     truth: &LegParameters<f64, 2>,
     states: u32,

@@ -40,8 +40,8 @@ impl<T: Real> Thresholds<T> {
         self.judge_set_aside(outliers, None, docket);
     }
 
-    /// Judges the shares of replaced samples and disturbed rows, on the motion identified from or a held-out
-    /// one.
+    /// Judges the shares of replaced samples and disturbed rows, on the motion
+    /// identified from or a held-out one.
     pub fn judge_set_aside<const N: usize>(
         &self,
         outliers: &Outliers<T, N>,

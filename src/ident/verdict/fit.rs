@@ -159,8 +159,8 @@ mod tests {
             stribeck: [None],
             selection: Selection::all(),
         };
-        // 400 rows worth 0.25 independent ones each: 100 degrees of freedom; chi-square's 0.999 quantile is
-        // 149.449.
+        // 400 rows worth 0.25 independent ones each: 100 degrees of freedom;
+        // chi-square's 0.999 quantile is 149.449.
         let thresholds = Thresholds { noise_quantile: 3.090_2, ..Thresholds::<f64>::default() };
         let allowed = |information, harmless| thresholds.allowed(&record(information), 0, 0.04, harmless);
         let noise = 0.04 * 1.494_49;

@@ -30,8 +30,8 @@ impl<T: Real> Thresholds<T> {
         }
     }
 
-    /// Judges contact: one long stretch of errors in all joints, in a motion that is otherwise predicted
-    /// well.
+    /// Judges contact: one long stretch of errors in all joints, in a motion that
+    /// is otherwise predicted well.
     pub fn judge_contact<const N: usize, const B: usize>(
         &self,
         motion: usize,
@@ -115,8 +115,8 @@ mod tests {
 
     #[test]
     fn of_a_length_alone_and_beside_the_others_the_one_that_says_more_is_judged() {
-        // As shares of the limit: 0.5 alone, 2 beside; 0.8 alone, 0.5 beside; in a tie the value alone is
-        // judged.
+        // As shares of the limit: 0.5 alone, 2 beside; 0.8 alone, 0.5 beside; in a
+        // tie the value alone is judged.
         assert_eq!(judged([0.015, 0.001], Some([-0.06, 0.002]), true), (-0.06, 0.03, false));
         assert_eq!(judged([0.024, 0.001], Some([0.05, 0.02]), true), (0.024, 0.03, true));
         assert_eq!(judged([0.015, 0.0], Some([-0.015, 0.0]), true), (0.015, 0.03, true));

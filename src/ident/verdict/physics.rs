@@ -12,8 +12,8 @@ use crate::model::{JointState, PARAMETERS_PER_JOINT, Parameter, mass_matrix, reg
 use crate::real::{self, Real};
 
 impl<T: Real> Thresholds<T> {
-    /// Judges signs: no negative friction, rotor inertia, mass or kinetic energy beyond noise; all values
-    /// finite.
+    /// Judges signs: no negative friction, rotor inertia, mass or kinetic energy
+    /// beyond noise; all values finite.
     pub fn judge_physics<const N: usize, const B: usize>(
         &self,
         model: &RowModel<T, N, B>,
@@ -86,8 +86,8 @@ impl<T: Real> Thresholds<T> {
     }
 }
 
-/// Negative excess of Coulomb friction in its lower direction, in standard deviations, for asymmetric
-/// friction.
+/// Negative excess of Coulomb friction in its lower direction, in standard
+/// deviations, for asymmetric friction.
 fn negative_direction_of_friction<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     estimate: &Estimate<T, B>,

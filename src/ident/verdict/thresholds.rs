@@ -11,20 +11,20 @@ pub struct Thresholds<T> {
     /// Least root mean square speed of every joint, rad/s. Below, the encoder's noise determines the sign of
     /// the speed, and Coulomb friction looks like an offset.
     pub smallest_speed: T,
-    /// Largest condition number of the scaled problem. Above, an error of 0.1 % in the rows moves the result
-    /// by its size.
+    /// Largest condition number of the scaled problem. Above, an error of 0.1 % in the rows
+    /// moves the result by its size.
     pub largest_condition: T,
     /// Negative excess that a nonnegative quantity may have, in standard deviations.
     pub largest_negative_sigmas: T,
     /// Spreads of chi-square by which a consistent leg may be worse than least squares: five are not noise.
     pub largest_excess_spreads: T,
-    /// Quantile of the standard normal distribution for all noise tests. Noise exceeds 5.2 once in ten
-    /// million. A run has some fifty such tests, so noise alone refuses less than one run in a hundred
-    /// thousand.
+    /// Quantile of the standard normal distribution for all noise tests. Noise exceeds 5.2
+    /// once in ten million. A run has some fifty such tests, so noise alone refuses less than
+    /// one run in a hundred thousand.
     pub noise_quantile: T,
-    /// Largest error on a held-out motion over that on the training motion, where the noise is unknown
-    /// (samples from another grid). Noise alone gives one; two allows for friction that depends on speed and
-    /// load.
+    /// Largest error on a held-out motion over that on the training motion, where the noise is
+    /// unknown (samples from another grid). Noise alone gives one; two allows for friction
+    /// that depends on speed and load.
     pub largest_error_ratio: T,
     /// Harmless systematic error on a held-out motion, as a share of the motion's root mean square torque:
     /// the servo's feedback makes up for it.
@@ -77,8 +77,8 @@ impl<T: Real> Default for Thresholds<T> {
 }
 
 impl<T: Real> Thresholds<T> {
-    /// Limit of chi-square with `freedom` degrees of freedom by chance: a number of its spreads above its
-    /// mean.
+    /// Limit of chi-square with `freedom` degrees of freedom by chance: a number
+    /// of its spreads above its mean.
     #[must_use]
     pub fn chance(&self, freedom: T) -> T {
         freedom + self.largest_excess_spreads * crate::real::sqrt(freedom + freedom)
@@ -100,8 +100,8 @@ mod tests {
 
     #[test]
     fn the_variance_ratio_is_the_tabulated_quantile_of_chi_square() {
-        // Standard normal quantile 3.0902: probability 0.999. Tables: chi-square 29.588 of 10, 149.449
-        // of 100.
+        // Standard normal quantile 3.0902: probability 0.999. Tables: chi-square
+        // 29.588 of 10, 149.449 of 100.
         let thresholds = Thresholds { noise_quantile: 3.090_2, ..Thresholds::<f64>::default() };
         for (freedom, tabulated) in [(10.0, 29.588), (100.0, 149.449)] {
             // Wilson and Hilferty's approximation is good to 0.6 % here.

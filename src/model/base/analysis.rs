@@ -39,8 +39,8 @@ pub type ColumnMask<const N: usize> = [[bool; PARAMETERS_PER_JOINT]; N];
 /// Number of random states. Each gives one row per joint, so there are at least four rows per column.
 const STATES: usize = 64;
 
-/// Bounds of the states' speeds, rad/s, and accelerations, rad/s2: gravity, inertia and friction columns of
-/// like size.
+/// Bounds of the states' speeds, rad/s, and accelerations, rad/s2: gravity, inertia and
+/// friction columns of like size.
 const SPEED_BOUND: f64 = 3.0;
 const ACCELERATION_BOUND: f64 = 10.0;
 
@@ -178,8 +178,8 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         self.columns().get(b).copied()
     }
 
-    /// Factors by which parameters sum up to base parameter `b`: 1 on its independent column. All zero from
-    /// the rank on.
+    /// Factors by which parameters sum up to base parameter `b`: 1 on its independent
+    /// column. All zero from the rank on.
     #[must_use]
     pub fn terms(&self, b: usize) -> &LegParameters<T, N> {
         self.terms.get(b).unwrap_or(&self.nothing)
@@ -200,9 +200,9 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         core::array::from_fn(|b| row_torque(self.terms(b), parameters))
     }
 
-    /// Full parameters with these base values. Starts from `others` and changes the independent columns'
-    /// parameters until the projection fits. With zero `others` the independent columns' parameters are the
-    /// base values.
+    /// Full parameters with these base values. Starts from `others` and changes the independent
+    /// columns' parameters until the projection fits. With zero `others` the independent columns'
+    /// parameters are the base values.
     #[must_use]
     pub fn complete(&self, values: &[T; B], others: &LegParameters<T, N>) -> LegParameters<T, N> {
         let present = self.project(others);

@@ -85,8 +85,8 @@ impl<T: Real, const N: usize> Factor<T, N> {
         }
     }
 
-    /// Brings the factor to echelon form; calls `kept` with each column that is independent of those before
-    /// it.
+    /// Brings the factor to echelon form; calls `kept` with each column that is
+    /// independent of those before it.
     ///
     /// A column is dependent if its part beyond the kept ones is at most `tolerance` of its entry in
     /// `lengths`, all of which are positive.
@@ -119,8 +119,8 @@ impl<T: Real, const N: usize> Factor<T, N> {
         echelon
     }
 
-    /// Back-substitution for one kept column: divides its row by the pivot and clears the column in earlier
-    /// rows.
+    /// Back-substitution for one kept column: divides its row by the pivot and
+    /// clears the column in earlier rows.
     pub fn substitute(&mut self, place: usize, joint: usize, parameter: Parameter) {
         let Some((pivot_row, before)) =
             self.rows.as_flattened_mut().get_mut(..=place).and_then(<[RegressorRow<T, N>]>::split_last_mut)

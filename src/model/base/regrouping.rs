@@ -30,8 +30,8 @@ use super::super::chain::Chain;
 use super::super::parameter::{LegParameters, Parameter};
 use crate::real::Real;
 
-/// Regroups a leg to the fewest parameters that the closed form allows; the torque of any motion is
-/// unchanged.
+/// Regroups a leg to the fewest parameters that the closed form allows; the
+/// torque of any motion is unchanged.
 #[must_use]
 pub fn regroup<T: Real, const N: usize>(
     chain: &Chain<T, N>,

@@ -1,5 +1,6 @@
-//! Tests of the tick on an independent joint: double precision, an inertia with viscous friction and gravity,
-//! a lagging drive and an encoder that counts.
+//! Tests of the tick on an independent joint in double precision.
+//!
+//! The joint is an inertia with viscous friction and gravity, a lagging drive and an encoder that counts.
 
 extern crate std;
 
@@ -173,8 +174,8 @@ fn the_integral_is_empty_when_the_drive_does_not_follow() {
     assert!(output.wanted_torque[0].abs().0 < 1.0, "{:?}", output.wanted_torque);
 }
 
-/// Exact law of the plant, in the model's angles: the second joint's angles and torques have the opposite
-/// sign.
+/// Exact law of the plant, in the model's angles: the second joint's angles and
+/// torques have the opposite sign.
 struct Exact;
 
 impl TorqueModel<2> for Exact {

@@ -1,5 +1,4 @@
-//! Bit flips in memory, on the host only: a test of the checksum (row M2 of docs/safety.md). No image
-//! contains it.
+//! Bit flips in memory, on the host only, to test the checksum (row M2 of docs/safety.md).
 
 use super::Servo;
 

@@ -306,8 +306,8 @@ mod tests {
 
     #[test]
     fn every_beetle_finds_the_food_of_a_bowl_by_the_whiskers_of_all() {
-        // With full trust and directions along the bowl's axes the shared step is Newton's: one move is
-        // enough.
+        // With full trust and directions along the bowl's axes the shared step is
+        // Newton's: one move is enough.
         let settings =
             AdaptiveSettings { velocity_share: 0.0, pair_directions: 0, ..AdaptiveSettings::default() };
         let mut rules = AdaptiveRules::<f64, N, D>::new(settings, D);

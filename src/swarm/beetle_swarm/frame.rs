@@ -216,8 +216,8 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     }
 }
 
-/// Scales a row to length 1. Returns false and leaves the row unchanged if it is shorter than `least` or not
-/// finite.
+/// Scales a row to length 1. Returns false and leaves the row unchanged if it is
+/// shorter than `least` or not finite.
 fn normalise<T: Real>(row: &mut [T], least: T) -> bool {
     let length = sqrt(dot(row, row));
     let long_enough = length >= least && is_finite(length);

@@ -12,8 +12,8 @@
 //! leap succeeds if the next standstill is better by 1e-3 of its value. After more than `leaps` failures in a
 //! row the swarm is scattered.
 //!
-//! Source: own experiments; hopping between minima is from Wales, Doye (1997), the coarse scale from homotopy
-//! methods.
+//! Source: own experiments; hopping between minima is from Wales, Doye (1997), the coarse
+//! scale from homotopy methods.
 //! Cost: nothing until progress has stopped, then 2 min(N, D) + N evaluations: all beetles leap.
 //! Known limits: axes. Along other directions ripples of several coordinates add up in the curvature, and a
 //! leap comes out too short: the swarm does not leave rotated ripples in 10 dimensions. Ripples that are not

@@ -1,9 +1,9 @@
 //! Learned metric of the adaptive beetle swarm: a matrix A with A A^T ~ H^-1 up to scale, and its inverse.
 //!
-//! Why: in a badly scaled cost a step that suits one direction is far too long or too short in another. In
-//! metric coordinates, y = A^-1 u, the cost should be equally curved in all directions. The method needs no
-//! covariance and no eigenproblem: every round stretches A along the directions in which curvature was just
-//! measured.
+//! Why: in a badly scaled cost a step that suits one direction is far too long or too short in another.
+//! In metric coordinates, y = A^-1 u, the cost should be equally curved in all directions. The method
+//! needs no covariance and no eigenproblem: every round stretches A along the directions in which
+//! curvature was just measured.
 //!
 //! Stretch by al along a unit vector z of metric coordinates, exactly rank 1, likewise for the inverse:
 //!   A = A + (al - 1) (A z) z^T,    A^-1 = A^-1 + z (1/al - 1) (z^T A^-1)

@@ -1,5 +1,4 @@
-//! Beetle swarm search: particles with two whiskers each, in the paper's mode or, by default, the adaptive
-//! one.
+//! Beetle swarm search: particles with two whiskers each, in the adaptive (default) or the paper's mode.
 //!
 //! Why one type for both: swarm, whiskers, moves, budget and ledger are shared. A mode decides only the
 //! whiskers' directions and the use of their readings. Evaluations are requested one at a time, so a run can

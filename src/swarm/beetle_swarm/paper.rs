@@ -1,5 +1,4 @@
-//! Rules of the paper's beetle swarm: whiskers along the velocity, a step of fixed decay towards the lower
-//! cost.
+//! Rules of the paper's beetle swarm: whiskers along the velocity, steps of fixed decay.
 //!
 //! Implemented to show the abilities and limits of the paper's rules; the default mode is the adaptive one.
 //!   x_r = x + v l,  x_l = x - v l                               (Eq. 27)
@@ -8,9 +7,9 @@
 //!   x   = x + lambda v + (1 - lambda) psi                       (Eq. 29, corrected)
 //!   delta = e1 delta + e0                                       (Eq. 25)
 //!   l   = delta / e2                                            (Eq. 26)
-//! As printed, Eq. (29) has v in place of psi, which is the plain particle swarm; the original beetle swarm
-//! (Wang, Yang, Liu, 2018) has psi. The order is that of the paper's Table II: psi uses the velocity before
-//! Eq. (19).
+//! As printed, Eq. (29) has v in place of psi, which is the plain particle swarm; the original
+//! beetle swarm (Wang, Yang, Liu, 2018) has psi. The order is that of the paper's Table II: psi uses
+//! the velocity before Eq. (19).
 //!
 //! Source: the paper, section 3.3.2. Cost: 3 N evaluations and 20 N D operations per iteration.
 //! Known limits: velocities collapse into the span of P - x and G - x, and the whiskers with them: no success

@@ -55,8 +55,8 @@ pub struct AdaptiveSettings<T> {
     pub step_limit: T,
     /// Directions of the frame (after the gradient's) that join two personal bests; default 12.
     pub pair_directions: usize,
-    /// Rounds without progress before the swarm leaps or, in the end, is scattered again; default 8, at
-    /// least 1.
+    /// Rounds without progress before the swarm leaps or, in the end, is scattered
+    /// again; default 8, at least 1.
     pub patience: u32,
     /// Failed leaps in a row that are allowed before the swarm is scattered again; default 8.
     pub leaps: u32,

@@ -58,8 +58,8 @@ fn every_format_is_a_line_whose_first_key_is_its_number() {
 /// Keys of the format are the fields, in the same order: a value behind the wrong key would be misread.
 #[test]
 fn keys_are_the_fields_in_their_order() {
-    // The debug form of a struct variant lists its fields; one record of every shape with more than one
-    // field.
+    // The debug form of a struct variant lists its fields; one record of every
+    // shape with more than one field.
     let text = |record: &Record<2>| {
         let mut text = Text { bytes: [0; 512], length: 0 };
         write!(text, "{record:?}").expect("fits");

@@ -59,8 +59,8 @@ fn ranks_of_known_chains_in_single_precision() {
     known_ranks::<f32>();
 }
 
-/// Compares the base set with the expected one: for each base parameter its terms, the independent column
-/// first.
+/// Compares the base set with the expected one: for each base parameter its terms,
+/// the independent column first.
 fn assert_terms<T: Real, const N: usize, const B: usize>(
     base: &BaseParameters<T, N, B>,
     expected: &[&[(usize, Parameter, f64)]],

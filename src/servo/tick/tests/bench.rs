@@ -1,5 +1,6 @@
-//! Test bench for ticks: two joints in double precision, independent of the servo. Each is an inertia with
-//! viscous friction and gravity, a lagging drive and an encoder that counts.
+//! Test bench for ticks: two joints in double precision, independent of the servo.
+//!
+//! Each is an inertia with viscous friction and gravity, a lagging drive and an encoder that counts.
 
 use super::*;
 
