@@ -22,7 +22,6 @@ use super::stribeck::{
 use super::window::{LARGEST_BLOCKS, Window};
 use crate::real::{self, Real};
 
-/// Rows a second.
 const ROW_RATE_HZ: f64 = 50.0;
 /// A block counts as disturbed when it keeps less than this share of its weight.
 const DISTURBED_BELOW: f64 = 0.5;

@@ -131,7 +131,6 @@ impl<T: Real, const B: usize> Stage<T, B> {
     }
 }
 
-/// Rounds of the power iteration.
 const POWER_ITERATIONS: usize = 40;
 
 /// Largest singular value.

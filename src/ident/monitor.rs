@@ -46,7 +46,6 @@ use crate::real::{self, Real};
 
 /// Moving rows of a joint in a block: half a second.
 pub const ROWS_PER_BLOCK: u32 = 25;
-/// Rows per second.
 const ROW_RATE_HZ: f64 = SAMPLE_RATE_HZ / DECIMATION as f64;
 /// Duration of a block for a joint that never stands still, s.
 const BLOCK_S: f64 = ROWS_PER_BLOCK as f64 / ROW_RATE_HZ;

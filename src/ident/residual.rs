@@ -153,7 +153,6 @@ impl<T: Real> JointResidual<T> {
     }
 }
 
-/// Duration of a row, s.
 const ROW_S: f64 = 0.02;
 
 /// All joints' residuals on one motion.

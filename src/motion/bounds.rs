@@ -18,7 +18,6 @@ use super::Fourier;
 use crate::real::{abs, max, min, sqrt};
 use crate::units::{Radian, RadianPerSecond, RadianPerSecondSquared};
 
-/// Grid points per harmonic.
 const POINTS_PER_HARMONIC: usize = 64;
 
 /// Limits or proven bounds of one joint.

@@ -15,7 +15,6 @@ pub(super) fn live_mut<T, const D: usize>(row: &mut [T; D], dimension: usize) ->
     &mut row[..dimension.min(D)]
 }
 
-/// Sum of products.
 pub(super) fn dot<T: Real>(one: &[T], other: &[T]) -> T {
     one.iter().zip(other).fold(T::zero(), |sum, (&a, &b)| sum + a * b)
 }

@@ -14,7 +14,6 @@ use crate::leg::{
     Estimate, Evidence, Identification, MotionWindow, Parameter, Plan, SearchState, VALIDATION_MOTIONS,
 };
 
-/// Number of parameters of a joint.
 const PARAMETERS: usize = Parameter::ALL.len();
 /// Findings stored at a time.
 const CHUNK: usize = 8;

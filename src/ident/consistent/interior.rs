@@ -48,7 +48,6 @@ pub(super) fn merit<T: Real, const N: usize>(
     real::is_finite(merit).then_some(merit)
 }
 
-/// Result of a step.
 pub(super) struct Step {
     /// `place` minimises `G`, within what matters or can be resolved.
     pub settled: bool,
