@@ -5,11 +5,11 @@
 //! points in a known direction:
 //!
 //! ```text
-//! z_j = d tau / d ln a_j,   d tau / d q0_j               at the model's parameters, by a difference quotient
+//! z_j = d tau / d ln a_j,   d tau / d q0_j           at the model's parameters, by a difference quotient
 //! r   = Y nu + z delta + noise                       rows of the held-out motions, over sigma of their joint
-//! R   = triangular factor of (Y, z, r);  u_j, w: the part of z_j and r below the rows of Y
-//! S   = u'u,      delta = u'w / S,      sigma = 1 / sqrt S                   each direction alone
-//! U delta = w,    sigma_j^2 = (U'U)^-1_jj                                     all directions together
+//! R   = triangular factor of (Y, z, r)               u_j, w: the part of z_j and r below the rows of Y
+//! S   = u'u,  delta = u'w / S,  sigma = 1 / sqrt S   each direction alone
+//! U delta = w,   sigma_j^2 = (U'U)^-1_jj             all directions together
 //! ```
 //!
 //! delta is the share by which a link is longer than assumed, or the angle by which a zero is off. For a

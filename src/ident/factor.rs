@@ -9,8 +9,8 @@
 //! precision loses accuracy (a diagonal of 1e3 swallows rows of 1). A motion is therefore recorded in small
 //! factors, merged with their like (`window`), so that only numbers of similar size ever meet.
 //!
-//! Cost of one row: about `2 B^2` multiplications and `B` square roots. Memory: `B
-//! (B + 1) + 2` numbers a factor.
+//! Cost of one row: about `2 B^2` multiplications and `B` square roots. Memory: `B (B + 1) + 2` numbers a
+//! factor.
 
 use crate::real::{self, Real};
 

@@ -5,11 +5,11 @@
 //! acceptance" against "unchanged":
 //!
 //! ```text
-//! E = mean of e^2 over the block                        1 while nothing has changed, see [`super::baseline`]
-//! l = nu/2 (E (1 - 1/rho) - ln rho)                      log-likelihood ratio of the block              (W1)
-//! S <- max(0, S + min(l, h/P)),         alarm when S >= h                                               (W2)
-//! nu = n / (1 + 2 sum_k (1 - k/n) rho_k^2)                       degrees of freedom of n rows that overlap
-//! rho_k = sum_j h_j h_(j + m k) / sum_j h_j^2                    their correlation, m the decimation
+//! E = mean of e^2 over the block                      1 while nothing has changed, see [`super::baseline`]
+//! l = nu/2 (E (1 - 1/rho) - ln rho)                   log-likelihood ratio of the block              (W1)
+//! S <- max(0, S + min(l, h/P))                        alarm when S >= h                              (W2)
+//! nu = n / (1 + 2 sum_k (1 - k/n) rho_k^2)            degrees of freedom of n rows that overlap
+//! rho_k = sum_j h_j h_(j + m k) / sum_j h_j^2         their correlation, m the decimation
 //! ```
 //!
 //! **Limit.** The time between false alarms of (W2) is at least `exp(t h)` blocks, with t the positive
@@ -21,17 +21,18 @@
 //! t ln rho + ln(1 - t kappa (1 - 1/rho)) = 0,     h = ln(N gamma) / t                                   (W3)
 //! ```
 //!
-//! for any nu (t = 1 for kappa = 1). Here gamma is the wanted time in blocks and N the number of
-//! charts. Clipping at h/P only makes the time longer. `rho = 2`, `kappa = 1.1` and 100 h give t =
-//! 0.70, h = 20.3 for two joints.
+//! for any nu (t = 1 for kappa = 1). Here gamma is the wanted time in blocks and N the number of charts.
+//! Clipping at h/P only makes the time longer. `rho = 2`, `kappa = 1.1` and 100 h give t = 0.70, h = 20.3 for
+//! two joints.
 //!
 //! **Persistence.** One block adds at most h/P, so an alarm needs P disturbed blocks, and more to make up for
 //! calm ones between them. A calm block takes off `nu/2 (ln rho - 1 + 1/rho)`, 1.7 of 20 at 16 Hz. A push of
 //! 0.3 s touches three blocks; 6 s of persistence ask for twelve. A wearer who pushes half of the time has
 //! changed the load.
 //!
-//! **Delay.** `h / min(nu/2 (E (1 - 1/rho) - ln rho), h/P)` blocks for an energy E. No energy below `E = rho
-//! ln rho / (rho - 1)` is noticed: 1.39 for rho = 2, a torque error of 0.62 standard deviations of a row.
+//! **Delay.** `h / min(nu/2 (E (1 - 1/rho) - ln rho), h/P)` blocks for an energy E. No energy below
+//! `E = rho ln rho / (rho - 1)` is noticed: 1.39 for rho = 2, a torque error of 0.62 standard deviations of a
+//! row.
 //!
 //! Sources: E. S. Page, Continuous inspection schemes, 1954; G. Lorden, Procedures for reacting to a change
 //! in distribution, 1971; D. Siegmund, Sequential Analysis, 1985; nu: Satterthwaite 1946.

@@ -8,8 +8,8 @@
 //! ```text
 //! r_b^2 = sum of squared residuals of block b, n_b rows, nu_b = n_b m sum h^2 degrees of freedom
 //! rounds 1..6     w_b = 1 / max(sqrt(r_b^2 / n_b), s)               sum of block norms, from any start
-//! rounds 7..12  u_b = ((r_b^2 / n_b s^2)^(1/3) - (1 - 2 / 9 nu_b)) / sqrt(2 / 9 nu_b)   normal if chi-square
-//!                 t_b = (u_b - median u) / max(1, spread of u),    w_b = 1 to t = 2.5, falling to 0 at t = 4
+//! rounds 7..12    u_b = ((r_b^2 / n_b s^2)^(1/3) - (1 - 2 / 9 nu_b)) / sqrt(2 / 9 nu_b)   normal if chi^2
+//!                 t_b = (u_b - median u) / max(1, spread of u),   w_b = 1 to t = 2.5, falling to 0 at t = 4
 //! ```
 //!
 //! s^2 is the median of `r_b^2 / n_b`, so up to half of the blocks may be disturbed. The spread of u is its

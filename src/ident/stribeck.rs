@@ -5,9 +5,9 @@
 //! three columns of fixed speeds beside the others; any other speed's column is a combination of these.
 //!
 //! ```text
-//! torque     ... + FC sign(v) + S sign(v) g(v / vs),      g(x) = exp(-x^2)                           (S1)
+//! torque     ... + FC sign(v) + S sign(v) g(v / vs),   g(x) = exp(-x^2)                             (S1)
 //! bank       sign(v) g(v / v_k),   v_k = 0.06, 0.12, 0.24 rad/s: each the fourth power of the next
-//! g(v / vs)  = sum_k w_k(vs) g(v / v_k) + a + b v,   least squares over speeds from 0 to 1.5 rad/s      (S2)
+//! g(v / vs)  = sum_k w_k(vs) g(v / v_k) + a + b v,   least squares over speeds from 0 to 1.5 rad/s  (S2)
 //! gain(vs)   = max(0, u z)^2 / (u u),   u = R w(vs)                                                 (S3)
 //! ```
 //!

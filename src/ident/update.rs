@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! beta = beta_0 + sum_k theta_k d_k          d_k: base values of one unit of parameter k alone
-//! payload:  parameters M, HX, HY, HZ, ZZ, XX, YY, XY, XZ, YZ of one link, as far as separable
+//! payload:   parameters M, HX, HY, HZ, ZZ, XX, YY, XY, XZ, YZ of one link, as far as separable
 //! friction:  FC and FV of every joint
 //! ```
 //!
@@ -17,17 +17,17 @@
 //! E_i  <= rho ln rho / (rho - 1)  energy of every joint's residual: where the monitor would stay silent (W7)
 //! ```
 //!
-//! and it is physically possible: no negative parameter that cannot be negative, and for the payload `M ZZ >=
-//! HX^2 + HY^2` within three standard deviations. That holds for every body put on and, with both signs
-//! turned, for every body taken off. Of several valid hypotheses the one with the smallest `chi2 + 2 k`
+//! and it is physically possible: no negative parameter that cannot be negative, and for the payload
+//! `M ZZ >= HX^2 + HY^2` within three standard deviations. That holds for every body put on and, with both
+//! signs turned, for every body taken off. Of several valid hypotheses the one with the smallest `chi2 + 2 k`
 //! (Akaike 1974) wins.
 //!
-//! Nothing changed if the old model passes both tests and no hypothesis improves on it by more than `k + 5
-//! sqrt(2 k)`. The alarm was then false, or its cause has passed. Without any explanation a full
+//! Nothing changed if the old model passes both tests and no hypothesis improves on it by more than
+//! `k + 5 sqrt(2 k)`. The alarm was then false, or its cause has passed. Without any explanation a full
 //! identification is needed.
 //!
-//! Cost: some `2 B^3 + 20 B^2` multiplications, once after an alarm. Memory: N +
-//! 1 hypotheses and an estimate.
+//! Cost: some `2 B^3 + 20 B^2` multiplications, once after an alarm. Memory: N + 1 hypotheses and an
+//! estimate.
 //! Limits: payloads on two links, or one together with other friction, are not among the hypotheses and are
 //! refused. For a payload on the first link torque determines the moment but not the mass. A payload
 //! parameter that the motion did not excite (its inertia, in slow gait) has a large sigma.

@@ -154,8 +154,8 @@ mod tests {
     #[test]
     fn a_ramp_is_as_quick_as_its_limits_allow_and_no_quicker() {
         let ramp = ramp();
-        // Joint 1 dominates with 1.875 * 0.7 / 1 s, above sqrt(5.77 * 0.7 / 4) =
-        // 1.005 s and joint 2 (0.76 s).
+        // Joint 1 dominates with 1.875 * 0.7 / 1 s, above sqrt(5.77 * 0.7 / 4) = 1.005 s
+        // and joint 2 with 0.76 s.
         let expected = 1.312_5 * RATE_HZ as f32;
         assert!((ramp.duration_ticks() as f32 - expected).abs() <= 1.0);
         let envelope = ramp.envelope();

@@ -4,9 +4,9 @@
 //! a log file a year later. A program cannot read sentences back, and a person cannot read a binary table.
 //!
 //! ```text
-//! line  = kind *(" " key "=" value)  parameter n=41 joint=2 symbol=ZZ value=0.3127 unit=kg_m2 ...
+//! line   = kind *(" " key "=" value)               parameter n=41 joint=2 symbol=ZZ value=0.3127 ...
 //! kind   = key = word of a-z, 0-9 and _
-//! value  = list / any characters but space and [  an unknown number is NaN; an unknown name is -
+//! value  = list / any characters but space and [   an unknown number is NaN; an unknown name is -
 //! list   = "[" value *(", " value) "]"
 //! ```
 //!

@@ -1,9 +1,9 @@
 //! Cost of full parameters as one triangular factor: the data, and a weak prior in directions without data.
 //!
 //! ```text
-//! y = (p - p0) / w                                         each parameter in the prior's standard deviations
+//! y = (p - p0) / w                                  each parameter in the prior's standard deviations
 //! F(y) = |R K W^1/2 y - R (beta - K p0)|^2 + pull |N y|^2 = |A y - b|^2 + const
-//! N = E - Q Q'                                              Q: orthonormal rows of K W^1/2 (determined ones)
+//! N = E - Q Q'                                      Q: orthonormal rows of K W^1/2 (determined ones)
 //! ```
 //!
 //! With the projector `N` instead of the identity the prior has no influence on what is measured.

@@ -4,7 +4,7 @@
 //! pseudo-inertia of every link positive definite
 //! mass              0.2 .. 5 of the prior's
 //! centre of mass    the prior's +- half the segment's length, each coordinate
-//! extent        second moment about the prior's centre of mass <= mass rho^2,  rho^2 = 15 k^2 + 3/4 length^2
+//! extent            second moment about the prior's centre <= mass rho^2,  rho^2 = 15 k^2 + 3/4 length^2
 //! rotor, Coulomb, viscous    0 .. 5 of the prior's;    offset +- 5 (|prior| + Coulomb)
 //! ```
 //!

@@ -4,11 +4,11 @@
 //! The model gives beta_0 with covariance C, so
 //!
 //! ```text
-//! w = z - R beta_0 = R D theta - R delta + e,     delta = beta_0 - beta(before), covariance C
-//! S = E + R C R' = L L'                            covariance of w while theta = 0
-//! theta = argmin |L^-1 (w - R D theta)|^2  generalised least squares (Aitken 1935), minimum chi2  (W4)
-//! G = d theta / d w = P (R D)' S^-1,               P = ((R D)' S^-1 R D)^-1, the covariance of theta
-//! Cov(beta_0 + D theta) = C + D P D' - U P D' - D P U',     U = C R' S^-1 R D                           (W5)
+//! w = z - R beta_0 = R D theta - R delta + e,   delta = beta_0 - beta(before), covariance C
+//! S = E + R C R' = L L'                       covariance of w while theta = 0
+//! theta = argmin |L^-1 (w - R D theta)|^2     generalised least squares (Aitken 1935), minimum chi2  (W4)
+//! G = d theta / d w = P (R D)' S^-1           P = ((R D)' S^-1 R D)^-1, the covariance of theta
+//! Cov(beta_0 + D theta) = C + D P D' - U P D' - D P U',   U = C R' S^-1 R D                          (W5)
 //! ```
 //!
 //! | symbol | meaning |

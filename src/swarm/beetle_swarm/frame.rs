@@ -8,8 +8,9 @@
 //!   g = (f_r - f_l) / (2 l),   h = (f_r - 2 f_0 + f_l) / l^2
 //!   s = -g / h where h > 0, else -sgn(g) times the usual whisker;   |s| <= step limit / |A z_j|
 //! For beetle i at x_i the minimum is q_ij = s_j - w_j.(x_i - x_j) away along z_j.
-//! Symbols: z_j unit vector in metric coordinates y = A^-1 x; d_j = A z_j its image in box coordinates; w_j =
-//! A^-T z_j, so that w_j.x = z_j.y without y: one product with the metric per direction, none per beetle.
+//! Symbols: z_j unit vector in metric coordinates y = A^-1 x; d_j = A z_j its image in box coordinates;
+//! w_j = A^-T z_j, so that w_j.x = z_j.y without y: one product with the metric per direction, none per
+//! beetle.
 //!
 //! Source: own experiments; one parabola per direction is Newton's step in the subspace of the frame.
 //! Cost: per direction two or three products with the metric (2 D^2 each) and 4 D j operations of

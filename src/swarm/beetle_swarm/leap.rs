@@ -102,7 +102,7 @@ mod tests {
         let mut rules = Rules::new(settings, 3);
         let standstills = [10.0, 10.0, 9.0, 9.0, 8.999, 9.5];
         let leaps = standstills.map(|best| rules.leaps_from(best));
-        // 10.0 fails once, 9.0 succeeds, then two failures, then the end.
+        // 10.0 fails once, 9.0 succeeds, then two failures; the third one ends the leaps.
         assert_eq!(leaps, [true, true, true, true, true, false]);
         assert!(rules.leap == Leap::none() && rules.leaps_from(9.5), "scattered: leaps count anew");
         let mut never = Rules::new(AdaptiveSettings { leaps: 0, ..settings }, 3);
