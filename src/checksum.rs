@@ -1,8 +1,8 @@
-//! A sum over words of memory that tells when one of them changed.
+//! Checksum over words of memory that detects a changed word.
 //!
-//! Why no cyclic redundancy check: this one is three instructions a word without a table, and what has to be seen is a word that is not
-//! what it was. A step is a bijection of the sum for each word and of the word for each sum, so any change within one word changes the
-//! sum for certain; changes of several words pass with 2^-32.
+//! Why no cyclic redundancy check: this one is three instructions a word without a table, and it only has to
+//! detect a changed word. A step is a bijection of the sum for each word and of the word for each sum. Any
+//! change within one word therefore changes the sum for certain; changes of several words pass with 2^-32.
 //!
 //! ```text
 //! sum = (sum xor word) * 16777619 modulo 2^32
@@ -10,33 +10,33 @@
 //!
 //! Source: Fowler, Noll, Vo (FNV-1a), a word at a time. Cost: 3 instructions a word.
 
-/// A sum over words.
+/// Checksum over words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Checksum(u32);
 
 impl Checksum {
-    /// Of nothing.
+    /// Checksum of no words.
     pub const EMPTY: Self = Self(0x811c_9dc5);
 
-    /// With one more word.
+    /// Adds one word.
     #[must_use]
     pub const fn word(self, word: u32) -> Self {
         Self((self.0 ^ word).wrapping_mul(16_777_619))
     }
 
-    /// With one more number, all of its bits.
+    /// Adds one number, with all of its bits.
     #[must_use]
     pub const fn number(self, number: f32) -> Self {
         self.word(number.to_bits())
     }
 
-    /// With some more numbers.
+    /// Adds several numbers.
     #[must_use]
     pub fn numbers(self, numbers: impl IntoIterator<Item = f32>) -> Self {
         numbers.into_iter().fold(self, Self::number)
     }
 
-    /// The sum as it is kept.
+    /// Value of the checksum.
     #[must_use]
     pub const fn value(self) -> u32 {
         self.0

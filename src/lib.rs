@@ -1,11 +1,11 @@
 //! Scarab: firmware of an exoskeleton leg's joint drive board that identifies the leg it moves.
 //!
-//! Everything here is pure, `no_std` and without heap; the same code runs on the board, in the emulator and,
-//! against the simulated hardware of `hal-sim`, on the host.
+//! All code is `no_std` and without heap. The same crate runs on the board, in the emulator and, against the
+//! simulated hardware of `hal-sim`, on the host.
 //!
-//! | room | what lives there |
+//! | module | content |
 //! | --- | --- |
-//! | [`real`], [`units`] | the only door to `libm` and `micromath`; unit newtypes |
+//! | [`real`], [`units`] | the only access to `libm` and `micromath`; unit newtypes |
 //! | [`hal`] | the ports a board provides |
 //! | [`model`] | serial chain, Newton-Euler, regressor, friction, base parameters |
 //! | [`motion`] | Fourier excitation, gait, ramps, and the proof that they stay within limits |
@@ -14,12 +14,12 @@
 //! | [`motor`] | field-oriented current control of one axis, 24 kHz, and its calibration |
 //! | [`safety`], [`servo`] | monitor and drive states; the 4 kHz tick |
 //! | [`leg`] | one leg: the activity machine, a control half and an identification half |
-//! | [`operation`] | what each axis does, what is known of it, and what the operator's contacts may have |
-//! | `place` | large values built where they stay |
-//! | [`trace`] | what leaves the board: records, one line each |
-//! | [`store`] | what outlives the power: configuration, calibrations, the accepted model |
-//! | [`bus`] | a CANopen node per joint, and a board's station of them, without I/O |
-//! | [`board`], `task` | one board's registers and interrupts; what runs at which priority (microcontroller only) |
+//! | [`operation`] | work of each axis, signals between tasks, rights of the operator's contacts |
+//! | `place` | large values built in place |
+//! | [`trace`] | output of the board: records, one line each |
+//! | [`store`] | nonvolatile store: configuration, calibrations, the accepted model |
+//! | [`bus`] | a CANopen node per joint, and a board's device with its nodes, without I/O |
+//! | [`board`], `task` | one board's registers and interrupts; tasks and priorities (microcontroller only) |
 #![no_std]
 
 pub mod board;

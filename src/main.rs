@@ -1,7 +1,7 @@
-//! The flash image of the ODrive v3.6 joint drive board: brings up the board, builds the leg, starts the levels.
+//! The flash image of the ODrive v3.6 joint drive board: starts the board, the leg and the priority levels.
 //!
-//! What runs where: `scarab::task`. Nothing here decides anything; what speaks against enabling is raised in the interlock,
-//! and the board goes on, so that it can be told.
+//! `scarab::task` shows which task runs at which level. Nothing is decided here: a failed start sets an
+//! inhibit reason, and the board goes on, so that the host can read it.
 #![no_std]
 #![no_main]
 

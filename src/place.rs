@@ -1,15 +1,15 @@
-//! Large values built where they stay.
+//! Construction of large values in place.
 //!
-//! Why: a value that is returned lives on the stack until it has been moved to its place, often more than once on the way. An
-//! identification has 77 KB, and a stack has room for other things.
+//! Why: a returned value lives on the stack until it has been moved to its destination, often more than once.
+//! An identification has 77 KB, too large for the stack.
 //!
-//! [`fill`] writes every field of a struct into memory that holds nothing yet, and does not compile when one is missing; a field
-//! that is large itself is handed its own place. The unsafe code that this takes is written in this file only.
+//! [`fill`] writes every field of a struct into uninitialised memory, and does not compile if one is missing.
+//! A field that is large itself gets its own memory to fill. The unsafe code for this is in this file only.
 
 use core::mem::MaybeUninit;
 
-/// `fill!(slot, { field: value, ... }, { field: |place| fill(place), ... })` in an `impl` of the struct: writes each of the first
-/// fields, has each of the second written in its place, and gives the struct back.
+/// `fill!(slot, { field: value, ... }, { field: |place| fill(place), ... })` in an `impl` of the struct.
+/// Writes each of the first fields, builds each of the second in place, and returns the struct.
 macro_rules! fill {
     ($slot:expr, { $($field:ident: $value:expr),* $(,)? }, { $($inner:ident: $build:expr),* $(,)? }) => {{
         // Does not compile unless every field is named.
@@ -20,19 +20,21 @@ macro_rules! fill {
         let whole = slot.as_mut_ptr();
         $(
             #[expect(unsafe_code, reason = "see `place`")]
-            // SAFETY: `whole` points to memory for a `Self` that nobody else reaches, so to that of its field.
+            // SAFETY: `whole` points to memory for a `Self` with no other reference
+            // to it, so to that of its field.
             unsafe {
                 $crate::place::write(&raw mut (*whole).$field, || $value);
             }
         )*
         $(
             #[expect(unsafe_code, reason = "see `place`")]
-            // SAFETY: as above; memory that may hold nothing yet is what a `MaybeUninit` stands for.
+            // SAFETY: as above; a `MaybeUninit` may be uninitialised.
             let inner = unsafe { &mut *$crate::place::slot(&raw mut (*whole).$inner) };
             $crate::place::build(inner, $build);
         )*
         #[expect(unsafe_code, reason = "see `place`")]
-        // SAFETY: every field was written above: the destructuring names each, the fields handed out were returned filled.
+        // SAFETY: every field was written above: the destructuring names each, the fields handed out were
+        // returned filled.
         unsafe {
             slot.assume_init_mut()
         }
@@ -40,39 +42,40 @@ macro_rules! fill {
 }
 pub(crate) use fill;
 
-/// Writes a field; what making it takes of the stack is free for the next.
+/// Writes a field; the stack space used to make the value is free for the next.
 ///
 /// # Safety
-/// `field` points to memory for the value that nobody else reaches.
+/// `field` points to memory for the value, with no other reference to it.
 #[expect(unsafe_code, reason = "see `place`")]
 #[inline(always)]
 pub unsafe fn write<T>(field: *mut T, make: impl FnOnce() -> T) {
-    /// A compiler that optimises for size gives each value of a function that it does not split a place of its own.
+    /// Largest value written inline, bytes. A size-optimising compiler gives every value of an unsplit
+    /// function its own stack slot.
     const SMALL: usize = 128;
-    // SAFETY: as this function's.
+    // SAFETY: the caller's contract is that of this function.
     unsafe { if const { size_of::<T>() > SMALL } { write_apart(field, make) } else { field.write(make()) } }
 }
 
 #[expect(unsafe_code, reason = "see `place`")]
 #[inline(never)]
 unsafe fn write_apart<T>(field: *mut T, make: impl FnOnce() -> T) {
-    // SAFETY: as `write`.
+    // SAFETY: the caller's contract is that of `write`.
     unsafe { field.write(make()) }
 }
 
-/// The memory of a field as the place of a value that is not there yet.
+/// Casts the memory of a field to uninitialised memory for its value.
 pub const fn slot<T>(field: *mut T) -> *mut MaybeUninit<T> {
     field.cast()
 }
 
-/// Has a value built in its place, and nowhere else.
+/// Builds a value in place; panics if the builder returns another address.
 pub fn build<'a, T>(slot: &'a mut MaybeUninit<T>, build: impl FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T) {
     let place = slot.as_mut_ptr();
     let built: *mut T = build(slot);
     assert!(core::ptr::eq(place, built), "what was built lies elsewhere");
 }
 
-/// An array, element by element.
+/// Builds an array, element by element.
 #[expect(unsafe_code, reason = "see `place`")]
 pub fn each<T, const N: usize>(slot: &mut MaybeUninit<[T; N]>, make: impl Fn() -> T) -> &mut [T; N] {
     let first = slot.as_mut_ptr().cast::<T>();
@@ -80,51 +83,51 @@ pub fn each<T, const N: usize>(slot: &mut MaybeUninit<[T; N]>, make: impl Fn() -
         // SAFETY: `first` points to memory for `N` elements, and `index` is below that.
         unsafe { first.add(index).write(make()) };
     }
-    // SAFETY: all of its elements were written.
+    // SAFETY: all elements were written.
     unsafe { slot.assume_init_mut() }
 }
 
-/// A value that is built in a place of its own and moved from there: for those who have the room.
+/// Builds a value in local memory and moves it from there; for callers with enough stack.
 #[expect(unsafe_code, reason = "see `place`")]
 pub fn made<T>(build_in: impl for<'a> FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T) -> T {
     let mut slot = MaybeUninit::uninit();
     build(&mut slot, build_in);
-    // SAFETY: `build` has seen the value built here.
+    // SAFETY: `build` has verified that the value was built here.
     unsafe { slot.assume_init() }
 }
 
-/// At most one value, built in its place: what `Option` is for values that the stack has no room for.
+/// At most one value, built in place: an `Option` for values that are too large for the stack.
 pub struct Slot<T> {
     full: bool,
     value: MaybeUninit<T>,
 }
 
 impl<T> Slot<T> {
-    /// Nothing in it.
+    /// True if the slot holds no value.
     pub fn is_empty(&self) -> bool {
         !self.full
     }
 
-    /// Empties it.
+    /// Empties the slot.
     pub fn clear(&mut self) {
         self.full = false;
     }
 
-    /// Has a value built in it, in the place of the one that was there.
+    /// Builds a value in place and replaces the previous one.
     pub fn fill(&mut self, build_in: impl for<'a> FnOnce(&'a mut MaybeUninit<T>) -> &'a mut T) {
         self.full = false;
         build(&mut self.value, build_in);
         self.full = true;
     }
 
-    /// The value.
+    /// Value, if there is one.
     #[expect(unsafe_code, reason = "see `place`")]
     pub fn as_ref(&self) -> Option<&T> {
-        // SAFETY: `full` is set by `fill` only, once `build` has seen the value built here.
+        // SAFETY: only `fill` sets `full`, after `build` has verified that the value was built here.
         self.full.then(|| unsafe { self.value.assume_init_ref() })
     }
 
-    /// The value, to be changed.
+    /// Mutable value, if there is one.
     #[expect(unsafe_code, reason = "see `place`")]
     pub fn as_mut(&mut self) -> Option<&mut T> {
         // SAFETY: as above.
@@ -132,12 +135,13 @@ impl<T> Slot<T> {
     }
 }
 
-/// A [`Slot`] that is empty, built in its place.
+/// Builds an empty [`Slot`] in place.
 #[expect(unsafe_code, reason = "see `place`")]
 pub fn empty_slot<T>(slot: &mut MaybeUninit<Slot<T>>) -> &mut Slot<T> {
     const { assert!(!core::mem::needs_drop::<T>(), "a value that is overwritten is not dropped") };
     let whole = slot.as_mut_ptr();
-    // SAFETY: `whole` points to memory for a `Slot`; its other field may hold anything while this one is false.
+    // SAFETY: `whole` points to memory for a `Slot`; its other field may be
+    // uninitialised while this one is false.
     unsafe {
         (&raw mut (*whole).full).write(false);
         slot.assume_init_mut()

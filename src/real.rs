@@ -1,24 +1,27 @@
-//! The only door to `libm` and `micromath`: scalars in single or double precision and the few functions the rooms need.
+//! The only access to `libm` and `micromath`: scalars in both precisions and their functions.
 //!
-//! Why a door: std's inherent `f32::sqrt` silently replaces any trait method of that name in tests, so what is
-//! tested on the host would not be what runs on the board; and `libm::sinf`, `libm::cosf` compute in double
-//! precision inside, which a Cortex-M4F does in software (about 1,000 instructions). Code that is generic over
-//! [`Real`] runs in `f32` on the device and in `f64` on the host, where the second checks the first.
+//! Why one access: std's inherent `f32::sqrt` silently replaces any trait method of that name in tests. The
+//! host would then test other code than the board runs. Also, `libm::sinf` and `libm::cosf` compute in double
+//! precision inside, which a Cortex-M4F does in software (about 1,000 instructions). Code that is generic
+//! over [`Real`] runs in `f32` on the device and in `f64` on the host, where the second checks the first.
 //!
 //! | function | `f32` | largest error |
 //! | --- | --- | --- |
-//! | [`sin_cos`] | Cody-Waite reduction, minimax polynomials (Moshier, Cephes, 1984-1992), single precision only | 1.2e-7 for arguments up to 8,192, beyond that not a number |
-//! | [`sin_cos_of_turns`] | the same polynomials, reduced exactly as an integer | 1.2e-7 |
+//! | [`sin_cos`] | Cody-Waite reduction, minimax polynomials, single precision only | 1.2e-7 (see below) |
+//! | [`sin_cos_of_turns`] | polynomials of [`sin_cos`], reduced exactly as an integer | 1.2e-7 |
 //! | [`sqrt`] | one instruction on the device, `libm` elsewhere | correctly rounded |
 //! | [`exp`], [`ln`], [`atan2`] | `libm` | 1 ulp |
 //!
-//! `f64` is `libm` throughout. [`fast_sin_cos`] is `micromath`'s, wrong by up to 1.1e-3, offered for the current loop's Park
-//! angle and nothing else. It is not faster: [`sin_cos_of_turns`] takes 44 instructions where it takes 81
+//! The polynomials are Moshier's (Cephes, 1984-1992). The error of [`sin_cos`] holds for arguments up to
+//! 8,192; beyond that the result is NaN.
+//!
+//! For `f64` all functions are those of `libm`. [`fast_sin_cos`] is `micromath`'s, wrong by up to 1.1e-3,
+//! offered for the current loop's Park angle only. [`sin_cos_of_turns`] is faster: 44 instructions against 81
 //! (`scripts/count-instructions`).
 
 use nalgebra::RealField;
 
-/// A scalar the rooms compute with: `f32` on the device, `f64` for reference.
+/// Scalar type of all computations: `f32` on the device, `f64` for reference.
 pub trait Real: RealField + Copy {
     /// Smallest number that still changes 1 when added.
     const EPSILON: Self;
@@ -26,9 +29,9 @@ pub trait Real: RealField + Copy {
     const LARGEST: Self;
     /// Nearest representable number.
     fn of(value: f64) -> Self;
-    /// The number in double precision.
+    /// Value in double precision.
     fn to_double(self) -> f64;
-    /// The number without what follows the point; 0 where it is negative or none, the largest integer where it is larger.
+    /// Integer part; 0 for a negative number or NaN, the largest integer for a larger number.
     fn to_count(self) -> u32;
     #[doc(hidden)]
     fn door_abs(self) -> Self;
@@ -52,7 +55,8 @@ pub fn sin_cos<T: Real>(angle: T) -> (T, T) {
 
 /// Sine and cosine of an angle in rad, -32..=32, wrong by up to 1.1e-3 each (parabolas, `micromath` 2.1).
 ///
-/// By the wrapper type, not by the trait: where `std` is linked its inherent methods would win over the trait's.
+/// Calls the wrapper type, not the trait: where `std` is linked its inherent
+/// methods would win over the trait's.
 #[must_use]
 #[inline(never)]
 pub fn fast_sin_cos(angle: f32) -> (f32, f32) {
@@ -60,12 +64,12 @@ pub fn fast_sin_cos(angle: f32) -> (f32, f32) {
     (sine.0, cosine.0)
 }
 
-/// Sine and cosine of an angle in units of 2^-32 turns, wrong by up to 1.2e-7 each: nothing is left to reduce.
+/// Sine and cosine of an angle in units of 2^-32 turns, wrong by up to 1.2e-7 each: no reduction needed.
 #[must_use]
 #[inline(always)]
 pub fn sin_cos_of_turns(units: u32) -> (f32, f32) {
     const RADIAN_PER_UNIT: f32 = core::f32::consts::TAU / 4_294_967_296.0;
-    // The nearest quarter turn, and the way from there.
+    // Nearest quarter turn, and the angle from there.
     let quarter = units.wrapping_add(1 << 29) >> 30;
     let rest = units.wrapping_sub(quarter << 30).cast_signed() as f32;
     let (sine, cosine) = eighth_of_a_turn(rest * RADIAN_PER_UNIT);
@@ -103,13 +107,13 @@ pub fn abs<T: Real>(value: T) -> T {
     value.door_abs()
 }
 
-/// The smaller of two numbers; the other one where one is not a number.
+/// The smaller of two numbers; if one is NaN, the other.
 #[must_use]
 pub fn min<T: Real>(one: T, other: T) -> T {
     if other < one || is_nan(one) { other } else { one }
 }
 
-/// The larger of two numbers; the other one where one is not a number.
+/// The larger of two numbers; if one is NaN, the other.
 #[must_use]
 pub fn max<T: Real>(one: T, other: T) -> T {
     if other > one || is_nan(one) { other } else { one }
@@ -119,7 +123,7 @@ fn is_nan<T: Real>(value: T) -> bool {
     value.partial_cmp(&value).is_none()
 }
 
-/// `value` limited to `low..=high`; `low` where it is not a number.
+/// Limits `value` to `low..=high`; NaN gives `low`.
 #[must_use]
 pub fn clamp<T: Real>(value: T, low: T, high: T) -> T {
     if value > high {
@@ -131,7 +135,7 @@ pub fn clamp<T: Real>(value: T, low: T, high: T) -> T {
     }
 }
 
-/// -1, 0 or 1.
+/// Sign of a number: -1, 0 or 1; 0 for NaN.
 #[must_use]
 pub fn sign<T: Real>(value: T) -> T {
     if value > T::zero() {
@@ -143,7 +147,7 @@ pub fn sign<T: Real>(value: T) -> T {
     }
 }
 
-/// Neither NaN nor infinite.
+/// True if neither NaN nor infinite.
 #[must_use]
 pub fn is_finite<T: Real>(value: T) -> bool {
     abs(value) <= T::LARGEST
@@ -221,17 +225,17 @@ fn sqrt_single(value: f32) -> f32 {
     libm::sqrtf(value)
 }
 
-/// The FPU's own square root: `core` has none on stable, and `libm`'s is computed with integers.
-/// Two instructions that touch `s0` only, as the calling convention allows.
-/// The directive names the FPU of a Cortex-M4F, which the assembler does not learn from the target.
+/// Square root of the FPU: `core` has none on stable, and `libm` computes it with integers. The two
+/// instructions change `s0` only, as the calling convention allows. The directive names the FPU of a
+/// Cortex-M4F, which the target does not tell the assembler.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 #[unsafe(naked)]
 extern "C" fn sqrt_single(value: f32) -> f32 {
     core::arch::naked_asm!(".fpu fpv4-sp-d16", "vsqrt.f32 s0, s0", "bx lr")
 }
 
-/// Beyond this angle, 1,300 turns, the three-part reduction loses digits, and what is told apart there is 0.03 degrees and more:
-/// no joint's, so not a number, which the next border refuses.
+/// Largest angle of the three-part reduction, 1,300 turns. Beyond, it loses digits and resolves 0.03 degrees
+/// or worse. No joint gets there, so the result is NaN, which the next check refuses.
 const LARGEST_REDUCED_ANGLE: f32 = 8192.0;
 
 #[expect(clippy::excessive_precision, reason = "the three parts of pi/4 as published")]
@@ -286,7 +290,7 @@ mod tests {
     #[test]
     fn sine_and_cosine_of_turns_stay_within_their_stated_error_over_the_whole_turn() {
         let mut worst = 0.0_f64;
-        // Odd, so that no period of it hits the quarters only; their borders beside it.
+        // An odd step, so that its multiples do not only hit quarters; the quarters' edges are added.
         let borders = (0..8_u32).flat_map(|eighth| [(eighth << 29).wrapping_sub(1), eighth << 29]);
         for units in (0..1_000_000_u32).map(|step| step.wrapping_mul(42_949_673)).chain(borders) {
             let (sine, cosine) = sin_cos_of_turns(units);
@@ -308,7 +312,7 @@ mod tests {
             worst =
                 worst.max((f64::from(sine) - true_sine).abs()).max((f64::from(cosine) - true_cosine).abs());
         }
-        // A better one would mean that std's has slipped in.
+        // A smaller error would mean that std's function is in use.
         assert!((1.0e-3..1.1e-3).contains(&worst), "worst error {worst:e}");
     }
 

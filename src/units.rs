@@ -1,7 +1,7 @@
 //! Unit newtypes for numbers that cross module borders on the device.
 //!
-//! A bare `f32` says nothing about what it measures; a `Radian` cannot be handed to somebody who expects an
-//! `Ampere`. Arithmetic that keeps the unit is provided; everything else goes through the public field.
+//! A bare `f32` does not show its unit; the compiler rejects a `Radian` where an `Ampere` is expected.
+//! Arithmetic that keeps the unit is provided; everything else goes through the public field.
 
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -13,15 +13,15 @@ macro_rules! unit {
         pub struct $name(pub f32);
 
         impl $name {
-            /// Nothing of it.
+            /// Zero.
             pub const ZERO: Self = Self(0.0);
-            /// The magnitude.
+            /// Returns the magnitude.
             #[must_use]
             pub const fn abs(self) -> Self { Self(self.0.abs()) }
-            /// Neither NaN nor infinite.
+            /// True if neither NaN nor infinite.
             #[must_use]
             pub const fn is_finite(self) -> bool { self.0.is_finite() }
-            /// Limited to `-bound..=bound`; zero where the value or the bound is not a number.
+            /// Limits to `-bound..=bound`; zero if the value or the bound is NaN.
             #[must_use]
             pub fn limited(self, bound: Self) -> Self {
                 let raised = if self.0 < -bound.0 { -bound.0 } else { self.0 };
@@ -53,7 +53,7 @@ unit! {
     RadianPerSecondSquared,
     /// Torque at the joint, N m.
     NewtonMetre,
-    /// Current, A; of a motor without further words its quadrature current.
+    /// Current, A; for a motor, its quadrature current unless stated otherwise.
     Ampere,
     /// Time, s.
     Second,
@@ -71,7 +71,7 @@ unit! {
     Volt,
     /// Resistance of one phase against the star point, ohm.
     Ohm,
-    /// Inductance of one phase as a rotating axis sees it, H.
+    /// Inductance of one phase in the rotating frame, H.
     Henry,
     /// Flux linkage of the magnets with one phase, peak, V s.
     Weber,

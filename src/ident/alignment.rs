@@ -1,29 +1,35 @@
-//! Whether held-out torque asks for other link lengths or encoder zeros than the model has.
+//! Test of link lengths and encoder zeros: does the held-out torque ask for values other than the model's?
 //!
-//! Why: a leg whose link is believed ten per cent too long is predicted within two per cent of its torque, since masses
-//! and moments make up for most of it. What they cannot make up for is small but points in a known direction:
+//! Why: with a link assumed ten per cent too long, the identified model still predicts the torque
+//! within two per cent. Masses and moments make up for most of the error. The rest is small but
+//! points in a known direction:
 //!
 //! ```text
-//! z_j = d tau / d ln a_j,   d tau / d q0_j                   at the model's parameters, by a difference quotient
-//! r   = Y nu + z delta + noise                               rows of the held-out motions, over sigma of their joint
-//! R   = triangular factor of (Y, z, r);  u_j, w: what of z_j and r lies below the rows of Y
-//! S   = u'u,      delta = u'w / S,      sigma = 1 / sqrt S                   each direction alone
-//! U delta = w,    sigma_j^2 = (U'U)^-1_jj                                     all directions together
+//! z_j = d tau / d ln a_j,   d tau / d q0_j           at the model's parameters, by a difference quotient
+//! r   = Y nu + z delta + noise                       rows of the held-out motions, over sigma of their joint
+//! R   = triangular factor of (Y, z, r)               u_j, w: the part of z_j and r below the rows of Y
+//! S   = u'u,  delta = u'w / S,  sigma = 1 / sqrt S   each direction alone
+//! U delta = w,   sigma_j^2 = (U'U)^-1_jj             all directions together
 //! ```
 //!
-//! delta is the share by which a link is longer than believed, or the angle by which a zero is off: of each alone, the
-//! parameters free to follow, and of each beside the others. Alone is the sharper question where one thing is wrong; a
-//! length and a zero that are both off resemble each other enough to cancel in it, and show only beside each other. It is zero within sigma for a leg as believed (score test, Rao 1948). The motion
-//! identified from cannot take part: while it streams by the parameters are not known, and z with them.
+//! delta is the share by which a link is longer than assumed, or the angle by which a zero is off. For a
+//! correct leg it is zero within sigma (score test, Rao 1948). It is computed for each direction alone, with
+//! the parameters free to follow, and for each direction beside the others. Alone is the sharper test where
+//! one thing is wrong. A wrong length and a wrong zero resemble each other enough to cancel there; they show
+//! only beside each other. The motion used for the identification takes no part: while it streams by, the
+//! parameters and hence z are unknown.
 //!
-//! A push of the wearer asks for nothing, but z'r would take it for geometry: rows within [`HELD`] rows of one that misses by
-//! more than is expected are left out. A wrong length or zero misses by a few per cent of the torque, never by so much.
+//! A push by the wearer is not a geometry error, but z'r would read it as one. Rows within [`HELD`] rows of
+//! an unexpectedly large residual are therefore excluded. A wrong length or zero misses by a few per cent of
+//! the torque, never by that much.
 //!
-//! What torque cannot tell: the zero of the last joint turns that link's own frame and is absorbed exactly by its first
-//! moments, and the lengths before the first joint move nothing: neither is looked at.
-//! Derivatives are rigid-body ones, which lie in the filter's passband, so z is taken at the row's centre unfiltered.
-//! Cost: one torque evaluation for each of 2 (N - 1) directions and one row rotated into B + 4 columns for each joint, 50
-//! times a second. Memory: 561 numbers, N (B + 6) for each of [`HELD`] rows and a queue of row centres.
+//! Known limits: the zero of the last joint turns that link's own frame, and its first moments absorb it
+//! exactly. The lengths before the first joint have no effect on torque. Neither is tested.
+//! z is taken at the row's centre without filtering, because rigid-body derivatives
+//! lie in the filter's passband.
+//! Cost: one torque evaluation for each of 2 (N - 1) directions and one row rotated into B + 4
+//! columns for each joint, 50 times a second. Memory: 561 numbers, N (B + 6) for each of [`HELD`]
+//! rows and a queue of row centres.
 
 use super::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE};
 use super::record::{LARGEST_STILL_SHARE, RowModel};
@@ -32,46 +38,47 @@ use super::smoothing::Smoothed;
 use crate::model::{Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, rigid_body_torques};
 use crate::real::{self, Real};
 
-/// Directions looked at: the length before each joint but the first, then the zero of each joint but the last; room for
-/// three joints.
+/// Directions tested: the length before each joint but the first, then the zero of each joint but the last.
+/// Enough for three joints.
 pub const DIRECTIONS: usize = 4;
-/// Rows held back, and left out beside one that misses by more than is expected: 0.3 s, the longer half of a push with the
-/// filter's reach.
+/// Rows held back, and rows excluded on either side of an unexpectedly large residual: 0.3 s. That is the
+/// longer half of a push plus the filter's reach.
 pub const HELD: usize = 15;
-/// A direction of which the parameters absorb all but this share of its power says nothing: single precision leaves 6e-7
-/// of one that is absorbed wholly; of the first joint's zero, most of which is gravity's, 6e-5 remain.
+/// Smallest share of a direction's power that the parameters must leave, or the direction is not
+/// reported. Single precision leaves 6e-7 of a wholly absorbed direction. The first joint's zero,
+/// mostly gravity, leaves 6e-5.
 const SEEN_SHARE: f64 = 1e-5;
-/// Step of the difference quotients: of the length, and rad.
+/// Step of the difference quotients: relative for a length, rad for a zero.
 const STEP: f64 = 1e-2;
 
-/// What a direction is about.
+/// Kind of geometry error that a direction stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// Length of the link before a joint; delta is the share by which it is longer than believed.
+    /// Length of the link before a joint; delta is the share by which it is longer than assumed.
     Length,
-    /// A joint's zero; delta is the angle by which it is further than believed, rad.
+    /// A joint's zero; delta is the angle by which it is too far on, rad.
     Zero,
 }
 
-/// What held-out motions say of one direction.
+/// Geometry error that the held-out motions show in one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misalignment<T> {
     /// Length or zero.
     pub direction: Direction,
-    /// Of this joint.
+    /// Joint index.
     pub joint: usize,
-    /// See [`Direction`]; of this direction alone.
+    /// Error in the unit of [`Direction`], from this direction alone.
     pub delta: T,
-    /// Its standard deviation.
+    /// Standard deviation of `delta`.
     pub sigma: T,
-    /// The same beside all other directions, and its standard deviation; `None` where they leave nothing of it.
+    /// Error and standard deviation beside all other directions; `None` where those absorb it.
     pub beside: Option<(T, T)>,
 }
 
-/// Of every direction that is seen.
+/// One entry per direction; `None` where the torque does not show it.
 pub type Misalignments<T> = [Option<Misalignment<T>>; DIRECTIONS];
 
-/// One row of each joint, held back.
+/// One row of each joint, held back until it is known to be undisturbed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct HeldRow<T, const N: usize, const B: usize> {
     used: [bool; N],
@@ -90,12 +97,12 @@ pub struct Alignment<T, const N: usize, const B: usize, const PENDING: usize> {
     /// Columns that are not estimated.
     dropped: [bool; B],
     held: [HeldRow<T, N, B>; HELD],
-    /// Rows since the motion began, and of them those that left [`Self::held`].
+    /// Rows since the motion began, and how many of these have left [`Self::held`].
     rows: usize,
     left: usize,
-    /// The last row of each joint that missed by more than is expected.
+    /// Index of each joint's last row with an unexpectedly large residual.
     last_wild: [Option<usize>; N],
-    /// Directions at the centres of rows that are not finished yet.
+    /// Directions at the centres of unfinished rows.
     queue: [[[T; N]; DIRECTIONS]; PENDING],
     next: usize,
     waiting: usize,
@@ -104,7 +111,7 @@ pub struct Alignment<T, const N: usize, const B: usize, const PENDING: usize> {
 }
 
 impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T, N, B, PENDING> {
-    /// Nothing seen.
+    /// Starts without data.
     #[must_use]
     pub fn new() -> Self {
         let zero = T::zero();
@@ -130,20 +137,21 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         }
     }
 
-    /// Forgets all motions.
+    /// Discards all motions.
     pub fn clear(&mut self) {
         self.break_off();
         self.factor.fill(T::zero());
     }
 
-    /// Another motion begins: a row that misses by more than `wild` N m is disturbed, `noise` is the standard deviation of an
-    /// independent row of each joint, N m. Columns that were `dropped` are not free to follow.
+    /// Starts another motion. A residual above `wild` (N m) marks a row as disturbed; `noise` is
+    /// the standard deviation of an independent row of each joint, N m. Columns that were
+    /// `dropped` are not free to follow.
     pub fn begin(&mut self, wild: &[T; N], noise: &[T; N], dropped: &[bool; B]) {
         self.break_off();
         (self.wild, self.weight, self.dropped) = (*wild, noise.map(|noise| T::one() / noise), *dropped);
     }
 
-    /// The samples that follow do not continue those before: what was held back is taken.
+    /// Ends a continuous stretch of samples: all rows that are held back enter the factor.
     pub fn break_off(&mut self) {
         while self.left < self.rows {
             self.release();
@@ -152,8 +160,8 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         (self.next, self.waiting, self.instants) = (0, 0, 0);
     }
 
-    /// Takes a smoothed instant, and the rows that were finished with it. `reach` is that of the low-pass: the row that
-    /// an instant finishes is centred so many instants earlier (whole windows only).
+    /// Takes a smoothed instant and the rows that it finished, if any. `reach` is that of the low-pass: a row
+    /// is centred that many instants before the instant that finishes it (whole windows only).
     pub fn take(
         &mut self,
         model: &RowModel<T, N, B>,
@@ -204,7 +212,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         }
     }
 
-    /// The oldest row that is held leaves: into the factor, unless it is too near to a disturbance.
+    /// Moves the oldest held row into the factor, unless it is too near to a disturbance.
     fn release(&mut self) {
         let row = self.left;
         self.left += 1;
@@ -226,14 +234,14 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         }
     }
 
-    /// Base columns and directions; all shipped sizes have room for both.
+    /// Base columns and directions; checked at compile time against the packed factor's capacity.
     const COLUMNS: usize = {
         assert!(B + DIRECTIONS <= LARGEST_COLUMNS, "no room for the directions");
         B + DIRECTIONS
     };
 
-    /// What the motions say, once [`Self::break_off`] has ended the last one. `None` for directions that are not there or that
-    /// parameters absorb.
+    /// Errors found so far; call [`Self::break_off`] first to end the last motion. `None` for a direction
+    /// that does not exist or that the parameters absorb.
     #[must_use]
     pub fn misalignments(&self) -> Misalignments<T> {
         let (mut power, mut seen, mut along) =
@@ -266,10 +274,10 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
         })
     }
 
-    /// All directions together: `U delta = w` from below upwards. A direction that those before it leave nothing of stays 0.
+    /// Solves all directions together: `U delta = w` by back substitution. An absorbed direction stays 0.
     fn beside(&self, power: &[T; DIRECTIONS]) -> [Option<(T, T)>; DIRECTIONS] {
         let mut triangle = [[T::zero(); DIRECTIONS]; DIRECTIONS];
-        // The right-hand side, and the columns of the unit matrix: their solution is U^-1.
+        // Columns: the unit matrix, whose solution is U^-1, then the right-hand side.
         let mut solved = [[T::zero(); DIRECTIONS + 1]; DIRECTIONS];
         for (column, row) in packed::rows(&self.factor, Self::COLUMNS) {
             let Some(direction) = column.checked_sub(B).filter(|&direction| direction < DIRECTIONS) else {
@@ -312,7 +320,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Default for 
     }
 }
 
-/// What a direction is about: the lengths before joints 1.., then the zeros of joints ..N-1.
+/// Kind and joint of a direction: the lengths before joints 1.., then the zeros of joints ..N-1.
 fn subject<const N: usize>(index: usize) -> Option<(Direction, usize)> {
     let others = N.checked_sub(1)?;
     match index.checked_sub(others) {
@@ -322,7 +330,7 @@ fn subject<const N: usize>(index: usize) -> Option<(Direction, usize)> {
     }
 }
 
-/// Change of the torques with each direction at one instant; zero where there is no such direction.
+/// Change of the torques with each direction at one instant; zero for a direction that does not exist.
 fn directions<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     values: &[T; B],

@@ -1,11 +1,12 @@
-//! From the window of blocks to the record of a motion: weights, Stribeck friction, one factor per joint.
+//! Turns the window of blocks into the record of a motion: weights, Stribeck friction, one factor per joint.
 //!
 //! ```text
-//! blocks -> weights of each joint (reweighting) -> one packed factor per joint -> Stribeck found, eliminated -> Record
+//! blocks -> weights of each joint (reweighting) -> one packed factor per joint
+//!        -> Stribeck friction found and eliminated -> Record
 //! ```
 //!
-//! What follows sees ordinary rows: each joint's factor over the base parameters, as many rows as the weights add up to,
-//! and the torque's size by the same weights.
+//! Later steps see ordinary rows: each joint's factor over the base parameters, the sum of the weights as row
+//! count, and the torque's size with the same weights.
 
 use super::choice::{Choice, Estimator};
 use super::factor::Factor;
@@ -21,27 +22,26 @@ use super::stribeck::{
 use super::window::{LARGEST_BLOCKS, Window};
 use crate::real::{self, Real};
 
-/// Rows a second.
 const ROW_RATE_HZ: f64 = 50.0;
-/// A block that got less than this of its weight counts as disturbed.
+/// A block counts as disturbed when it keeps less than this share of its weight.
 const DISTURBED_BELOW: f64 = 0.5;
-/// A column of which less is independent of the others does not help to predict.
+/// A column with a smaller independent share does not help to predict.
 const INDEPENDENT_SHARE: f64 = 1e-4;
-/// Below this share of the torque's root mean square single precision and not the data decides.
+/// Noise floor as a share of the torque's root mean square: below it single precision decides, not the data.
 const SMALLEST_NOISE_SHARE: f64 = 1e-5;
 
-/// What the blocks of a motion add up to.
+/// Sums over the blocks of a motion.
 pub(super) struct Assembly<T, const N: usize, const B: usize> {
     pub factors: [Factor<T, B>; N],
     pub torque: [TorqueSize<T>; N],
     pub rows: [u32; N],
     pub outliers: Outliers<T, N>,
     pub stribeck: [Option<StribeckFit<T, B>>; N],
-    /// Gain and surplus of the best curve of each joint that was looked for.
+    /// Gain and surplus of the best curve, for each joint that was searched.
     pub tried: [Option<(T, T)>; N],
 }
 
-/// Adds up a window. `information` is `m sum h^2`; without a model nothing was recorded.
+/// Adds up a window. `information` is `m sum h^2`; `model` is `None` when nothing was recorded.
 #[inline(never)]
 pub(super) fn assemble<T: Real, const N: usize, const B: usize, const ROOM: usize>(
     window: &Window<T, N, B, ROOM>,
@@ -120,7 +120,7 @@ pub(super) fn assemble<T: Real, const N: usize, const B: usize, const ROOM: usiz
     assembly
 }
 
-/// What of the row model the assembly needs.
+/// Choices of the row model that the assembly needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Choices<const N: usize> {
     rank: usize,
@@ -128,12 +128,12 @@ pub(super) struct Choices<const N: usize> {
 }
 
 impl<const N: usize> Choices<N> {
-    /// Of a model; where a curve is known already, nothing is looked for.
+    /// Takes the rank and the Stribeck choices from a model.
     pub(super) fn of<T: Real, const B: usize>(model: &RowModel<T, N, B>) -> Self {
         Self { rank: model.base.rank(), stribeck: model.stribeck_choice }
     }
 
-    /// The same without Stribeck friction.
+    /// Disables Stribeck friction for all joints.
     pub(super) fn without_stribeck(self) -> Self {
         Self { stribeck: [Choice::Off; N], ..self }
     }
@@ -155,7 +155,8 @@ fn sums<T: Real, const N: usize, const B: usize, const ROOM: usize>(
     (rows, absolute)
 }
 
-/// Error of all rows of one joint by what its weighted rows say, over the torque of all; zero where nothing is known.
+/// Error of all rows of one joint with the weighted solution, over the torque of
+/// all rows; zero without torque.
 fn whole_error_share<T: Real, const N: usize, const B: usize, const ROOM: usize>(
     window: &Window<T, N, B, ROOM>,
     joint: usize,
@@ -171,7 +172,7 @@ fn whole_error_share<T: Real, const N: usize, const B: usize, const ROOM: usize>
     if power > T::zero() { real::sqrt(error / power) } else { T::zero() }
 }
 
-/// Shares and longest stretches of what was disturbed. A block in which a joint only stood still is as the one before.
+/// Shares and longest stretches of disturbed rows. A block without usable rows inherits the state before it.
 fn disturbed<T: Real, const N: usize, const B: usize, const ROOM: usize>(
     window: &Window<T, N, B, ROOM>,
     weights: &[Weights<T>; N],

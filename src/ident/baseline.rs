@@ -1,7 +1,7 @@
-//! What an accepted identification leaves behind for judging later motion by it: values, covariance, noise of a row.
+//! Reference from an accepted identification to monitor later motion: values, covariance, noise of a row.
 //!
-//! Why not the model alone: whether a residual is too large can only be said beside the noise that was there when the
-//! model was accepted, and beside what the model itself does not know.
+//! Why not the model alone: a residual is too large only relative to the noise at the time of acceptance, and
+//! to the model's own uncertainty.
 //!
 //! ```text
 //! r = tau_f - y_f beta                                     residual of one filtered row
@@ -9,8 +9,9 @@
 //! sigma_i^2 = largest mean square residual of joint i among the motion identified from and those predicted
 //! ```
 //!
-//! The largest, because a model is accepted with some misfit beyond noise (friction that depends on more than speed), and
-//! that misfit is no change. Of the motion identified from it is the unbiased variance, see [`super::estimate`].
+//! The largest, because an accepted model has some misfit beyond noise (friction that depends on more than
+//! speed), and that misfit is not a change. The motion identified from contributes its unbiased variance, see
+//! [`super::estimate`].
 //! Cost of a row: `B^2 + 2 B` multiplications. Memory: `B^2 + B + N + 1` numbers and `B` flags.
 
 use super::estimate::{Estimate, noise};
@@ -18,7 +19,7 @@ use super::record::Record;
 use super::rows::FilteredRows;
 use crate::real::{self, Real};
 
-/// An accepted model as the reference of what comes after.
+/// An accepted model as the reference for later motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baseline<T, const N: usize, const B: usize> {
     /// Base values and their covariance.
@@ -30,7 +31,7 @@ pub struct Baseline<T, const N: usize, const B: usize> {
 }
 
 impl<T: Real, const N: usize, const B: usize> Baseline<T, N, B> {
-    /// From the estimate, the record it was made from and those it was tried on.
+    /// Builds the reference from the estimate, its record and the records that it was tested on.
     #[must_use]
     pub fn new<'a>(
         estimate: Estimate<T, B>,
@@ -48,7 +49,7 @@ impl<T: Real, const N: usize, const B: usize> Baseline<T, N, B> {
         Self { estimate, row_variance, row_information }
     }
 
-    /// Standard deviation of one independent row of a joint, N m, as a [`super::Problem`] weighs it.
+    /// Standard deviation of one independent row of a joint, N m: the weight that [`super::Problem`] uses.
     #[must_use]
     pub fn noise(&self, joint: usize) -> T {
         let variance = self.row_variance.get(joint).copied().unwrap_or(T::one());

@@ -8,36 +8,36 @@
 //! offset          +- 5 (|prior| + Coulomb)
 //! ```
 //!
-//! Products and sums of intervals give the parameters about the joint's origin, and the base parameters' terms
-//! the box of the base set. It contains every leg the ranges allow, and more. A range of no width (a prior of
-//! zero), and everything where there is no prior, is replaced by what the measured torque could at most need:
-//! ten times the torque over the size of its column.
+//! Interval sums and products give the ranges about the joint's origin; the base parameters' terms turn them
+//! into the box of the base set. The box contains every leg that the ranges allow, and more. Two kinds of
+//! range are replaced by the most that the measured torque could need: those of zero width (a prior of zero)
+//! and all without a prior. That limit is ten times the torque over the size of its column.
 
 use super::constrained::ParameterBox;
 use super::record::{Record, RowModel};
 use crate::model::{self, LegParameters, PARAMETERS_PER_JOINT, Parameter, RigidBody};
 use crate::real::{self, Real};
 
-/// What is believed of one link and joint before it is measured.
+/// Prior of one link and joint, known before any measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkPrior<T> {
     /// Mass, centre of mass and inertia about it.
     pub body: RigidBody<T>,
-    /// At the joint, kg m^2.
+    /// Rotor inertia at the joint, kg m^2.
     pub rotor_inertia: T,
-    /// N m.
+    /// Coulomb friction, N m.
     pub coulomb_friction: T,
-    /// N m s/rad.
+    /// Viscous friction, N m s/rad.
     pub viscous_friction: T,
-    /// N m.
+    /// Torque offset, N m.
     pub offset: T,
 }
 
 /// Largest and smallest share of the prior's mass, inertia and friction.
 const SHARE: (f64, f64) = (0.2, 5.0);
-/// Torque that one base parameter may need alone, in units of the measured one.
+/// Largest torque of one base parameter alone, in units of the measured torque.
 const TORQUE_SHARE: f64 = 10.0;
-/// No segment is shorter, m.
+/// Lower limit of a segment's length, m.
 const SHORTEST_SEGMENT_M: f64 = 0.05;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +76,7 @@ impl<T: Real> Interval<T> {
 }
 
 impl<T: Real> LinkPrior<T> {
-    /// The same in another precision.
+    /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> LinkPrior<U> {
         let convert = |value: T| U::of(value.to_double());
@@ -139,7 +139,7 @@ impl<T: Real> LinkPrior<T> {
     }
 }
 
-/// The box of the base parameters.
+/// Search box of the base parameters.
 #[must_use]
 pub fn search_box<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
@@ -172,8 +172,8 @@ fn ranges<T: Real, const N: usize, const B: usize>(
     core::array::from_fn(|joint| prior[joint].ranges(segment_length(model, prior, joint)))
 }
 
-/// Smallest and largest values that a prior allows the single parameters: the ranges of which the box of the base
-/// parameters is made.
+/// Smallest and largest values that a prior allows for the single parameters. The box of the base parameters
+/// is made from these ranges.
 #[must_use]
 pub fn parameter_box<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
@@ -183,7 +183,7 @@ pub fn parameter_box<T: Real, const N: usize, const B: usize>(
     (ranges.map(|joint| joint.map(|range| range.0)), ranges.map(|joint| joint.map(|range| range.1)))
 }
 
-/// Distance to the next joint; of the last segment, what its centre of mass suggests.
+/// Distance to the next joint; for the last segment, twice the distance of its centre of mass.
 pub(super) fn segment_length<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     prior: &[LinkPrior<T>; N],
@@ -195,7 +195,7 @@ pub(super) fn segment_length<T: Real, const N: usize, const B: usize>(
     real::max(to_next, real::max(suggested, T::of(SHORTEST_SEGMENT_M)))
 }
 
-/// What the measured torque could need: columns and torques have a size.
+/// Box from the measured torque: each bound is the torque's size over the column's.
 pub(super) fn measured_box<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     record: &Record<T, N, B>,
@@ -218,7 +218,7 @@ pub(super) fn measured_box<T: Real, const N: usize, const B: usize>(
     bounds
 }
 
-/// The fourteen parameters of every joint as the prior has them.
+/// All fourteen parameters of every joint, at the prior's values.
 #[must_use]
 pub fn prior_parameters<T: Real, const N: usize>(prior: &[LinkPrior<T>; N]) -> LegParameters<T, N> {
     core::array::from_fn(|joint| {

@@ -1,14 +1,14 @@
-//! From base parameters back to all fourteen of every joint: what is known, grouped, or only believed.
+//! From base parameters back to all fourteen of every joint: measured, grouped, or from the prior only.
 //!
 //! ```text
 //! minimise (p - p0)' W^-1 (p - p0)  subject to  K p = beta
 //! p = p0 + W K' (K W K')^-1 (beta - K p0)
 //! ```
 //!
-//! `K` holds the base parameters' terms, `p0` the prior and `W` its variances (each parameter within half of its
-//! size, never less than a hundredth of the largest of its kind). Parameters that torque does not see keep the
-//! prior's value, grouped ones share what their group is off; nothing but a prior can tell them apart, and the
-//! status says so.
+//! `K` holds the base parameters' terms, `p0` the prior and `W` its variances. The prior's standard deviation
+//! is half of each parameter's size, at least a hundredth of the largest of its kind. Parameters without
+//! effect on torque keep the prior's value. Grouped ones share the deviation of their group; only a prior can
+//! separate them, and the status says so.
 
 use super::estimate::Estimate;
 use super::factor::Factor;
@@ -21,16 +21,16 @@ use crate::real::{self, Real};
 pub enum Status {
     /// Measured alone.
     Identified,
-    /// Measured only in a sum with others; the share is the prior's.
+    /// Measured only in a sum with others; the split comes from the prior.
     Grouped,
-    /// Measured, but the data hardly tell it from others.
+    /// Measured, but hard to separate from others.
     Weak,
-    /// Not seen by the torque at all; or not estimated, then it is zero.
+    /// Without effect on torque, so the prior's value; or not estimated, then zero.
     Prior,
 }
 
 impl Status {
-    /// The word used in reports.
+    /// Word used in reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -42,11 +42,11 @@ impl Status {
     }
 }
 
-/// A base parameter is weak when an error of one standard deviation, the others unchanged, would move the torque
-/// of a joint by more than this share of its size: only because others make up for it is it not seen.
+/// Limit for a weak base parameter: share of a joint's torque that an error of one standard deviation would
+/// move, with the others unchanged. Only because others make up for it does such an error stay hidden.
 const WEAK_SHARE: f64 = 0.02;
 
-/// Whether the data hardly tell base parameter `base` from the others.
+/// True if the data hardly separate base parameter `base` from the others.
 #[must_use]
 pub fn is_weak<T: Real, const N: usize, const B: usize>(
     record: &super::record::Record<T, N, B>,
@@ -78,7 +78,7 @@ pub fn status<T: Real, const N: usize, const B: usize>(
     }
 }
 
-/// All parameters of all joints: nearest to the prior among those with these base parameters.
+/// All parameters of all joints: the nearest to the prior with these base parameters.
 ///
 /// `None` when the groups are degenerate beyond rounding.
 #[must_use]
@@ -90,7 +90,7 @@ pub fn complete<T: Real, const N: usize, const B: usize>(
     complete_within(model, base_values, prior, &prior_deviations(prior))
 }
 
-/// The same, with the prior's standard deviations given.
+/// [`complete`] with the prior's standard deviations given.
 pub(super) fn complete_within<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     base_values: &[T; B],
@@ -128,10 +128,10 @@ pub(super) fn complete_within<T: Real, const N: usize, const B: usize>(
     Some(parameters)
 }
 
-/// How far a prior is believed to be off: half of each value, and a hundredth of the largest of its kind.
+/// Standard deviations of a prior: half of each value, at least a hundredth of the largest of its kind.
 pub(super) fn prior_deviations<T: Real, const N: usize>(prior: &LegParameters<T, N>) -> LegParameters<T, N> {
     let kind = |index: usize| match index {
-        0..=5 | 10 => 0, // inertias, the rotor's included
+        0..=5 | 10 => 0, // inertias, including the rotor's
         6..=8 => 1,
         9 => 2,
         _ => 3,

@@ -1,12 +1,12 @@
-//! Least squares within a box: the optimum that the swarm is measured against.
+//! Least squares within a box: the reference optimum for the swarm.
 //!
 //! ```text
 //! minimise |R p - z|^2   subject to   low <= p <= high
 //! ```
 //!
-//! Active-set method for bounded variables (Stark and Parker 1995): parameters at a bound are held while the
-//! rest are solved; the step to that solution is cut where a bound is met; a held parameter is released where the
-//! gradient points inside. The cost is convex, so the optimum found is the global one.
+//! Active-set method for bounded variables (Stark and Parker 1995). Parameters at a bound are held while the
+//! rest are solved. The step to that solution is cut where it meets a bound. A held parameter is freed where
+//! the gradient points inside. The cost is convex, so the optimum found is the global one.
 //!
 //! Cost: a few restricted factors of `B` columns. Bounded: at most `10 B` changes of the active set.
 
@@ -22,9 +22,9 @@ pub struct ParameterBox<T, const B: usize> {
     pub high: [T; B],
 }
 
-/// The parameters in the box with the smallest `|R p - z|^2`, of the first `count` columns.
+/// Parameters in the box with the smallest `|R p - z|^2`, for the first `count` columns.
 ///
-/// Parameters without information stay where the box is nearest to zero.
+/// Parameters without information get the value nearest to zero in the box.
 #[must_use]
 pub fn least_squares_in_box<T: Real, const B: usize>(
     factor: &Factor<T, B>,
@@ -93,7 +93,7 @@ fn step_to_free_solution<T: Real, const B: usize>(
     stopped.is_some()
 }
 
-/// Releases the held parameter that gains most by moving inside; false when none does.
+/// Frees the held parameter that gains most by moving inside; false when none gains.
 #[inline(never)]
 fn release_one<T: Real, const B: usize>(
     factor: &Factor<T, B>,
@@ -108,7 +108,7 @@ fn release_one<T: Real, const B: usize>(
         let downhill = -gradient[index];
         let inside = (values[index] <= bounds.low[index] && downhill > T::zero())
             || (values[index] >= bounds.high[index] && downhill < T::zero());
-        // The gain of moving this parameter alone: g^2 / |column|^2; rounding stays below this share of the cost.
+        // Gain of moving this parameter alone: g^2 / |column|^2. Rounding stays below this share of the cost.
         let length = factor.column_length(index);
         let gain = if length > T::zero() { real::abs(downhill) / length } else { T::zero() };
         let least = T::EPSILON * T::of(100.0) * (T::one() + real::sqrt(factor.excess(values)));

@@ -6,24 +6,24 @@
 //! Cov   = (sum_i R_i' R_i / s_i^2)^-1
 //! ```
 //!
-//! Filtered rows overlap, so the naive standard deviation is too small; with a flat passband the rows carry the
-//! information of `m sum h^2` independent ones each (m the decimation; exact while that is at most one).
-//! The residual variance is unbiased by the same count: `n` rows lose `k / (m sum h^2)` to `k` parameters.
+//! Filtered rows overlap, so the naive standard deviation is too small. With a flat passband each row carries
+//! the information of `m sum h^2` independent ones (m the decimation; exact while that is at most one). The
+//! residual variance is unbiased with the same count: `n` rows lose `k / (m sum h^2)` to `k` parameters.
 //!
 //! Two plans (paper, 3.2 and 4.2):
 //!
 //! - **one-time**: all rows of all joints, weighted by each joint's noise, at once;
-//! - **sequential**: from the distal joint to the proximal one; each joint's own rows give the parameters that
-//!   are still open, those found before are substituted and their errors carried on.
+//! - **sequential**: from the distal joint to the proximal one. Each joint's own rows give the parameters
+//!   that are still open; earlier results are substituted and their errors propagated.
 //!
-//! In both plans all joints move: a joint that is held sticks, which leaves its friction torque undetermined, and
-//! a distal joint that moves alone cannot tell its rotor's inertia from its link's.
+//! In both plans all joints move. A joint at rest sticks, which leaves its friction torque undetermined. A
+//! distal joint that moves alone cannot separate its rotor's inertia from its link's.
 
 use super::factor::Factor;
 use super::record::{Record, RowModel};
 use crate::real::{self, Real};
 
-/// How parameters are found from the joints' rows.
+/// Order in which the joints' rows give the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Plan {
     /// All joints at once, weighted by their noise.
@@ -33,11 +33,11 @@ pub enum Plan {
     Sequential,
 }
 
-/// A column whose part that no earlier column explains is smaller than this share of it is not determined by the
-/// data. Single precision leaves 1e-6 of noise there.
+/// Smallest independent share of a column that the data determine: the part that no earlier column explains.
+/// Single precision leaves noise of 1e-6 there.
 const DETERMINED_SHARE: f64 = 1e-4;
-/// Smallest standard deviation of a row in units of the torque's root mean square: below, single precision and
-/// not the data decides (noise-free simulations).
+/// Smallest standard deviation of a row in units of the torque's root mean square. Below, single precision
+/// decides, not the data (noise-free simulations).
 const SMALLEST_NOISE_SHARE: f64 = 1e-5;
 
 /// Standard deviation of one independent row of each joint, N m.
@@ -88,13 +88,13 @@ impl<T: Real, const B: usize> Stage<T, B> {
         Self { columns, count: kept, asked: count, factor }
     }
 
-    /// The base parameters this stage determines.
+    /// Base parameters that this stage determines.
     #[must_use]
     pub fn columns(&self) -> &[usize] {
         self.columns.get(..self.count).unwrap_or(&[])
     }
 
-    /// How many base parameters it was to determine.
+    /// Number of base parameters that were open in this stage.
     #[must_use]
     pub fn asked(&self) -> usize {
         self.asked
@@ -106,10 +106,10 @@ impl<T: Real, const B: usize> Stage<T, B> {
         &self.factor
     }
 
-    /// Largest over smallest singular value of the stage with columns scaled to unit length; `None` without columns.
+    /// Condition number of the stage: largest over smallest singular value, columns scaled to unit length.
+    /// `None` without columns.
     ///
-    /// Power iteration on `S'S` and on its inverse, forty rounds each: a lower bound, within a few
-    /// percent.
+    /// Power iteration on `S'S` and on its inverse, forty rounds each: a lower bound, within a few percent.
     #[must_use]
     pub fn condition(&self) -> Option<T> {
         if self.count == 0 {
@@ -131,7 +131,6 @@ impl<T: Real, const B: usize> Stage<T, B> {
     }
 }
 
-/// Rounds of the power iteration.
 const POWER_ITERATIONS: usize = 40;
 
 /// Largest singular value.
@@ -172,12 +171,12 @@ pub struct Estimate<T, const B: usize> {
     pub values: [T; B],
     /// Covariance, `[row][column]`; rows of parameters that are not determined are zero.
     pub covariance: [[T; B]; B],
-    /// Whether the data determine each.
+    /// Base parameters that the data determine.
     pub determined: [bool; B],
 }
 
 impl<T: Real, const B: usize> Estimate<T, B> {
-    /// Nothing known yet.
+    /// Estimate without any determined parameter.
     #[must_use]
     pub fn nothing() -> Self {
         Self { values: [T::zero(); B], covariance: [[T::zero(); B]; B], determined: [false; B] }
@@ -203,7 +202,7 @@ impl<T: Real, const B: usize> Estimate<T, B> {
         real::sqrt(real::max(variance, T::zero()))
     }
 
-    /// How many base parameters the data determine.
+    /// Number of base parameters that the data determine.
     #[must_use]
     pub fn rank(&self) -> usize {
         self.determined.iter().filter(|determined| **determined).count()
@@ -222,7 +221,7 @@ pub struct Problem<'a, T: Real, const N: usize, const B: usize> {
 }
 
 impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
-    /// The problem that `record` poses for the base parameters of `model`.
+    /// Problem of `record` for the base parameters of `model`.
     #[must_use]
     pub fn new(record: &'a Record<T, N, B>, model: &RowModel<T, N, B>) -> Self {
         let mut owner = [0; B];
@@ -253,7 +252,7 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
         all
     }
 
-    /// The same as a stage over all base parameters.
+    /// All weighted rows as one stage over all base parameters.
     #[must_use]
     pub fn whole(&self) -> Stage<T, B> {
         Stage::new(&self.weighted(), T::one(), &self.free, &[T::zero(); B])
@@ -268,7 +267,7 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
         }
     }
 
-    /// One stage of a plan; what earlier stages determined is held at `values`.
+    /// One stage of a plan; parameters determined by earlier stages are held at `values`.
     #[must_use]
     pub fn stage(&self, plan: Plan, index: usize, values: &[T; B], determined: &[bool; B]) -> Stage<T, B> {
         match (plan, self.sequential_joint(index)) {
@@ -304,14 +303,14 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
         estimate
     }
 
-    /// Covariance of a stage's parameters: their own, and what the held ones pass on,
+    /// Covariance of a stage's parameters: their own, plus the errors of the held ones by
     /// `p_u = R_uu^-1 (z - R_uf p_f)`.
     fn carry_errors(&self, plan: Plan, index: usize, stage: &Stage<T, B>, estimate: &mut Estimate<T, B>) {
         let inverse = stage.factor.inverse(stage.count);
-        let mut gain = [[T::zero(); B]; B]; // d p_u / d p_f, row = place in the stage, column = base parameter
+        let mut gain = [[T::zero(); B]; B]; // d p_u / d p_f, row = index in the stage, column = base parameter
         if let (Plan::Sequential, Some(joint)) = (plan, self.sequential_joint(index)) {
             for base in (0..self.rank).filter(|&base| estimate.determined[base]) {
-                // The held column is the only right-hand side: least squares against it gives its gain.
+                // Least squares with the held column as right-hand side gives its gain.
                 let mut unit = [T::zero(); B];
                 unit[base] = -T::one();
                 let weight = T::one() / self.noise[joint];

@@ -4,12 +4,13 @@
 //! sum over rows (y p - t)^2 = |R p - z|^2 + residual,     R upper triangular
 //! ```
 //!
-//! Each row is rotated into `R` by Givens rotations (Golub and Van Loan, Matrix Computations, 5.1.8); the cost of
-//! any parameter vector is then exact and independent of the number of rows. Feeding one factor for hours in
-//! single precision loses it (a diagonal of 1e3 swallows rows of 1): a motion is recorded in small factors that are merged
-//! with their like (`window`), so that only numbers of like size ever meet.
+//! Givens rotations enter each row into `R` (Golub and Van Loan, Matrix Computations, 5.1.8). The cost of any
+//! parameter vector is then exact and independent of the number of rows. One factor fed for hours in single
+//! precision loses accuracy (a diagonal of 1e3 swallows rows of 1). A motion is therefore recorded in small
+//! factors, merged with their like (`window`), so that only numbers of similar size ever meet.
 //!
-//! Cost of one row: about `2 B^2` multiplications and `B` square roots. Memory: `B (B + 1) + 2` numbers a factor.
+//! Cost of one row: about `2 B^2` multiplications and `B` square roots. Memory: `B (B + 1) + 2` numbers a
+//! factor.
 
 use crate::real::{self, Real};
 
@@ -24,29 +25,29 @@ pub struct Factor<T, const B: usize> {
 }
 
 impl<T: Real, const B: usize> Factor<T, B> {
-    /// A factor that has seen no row.
+    /// An empty factor.
     #[must_use]
     pub fn new() -> Self {
         Self { r: [[T::zero(); B]; B], z: [T::zero(); B], residual: T::zero(), rows: 0 }
     }
 
-    /// Takes one row: `row . parameters` should be `right`.
+    /// Takes one row of the equation `row . parameters = right`.
     pub fn insert(&mut self, row: &[T; B], right: T) {
         self.rotate(*row, right);
         self.rows = self.rows.saturating_add(1);
     }
 
-    /// Takes one row of a factor that was made elsewhere: it is none of the rows counted.
+    /// Takes one row of a factor made elsewhere, without counting it.
     pub(super) fn absorb(&mut self, row: &[T; B], right: T) {
         self.rotate(*row, right);
     }
 
-    /// Sum of squares that came with such rows.
+    /// Adds the residual sum of squares that belongs to absorbed rows.
     pub(super) fn add_residual(&mut self, residual: T) {
         self.residual += residual;
     }
 
-    /// How many rows it stands for.
+    /// Sets the number of rows that the factor represents.
     pub(super) fn set_rows(&mut self, rows: u32) {
         self.rows = rows;
     }
@@ -95,7 +96,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
         self.residual += right * right;
     }
 
-    /// `|R p - z|^2`: the cost above the least-squares optimum. `parameters` beyond the slice count as zero.
+    /// `|R p - z|^2`: the cost above the least-squares optimum. Missing `parameters` count as zero.
     #[must_use]
     pub fn excess(&self, parameters: &[T]) -> T {
         let count = parameters.len().min(B);
@@ -110,10 +111,10 @@ impl<T: Real, const B: usize> Factor<T, B> {
         total
     }
 
-    /// The same factor in another precision.
+    /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Factor<U, B> {
-        // Element by element: a large array handled by value is taken apart by the compiler at great cost.
+        // Element by element: the compiler expands a large array by value at great cost.
         let mut converted = Factor::new();
         for (to, from) in converted.r.iter_mut().flatten().zip(self.r.iter().flatten()) {
             *to = U::of(from.to_double());
@@ -126,13 +127,13 @@ impl<T: Real, const B: usize> Factor<T, B> {
         converted
     }
 
-    /// Sum of squares that no parameter vector can explain.
+    /// Residual sum of squares at the least-squares optimum.
     #[must_use]
     pub fn residual(&self) -> T {
         self.residual
     }
 
-    /// Number of rows taken.
+    /// Number of rows that the factor represents.
     #[must_use]
     pub fn rows(&self) -> u32 {
         self.rows
@@ -161,8 +162,8 @@ impl<T: Real, const B: usize> Factor<T, B> {
         )
     }
 
-    /// The problem in which only `columns` are free and the others are held at `fixed`: a factor whose column `i`
-    /// is `columns[i]`.
+    /// Restricts the problem: only `columns` are free, the others are held at `fixed`. Column `i` of the
+    /// result is `columns[i]`.
     #[must_use]
     #[inline(never)]
     pub fn restricted(&self, columns: &[usize], fixed: &[T; B], weight: T) -> Self {
@@ -176,7 +177,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
             for (slot, &column) in compact.iter_mut().zip(columns) {
                 let (element, value) = (row.get(column), fixed.get(column));
                 *slot = element.copied().unwrap_or(T::zero()) * weight;
-                // A free column is not held: what the loop above took off is given back.
+                // A free column is not held: give back what the loop above subtracted.
                 rest += element.copied().unwrap_or(T::zero()) * value.copied().unwrap_or(T::zero());
             }
             result.rotate(compact, rest * weight);
@@ -186,7 +187,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
         result
     }
 
-    /// The same problem with these columns held at zero: they are left out, the others stay where they are.
+    /// Holds these columns at zero; the other columns keep their index.
     #[must_use]
     #[inline(never)]
     pub fn without(&self, columns: &[bool; B]) -> Self {
@@ -205,13 +206,13 @@ impl<T: Real, const B: usize> Factor<T, B> {
         result
     }
 
-    /// The same rows with zero on the right.
+    /// Rows of this factor with zero on the right.
     #[must_use]
     pub fn without_right(&self) -> Self {
         Self { z: [T::zero(); B], residual: T::zero(), ..self.clone() }
     }
 
-    /// The same rows with each right-hand side times `scale`, less the row times `shift`.
+    /// Rows of this factor with each right-hand side times `scale`, less the row times `shift`.
     #[must_use]
     pub fn with_right(&self, scale: T, shift: &[T; B]) -> Self {
         let mut result = self.clone();

@@ -1,11 +1,11 @@
-//! The two filters of a recorder.
+//! The recorder's two filters.
 
 use super::kernel::{Kernel, KernelError, LowPass};
 use super::record::{SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
 use super::rows::RowFilter;
 use crate::real::Real;
 
-/// Both filters of a recorder, made apart from it: what may fail is done before something large is put in its place.
+/// Both filters of a recorder, built before it: construction may fail while nothing large is allocated yet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filters<T, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
     pub(super) smoothing: Kernel<T, TAPS>,
@@ -15,10 +15,10 @@ pub struct Filters<T, const N: usize, const B: usize, const TAPS: usize, const P
 impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     Filters<T, N, B, TAPS, PENDING>
 {
-    /// Of a low-pass that is 3 dB down at `bandwidth_hz`.
+    /// Builds both filters for a low-pass that is 3 dB down at `bandwidth_hz`.
     ///
     /// # Errors
-    /// [`KernelError`] when the bandwidth is absurd or its kernel does not fit `TAPS` and `PENDING`.
+    /// [`KernelError`] when the bandwidth is invalid or its kernel does not fit `TAPS` and `PENDING`.
     #[inline(never)]
     pub fn new(bandwidth_hz: T) -> Result<Self, KernelError> {
         let rate = T::of(SAMPLE_RATE_HZ);
@@ -30,7 +30,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
         Ok(Self { smoothing, low_pass })
     }
 
-    /// The second filter.
+    /// Row low-pass, the second filter.
     #[must_use]
     pub fn low_pass(&self) -> &LowPass<T, TAPS> {
         &self.low_pass

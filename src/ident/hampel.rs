@@ -1,20 +1,22 @@
-//! Isolated wild samples are replaced before the filter chain sees them.
+//! Outlier filter: replaces isolated outliers before the filter chain.
 //!
-//! Why before: one wild angle or torque spoils every filtered row within two reaches of it; 3 % of them touch 94 % of
-//! the rows. A sample is wild if it lies far from what its eight neighbours predict *and* far outside their range:
+//! Why before: one outlier of angle or torque corrupts every filtered row within two reaches of it; 3 %
+//! outliers touch 94 % of the rows. A sample is an outlier if it lies far from its eight neighbours'
+//! prediction *and* far outside their range:
 //!
 //! ```text
-//! torque     p = median of (x[k-j] + x[k+j]) / 2, j = 1..4                     a linear trend cancels
-//! angle      p = median of the parabolas through +-1, +-2; through +-3, +-4; and through -1, -2, -3
-//! s          running median of |x - p|: s := s exp(+-eta), up where |x - p| > s
-//! limit      L = max(FACTOR s, floor)
-//! wild       |x - p| > L  and  x outside [third smallest - L, third largest + L] of the neighbours; then x := p
+//! torque   p = median of (x[k-j] + x[k+j]) / 2, j = 1..4                     a linear trend cancels
+//! angle    p = median of the parabolas through +-1, +-2; through +-3, +-4; and through -1, -2, -3
+//! s        running median of |x - p|: s := s exp(+-eta), up where |x - p| > s
+//! limit    L = max(FACTOR s, floor)
+//! outlier  |x - p| > L  and  x outside [third smallest - L, third largest + L] of neighbours; then x := p
 //! ```
 //!
-//! The second condition keeps honest steps, ramps and jittered recordings: where a signal goes somewhere, each sample
-//! lies within the range of its neighbours. Neighbours of the past are clean already, so of the four to come two may be
-//! wild: up to three in a row are found. A longer run is not isolated and passes; reweighting sees it later.
-//! At the ends of a motion neighbours are missing; there the range is widened by its own width.
+//! The second condition spares real steps, ramps and jittered recordings: where a signal moves steadily,
+//! each sample lies within the range of its neighbours. Past neighbours are already clean, so of the
+//! four to come two may be outliers: up to three in a row are found. A longer run is not isolated and
+//! passes; reweighting handles it later. At the ends of a motion neighbours are missing; there the range
+//! is widened by its own width.
 //!
 //! | symbol | meaning | here |
 //! | --- | --- | --- |
@@ -22,29 +24,30 @@
 //! | FACTOR | limit over the running median; 6 medians are 4 standard deviations of x - p | 6 |
 //! | floor | angle: 5e-4 rad; torque: 10 % of the running mean of its size | |
 //!
-//! Source: the decision filter of Hampel (1974), with pairs for trends and a scale that outlives the window, because a
-//! scale of eight samples alone would call 1 % of Gaussian noise wild.
+//! Source: the decision filter of Hampel (1974), with pairs for trends. The scale outlives the window,
+//! because a scale of eight samples alone would flag 1 % of Gaussian noise.
 //! Cost: about 150 operations a value. Memory: 16 numbers a value. Delay: four samples.
-//! Limits: a wild value below the limit stays; it is of the size of the noise.
+//! Limits: an outlier below the limit stays; its size is that of the noise.
 
 use crate::real::{self, Real};
 
-/// Samples by which the filter lags: neighbours wanted on each side.
+/// Delay of the filter in samples: neighbours needed on each side.
 pub const REACH: usize = 4;
 const WINDOW: usize = 2 * REACH + 1;
 const FACTOR: f64 = 6.0;
 const STEP: f64 = 0.02;
-/// Below this no angle is called wild, rad: what it does to a speed is below what a reversal leaves uncertain.
+/// Smallest limit for an angle, rad. A smaller error in speed is below the
+/// uncertainty that a reversal leaves.
 const ANGLE_FLOOR_RAD: f64 = 5e-4;
-/// Nor a torque below this share of the running mean size.
+/// Smallest limit for a torque, as a share of the running mean size.
 const TORQUE_FLOOR_SHARE: f64 = 0.1;
-/// Neighbours left out at either end of their range: as many wild ones may lie there.
+/// Neighbours trimmed at either end of their range: up to this many may be outliers.
 const TRIMMED: usize = 2;
 
-/// What is measured.
+/// Kind of measured value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Smooth, hardly any noise: parabolas predict.
+    /// Smooth and almost free of noise: parabolas predict.
     Angle,
     /// Noisy: means of pairs predict.
     Torque,
@@ -53,9 +56,9 @@ pub enum Quantity {
 /// One cleaned value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cleaned<T> {
-    /// The sample, or what takes its place.
+    /// The sample or its replacement.
     pub value: T,
-    /// Whether it was replaced.
+    /// True if it was replaced.
     pub wild: bool,
 }
 
@@ -66,7 +69,7 @@ pub struct Hampel<T> {
     /// Newest last; those before the candidate are clean.
     window: [T; WINDOW],
     filled: usize,
-    /// Places behind the newest sample that are not there any more ([`Self::finish`]).
+    /// Samples missing after the newest one, at the end of a motion ([`Self::finish`]).
     missing: usize,
     deviation: T,
     size: T,
@@ -74,7 +77,7 @@ pub struct Hampel<T> {
 }
 
 impl<T: Real> Hampel<T> {
-    /// Nothing seen yet.
+    /// A filter that has seen no sample.
     #[must_use]
     pub fn new(quantity: Quantity) -> Self {
         Self {
@@ -88,19 +91,19 @@ impl<T: Real> Hampel<T> {
         }
     }
 
-    /// The samples that follow do not continue those before; what was learned of their size stays.
+    /// Begins a new stretch of samples; the learned scale stays.
     pub fn restart(&mut self) {
         (self.filled, self.missing) = (0, 0);
     }
 
-    /// Takes a sample; gives the one of [`REACH`] samples ago back, once there is one.
+    /// Takes a sample; returns the cleaned sample of [`REACH`] samples ago, once there is one.
     pub fn push(&mut self, sample: T) -> Option<Cleaned<T>> {
         self.shift(sample);
         self.filled = (self.filled + 1).min(WINDOW);
         (self.filled > REACH).then(|| self.clean())
     }
 
-    /// After the last sample: what is still held back, one at a call.
+    /// Returns one held-back sample per call, after the last sample of a motion.
     pub fn finish(&mut self) -> Option<Cleaned<T>> {
         if self.missing >= REACH || self.missing >= self.filled {
             return None;
@@ -108,7 +111,7 @@ impl<T: Real> Hampel<T> {
         self.missing += 1;
         self.shift(T::zero());
         self.filled = (self.filled + 1).min(WINDOW);
-        // Of a motion shorter than the reach the first sample is not in the middle yet.
+        // In a motion shorter than the reach the first sample is not in the middle yet.
         if self.filled > REACH { Some(self.clean()) } else { self.finish() }
     }
 
@@ -121,7 +124,7 @@ impl<T: Real> Hampel<T> {
 
     fn clean(&mut self) -> Cleaned<T> {
         let value = self.window[REACH];
-        // Neighbours that are there: places of the window.
+        // Range of the window that holds samples.
         let first = WINDOW - self.filled;
         let end = WINDOW - self.missing;
         let whole = first == 0 && end == WINDOW;
@@ -157,7 +160,7 @@ impl<T: Real> Hampel<T> {
             * real::max(step * T::of(0.1), T::one() / T::of(f64::from(self.seen)));
     }
 
-    /// What the neighbours say; `None` without any.
+    /// Prediction from the neighbours; `None` with too few.
     fn predict(&self, first: usize, end: usize) -> Option<T> {
         let at = |place: usize| self.window[place];
         if first > 0 || end < WINDOW {
@@ -181,7 +184,7 @@ impl<T: Real> Hampel<T> {
         })
     }
 
-    /// From the side that is longer.
+    /// Prediction from the longer side.
     fn extrapolate(&self, first: usize, end: usize) -> Option<T> {
         let (before, after) = (REACH - first.min(REACH), end.saturating_sub(REACH + 1));
         let side =
@@ -217,7 +220,7 @@ impl<T: Real> Hampel<T> {
     }
 }
 
-/// Deviations seen before anything is called wild.
+/// Deviations to learn before any sample is replaced.
 const SETTLED: u32 = 25;
 
 /// Insertion sort: a handful of numbers.

@@ -1,8 +1,8 @@
-//! One finite low-pass and its exact derivatives.
+//! A finite low-pass and its exact derivatives.
 //!
 //! Why: identification needs angle, speed and acceleration from encoder counts alone. Local polynomials give
 //! three estimates that are not derivatives of one another and bias the inertias by about one standard
-//! deviation; here all three weights come from one function of time.
+//! deviation. Here all three weights come from one function of time.
 //!
 //! ```text
 //! h(t)   =  1/W (1/2 c_0 + sum_n c_n cos(n pi t/W)),     |t| <= W
@@ -10,15 +10,16 @@
 //! h''(t) = -1/W  sum_n c_n (n pi/W)^2 cos(n pi t/W)
 //! ```
 //!
-//! `W` is the reach in s and `c_n` the gain at the frequency `n/(2 W)`: a frequency-sampling design (Rabiner,
-//! Gold and McGonegal 1970) with a flat passband of three samples and four transition samples, found by
-//! minimising the largest deviation in both bands under `h(W) = h''(W) = 0`, so that `h`, `h'` and `h''` all end
-//! without a step. In units of the bandwidth (-3 dB): within 0.1 % of one up to 0.55, below -77 dB from 1.8,
-//! reach 1.967 periods. The weights are samples of these functions: the discrete derivative is exact but for the
-//! aliased stopband, and the remaining 1e-5 of a constant, a ramp and a parabola are normalised away.
+//! `W` is the reach in s and `c_n` the gain at the frequency `n/(2 W)`. The design is frequency sampling
+//! (Rabiner, Gold and McGonegal 1970) with a flat passband of three samples and four transition samples. The
+//! transition samples minimise the largest deviation in both bands under `h(W) = h''(W) = 0`, so `h`, `h'`
+//! and `h''` all end without a step. In units of the bandwidth (-3 dB): within 0.1 % of one up to 0.55, below
+//! -77 dB from 1.8, reach 1.967 periods. The weights are samples of these functions, so the discrete
+//! derivative is exact but for the aliased stopband. Normalisation removes the remaining 1e-5 of a constant,
+//! a ramp and a parabola.
 //!
-//! Cost: built once; about 60 flops for each tap. Memory: `TAPS` numbers for [`LowPass`], three times as many for
-//! [`Kernel`].
+//! Cost: built once; about 60 flops for each tap. Memory: `TAPS` numbers for [`LowPass`], three
+//! times as many for [`Kernel`].
 
 use crate::real::{self, Real};
 
@@ -26,15 +27,15 @@ use crate::real::{self, Real};
 const GAINS: [f64; 7] = [1.0, 1.0, 1.0, 0.952_295, 0.680_526, 0.263_507, 0.035_275];
 /// Reach times bandwidth.
 const REACH_IN_PERIODS: f64 = 1.966_742;
-/// Fewer taps to each side cannot represent the three functions.
+/// Fewest taps to each side that represent the three functions.
 const SMALLEST_REACH: usize = 8;
 
-/// Why a kernel cannot be built.
+/// Reason why a kernel cannot be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KernelError {
     /// The bandwidth is not a positive finite number.
     Bandwidth,
-    /// The reach needs more taps than the memory set aside; a higher bandwidth needs fewer.
+    /// The kernel exceeds the reserved memory; a higher bandwidth needs fewer taps.
     TooLong {
         /// Taps needed.
         needed: usize,
@@ -54,10 +55,10 @@ pub struct LowPass<T, const TAPS: usize> {
 }
 
 impl<T: Real, const TAPS: usize> LowPass<T, TAPS> {
-    /// The low-pass that is 3 dB down at `bandwidth_hz`, for samples at `sample_rate_hz`.
+    /// Builds the low-pass that is 3 dB down at `bandwidth_hz`, for samples at `sample_rate_hz`.
     ///
     /// # Errors
-    /// [`KernelError`] when the bandwidth is absurd or does not fit `TAPS`.
+    /// [`KernelError`] when the bandwidth is invalid or does not fit `TAPS`.
     pub fn new(bandwidth_hz: T, sample_rate_hz: T) -> Result<Self, KernelError> {
         if !(bandwidth_hz > T::zero() && real::is_finite(bandwidth_hz)) {
             return Err(KernelError::Bandwidth);
@@ -96,21 +97,21 @@ impl<T: Real, const TAPS: usize> LowPass<T, TAPS> {
         2 * self.reach + 1
     }
 
-    /// Oldest sample first.
+    /// Weights, oldest sample first.
     #[must_use]
     pub fn weights(&self) -> &[T] {
         &self.weights[..self.taps()]
     }
 
-    /// Sum of the squared weights: the variance that is left of white noise.
+    /// Sum of the squared weights: the share of a white noise's variance that remains.
     #[must_use]
     pub fn energy(&self) -> T {
         self.energy
     }
 }
 
-/// `h`, `h'` and `h''` a number of samples from the centre, derivatives with the sign of a correlation: that of a
-/// rising ramp.
+/// `h`, `h'` and `h''` at `offset` samples from the centre. The derivatives have the sign of a correlation:
+/// positive for a rising ramp.
 fn function_and_derivatives<T: Real>(offset: T, half_width: T, sample_rate_hz: T) -> (T, T, T) {
     let fundamental = T::of(core::f64::consts::PI) / half_width; // rad per sample
     let (sine_one, cosine_one) = real::sin_cos(fundamental * offset);
@@ -135,10 +136,11 @@ pub struct Kernel<T, const TAPS: usize> {
 }
 
 impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
-    /// The low-pass that is 3 dB down at `bandwidth_hz`, for samples at `sample_rate_hz`, and its derivatives.
+    /// Builds the low-pass that is 3 dB down at `bandwidth_hz`, for samples at
+    /// `sample_rate_hz`, and its derivatives.
     ///
     /// # Errors
-    /// [`KernelError`] when the bandwidth is absurd or does not fit `TAPS`.
+    /// [`KernelError`] when the bandwidth is invalid or does not fit `TAPS`.
     pub fn new(bandwidth_hz: T, sample_rate_hz: T) -> Result<Self, KernelError> {
         let low_pass = LowPass::new(bandwidth_hz, sample_rate_hz)?;
         let mut kernel =
@@ -176,19 +178,19 @@ impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
         self.low_pass.reach()
     }
 
-    /// Number of weights of each of the three.
+    /// Number of weights of each of the three filters.
     #[must_use]
     pub const fn taps(&self) -> usize {
         self.low_pass.taps()
     }
 
-    /// Value, slope (1/s) and curvature (1/s^2) at the centre of a window of [`Self::taps`] samples, given in two
-    /// pieces, oldest first, as a ring buffer holds them.
+    /// Value, slope (1/s) and curvature (1/s^2) at the centre of a window of [`Self::taps`] samples. The
+    /// window comes in two pieces, oldest first, as a ring buffer holds them.
     #[must_use]
     pub fn apply(&self, older: &[T], newer: &[T], centre: T) -> (T, T, T) {
-        // Differences from the centre: what the weights must cancel is cancelled before it can cost digits.
+        // Differences from the centre: large constants cancel before they cost digits.
         let (mut value, mut slope, mut curvature) = (T::zero(), T::zero(), T::zero());
-        // Piece by piece: a chained iterator asks at every sample which piece it is in.
+        // Piece by piece: a chained iterator would test at every sample which piece is current.
         let mut begin = 0;
         for piece in [older, newer] {
             let rest = begin.min(TAPS)..;

@@ -1,18 +1,18 @@
 //! Identification: from logged angles and currents to parameters, their uncertainty, and a verdict.
 //!
 //! ```text
-//! q, tau 500 Hz -> smoothing: g, g', g'' -> regressor; regressor and tau -> rows: one h, 50 Hz -> factor   (record)
-//! factor -> selection: columns that the data do not tell, where that may be asked
+//! q, tau 500 Hz -> smoothing: g, g', g'' -> regressor; both -> rows: one h, 50 Hz -> factor  (record)
+//! factor -> selection: drops columns that the data do not determine, where allowed
 //!        -> estimate: noise weights, least squares, covariance
 //!        -> search: beetle swarm in the prior's box (bounds), against the constrained optimum (constrained)
 //!        -> completion: fourteen parameters of every joint, each with its status
-//! held-out motions -> residual, alignment (held_out): its order in time, and what it asks for
+//! held-out motions -> residual, alignment (held_out): order in time, geometry errors
 //!        -> verdict: accepted, or refused with reasons
 //! scale: torque constants from two records, without and with a known mass
-//! accepted -> baseline -> monitor of the residual while the leg moves -> update: what changed, from gait alone
+//! accepted -> baseline -> monitor of the residual in motion -> update: cause of a change, from gait
 //! ```
 //!
-//! Everything is generic over the scalar: the board runs it in `f32`, tests check it in `f64`.
+//! All code is generic over the scalar: the board runs it in `f32`, tests check it in `f64`.
 
 pub mod alignment;
 mod assembly;

@@ -1,4 +1,4 @@
-//! What is kept of one motion: information, sizes, what was set aside. Made by a [`super::record::Recorder`].
+//! Record of one motion: information, sizes, excluded data. Made by a [`super::record::Recorder`].
 
 use super::estimate::Estimate;
 use super::factor::Factor;
@@ -8,7 +8,7 @@ use super::selection::Selection;
 use super::stribeck::StribeckFit;
 use crate::real::{self, Real};
 
-/// What one joint's part of a motion looked like.
+/// Size of one joint's torque and speed in a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueSize<T> {
     /// Mean of the absolute filtered torque, N m.
@@ -19,7 +19,7 @@ pub struct TorqueSize<T> {
     pub speed: T,
 }
 
-/// Everything that identification and validation need of one motion.
+/// All data that identification and validation need of one motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record<T, const N: usize, const B: usize> {
     /// Rows of each joint's torque.
@@ -28,22 +28,23 @@ pub struct Record<T, const N: usize, const B: usize> {
     pub torque: [TorqueSize<T>; N],
     /// Filtered rows of each joint.
     pub rows: [u32; N],
-    /// Samples and rows that were not finite.
+    /// Number of samples and rows that were not finite.
     pub rejected: u32,
     /// Information of one row in units of independent ones, `m sum h^2`: below one because rows overlap.
     pub row_information: T,
-    /// Standard deviation of the torque noise of one 500 Hz sample, from its own scatter, N m; zero where not known.
+    /// Standard deviation of the torque noise of one 500 Hz sample, from its own
+    /// scatter, N m; zero if unknown.
     pub noise: [T; N],
-    /// What was set aside.
+    /// Statistics of replaced samples and disturbed rows.
     pub outliers: Outliers<T, N>,
-    /// Stribeck friction of each joint that shows it; its parameters are eliminated from the factor.
+    /// Stribeck friction of each joint that shows it, with its parameters eliminated from the factor.
     pub stribeck: [Option<StribeckFit<T, B>>; N],
-    /// Which columns are held at zero; those of motions held out all are there.
+    /// Columns held at zero; in held-out motions none are.
     pub selection: Selection<T, N, B>,
 }
 
 impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
-    /// The same record in another precision.
+    /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Record<U, N, B> {
         let convert = |value: T| U::of(value.to_double());
@@ -64,15 +65,15 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
         }
     }
 
-    /// Standard deviation that noise alone leaves of one joint's filtered torque, N m; `None` where it is not known.
+    /// Standard deviation of one joint's filtered torque due to noise alone, N m; `None` if unknown.
     #[must_use]
     pub fn filtered_noise(&self, joint: usize) -> Option<T> {
         let energy = self.row_information / T::of(DECIMATION as f64); // sum h^2
         self.noise.get(joint).filter(|&&noise| noise > T::zero()).map(|&noise| noise * real::sqrt(energy))
     }
 
-    /// Root mean square of what the parameters' covariance leaves uncertain of one joint's torque, N m:
-    /// `tr(R Cov R') / rows`.
+    /// Root mean square torque error of one joint that the parameters' covariance
+    /// explains, N m: `tr(R Cov R') / rows`.
     #[must_use]
     #[inline(never)]
     pub fn uncertainty(&self, joint: usize, estimate: &Estimate<T, B>) -> T {
@@ -90,7 +91,7 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
         real::sqrt(real::max(sum, T::zero()) / T::of(f64::from(rows.max(1))))
     }
 
-    /// Root mean square torque error of one joint with these base parameters, N m.
+    /// Root mean square torque error of one joint with these base parameters, N m; `None` without rows.
     #[must_use]
     pub fn torque_error(&self, joint: usize, base: &[T; B]) -> Option<T> {
         let factor = self.factors.get(joint)?;

@@ -1,7 +1,7 @@
-//! How noisy the torque signal is, from its own scatter, without any model.
+//! Noise level of the torque signal, from its own scatter, without any model.
 //!
-//! Why: a residual can only be called too large against noise that was not estimated from that residual. Samples that
-//! follow one another at 500 Hz differ by noise alone once the smooth part is taken off:
+//! Why: a residual can only be judged against noise that was not estimated from that residual. Consecutive
+//! samples at 500 Hz differ by noise alone, once the smooth part is removed:
 //!
 //! ```text
 //! d_k   = x_k - 3 x_(k-1) + 3 x_(k-2) - x_(k-3)          a motion of 2 Hz leaves 1.6e-5 of its amplitude
@@ -9,11 +9,11 @@
 //! sigma = median |d| / (0.674490 sqrt 20)                 robust: steps and outliers are few
 //! ```
 //!
-//! The median comes from five markers that move with the data (P^2 algorithm, Jain and Chlamtac 1985), so that memory is
-//! constant. Cost: some 40 flops for each joint and sample. Memory: 13 numbers for each joint.
-//! Known limits: the noise must be white from 5 to 250 Hz. What the servo itself makes of encoder steps is real torque
-//! and counts as noise here; samples that were interpolated from another grid have lost their scatter, and the result
-//! is then too small.
+//! Five markers that move with the data give the median in constant memory (P^2 algorithm, Jain and Chlamtac
+//! 1985). Cost: some 40 flops for each joint and sample. Memory: 13 numbers for each joint.
+//! Known limits: the noise must be white from 5 to 250 Hz. The servo's response to encoder steps is real
+//! torque but counts as noise here. Samples interpolated from another grid have lost their scatter; the
+//! result is then too small.
 
 use crate::real::{self, Real};
 
@@ -54,9 +54,9 @@ impl<T: Real> Median<T> {
         }
     }
 
-    /// Moves a marker by one place where it lags its quarter by a place or more.
+    /// Moves a marker by one position if it lags its quarter by one or more.
     fn adjust(&mut self, marker: usize) {
-        // In whole quarters: exact however long the stream, and no double precision on the device.
+        // In whole quarters: exact for a stream of any length, without double precision on the device.
         let wanted = u64::from(self.seen - 1) * marker as u64;
         let place = u64::from(self.positions[marker]) * 4;
         let (before, after) = (self.gap(marker - 1), self.gap(marker));
@@ -82,12 +82,12 @@ impl<T: Real> Median<T> {
             if forward { self.positions[marker] + 1 } else { self.positions[marker].saturating_sub(1) };
     }
 
-    /// Places from a marker to the next one.
+    /// Distance in positions from a marker to the next one.
     fn gap(&self, marker: usize) -> u32 {
         self.positions[marker + 1].saturating_sub(self.positions[marker])
     }
 
-    /// `None` before the fifth value.
+    /// The median; `None` before the fifth value.
     fn value(&self) -> Option<T> {
         (self.seen >= 5).then_some(self.heights[2])
     }
@@ -103,7 +103,7 @@ fn sort<T: Real>(values: &mut [T; 5]) {
     }
 }
 
-/// Standard deviation of one joint's torque noise, in the making.
+/// Running estimate of the standard deviation of one joint's torque noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseLevel<T> {
     /// Newest first.
@@ -113,13 +113,13 @@ pub struct NoiseLevel<T> {
 }
 
 impl<T: Real> NoiseLevel<T> {
-    /// Nothing seen.
+    /// Starts without data.
     #[must_use]
     pub fn new() -> Self {
         Self { last: [T::zero(); 3], filled: 0, scatter: Median::new() }
     }
 
-    /// The samples that follow do not continue those before.
+    /// Ends a continuous stretch of samples.
     pub fn break_off(&mut self) {
         self.filled = 0;
     }
@@ -135,7 +135,7 @@ impl<T: Real> NoiseLevel<T> {
         self.last = [sample, newest, middle];
     }
 
-    /// Standard deviation of the noise of one sample; zero where nothing is known.
+    /// Standard deviation of the noise of one sample; zero before the fifth difference.
     #[must_use]
     pub fn sigma(&self) -> T {
         self.scatter.value().map_or(T::zero(), |median| median / T::of(0.674_490 * 4.472_136))
@@ -178,7 +178,8 @@ mod tests {
                 10_000,
                 seed,
             );
-            // The median of 10,000 correlated differences scatters by 1.6 %; 8 % of outliers raise it by 10 %.
+            // The median of 10,000 correlated differences scatters by 1.6 %; 8 %
+            // of outliers raise it by 10 %.
             assert!(found > 1.45 && found < 1.75, "{found}");
             let clean = level(|_, normal| 1.5 * normal, 10_000, seed);
             assert!((clean / 1.5 - 1.0).abs() < 0.06, "{clean}");
@@ -187,7 +188,8 @@ mod tests {
 
     #[test]
     fn a_marker_that_goes_back_beside_a_steep_tail_comes_down_towards_its_neighbour() {
-        // The parabola through 0, 1 and 100 leads below 0, so the line to the neighbour two places before counts.
+        // The parabola through 0, 1 and 100 leads below 0, so the line to the
+        // neighbour two positions before counts.
         let mut median =
             Median::<f64> { heights: [0.0, 0.0, 1.0, 100.0, 200.0], positions: [0, 1, 3, 4, 8], seen: 5 };
         median.adjust(2);

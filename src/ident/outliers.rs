@@ -1,16 +1,16 @@
-//! What was set aside of one motion: wild samples before the filter, disturbed stretches after it.
+//! Statistics of excluded data in one motion: replaced samples and disturbed stretches.
 //!
-//! A result that was cleaned silently cannot be trusted; so the record of a motion says how many samples were
-//! replaced ([`super::hampel`]) and how much of the motion counted for less ([`super::reweighting`]).
+//! Silent cleaning would hide what a result rests on. The record of a motion therefore says how many samples
+//! were replaced ([`super::hampel`]) and how much of the motion got less weight ([`super::reweighting`]).
 
 use crate::real::Real;
 
-/// What was set aside of one motion before and after filtering.
+/// Replaced samples and down-weighted rows of one motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outliers<T, const N: usize> {
     /// 500 Hz samples taken in.
     pub samples: u32,
-    /// Isolated wild angles and torques of each joint, replaced before the filter.
+    /// Isolated outliers of each joint's angle and torque, replaced before the filter.
     pub replaced: [u32; N],
     /// Share of each joint's rows that got less than half of their weight, 0..1.
     pub disturbed_share: [T; N],
@@ -18,12 +18,12 @@ pub struct Outliers<T, const N: usize> {
     pub longest_s: [T; N],
     /// Longest stretch in which all joints' rows were disturbed at once, s.
     pub longest_common_s: T,
-    /// What the rows that counted say of all rows, those set aside included: the error's root mean square over the torque's.
+    /// Error over torque, root mean squares over all rows, with the parameters that the weighted rows give.
     pub whole_error_share: [T; N],
 }
 
 impl<T: Real, const N: usize> Outliers<T, N> {
-    /// Nothing taken in, nothing set aside.
+    /// Empty statistics.
     #[must_use]
     pub fn none() -> Self {
         Self {
@@ -36,7 +36,7 @@ impl<T: Real, const N: usize> Outliers<T, N> {
         }
     }
 
-    /// The same in another precision.
+    /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Outliers<U, N> {
         let convert = |value: T| U::of(value.to_double());

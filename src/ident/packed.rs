@@ -5,28 +5,29 @@
 //! sum over rows (y p - t)^2 = |R p - z|^2 + residual
 //! ```
 //!
-//! The same factor as [`super::factor`], without the zeros below the diagonal and for as many columns as are there: a
-//! window of many small factors needs less than half of the room. A row is `n` columns and the right-hand side.
+//! A variant of [`super::factor`] without the zeros below the diagonal, with only the columns
+//! present. A window of many small factors needs less than half of the memory. A row is `n`
+//! columns and the right-hand side.
 //!
 //! Memory: `n (n + 3) / 2 + 1` numbers. Cost of one row: about `2 n^2` multiplications and `n` square roots.
 
 use crate::real::{self, Real};
 
-/// Columns that a packed factor may have.
+/// Most columns of a packed factor.
 pub const LARGEST_COLUMNS: usize = 32;
 /// A row with its right-hand side.
 pub type Row<T> = [T; LARGEST_COLUMNS + 1];
 
-/// Numbers that a factor of `columns` takes.
+/// Length of a factor of `columns`, in numbers.
 #[must_use]
 pub const fn size(columns: usize) -> usize {
     columns * (columns + 3) / 2 + 1
 }
 
-/// Numbers of the largest factor.
+/// Length of the largest factor, in numbers.
 pub const LARGEST_SIZE: usize = size(LARGEST_COLUMNS);
 
-/// Takes one row; `row` is used up.
+/// Takes one row; overwrites `row`.
 pub fn rotate<T: Real>(factor: &mut [T], columns: usize, row: &mut Row<T>) {
     let mut rest = factor;
     for column in 0..columns.min(LARGEST_COLUMNS) {
@@ -57,7 +58,7 @@ pub fn rotate<T: Real>(factor: &mut [T], columns: usize, row: &mut Row<T>) {
     }
 }
 
-/// The rows of a factor, each as its first column and its entries from there on, the right-hand side last.
+/// Rows of a factor, each as its first column and its entries from there on, the right-hand side last.
 pub fn rows<T: Real>(factor: &[T], columns: usize) -> impl Iterator<Item = (usize, &[T])> {
     let mut rest = factor;
     (0..columns).map_while(move |column| {
@@ -67,7 +68,7 @@ pub fn rows<T: Real>(factor: &[T], columns: usize) -> impl Iterator<Item = (usiz
     })
 }
 
-/// Sum of squares that no parameters can explain.
+/// Residual sum of squares at the least-squares optimum.
 #[must_use]
 pub fn residual<T: Real>(factor: &[T], columns: usize) -> T {
     factor.get(size(columns) - 1).copied().unwrap_or(T::zero())
@@ -87,7 +88,7 @@ pub fn merge<T: Real>(factor: &mut [T], other: &[T], columns: usize, weight: T) 
     }
 }
 
-/// `|R p - z|^2 + residual`: the sum of squares that these parameters leave.
+/// `|R p - z|^2 + residual`: sum of squares with these parameters.
 #[must_use]
 pub fn cost<T: Real>(factor: &[T], columns: usize, parameters: &[T]) -> T {
     let mut total = residual(factor, columns);
@@ -102,8 +103,8 @@ pub fn cost<T: Real>(factor: &[T], columns: usize, parameters: &[T]) -> T {
     total
 }
 
-/// Least squares by back substitution; a column without information gives zero. `share` is the part of the column's
-/// length below which what is independent of the others counts as none.
+/// Least squares by back substitution; a column without information gives zero. A column counts as one
+/// without information if its independent part is at most `share` of its length.
 #[must_use]
 pub fn solve<T: Real>(factor: &[T], columns: usize, share: T) -> [T; LARGEST_COLUMNS] {
     let mut parameters = [T::zero(); LARGEST_COLUMNS];

@@ -1,13 +1,13 @@
-//! From logged samples to a record of one motion, in constant memory whatever its duration.
+//! From logged samples to a record of one motion, in constant memory for any duration.
 //!
 //! ```text
-//! angle, torque 500 Hz -> Hampel -> Smoother -> regressor of the smoothed motion -> RowFilter 50 Hz -> Window
+//! angle, torque 500 Hz -> Hampel -> Smoother -> regressor of smoothed motion -> RowFilter 50 Hz -> Window
 //! end of the motion: Window -> weights, Stribeck friction -> one factor per joint (assembly)
 //! ```
 //!
-//! A [`Record`] holds one information factor for each joint, so that noise weights can be chosen afterwards, and
-//! the size of the filtered torque. The fit of *any* parameters to the motion follows from it without the samples:
-//! training and validation use the same type.
+//! A [`Record`] holds one information factor for each joint, so that noise weights can be chosen afterwards,
+//! and the size of the filtered torque. These give the fit of *any* parameters to the motion without the
+//! samples; training and validation use the same type.
 
 use core::borrow::BorrowMut;
 use core::mem::MaybeUninit;
@@ -29,26 +29,29 @@ use super::window::{self, Window};
 use crate::place::{fill, made};
 use crate::real::{self, Real};
 
-/// Bandwidth of the smoothing over that of the rows: the motion is undisturbed where the rows are sensitive, so that
-/// only one low-pass shapes the equation. With one bandwidth for both, large fast swings are predicted worse (double
-/// pendulum's swing-up 0.137 and 0.093 against 0.117 and 0.085 N m; simple pendulum at 3 Hz 0.165 against 0.056).
+/// Bandwidth of the smoothing over that of the rows. The smoothing must leave the motion unchanged in the
+/// rows' band, so that only one low-pass shapes the equation. With one bandwidth for both, large fast swings
+/// are predicted worse: double pendulum's swing-up 0.137 and 0.093 against 0.117 and 0.085 N m, simple
+/// pendulum at 3 Hz 0.165 against 0.056.
 pub const SMOOTHING_BANDWIDTHS: f64 = 2.0;
-/// Rate of the samples a [`Recorder`] takes.
+/// Sample rate of a [`Recorder`].
 pub const SAMPLE_RATE_HZ: f64 = 500.0;
 
-/// Below this smoothed speed a joint may stick, rad/s. One flickering count of a resting 14-bit encoder at the joint
-/// reaches at most 0.0096 rad/s of the speed smoothed at 8 Hz, in proportion to the bandwidth: 0.019 with rows at 8 Hz.
+/// Smoothed speed below which a joint may stick, rad/s. One flickering count of a resting 14-bit encoder at
+/// the joint gives at most 0.0096 rad/s of the speed smoothed at 8 Hz. The noise is in proportion to the
+/// bandwidth: 0.019 with rows at 8 Hz.
 pub const STILL_SPEED: f64 = 0.03;
-/// A row in whose window a joint stood still for a larger share says nothing reliable of that joint: friction at
-/// rest takes any value up to breakaway. On the MuJoCo leg, whose hip sticks a fifth of the time, leaving such
-/// rows in costs 14 % of Coulomb friction and twelve times the torque error; on the simulated default leg a share of
-/// 0.3 biases the knee's rotor inertia by 2.5 standard deviations, 0.05 by 0.1.
+/// Largest share of standstill in a row's window for the row to be used. Friction at rest takes any value up
+/// to breakaway, so a row beyond it is unreliable. On the MuJoCo leg, whose hip sticks a fifth of the time,
+/// using such rows costs 14 % of Coulomb friction and twelve times the torque error. On the simulated default
+/// leg a share of 0.3 biases the knee's rotor inertia by 2.5 standard deviations, 0.05 by 0.1.
 pub const LARGEST_STILL_SHARE: f64 = 0.05;
 
-/// Window of the blocks of one motion, as large as the device's.
+/// Window of the blocks of one motion, with the device's size.
 pub type MotionWindow<T, const N: usize, const B: usize> = Window<T, N, B, { window::ROOM }>;
 
-/// Accumulates one motion after the other. The window is its own, or (`W` a reference) one that lies elsewhere in memory.
+/// Accumulates one motion after the other. The recorder owns its window, or `W`
+/// refers to one elsewhere in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recorder<
     T,
@@ -64,9 +67,9 @@ pub struct Recorder<
     filter: RowFilter<T, N, B, PENDING>,
     estimator: Estimator,
     ends: Ends,
-    /// Disturbed stretches of this motion count for less.
+    /// True if disturbed stretches of this motion get less weight.
     reweights: bool,
-    /// Angle and torque of each joint.
+    /// Outlier filters for angle and torque of each joint.
     hampel: [[Hampel<T>; 2]; N],
     window: W,
     choices: Option<Choices<N>>,
@@ -79,22 +82,22 @@ pub struct Recorder<
     rejected: u32,
 }
 
-/// What one sample brought.
+/// Results of one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress<T, const N: usize, const B: usize> {
-    /// The smoothed motion `reach` samples ago.
+    /// Smoothed motion `reach` samples ago.
     pub instant: Smoothed<T, N>,
-    /// The rows finished by this sample; their centre lies `2 reach` samples ago.
+    /// Rows finished by this sample; their centre lies `2 reach` samples ago.
     pub rows: Option<FilteredRows<T, N, B>>,
 }
 
 impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     Recorder<T, N, B, TAPS, PENDING>
 {
-    /// A recorder whose low-pass is 3 dB down at `bandwidth_hz`.
+    /// Builds a recorder whose low-pass is 3 dB down at `bandwidth_hz`.
     ///
     /// # Errors
-    /// [`KernelError`] when the bandwidth is absurd or its kernel does not fit `TAPS` and `PENDING`.
+    /// [`KernelError`] when the bandwidth is invalid or its kernel does not fit `TAPS` and `PENDING`.
     pub fn new(bandwidth_hz: T) -> Result<Self, KernelError> {
         Self::with_window(bandwidth_hz, Window::new())
     }
@@ -105,7 +108,7 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
 where
     W: BorrowMut<MotionWindow<T, N, B>>,
 {
-    /// The same with a window that is empty.
+    /// Builds a recorder with the given empty window.
     ///
     /// # Errors
     /// See [`Recorder::new`].
@@ -115,7 +118,7 @@ where
         Ok(made(|slot| Self::place(slot, &filters, Estimator::Robust, window)))
     }
 
-    /// The same with filters that fit, built in its place.
+    /// Builds a recorder in place, from filters that already fit.
     pub fn place<'a>(
         slot: &'a mut MaybeUninit<Self>,
         filters: &Filters<T, N, B, TAPS, PENDING>,
@@ -143,7 +146,7 @@ where
         }, {})
     }
 
-    /// Samples by which the smoothed motion lags the newest one.
+    /// Delay of the smoothed motion behind the newest sample, in samples.
     #[must_use]
     pub fn delay(&self) -> usize {
         self.smoothing.reach()
@@ -153,7 +156,7 @@ where
             }
     }
 
-    /// How disturbances are met; robust unless said otherwise.
+    /// Sets the treatment of disturbances; the default is [`Estimator::Robust`].
     pub fn set_estimator(&mut self, estimator: Estimator) {
         self.estimator = estimator;
     }
@@ -164,13 +167,14 @@ where
         self.low_pass.reach()
     }
 
-    /// All of the motion that began last counts alike: where the noise is not known nothing tells a disturbance from it.
+    /// Gives all rows of the current motion equal weight: without a known noise level
+    /// disturbances cannot be detected.
     pub fn count_disturbances(&mut self) {
         self.reweights = false;
     }
 
-    /// Forgets everything: a new motion begins, or what follows in the middle of one is looked at by itself. Over whole
-    /// windows Stribeck friction is the model's own.
+    /// Discards everything, for a new motion or for a part of one to be analysed by itself. With whole
+    /// windows no Stribeck friction is searched: the model's own applies.
     pub fn clear(&mut self, ends: Ends) {
         self.smoother.clear();
         self.hampel.iter_mut().flatten().for_each(Hampel::restart);
@@ -185,8 +189,8 @@ where
         (self.instants, self.rows, self.rejected) = (0, [0; N], 0);
     }
 
-    /// The samples held back for want of neighbours, once no more will come: one at a call, then `None`. To be called before
-    /// [`Self::break_off`] or [`Self::finish`], which drop what is held back.
+    /// Returns the samples held back for lack of neighbours after the last one, one per call; then `None`.
+    /// Call it before [`Self::break_off`] or [`Self::finish`], which drop held-back samples.
     pub fn flush(&mut self, model: &RowModel<T, N, B>) -> Option<Option<Progress<T, N, B>>> {
         if self.estimator == Estimator::Plain {
             return None;
@@ -202,8 +206,8 @@ where
         Some(self.advance(model, &position, &torque))
     }
 
-    /// The samples that follow do not continue those before: windows start anew, rows already taken stay. Returns how
-    /// many rows the cut windows at the end gave.
+    /// Ends a continuous stretch of samples: windows restart, rows already taken stay. Returns the number
+    /// of rows that the cut windows at the end gave.
     pub fn break_off(&mut self) -> u32 {
         self.smoother.clear();
         self.noise.iter_mut().for_each(NoiseLevel::break_off);
@@ -232,7 +236,7 @@ where
         }
     }
 
-    /// The sample of a few samples ago, wild values replaced.
+    /// Sample of a few samples ago, outliers replaced.
     fn clean(&mut self, position: &[T; N], torque: &[T; N]) -> Option<([T; N], [T; N])> {
         if self.estimator == Estimator::Plain {
             return Some((*position, *torque));
@@ -276,7 +280,7 @@ where
         self.advance(model, &position, &torque)
     }
 
-    /// The filter chain behind the first step.
+    /// Runs the filter chain behind the outlier filter.
     fn advance(
         &mut self,
         model: &RowModel<T, N, B>,
@@ -299,13 +303,13 @@ where
         Some(Progress { instant, rows })
     }
 
-    /// Rows taken of each joint so far.
+    /// Number of rows taken so far, per joint.
     #[must_use]
     pub fn rows(&self) -> [u32; N] {
         self.rows
     }
 
-    /// What was recorded since [`Self::clear`], the last samples included.
+    /// Record of everything since [`Self::clear`], including the last samples.
     pub fn finish(&mut self) -> Record<T, N, B> {
         self.break_off();
         self.record()

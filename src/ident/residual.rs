@@ -1,22 +1,22 @@
-//! What a known model leaves unexplained while a motion streams by: how large, how slow, for how long.
+//! Residual of a known model while a motion streams by: its size, its slow part, its duration.
 //!
-//! Why: a factor tells the size of the residual of any parameters, but not its order in time. Noise has none; a wrong
-//! model, a foot on the floor and a changed load do. On motions that are predicted the parameters are known, so the
-//! residual can be looked at row by row in constant memory.
+//! Why: a factor gives the size of the residual of any parameters, but not its order in time. Noise has no
+//! order; a wrong model, a foot on the floor and a changed load do. In predicted motions the parameters are
+//! known, so the residual can be examined row by row in constant memory.
 //!
 //! ```text
-//! r_k    = tau_k - y_k p                            filtered rows at 50 Hz, those of a joint at rest left out
-//! b_j    = mean of r over half a second             one block of 25 rows, at least 12 of them used
-//! slow^2 = sum b_j b_(j+1) / pairs                  power of what lasts longer than a block; where disturbances are
-//!                                                   forgiven, of pairs without a row that misses wildly
-//! chance = q var b / sqrt(pairs)                    what slow^2 does not exceed for noise, q standard normal
+//! r_k    = tau_k - y_k p                          filtered rows at 50 Hz, without those of a joint at rest
+//! b_j    = mean of r over half a second           one block of 25 rows, at least 12 of them used
+//! slow^2 = sum b_j b_(j+1) / pairs                power of what lasts longer than a block; with disturbances
+//!                                                 forgiven, of pairs without an outlier row
+//! chance = q var b / sqrt(pairs)                  limit of slow^2 for noise alone, q standard normal
 //! ```
 //!
-//! Neighbouring blocks share no noise but what the filter's reach carries across (0.12 s at 16 Hz), so the mean product
-//! of neighbours is free of noise: it needs no noise level. Source: lag-one autocovariance of block means; its
-//! spread after Bartlett (1946).
+//! Neighbouring blocks share only the noise that the filter's reach carries across (0.12 s at 16 Hz). The
+//! mean product of neighbours is therefore free of noise and needs no noise level. Source: lag-one
+//! autocovariance of block means; its spread after Bartlett (1946).
 //! Cost: B multiplications for each joint and row. Memory: 13 numbers for each joint. Known limits: a
-//! rest that changes its sign within half a second, as friction's does at fast reversals, does not show.
+//! residual that changes sign within half a second, as friction's does at fast reversals, does not show.
 
 use super::record::LARGEST_STILL_SHARE;
 use super::rows::{DECIMATION, FilteredRows};
@@ -24,9 +24,9 @@ use crate::real::{self, Real};
 
 /// Rows of a block: half a second.
 pub const BLOCK_ROWS: u32 = 25;
-/// A block of which fewer rows were used says nothing.
+/// Fewest used rows of a valid block.
 const LEAST_FILLED: u32 = 12;
-/// Wild rows are a minority up to one in so many.
+/// Outlier rows are a minority up to one in this many.
 const LARGEST_WILD_PART: u64 = 3;
 
 /// Products of neighbouring blocks.
@@ -56,12 +56,12 @@ impl<T: Real> Neighbours<T> {
 /// One joint's residual on one motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointResidual<T> {
-    /// Rows looked at.
+    /// Rows used.
     pub rows: u32,
-    /// Rows that missed by more than the limit.
+    /// Rows with an error above the limit.
     pub wild: u32,
     all: Neighbours<T>,
-    /// Of blocks without a row that missed by more than the limit.
+    /// Statistics over blocks without an error above the limit.
     undisturbed: Neighbours<T>,
     block: T,
     age: u32,
@@ -83,8 +83,8 @@ impl<T: Real> JointResidual<T> {
         }
     }
 
-    /// What is judged: disturbed blocks are left out where they are `forgiven` and wild rows are a minority. An error that
-    /// is everywhere is no disturbance.
+    /// Statistics to judge by. Disturbed blocks are excluded where they are `forgiven` and outlier rows are a
+    /// minority. An error that is everywhere is not a disturbance.
     fn judged(&self, forgiven: bool) -> &Neighbours<T> {
         let minority = u64::from(self.wild) * LARGEST_WILD_PART <= u64::from(self.rows);
         if forgiven && minority { &self.undisturbed } else { &self.all }
@@ -96,7 +96,8 @@ impl<T: Real> JointResidual<T> {
         self.judged(forgiven).pairs
     }
 
-    /// Root mean square of what lasts longer than half a second, N m; zero where neighbours do not agree.
+    /// Root mean square of the residual slower than half a second, N m; zero
+    /// without correlation of neighbours.
     #[must_use]
     pub fn slow(&self, forgiven: bool) -> T {
         let judged = self.judged(forgiven);
@@ -104,9 +105,9 @@ impl<T: Real> JointResidual<T> {
         real::sqrt(real::max(mean, T::zero()))
     }
 
-    /// What [`Self::slow`] does not exceed for noise alone, at a quantile of the standard normal distribution. `noise` is
-    /// the standard deviation of a 500 Hz sample; where it is not known nothing is forgiven, the blocks' own scatter takes
-    /// its place, and with fewer than `quantile^2` pairs nothing can be said.
+    /// Limit of [`Self::slow`] for noise alone, at a quantile of the standard normal distribution. `noise` is
+    /// the standard deviation of a 500 Hz sample. Without it nothing is forgiven and the blocks' own scatter
+    /// takes its place; with fewer than `quantile^2` pairs the result is then meaningless.
     #[must_use]
     pub fn slow_by_chance(&self, quantile: T, noise: Option<T>) -> T {
         let judged = self.judged(noise.is_some());
@@ -118,13 +119,13 @@ impl<T: Real> JointResidual<T> {
         real::sqrt(quantile * variance / real::sqrt(pairs))
     }
 
-    /// Neighbours end here.
+    /// Ends the stretch: the next block has no neighbour before it.
     fn break_off(&mut self) {
         (self.block, self.age, self.filled, self.is_disturbed) = (T::zero(), 0, 0, false);
         (self.all.before, self.undisturbed.before) = (None, None);
     }
 
-    /// A row that is left out: the block goes on without it.
+    /// Skips an excluded row: the block continues without it.
     fn skip(&mut self) {
         self.age += 1;
         self.close();
@@ -152,33 +153,32 @@ impl<T: Real> JointResidual<T> {
     }
 }
 
-/// Duration of a row, s.
 const ROW_S: f64 = 0.02;
 
 /// All joints' residuals on one motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residual<T, const N: usize> {
-    /// Each joint's.
+    /// Residual of each joint.
     pub joints: [JointResidual<T>; N],
-    /// Longest stretch in which some joint missed by more than its limit and none was as expected, s.
+    /// Longest stretch in which some joint exceeded its limit and no moving joint was within it, s.
     pub longest_common_s: T,
     common: u32,
 }
 
 impl<T: Real, const N: usize> Residual<T, N> {
-    /// Nothing seen.
+    /// Starts without data.
     #[must_use]
     pub fn new() -> Self {
         Self { joints: [JointResidual::new(); N], longest_common_s: T::zero(), common: 0 }
     }
 
-    /// The rows that follow do not continue those before.
+    /// Ends a continuous stretch of rows.
     pub fn break_off(&mut self) {
         self.joints.iter_mut().for_each(JointResidual::break_off);
         self.common = 0;
     }
 
-    /// Takes one row of each joint; one that misses by more than `wild` N m is part of a stretch.
+    /// Takes one row of each joint; an error above `wild` (N m) is part of a stretch.
     pub fn take<const B: usize>(&mut self, rows: &FilteredRows<T, N, B>, values: &[T; B], wild: &[T; N]) {
         if !rows.is_finite() {
             self.break_off();

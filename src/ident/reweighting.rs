@@ -1,52 +1,55 @@
-//! Disturbed stretches of a motion count for less: least squares reweighted block by block.
+//! Robust weights: least squares reweighted block by block, so that disturbed stretches count less.
 //!
-//! A push lasts some tenths of a second; it cannot be told from noise sample by sample, and after the filter it is
-//! smooth. But the mean square residual of its blocks is many times that of the others. Each joint is judged by its own
-//! rows and columns alone: residuals need a prediction, not parameters, and a disturbed knee says nothing of the hip.
+//! A push lasts some tenths of a second. Sample by sample it looks like noise, and after the filter it is
+//! smooth. But the mean square residual of its blocks is many times that of the others. Each joint is judged
+//! by its own rows and columns alone: residuals need a prediction, not parameters, and a disturbed knee
+//! implies nothing for the hip.
 //!
 //! ```text
 //! r_b^2 = sum of squared residuals of block b, n_b rows, nu_b = n_b m sum h^2 degrees of freedom
 //! rounds 1..6     w_b = 1 / max(sqrt(r_b^2 / n_b), s)               sum of block norms, from any start
-//! rounds 7..12    u_b = ((r_b^2 / n_b s^2)^(1/3) - (1 - 2 / 9 nu_b)) / sqrt(2 / 9 nu_b)       normal if chi-square
-//!                 t_b = (u_b - median u) / max(1, spread of u),     w_b = 1 to t = 2.5, falling to 0 at t = 4
+//! rounds 7..12    u_b = ((r_b^2 / n_b s^2)^(1/3) - (1 - 2 / 9 nu_b)) / sqrt(2 / 9 nu_b)   normal if chi^2
+//!                 t_b = (u_b - median u) / max(1, spread of u),   w_b = 1 to t = 2.5, falling to 0 at t = 4
 //! ```
 //!
-//! s^2 is the median of `r_b^2 / n_b`, so up to half of the blocks may be disturbed. The spread of u is its median
-//! absolute deviation over 0.6745: where a model misses everywhere a little (a real machine), blocks differ by more than
-//! chance, and only what stands out from *that* is a disturbance. Only too large residuals are punished. Of clean blocks
-//! 0.6 % lie beyond 2.5, so the efficiency lost on clean data is below one per cent. Beside a block of which nothing is
-//! left the limits are 0.5 and 2: the tail of a push lies there.
+//! s^2 is the median of `r_b^2 / n_b`, so up to half of the blocks may be disturbed. The spread of u is its
+//! median absolute deviation over 0.6745. A model of a real machine has a small error everywhere, so blocks
+//! differ by more than chance. Only an excess over *that* is a disturbance. Only too large residuals lose
+//! weight. In clean data 0.6 % of the blocks lie beyond 2.5, so the efficiency lost is below one per cent.
+//! Beside a block with zero weight the limits are 0.5 and 2: the tail of a push lies there.
 //!
-//! Sources: iteratively reweighted least squares, redescending weights: Huber and Ronchetti, Robust Statistics, 2009;
-//! the cube root: Wilson and Hilferty (1931).
-//! Cost: at most twelve times blocks times columns row rotations and solutions of each joint, once per motion.
-//! Limits: a disturbance below the noise of a block stays; one that lasts for more than half of the motion is taken for
-//! the rule (the verdict sees the residual); a block is thrown away whole.
+//! Sources: iteratively reweighted least squares, redescending weights: Huber and Ronchetti, Robust
+//! Statistics, 2009; the cube root: Wilson and Hilferty (1931).
+//! Cost: at most twelve times blocks times columns row rotations and solutions of
+//! each joint, once per motion.
+//! Limits: a disturbance below the noise of a block stays. One that lasts for more than half of the motion
+//! counts as normal (the verdict sees the residual). A block is excluded as a whole.
 
 use super::packed::{self, LARGEST_SIZE};
 use super::window::{LARGEST_BLOCKS, Window};
 use crate::real::{self, Real};
 
-/// With fewer blocks there is no majority to trust.
+/// Fewest blocks for a credible majority.
 const FEWEST_BLOCKS: usize = 8;
-/// Nor with fewer independent rows for each column: a block that a badly known parameter explains is then easily taken for
-/// a disturbance (the simple pendulum's 3 s, 22 independent rows for 6 columns, were predicted 1.5 times worse).
+/// Fewest independent rows for each column. With fewer a block that a poorly known parameter explains
+/// easily looks like a disturbance. The simple pendulum's 3 s, 22 independent rows for 6 columns,
+/// were predicted 1.5 times worse.
 const INDEPENDENT_ROWS_PER_COLUMN: f64 = 10.0;
 const NORM_ROUNDS: usize = 6;
 const ROUNDS: usize = 12;
-/// Where a block's weight begins to fall, and where nothing is left, in standard deviations.
+/// Scores at which a block's weight begins to fall and reaches zero, in standard deviations.
 const LIMITS: (f64, f64) = (2.5, 4.0);
-/// The same beside a block of which nothing is left: a disturbance does not end where a block ends.
+/// Limits for a neighbour of a block with zero weight: a disturbance does not end at a block's edge.
 const LIMITS_BESIDE: (f64, f64) = (0.5, 2.0);
-/// Residuals below this share of the torque's root mean square are never a disturbance.
+/// Largest harmless residual, as a share of the torque's root mean square: never a disturbance.
 const HARMLESS_SHARE: f64 = 2e-3;
-/// A column of which less is independent of the others does not help to predict.
+/// A column with a smaller independent share does not help to predict.
 const INDEPENDENT_SHARE: f64 = 1e-4;
 
 /// Weight of each block's squares, 0..1.
 pub type Weights<T> = [T; LARGEST_BLOCKS];
 
-/// All rows of one joint, each block's squares times its weight.
+/// Factor of all rows of one joint, each block's squares times its weight.
 pub fn weighted<T: Real, const N: usize, const B: usize, const ROOM: usize>(
     window: &Window<T, N, B, ROOM>,
     joint: usize,
@@ -149,7 +152,7 @@ impl<T: Real> Residuals<T> {
     }
 }
 
-/// Some numbers, at most one for each block.
+/// List of at most one number per block.
 struct List<T> {
     values: [T; LARGEST_BLOCKS],
     count: usize,
@@ -168,7 +171,7 @@ impl<T: Real> List<T> {
     }
 }
 
-/// Middle of the sorted values, the upper one of two.
+/// Median of the values, the upper one of two.
 fn median<T: Real>(list: &mut List<T>) -> T {
     let Some(values) = list.values.get_mut(..list.count) else { return T::zero() };
     for end in 1..values.len() {
@@ -181,7 +184,7 @@ fn median<T: Real>(list: &mut List<T>) -> T {
     values.get(values.len() / 2).copied().unwrap_or(T::zero())
 }
 
-/// Standard normal if the block's residuals are noise of variance `scale`.
+/// Score of a block: standard normal if its residuals are noise of variance `scale`.
 fn normal_score<T: Real>(block: &Block<T>, scale: T, information: T) -> T {
     let freedom = real::max(block.rows * information, T::one());
     let spread = T::of(2.0 / 9.0) / freedom;

@@ -1,4 +1,4 @@
-//! What turns a motion into regressor rows: geometry, gravity, which columns are estimated, and known friction curves.
+//! Model that turns a motion into regressor rows: geometry, gravity, columns, friction curves.
 
 use nalgebra::Vector3;
 
@@ -10,31 +10,31 @@ use super::stribeck::{BANK, bank_columns};
 use crate::model::{BaseParameters, Chain, JointState, Parameter, friction::Stribeck, regressor};
 use crate::real::{self, Real};
 
-/// What turns a motion into regressor rows.
+/// Geometry, columns and friction curves that turn a motion into regressor rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowModel<T: Real, const N: usize, const B: usize> {
     /// Geometry of the leg.
     pub chain: Chain<T, N>,
     /// Acceleration of gravity in the base frame, m/s^2.
     pub gravity: Vector3<T>,
-    /// The columns that torque can tell apart.
+    /// Base parameters: the columns that torque can separate.
     pub base: BaseParameters<T, N, B>,
-    /// Whether Stribeck friction of each joint is looked for.
+    /// Whether to search for Stribeck friction, per joint.
     pub stribeck_choice: [Choice; N],
-    /// What of each joint's drive the base parameters hold, and what of it may be dropped.
+    /// Drive parameters in the base set, and which of them may be dropped, per joint.
     pub drive_choice: [DriveChoice; N],
-    /// Stribeck friction found before: a factor on the Coulomb column. Without excess until something is found.
+    /// Known Stribeck friction: a factor on the Coulomb column. Zero excess until one is found.
     pub stribeck: [Stribeck<T>; N],
 }
 
-/// No Stribeck friction.
+/// Zero Stribeck friction for all joints.
 #[must_use]
 pub fn no_stribeck<T: Real, const N: usize>() -> [Stribeck<T>; N] {
     [Stribeck { excess: T::zero(), velocity: T::one() }; N]
 }
 
 impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
-    /// Without Stribeck friction.
+    /// Builds a model without Stribeck friction.
     #[must_use]
     pub fn new(chain: Chain<T, N>, gravity: Vector3<T>, base: BaseParameters<T, N, B>) -> Self {
         Self {
@@ -47,7 +47,7 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
         }
     }
 
-    /// Base columns of every joint for one instant, and its torque.
+    /// Base columns of every joint and its torque at one instant.
     #[must_use]
     pub fn rows(&self, instant: &Smoothed<T, N>) -> FilteredRows<T, N, B> {
         let state = JointState { q: instant.position, qd: instant.velocity, qdd: instant.acceleration };
@@ -76,7 +76,7 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
         rows
     }
 
-    /// The base parameter that is carried by this parameter of a joint.
+    /// Index of the base parameter that stands for this parameter of a joint.
     #[must_use]
     pub fn drive(&self, joint: usize, parameter: Parameter) -> Option<usize> {
         (0..self.base.rank()).find(|&base| self.base.independent(base) == Some((joint, parameter)))

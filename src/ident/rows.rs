@@ -4,14 +4,14 @@
 //! y_f(t) = sum_k h_k y(t - k T),     tau_f(t) = sum_k h_k tau(t - k T)
 //! ```
 //!
-//! The whole row goes through the filter, the sharp `sign(qd)` of Coulomb friction included: a sharp column
-//! against a smoothed torque biases friction by three standard deviations, both through the same filter by less
-//! than 0.2. Instead of storing `TAPS` rows, each open output is a running sum: a new sample is added to the
-//! `taps / decimation` outputs whose windows contain it.
+//! The whole row goes through the filter, including the sharp `sign(qd)` of Coulomb friction. A sharp column
+//! against a smoothed torque biases friction by three standard deviations; with the same filter for both the
+//! bias is below 0.2. Instead of storing `TAPS` rows, each open output is a running sum: a new sample is
+//! added to the `taps / decimation` outputs whose windows contain it.
 //!
-//! At the ends of a motion windows may be cut short ([`Ends::Cut`]): whatever weights are used, used on both sides they
-//! leave the equation true, and no information is lost. Only the half without the centre may be missing. A cut window
-//! has a sharp edge and lets through what the low-pass keeps out, so errors are measured on whole windows
+//! At the ends of a motion windows may be cut short ([`Ends::Cut`]). Any weights used on both sides leave the
+//! equation true, so no information is lost. Only the half without the centre may be missing. A cut window
+//! has a sharp edge and passes frequencies above the low-pass, so errors are measured on whole windows
 //! ([`Ends::Whole`]).
 //!
 //! Cost of one sample: `PENDING (N (B + 5) + 1)` multiplications. Memory: as many numbers.
@@ -28,11 +28,11 @@ pub const DECIMATION: usize = 10;
 pub struct FilteredRows<T, const N: usize, const B: usize> {
     /// `regressor[joint]` times base parameters is the torque.
     pub regressor: [[T; B]; N],
-    /// Stribeck columns of each joint's own torque; zero where none is looked for.
+    /// Stribeck columns of each joint's own torque; zero where no curve is searched.
     pub stribeck: [[T; BANK]; N],
-    /// N m, D-H sign.
+    /// Filtered torque, N m, D-H sign.
     pub torque: [T; N],
-    /// Share of the window, weighted by the filter's magnitude, in which the joint stood still: 0..1.
+    /// Share of the window, weighted by the filter's magnitude, with the joint at rest: 0..1.
     pub still: [T; N],
 }
 
@@ -46,7 +46,7 @@ impl<T: Real, const N: usize, const B: usize> FilteredRows<T, N, B> {
         }
     }
 
-    /// No NaN, no infinity.
+    /// True if all entries are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.torque
@@ -57,16 +57,16 @@ impl<T: Real, const N: usize, const B: usize> FilteredRows<T, N, B> {
     }
 }
 
-/// What happens where a motion begins and ends.
+/// Treatment of windows at both ends of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
-    /// Windows are cut short: nothing is lost.
+    /// Windows are cut short; no row is lost.
     Cut,
-    /// Only whole windows count.
+    /// Only whole windows give rows.
     Whole,
 }
 
-/// An output in the making.
+/// An unfinished output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Open<T, const N: usize, const B: usize> {
     rows: FilteredRows<T, N, B>,
@@ -84,7 +84,7 @@ impl<T: Real, const N: usize, const B: usize> Open<T, N, B> {
         self.weight += real::abs(weight);
     }
 
-    /// The rows, the shares of stillness related to the window that was there.
+    /// Finished rows; shares of standstill are relative to the weights used.
     fn close(&self) -> FilteredRows<T, N, B> {
         let mut rows = self.rows;
         for still in &mut rows.still {
@@ -98,15 +98,16 @@ impl<T: Real, const N: usize, const B: usize> Open<T, N, B> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowFilter<T, const N: usize, const B: usize, const PENDING: usize> {
     open: [Open<T, N, B>; PENDING],
-    /// Samples since the start of the window of the output that will be finished next; `None` before the first.
+    /// Samples since the start of the window of the output that will be finished
+    /// next; `None` before the first.
     age: Option<usize>,
-    /// Slot of that output.
+    /// Index of that output in `open`.
     oldest: usize,
     ends: Ends,
 }
 
 impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T, N, B, PENDING> {
-    /// No sample taken yet.
+    /// An empty filter.
     #[must_use]
     pub fn new(ends: Ends) -> Self {
         Self { open: [Open::empty(); PENDING], age: None, oldest: 0, ends }
@@ -118,12 +119,13 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
         taps.div_ceil(DECIMATION)
     }
 
-    /// Forgets all samples.
+    /// Discards all samples.
     pub fn clear(&mut self) {
         *self = Self::new(self.ends);
     }
 
-    /// Takes the rows of one 500 Hz sample; every tenth call returns a finished output once the window is full.
+    /// Takes the rows of one 500 Hz sample; every tenth call returns a finished
+    /// output once the window is full.
     ///
     /// An output needs `outputs_needed(low_pass.taps()) <= PENDING`; the recorder that owns both checks it.
     pub fn push<const TAPS: usize>(
@@ -139,7 +141,7 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
         });
         let mut slot = self.oldest;
         for behind in 0..PENDING {
-            // The output `behind` places younger began `behind * DECIMATION` samples later.
+            // The output `behind` positions younger began `behind * DECIMATION` samples later.
             let Some(tap) = age.checked_sub(behind * DECIMATION) else { break };
             if let (Some(output), Some(&weight)) = (self.open.get_mut(slot), weights.get(tap)) {
                 output.add(rows, weight);
@@ -150,7 +152,8 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T,
         if age + 1 < weights.len() { None } else { self.take_oldest() }
     }
 
-    /// After the last sample: the outputs whose centre was seen, one at a call; then `None`, and the filter is empty.
+    /// Returns the outputs whose centre was seen, one per call, after the last sample; then `None`, and the
+    /// filter is empty.
     pub fn finish<const TAPS: usize>(
         &mut self,
         low_pass: &LowPass<T, TAPS>,

@@ -1,8 +1,8 @@
-//! Torque constants from two runs of the same leg, without and with a known mass.
+//! Torque constants from two runs of one leg, without and with a known mass.
 //!
-//! Why: torque is current times a constant that is believed, not measured. A wrong constant scales every parameter and
-//! fits as well as the right one; only something whose torque is known beforehand tells. With k_b the constant that is
-//! used, k_t the true one and c = k_b / k_t, the logged torque of joint i is c_i times its real torque:
+//! Why: torque is current times a constant that is assumed, not measured. A wrong constant scales every
+//! parameter and fits as well as the right one. Only a known torque reveals it. With k_b the assumed
+//! constant, k_t the true one and c = k_b / k_t, the logged torque of joint i is c_i times its real torque:
 //!
 //! ```text
 //! run without: tau_i = Y_i b_i                      b_i = c_i beta
@@ -10,54 +10,55 @@
 //!
 //! from the two factors of joint i:   | R  0       | | b_i |   | z  |
 //!                                    | R' R'delta | | c_i | = | z' |
-//! w = (0, R'delta), v = (z, z'), both without what the columns (R; R') explain:
+//! w = (0, R'delta), v = (z, z'), both without the part that the columns (R; R') explain:
 //! c_i = w.v / w.w        sigma(c_i) = s_i / |w|        k_t = k_b / c_i
 //! J_i(both) - J_i(without) - J_i(with)                 chi-square, one degree of freedom less than columns
 //! ```
 //!
-//! Linear, each joint by itself: no joint's answer rests on another's constant or on the geometry between them. A mass
-//! on the knee's link loads both joints; on the hip's link it loads the hip alone, and the knee's constant stays unknown.
+//! The problem is linear, each joint by itself: no result depends on another joint's constant or on the
+//! geometry between them. A mass on the knee's link loads both joints. On the hip's link it loads the hip
+//! alone, and the knee's constant stays unknown.
 //!
-//! The last line tells whether the two runs differ by this mass at this place. A wrong *place* bends `delta` and shows;
-//! a wrong *mass* only scales it, so an error of 10 % in the stated mass is one of 10 % in c, and nothing notices.
+//! The last line tests whether the two runs differ by this mass at this position. A wrong
+//! *position* bends `delta` and shows. A wrong *mass* only scales it: an error of 10 % in the
+//! stated mass gives 10 % in c, undetected.
 //!
-//! With the constants known, [`Record::corrected`] turns a record into the one that right constants (and no known load)
-//! would have given; solving it again gives absolute parameters, and [`widen`] adds what the constants' own errors do.
+//! With the constants known, [`Record::corrected`] converts a record to right constants without the load.
+//! Solving it again gives absolute parameters, and [`widen`] adds the effect of the constants' own errors.
 //!
-//! Source: M. Gautier and S. Briot, Global identification of joint drive gains and dynamic parameters of robots, 2014:
-//! there with total least squares over all joints at once.
+//! Source: M. Gautier and S. Briot, Global identification of joint drive gains and dynamic parameters of
+//! robots, 2014; there with total least squares over all joints at once.
 //! Cost: one factor of B columns on the stack, 4 B^3 multiplications a joint.
-//! Limits: friction must not depend on the load; the constant must not change between the runs (a motor 50 K warmer has
-//! 5 % less, with ferrite magnets 10 %).
+//! Limits: friction must not depend on the load; the constant must not change between the runs. A motor 50 K
+//! warmer has 5 % less, with ferrite magnets 10 %.
 
 use super::estimate::Estimate;
 use super::factor::Factor;
 use super::record::Record;
 use crate::real::{self, Real};
 
-/// What two runs tell about the torque constant of one joint.
+/// Estimate of one joint's torque constant from two runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantRatio<T> {
-    /// Believed over true constant.
+    /// Assumed over true constant.
     pub ratio: T,
-    /// Its standard deviation.
+    /// Standard deviation of the ratio.
     pub sigma: T,
-    /// Chi-square by which the two runs do not differ by the stated mass alone.
+    /// Chi-square of the difference between the two runs that the stated mass does not explain.
     pub mismatch: T,
-    /// Degrees of freedom of that.
+    /// Degrees of freedom of `mismatch`.
     pub freedom: u32,
 }
 
-/// Spreads of chi-square by which the two runs may differ otherwise than by the mass: as for the prior's box, five are
-/// not noise.
+/// Largest credible mismatch in spreads of chi-square: as for the prior's box, five are not noise.
 const LARGEST_MISMATCH_SPREADS: f64 = 5.0;
-/// Largest sigma, as a share of the ratio, at which torques are put right: above it a mass is too light to tell.
+/// Largest sigma for a correction of torques, as a share of the ratio. Above it the mass is too light.
 const LARGEST_SIGMA_SHARE: f64 = 0.05;
 
 impl<T: Real> ConstantRatio<T> {
-    /// Whether the two runs differ by the stated mass at the stated place, as far as they can tell. Nothing but noise is
-    /// excused: a link believed 5 % too long makes a constant 4.5 % wrong and shows by no more than 90 units of
-    /// chi-square where honest runs have eight.
+    /// True if the two runs differ by the stated mass at the stated position, within noise. Nothing but noise
+    /// is excused. A link assumed 5 % too long makes a constant 4.5 % wrong and adds at most 90 units of
+    /// chi-square, where correct runs have eight.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
         let freedom = T::of(f64::from(self.freedom));
@@ -65,15 +66,15 @@ impl<T: Real> ConstantRatio<T> {
         self.mismatch <= freedom + T::of(LARGEST_MISMATCH_SPREADS) * spread
     }
 
-    /// Whether the mass is heavy enough for this joint to tell anything.
+    /// True if the mass is heavy enough to determine this joint's constant.
     #[must_use]
     pub fn is_told(&self) -> bool {
         self.ratio > T::zero() && self.sigma <= T::of(LARGEST_SIGMA_SHARE) * self.ratio
     }
 }
 
-/// Believed over true torque constant of one joint, from a record without and one with a load of base parameters `load`;
-/// `None` where the joint does not feel the load.
+/// Assumed over true torque constant of one joint, from a record without and one with a load of base
+/// parameters `load`; `None` where the load has no effect on the joint.
 #[must_use]
 #[inline(never)]
 pub fn torque_constant_ratio<T: Real, const N: usize, const B: usize>(
@@ -92,7 +93,7 @@ pub fn torque_constant_ratio<T: Real, const N: usize, const B: usize>(
     let ratio = both.product / both.load_squared;
     let scaled_load = load.map(|element| ratio * element);
 
-    // The same rows once more with the load's torque taken off: what is left is noise, and mismatch.
+    // Both runs again with the load's torque subtracted: noise and mismatch remain.
     let mut together = first.clone();
     together.merge(&second.with_right(T::one(), &scaled_load));
     let columns = (0..B).filter(|&column| together.triangle()[column][column] != T::zero()).count();
@@ -111,12 +112,12 @@ pub fn torque_constant_ratio<T: Real, const N: usize, const B: usize>(
     })
 }
 
-/// Two right-hand sides, torque and the load's torque, with what the columns explain rotated away.
+/// Torque and the load's torque as right-hand sides, with the part that the columns explain rotated away.
 struct Eliminated<T, const B: usize> {
     triangle: [[T; B]; B],
     torque: [T; B],
     load: [T; B],
-    /// Of what is left of both: w.w and w.v.
+    /// Sums w.w and w.v over the remaining parts.
     load_squared: T,
     product: T,
 }
@@ -162,9 +163,9 @@ impl<T: Real, const B: usize> Eliminated<T, B> {
 }
 
 impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
-    /// The record that true torque constants, and no load of base parameters `load`, would have given: torque over
-    /// `ratios` (believed over true constant of each joint), less the load's. The mean absolute torque, of which a record
-    /// keeps no more than the number, is taken to change as the root mean square does.
+    /// Converts the record to true torque constants without the load of base parameters `load`: torque over
+    /// `ratios` (assumed over true constant of each joint), less the load's. A record stores only the value
+    /// of the mean absolute torque; it is assumed to change in proportion to the root mean square.
     #[must_use]
     pub fn corrected(&self, ratios: &[T; N], load: &[T; B]) -> Self {
         let mut record = self.clone();
@@ -187,8 +188,8 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
     }
 }
 
-/// Adds to an estimate's covariance what one more uncertain number does to it: `moved` is the estimate that number gives
-/// when it is one standard deviation larger.
+/// Adds the effect of one more uncertain number to an estimate's covariance. `moved` is the estimate for that
+/// number one standard deviation larger.
 pub fn widen<T: Real, const B: usize>(estimate: &mut Estimate<T, B>, moved: &Estimate<T, B>) {
     let mut step = [T::zero(); B];
     for (base, element) in step.iter_mut().enumerate() {

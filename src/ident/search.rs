@@ -1,7 +1,8 @@
-//! The beetle swarm on the identification cost: a plan's stages searched one after the other, in slices.
+//! Beetle swarm on the identification cost: a plan's stages searched one after the other, in slices.
 //!
-//! On this quadratic cost least squares is exact and instant; the search is run on the same factor, in the box of
-//! the prior, from a cold start, and shown beside it. Cost of one evaluation: `B^2 / 2` multiplications.
+//! On this quadratic cost least squares is exact and instant. The search runs on the same factor, in the
+//! prior's box, from a cold start, and is reported beside it. Cost of one evaluation: `B^2 / 2`
+//! multiplications.
 
 use core::mem::MaybeUninit;
 
@@ -11,16 +12,16 @@ use crate::place::{Slot, empty_slot, fill};
 use crate::real::Real;
 use crate::swarm::{Bso, BsoSettings, Objective, Search, SwarmError};
 
-/// Beetles of the swarm (paper, 4.1).
+/// Beetles in the swarm (paper, 4.1).
 pub const BEETLES: usize = 20;
-/// A stage ends after this many iterations at the latest.
+/// Most iterations of a stage.
 pub const LARGEST_ITERATIONS: u32 = 300;
 /// A stage ends when the best cost fell by less than [`SMALLEST_GAIN`] in this many iterations.
 pub(super) const PATIENCE: u32 = 15;
-/// Chi-square units; a tenth of a standard deviation of one parameter is 0.01.
+/// Smallest progress in chi-square units; a tenth of a standard deviation of one parameter is 0.01.
 pub(super) const SMALLEST_GAIN: f64 = 1e-3;
 
-/// One stage's cost in its box.
+/// Cost of one stage in its box.
 struct StageCost<'a, T, const B: usize> {
     stage: &'a Stage<T, B>,
     bounds: &'a ParameterBox<T, B>,
@@ -39,18 +40,18 @@ impl<T: Real, const B: usize> Objective<T> for StageCost<'_, T, B> {
     }
 }
 
-/// Where a search stands.
+/// Progress of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchState {
-    /// More evaluations are wanted.
+    /// More evaluations are needed.
     Running,
-    /// All stages ended.
+    /// All stages have ended.
     Done,
-    /// The cost or its box cannot be searched.
+    /// The cost or its box is invalid for a search.
     Failed(SwarmError),
 }
 
-/// A search over all stages of a plan; plain data, cut into slices by the budget of [`Self::advance`].
+/// A search over all stages of a plan; plain data, divided into slices by the budget of [`Self::advance`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct SwarmSearch<T: Real, const B: usize> {
     plan: Plan,
@@ -70,8 +71,8 @@ pub struct SwarmSearch<T: Real, const B: usize> {
 }
 
 impl<T: Real, const B: usize> SwarmSearch<T, B> {
-    /// A cold start: beetles scattered uniformly over the box, with the first of [`Self::advance`].
-    /// Built in its place.
+    /// Builds a cold search in place. The first [`Self::advance`] scatters the
+    /// beetles uniformly over the box.
     pub fn place<'a, const N: usize>(
         slot: &'a mut MaybeUninit<Self>,
         problem: &Problem<'_, T, N, B>,
@@ -99,7 +100,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
         }, { swarm: empty_slot })
     }
 
-    /// Begins anew, cold, with the columns that are left.
+    /// Restarts cold, with the columns that remain.
     pub fn restart<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
         (self.values, self.determined) = ([T::zero(); B], [false; B]);
         self.stage = problem.stage(self.plan, 0, &self.values, &self.determined);
@@ -109,7 +110,8 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
         (self.watched_value, self.watched_iteration) = (T::LARGEST, 0);
     }
 
-    /// The first stage that has something to search; a large swarm, so it is made where it stays and not with `new`.
+    /// Starts the first stage with open columns. The swarm is large, so it is
+    /// built in its slot, not by `new`.
     #[inline(never)]
     fn start<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
         if self.stage.columns().is_empty() {
@@ -122,7 +124,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
     #[inline(never)]
     fn start_stage(&mut self) {
         let cost = StageCost { stage: &self.stage, bounds: &self.bounds };
-        // Each stage draws its own numbers.
+        // Each stage has its own random numbers.
         let seed = self.seed.wrapping_add(self.stage_index as u64);
         match Bso::new(&cost, self.settings, seed) {
             Ok(swarm) => self.swarm.fill(|slot| slot.write(swarm)),
@@ -140,7 +142,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
         if self.swarm.is_empty() && self.state == SearchState::Running && evaluations > 0 {
             self.start(problem);
         }
-        // One at a time: the rule that ends a stage looks at whole iterations, wherever a slice ends.
+        // One at a time: the rule that ends a stage needs whole iterations, wherever a slice ends.
         for _ in 0..evaluations {
             let (Some(swarm), SearchState::Running) = (self.swarm.as_mut(), self.state) else { break };
             let cost = StageCost { stage: &self.stage, bounds: &self.bounds };
@@ -179,10 +181,10 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
         self.next_stage(problem);
     }
 
-    /// Starts the next stage that has something to search, or ends.
+    /// Starts the next stage with open columns, or ends the search.
     fn next_stage<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
         self.swarm.clear();
-        // A stage that determines nothing has nothing to search.
+        // A stage without determined columns has nothing to search.
         while self.swarm.is_empty() && self.state == SearchState::Running {
             self.stage_index += 1;
             if self.stage_index >= Problem::<T, N, B>::stages(self.plan) {
@@ -196,7 +198,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
         }
     }
 
-    /// Where the search stands.
+    /// Current state of the search.
     #[must_use]
     pub fn state(&self) -> SearchState {
         self.state

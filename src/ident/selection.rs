@@ -1,31 +1,33 @@
-//! Which of the columns that may be dropped are: backward elimination by what each explains.
+//! Selection of columns to drop: backward elimination by the chi-square that each explains.
 //!
-//! A column that the data do not tell from zero makes every other parameter that resembles it uncertain, and says
-//! nothing itself. Where `auto` is asked for, the rotor's inertia and the constant torque of a joint are such columns.
+//! A column that the data cannot distinguish from zero carries no information, and makes every similar
+//! parameter uncertain. With the choice `auto` the rotor's inertia and the constant torque of a joint are
+//! such candidates.
 //!
 //! ```text
-//! gain_c = J without c - J = beta_c^2 / Cov_cc                    chi-square of one degree of freedom if beta_c = 0   (C1)
-//! until every candidate gains at least 9: the one that gains least is held at zero, the rest is solved again
+//! gain_c = J without c - J = beta_c^2 / Cov_cc       chi-square of one degree of freedom if beta_c = 0  (C1)
+//! repeat until every candidate gains at least 9: hold the one that gains least at zero, solve the rest again
 //! ```
 //!
-//! (C1) is exact, since the cost is quadratic; a column without information gains nothing. Holding a column at zero takes
-//! it out of the same factor: its entries are left out and the rows rotated to a triangle again
-//! ([`super::factor::Factor::restricted`]), so that no row is needed twice.
+//! (C1) is exact, since the cost is quadratic; a column without information gains nothing. A column at zero
+//! leaves the factor: its entries are removed and the rows rotated to a triangle again
+//! ([`super::factor::Factor::restricted`]), so no row is needed twice.
 //!
-//! **The limit** is three standard deviations. A column that is zero is kept in 0.27 % of all cases; one that is not is
-//! dropped in half of the cases where its value is three of its standard deviations, and hardly ever from six on. It is
-//! the limit at which the verdict calls a rotor inertia negative, so that one that is negative beyond noise is kept and
-//! refused, not dropped and forgotten.
+//! **The limit** is three standard deviations. A zero column is kept in 0.27 % of all cases. A nonzero one is
+//! dropped in half of the cases where its value is three of its standard deviations, and hardly ever from six
+//! on. The verdict uses the same limit for a negative rotor inertia: one that is negative beyond noise is
+//! kept and refused, not silently dropped.
 //!
 //! | symbol | meaning | unit |
 //! | --- | --- | --- |
-//! | J, beta, Cov | cost, least squares and its covariance over the columns still there | chi-square, SI |
+//! | J, beta, Cov | cost, least squares and its covariance over the remaining columns | chi-square, SI |
 //!
 //! Source: backward elimination, Draper and Smith, Applied Regression Analysis, ch. 15.
-//! Cost: one restricted factor and its inverse each step, about `2 B^3` multiplications; at most `2 N + 1` steps.
-//! Limits: what is dropped counts as exactly zero afterwards. Of the others' sigma the part that resembled it is gone,
-//! though up to three of its standard deviations may have been there: where the truth is neither zero nor clearly
-//! seen, they are biased by that part and their sigma does not say so.
+//! Cost: one restricted factor and its inverse each step, about `2 B^3`
+//! multiplications; at most `2 N + 1` steps.
+//! Limits: a dropped value counts as exactly zero afterwards. The other parameters' sigma lose the part that
+//! resembled it, although up to three of its standard deviations may be real. Where the truth is neither zero
+//! nor clearly visible, the others are biased by that part, and their sigma does not show it.
 
 use super::choice::Choice;
 use super::estimate::Problem;
@@ -33,42 +35,42 @@ use super::record::{Record, RowModel};
 use crate::model::{Parameter, Standing};
 use crate::real::Real;
 
-/// Chi-square that a column must explain to be kept: three standard deviations.
+/// Least chi-square that a kept column must explain: three standard deviations.
 pub const SMALLEST_GAIN: f64 = 9.0;
 
-/// What was decided about the columns of one record.
+/// Decisions about the columns of one record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection<T, const N: usize, const B: usize> {
-    /// Nothing more is to be decided.
+    /// True when the elimination has ended.
     pub is_made: bool,
     /// Base parameters that are held at zero.
     pub dropped: [bool; B],
-    /// (C1) of every candidate, of a dropped one when it was dropped; zero of what was no candidate.
+    /// (C1) of every candidate, at the time of dropping for a dropped one; zero for all others.
     pub gain: [T; B],
-    /// Gain and surplus (N m) of the best Stribeck curve of each joint that was looked for, taken or not.
+    /// Gain and surplus (N m) of the best Stribeck curve of each joint that was searched, accepted or not.
     pub stribeck: [Option<(T, T)>; N],
 }
 
 impl<T: Real, const N: usize, const B: usize> Selection<T, N, B> {
-    /// Every column is there; nothing was asked.
+    /// Selection of all columns, before any decision.
     #[must_use]
     pub fn all() -> Self {
         Self { is_made: false, dropped: [false; B], gain: [T::zero(); B], stribeck: [None; N] }
     }
 
-    /// How many base parameters are held at zero.
+    /// Number of base parameters held at zero.
     #[must_use]
     pub fn dropped_count(&self) -> usize {
         self.dropped.iter().filter(|dropped| **dropped).count()
     }
 
-    /// Whether this parameter is one of them.
+    /// True if this parameter is held at zero.
     #[must_use]
     pub fn drops(&self, model: &RowModel<T, N, B>, joint: usize, parameter: Parameter) -> bool {
         model.drive(joint, parameter).and_then(|base| self.dropped.get(base)).copied().unwrap_or(false)
     }
 
-    /// The same in another precision.
+    /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Selection<U, N, B> {
         let convert = |value: T| U::of(value.to_double());
@@ -83,8 +85,8 @@ impl<T: Real, const N: usize, const B: usize> Selection<T, N, B> {
     }
 }
 
-/// The base parameters that may be dropped: those of one parameter alone. What is measured in a sum only (the first
-/// joint's rotor, with its link's ZZ) has no column of its own, and its sum is needed all the same.
+/// Base parameters that may be dropped: those of one parameter alone. A parameter measured only in a sum has
+/// no column of its own, for example the first joint's rotor with its link's ZZ. The sum is needed anyway.
 pub fn candidates<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
 ) -> impl Iterator<Item = usize> + '_ {
@@ -99,7 +101,7 @@ pub fn candidates<T: Real, const N: usize, const B: usize>(
     })
 }
 
-/// One step of the elimination; true when there is nothing left to decide.
+/// Takes one step of the elimination; true when finished.
 #[inline(never)]
 pub fn step<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
@@ -130,7 +132,7 @@ pub fn step<T: Real, const N: usize, const B: usize>(
         }
     }
     match weakest {
-        // A gain that is not a number is for the verdict to see.
+        // A gain of NaN is left for the verdict.
         Some((base, gain)) if gain < T::of(SMALLEST_GAIN) => record.selection.dropped[base] = true,
         _ => record.selection.is_made = true,
     }

@@ -1,7 +1,7 @@
-//! First stage of the filter chain: angle, speed and acceleration of one past instant, and the torque then.
+//! First filter step: angle, speed and acceleration of one past instant, and the torque at that instant.
 //!
-//! A window of the last `2 reach + 1` angles goes through the three weights of one [`Kernel`]; the torque is only
-//! delayed to the same instant, because the second stage filters it together with the whole regressor.
+//! A window of the last `2 reach + 1` angles goes through the three weights of one [`Kernel`]. The torque is
+//! only delayed to the same instant, because the second step filters it together with the whole regressor.
 //!
 //! Cost: 3 `taps` multiplications for each joint and sample. Memory: 2 `TAPS` numbers for each joint.
 
@@ -11,17 +11,17 @@ use crate::real::Real;
 /// Motion and torque of one instant, D-H angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothed<T, const N: usize> {
-    /// rad.
+    /// Angle, rad.
     pub position: [T; N],
-    /// rad/s.
+    /// Speed, rad/s.
     pub velocity: [T; N],
-    /// rad/s^2.
+    /// Acceleration, rad/s^2.
     pub acceleration: [T; N],
-    /// As measured, N m.
+    /// Measured torque, N m.
     pub torque: [T; N],
 }
 
-/// The window of samples behind [`Smoothed`].
+/// Window of samples that gives a [`Smoothed`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Smoother<T, const N: usize, const TAPS: usize> {
     positions: [[T; TAPS]; N],
@@ -37,7 +37,7 @@ impl<T: Real, const N: usize, const TAPS: usize> Smoother<T, N, TAPS> {
         Self { positions: [[T::zero(); TAPS]; N], torques: [[T::zero(); TAPS]; N], next: 0, filled: 0 }
     }
 
-    /// Forgets all samples.
+    /// Discards all samples.
     pub fn clear(&mut self) {
         self.next = 0;
         self.filled = 0;
@@ -60,7 +60,7 @@ impl<T: Real, const N: usize, const TAPS: usize> Smoother<T, N, TAPS> {
         if self.filled < taps {
             return None;
         }
-        // The ring holds exactly the window: its oldest sample stands where the next one will go.
+        // The ring holds exactly the window: its oldest sample is where the next one will go.
         let centre = if self.next + kernel.reach() >= taps {
             self.next + kernel.reach() - taps
         } else {
@@ -105,7 +105,8 @@ mod tests {
             let sample = [0.7 + 0.4 * real::sin_cos(omega * time).0];
             let Some(smoothed) = smoother.push(&kernel, &sample, &[index as f32]) else { continue };
             let (sine, cosine) = real::sin_cos(omega * (index - kernel.reach()) as f32 / 500.0);
-            // The passband is flat to 1.6e-4; single precision adds 1e-7 of 1 rad through a curvature gain of 1e4.
+            // The passband is flat to 1.6e-4; single precision adds 1e-7 of 1 rad
+            // through a curvature gain of 1e4.
             assert!((smoothed.position[0] - 0.7 - 0.4 * sine).abs() < 1.6e-4 * 0.4 + 1e-6);
             assert!((smoothed.velocity[0] - 0.4 * omega * cosine).abs() < 1.6e-4 * 0.4 * omega + 1e-5);
             assert!(

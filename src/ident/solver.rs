@@ -1,9 +1,9 @@
 //! One identification from a training record to a verdict: closed form, swarm, judgement.
 //!
-//! The leg advances it in slices at the lowest priority; the host's replay of recordings runs the same value to
-//! its end. The swarm searches the base values in the box the prior allows; they are then completed to a leg that can
-//! exist ([`super::consistent`]), whose base values are the result. The covariance is that of the least-squares problem,
-//! whose optimum the swarm is measured against.
+//! The leg advances it in slices at the lowest priority; the host's replay of recordings runs the same value
+//! to its end. The swarm searches the base values in the box that the prior allows. The completion turns them
+//! into a physically consistent leg ([`super::consistent`]), whose base values are the result. The covariance
+//! is that of the least-squares problem, whose optimum is the swarm's reference.
 
 use core::mem::MaybeUninit;
 
@@ -24,17 +24,17 @@ use crate::place::{fill, made};
 use crate::real::{self, Real};
 use crate::swarm::BsoSettings;
 
-/// Evaluations of the search that take about as long as one step of the completion.
+/// Evaluations of the search that take as long as one step of the completion.
 const EVALUATIONS_PER_STEP: u32 = 32;
-/// Evaluations that take about as long as one step of the selection.
+/// Evaluations that take as long as one step of the selection.
 const EVALUATIONS_PER_CHOICE: u32 = 12;
 
-/// How much worse than least squares a leg that can exist explains the data.
+/// Loss of fit of the physically consistent leg against least squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Consistency<T> {
-    /// Cost of the data alone above least squares, chi-square units; the prior's pull is not in it.
+    /// Cost of the data alone above least squares, chi-square units, without the prior's pull.
     pub excess: T,
-    /// Base parameters: the most that chi-square can have, as if every one of them were held by a constraint.
+    /// Number of base parameters: the upper limit for chi-square, as if a constraint held every one of them.
     pub degrees_of_freedom: usize,
 }
 
@@ -48,15 +48,15 @@ pub struct Solver<T: Real, const N: usize, const B: usize> {
     search: SwarmSearch<T, B>,
     bounds: ParameterBox<T, B>,
     completion: Completion<T, N>,
-    /// Base values of the completed leg and what they cost, once it is there.
+    /// Base values and cost of the completed leg, once available.
     completed: Option<([T; B], Consistency<T>)>,
-    /// Values to be judged instead of those found.
+    /// Values to judge instead of the result.
     given: Option<[T; B]>,
 }
 
 impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
-    /// Solves in closed form and puts the swarm at its start. Where columns may be dropped that is done again once
-    /// [`Self::advance`] has decided which.
+    /// Solves in closed form and prepares the swarm. Where columns may be dropped, [`Self::advance`] solves
+    /// again after the selection.
     #[must_use]
     pub fn new(
         model: &RowModel<T, N, B>,
@@ -68,7 +68,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         made(|slot| Self::place(slot, model, record, plan, prior, swarm_seed))
     }
 
-    /// As [`Self::new`], built in its place: it takes a third of the device's stack.
+    /// Builds a solver in place, see [`Self::new`]: by value it would take a third of the device's stack.
     pub fn place<'a>(
         slot: &'a mut MaybeUninit<Self>,
         model: &RowModel<T, N, B>,
@@ -100,7 +100,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         })
     }
 
-    /// Whether it is decided which columns are there; always where none may be dropped.
+    /// True when the selection of columns has ended, or no column may be dropped.
     #[must_use]
     pub fn is_selected(&self) -> bool {
         self.record.selection.is_made
@@ -116,8 +116,8 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         self.search.restart(&problem);
     }
 
-    /// Spends up to `evaluations` of the cost on the choice of columns, then on the search, then steps of the completion for as many; any slicing
-    /// gives the same result.
+    /// Spends up to `evaluations` of the cost: first on the selection of columns, then on the search, then on
+    /// completion steps of equal cost. Any slicing gives the same result.
     pub fn advance(&mut self, model: &RowModel<T, N, B>, evaluations: u32) -> SearchState {
         let mut evaluations = evaluations;
         while !self.record.selection.is_made {
@@ -150,8 +150,8 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         state
     }
 
-    /// Base values from which the cost of giving way is counted: the swarm's, unless its box held them. The box is wider
-    /// than what is allowed, so its edges say nothing; then least squares itself.
+    /// Base values from which the cost of constraints is counted: the swarm's, unless its box limits them.
+    /// The box is wider than the allowed set, so its edges mean nothing; least squares itself then serves.
     fn centre(&self) -> [T; B] {
         let (low, high) = (&self.bounds.low, &self.bounds.high);
         let mut free =
@@ -184,37 +184,37 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         self.completed = Some((values, Consistency { excess, degrees_of_freedom: whole.columns().len() }));
     }
 
-    /// The motion identified from.
+    /// Record of the motion identified from.
     #[must_use]
     pub fn record(&self) -> &Record<T, N, B> {
         &self.record
     }
 
-    /// One-time or sequential.
+    /// Plan: one-time or sequential.
     #[must_use]
     pub fn plan(&self) -> Plan {
         self.plan
     }
 
-    /// The closed form.
+    /// Closed-form estimate.
     #[must_use]
     pub fn least_squares(&self) -> &Estimate<T, B> {
         &self.least_squares
     }
 
-    /// Adds to the covariance what one more uncertain number does to the result: `moved` is the closed form with that number
-    /// one standard deviation larger.
+    /// Adds the effect of one more uncertain number to the covariance. `moved` is the closed form for that
+    /// number one standard deviation larger.
     pub fn widen(&mut self, moved: &Estimate<T, B>) {
         widen(&mut self.least_squares, moved);
     }
 
-    /// The swarm.
+    /// Swarm search.
     #[must_use]
     pub fn search(&self) -> &SwarmSearch<T, B> {
         &self.search
     }
 
-    /// Where the swarm searches.
+    /// Search box of the swarm.
     #[must_use]
     pub fn bounds(&self) -> &ParameterBox<T, B> {
         &self.bounds
@@ -226,38 +226,38 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         self.condition
     }
 
-    /// Puts these base values, those of a stored model say, in the place of those found: unused motions are then held
-    /// against them.
+    /// Judges these base values, for instance those of a stored model, in place of the result. Held-out
+    /// motions are then tested against them.
     pub fn examine(&mut self, values: &[T; B]) {
         self.given = Some(*values);
     }
 
-    /// Base values of the leg that was found; until it is there, of the swarm.
+    /// Base values of the consistent leg; until it is complete, those of the swarm.
     #[must_use]
     pub fn found(&self) -> [T; B] {
         self.completed.as_ref().map_or_else(|| self.search.values(), |(values, _)| *values)
     }
 
-    /// The base values that are judged: those found unless others were given.
+    /// Base values to judge: the result, or those of [`Self::examine`].
     #[must_use]
     pub fn values(&self) -> [T; B] {
         self.given.unwrap_or_else(|| self.found())
     }
 
-    /// The base parameters that are judged, those found unless others were given, with the covariance of the problem.
+    /// Estimate to judge: [`Self::values`] with the covariance of the problem.
     #[must_use]
     pub fn estimate(&self) -> Estimate<T, B> {
         Estimate { values: self.values(), ..self.least_squares.clone() }
     }
 
-    /// Stribeck friction of each joint that goes with the base values that are judged, as a factor on its Coulomb friction.
+    /// Stribeck friction of each joint for the judged base values, as a factor on its Coulomb friction.
     #[must_use]
     pub fn stribeck(&self, model: &RowModel<T, N, B>) -> [Stribeck<T>; N] {
         let values = self.values();
         let mut found = no_stribeck();
         for (joint, (slot, fit)) in found.iter_mut().zip(&self.record.stribeck).enumerate() {
             let coulomb = model.drive(joint, Parameter::FC).map_or(T::zero(), |base| values[base]);
-            // Without Coulomb friction there is nothing to be a factor of; the verdict calls that unphysical.
+            // Without Coulomb friction the factor is undefined; the verdict calls that unphysical.
             if let Some(fit) = fit
                 && coulomb > T::zero()
             {
@@ -268,25 +268,26 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         found
     }
 
-    /// From base values to a leg that can exist.
+    /// Completion from base values to a physically consistent leg.
     #[must_use]
     pub fn completion(&self) -> &Completion<T, N> {
         &self.completion
     }
 
-    /// All parameters of a leg that can exist; `None` until the search and its completion have ended.
+    /// All parameters of the consistent leg; `None` until search and completion have ended.
     #[must_use]
     pub fn parameters(&self) -> Option<LegParameters<T, N>> {
         self.completed.is_some().then(|| self.completion.parameters())
     }
 
-    /// How much worse than the plan's least squares the leg that was found explains all rows; `None` until it is there.
+    /// Loss of fit of the consistent leg against the plan's least squares, over all rows;
+    /// `None` until it is complete.
     #[must_use]
     pub fn consistency(&self) -> Option<Consistency<T>> {
         self.completed.as_ref().map(|(_, consistency)| *consistency)
     }
 
-    /// Torque error of a row above which it is no noise, N m: six standard deviations and a twentieth of the torque.
+    /// Limit of a row's torque error by noise, N m: six standard deviations plus a twentieth of the torque.
     #[must_use]
     pub fn unexpected(&self) -> [T; N] {
         let values = self.found();
@@ -297,14 +298,14 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         })
     }
 
-    /// Standard deviation of one independent row of each joint on the motion identified from, N m.
+    /// Standard deviation of one independent row of each joint in the motion identified from, N m.
     #[must_use]
     pub fn row_noise(&self) -> [T; N] {
         noise(&self.record)
     }
 
-    /// Accepted, or refused with all reasons that apply, given motions that were not used and what they ask for; every
-    /// piece of evidence goes to `hand_on`.
+    /// Judges the result with held-out motions and the geometry errors they show: accepted, or refused with
+    /// all reasons that apply. Every piece of evidence goes to `hand_on`.
     pub fn judge<'a>(
         &self,
         model: &RowModel<T, N, B>,
@@ -322,7 +323,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         let found = self.found();
         let estimate = self.estimate();
         if !docket.verdict().has(Reason::Unexcited) {
-            // Of parameters that the motion did not show nothing can be said.
+            // Parameters that the motion did not excite cannot be judged.
             thresholds.judge_physics(model, &self.record, &self.least_squares, docket);
             thresholds.judge_physics(model, &self.record, &estimate, docket);
             if let Some(consistency) = self.consistency() {
@@ -330,7 +331,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
             }
         }
         thresholds.judge_disturbance(&self.record.outliers, docket);
-        // What the data said before it was made a leg: a computed torque asks for none.
+        // The values before the completion: a computed torque has no inertia or friction in them.
         thresholds.judge_measurement(model, &self.record, &self.search.values(), docket);
         thresholds.judge_residual(&self.record, &found, docket);
         let noise_is_known = self.record.noise.iter().all(|&noise| noise > T::zero());
@@ -346,7 +347,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
             thresholds.judge_whole(&self.record.outliers, docket);
         }
         if !docket.verdict().has(Reason::Validation) {
-            // What pushes and a wrong mass ask for is no geometry.
+            // Pushes and a wrong mass ask for changes that are not geometry errors.
             for found in asked.iter().flatten() {
                 thresholds.judge_alignment(found, noise_is_known, docket);
             }

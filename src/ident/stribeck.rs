@@ -1,32 +1,35 @@
-//! Stribeck friction from one record, without a second look at the samples.
+//! Stribeck friction from one record, without a second pass over the samples.
 //!
-//! Near standstill friction is higher by a surplus that fades with speed. The surplus is linear, its speed is not; and
-//! the rows are gone when the speed is looked for. So the rows carry three columns of fixed speeds beside the others,
-//! and any other speed's column is a combination of these.
+//! Near standstill friction is higher by a surplus that fades with speed. The surplus is a linear parameter,
+//! its speed is not, and the rows are gone when the search for the speed begins. The rows therefore carry
+//! three columns of fixed speeds beside the others; any other speed's column is a combination of these.
 //!
 //! ```text
-//! torque       ... + FC sign(v) + S sign(v) g(v / vs),      g(x) = exp(-x^2)                                  (S1)
-//! bank         sign(v) g(v / v_k),   v_k = 0.06, 0.12, 0.24 rad/s: each the fourth power of the next
-//! g(v / vs)    = sum_k w_k(vs) g(v / v_k) + a + b v,   least squares over speeds from 0 to 1.5 rad/s              (S2)
-//! gain(vs)     = max(0, u z)^2 / (u u),   u = R w(vs)                                                        (S3)
+//! torque     ... + FC sign(v) + S sign(v) g(v / vs),   g(x) = exp(-x^2)                             (S1)
+//! bank       sign(v) g(v / v_k),   v_k = 0.06, 0.12, 0.24 rad/s: each the fourth power of the next
+//! g(v / vs)  = sum_k w_k(vs) g(v / v_k) + a + b v,   least squares over speeds from 0 to 1.5 rad/s  (S2)
+//! gain(vs)   = max(0, u z)^2 / (u u),   u = R w(vs)                                                 (S3)
 //! ```
 //!
-//! R and z are the last three rows of the factor of all joints once every other parameter is eliminated: the search over
-//! vs is one of three numbers. What is left for all other steps is the factor in which S and ln vs are *eliminated*, not
-//! held: its cost is the least over both, and the covariance of everything else counts that they had to be estimated.
+//! R and z are the last three rows of the factor of all joints, with every other parameter eliminated. The
+//! search over vs therefore works on three numbers. All later steps use the factor with S and ln vs
+//! *eliminated*, not held. Its cost is the least over both, and the covariance of all other parameters
+//! includes their estimation.
 //!
 //! | symbol | meaning | unit |
 //! | --- | --- | --- |
 //! | S, vs | surplus FS - FC; speed at which it has fallen to 1/e | N m, rad/s |
 //! | gain | chi-square that S explains | 1 |
 //!
-//! Sources: Stribeck's curve in Gaussian form: Armstrong-Helouvry, Dupont and Canudas de Wit (1994); elimination of
-//! linear parameters: Golub and Pereyra, variable projection (1973). (S2) is off by at most 3.2 % of the surplus within
-//! 0.06..0.24 rad/s. The constant and the line, which the columns of Coulomb and viscous friction supply, keep what it
-//! is off orthogonal to these columns: without them 1.7 % of the surplus went into Coulomb friction, two of its standard
-//! deviations on the simulated leg, with them 0.2 %.
-//! Cost: one exponential per joint and sample; the search about 50 small solutions per joint, once per motion.
-//! Limits: speeds below 0.03 rad/s are not in the rows (stillness rule), so a vs below 0.05 rad/s is reported as 0.05.
+//! Sources: Stribeck's curve in Gaussian form: Armstrong-Helouvry, Dupont and Canudas de Wit (1994);
+//! elimination of linear parameters: Golub and Pereyra, variable projection (1973). The error of (S2) is at
+//! most 3.2 % of the surplus within 0.06..0.24 rad/s. The constant and the line come from the columns of
+//! Coulomb and viscous friction and make the error orthogonal to these columns. Without them 1.7 % of the
+//! surplus went into Coulomb friction, two of its standard deviations on the simulated leg; with them 0.2 %.
+//! Cost: one exponential per joint and sample; the search about 50 small
+//! solutions per joint, once per motion.
+//! Limits: the rows contain no speeds below 0.03 rad/s (standstill rule), so a vs below 0.05 rad/s is
+//! reported as 0.05.
 
 mod curve;
 
@@ -41,45 +44,45 @@ use crate::real::{self, Real};
 
 /// Stribeck columns of a joint.
 pub const BANK: usize = 3;
-/// The slowest of them, rad/s; each is twice the one before.
+/// Speed of the slowest column, rad/s; each is twice the one before.
 pub const SLOWEST_RAD_S: f64 = 0.06;
-/// Speeds looked at, rad/s.
+/// Range of the search, rad/s.
 pub const SPEEDS_RAD_S: (f64, f64) = (0.05, 0.3);
-/// Chi-square that a surplus must explain to be believed when nobody asked for it. With no surplus the gain stays below
-/// the chi-square of the bank's three columns, which exceeds 30 in 1.4 of a million motions; in 200 honest
-/// runs of the default leg it was at most 8.7.
+/// Least chi-square of a surplus under `auto`. Without a surplus the gain stays below the chi-square of the
+/// bank's three columns, which exceeds 30 in 1.4 of a million motions. In 200 undisturbed runs of the default
+/// leg it was at most 8.7.
 pub const SMALLEST_GAIN: f64 = 30.0;
-/// Nor is a surplus below this share of the torque's root mean square, however little noise there is: errors of the model
-/// and of the encoder make such ones.
+/// Least surplus as a share of the torque's root mean square, however little noise there is. Errors of the
+/// model and of the encoder cause smaller ones.
 pub const SMALLEST_SURPLUS_SHARE: f64 = 0.02;
-/// What is believed of ln vs beforehand: keeps a speed that the data do not tell from spoiling what they tell.
+/// Prior standard deviation of ln vs: keeps an undetermined speed from corrupting the other parameters.
 const LOG_SPEED_SIGMA: f64 = 0.5;
 const GRID: usize = 25;
 
-/// What was found of one joint's Stribeck friction.
+/// Result for one joint's Stribeck friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StribeckFit<T, const B: usize> {
-    /// rad/s.
+    /// Speed vs, rad/s.
     pub speed: T,
-    /// Standard deviation, rad/s.
+    /// Standard deviation of the speed, rad/s.
     pub speed_sigma: T,
     /// Standard deviation of the surplus, N m.
     pub sigma: T,
-    /// Chi-square explained.
+    /// Chi-square that the surplus explains.
     pub gain: T,
-    /// The best surplus for given base parameters: constant - slope . base.
+    /// Best surplus for given base parameters: constant - slope . base.
     constant: T,
     slope: [T; B],
 }
 
 impl<T: Real, const B: usize> StribeckFit<T, B> {
-    /// Surplus FS - FC that goes with these base parameters, N m.
+    /// Surplus FS - FC for these base parameters, N m.
     #[must_use]
     pub fn surplus(&self, base: &[T; B]) -> T {
         self.slope.iter().zip(base).fold(self.constant, |sum, (&slope, &value)| sum - slope * value)
     }
 
-    /// What torque over `ratio`, less that of base parameters `load`, would have given.
+    /// Converts the fit to torque over `ratio`, less that of base parameters `load`.
     pub(super) fn correct(&mut self, ratio: T, load: &[T; B]) {
         self.constant = self
             .slope
@@ -89,7 +92,7 @@ impl<T: Real, const B: usize> StribeckFit<T, B> {
         self.sigma /= ratio;
     }
 
-    /// The same in another precision.
+    /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> StribeckFit<U, B> {
         let convert = |value: T| U::of(value.to_double());
@@ -104,18 +107,18 @@ impl<T: Real, const B: usize> StribeckFit<T, B> {
     }
 }
 
-/// One joint's rows: packed, with the bank behind the base columns, and the standard deviation of an independent row.
+/// One joint's packed rows, bank columns after the base columns, and the standard deviation of a row.
 #[derive(Clone, Copy, Debug)]
 pub struct JointRows<'a, T, const B: usize> {
-    /// Packed.
+    /// Packed factor.
     pub factor: &'a [T; LARGEST_SIZE],
-    /// Its columns.
+    /// Columns of the factor.
     pub columns: &'a Columns<B>,
-    /// N m.
+    /// Standard deviation of an independent row, N m.
     pub noise: T,
 }
 
-/// The factor in which `front` combinations of the bank stand before the base columns.
+/// Rotates the factor so that the `front` combinations of the bank precede the base columns.
 fn reordered<T: Real, const B: usize, const K: usize>(
     joint: &JointRows<'_, T, B>,
     front: &[Combination<T>; K],
@@ -148,7 +151,7 @@ fn reordered<T: Real, const B: usize, const K: usize>(
     result
 }
 
-/// The base columns of a packed factor whose first `front` columns are eliminated.
+/// Base columns of a packed factor with its first `front` columns eliminated.
 fn without_front<T: Real, const B: usize>(
     packed: &[T; LARGEST_SIZE],
     front: usize,
@@ -168,13 +171,13 @@ fn without_front<T: Real, const B: usize>(
     factor
 }
 
-/// The base columns with no Stribeck friction at all: what the bank would explain stays in the residual.
+/// Base columns without Stribeck friction: the part that the bank would explain stays in the residual.
 #[must_use]
 pub fn without_bank<T: Real, const B: usize>(joint: &JointRows<'_, T, B>) -> Factor<T, B> {
     without_front(&reordered::<T, B, 0>(joint, &[]), 0, joint.columns)
 }
 
-/// The base columns with all of the bank eliminated: unbiased whether there is Stribeck friction or not.
+/// Base columns with the whole bank eliminated: unbiased with and without Stribeck friction.
 #[must_use]
 pub fn bank_eliminated<T: Real, const B: usize>(joint: &JointRows<'_, T, B>) -> Factor<T, B> {
     let unit = core::array::from_fn(|row| Combination {
@@ -184,7 +187,7 @@ pub fn bank_eliminated<T: Real, const B: usize>(joint: &JointRows<'_, T, B>) -> 
     without_front(&reordered::<T, B, BANK>(joint, &unit), BANK, joint.columns)
 }
 
-/// The bank's part of all rows once every base parameter is eliminated, chi-square units.
+/// Bank's part of all rows with every base parameter eliminated, chi-square units.
 struct Reduced<T> {
     rows: [[T; BANK]; BANK],
     right: [T; BANK],
@@ -228,7 +231,7 @@ impl<T: Real> Reduced<T> {
         self.rows.map(|row| dot(&row, weights))
     }
 
-    /// (S3), and the surplus behind it.
+    /// (S3) and the surplus at its optimum.
     fn gain(&self, speed: T) -> (T, T) {
         let image = self.image(&combination(speed).bank);
         let power = dot(&image, &image);
@@ -240,7 +243,7 @@ impl<T: Real> Reduced<T> {
         }
     }
 
-    /// The speed of the largest gain: a grid in ln vs, then twice a finer one around its best.
+    /// Speed of the largest gain: a grid in ln vs, then two finer ones around the best point.
     fn best_speed(&self) -> T {
         let (slowest, fastest) = (T::of(SPEEDS_RAD_S.0), T::of(SPEEDS_RAD_S.1));
         let mut step = real::ln(fastest / slowest) / T::of((GRID - 1) as f64);
@@ -266,18 +269,18 @@ fn dot<T: Real>(one: &[T; BANK], other: &[T; BANK]) -> T {
     one.iter().zip(other).fold(T::zero(), |sum, (&left, &right)| sum + left * right)
 }
 
-/// The Stribeck curve that explains most of one joint's rows.
+/// Stribeck curve that explains most of one joint's rows.
 pub struct Strongest<T> {
     reduced: Reduced<T>,
     speed: T,
-    /// Chi-square explained.
+    /// Chi-square that the curve explains.
     pub gain: T,
-    /// N m.
+    /// Surplus, N m.
     pub surplus: T,
 }
 
-/// Looks for Stribeck friction of one joint. `others` holds the rows of the other joints, weighted to chi-square units,
-/// `rank` counts the base parameters.
+/// Searches for Stribeck friction of one joint. `others` holds the rows of the other joints, weighted to
+/// chi-square units; `rank` is the number of base parameters.
 #[must_use]
 pub fn strongest<T: Real, const B: usize>(
     joint: &JointRows<'_, T, B>,
@@ -290,8 +293,8 @@ pub fn strongest<T: Real, const B: usize>(
     Strongest { reduced, speed, gain, surplus }
 }
 
-/// The fit, and the joint's factor with surplus and speed eliminated; gains and surpluses that are not above `least` are
-/// nothing, and `None` where nothing at all is explained.
+/// Returns the fit and the joint's factor with surplus and speed eliminated. `None` where gain and surplus
+/// are not both above `least`, or the problem is degenerate.
 #[must_use]
 pub fn eliminate<T: Real, const B: usize>(
     joint: &JointRows<'_, T, B>,
@@ -305,7 +308,7 @@ pub fn eliminate<T: Real, const B: usize>(
     }
     let curve = combination(speed);
     let slope = slope(speed).scaled(surplus);
-    // Information of surplus and ln vs, the latter with what was believed before.
+    // Information matrix of surplus and ln vs, the latter with its prior.
     let (one, other) = (reduced.image(&curve.bank), reduced.image(&slope.bank));
     let belief = T::one() / T::of(LOG_SPEED_SIGMA * LOG_SPEED_SIGMA);
     let (a, b, c) = (dot(&one, &one), dot(&one, &other), dot(&other, &other) + belief);

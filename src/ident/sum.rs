@@ -10,11 +10,9 @@ pub(super) struct Sum<T> {
 }
 
 impl<T: Real> Sum<T> {
-    /// No term yet.
     pub(super) fn zero() -> Self {
         Self { total: T::zero(), lost: T::zero() }
     }
-    /// Takes a term.
     pub(super) fn add(&mut self, term: T) {
         let total = self.total + term;
         self.lost += if real::abs(self.total) >= real::abs(term) {
@@ -24,7 +22,6 @@ impl<T: Real> Sum<T> {
         };
         self.total = total;
     }
-    /// The sum.
     pub(super) fn value(&self) -> T {
         self.total + self.lost
     }

@@ -1,30 +1,36 @@
-//! After a change: what changed, found from gait alone while the rest of the model is kept.
+//! Cause of a change, found from gait alone with the rest of the model unchanged.
 //!
-//! Why not a new identification: nobody lies down for an exciting motion because a bag was hung on the shank. A few
-//! parameters can be told from walking if all others are held at the accepted model's values.
+//! Why not a new identification: a wearer does not lie down for an exciting motion because a bag was hung on
+//! the shank. Walking determines a few parameters if all others are held at the accepted model's values.
 //!
 //! ```text
 //! beta = beta_0 + sum_k theta_k d_k          d_k: base values of one unit of parameter k alone
-//! payload:   parameters M, HX, HY, HZ, ZZ, XX, YY, XY, XZ, YZ of one link, as far as the motion tells them apart
+//! payload:   parameters M, HX, HY, HZ, ZZ, XX, YY, XY, XZ, YZ of one link, as far as separable
 //! friction:  FC and FV of every joint
 //! ```
 //!
-//! Each link's payload and friction are fitted to the rows collected after the alarm ([`hypothesis`]). A hypothesis explains the change when
+//! Payload and friction are fitted to the rows collected after the alarm ([`hypothesis`]), the payload of
+//! each link by itself. A hypothesis explains the change when
 //!
 //! ```text
-//! chi2 <= f + 5 sqrt(2 f)                    f = rank - k degrees of freedom, as in [`super::verdict`]             (W6)
-//! E_i  <= rho ln rho / (rho - 1)             energy of every joint's residual: where the monitor would stay silent (W7)
+//! chi2 <= f + 5 sqrt(2 f)         f = rank - k degrees of freedom, as in [`super::verdict`]             (W6)
+//! E_i  <= rho ln rho / (rho - 1)  energy of every joint's residual: where the monitor would stay silent (W7)
 //! ```
 //!
-//! and it can exist: nothing negative that cannot be, and for the payload `M ZZ >= HX^2 + HY^2` within three standard
-//! deviations, which holds of every body put on, and with both signs turned of every body taken off. Of several that
-//! explain it the one with the smaller `chi2 + 2 k` (Akaike 1974) is meant. Where the model as it was explains the rows by the
-//! same two tests, and no change explains them better by more than `k + 5 sqrt(2 k)`, nothing changed: the alarm was false, or
-//! what caused it has passed. None of them: a full identification is needed.
+//! and it is physically possible: no negative parameter that cannot be negative, and for the payload
+//! `M ZZ >= HX^2 + HY^2` within three standard deviations. That holds for every body put on and, with both
+//! signs turned, for every body taken off. Of several valid hypotheses the one with the smallest `chi2 + 2 k`
+//! (Akaike 1974) wins.
 //!
-//! Cost: some `2 B^3 + 20 B^2` multiplications, once after an alarm. Memory: N + 1 hypotheses and an estimate.
-//! Limits: payloads on two links, or one together with other friction, are not among the hypotheses and are refused. Of a
-//! payload on the first link torque tells the moment but not the mass. What the motion did not show of the payload (its inertia, on slow gait) has a large sigma.
+//! Nothing changed if the old model passes both tests and no hypothesis improves on it by more than
+//! `k + 5 sqrt(2 k)`. The alarm was then false, or its cause has passed. Without any explanation a full
+//! identification is needed.
+//!
+//! Cost: some `2 B^3 + 20 B^2` multiplications, once after an alarm. Memory: N + 1 hypotheses and an
+//! estimate.
+//! Limits: payloads on two links, or one together with other friction, are not among the hypotheses and are
+//! refused. For a payload on the first link torque determines the moment but not the mass. A payload
+//! parameter that the motion did not excite (its inertia, in slow gait) has a large sigma.
 
 pub mod hypothesis;
 
@@ -37,7 +43,7 @@ use crate::model::Parameter;
 use crate::real::{self, Real};
 use hypothesis::{Comparison, DIRECTIONS, Explanation, Hypothesis};
 
-/// Parameters of the payload, those that are worth most first: where the motion cannot tell all apart, the later go.
+/// Parameters of the payload, most important first: where the motion cannot separate all, the later ones go.
 pub const PAYLOAD_PARAMETERS: [Parameter; DIRECTIONS] = [
     Parameter::M,
     Parameter::HX,
@@ -51,45 +57,45 @@ pub const PAYLOAD_PARAMETERS: [Parameter; DIRECTIONS] = [
     Parameter::YZ,
 ];
 
-/// What explains a change.
+/// Cause of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// Mass was put on a link or taken off.
     Payload {
-        /// Counted from 0.
+        /// Link, counted from 0.
         link: usize,
     },
-    /// Friction of the joints.
+    /// Friction of the joints changed.
     Friction,
-    /// The model as it was explains the rows: the alarm was false, or what caused it has passed.
+    /// No change: the old model explains the rows. The alarm was false, or its cause has passed.
     Nothing,
-    /// None of these: a full identification is needed.
+    /// Cause unknown: a full identification is needed.
     Unexplained,
 }
 
-/// A model brought up to date, or the refusal to.
+/// An updated model, or the refusal of one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Update<T, const N: usize, const B: usize> {
-    /// What is meant.
+    /// Most probable cause.
     pub cause: Cause,
-    /// Accepted where something explains the rows.
+    /// Accepted where a cause explains the rows.
     pub verdict: Verdict,
-    /// chi-square and degrees of freedom of the model as it was.
+    /// Chi-square and degrees of freedom of the old model.
     pub unchanged: (T, T),
     /// Parameter changes of each link, in the order of [`PAYLOAD_PARAMETERS`].
     pub payload: [Hypothesis<T>; N],
     /// Friction changes: FC1, FV1, FC2, FV2, ...
     pub friction: Hypothesis<T>,
-    /// Energy of each joint's residual over that at acceptance, before.
+    /// Energy of each joint's residual over that at acceptance, with the old model.
     pub energy_before: [T; N],
-    /// The same with the values of `estimate`.
+    /// Energy of each joint's residual over that at acceptance, with the values of `estimate`.
     pub energy_after: [T; N],
-    /// Base values after the change; the accepted ones where there was none or nothing explains it.
+    /// Base values after the change; the accepted ones without a change or an explanation.
     pub estimate: Estimate<T, B>,
 }
 
 impl<T: Real, const N: usize, const B: usize> Update<T, N, B> {
-    /// From the rows collected after the alarm; `silent_energy` is the right-hand side of (W7).
+    /// Analyses the rows collected after the alarm; `silent_energy` is the right-hand side of (W7).
     #[must_use]
     pub fn new(
         model: &RowModel<T, N, B>,
@@ -155,20 +161,21 @@ impl<T: Real, const N: usize, const B: usize> Update<T, N, B> {
         update
     }
 
-    /// Whether another model than before is to be used.
+    /// True if the updated model replaces the old one.
     #[must_use]
     pub fn is_change(&self) -> bool {
         self.verdict.is_accepted() && self.cause != Cause::Nothing
     }
 
-    /// The model with its uncertainty, if a change explains the rows; its noise is the old one's.
+    /// Updated model with its uncertainty, if a change explains the rows; the noise is the old model's.
     #[must_use]
     pub fn baseline(&self, before: &Baseline<T, N, B>) -> Option<Baseline<T, N, B>> {
         self.is_change().then(|| Baseline { estimate: self.estimate.clone(), ..before.clone() })
     }
 }
 
-/// FC and FV of the joints, as many as there is room for; the rest repeats the first and is dropped as not told apart.
+/// FC and FV of the joints, up to the array's length. Spare entries repeat the
+/// first and drop out as dependent.
 fn friction_parameters<const N: usize>() -> [(usize, Parameter); DIRECTIONS] {
     core::array::from_fn(|index| {
         let parameter = if index % 2 == 0 { Parameter::FC } else { Parameter::FV };
@@ -188,7 +195,8 @@ fn energy<T: Real, const N: usize, const B: usize>(
     })
 }
 
-/// `M ZZ - HX^2 - HY^2` not negative by more than the allowed standard deviations, where all four are told.
+/// True unless `M ZZ - HX^2 - HY^2` is negative beyond the allowed standard
+/// deviations, with all four determined.
 fn payload_can_exist<T: Real, const B: usize>(
     explanation: &Explanation<T, B>,
     thresholds: &Thresholds<T>,
@@ -208,7 +216,7 @@ fn payload_can_exist<T: Real, const B: usize>(
     let mut gradient = [T::zero(); DIRECTIONS];
     (gradient[m], gradient[zz]) = (value(zz), value(m));
     (gradient[x], gradient[y]) = (-T::of(2.0) * value(x), -T::of(2.0) * value(y));
-    // Where the mass is about zero the gradient is too: the curvature of the product counts then.
+    // Near zero mass the gradient vanishes too; the curvature of the product then dominates.
     let curvature = payload.sigma(m).unwrap_or(T::zero()) * payload.sigma(zz).unwrap_or(T::zero());
     let spread = real::sqrt(explanation.variance_of(&gradient) + curvature * curvature);
     surplus >= -thresholds.largest_negative_sigmas * spread

@@ -1,22 +1,24 @@
-//! A motion as a window of blocks: what reweighting needs, in memory that does not grow with the duration.
+//! A motion as a window of blocks: input of the reweighting, in memory independent of the duration.
 //!
-//! One factor for a whole motion cannot be reweighted: a push that has entered it cannot be taken out. So the motion is
-//! cut into blocks of [`BLOCK_ROWS`] filtered rows, and each block keeps for each joint a small factor over the columns
-//! that this joint's torque can see. When the room is full two neighbours become one block: of the adjacent pairs of
-//! equal level (doublings) the lowest and oldest. Blocks are then of two neighbouring levels and the youngest ones
-//! finer, whatever the duration; and only factors of like size ever meet, which single precision needs.
+//! One factor for a whole motion cannot be reweighted: a push inside it cannot be removed. The motion is
+//! therefore cut into blocks of [`BLOCK_ROWS`] filtered rows. Each block stores for each joint a small factor
+//! over the columns that act on this joint's torque. When the memory is full two neighbours become one block:
+//! among the adjacent pairs of equal level (doublings) the lowest and oldest. Blocks then have two
+//! neighbouring levels, the youngest ones finer, whatever the duration. Only factors of similar size ever
+//! meet, as single precision needs.
 //!
 //! ```text
-//! joint i sees   link columns of joints >= i, drive columns of joint i, its Stribeck columns
+//! joint i depends on   link columns of joints >= i, drive columns of joint i, its Stribeck columns
 //! numbers of a block   sum over joints of  n_i (n_i + 3) / 2 + 1  and two more: sum of |torque|, rows
 //! ```
 //!
-//! Memory: `ROOM` numbers and about 1 kB. For the default leg (9 + 3 and 7 + 3 columns) a block takes 161 numbers, so
-//! 8192 numbers hold 50 blocks: 22 s of motion in pieces of 0.32 and 0.64 s.
-//! Cost: a row is rotated into a factor of its joint's columns. Every eighth output two blocks are merged, one joint at each
-//! call of [`Window::tidy`], so that no sample bears the whole; the blocks say the same at any time.
-//! Limits: with three joints and 28 columns there is room for 10 blocks only; a chain whose joint sees more than
-//! 32 columns is not held.
+//! Memory: `ROOM` numbers and about 1 kB. For the default leg (9 + 3 and 7 + 3 columns) a block takes 161
+//! numbers, so 8192 numbers hold 50 blocks: 22 s of motion in pieces of 0.32 and 0.64 s.
+//! Cost: a row is rotated into a factor of its joint's columns. Every eighth output two blocks are merged,
+//! one joint per call of [`Window::tidy`], so that no sample bears the whole cost. The sums over blocks stay
+//! the same meanwhile.
+//! Limits: with three joints and 28 columns only 10 blocks fit. A chain with a joint that depends on more
+//! than 32 columns is rejected.
 
 use super::packed::{self, LARGEST_COLUMNS, Row};
 use super::record::RowModel;
@@ -25,36 +27,36 @@ use super::stribeck::BANK;
 use crate::model::Parameter;
 use crate::real::{self, Real};
 
-/// Outputs of the row filter, 50 a second, that make a block.
+/// Outputs of the row filter, 50 a second, in a block.
 pub const BLOCK_ROWS: u32 = 8;
-/// Numbers in the window of the device: 32 KB in single precision.
+/// Length of the device's window in numbers: 32 KB in single precision.
 pub const ROOM: usize = 8192;
-/// Blocks that are kept track of.
+/// Most blocks of a window.
 pub const LARGEST_BLOCKS: usize = 64;
-/// What a block holds of a joint besides its factor: sum of the absolute torque, and rows.
+/// Numbers of a joint in a block besides its factor: sum of the absolute torque, and rows.
 const BESIDE: usize = 2;
 
-/// Which columns one joint's torque sees.
+/// Columns that act on one joint's torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Columns<const B: usize> {
     base: [usize; B],
     count: usize,
-    /// Which of them are the joint's Coulomb and viscous friction.
+    /// Indices of the joint's Coulomb and viscous friction among them.
     pub friction: [Option<usize>; 2],
-    /// Stribeck columns behind them.
+    /// Number of Stribeck columns after them.
     pub bank: usize,
-    /// Where the joint's numbers begin in a block.
+    /// Offset of the joint's numbers in a block.
     start: usize,
 }
 
 impl<const B: usize> Columns<B> {
-    /// The base parameters, in the order of the factor's columns.
+    /// Base parameters, in the order of the factor's columns.
     #[must_use]
     pub fn base(&self) -> &[usize] {
         self.base.get(..self.count).unwrap_or(&[])
     }
 
-    /// All columns, the Stribeck ones last.
+    /// Number of all columns, Stribeck columns included.
     #[must_use]
     pub fn all(&self) -> usize {
         self.count + self.bank
@@ -64,9 +66,9 @@ impl<const B: usize> Columns<B> {
 /// One joint's part of a block.
 #[derive(Clone, Copy, Debug)]
 pub struct Part<'a, T> {
-    /// Packed.
+    /// Packed factor.
     pub factor: &'a [T],
-    /// N m.
+    /// Sum of the absolute torque, N m.
     pub absolute_torque: T,
     /// Rows taken.
     pub rows: T,
@@ -78,19 +80,19 @@ pub struct Window<T, const N: usize, const B: usize, const ROOM: usize> {
     columns: [Columns<B>; N],
     stride: usize,
     capacity: usize,
-    /// Slots of the closed blocks, oldest first, and behind them those that are free.
+    /// Slots of the closed blocks, oldest first, then the free slots.
     order: [u8; LARGEST_BLOCKS],
     level: [u8; LARGEST_BLOCKS],
-    /// Filter outputs in each slot, those of joints that stood still included.
+    /// Filter outputs in each slot, including those of joints at rest.
     outputs: [u32; LARGEST_BLOCKS],
     closed: usize,
-    /// Place of the pair that is being joined, and the joint that comes next.
+    /// Index of the pair that is being merged, and the next joint.
     joining: Option<(u8, u8)>,
     room: [T; ROOM],
 }
 
 impl<const N: usize, const B: usize, const ROOM: usize> Window<f32, N, B, ROOM> {
-    /// Empty, without any columns yet: for a place of its own in the device's memory, where it is never moved.
+    /// Empty window without columns: for a static of its own in the device's memory, where it is never moved.
     pub const EMPTY: Self = Self {
         columns: [Columns { base: [0; B], count: 0, friction: [None; 2], bank: 0, start: 0 }; N],
         stride: 0,
@@ -105,7 +107,7 @@ impl<const N: usize, const B: usize, const ROOM: usize> Window<f32, N, B, ROOM> 
 }
 
 impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B, ROOM> {
-    /// Empty, without any columns yet.
+    /// Empty window without columns.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -121,7 +123,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         }
     }
 
-    /// Forgets all rows.
+    /// Discards all rows.
     pub fn clear(&mut self) {
         (self.stride, self.capacity, self.closed) = (0, 0, 0);
         self.joining = None;
@@ -133,7 +135,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         &self.columns
     }
 
-    /// Makes room for the columns of a model; all blocks are forgotten.
+    /// Arranges the columns of a model; discards all blocks.
     pub fn lay_out(&mut self, model: &RowModel<T, N, B>) {
         let mut all = self.columns;
         for (joint, columns) in all.iter_mut().enumerate() {
@@ -158,7 +160,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         self.arrange(all);
     }
 
-    /// For tests: every joint sees the first `count` columns, Coulomb and viscous friction among them as said.
+    /// Window for tests: every joint has the first `count` columns and the given friction columns.
     #[cfg(test)]
     pub(super) fn of_columns(count: usize, friction: [Option<usize>; 2], bank: usize) -> Self {
         let mut window = Self::new();
@@ -196,7 +198,8 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         usize::from(self.order[place.min(LARGEST_BLOCKS - 1)])
     }
 
-    /// Takes one output of the row filter; `taken` tells of which joints the row counts. False where there is no room.
+    /// Takes one output of the row filter; `taken` marks the joints whose row is
+    /// used. False without capacity.
     pub fn insert(&mut self, rows: &FilteredRows<T, N, B>, taken: &[bool; N]) -> bool {
         if self.capacity < 2 {
             return false;
@@ -227,7 +230,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         true
     }
 
-    /// Ends the open block: what follows does not continue it.
+    /// Ends the open block: the next row starts another.
     pub fn close(&mut self) {
         while self.tidy() {}
         if self.capacity >= 2 && self.outputs[self.slot(self.closed)] > 0 {
@@ -245,7 +248,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         }
     }
 
-    /// The pair of neighbours that [`Window`] speaks of; where levels differ everywhere, the shortest pair.
+    /// Pair of neighbours to merge by the header's rule; where all levels differ, the shortest pair.
     fn pair_to_join(&self) -> Option<usize> {
         let pair = |place: &usize| (self.slot(*place), self.slot(*place + 1));
         let equal = (0..self.closed - 1)
@@ -257,8 +260,8 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         })
     }
 
-    /// Makes room where the last block took it: one joint's part of two blocks becomes one. Tells whether there was
-    /// something to do. [`Self::insert`] does what is left over.
+    /// Continues a pending merge by one joint's part of two blocks; true if there was work to do.
+    /// [`Self::insert`] does the rest.
     pub fn tidy(&mut self) -> bool {
         let Some((place, joint)) = self.joining else { return false };
         let (place, joint) = (usize::from(place), usize::from(joint));
@@ -303,7 +306,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
         self.room.get_mut(start..start + packed::size(columns.all()) + BESIDE)
     }
 
-    /// Number of blocks with rows, the open one included.
+    /// Number of blocks with rows, including the open one.
     #[must_use]
     pub fn blocks(&self) -> usize {
         let open = self.capacity > 1 && self.joining.is_none() && self.outputs[self.slot(self.closed)] > 0;

@@ -1,7 +1,8 @@
-//! Flexion angles and the chain's angles: the one place where they are converted.
+//! Flexion angles and the chain's angles: all conversions are here.
 //!
-//! Outside, angles are anatomical (hip and knee flexion positive, zero when standing straight); inside, they are
-//! those of the Denavit-Hartenberg frames. A joint may turn the other way and start elsewhere.
+//! Outside this module angles are anatomical: hip and knee flexion positive, zero when standing
+//! straight. Inside the model they are those of the Denavit-Hartenberg frames. A joint may turn the
+//! other way and start elsewhere.
 //!
 //! ```text
 //! q = direction q_anatomical + zero_offset
@@ -17,7 +18,7 @@
 
 use crate::real::{Real, is_finite};
 
-/// Why a joint cannot be described.
+/// Reason why a joint's conversion is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnatomyError {
     /// The direction is neither 1 nor -1.
@@ -26,7 +27,7 @@ pub enum AnatomyError {
     ZeroOffset,
 }
 
-/// How one joint's anatomical angle becomes the chain's.
+/// Conversion between one joint's anatomical angle and the chain's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnatomicalJoint<T> {
     direction: T,
@@ -34,14 +35,14 @@ pub struct AnatomicalJoint<T> {
 }
 
 impl AnatomicalJoint<f32> {
-    /// Both angles are the same.
+    /// Identity: both angles are equal.
     pub const SAME: Self = Self { direction: 1.0, zero_offset: 0.0 };
-    /// The chain's angle grows against the anatomical one.
+    /// Reversal: the chain's angle falls as the anatomical one grows.
     pub const OPPOSITE: Self = Self { direction: -1.0, zero_offset: 0.0 };
 }
 
 impl<T: Real> AnatomicalJoint<T> {
-    /// A joint of `direction` 1 or -1 whose chain angle is `zero_offset` (rad) at the anatomical zero.
+    /// Conversion with `direction` 1 or -1 and a chain angle of `zero_offset` (rad) at the anatomical zero.
     ///
     /// # Errors
     /// [`AnatomyError`] names the argument that is out of its range.
@@ -57,25 +58,25 @@ impl<T: Real> AnatomicalJoint<T> {
         Ok(Self { direction, zero_offset })
     }
 
-    /// Both angles are the same.
+    /// Identity: both angles are equal.
     #[must_use]
     pub fn identity() -> Self {
         Self { direction: T::one(), zero_offset: T::zero() }
     }
 
-    /// 1 or -1.
+    /// Direction, 1 or -1.
     #[must_use]
     pub fn direction(&self) -> T {
         self.direction
     }
 
-    /// The chain's angle at the anatomical zero, rad.
+    /// Chain angle at the anatomical zero, rad.
     #[must_use]
     pub fn zero_offset(&self) -> T {
         self.zero_offset
     }
 
-    /// The same joint in another precision.
+    /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> AnatomicalJoint<U> {
         AnatomicalJoint {
@@ -84,25 +85,25 @@ impl<T: Real> AnatomicalJoint<T> {
         }
     }
 
-    /// The chain's angle (rad) of an anatomical one.
+    /// Converts an anatomical angle to the chain's, rad.
     #[must_use]
     pub fn angle_to_chain(&self, anatomical: T) -> T {
         self.direction * anatomical + self.zero_offset
     }
 
-    /// The anatomical angle (rad) of the chain's.
+    /// Converts a chain angle to the anatomical one, rad.
     #[must_use]
     pub fn angle_from_chain(&self, q: T) -> T {
         self.direction * (q - self.zero_offset)
     }
 
-    /// The chain's speed, acceleration or torque of an anatomical one.
+    /// Converts an anatomical speed, acceleration or torque to the chain's.
     #[must_use]
     pub fn to_chain(&self, anatomical: T) -> T {
         self.direction * anatomical
     }
 
-    /// The anatomical speed, acceleration or torque of the chain's.
+    /// Converts the chain's speed, acceleration or torque to the anatomical one.
     #[must_use]
     pub fn from_chain(&self, value: T) -> T {
         self.direction * value

@@ -1,7 +1,7 @@
 //! Geometry of a serial chain of revolute joints in modified Denavit-Hartenberg numbers.
 //!
-//! The modified convention puts frame i on joint i's own axis, so that a link's parameters do not depend on the
-//! joint after it; Gautier's closed-form regrouping ([`super::base`]) is written in it.
+//! The modified convention puts frame i on joint i's own axis, so that a link's parameters do not depend on
+//! the joint after it; Gautier's closed-form regrouping ([`super::base`]) is written in it.
 //!
 //! ```text
 //! T(i-1, i) = Rx(alpha_i) Tx(a_i) Rz(q_i) Tz(d_i)
@@ -19,7 +19,8 @@
 //! | q | joint angle, from x(i-1) to x(i) about z(i) | rad |
 //! | R, p | frame i seen from frame i-1; p does not depend on q | -, m |
 //!
-//! Source: J. J. Craig, Introduction to Robotics, 3rd ed. 2005, Eq. (3.6); W. Khalil and J.-F. Kleinfinger, 1986.
+//! Source: J. J. Craig, Introduction to Robotics, 3rd ed. 2005, Eq. (3.6); W. Khalil and J.-F.
+//! Kleinfinger, 1986.
 //! Cost: sine and cosine of alpha are computed once, here; 24 bytes per joint in `f32`.
 //! Limits: revolute joints only, one branch, fixed base.
 
@@ -28,7 +29,7 @@ use nalgebra::Vector3;
 use super::kinematics::JointFrame;
 use crate::real::{Real, abs, is_finite, sin_cos, sqrt};
 
-/// Where a joint's axis lies, seen from the joint before it (the base for the first).
+/// Position of a joint's axis, seen from the joint before it (the base for the first).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DenavitHartenberg<T> {
     /// Twist between the axes, rad.
@@ -39,7 +40,7 @@ pub struct DenavitHartenberg<T> {
     pub d: T,
 }
 
-/// Why a chain cannot be built.
+/// Reason why a chain is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChainError {
     /// A Denavit-Hartenberg number of this joint (counted from 0) is NaN or infinite.
@@ -49,7 +50,7 @@ pub enum ChainError {
     },
 }
 
-/// What of a joint's frame does not depend on its angle.
+/// Part of a joint's frame that does not depend on its angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Placement<T> {
     sin_alpha: T,
@@ -65,10 +66,10 @@ pub struct Chain<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Chain<T, N> {
-    /// The chain with these numbers, proximal joint first.
+    /// Builds the chain with these numbers, proximal joint first.
     ///
-    /// A sine or cosine of alpha below four units of rounding is taken for zero: axes meant to be parallel or
-    /// perpendicular are exactly so, and no parameter is seen through the rounding of pi/2.
+    /// A sine or cosine of alpha below four units of rounding becomes zero. Axes meant to be parallel or
+    /// perpendicular are then exactly so, and the rounding of pi/2 makes no parameter visible.
     ///
     /// # Errors
     /// [`ChainError::NotFinite`] names the first joint with a number that is NaN or infinite.
@@ -86,7 +87,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         Ok(Self { placements })
     }
 
-    /// The same chain in another precision, each number rounded once.
+    /// Converts to another precision, each number rounded once.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Chain<U, N> {
         let convert = |value: T| U::of(value.to_double());
@@ -100,7 +101,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         }
     }
 
-    /// Distance from the axis point of the joint before to that of `joint`, m; `None` beyond the last.
+    /// Distance between the axis points of the previous joint and of `joint`, m; `None` beyond the last.
     #[must_use]
     pub fn distance_to(&self, joint: usize) -> Option<T> {
         self.placements
@@ -108,13 +109,13 @@ impl<T: Real, const N: usize> Chain<T, N> {
             .map(|placement| sqrt(placement.a * placement.a + placement.d * placement.d))
     }
 
-    /// Whether the common normal before `joint` has a length at all.
+    /// True if the common normal before `joint` has a nonzero length.
     #[must_use]
     pub fn has_length(&self, joint: usize) -> bool {
         self.placements.get(joint).is_some_and(|placement| placement.a != T::zero())
     }
 
-    /// The same chain with the length before `joint` multiplied by `factor`.
+    /// Returns the chain with the length before `joint` multiplied by `factor`.
     #[must_use]
     pub fn with_length(&self, joint: usize, factor: T) -> Self {
         let mut changed = *self;
@@ -129,7 +130,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         self.placements.map(|placement| (placement.sin_alpha, placement.cos_alpha, placement.a, placement.d))
     }
 
-    /// Each joint's frame seen from the one before it, at the angles `q` (rad).
+    /// Frame of each joint seen from the one before it, at the angles `q` (rad).
     #[inline]
     pub(super) fn frames(&self, q: &[T; N]) -> [JointFrame<T>; N] {
         core::array::from_fn(|joint| {

@@ -1,26 +1,29 @@
-//! A leg's fingerprint: whether a stored model belongs to the leg that is to use it.
+//! Fingerprint of a leg: tells whether a stored model belongs to the leg that is to use it.
 //!
-//! Parameters of one leg move another one wrongly, and nothing in the numbers themselves says so. What they were
-//! identified with is therefore condensed to 64 bits that are kept beside them and compared before they are used.
+//! Parameters of one leg move another one wrongly, and the numbers themselves do not show
+//! it. The leg's description is therefore condensed to 64 bits, stored beside the
+//! parameters, and compared before their use.
 //!
 //! ```text
 //! fingerprint = CRC-64/XZ of  version, N, then per joint from the base:
-//!               sin alpha, cos alpha in steps of 2^-16;  a, d, direction, zero offset, torque per ampere as f32 bits, the
-//!               last negative where the drive is mounted mirrored, as on a left leg
+//!               sin alpha, cos alpha in steps of 2^-16; a, d, direction, zero offset, torque per ampere
+//!               as f32 bits, the last negative where the drive is mounted mirrored, as on a left leg
 //! ```
 //!
 //! | covered | not covered |
 //! | --- | --- |
-//! | number and order of the joints, their axes and lengths | gravity: an argument of every torque, it turns with the trunk |
-//! | sense and zero of each joint's angle, side of the body | encoder counts and gear ratio: they scale the angle, not the model |
-//! | torque constants: all parameters are in their units | limits, gains, prior, names, what is being estimated |
+//! | number and order of the joints, axes and lengths | gravity: an argument of every torque |
+//! | sense and zero of each joint's angle, side of the body | encoder counts, gear ratio |
+//! | torque constants: all parameters are in their units | limits, gains, prior, names, estimated columns |
 //!
-//! Sines are in steps because a board may compute them in `f32` and the host in `f64`; everything else is rounded to
-//! `f32` once and compared exactly. -0 and 0 are the same number here. A twist so close to the edge of a step that the
-//! two precisions fall on either side (one in a hundred, none of the multiples of 5 degrees) is refused, not accepted.
+//! Sines are in steps because a board may compute them in `f32` and the host in `f64`. All other numbers
+//! are rounded to `f32` once and compared exactly; -0 equals 0. A twist close to the edge of a step,
+//! with the two precisions on either side, is refused, not accepted. That is one in a hundred, and none
+//! of the multiples of 5 degrees.
 //!
-//! Source of the code: ECMA-182, reflected (the catalogue's CRC-64/XZ), by the crate `crc` without its table. It tells
-//! mistakes apart, not malice. Cost: 25 bytes a joint, some 10 instructions a bit; once per model, outside the tick.
+//! Source of the code: ECMA-182, reflected (the catalogue's CRC-64/XZ), by the crate `crc` without its table.
+//! The code detects mistakes, not malice. Cost: 25 bytes a joint, some 10 instructions a bit; once per model,
+//! outside the tick.
 
 use crc::{CRC_64_XZ, Crc, Digest, NoTable};
 
@@ -29,18 +32,19 @@ use super::chain::Chain;
 
 const CODE: Crc<u64, NoTable> = Crc::<u64, NoTable>::new(&CRC_64_XZ);
 
-/// Of what is covered, and how: a fingerprint of another version never fits.
+/// Version of the covered fields and their coding: a fingerprint of another version never fits.
 const VERSION: u8 = 1;
 
-/// Steps of a sine or cosine.
+/// Steps per unit of a sine or cosine.
 const STEPS: f32 = (1_u32 << 16) as f32;
 
-/// What a model was identified with, in 64 bits.
+/// Description of the leg that a model was identified with, in 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fingerprint(pub u64);
 
 impl Fingerprint {
-    /// Of a leg with these torque constants (N m/A at the joint), negative where the drive is mounted mirrored.
+    /// Computes the fingerprint. The torque constants (N m/A at the joint) are negative where the drive is
+    /// mounted mirrored.
     #[must_use]
     pub fn of<const N: usize>(
         chain: &Chain<f32, N>,
@@ -156,7 +160,8 @@ mod tests {
 
     #[test]
     fn a_fingerprint_stays_what_it_was() {
-        // It is kept in files and in flash: a change of this number is a new version. Computed by another program.
+        // The number is stored in files and in flash: a change requires a new
+        // version. Computed by another program.
         assert_eq!(own(), Fingerprint(211_407_862_034_066_059));
     }
 }

@@ -1,4 +1,4 @@
-//! What the drive itself takes: rotor inertia, Coulomb and viscous friction, a constant offset.
+//! Drive torque: rotor inertia, Coulomb and viscous friction, a constant offset.
 //!
 //! ```text
 //! torque = IA qdd + FC sign(qd) + FV qd + OFF               sign(0) = 0
@@ -9,9 +9,9 @@
 //! | IA | rotor inertia at the joint | kg m2 |
 //! | FC, FV, OFF | Coulomb, viscous friction; offset | N m, N m s/rad, N m |
 //!
-//! Linear in its four parameters. [`Stribeck`] adds what is not linear: friction that falls with speed.
+//! Linear in its four parameters. [`Stribeck`] adds the nonlinear part: friction that falls with speed.
 //! Source: B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, A survey of models, 1994.
-//! Limits: friction at rest is whatever holds the joint, up to FC; the model says 0 there.
+//! Limits: friction at rest takes any value up to FC that holds the joint; the model gives 0 there.
 
 use super::parameter::{JointParameters, Parameter};
 use crate::real::{Real, abs, exp, sign};
@@ -39,7 +39,7 @@ pub fn friction_torque<T: Real>(parameters: &JointParameters<T>, qd: T) -> T {
         + parameters[Parameter::OFF.index()]
 }
 
-/// The Stribeck effect: near standstill Coulomb friction is larger by `excess`.
+/// Stribeck effect: near standstill Coulomb friction is larger by `excess`.
 ///
 /// ```text
 /// FC(qd) = FC (1 + excess exp(-(qd / velocity)^2))
@@ -76,7 +76,7 @@ mod tests {
         joint[Parameter::FV.index()] = 1.2;
         joint[Parameter::OFF.index()] = 0.4;
         assert_eq!(friction_torque(&joint, 0.0), 0.4);
-        // 3 + 1.2 / 2 either way; one rounding each.
+        // Exactly 3 + 1.2 / 2 either way; one rounding each.
         assert!((friction_torque(&joint, 0.5) - 4.0).abs() < 1e-15);
         assert!((friction_torque(&joint, -0.5) + 3.2).abs() < 1e-15);
     }

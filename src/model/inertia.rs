@@ -1,6 +1,6 @@
-//! Mass, centre of mass and inertia of a body, and the ten parameters they become about a joint frame's origin.
+//! Mass, centre of mass and inertia of a body, and its ten parameters about a joint frame's origin.
 //!
-//! Drawings and tables give inertia about the centre of mass; torque is linear only in the inertia about the
+//! Drawings and tables give inertia about the centre of mass. Torque is linear only in the inertia about the
 //! joint's own origin. The parallel-axis theorem links the two.
 //!
 //! ```text
@@ -15,7 +15,7 @@
 //! | h | first moment of mass: HX, HY, HZ | kg m |
 //!
 //! Source: Steiner's theorem. The paper's Eq. (4) swaps the two inertias' names and the two products of c.
-//! Limits: nothing here asks whether such a body can exist; [`super::log_cholesky`] does.
+//! Limits: no test here whether such a body can exist; [`super::log_cholesky`] has it.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -28,19 +28,20 @@ pub const INERTIAL_PARAMETERS: usize = 10;
 /// XX XY XZ YY YZ ZZ HX HY HZ M about the joint frame's origin.
 pub type InertialParameters<T> = [T; INERTIAL_PARAMETERS];
 
-/// A rigid body as a drawing gives it.
+/// Rigid body in the terms of a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidBody<T> {
-    /// kg.
+    /// Mass, kg.
     pub mass: T,
-    /// In the joint's frame, m.
+    /// Centre of mass in the joint's frame, m.
     pub centre_of_mass: Vector3<T>,
     /// Tensor about the centre of mass, along the joint frame's axes, kg m2; symmetric.
     pub inertia: Matrix3<T>,
 }
 
 impl<T: Real> RigidBody<T> {
-    /// The ten parameters about the joint frame's origin. Parameters of bodies fixed to one another add up.
+    /// Computes the ten parameters about the joint frame's origin. Parameters of bodies
+    /// fixed to one another add up.
     #[must_use]
     pub fn to_parameters(&self) -> InertialParameters<T> {
         let h = self.centre_of_mass * self.mass;
@@ -59,7 +60,7 @@ impl<T: Real> RigidBody<T> {
         ]
     }
 
-    /// The body with these parameters; `None` unless the mass is finite and more than zero.
+    /// Computes the body with these parameters; `None` unless the mass is finite and positive.
     #[must_use]
     pub fn from_parameters(parameters: &InertialParameters<T>) -> Option<Self> {
         let [xx, xy, xz, yy, yz, zz, hx, hy, hz, mass] = *parameters;
@@ -78,15 +79,15 @@ fn steiner<T: Real>(c: &Vector3<T>, h: &Vector3<T>) -> Matrix3<T> {
     Matrix3::from_diagonal_element(c.dot(h)) - c * h.transpose()
 }
 
-/// The inertial part of a joint's parameters.
+/// Inertial part of a joint's parameters.
 #[must_use]
 pub fn inertial<T: Real>(parameters: &JointParameters<T>) -> InertialParameters<T> {
     let [xx, xy, xz, yy, yz, zz, hx, hy, hz, m, ..] = *parameters;
     [xx, xy, xz, yy, yz, zz, hx, hy, hz, m]
 }
 
-/// A joint's parameters from its link's inertia and its drive: rotor inertia (kg m2), Coulomb (N m), viscous
-/// (N m s/rad), offset (N m).
+/// Joins a link's inertia and its drive to a joint's parameters. The drive: rotor inertia (kg m2), Coulomb (N
+/// m), viscous (N m s/rad), offset (N m).
 #[must_use]
 pub fn joint<T: Real>(link: &InertialParameters<T>, drive: &[T; 4]) -> JointParameters<T> {
     let [xx, xy, xz, yy, yz, zz, hx, hy, hz, m] = *link;
@@ -94,7 +95,7 @@ pub fn joint<T: Real>(link: &InertialParameters<T>, drive: &[T; 4]) -> JointPara
     [xx, xy, xz, yy, yz, zz, hx, hy, hz, m, ia, fc, fv, off]
 }
 
-/// I w: the inertia tensor about the frame's origin times a vector.
+/// Product I w: the inertia tensor about the frame's origin times a vector.
 #[inline]
 pub(super) fn angular_momentum<T: Real>(parameters: &JointParameters<T>, w: &Vector3<T>) -> Vector3<T> {
     let [xx, xy, xz, yy, yz, zz, ..] = *parameters;
@@ -120,7 +121,7 @@ mod tests {
     use super::super::testing::Dice;
     use super::*;
 
-    /// Ten parameters of point masses by their definition, the integrals as sums.
+    /// Parameters of point masses by their definition, the integrals as sums.
     fn cloud(points: &[(f64, Vector3<f64>)]) -> InertialParameters<f64> {
         let sum =
             |of: &dyn Fn(&Vector3<f64>) -> f64| points.iter().map(|(mass, place)| mass * of(place)).sum();

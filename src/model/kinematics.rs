@@ -1,4 +1,4 @@
-//! How a link moves: velocities and accelerations handed from frame to frame.
+//! Motion of the links: velocities and accelerations propagated from frame to frame.
 //!
 //! Newton-Euler and the regressor need the same three vectors per link, each in the link's own frame; gravity
 //! enters as an upward acceleration of the base.
@@ -15,26 +15,28 @@
 //! | a | acceleration of its frame's origin, less gravity | m/s2 |
 //! | R, p | frame i seen from the frame before, see [`super::chain`] | -, m |
 //!
-//! Source: J. Y. S. Luh, M. W. Walker and R. P. C. Paul, 1980; link frames as in Craig 2005, Eqs (6.45)-(6.47).
+//! Source: J. Y. S. Luh, M. W. Walker and R. P. C. Paul, 1980; link frames as in
+//! Craig 2005, Eqs (6.45)-(6.47).
 //! Cost: about 70 multiplications and additions per link.
 
 use nalgebra::Vector3;
 
 use crate::real::Real;
 
-/// a x b. `nalgebra`'s own asks for its operands' shapes again at every call of a build that is to be small.
+/// Cross product a x b. `nalgebra`'s own checks its operands' shapes at every call in a size-optimised build.
 #[inline(always)]
 pub(super) fn cross<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
     Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 }
 
-/// a + b, component by component: `nalgebra`'s own is a loop over memory in a build that is to be small, 45 instructions instead of 3.
+/// Sum a + b by component. In a size-optimised build `nalgebra`'s own is a loop over memory:
+/// 45 instructions instead of 3.
 #[inline(always)]
 pub(super) fn sum<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
     Vector3::new(a.x + b.x, a.y + b.y, a.z + b.z)
 }
 
-/// s a, likewise.
+/// Product s a, for the reason given at [`sum`].
 #[inline(always)]
 pub(super) fn scaled<T: Real>(a: &Vector3<T>, s: T) -> Vector3<T> {
     Vector3::new(a.x * s, a.y * s, a.z * s)
@@ -52,7 +54,7 @@ pub(super) struct JointFrame<T> {
 }
 
 impl<T: Real> JointFrame<T> {
-    /// A vector given in the joint's frame, in the frame before it: R v = Rx(alpha) Rz(q) v.
+    /// Rotates a vector from the joint's frame to the frame before it: R v = Rx(alpha) Rz(q) v.
     #[inline(always)]
     pub fn to_parent(self, v: &Vector3<T>) -> Vector3<T> {
         let y = self.sin_q * v.x + self.cos_q * v.y;
@@ -63,7 +65,7 @@ impl<T: Real> JointFrame<T> {
         )
     }
 
-    /// A vector given in the frame before, in the joint's frame: R' v.
+    /// Rotates a vector from the frame before to the joint's frame: R' v.
     #[inline(always)]
     pub fn to_child(self, v: &Vector3<T>) -> Vector3<T> {
         let y = self.cos_alpha * v.y + self.sin_alpha * v.z;
@@ -78,16 +80,16 @@ impl<T: Real> JointFrame<T> {
 /// Motion of a link in its own frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LinkMotion<T> {
-    /// rad/s.
+    /// Angular velocity, rad/s.
     pub angular_velocity: Vector3<T>,
-    /// rad/s2.
+    /// Angular acceleration, rad/s2.
     pub angular_acceleration: Vector3<T>,
-    /// Of the frame's origin, less gravity, m/s2.
+    /// Acceleration of the frame's origin, less gravity, m/s2.
     pub acceleration: Vector3<T>,
 }
 
 impl<T: Real> LinkMotion<T> {
-    /// A base at rest under `gravity` (m/s2, base frame).
+    /// Motion of a base at rest under `gravity` (m/s2, base frame).
     #[inline]
     pub fn base(gravity: &Vector3<T>) -> Self {
         let zero = Vector3::new(T::zero(), T::zero(), T::zero());
@@ -98,7 +100,7 @@ impl<T: Real> LinkMotion<T> {
         }
     }
 
-    /// The next link's motion, across a joint that turns with `qd` (rad/s) and `qdd` (rad/s2).
+    /// Motion of the next link, across a joint with speed `qd` (rad/s) and acceleration `qdd` (rad/s2).
     #[inline(always)]
     pub fn next(&self, frame: JointFrame<T>, qd: T, qdd: T) -> Self {
         let carried = frame.to_child(&self.angular_velocity);
@@ -118,7 +120,8 @@ impl<T: Real> LinkMotion<T> {
     }
 }
 
-/// Velocity of a link per unit speed of one joint before it: a column of the link's Jacobian, in the link's frame.
+/// Velocity of a link per unit speed of one joint before it: a column of the link's
+/// Jacobian, in the link's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct JointAxis<T> {
     /// Direction of the joint's axis.
@@ -128,7 +131,7 @@ pub(super) struct JointAxis<T> {
 }
 
 impl<T: Real> JointAxis<T> {
-    /// The link's own joint: it turns about z and leaves the origin where it is.
+    /// Column for the link's own joint: it turns about z and leaves the origin at rest.
     #[inline]
     pub fn own() -> Self {
         Self {
@@ -137,7 +140,7 @@ impl<T: Real> JointAxis<T> {
         }
     }
 
-    /// The same axis in the frame of the next link.
+    /// Column of this axis in the frame of the next link.
     #[inline]
     pub fn next(&self, frame: JointFrame<T>) -> Self {
         Self {

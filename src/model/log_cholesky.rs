@@ -1,7 +1,8 @@
-//! Physical consistency: which ten numbers belong to a body that can exist, and coordinates in which all do.
+//! Physical consistency: a test for possible bodies, and coordinates in which every body is possible.
 //!
-//! Ten parameters are those of a body (positive density somewhere, negative nowhere) exactly if their pseudo-inertia
-//! is positive definite. A search that moves in log-Cholesky coordinates cannot leave that set, whatever the data.
+//! Ten parameters belong to a body (positive density somewhere, negative nowhere) exactly if
+//! their pseudo-inertia is positive definite. A search in log-Cholesky coordinates cannot leave
+//! that set, whatever the data.
 //!
 //! ```text
 //! J = | S   h |      S = tr(I)/2 E - I                    (integral of x x' dm)
@@ -20,12 +21,13 @@
 //! | s12 s23 s13 | shear of that extent | m | +-1000 |
 //! | t1 t2 t3 | centre of mass | m | +-1000 |
 //!
-//! Source: C. Rucker and P. M. Wensing, Smooth Parameterization of Rigid-Body Inertia, 2022, Eqs (9)-(11); the
-//! criterion P. M. Wensing, S. Kim and J.-J. E. Slotine, 2018. Cost: four exponentials and about 40 flops one way,
-//! 390 instructions in `f32` on a Cortex-M4F (emulated); three square roots and four logarithms the other.
-//! Limits: the ranges keep every product below 1e18, so that `f32` never overflows. In `f32` the way back from
-//! parameters loses the digits that the shift to the centre of mass cancels: a body of radius r at distance c comes
-//! back with a relative error of about 1e-7 (c/r)^2.
+//! Source: C. Rucker and P. M. Wensing, Smooth Parameterization of Rigid-Body Inertia, 2022, Eqs
+//! (9)-(11); the criterion P. M. Wensing, S. Kim and J.-J. E. Slotine, 2018. Cost: four exponentials
+//! and about 40 flops one way, 390 instructions in `f32` on a Cortex-M4F (emulated); three square roots
+//! and four logarithms the other.
+//! Limits: the ranges keep every product below 1e18, so that `f32` never overflows. In `f32` the conversion
+//! from parameters loses the digits that the shift to the centre of mass cancels. A body of radius r at
+//! distance c has a relative error of about 1e-7 (c/r)^2.
 
 use nalgebra::{Matrix4, Vector4};
 
@@ -43,7 +45,7 @@ pub const LENGTH_LIMIT_M: f64 = 1000.0;
 pub struct LogCholesky<T>(pub [T; INERTIAL_PARAMETERS]);
 
 impl<T: Real> LogCholesky<T> {
-    /// The coordinates of these parameters; `None` unless they are physically consistent.
+    /// Converts parameters to coordinates; `None` unless they are physically consistent.
     #[must_use]
     pub fn from_parameters(parameters: &InertialParameters<T>) -> Option<Self> {
         let [xx, xy, xz, yy, yz, zz, hx, hy, hz, mass] = *parameters;
@@ -64,9 +66,9 @@ impl<T: Real> LogCholesky<T> {
         Some(Self([alpha, ln(extent_x), ln(extent_y), ln(extent_z), s12, s23, s13, t1, t2, t3]))
     }
 
-    /// The parameters of these coordinates: always finite and always those of a body.
+    /// Converts coordinates to parameters: always finite and physically consistent.
     ///
-    /// Each coordinate is limited to its range first; one that is not a number counts as its lower limit.
+    /// Each coordinate is limited to its range first; NaN counts as the lower limit.
     #[must_use]
     pub fn to_parameters(&self) -> InertialParameters<T> {
         let [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] = self.0;
@@ -97,12 +99,12 @@ impl<T: Real> LogCholesky<T> {
     }
 }
 
-/// Square root of a pivot (m2) that must be more than the rounding of what it was subtracted from.
+/// Square root of a pivot (m2); `None` unless it exceeds the rounding of the number it was subtracted from.
 fn extent<T: Real>(pivot: T, whole: T) -> Option<T> {
     (pivot > max(whole, T::zero()) * T::EPSILON * T::of(4.0)).then(|| sqrt(pivot))
 }
 
-/// A body with these ten parameters can exist: mass, and extent in three directions, beyond rounding.
+/// True if a body with these parameters can exist: mass, and extent in three directions, beyond rounding.
 #[must_use]
 pub fn is_physically_consistent<T: Real>(parameters: &InertialParameters<T>) -> bool {
     LogCholesky::from_parameters(parameters).is_some()
@@ -127,7 +129,7 @@ mod tests {
     use super::super::testing::Dice;
     use super::*;
 
-    /// Greatest coordinate error after to_parameters and back, over random bodies.
+    /// Largest coordinate error after a conversion to parameters and back, over random bodies.
     fn round_trip_error<T: Real>(seed: u64) -> f64 {
         let mut dice = Dice::new(seed);
         let mut worst = 0.0_f64;
@@ -143,7 +145,7 @@ mod tests {
 
     #[test]
     fn log_cholesky_there_and_back_is_the_identity() {
-        // Down to 5 cm wide at up to 0.5 m: the shift to the centre of mass costs two to three digits.
+        // Bodies down to 5 cm wide at up to 0.5 m: the shift to the centre of mass costs two to three digits.
         let (double, single) = (round_trip_error::<f64>(51), round_trip_error::<f32>(52));
         assert!(double < 1e-12, "{double:e}");
         assert!(single < 1e-3, "{single:e}");

@@ -1,7 +1,7 @@
 //! The mass matrix: joint torque per joint acceleration.
 //!
-//! Wanted where a controller scales its gains with what it moves, and as a check: a physically consistent leg has a
-//! positive definite one at every angle.
+//! Use: a controller scales its gains with the moved inertia. Also a check: a physically consistent leg has a
+//! positive definite mass matrix at every angle.
 //!
 //! ```text
 //! M_ik = sum over links j of  u_i . (I u_k + h x v_k) + v_i . (m v_k + u_k x h)      M_ii += IA_i
@@ -13,7 +13,8 @@
 //! | I, h, m | inertia, first moment, mass of link j about its frame's origin | kg m2, kg m, kg |
 //!
 //! Source: R. Featherstone, Rigid Body Dynamics Algorithms, 2008, Eq. (6.5), with the Jacobian written out.
-//! Cost: about 60 flops per link and pair of joints before it; 210 instructions for two joints (Cortex-M4F, `f32`).
+//! Cost: about 60 flops per link and pair of joints before it; 210 instructions for
+//! two joints (Cortex-M4F, `f32`).
 
 use nalgebra::SMatrix;
 
@@ -64,7 +65,7 @@ mod tests {
     use super::super::testing::{Dice, rounded_state};
     use super::*;
 
-    /// Greatest difference between M qdd and the torque that acceleration adds, over the greatest such torque.
+    /// Largest difference between M qdd and the torque that acceleration adds, over the largest such torque.
     fn inconsistency<T: Real>(seed: u64) -> f64 {
         let mut dice = Dice::new(seed);
         let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
@@ -100,7 +101,7 @@ mod tests {
             assert_eq!(matrix, matrix.transpose());
             let smallest_rotor =
                 leg.iter().map(|joint| joint[Parameter::IA.index()]).fold(f64::MAX, f64::min);
-            // Links add to the rotors' diagonal a positive semidefinite matrix; rounding of entries up to 50.
+            // Links add a positive semidefinite matrix to the rotors' diagonal; rounding of entries up to 50.
             assert!(matrix.symmetric_eigenvalues().min() > smallest_rotor - 1e-13);
         }
     }

@@ -1,19 +1,20 @@
-//! Serial chain: what torque each joint of a leg needs for a motion, and which parameters that torque can tell.
+//! Serial chain: torque of each joint for a motion, and the parameters that this torque determines.
 //!
-//! Every room that predicts or explains torque goes through here, so the conventions are fixed once:
+//! Every module that predicts or explains torque uses this one, so the conventions are fixed once:
 //!
-//! - **Frames**: modified Denavit-Hartenberg (Khalil, Craig), see [`chain`]. Joint i turns about z of frame i.
-//! - **Parameters**: 14 per joint in the order of [`Parameter`]. The ten inertial ones are about the origin of the
-//!   joint's frame, in that frame, and inertias are ELEMENTS of the tensor (XY = -integral of x y dm).
+//! - **Frames**: modified Denavit-Hartenberg (Khalil, Craig), see [`chain`]. Joint
+//!   i turns about z of frame i.
+//! - **Parameters**: 14 per joint in the order of [`Parameter`]. The ten inertial ones are about the origin
+//!   of the joint's frame, in that frame, and inertias are ELEMENTS of the tensor (XY = -integral of x y dm).
 //! - **Gravity** is an argument: the acceleration vector in the base frame, m/s2. It turns with the trunk.
-//! - **Angles** in here are the chain's; [`anatomy`] converts from and to flexion.
+//! - **Angles** in this module are the chain's; [`anatomy`] converts from and to flexion.
 //!
 //! ```text
 //! torque = regressor(chain, q, qd, qdd, gravity) . parameters
 //! ```
 //!
-//! Everything is generic over the scalar ([`crate::real::Real`]: `f32` on the board, `f64` for reference) and the
-//! number of joints.
+//! All code is generic over the scalar ([`crate::real::Real`]: `f32` on the board, `f64` for reference) and
+//! the number of joints.
 
 pub mod anatomy;
 pub mod base;

@@ -1,8 +1,8 @@
-//! Joint torques of a chain by recursive Newton-Euler, straight from the parameters.
+//! Joint torques of a chain by recursive Newton-Euler, directly from the parameters.
 //!
-//! The independent check of the [`mod@super::regressor`], and the cheaper of the two where only torque is wanted.
-//! Forces are balanced link by link from the tip; with the parameters about the joint frame's origin no centre of
-//! mass is needed and the torque is linear in all of them.
+//! The independent check of the [`mod@super::regressor`], and cheaper where only torque is needed. Forces are
+//! balanced link by link from the tip. With the parameters about the joint frame's origin no centre of mass
+//! is needed, and the torque is linear in all of them.
 //!
 //! ```text
 //! f_i = M a + wd x h + w x (w x h) + R f_(i+1)                    h = (HX, HY, HZ)
@@ -16,9 +16,10 @@
 //! | f, n | force and moment (about the frame's origin) that link i-1 puts on link i | N, N m |
 //! | R, p | frame i+1 seen from frame i | -, m |
 //!
-//! Source: Luh, Walker and Paul 1980; this form W. Khalil and E. Dombre, Modeling, Identification and Control of
-//! Robots, 2002, Eqs (9.86)-(9.94). Cost: about 200 flops per joint; a leg's tick takes 754 instructions more with the model than without
-//! (`scripts/count-instructions`; two joints, friction and fading included). Numbers that are not finite pass through.
+//! Source: Luh, Walker and Paul 1980; this form W. Khalil and E. Dombre, Modeling, Identification and Control
+//! of Robots, 2002, Eqs (9.86)-(9.94). Cost: about 200 flops per joint; a leg's tick takes 754 instructions
+//! more with the model than without (`scripts/count-instructions`; two joints, friction and fading included).
+//! Numbers that are not finite pass through.
 
 use nalgebra::Vector3;
 
@@ -41,7 +42,7 @@ pub struct JointState<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> JointState<T, N> {
-    /// At rest at these angles (rad).
+    /// State at rest at these angles (rad).
     #[must_use]
     pub fn at_rest(q: [T; N]) -> Self {
         Self { q, qd: [T::zero(); N], qdd: [T::zero(); N] }
@@ -62,7 +63,7 @@ pub fn joint_torques<T: Real, const N: usize>(
     })
 }
 
-/// Torque of every joint, N m, that the links alone need: no rotor inertia, friction or offset.
+/// Torque of every joint for the links alone, N m: no rotor inertia, friction or offset.
 #[must_use]
 pub fn rigid_body_torques<T: Real, const N: usize>(
     chain: &Chain<T, N>,
@@ -74,7 +75,7 @@ pub fn rigid_body_torques<T: Real, const N: usize>(
     let mut motion = LinkMotion::base(gravity);
     let zero = Vector3::new(T::zero(), T::zero(), T::zero());
     let mut wrenches = [Wrench { force: zero, moment: zero }; N];
-    // Not `from_fn`: in a build that is to be small it becomes a call for each link, with its wrench through memory.
+    // Not `from_fn`: a size-optimised build would call it for each link and pass the wrench through memory.
     for (link, wrench) in wrenches.iter_mut().enumerate() {
         motion = motion.next(frames[link], state.qd[link], state.qdd[link]);
         *wrench = Wrench::of_link(&parameters[link], &motion);
@@ -98,7 +99,7 @@ struct Wrench<T> {
 }
 
 impl<T: Real> Wrench<T> {
-    /// What the link's own mass needs.
+    /// Wrench that the link's own mass needs.
     #[inline(always)]
     fn of_link(parameters: &JointParameters<T>, motion: &LinkMotion<T>) -> Self {
         let (w, wd, a) = (motion.angular_velocity, motion.angular_acceleration, motion.acceleration);
@@ -130,7 +131,7 @@ mod tests {
     use super::super::testing::Dice;
     use super::*;
 
-    /// Positions of each link's origin and orientation, from the angles alone (no velocities of this room).
+    /// Origin and orientation of each link from the angles alone, without the velocities of this module.
     fn poses<const N: usize>(
         chain: &Chain<f64, N>,
         q: &[f64; N],
@@ -149,8 +150,8 @@ mod tests {
         })
     }
 
-    /// Kinetic plus potential energy at a time on a parabola through the state: masses at rest and in motion as seen
-    /// from the base, velocities by differences of poses.
+    /// Kinetic plus potential energy at a time on a parabola through the state. Masses at rest and in motion
+    /// as seen from the base, velocities by differences of poses.
     fn energy<const N: usize>(
         chain: &Chain<f64, N>,
         leg: &LegParameters<f64, N>,

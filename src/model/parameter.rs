@@ -7,16 +7,16 @@ use crate::real::Real;
 /// Parameters of one joint: ten of the link's inertia, rotor inertia, three of friction.
 pub const PARAMETERS_PER_JOINT: usize = 14;
 
-/// The parameters of one joint in the order of [`Parameter`].
+/// Parameters of one joint in the order of [`Parameter`].
 pub type JointParameters<T> = [T; PARAMETERS_PER_JOINT];
 
-/// The parameters of all joints, proximal first.
+/// Parameters of all joints, proximal first.
 pub type LegParameters<T, const N: usize> = [JointParameters<T>; N];
 
-/// What one torque owes to each parameter of each joint: the derivative of the torque by that parameter.
+/// Derivative of one torque by each parameter of each joint.
 pub type RegressorRow<T, const N: usize> = [JointParameters<T>; N];
 
-/// One of the parameters of a joint; the discriminant is its place in [`JointParameters`].
+/// One of the parameters of a joint; the discriminant is its index in [`JointParameters`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Parameter {
@@ -51,7 +51,7 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// All of them, in order.
+    /// All parameters, in order.
     pub const ALL: [Self; PARAMETERS_PER_JOINT] = [
         Self::XX,
         Self::XY,
@@ -69,13 +69,13 @@ impl Parameter {
         Self::OFF,
     ];
 
-    /// Place in [`JointParameters`], 0..14.
+    /// Index in [`JointParameters`], 0..14.
     #[must_use]
     pub const fn index(self) -> usize {
         self as usize
     }
 
-    /// The symbol used in reports and files.
+    /// Symbol used in reports and files.
     #[must_use]
     pub const fn symbol(self) -> &'static str {
         match self {
@@ -96,13 +96,13 @@ impl Parameter {
         }
     }
 
-    /// Of a leg that can exist this is never below zero, regrouped or not.
+    /// True if no physically consistent leg has a negative value of it, regrouped or not.
     #[must_use]
     pub const fn is_never_negative(self) -> bool {
         matches!(self, Self::ZZ | Self::M | Self::IA | Self::FC | Self::FV)
     }
 
-    /// The unit, in ASCII.
+    /// Unit, in ASCII.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -115,7 +115,7 @@ impl Parameter {
     }
 }
 
-/// Parameters from double precision, each rounded once.
+/// Converts parameters from double precision, each rounded once.
 #[must_use]
 pub fn rounded<T: Real, const N: usize>(parameters: &LegParameters<f64, N>) -> LegParameters<T, N> {
     parameters.map(|joint| joint.map(T::of))

@@ -1,8 +1,8 @@
-//! A point mass fixed to a link: what it adds to the parameters.
+//! A point mass fixed to a link, and its contribution to the parameters.
 //!
-//! Why: a known load need not be identified again. Parameters of bodies fixed to one another add up, so a load is put on
-//! and taken off a model by one addition, and a load of known mass is the yardstick that torque constants are measured
-//! with ([`crate::ident::scale`]).
+//! Why: a known load needs no new identification. Parameters of bodies fixed to one another add up, so one
+//! addition puts a load on a model or takes it off. A load of known mass is also the reference for torque
+//! constants ([`crate::ident::scale`]).
 //!
 //! ```text
 //! delta: M = m     H = m r     I = m (r.r E - r r')      about the origin of the link's joint frame
@@ -11,11 +11,11 @@
 //! | symbol | meaning | unit |
 //! | --- | --- | --- |
 //! | m | mass; negative to take a load off | kg |
-//! | r | its place in the link's joint frame | m |
+//! | r | position in the link's joint frame | m |
 //!
-//! Source: Steiner's theorem with no inertia of its own. Cost: 20 multiplications. Limits: a load of some size has an
-//! inertia of its own, m k^2 with k its radius of gyration; at r = 0.2 m a disc of 0.1 m radius (k = 0.05 m about its
-//! diameter) has 6 % of m r^2.
+//! Source: Steiner's theorem with no inertia of its own. Cost: 20 multiplications. Limits: a load of some
+//! size has an inertia of its own, m k^2 with k its radius of gyration. At r = 0.2 m a disc of 0.1 m radius
+//! (k = 0.05 m about its diameter) has 6 % of m r^2.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -26,16 +26,16 @@ use crate::real::Real;
 /// A point mass on a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Payload<T> {
-    /// The joint whose link carries it, from 0.
+    /// Joint of the link that carries it, from 0.
     pub joint: usize,
-    /// kg.
+    /// Mass, kg.
     pub mass: T,
-    /// In the joint's frame, m.
+    /// Position in the joint's frame, m.
     pub place: Vector3<T>,
 }
 
 impl<T: Real> Payload<T> {
-    /// What it adds to the parameters of a leg; nothing where there is no such joint.
+    /// Contribution to the parameters of a leg; zero for a joint that does not exist.
     #[must_use]
     pub fn parameters<const N: usize>(&self) -> LegParameters<T, N> {
         let mut parameters = [[T::zero(); PARAMETERS_PER_JOINT]; N];
@@ -48,7 +48,7 @@ impl<T: Real> Payload<T> {
         parameters
     }
 
-    /// The same payload in another precision.
+    /// Converts to another precision.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Payload<U> {
         Payload {
@@ -58,7 +58,7 @@ impl<T: Real> Payload<T> {
         }
     }
 
-    /// The parameters of a leg that carries it beside what it carried before.
+    /// Adds the payload to the parameters of a leg.
     pub fn add_to<const N: usize>(&self, parameters: &mut LegParameters<T, N>) {
         let delta = self.parameters::<N>();
         for (value, added) in parameters.iter_mut().flatten().zip(delta.iter().flatten()) {
@@ -75,8 +75,8 @@ mod tests {
 
     #[test]
     fn a_point_mass_adds_the_torque_of_its_own_motion() {
-        // Torque of a point mass by d'Alembert: its weight and its inertia force through the Jacobian, both by
-        // differences of its place, without any tensor.
+        // Torque of a point mass by d'Alembert: its weight and its inertia force through the Jacobian, both
+        // by differences of its position, without any tensor.
         let (mut dice, chain) = (Dice::new(91), paper_chain::<f64>());
         let gravity = Vector3::new(0.3, -0.2, -9.7);
         for joint in 0..3 {

@@ -1,11 +1,12 @@
 //! The regressor: the matrix that turns parameters into torques for one state of motion.
 //!
-//! Identification rests on torque being linear in the parameters. Row i holds, for every link j, the derivative of
-//! torque i by the 14 parameters of joint j; it is zero for j < i, since a link does not load the joints beyond it.
+//! Identification relies on torque being linear in the parameters. Row i holds, for every link j, the
+//! derivative of torque i by the 14 parameters of joint j. It is zero for j < i, since a link does not load
+//! the joints beyond it.
 //!
-//! Instead of carrying a 6 x 10 wrench matrix of each link down the chain, the axis of joint i is carried up to the
-//! link (u, v: the link's angular and origin velocity per unit speed of joint i). Torque i is the power of link j's
-//! wrench along (u, v):
+//! A 6 x 10 wrench matrix of each link carried down the chain would be costly. Instead the axis of joint i is
+//! carried up to the link (u, v: the link's angular and origin velocity per unit speed of joint i). Torque i
+//! is the power of link j's wrench along (u, v):
 //!
 //! ```text
 //! row_ij . parameters_j = u . (I wd + w x I w + h x a) + v . (M a + wd x h + w x (w x h))
@@ -21,9 +22,11 @@
 //! | u, v | axis of joint i seen from link j | -, m |
 //! | I, h, M | inertia tensor, first moment, mass of link j | kg m2, kg m, kg |
 //!
-//! Source: C. G. Atkeson, C. H. An and J. M. Hollerbach 1986 (linear form); the axes are the Jacobian's columns.
+//! Source: C. G. Atkeson, C. H. An and J. M. Hollerbach 1986 (linear form); the
+//! axes are the Jacobian's columns.
 //! Cost: about 90 flops per pair (i, j) and 90 per link; 1,550 instructions for two joints in `f32` on a
-//! Cortex-M4F (emulated), 95 for a row times the parameters. Memory: 56 N^2 bytes in `f32`. Numbers that are not finite pass through.
+//! Cortex-M4F (emulated), 95 for a row times the parameters. Memory: 56 N^2 bytes in `f32`. Numbers that are
+//! not finite pass through.
 
 use nalgebra::Vector3;
 
@@ -84,7 +87,7 @@ fn inertial_columns<T: Real>(axis: &JointAxis<T>, motion: &LinkMotion<T>) -> Ine
     ]
 }
 
-/// A regressor row times the parameters: the torque of its joint, N m.
+/// Product of a regressor row and the parameters: the torque of its joint, N m.
 #[inline]
 #[must_use]
 pub fn row_torque<T: Real, const N: usize>(row: &RegressorRow<T, N>, parameters: &LegParameters<T, N>) -> T {
@@ -104,7 +107,8 @@ mod tests {
     use super::super::testing::{Dice, rounded_state};
     use super::*;
 
-    /// Greatest difference of regressor times parameters and Newton-Euler over random legs, over the greatest torque.
+    /// Largest difference of regressor times parameters and Newton-Euler over random
+    /// legs, over the largest torque.
     fn identity_error<T: Real, const N: usize>(seed: u64) -> f64 {
         let mut dice = Dice::new(seed);
         let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
@@ -122,7 +126,8 @@ mod tests {
 
     #[test]
     fn regressor_times_parameters_equals_newton_euler() {
-        // 42 products and three frames of rounding: a few tens of units in the last place of the greatest torque.
+        // 42 products and three frames of rounding: a few tens of units in the
+        // last place of the largest torque.
         for error in [identity_error::<f64, 1>(1), identity_error::<f64, 2>(2), identity_error::<f64, 3>(3)] {
             assert!(error < 1e-14, "{error:e}");
         }
@@ -147,7 +152,8 @@ mod tests {
                 largest = largest.max(other.abs());
             }
         }
-        // Angles up to pi are off by 1.2e-7, and centripetal terms square and add what three frames carry.
+        // Angles up to pi are off by 1.2e-7; centripetal terms square and add the
+        // errors that three frames carry.
         assert!(worst < 2e-6 * largest, "{:e}", worst / largest);
     }
 

@@ -1,4 +1,4 @@
-//! Random chains, legs and motions for the tests of this room, from fixed seeds.
+//! Random chains, legs and motions for this module's tests, from fixed seeds.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
@@ -18,7 +18,7 @@ pub fn down_along_x<T: Real>() -> Vector3<T> {
     Vector3::new(T::of(9.81), T::zero(), T::zero())
 }
 
-/// A leg's numbers in double precision, and their images in another.
+/// Random generator of chains, legs and motions, in double precision.
 pub struct Dice(Xoshiro128PlusPlus);
 
 impl Dice {
@@ -52,7 +52,8 @@ impl Dice {
         Vector3::new(self.within(9.81), self.within(9.81), self.within(9.81))
     }
 
-    /// Coordinates of a body of 0.4 to 20 kg, a few centimetres to decimetres wide, up to 0.3 m from the origin.
+    /// Coordinates of a body of 0.4 to 20 kg, a few centimetres to decimetres wide,
+    /// up to 0.3 m from the origin.
     pub fn body(&mut self) -> LogCholesky<f64> {
         let mut body = [0.0; 10];
         body[0] = 0.5 + self.within(1.0);

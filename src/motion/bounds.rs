@@ -1,7 +1,8 @@
-//! Bounds of a motion that are proved from its coefficients, and the witness that they lie within limits.
+//! Proven bounds of a motion from its coefficients, and the proof that they lie within limits.
 //!
-//! Sampling a curve misses its peaks; summing its amplitudes overstates them. Both together are tight and certain.
-//! At a peak of f the slope vanishes, and the nearest of M points of a grid is at most pi/M away, so by Taylor
+//! Sampling a curve misses its peaks; summing its amplitudes overstates them. Both together are
+//! tight and certain. At a peak of f the slope vanishes, and the nearest of M points of a grid is at
+//! most pi/M away, so by Taylor
 //!
 //! ```text
 //! max f <= max over the grid + (pi/M)^2 / 2 * sum_k k^2 A_k            A_k = sqrt(s_k^2 + c_k^2)
@@ -17,10 +18,9 @@ use super::Fourier;
 use crate::real::{abs, max, min, sqrt};
 use crate::units::{Radian, RadianPerSecond, RadianPerSecondSquared};
 
-/// Grid points per harmonic.
 const POINTS_PER_HARMONIC: usize = 64;
 
-/// What one joint may do, or what it is proved to do at most.
+/// Limits or proven bounds of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointEnvelope {
     /// Smallest angle.
@@ -33,7 +33,7 @@ pub struct JointEnvelope {
     pub acceleration: RadianPerSecondSquared,
 }
 
-/// The quantity by which a motion leaves its limits.
+/// Quantity that exceeds its limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// The smallest angle, rad.
@@ -46,34 +46,34 @@ pub enum Quantity {
     Acceleration,
 }
 
-/// The first joint and quantity by which a motion cannot be shown to stay within limits.
+/// First joint and quantity that cannot be proven to stay within limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitViolation {
-    /// Counted from 0.
+    /// Joint, counted from 0.
     pub joint: usize,
-    /// What is exceeded.
+    /// Exceeded quantity.
     pub quantity: Quantity,
-    /// What the motion may reach, in the quantity's unit.
+    /// Bound of the motion, in the quantity's unit.
     pub bound: f32,
-    /// What is allowed, in the quantity's unit.
+    /// Limit, in the quantity's unit.
     pub limit: f32,
 }
 
-/// Witness that a motion stays within the limits it was held against.
+/// Proof that a motion stays within the limits it was compared with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proof<const N: usize> {
     envelope: [JointEnvelope; N],
 }
 
 impl<const N: usize> Proof<N> {
-    /// The motion's own bounds.
+    /// Bounds of the motion itself.
     #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         self.envelope
     }
 }
 
-/// Holds bounds against limits; what is not a number is a violation.
+/// Compares bounds with limits; NaN is a violation.
 pub fn prove<const N: usize>(
     envelope: [JointEnvelope; N],
     limits: &[JointEnvelope; N],
@@ -101,7 +101,7 @@ pub fn prove<const N: usize>(
 }
 
 impl<const N: usize, const H: usize> Fourier<N, H> {
-    /// Proved bounds of the curve at full speed; see the module's inequality.
+    /// Proven bounds of the curve at full speed; see the module's inequality.
     #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         let points = POINTS_PER_HARMONIC * H.max(1);
@@ -122,7 +122,7 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
         core::array::from_fn(|joint| {
             let sums = self.amplitude_sums(joint);
             let slack = |order: usize| {
-                // The angle is rounded by up to 2 pi eps, each harmonic by some 2 eps, each sum by H eps.
+                // Rounding: the angle by up to 2 pi eps, each harmonic by some 2 eps, each sum by H eps.
                 let rounding = f32::EPSILON * (8.0 + 4.0 * H as f32) * (sums[order] + sums[order + 1]);
                 0.5 * half_step * half_step * sums[order + 2] + rounding
             };
@@ -157,7 +157,7 @@ mod tests {
     use super::super::{MotionState, Phase};
     use super::*;
 
-    /// Densest extremes of one joint over a period: low, high, speed, acceleration.
+    /// Extremes of one joint on a dense grid over a period: low, high, speed, acceleration.
     fn sampled(state: impl Fn(f32) -> MotionState<2>, joint: usize) -> [f32; 4] {
         let mut extremes = [f32::INFINITY, f32::NEG_INFINITY, 0.0, 0.0];
         for point in 0..20_000 {

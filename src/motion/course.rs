@@ -1,53 +1,56 @@
-//! One joint's way from tick to tick towards a target that may change at any time.
+//! Course of one joint, tick by tick, towards a target that may change at any time.
 //!
-//! Why beside [`Motion`](super::Motion): a host that commands tick by tick gives no motion that could be proved beforehand, only
-//! where to go next. So the course is led on by one tick at a time, with bounded speed and acceleration, from wherever it is.
+//! Why beside [`Motion`](super::Motion): a host that commands every tick gives no motion that could
+//! be proven in advance. Each tick therefore extends the course from its present state, with
+//! bounded speed and acceleration.
 //!
 //! ```text
-//! to a position   v' = v moved towards +-min(speed, s(d), |d| / T) by at most acceleration T, or deceleration T where it slows
+//! to a position   v' = v moved towards +-min(speed, s(d), |d| / T), by at most acceleration T,
+//!                 or deceleration T while slowing down
 //!                 s(d) = sqrt((b/2)^2 + 2 deceleration |d|) - b/2,   b = deceleration T
-//! to a velocity   v' = v moved towards the target likewise; never faster towards an end of the range than s(its distance)
+//! to a velocity   v' = v moved towards the target likewise; near an end of the range at most s(its distance)
 //! interpolated    v' = (target - q) / (n T), n ticks of the period left, at most speed
 //! always          q' = q + T v'
 //! ```
 //!
-//! `d` the distance to the target, rad; `T` a tick; `s` the greatest speed from which whole ticks of braking end at the target, so
-//! a target that could be reached by braking is overshot by a tick of it at most. The sum over the ticks is compensated (W. Kahan, "Further remarks on
-//! reducing truncation errors", CACM 8, 1965): at 0.001 rad/s a tick moves by two units in the last place of 1 rad.
+//! Here `d` is the distance to the target, rad, and `T` a tick. The speed `s` is the largest from which whole
+//! ticks of braking end at the target. A target that braking can reach is therefore overshot by at most one
+//! tick of braking. The sum over the ticks is compensated (W. Kahan, "Further remarks on reducing truncation
+//! errors", CACM 8, 1965): at 0.001 rad/s a tick moves by two units in the last place of 1 rad.
 //!
 //! Cost: a square root and some 20 operations; two square roots to a velocity.
 
 use crate::real::{abs, clamp, max, min, sqrt};
 
-/// How fast a course may become, rad/s, and how fast it may get there, rad/s^2; all positive.
+/// Limits of a course's speed, rad/s, and acceleration, rad/s^2; all positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rates {
-    /// Greatest speed.
+    /// Largest speed.
     pub speed: f32,
-    /// While it becomes faster.
+    /// Acceleration while speeding up.
     pub acceleration: f32,
-    /// While it becomes slower.
+    /// Acceleration while slowing down.
     pub deceleration: f32,
 }
 
-/// Where one joint is commanded to be, and how it moves there; rad and s.
+/// Commanded position and motion of one joint; rad and s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Course {
     position: f32,
-    /// What the sum over the ticks has lost.
+    /// Rounding error of the sum over the ticks.
     lost: f32,
     velocity: f32,
     acceleration: f32,
 }
 
 impl Course {
-    /// Standing still.
+    /// Course at rest.
     #[must_use]
     pub const fn at_rest(position: f32) -> Self {
         Self::moving(position, 0.0)
     }
 
-    /// Moving.
+    /// Course in motion.
     #[must_use]
     pub const fn moving(position: f32, velocity: f32) -> Self {
         Self { position, lost: 0.0, velocity, acceleration: 0.0 }
@@ -71,7 +74,7 @@ impl Course {
         self.acceleration
     }
 
-    /// Both together.
+    /// Sum of two courses.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
         Self {
@@ -82,22 +85,22 @@ impl Course {
         }
     }
 
-    /// The same course with another zero.
+    /// Moves the zero of the position.
     pub fn shift(&mut self, by: f32) {
         self.position += by;
     }
 
-    /// No farther than `window` from `place`.
+    /// Limits the position to at most `window` from `place`.
     pub fn keep_within(&mut self, window: f32, place: f32) {
         self.position = clamp(self.position, place - window, place + window);
     }
 
-    /// One tick towards a position.
+    /// Moves one tick towards a position.
     pub fn approach(&mut self, target: f32, rates: &Rates, tick_s: f32) {
-        // Near the target what the sum has lost is as large as the last steps.
+        // Near the target the lost part of the sum is as large as the last steps.
         let distance = (target - self.position) + self.lost;
         let size = abs(distance);
-        // Within one tick of braking it lands; whole ticks end up to that far beyond.
+        // Within one tick of braking the course lands; whole ticks end up to that far beyond.
         let brake = rates.deceleration * tick_s;
         let speed = abs(self.velocity);
         if speed <= 1.001 * brake && size <= 1.2 * max(speed, brake) * tick_s {
@@ -108,18 +111,18 @@ impl Course {
         self.change(if distance < 0.0 { -speed } else { speed }, rates, tick_s);
     }
 
-    /// One tick towards a velocity that ends at the ends of a range.
+    /// Moves one tick towards a velocity; stops at the ends of a range.
     pub fn accelerate(&mut self, target: f32, rates: &Rates, range: [f32; 2], tick_s: f32) {
         let wanted = self.within(clamp(target, -rates.speed, rates.speed), rates, range, tick_s);
         self.change(wanted, rates, tick_s);
     }
 
-    /// One tick of the `left` that lead to a position.
+    /// Moves one tick of the `left` ticks that lead to a position.
     pub fn interpolate_position(&mut self, target: f32, left: u32, speed: f32, tick_s: f32) {
         let before = self.velocity;
         let ticks = left.max(1) as f32;
         let velocity = clamp((target - self.position) / (ticks * tick_s), -speed, speed);
-        // A velocity per period is a staircase; its acceleration is that of the whole period.
+        // A constant velocity per period is a staircase; its acceleration is that of the whole period.
         self.acceleration =
             if velocity == before { self.acceleration } else { (velocity - before) / (ticks * tick_s) };
         if left == 0 {
@@ -128,7 +131,7 @@ impl Course {
         self.advance(velocity, tick_s);
     }
 
-    /// One tick of the `left` that lead to a velocity; ends at the ends of a range.
+    /// Moves one tick of the `left` ticks that lead to a velocity; stops at the ends of a range.
     pub fn interpolate_velocity(
         &mut self,
         target: f32,
@@ -144,7 +147,7 @@ impl Course {
         self.advance(velocity, tick_s);
     }
 
-    /// The velocity from which it can still stop in the range.
+    /// Limits a velocity so that the course can still stop in the range.
     fn within(&self, velocity: f32, rates: &Rates, [low, high]: [f32; 2], tick_s: f32) -> f32 {
         let up = stopping_speed(max(high - self.position, 0.0), rates, tick_s);
         let down = stopping_speed(max(self.position - low, 0.0), rates, tick_s);
@@ -168,7 +171,7 @@ impl Course {
     }
 }
 
-/// `s` of the module.
+/// Speed `s` of the module's equations.
 fn stopping_speed(distance: f32, rates: &Rates, tick_s: f32) -> f32 {
     let half = 0.5 * rates.deceleration * tick_s;
     sqrt(half * half + 2.0 * rates.deceleration * distance) - half
@@ -190,7 +193,7 @@ mod tests {
                 let before = course.velocity();
                 course.approach(target, &RATES, TICK_S);
                 let change = (course.velocity().abs() - before.abs()) / TICK_S;
-                // The last step lands with what is left.
+                // The last step covers the remaining distance.
                 let lands = course == Course::at_rest(target);
                 assert!(lands || (-8.01..=4.001).contains(&change), "{change}");
                 (ticks, fastest) = (ticks + 1, fastest.max(course.velocity().abs()));
@@ -206,7 +209,7 @@ mod tests {
                 "{target}: {ticks} {time}"
             );
             assert!(fastest <= 1.0 && fastest > 0.9 * peak - 8.0 * TICK_S, "{fastest} {peak}");
-            // A tick of braking: 8 T^2.
+            // One tick of braking: 8 T^2.
             assert!(farthest <= 6e-7, "{farthest}");
         }
     }
@@ -264,7 +267,7 @@ mod tests {
             assert!((course.position() - target).abs() < 2e-7);
             assert!((course.velocity() - 0.5).abs() < 1e-3);
         }
-        // A jump is followed at the greatest speed, and nothing goes on once the host is silent.
+        // A jump is followed at the largest speed, and all motion ends once the host is silent.
         for _ in 0..8 {
             course.interpolate_position(1.0, 0, 3.0, TICK_S);
         }

@@ -1,7 +1,7 @@
 //! A periodic curve of `N` joints as a Fourier series of `H` harmonics.
 //!
-//! Why: a band-limited periodic excitation can be averaged over its periods, its derivatives are exact, and its
-//! bounds follow from its coefficients.
+//! Why: a band-limited periodic excitation can be averaged over its periods, its derivatives are exact, and
+//! its bounds follow from its coefficients.
 //!
 //! ```text
 //! q(theta)   = q0 + sum_k  s_k sin(k theta) + c_k cos(k theta)          k = 1..H
@@ -10,20 +10,20 @@
 //! theta = w t,   w = 2 pi / period,   s_k = a_k / (k w),   c_k = -b_k / (k w)
 //! ```
 //!
-//! `q0` rad, any; `s_k`, `c_k` amplitudes in rad; `a_k`, `b_k` the velocity coefficients in rad/s of
-//! J. Swevers et al., "Optimal robot excitation and identification", IEEE Trans. Robotics and Automation 13 (1997),
-//! equation 9. The amplitudes are kept, not the velocity coefficients: a curve then keeps its shape and range when
-//! its period is changed.
+//! `q0` rad, any; `s_k`, `c_k` amplitudes in rad; `a_k`, `b_k` the velocity coefficients in rad/s of J.
+//! Swevers et al., "Optimal robot excitation and identification", IEEE Trans. Robotics and Automation 13
+//! (1997), equation 9. The amplitudes are stored, not the velocity coefficients. A curve then keeps its shape
+//! and range when its period changes.
 //!
-//! Cost of one evaluation: one [`sin_cos`], 4 H multiplications for the harmonics by the addition theorem and 6 H
-//! per joint, about 300 instructions for two joints and six harmonics; no division. The addition
-//! theorem loses about two units in the last place per harmonic.
+//! Cost of one evaluation: one [`sin_cos`], 4 H multiplications for the harmonics by the addition theorem and
+//! 6 H per joint, about 300 instructions for two joints and six harmonics; no division. The addition theorem
+//! loses about two units in the last place per harmonic.
 
 use super::{MotionError, MotionState, Phase};
 use crate::real::{is_finite, sin_cos};
 use crate::units::{Radian, Second};
 
-/// Harmonics of the gait, and of an excitation unless said otherwise.
+/// Harmonics of the gait, and the default number for an excitation.
 pub const HARMONICS: usize = 6;
 
 const TURN_RAD: f32 = core::f32::consts::TAU;
@@ -46,7 +46,7 @@ pub(super) struct Shape<const N: usize> {
 }
 
 impl<const N: usize, const H: usize> Fourier<N, H> {
-    /// From amplitudes `s_k`, `c_k` in rad, lowest harmonic first.
+    /// Builds a curve from amplitudes `s_k`, `c_k` in rad, lowest harmonic first.
     pub fn new(
         period: Second,
         centre_rad: [f32; N],
@@ -64,7 +64,7 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
         curve.with_period(period)
     }
 
-    /// From velocity coefficients `a_k`, `b_k` in rad/s, lowest harmonic first.
+    /// Builds a curve from velocity coefficients `a_k`, `b_k` in rad/s, lowest harmonic first.
     pub fn from_velocity_coefficients(
         period: Second,
         centre_rad: [f32; N],
@@ -80,7 +80,7 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
         Self::new(period, centre_rad, amplitude(a_rad_per_s, 1.0), amplitude(b_rad_per_s, -1.0))
     }
 
-    /// The same path at another pace.
+    /// Returns a curve with this path and another period.
     pub fn with_period(self, period: Second) -> Result<Self, MotionError> {
         if !(period.0 > 0.0 && is_finite(period.0) && is_finite(TURN_RAD / period.0)) {
             return Err(MotionError::Period);
@@ -88,7 +88,7 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
         Ok(Self { period_s: period.0, angular_frequency_rad_per_s: TURN_RAD / period.0, ..self })
     }
 
-    /// Every joint's angle replaced by `scale * angle + offset`: anatomical to D-H angles, or into another range.
+    /// Maps each joint's angle to `scale * angle + offset`: anatomical to D-H angles, or into another range.
     pub fn mapped(self, scale: [f32; N], offset: [Radian; N]) -> Result<Self, MotionError> {
         let scaled = |amplitudes: [[f32; H]; N]| {
             core::array::from_fn(|joint| amplitudes[joint].map(|amplitude| scale[joint] * amplitude))
@@ -103,19 +103,19 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
         Second(self.period_s)
     }
 
-    /// `q0` of every joint, rad.
+    /// Centre `q0` of every joint, rad.
     #[must_use]
     pub fn centre_rad(&self) -> [f32; N] {
         self.centre_rad
     }
 
-    /// `s_k` of every joint, rad.
+    /// Amplitudes `s_k` of every joint, rad.
     #[must_use]
     pub fn sine_rad(&self) -> [[f32; H]; N] {
         self.sine_rad
     }
 
-    /// `c_k` of every joint, rad.
+    /// Amplitudes `c_k` of every joint, rad.
     #[must_use]
     pub fn cosine_rad(&self) -> [[f32; H]; N] {
         self.cosine_rad
@@ -125,8 +125,8 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
         self.angular_frequency_rad_per_s
     }
 
-    /// Position, velocity and acceleration where the phase is `phase.turn` and runs as `phase` says:
-    /// `qd = q' w v`, `qdd = q'' (w v)^2 + q' w v'` with the phase's relative speed `v`.
+    /// Position, velocity and acceleration at a phase: `qd = q' w v`, `qdd = q'' (w v)^2 + q' w v'` with the
+    /// phase's relative speed `v`.
     #[must_use]
     pub fn state_at(&self, phase: &Phase) -> MotionState<N> {
         let shape = self.shape_at(phase.turn);
@@ -144,7 +144,7 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
     pub(super) fn shape_at(&self, turn: f32) -> Shape<N> {
         let (sine, cosine) = sin_cos(turn * TURN_RAD);
         let mut shape = Shape { value: self.centre_rad, slope: [0.0; N], curvature: [0.0; N] };
-        // Joint by joint, so that its three sums stay in registers.
+        // Joint by joint, so that the three sums stay in registers.
         for joint in 0..N {
             let (mut value, mut slope, mut curvature) = (shape.value[joint], 0.0, 0.0);
             let (mut sine_k, mut cosine_k, mut order) = (sine, cosine, 1.0);
@@ -168,12 +168,12 @@ pub(super) mod tests {
     use rand_core::{Rng, SeedableRng};
     use rand_xoshiro::Xoshiro128PlusPlus;
 
-    /// Uniform in -1..=1.
+    /// Uniform number in -1..=1.
     pub(in crate::motion) fn symmetric(random: &mut Xoshiro128PlusPlus) -> f32 {
         random.next_u32() as f32 / u32::MAX as f32 * 2.0 - 1.0
     }
 
-    /// Amplitudes that fall with the order, as an excitation's do.
+    /// Random curve with amplitudes that fall with the order, as an excitation's do.
     pub(in crate::motion) fn random_curve(seed: u64) -> Fourier<2, 6> {
         let mut random = Xoshiro128PlusPlus::seed_from_u64(seed);
         let mut amplitudes = || {
@@ -183,7 +183,7 @@ pub(super) mod tests {
         Fourier::new(Second(10.0), [0.4, -0.7], sine, cosine).expect("finite amplitudes")
     }
 
-    /// The module's first equation in double precision.
+    /// First equation of the module in double precision.
     pub(in crate::motion) fn position_in_double(curve: &Fourier<2, 6>, joint: usize, turn: f64) -> f64 {
         let mut position = f64::from(curve.centre_rad[joint]);
         for harmonic in 0..6 {
@@ -205,12 +205,14 @@ pub(super) mod tests {
                 let turn = f64::from(turn);
                 for joint in 0..2 {
                     let position = |turn| position_in_double(&curve, joint, turn);
-                    // Central differences of h = 1e-4 turns err by h^2/6 q''' (1e-6 here) and 1e-16/h^2 (1e-8).
+                    // Central differences of h = 1e-4 turns err by h^2/6 q'''
+                    // (1e-6 here) and 1e-16/h^2 (1e-8).
                     let h = 1e-4;
                     let velocity = (position(turn + h) - position(turn - h)) / (2.0 * h * period);
                     let acceleration = (position(turn + h) - 2.0 * position(turn) + position(turn - h))
                         / (h * h * period * period);
-                    // f32: 6 harmonics of up to 0.3 rad, orders squared up to 36: a few units of 1e-6.
+                    // Rounding in f32: 6 harmonics of up to 0.3 rad, orders squared
+                    // up to 36: a few units of 1e-6.
                     assert!((f64::from(state.position_rad[joint]) - position(turn)).abs() < 2e-6);
                     assert!((f64::from(state.velocity_rad_per_s[joint]) - velocity).abs() < 1e-5);
                     assert!((f64::from(state.acceleration_rad_per_s2[joint]) - acceleration).abs() < 3e-5);

@@ -1,6 +1,6 @@
 //! The walking pattern of the paper, repaired, closed and written as a Fourier curve.
 //!
-//! Why not the printed equations: they do not stay in the range the paper states, they are not periodic, and the
+//! Why not the printed equations: they leave the range that the paper states, they are not periodic, and the
 //! knee's reaches 625 degrees. Tian et al. print, for the flexion in degrees at `t` per cent of the cycle,
 //!
 //! ```text
@@ -8,19 +8,20 @@
 //! (32)  knee = -5089 e^-((t-76.25)/13.44)^2 + 5677 e^-((t-75.76)/12.88)^2 + 5.3288 e^-((t-19.74)/23.41)^2
 //! ```
 //!
-//! What is used instead, step by step:
+//! The repair, step by step:
 //!
-//! 1. 508.9 and 567.7 for 5089 and 5677: the knee then spans 75.6 degrees and a 6.5 s cycle accelerates it by
-//!    5.4 rad/s^2 at 4.8 s, which the paper reports as 5.2 rad/s^2 at 4.8 s.
-//! 2. Closed: the jump from 100 % back to 0 (hip -15.0, knee -8.6 degrees) is taken out as a straight line through
-//!    the middle of the cycle, which moves no point by more than half of it.
-//! 3. The Fourier series of the closed curve up to the sixth harmonic. It stays within 0.70 (hip) and 0.72 degrees
-//!    (knee) of the closed curve, farthest at the kink where the cycle closes.
-//! 4. An offset, 25.0 and 23.7 degrees, that puts each joint into the middle of the paper's working range of
-//!    2.17..50.18 (hip) and 6.85..95.53 degrees (knee). It then spans 15.0..37.4 and 14.3..88.2 degrees.
+//! 1. Use 508.9 and 567.7 for 5089 and 5677: the knee then spans 75.6 degrees, and a 6.5 s cycle accelerates
+//!    it by 5.4 rad/s^2 at 4.8 s, which the paper reports as 5.2 rad/s^2 at 4.8 s.
+//! 2. Close the curve: a straight line through the middle of the cycle removes the jump from 100 % back to 0
+//!    (hip -15.0, knee -8.6 degrees). No point moves by more than half of the jump.
+//! 3. Take the Fourier series of the closed curve up to the sixth harmonic. The series stays within 0.70
+//!    (hip) and 0.72 degrees (knee) of the closed curve, farthest at the kink where the cycle closes.
+//! 4. Add an offset, 25.0 and 23.7 degrees, that puts each joint into the middle of the paper's
+//!    working range of 2.17..50.18 (hip) and 6.85..95.53 degrees (knee). The joints then span
+//!    15.0..37.4 and 14.3..88.2 degrees.
 //!
-//! The coefficients below are the outcome of these steps; a test derives them again from the equations.
-//! Angles are anatomical: flexion positive at both joints.
+//! The coefficients below are the result of these steps; a test derives them again from the equations. Angles
+//! are anatomical: flexion positive at both joints.
 
 use super::{Fourier, HARMONICS, MotionError};
 use crate::real::{Real, abs, exp, is_finite, max, sin_cos};
@@ -62,7 +63,7 @@ impl GaitJoint {
         }
     }
 
-    /// The angle that step 4 adds.
+    /// Angle that step 4 adds, degrees.
     #[must_use]
     pub const fn offset_deg(self) -> f32 {
         match self {
@@ -87,7 +88,7 @@ impl GaitJoint {
         }
     }
 
-    /// The repaired curve with its jump taken out (step 2), degrees at `percent` of the cycle.
+    /// Repaired curve without its jump (step 2), degrees at `percent` of the cycle.
     #[must_use]
     pub fn closed_deg<T: Real>(self, percent: T) -> T {
         let hundred = T::of(100.0);
@@ -96,7 +97,7 @@ impl GaitJoint {
     }
 }
 
-/// The walking pattern of a leg whose joints are `joints`, anatomical angles in rad, one cycle per `period`.
+/// Walking pattern of a leg with these `joints`, anatomical angles in rad, one cycle per `period`.
 pub fn curve<const N: usize>(joints: [GaitJoint; N], period: Second) -> Result<Fourier<N>, MotionError> {
     let radian = |degree: f32| degree.to_radians();
     Fourier::new(
@@ -107,9 +108,9 @@ pub fn curve<const N: usize>(joints: [GaitJoint; N], period: Second) -> Result<F
     )
 }
 
-/// A curve stretched and shifted so that each joint's proved range becomes the given `(low, high)`.
+/// Stretches and shifts a curve so that each joint's proven range becomes the given `(low, high)`.
 ///
-/// For legs whose range is not the paper's. A joint that does not move is put into the middle.
+/// For legs with another range than the paper's. A joint that does not move gets the middle of its range.
 pub fn mapped_into<const N: usize, const H: usize>(
     curve: Fourier<N, H>,
     ranges: [(Radian, Radian); N],
@@ -122,7 +123,7 @@ pub fn mapped_into<const N: usize, const H: usize>(
             return Err(MotionError::Range { joint });
         }
         let (curve_low, curve_high) = (envelope[joint].low.0, envelope[joint].high.0);
-        // Narrower by what rounding the stretched coefficients and the new centre may cost.
+        // Narrower by the possible rounding of the stretched coefficients and the new centre.
         let rounding = 1e-5 * (high - low) + 32.0 * f32::EPSILON * max(abs(low), abs(high));
         let factor = (high - low - rounding) / (curve_high - curve_low);
         scale[joint] = if factor > 0.0 && factor < 1e4 { factor } else { 1.0 };
@@ -141,7 +142,7 @@ mod tests {
     /// The paper's working range, degrees.
     const WORKING_RANGE_DEG: [(f32, f32); 2] = [(2.17, 50.18), (6.85, 95.53)];
 
-    /// Step 3 in double precision by the discrete transform; 4,096 points alias harmonics above 4,090 only.
+    /// Step 3 in double precision by the discrete transform; 4,096 points alias only harmonics above 4,090.
     fn series(joint: GaitJoint) -> (f64, [f64; HARMONICS], [f64; HARMONICS]) {
         const POINTS: usize = 4096;
         let value = |point: usize| joint.closed_deg(100.0 * point as f64 / POINTS as f64);
@@ -206,7 +207,7 @@ mod tests {
         // Found: 5.36 rad/s^2 at 4.83 s; reported as 5.4 at 4.80 s, printed as 5.2 at 4.8 s.
         assert!((peak - 5.36).abs() < 0.01, "{peak}");
         assert!((time - 4.8).abs() < 0.05, "{time}");
-        // The closed series keeps it: 5.29 rad/s^2.
+        // The closed series still has 5.29 rad/s^2.
         let series = curve(JOINTS, Second(6.5)).expect("constant").envelope()[1].acceleration.0;
         assert!((series - 5.29).abs() < 0.03, "{series}");
     }

@@ -1,8 +1,8 @@
-//! Whole cycles of a periodic curve, entered and left at rest.
+//! Whole cycles of a periodic curve, with blends from and to rest.
 //!
-//! Why: a Fourier curve moves at every instant. Instead of multiplying its amplitude by a window, which would change
-//! its path, the speed of its phase is ramped: the joints follow the very same path, slower. Between the two blends
-//! the phase runs at speed 1 for whole cycles, which is what identification uses ([`Periodic::is_steady`]).
+//! Why: a Fourier curve moves at every instant. A window on its amplitude would change its path. Instead the
+//! speed of its phase is ramped: the joints follow the identical path, slower. Between the two blends the
+//! phase runs at speed 1 for whole cycles, which identification uses ([`Periodic::is_steady`]).
 //!
 //! ```text
 //! v(x) = 3 x^2 - 2 x^3                    speed of the phase, x = t / B in 0..=1, B the blend
@@ -11,16 +11,17 @@
 //! |qdd| <= max |q''| w^2 + max |q'| w 3/2 / B
 //! ```
 //!
-//! The motion leaves as it enters, mirrored in time: it starts at the curve's turn -B/2P and ends at +B/2P, two
-//! different poses. Position, velocity and acceleration are continuous throughout, and zero at both ends as far as
-//! the last two go. Period and blend are rounded to whole ticks, so the phase is exact after any number of cycles.
+//! The end mirrors the start in time: the motion starts at the curve's turn -B/2P and ends at +B/2P, two
+//! different poses. Position, velocity and acceleration are continuous throughout; velocity and
+//! acceleration are zero at both ends. Period and blend are rounded to whole ticks, so the phase is
+//! exact after any number of cycles.
 //! Cost: some 10 multiplications and one integer division beside the curve's evaluation.
 
 use super::{Fourier, HARMONICS, JointEnvelope, MotionError, MotionState, whole_ticks};
 use crate::units::{RadianPerSecondSquared, Second};
 use core::num::NonZeroU32;
 
-/// Where on its curve a motion is, and how fast the phase runs.
+/// Phase of a motion on its curve, and the phase's speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase {
     /// Phase in turns (periods); any number, best small.
@@ -32,7 +33,7 @@ pub struct Phase {
 }
 
 impl Phase {
-    /// At full speed.
+    /// Phase at full speed.
     #[must_use]
     pub const fn steady(turn: f32) -> Self {
         Self { turn, speed: 1.0, speed_slope_per_s: 0.0 }
@@ -54,7 +55,8 @@ pub struct Periodic<const N: usize, const H: usize = HARMONICS> {
 }
 
 impl<const N: usize, const H: usize> Periodic<N, H> {
-    /// `cycles` whole cycles at full speed, and a blend before and after, at `rate_hz` ticks per second.
+    /// Builds a motion of `cycles` whole cycles at full speed with a blend before and after, at `rate_hz`
+    /// ticks per second.
     pub fn new(curve: Fourier<N, H>, blend: Second, cycles: u32, rate_hz: u32) -> Result<Self, MotionError> {
         let period_ticks = whole_ticks(curve.period(), rate_hz).ok_or(MotionError::Period)?;
         if period_ticks.get() < 2 {
@@ -83,7 +85,7 @@ impl<const N: usize, const H: usize> Periodic<N, H> {
         })
     }
 
-    /// The curve, its period rounded to whole ticks.
+    /// Curve with its period rounded to whole ticks.
     #[must_use]
     pub fn curve(&self) -> &Fourier<N, H> {
         &self.curve
@@ -101,19 +103,19 @@ impl<const N: usize, const H: usize> Periodic<N, H> {
         self.blend_ticks
     }
 
-    /// Ticks until the joints rest again.
+    /// Ticks until the joints are at rest again.
     #[must_use]
     pub fn duration_ticks(&self) -> u32 {
         self.end
     }
 
-    /// Whether the phase runs at full speed at this tick.
+    /// True if the phase runs at full speed at this tick.
     #[must_use]
     pub fn is_steady(&self, tick: u32) -> bool {
         tick >= self.blend_ticks && tick < self.steady_end
     }
 
-    /// The phase `tick` ticks after the start; at rest before and after.
+    /// Phase `tick` ticks after the start; at rest before and after the motion.
     #[must_use]
     pub fn phase_at(&self, tick: u32) -> Phase {
         if self.is_steady(tick) {
@@ -121,7 +123,7 @@ impl<const N: usize, const H: usize> Periodic<N, H> {
                 ((tick - self.blend_ticks) % self.period_ticks) as f32 * self.turn_per_tick,
             );
         }
-        // Entering looks forward from the start, leaving looks back from the end.
+        // The first blend counts ticks from the start, the last one back from the end.
         let (ticks_from_rest, sign) =
             if tick < self.blend_ticks { (tick, 1.0) } else { (self.end.saturating_sub(tick), -1.0) };
         let x = ticks_from_rest as f32 * self.per_blend_tick;
@@ -132,13 +134,13 @@ impl<const N: usize, const H: usize> Periodic<N, H> {
         }
     }
 
-    /// The state `tick` ticks after the start; at rest before and after.
+    /// State `tick` ticks after the start; at rest before and after the motion.
     #[must_use]
     pub fn state_at(&self, tick: u32) -> MotionState<N> {
         self.curve.state_at(&self.phase_at(tick))
     }
 
-    /// Proved bounds of the motion, its blends included.
+    /// Proven bounds of the motion, including its blends.
     #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         self.curve.envelope().map(|mut joint| {
@@ -183,7 +185,7 @@ mod tests {
                 let step = state.velocity_rad_per_s[joint] - before.velocity_rad_per_s[joint];
                 // Trapezoid: dt^3/12 of the third derivative of velocity and single precision of 1 rad/s.
                 assert!((step - mean * dt).abs() < 2e-6, "tick {tick}");
-                // The jerk of blend and curve stays below 60 rad/s^3 here: no jump hides in 0.25 ms.
+                // The jerk of blend and curve stays below 60 rad/s^3 here: 0.25 ms hide no jump.
                 assert!((acceleration(&state) - acceleration(&before)).abs() < 60.0 * dt);
                 let mean = 0.5 * (before.velocity_rad_per_s[joint] + state.velocity_rad_per_s[joint]);
                 let step = state.position_rad[joint] - before.position_rad[joint];
@@ -197,7 +199,8 @@ mod tests {
 
     #[test]
     fn the_bound_of_acceleration_covers_a_quick_blend_and_is_tight_there() {
-        // A sine is fastest where the blend ends, and a blend of 0.2 s in a period of 10 s outweighs its curvature.
+        // A sine is fastest where the blend ends, and a blend of 0.2 s in a period of
+        // 10 s outweighs its curvature.
         let sine = Fourier::<1, 1>::new(Second(10.0), [0.0], [[0.5]], [[0.0]]).expect("finite");
         let motion = Periodic::new(sine, Second(0.2), 1, RATE_HZ).expect("positive times");
         let peak = (0..motion.duration_ticks())

@@ -1,21 +1,21 @@
-//! The motions a leg can be given, as one value.
+//! All kinds of motion of a leg, as one type.
 
 use super::{Fourier, HARMONICS, JointEnvelope, LimitViolation, MotionState, Periodic, Proof, Ramp, bounds};
 use crate::units::{Radian, RadianPerSecond, RadianPerSecondSquared};
 
-/// A motion of `N` joints, `H` harmonics at most; it starts and ends at rest.
+/// Motion of `N` joints with at most `H` harmonics; starts and ends at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion<const N: usize, const H: usize = HARMONICS> {
-    /// Stand in a pose, rad, until told otherwise.
+    /// Stand in a pose, rad, until another command.
     Hold([f32; N]),
-    /// From a pose to a pose.
+    /// Move from a pose to a pose.
     Ramp(Ramp<N>),
-    /// Whole cycles of a curve, an excitation or a gait, between two blends.
+    /// Move in whole cycles of a curve, an excitation or a gait, between two blends.
     Periodic(Periodic<N, H>),
 }
 
 impl<const N: usize, const H: usize> Motion<N, H> {
-    /// The state `tick` ticks after the start; before and after the motion its ends, at rest.
+    /// State `tick` ticks after the start; before and after the motion at rest at its ends.
     #[must_use]
     pub fn state_at(&self, tick: u32) -> MotionState<N> {
         match self {
@@ -25,7 +25,7 @@ impl<const N: usize, const H: usize> Motion<N, H> {
         }
     }
 
-    /// Ticks until the joints rest at the motion's end; `None` for a pose held without end.
+    /// Ticks until the joints are at rest at the motion's end; `None` for a held pose.
     #[must_use]
     pub fn duration_ticks(&self) -> Option<u32> {
         match self {
@@ -35,13 +35,13 @@ impl<const N: usize, const H: usize> Motion<N, H> {
         }
     }
 
-    /// Whether the tick lies in the whole cycles that run at full speed.
+    /// True if the tick lies in the whole cycles at full speed.
     #[must_use]
     pub fn is_steady(&self, tick: u32) -> bool {
         matches!(self, Self::Periodic(periodic) if periodic.is_steady(tick))
     }
 
-    /// The curve behind a periodic motion.
+    /// Curve of a periodic motion.
     #[must_use]
     pub fn curve(&self) -> Option<&Fourier<N, H>> {
         match self {
@@ -50,19 +50,19 @@ impl<const N: usize, const H: usize> Motion<N, H> {
         }
     }
 
-    /// Where the joints rest before the motion, rad.
+    /// Pose at rest before the motion, rad.
     #[must_use]
     pub fn start_rad(&self) -> [f32; N] {
         self.state_at(0).position_rad
     }
 
-    /// Where the joints rest after the motion, rad.
+    /// Pose at rest after the motion, rad.
     #[must_use]
     pub fn end_rad(&self) -> [f32; N] {
         self.state_at(u32::MAX).position_rad
     }
 
-    /// Proved bounds of the whole motion.
+    /// Proven bounds of the whole motion.
     #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         match self {
@@ -77,7 +77,8 @@ impl<const N: usize, const H: usize> Motion<N, H> {
         }
     }
 
-    /// Shows that the whole motion stays within limits, or the first joint and quantity for which it cannot.
+    /// Proves that the whole motion stays within limits; the error names the first
+    /// joint and quantity that may not.
     pub fn prove(&self, limits: &[JointEnvelope; N]) -> Result<Proof<N>, LimitViolation> {
         bounds::prove(self.envelope(), limits)
     }

@@ -1,7 +1,7 @@
-//! From a pose to a pose, at rest at both ends, as fast as given speeds and accelerations allow.
+//! Motion from a pose to a pose, at rest at both ends, as fast as the given speeds and accelerations allow.
 //!
-//! The path of least jerk between two rests (T. Flash, N. Hogan, "The coordination of arm movements", Journal of
-//! Neuroscience 5, 1985, equation 3), all joints together:
+//! The path of least jerk between two rests (T. Flash, N. Hogan, "The coordination of arm movements", Journal
+//! of Neuroscience 5, 1985, equation 3), all joints together:
 //!
 //! ```text
 //! q(x) = from + (to - from) (10 x^3 - 15 x^4 + 6 x^5),   x = t / T in 0..=1
@@ -17,9 +17,9 @@ use super::{JointEnvelope, MOST_EXACT_TICKS, MotionError, MotionState};
 use crate::real::{abs, is_finite, max, min, sqrt};
 use crate::units::{Radian, RadianPerSecond, RadianPerSecondSquared};
 
-/// 15/8, the peak of the unit path's speed.
+/// Peak speed of the unit path, 15/8.
 const PEAK_SPEED: f32 = 1.875;
-/// 10/sqrt(3), the peak of the unit path's acceleration.
+/// Peak acceleration of the unit path, 10/sqrt(3).
 const PEAK_ACCELERATION: f32 = 5.773_503;
 
 /// A motion from a pose to a pose; see the module's equations.
@@ -33,7 +33,7 @@ pub struct Ramp<const N: usize> {
 }
 
 impl<const N: usize> Ramp<N> {
-    /// The quickest ramp whose joints keep below their speeds and accelerations, at `rate_hz` ticks per second.
+    /// Builds the fastest ramp within the joints' speeds and accelerations, at `rate_hz` ticks per second.
     pub fn between(
         from_rad: [f32; N],
         to_rad: [f32; N],
@@ -53,7 +53,7 @@ impl<const N: usize> Ramp<N> {
             seconds = max(seconds, PEAK_SPEED * distance / speed[joint].0);
             seconds = max(seconds, sqrt(PEAK_ACCELERATION * distance / acceleration[joint].0));
         }
-        // One tick more than the cast keeps pays for its rounding down.
+        // One extra tick makes up for the cast, which rounds down.
         let ticks = seconds * rate_hz as f32;
         let fits = ticks < (MOST_EXACT_TICKS - 1) as f32;
         if !fits || rate_hz == 0 {
@@ -64,25 +64,25 @@ impl<const N: usize> Ramp<N> {
         Ok(Self { from_rad, to_rad, duration_ticks, per_tick, per_second: per_tick * rate_hz as f32 })
     }
 
-    /// Ticks until the joints rest at their goal.
+    /// Ticks until the joints are at rest at their goal.
     #[must_use]
     pub fn duration_ticks(&self) -> u32 {
         self.duration_ticks
     }
 
-    /// The pose the ramp starts from, rad.
+    /// Start pose of the ramp, rad.
     #[must_use]
     pub fn from_rad(&self) -> [f32; N] {
         self.from_rad
     }
 
-    /// The pose the ramp ends in, rad.
+    /// End pose of the ramp, rad.
     #[must_use]
     pub fn to_rad(&self) -> [f32; N] {
         self.to_rad
     }
 
-    /// The state `tick` ticks after the start; at rest in the goal from the last tick on.
+    /// State `tick` ticks after the start; at rest in the goal from the last tick on.
     #[must_use]
     pub fn state_at(&self, tick: u32) -> MotionState<N> {
         if tick >= self.duration_ticks {
@@ -154,7 +154,8 @@ mod tests {
     #[test]
     fn a_ramp_is_as_quick_as_its_limits_allow_and_no_quicker() {
         let ramp = ramp();
-        // Joint 1: 1.875 * 0.7 / 1 s rules; sqrt(5.77 * 0.7 / 4) = 1.005 s and joint 2 (0.76 s) do not.
+        // Joint 1 dominates with 1.875 * 0.7 / 1 s, above sqrt(5.77 * 0.7 / 4) = 1.005 s
+        // and joint 2 with 0.76 s.
         let expected = 1.312_5 * RATE_HZ as f32;
         assert!((ramp.duration_ticks() as f32 - expected).abs() <= 1.0);
         let envelope = ramp.envelope();

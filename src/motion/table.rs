@@ -1,8 +1,8 @@
-//! An excitation as plain numbers: what a design tool writes and an image holds as a constant.
+//! An excitation as plain numbers: the output of a design tool and a constant of an image.
 //!
-//! Why apart from [`Periodic`]: that one is made by code that rounds times to ticks and may refuse; a constant has to
-//! be plain data. So the numbers are kept as they were designed, and [`ExcitationTable::motion`] makes the motion,
-//! which must be proved like any other before a leg takes it.
+//! Why separate from [`Periodic`]: its constructor rounds times to ticks and may fail, while a constant has
+//! to be plain data. The table holds the numbers as designed. [`ExcitationTable::motion`] builds the motion,
+//! which must be proven like any other before a leg takes it.
 //!
 //! Angles are the model's (D-H) joint angles, rad; the amplitudes are `s_k`, `c_k` of [`Fourier`].
 //!
@@ -29,23 +29,23 @@ use crate::units::Second;
 pub struct ExcitationTable<const N: usize, const H: usize = HARMONICS> {
     /// One cycle, s.
     pub period_s: f32,
-    /// From rest to full speed and back, s.
+    /// Time from rest to full speed, and back, s.
     pub blend_s: f32,
     /// Cycles at full speed.
     pub cycles: u32,
-    /// `q0` of every joint, rad.
+    /// Centre `q0` of every joint, rad.
     pub centre_rad: [f32; N],
-    /// `s_k` of every joint, rad, lowest harmonic first.
+    /// Amplitudes `s_k` of every joint, rad, lowest harmonic first.
     pub sine_rad: [[f32; H]; N],
-    /// `c_k` of every joint, rad, lowest harmonic first.
+    /// Amplitudes `c_k` of every joint, rad, lowest harmonic first.
     pub cosine_rad: [[f32; H]; N],
 }
 
 impl<const N: usize, const H: usize> ExcitationTable<N, H> {
-    /// The motion at `rate_hz` ticks per second; not yet proved against any limits.
+    /// Builds the motion at `rate_hz` ticks per second; not yet proven against any limits.
     ///
     /// # Errors
-    /// [`MotionError`] where a number makes no sense.
+    /// [`MotionError`] for an invalid number.
     pub fn motion(&self, rate_hz: u32) -> Result<Periodic<N, H>, MotionError> {
         let curve = Fourier::new(Second(self.period_s), self.centre_rad, self.sine_rad, self.cosine_rad)?;
         Periodic::new(curve, Second(self.blend_s), self.cycles, rate_hz)

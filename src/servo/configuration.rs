@@ -1,49 +1,49 @@
-//! What the servo must be told about each joint, and the refusal of what makes no sense.
+//! Configuration of the servo's joints, and its checks.
 
 use super::JointScale;
 use crate::safety::{JointLimits, LimitsError};
 use crate::units::{Ampere, Hertz, KilogramMetreSquared, NewtonMetre, Radian, RadianPerSecond};
 
-/// One joint of the servo. Range and signs are the model's.
+/// One joint of the servo. Range and signs are those of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointConfiguration {
-    /// Counts and currents to the model's angles and torques.
+    /// Conversion of counts and currents to the model's angles and torques.
     pub scale: JointScale,
     /// Smallest angle.
     pub low: Radian,
     /// Largest angle.
     pub high: Radian,
-    /// Largest speed that is commanded.
+    /// Largest commanded speed.
     pub speed: RadianPerSecond,
-    /// Largest torque that is commanded.
+    /// Largest commanded torque.
     pub torque: NewtonMetre,
-    /// Largest motor current that is commanded.
+    /// Largest commanded motor current.
     pub current: Ampere,
-    /// Largest inertia the joint moves, rotor and the links beyond it included.
+    /// Largest inertia that the joint moves, including the rotor and the links beyond it.
     pub inertia: KilogramMetreSquared,
     /// Bandwidth of the position loop, 0.5..=8 Hz; see [`super::ControllerGains`].
     pub bandwidth: Hertz,
 }
 
-/// Why a configuration is refused.
+/// Reason why a configuration is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ServoError {
-    /// A limit makes no sense.
+    /// A limit is invalid.
     Limits(LimitsError),
-    /// The scale of this joint (from 0) makes no sense.
+    /// The scale of this joint is invalid.
     Scale {
-        /// Counted from 0.
+        /// Joint, counted from 0.
         joint: usize,
     },
-    /// The bandwidth of this joint (from 0) is out of range.
+    /// The bandwidth of this joint is out of range.
     Bandwidth {
-        /// Counted from 0.
+        /// Joint, counted from 0.
         joint: usize,
     },
 }
 
 impl JointConfiguration {
-    /// The limits as the monitor wants them.
+    /// Limits in the form of the monitor.
     #[must_use]
     pub fn limits(&self) -> JointLimits {
         JointLimits {

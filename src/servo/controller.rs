@@ -1,7 +1,7 @@
 //! Position and velocity control of one joint, with an integral that cannot wind up.
 //!
-//! A cascade: the position error asks for a velocity, the velocity error for a torque; what gravity and friction leave
-//! over without a model is taken up by the integral. Feedforward comes on top.
+//! A cascade: the position error commands a velocity, the velocity error a torque. Feedforward is added. The
+//! integral covers the gravity and friction that no model describes.
 //!
 //! ```text
 //! torque = feedforward + D (qd_c - qd + kp (q_c - q)) + integral
@@ -9,31 +9,32 @@
 //! D = 4 kp J,   kp = 2 pi f / 1.29,   ki = kp / 8
 //! ```
 //!
-//! `q`, `qd` estimated and `q_c`, `qd_c` commanded angle (rad) and velocity (rad/s); `J` the joint's largest inertia,
-//! kg m^2; `D` N m s/rad; `kp`, `ki` 1/s; `f` the bandwidth, Hz. Without integral and delay the closed loop has a double
-//! pole at 2 kp and follows a commanded position (no velocity commanded) to -3 dB at 1.29 kp / 2 pi = f. With the
-//! commanded velocity, as the servo runs, it follows further.
+//! `q`, `qd` estimated and `q_c`, `qd_c` commanded angle (rad) and velocity (rad/s); `J` the joint's largest
+//! inertia, kg m^2; `D` N m s/rad; `kp`, `ki` 1/s; `f` the bandwidth, Hz. Without integral and delay the
+//! closed loop has a double pole at 2 kp. It follows a commanded position (no velocity commanded) to -3 dB at
+//! 1.29 kp / 2 pi = f. With the commanded velocity, as the servo runs, it follows further.
 //!
-//! Measured against a simulated knee (2.53 kg m^2, 3.3 N m s/rad, drive of 1 ms, one tick of computing, f = 6 Hz):
-//! -3 dB at 6.3 Hz without and 40 Hz with the commanded velocity; crossover 19.5 Hz with a phase margin of 47 degrees,
-//! 42 degrees at three quarters and 29 at half of the inertia.
+//! Measured against a simulated knee (2.53 kg m^2, 3.3 N m s/rad, drive of 1 ms, one tick of computing, f = 6
+//! Hz): -3 dB at 6.3 Hz without and 40 Hz with the commanded velocity; crossover 19.5 Hz with a phase margin
+//! of 47 degrees, 42 degrees at three quarters and 29 at half of the inertia.
 //!
-//! The integral stands still while the monitor takes torque away and the error would ask for more of it, never
-//! exceeds the torque cap, and is empty whenever the drive does not follow. Cost: about 15 operations per joint.
+//! The integral stops while the monitor limits the torque and the error would increase it. Its
+//! magnitude never exceeds the torque cap, and it is zero whenever the drive does not follow. Cost:
+//! about 15 operations per joint.
 
 use super::TICK_S;
 use crate::checksum::Checksum;
 use crate::real::clamp;
 use crate::units::{Hertz, KilogramMetreSquared, NewtonMetre, Radian, RadianPerSecond};
 
-/// -3 dB of a double pole lies at 0.644 of it, the pole at 2 kp.
+/// Ratio of bandwidth and gain: -3 dB of a double pole lies at 0.644 of it, the pole at 2 kp.
 const BANDWIDTH_PER_GAIN: f32 = 1.287_2;
-/// Velocity loop over position loop: both poles together.
+/// Ratio of velocity loop and position loop that puts both poles together.
 const DAMPING_PER_GAIN: f32 = 4.0;
-/// Position loop over integral: costs some 2 degrees of phase margin.
+/// Ratio of position loop and integral: costs some 2 degrees of phase margin.
 const GAIN_PER_INTEGRAL: f32 = 8.0;
 
-/// The gains of one joint; see the module's equations.
+/// Gains of one joint; see the module's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControllerGains {
     position_per_s: f32,
@@ -43,7 +44,7 @@ pub struct ControllerGains {
 }
 
 impl ControllerGains {
-    /// Gains for an inertia and a bandwidth; the integral stays below `cap`.
+    /// Computes the gains for an inertia and a bandwidth; `cap` limits the integral.
     #[must_use]
     pub fn new(inertia: KilogramMetreSquared, bandwidth: Hertz, cap: NewtonMetre) -> Self {
         let position_per_s = core::f32::consts::TAU * bandwidth.0 / BANDWIDTH_PER_GAIN;
@@ -57,7 +58,7 @@ impl ControllerGains {
         }
     }
 
-    /// With everything of it.
+    /// Adds all gains to a checksum.
     #[must_use]
     pub fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { position_per_s, damping_nm_s_per_rad, integral_nm_per_rad_s, cap_nm } = *self;
@@ -77,7 +78,7 @@ impl ControllerGains {
     }
 }
 
-/// What one joint's controller remembers: the integral's torque.
+/// State of one joint's controller: the integral's torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Controller {
     integral_nm: f32,
@@ -96,7 +97,7 @@ impl Controller {
         NewtonMetre(gains.damping_nm_s_per_rad * velocity_error + self.integral_nm)
     }
 
-    /// Moves the integral on, told which torque was wanted and which was applied.
+    /// Updates the integral from the wanted and the applied torque.
     pub fn settle(
         &mut self,
         gains: &ControllerGains,
@@ -112,7 +113,7 @@ impl Controller {
         self.integral_nm = clamp(integral_nm, -gains.cap_nm, gains.cap_nm);
     }
 
-    /// The integral gives this torque, as far as it may.
+    /// Sets the integral to this torque, within its cap.
     pub fn preset(&mut self, gains: &ControllerGains, torque: NewtonMetre) {
         self.integral_nm = clamp(torque.0, -gains.cap_nm, gains.cap_nm);
     }
@@ -122,7 +123,7 @@ impl Controller {
         self.integral_nm = 0.0;
     }
 
-    /// The integral's torque.
+    /// Torque of the integral.
     #[must_use]
     pub fn integral(&self) -> NewtonMetre {
         NewtonMetre(self.integral_nm)
@@ -145,7 +146,7 @@ mod tests {
         // Single precision of numbers of some 50,000.
         assert!(discriminant.abs() < 0.1, "{discriminant}");
         let pole_hz = gains.damping_nm_s_per_rad / (2.0 * 2.0) / core::f32::consts::TAU;
-        // (sqrt(2) - 1)^(1/2) of a double pole is its half power.
+        // The half power of a double pole is at (sqrt(2) - 1)^(1/2).
         assert!((pole_hz * 0.643_594 - 6.0).abs() < 1e-3, "{pole_hz}");
     }
 
@@ -159,7 +160,7 @@ mod tests {
         controller.settle(&gains, error, NewtonMetre(90.0), NewtonMetre(90.0));
         let grown = controller.integral();
         assert!(grown.0 > 0.0);
-        // It may always shrink.
+        // Shrinking is always allowed.
         controller.settle(&gains, -error, NewtonMetre(150.0), NewtonMetre(100.0));
         assert!(controller.integral() < grown);
         for _ in 0..1_000_000 {

@@ -1,25 +1,25 @@
 //! Feedforward torque from the commanded motion.
 //!
-//! Why from the command: commanded angles and their derivatives are exact and free of noise, and a torque that does
-//! not depend on what is measured cannot make the loop unstable. What the model leaves over, feedback corrects.
+//! Why from the command: commanded angles and their derivatives are exact and free of noise. A torque that
+//! does not depend on measurements cannot make the loop unstable. Feedback corrects the model's error.
 
 use crate::motion::MotionState;
 use crate::real::clamp;
 use crate::units::RadianPerSecond;
 
-/// Below this commanded speed Coulomb friction fades to zero: 0.02 rad/s (1.1 degrees/s). The smoothing replaces a
-/// step of twice the Coulomb torque at every reversal by a rise that lasts 2 * 0.02 rad/s over the acceleration there
-/// (40 ms at 1 rad/s^2), and keeps the drive quiet while a pose is held.
+/// Commanded speed below which Coulomb friction fades to zero: 0.02 rad/s (1.1 degrees/s). Without it the
+/// torque would jump by twice the Coulomb torque at every reversal. With it the rise lasts 2 * 0.02 rad/s
+/// over the acceleration there (40 ms at 1 rad/s^2), and the drive is quiet while a pose is held.
 pub const COULOMB_BAND: RadianPerSecond = RadianPerSecond(0.02);
 
-/// What the servo needs of a model: the torques that move `N` joints as commanded, model's angles and signs.
+/// Interface of a model for the servo: torques that move `N` joints as commanded, model's angles and signs.
 pub trait TorqueModel<const N: usize> {
-    /// Joint torques, N m, for angles `q` (rad), velocities `qd` (rad/s) and accelerations `qdd` (rad/s^2) with
-    /// `gravity` in the base frame (m/s^2); friction included, its Coulomb part with [`smoothed_sign`].
+    /// Joint torques, N m, for angles `q` (rad), velocities `qd` (rad/s) and accelerations `qdd` (rad/s^2)
+    /// with `gravity` in the base frame (m/s^2); friction included, its Coulomb part with [`smoothed_sign`].
     fn torques(&self, q: &[f32; N], qd: &[f32; N], qdd: &[f32; N], gravity: [f32; 3]) -> [f32; N];
 }
 
-/// No model: feedback does all the work.
+/// Absent model: feedback does all the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NoModel;
 
@@ -29,15 +29,15 @@ impl<const N: usize> TorqueModel<N> for NoModel {
     }
 }
 
-/// The sign of a commanded velocity, smooth within [`COULOMB_BAND`]: `x (3 - x^2) / 2`, x = velocity / band, held at
-/// -1 and 1 outside; value and slope are continuous.
+/// Sign of a commanded velocity, smooth within [`COULOMB_BAND`]: `x (3 - x^2) / 2`, x = velocity / band,
+/// limited to -1 and 1 outside; value and slope are continuous.
 #[must_use]
 pub fn smoothed_sign(velocity: RadianPerSecond) -> f32 {
     let x = clamp(velocity.0 * (1.0 / COULOMB_BAND.0), -1.0, 1.0);
     x * (1.5 - 0.5 * x * x)
 }
 
-/// The model's torques for a commanded motion, N m; zero without a model.
+/// Torques of the model for a commanded motion, N m; zero without a model.
 #[must_use]
 pub fn feedforward_nm<const N: usize, M: TorqueModel<N>>(
     model: Option<&M>,
@@ -62,7 +62,7 @@ mod tests {
     fn the_smoothed_sign_is_odd_monotonous_and_one_outside_its_band() {
         let sign = |velocity: f32| smoothed_sign(RadianPerSecond(velocity));
         assert_eq!((sign(0.0), sign(0.02), sign(-5.0), sign(f32::INFINITY)), (0.0, 1.0, -1.0, 1.0));
-        // It arrives without a kink: at 99 % of the band 1.5e-4 are missing.
+        // No kink at the edge: at 99 % of the band 1.5e-4 are missing.
         assert!(sign(0.0198) > 0.9998);
         let mut before = sign(-0.03);
         for step in -300..=300 {

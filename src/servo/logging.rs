@@ -1,11 +1,13 @@
 //! Means of eight ticks of angle and torque, 500 Hz, for identification.
 //!
-//! Why means: eight readings of the encoder and the current carry more than one of eight, and the mean of eight (its
-//! first zero is at 500 Hz) is the first anti-alias filter of the chain that follows. Angles are averaged as integers,
-//! relative to the first of the eight, so the mean has an eighth of a count as its last digit and none is lost.
+//! Why means: eight readings of the encoder and the current carry more information than one. The mean
+//! of eight (its first zero is at 500 Hz) is the first anti-alias filter of the chain that follows.
+//! Angles are averaged as integers relative to the first of the eight. The mean resolves an eighth of a
+//! count, and no digit is lost.
 //!
-//! A mean belongs to the middle of its ticks, 3.5 ticks (0.875 ms) before [`LogSample::tick`], for angle and torque
-//! alike. Readings that the step gate rejects are in the mean: cleaning is for who has the samples around.
+//! A mean belongs to the middle of its ticks, 3.5 ticks (0.875 ms) before [`LogSample::tick`], for angle and
+//! torque alike. The mean includes readings that the step gate rejects: the outlier filter has the
+//! neighbouring samples.
 //! Cost: some 10 operations per joint and tick.
 
 use super::SERVO_RATE_HZ;
@@ -13,9 +15,9 @@ use super::scale::JointScale;
 use crate::hal::Sample;
 use crate::units::Ampere;
 
-/// Ticks behind one sample of the log.
+/// Ticks per logged sample.
 pub const TICKS_PER_LOG: u32 = 8;
-/// Samples of the log per second.
+/// Logged samples per second.
 pub const LOG_RATE_HZ: u32 = SERVO_RATE_HZ / TICKS_PER_LOG;
 
 /// Means of [`TICKS_PER_LOG`] ticks, in the model's angles and signs.
@@ -25,13 +27,13 @@ pub struct LogSample<const N: usize> {
     pub position_rad: [f32; N],
     /// Joint torques from the measured currents, N m.
     pub torque_nm: [f32; N],
-    /// Sums of the eight encoder counts, modulo 2^32: the same means, exact, drive's sign.
+    /// Sums of the eight encoder counts, modulo 2^32, with the drive's sign: the exact means.
     pub counts_sum: [i32; N],
-    /// The last of the eight ticks.
+    /// Last of the eight ticks.
     pub tick: u32,
 }
 
-/// Collects ticks until there is a sample of the log.
+/// Collects ticks into a logged sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogAverager<const N: usize> {
     first: [i32; N],
@@ -42,15 +44,15 @@ pub struct LogAverager<const N: usize> {
 }
 
 impl<const N: usize> LogAverager<N> {
-    /// Nothing collected yet.
+    /// Averager without ticks.
     pub const EMPTY: Self = Self { first: [0; N], counts: [0; N], current_a: [0.0; N], collected: 0 };
 
-    /// Takes one tick in; every eighth returns the means and starts over.
+    /// Takes one tick; every eighth returns the means and starts over.
     pub fn push(&mut self, tick: u32, sample: &Sample<N>, scales: &[JointScale; N]) -> Option<LogSample<N>> {
         self.collect(sample).then(|| self.means(tick, scales))
     }
 
-    /// Takes one tick in; whether there are eight.
+    /// Takes one tick; true at every eighth.
     pub fn collect(&mut self, sample: &Sample<N>) -> bool {
         if self.collected == 0 {
             *self = Self { first: sample.joints.map(|joint| joint.encoder_counts), ..Self::EMPTY };
@@ -68,7 +70,7 @@ impl<const N: usize> LogAverager<N> {
         true
     }
 
-    /// The means of eight ticks, the last of which is this one.
+    /// Means of eight ticks, the last of which is `tick`.
     #[must_use]
     pub fn means(&self, tick: u32, scales: &[JointScale; N]) -> LogSample<N> {
         const SHARE: f32 = 1.0 / TICKS_PER_LOG as f32;

@@ -1,21 +1,21 @@
-//! The 4 kHz tick of a leg: from encoder counts and a commanded motion to what the drives are told.
+//! The 4 kHz tick of a leg: from encoder counts and a commanded motion to the drives' commands.
 //!
 //! ```text
 //! counts -> step gate -> observer -> position, velocity --+
 //! commanded motion -> torque model (feedforward) ---------+-> controller -> torque -> monitor -> currents
 //! ```
 //!
-//! | part | what it is |
+//! | part | content |
 //! | --- | --- |
-//! | [`JointScale`] | counts and currents to the model's angles and torques, the only place where signs change |
+//! | [`JointScale`] | counts and currents to the model's angles and torques; all signs |
 //! | [`Observer`] | position and velocity from counts |
 //! | [`Controller`] | position and velocity control with an integral that cannot wind up |
-//! | [`TorqueModel`] | what the feedforward needs of a model; [`NoModel`] for none |
+//! | [`TorqueModel`] | model interface of the feedforward; [`NoModel`] for none |
 //! | [`Servo`] | the tick, a pure function of its state and arguments |
 //! | [`LogAverager`] | means of eight ticks for identification, 500 Hz |
 //!
-//! Everything inside is in the model's (D-H) angles and signs. The servo never sees identification: a model's
-//! parameters arrive as a value between two ticks.
+//! All values inside are the model's (D-H) angles and signs. The servo is independent of identification: a
+//! model's parameters arrive as a value between two ticks.
 
 pub mod configuration;
 pub mod controller;

@@ -1,8 +1,8 @@
 //! Position and velocity of a joint from its encoder counts: a second-order tracking loop.
 //!
-//! Why not differences of counts: at 4 kHz one count of the default leg's encoder is 0.06 rad/s, of a 14-bit joint
-//! encoder 1.5 rad/s. The loop runs a model of constant velocity (plus a commanded acceleration, if given) and pulls
-//! it to every reading, both poles at `beta = exp(-w T)`, w = 2 pi times the bandwidth:
+//! Why not differences of counts: at 4 kHz one count of the default leg's encoder is 0.06 rad/s, of a 14-bit
+//! joint encoder 1.5 rad/s. The loop runs a model of constant velocity, plus a commanded acceleration if
+//! given, and pulls it to every reading. Both poles are at `beta = exp(-w T)`, w = 2 pi times the bandwidth:
 //!
 //! ```text
 //! predict   position += velocity T + a T^2 / 2,   velocity += a T
@@ -17,21 +17,23 @@
 //! | delay of position | none; error at a constant acceleration a | -a / w^2 |
 //! | noise of velocity per noise of reading | sqrt(2 ((1-beta)/(1+beta))^3) / T | 124 1/s |
 //!
-//! A constant velocity is followed without error, and with the true acceleration given, a constant acceleration too.
-//! Source: N. Morrison, Introduction to Sequential Smoothing and Prediction (1969), the fading-memory filter of
-//! degree one; critically damped g-h filter in E. Brookner, Tracking and Kalman Filtering Made Easy (1998).
+//! The observer follows a constant velocity without error, and a constant acceleration too if it is given.
+//! Source: N. Morrison, Introduction to Sequential Smoothing and Prediction (1969), the
+//! fading-memory filter of degree one; critically damped g-h filter in E. Brookner, Tracking and
+//! Kalman Filtering Made Easy (1998).
 //!
-//! The state is kept relative to the last reading, so counts may wrap and `f32` keeps its digits anywhere.
+//! The state is relative to the last reading, so counts may wrap and `f32` keeps its digits anywhere.
 //! Cost: 10 multiplications and additions per joint.
 
 use super::TICK_S;
 use crate::real::exp;
 use crate::units::Hertz;
 
-/// Bandwidth used by the servo: twice the delay would eat the controller's margin, half would double its noise.
+/// Bandwidth used by the servo. Half of it would double the delay and use up the controller's margin, twice
+/// would double its noise.
 pub const OBSERVER_BANDWIDTH: Hertz = Hertz(100.0);
 
-/// The loop's constants, for one bandwidth at the servo's rate.
+/// Constants of the loop, for one bandwidth at the servo's rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObserverGains {
     position: f32,
@@ -39,7 +41,7 @@ pub struct ObserverGains {
 }
 
 impl ObserverGains {
-    /// Both poles at the given frequency; see the module's table.
+    /// Puts both poles at the given frequency; see the module's table.
     #[must_use]
     pub fn new(bandwidth: Hertz) -> Self {
         let beta = exp(-core::f32::consts::TAU * bandwidth.0 * TICK_S);
@@ -47,10 +49,10 @@ impl ObserverGains {
     }
 }
 
-/// What is known of one joint, in counts.
+/// Estimated state of one joint, in counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Observer {
-    /// The last reading that was used; `None` before the first.
+    /// Last reading that was used; `None` before the first.
     reading: Option<i32>,
     /// Estimated position minus that reading, counts.
     deviation: f32,
@@ -58,7 +60,7 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// Runs one tick with a reading; `acceleration` in counts/s^2 is commanded, or 0.
+    /// Runs one tick with a reading; `acceleration` is the commanded one in counts/s^2, or 0.
     pub fn update(&mut self, gains: &ObserverGains, reading: i32, acceleration: f32) {
         let Some(last) = self.reading else {
             return self.reseat(reading);
@@ -77,13 +79,13 @@ impl Observer {
         self.velocity_per_s += TICK_S * acceleration;
     }
 
-    /// The count is elsewhere now: counts from there on with the velocity there was.
+    /// Moves the position to a new count; the velocity stays.
     pub fn reseat(&mut self, reading: i32) {
         self.reading = Some(reading);
         self.deviation = 0.0;
     }
 
-    /// The same place has another count now.
+    /// Renumbers the counts: the position stays, with another count.
     pub fn shift(&mut self, counts: i32) {
         self.reading = self.reading.map(|reading| reading.wrapping_add(counts));
     }
@@ -94,7 +96,7 @@ impl Observer {
         self.reading.unwrap_or(0) as f32 + self.deviation
     }
 
-    /// Estimated position as an encoder would show it.
+    /// Estimated position, rounded to a whole count.
     #[must_use]
     pub fn nearest_counts(&self) -> i32 {
         let rounded = if self.deviation < 0.0 { self.deviation - 0.5 } else { self.deviation + 0.5 };
@@ -119,7 +121,8 @@ mod tests {
     const RATE_HZ: f64 = 4000.0;
     const POLE_RAD_PER_S: f64 = TAU * 100.0;
 
-    /// Runs a position in counts (rounded down to readings) and shows position and velocity errors of late ticks.
+    /// Runs a position in counts (rounded down to readings) and shows position and
+    /// velocity errors of late ticks.
     fn run(ticks: u32, from: u32, path: impl Fn(f64) -> f64, mut see: impl FnMut(f64, f64, f64)) {
         let gains = ObserverGains::new(OBSERVER_BANDWIDTH);
         let mut observer = Observer::default();

@@ -1,50 +1,51 @@
-//! Counts and currents of a joint's drive to the model's angles and torques.
+//! Conversion of a drive's counts and currents to the model's angles and torques.
 //!
 //! ```text
 //! q   = direction * mounting * radian_per_count * counts + zero_offset
 //! tau = direction * mounting * torque_per_ampere * current
 //! ```
 //!
-//! Counts and currents grow with the joint's angle and torque (anatomical, flexion positive); `mounting` is 1, or -1 where
-//! the drive is mounted mirrored, as on a left leg, and they fall. `q`, `tau` are the model's (D-H). Counts are exact in `f32` up to 2^24, some 40 turns of a joint with 409,600 counts per turn.
+//! Counts and currents grow with the joint's angle and torque (anatomical, flexion positive). `mounting` is
+//! 1, or -1 where the drive is mounted mirrored, as on a left leg, and they fall. `q`, `tau` are the model's
+//! (D-H). Counts are exact in `f32` up to 2^24, some 40 turns of a joint with 409,600 counts per turn.
 
 use crate::model::AnatomicalJoint;
 use crate::real::{abs, is_finite};
 use crate::units::{Ampere, NewtonMetre, NewtonMetrePerAmpere, Radian};
 
-/// The conversion of one joint; see the module's equations.
+/// Conversion of one joint; see the module's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointScale {
-    /// Joint angle per encoder count, positive; gear ratio and counts per turn included.
+    /// Joint angle per encoder count, positive; includes gear ratio and counts per turn.
     pub radian_per_count: Radian,
     /// Sense and zero of the joint's angle in the model.
     pub anatomy: AnatomicalJoint<f32>,
-    /// Motor and encoder turn against the joint, as on a left leg.
+    /// True if motor and encoder turn against the joint, as on a left leg.
     pub mirrored: bool,
     /// Joint torque per motor current, positive.
     pub torque_per_ampere: NewtonMetrePerAmpere,
 }
 
 impl JointScale {
-    /// The model's angle of a place given in counts; fractions of a count are welcome.
+    /// Model angle for a position in counts, fractions allowed.
     #[must_use]
     pub fn position(&self, counts: f32) -> Radian {
         Radian(self.anatomy.angle_to_chain(self.mounted(self.radian_per_count.0) * counts))
     }
 
-    /// The model's torque of a motor current.
+    /// Model torque for a motor current.
     #[must_use]
     pub fn torque(&self, current: Ampere) -> NewtonMetre {
         NewtonMetre(self.signed_torque_per_ampere().0 * current.0)
     }
 
-    /// The model's angle per count, of either sign.
+    /// Model angle per count, of either sign.
     #[must_use]
     pub fn signed_radian_per_count(&self) -> f32 {
         self.anatomy.to_chain(self.mounted(self.radian_per_count.0))
     }
 
-    /// The model's torque per motor current, of either sign.
+    /// Model torque per motor current, of either sign.
     #[must_use]
     pub fn signed_torque_per_ampere(&self) -> NewtonMetrePerAmpere {
         NewtonMetrePerAmpere(self.anatomy.to_chain(self.mounted(self.torque_per_ampere.0)))
@@ -54,7 +55,7 @@ impl JointScale {
         if self.mirrored { -value } else { value }
     }
 
-    /// Between a ten-millionth and a tenth of a radian per count, offset within 2 pi, a positive torque constant.
+    /// Valid range: 1e-7 to 0.1 radian per count, offset within 2 pi, a positive finite torque constant.
     pub(super) fn is_sensible(&self) -> bool {
         let step = self.radian_per_count.0;
         (1e-7..=0.1).contains(&step)
@@ -68,7 +69,7 @@ impl JointScale {
 pub(super) mod tests {
     use super::*;
 
-    /// The default leg: 8,192 counts at the motor, 50:1, 1.5 N m/A; the hip's sense is the model's.
+    /// Default leg: 8,192 counts at the motor, 50:1, 1.5 N m/A; the hip's sense is the model's.
     pub(in crate::servo) const HIP: JointScale = JointScale {
         radian_per_count: Radian(core::f32::consts::TAU / 409_600.0),
         anatomy: AnatomicalJoint::SAME,
@@ -76,7 +77,7 @@ pub(super) mod tests {
         torque_per_ampere: NewtonMetrePerAmpere(1.5),
     };
 
-    /// As [`HIP`], but flexion is negative in the model.
+    /// Joint as [`HIP`], but flexion is negative in the model.
     pub(in crate::servo) const KNEE: JointScale = JointScale { anatomy: AnatomicalJoint::OPPOSITE, ..HIP };
 
     #[test]

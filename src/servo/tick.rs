@@ -1,17 +1,17 @@
 //! The servo tick of a leg: sample, command and gravity in, a decision out; no clock, no log, no hardware.
 //!
-//! In this order, every tick and in every state (so the cost does not depend on what happens):
+//! Every tick takes these steps in every state, so the cost does not depend on the situation:
 //!
-//! 1. Each reading is judged by its step gate and moves its observer, together with the commanded acceleration while
-//!    the drive follows (held to what the joint can do).
+//! 1. Each reading passes its step gate and updates its observer. While the drive follows, the commanded
+//!    acceleration is added, limited to the joint's ability.
 //! 2. Feedforward from the commanded motion, feedback from its error.
 //! 3. The monitor decides, last.
-//! 4. The integrals learn what was applied.
+//! 4. The integrals are updated with the applied torque.
 //!
 //! Cost: most of the leg's tick, which `scripts/count-instructions` counts (Cortex-M4F, two joints, enabled).
 //!
-//! What is not finite passes through to the monitor, which switches off in the same tick, and is kept out of every
-//! state: observers only take integers and a bounded acceleration, integrals are emptied.
+//! Values that are not finite pass through to the monitor, which switches off in that tick, and enter no
+//! state: observers take only integers and a bounded acceleration, integrals are cleared.
 
 use super::configuration::{JointConfiguration, ServoError};
 use super::controller::{Controller, ControllerGains};
@@ -29,64 +29,64 @@ use crate::safety::{
 };
 use crate::units::{NewtonMetre, Radian, RadianPerSecond};
 
-/// Multiple of the speed limit that an encoder step may show, and counts on top of it for quantisation.
+/// Largest encoder step as a multiple of the speed limit, and extra counts for quantisation.
 const STEP_PER_SPEED: f32 = 2.0;
 const STEP_COUNTS: u32 = 2;
 
-/// What a leg is told at one tick.
+/// Command to a leg at one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoCommand<'model, const N: usize, M> {
-    /// Where to be, model's angles.
+    /// Commanded motion, model's angles.
     pub motion: MotionState<N>,
-    /// The model for the feedforward, if there is one.
+    /// Model for the feedforward, if there is one.
     pub feedforward: Option<&'model M>,
-    /// What the operator asks of the drive, at the one tick at which it is asked.
+    /// Power request of the operator, only at the tick of the request.
     pub power: Option<PowerRequest>,
 }
 
-/// What is asked of a joint beside the motion.
+/// Torque command of a joint beside the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// On top of what holds the motion, or alone.
+    /// Torque in addition to the motion's, or alone.
     pub torque: NewtonMetre,
-    /// The motion is held; else the torque is all that is given.
+    /// True if the motion is held; otherwise `torque` is the whole command.
     pub held: bool,
-    /// No more than this is asked for; what holds the motion does not wind up against it.
+    /// Limit of the commanded torque; the motion's control does not wind up against it.
     pub largest: NewtonMetre,
 }
 
 impl Effort {
-    /// Only the motion.
+    /// Effort of the motion alone.
     pub const HELD: Self =
         Self { torque: NewtonMetre::ZERO, held: true, largest: NewtonMetre(f32::INFINITY) };
 }
 
-/// What came of one tick, in the model's angles and signs.
+/// Result of one tick, in the model's angles and signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoOutput<const N: usize> {
     /// Estimated angles.
     pub position: [Radian; N],
     /// Estimated velocities.
     pub velocity: [RadianPerSecond; N],
-    /// Encoder counts as far as they are believed: the observer's where the reading was impossible.
+    /// Encoder counts; those of the observer where the reading was impossible.
     pub believed_counts: [i32; N],
     /// Commanded minus estimated angles.
     pub tracking_error: [Radian; N],
-    /// Torques that feedforward and feedback wanted.
+    /// Torques of feedforward and feedback before the monitor.
     pub wanted_torque: [NewtonMetre; N],
-    /// What the monitor made of it; its command is for the drives.
+    /// Decision of the monitor; its command is for the drives.
     pub decision: Decision<N>,
 }
 
 impl<const N: usize> ServoOutput<N> {
-    /// What the drives are told.
+    /// Command for the drives.
     #[must_use]
     pub fn drive(&self) -> &DriveCommand<N> {
         &self.decision.command
     }
 }
 
-/// What does not change about one joint.
+/// Constants of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Joint {
     scale: JointScale,
@@ -95,7 +95,7 @@ struct Joint {
     largest_acceleration_rad_per_s2: f32,
 }
 
-/// The servo of one leg; see the module's steps.
+/// Servo of one leg; see the module's steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Servo<const N: usize> {
     joints: [Joint; N],
@@ -107,7 +107,7 @@ pub struct Servo<const N: usize> {
 }
 
 impl<const N: usize> Servo<N> {
-    /// A servo, drive off, or what is wrong with the first wrong joint.
+    /// Builds a servo with the drive off; the error names the first invalid joint.
     pub fn new(joints: [JointConfiguration; N]) -> Result<Self, ServoError> {
         for (joint, configuration) in joints.iter().enumerate() {
             configuration.check(joint)?;
@@ -135,7 +135,7 @@ impl<const N: usize> Servo<N> {
         })
     }
 
-    /// Drive off, nothing read yet: for joints whose counts mean something else from now on.
+    /// Resets to drive off without readings: for joints whose counts get another meaning.
     pub fn restart(&mut self) {
         self.gates.iter_mut().for_each(StepGate::restart);
         self.observers = [Observer::default(); N];
@@ -143,13 +143,13 @@ impl<const N: usize> Servo<N> {
         self.monitor.restart();
     }
 
-    /// Where the drive stands.
+    /// State of the drive.
     #[must_use]
     pub fn state(&self) -> DriveState {
         self.monitor.state()
     }
 
-    /// Over gains, scales and limits, which do not change.
+    /// Checksum of gains, scales and limits, which never change.
     #[must_use]
     pub fn checksum(&self) -> Checksum {
         self.joints.iter().fold(self.monitor.checksum(), |sum, joint| {
@@ -162,35 +162,35 @@ impl<const N: usize> Servo<N> {
         })
     }
 
-    /// Something else saw a fault, of which the monitor has to hear: at the next tick.
+    /// Reports a fault from elsewhere to the monitor, for the next tick.
     pub fn report(&mut self, fault: Fault) {
         self.monitor.report(fault);
     }
 
-    /// What temperature and bus voltage leave of the torque caps from the next tick on.
+    /// Sets the torque caps that temperature and bus voltage allow, from the next tick on.
     pub fn derate(&mut self, derating: &Derating) {
         self.monitor.derate(derating);
     }
 
-    /// Codes of what a decision took from each joint.
+    /// Codes of the limits that a decision applied to each joint.
     #[must_use]
     pub fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
         self.monitor.limit_codes(decision)
     }
 
-    /// What each joint may do.
+    /// Limits of each joint.
     #[must_use]
     pub fn limits(&self) -> &Limits<N> {
         self.monitor.limits()
     }
 
-    /// Each joint's conversion.
+    /// Conversion of each joint.
     #[must_use]
     pub fn scales(&self) -> [JointScale; N] {
         self.joints.map(|joint| joint.scale)
     }
 
-    /// The counts of each joint are so many more from now on, and its angle another one, though nothing moved.
+    /// Adds an offset to each joint's counts: the angle changes, but the joint does not move.
     pub fn shift(&mut self, counts: &[i32; N]) {
         for joint in 0..N {
             self.gates[joint].shift(counts[joint]);
@@ -198,7 +198,7 @@ impl<const N: usize> Servo<N> {
         }
     }
 
-    /// One tick; `gravity` in the base frame, m/s^2.
+    /// Runs one tick; `gravity` in the base frame, m/s^2.
     #[must_use]
     pub fn tick<M: TorqueModel<N>>(
         &mut self,
@@ -209,7 +209,7 @@ impl<const N: usize> Servo<N> {
         self.tick_with(sample, command, None, gravity)
     }
 
-    /// The same with torques beside the motion.
+    /// Runs one tick with torques beside the motion.
     #[must_use]
     #[inline]
     pub fn tick_with<M: TorqueModel<N>>(
@@ -221,7 +221,7 @@ impl<const N: usize> Servo<N> {
     ) -> ServoOutput<N> {
         let motion = &command.motion;
         let rejected = self.observe(sample, motion);
-        // One loop, not a closure for each: a build that is to be small would call every one of them for every joint.
+        // One loop, not a closure for each: a size-optimised build would call every closure for every joint.
         let mut believed_counts = [0; N];
         let mut position = [Radian::ZERO; N];
         let mut velocity = [RadianPerSecond::ZERO; N];
@@ -249,13 +249,13 @@ impl<const N: usize> Servo<N> {
             }
         });
 
-        // What the axis did not believe is gone from the sample, but it is told and counts as well.
+        // A reading that the axis rejected is absent from the sample but flagged, and counts as rejected too.
         let rejected = core::array::from_fn(|joint| rejected[joint] || sample.joints[joint].doubtful);
         let observation =
             Observation { position, velocity, current: sample.joints.map(|joint| joint.current), rejected };
         let torque = match efforts {
             None => wanted_torque,
-            // What is no number goes through to the monitor, which switches off.
+            // NaN passes through to the monitor, which switches off.
             Some(efforts) => core::array::from_fn(|joint| match wanted_torque[joint] {
                 wanted if wanted.abs() > efforts[joint].largest => wanted.limited(efforts[joint].largest),
                 wanted => wanted,
@@ -266,14 +266,14 @@ impl<const N: usize> Servo<N> {
         self.settle(&tracking_error, &wanted_torque, &decision);
         for joint in 0..N {
             if efforts.is_some_and(|efforts| !efforts[joint].held) {
-                // Once the motion is held again it begins with the torque there is.
+                // Preset, so that the motion's control later starts from the present torque.
                 self.controllers[joint].preset(&self.joints[joint].controller, decision.torque[joint]);
             }
         }
         ServoOutput { position, velocity, believed_counts, tracking_error, wanted_torque, decision }
     }
 
-    /// Moves the observers by one tick and tells which readings were rejected.
+    /// Moves the observers by one tick; returns which readings were rejected.
     fn observe(&mut self, sample: &Sample<N>, motion: &MotionState<N>) -> [bool; N] {
         let follows = self.monitor.state().permission() == Permission::Follow;
         core::array::from_fn(|joint| {

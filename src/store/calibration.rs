@@ -1,7 +1,7 @@
-//! A calibration as it is kept: what a motor and its encoder were found to be, with the setting it holds for.
+//! Stored calibration of a motor and its encoder, with the setting that it holds for.
 //!
-//! It is not believed: before current flows the axis compares it at the motor (`motor::Calibration`, verification), and refuses
-//! one that was found with another setting.
+//! A stored calibration is not trusted. Before current flows the axis checks it at the motor
+//! (`motor::Calibration`, verification), and refuses one that was made with another setting.
 
 use zerocopy::little_endian::{F32, I32, U32};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
@@ -11,22 +11,22 @@ use crate::leg::{CounterDirection, ElectricalAngle, EncoderSetting, StoredCalibr
 use crate::real::is_finite;
 use crate::units::{Henry, Ohm};
 
-/// A calibration of one axis.
+/// Calibration of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeptCalibration(pub StoredCalibration);
 
-/// In the flash; 24 bytes.
+/// Layout in the flash, 24 bytes.
 #[derive(Clone, Copy, Debug, Default, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct CalibrationLayout {
     resistance_ohm: F32,
     direct_henry: F32,
     quadrature_henry: F32,
-    /// Units of 2^-32 electrical turns.
+    /// Offset in units of 2^-32 electrical turns.
     offset: I32,
     counts_per_turn: U32,
     pole_pairs: u8,
-    /// 0 up, 1 down.
+    /// Counter direction: 0 up, 1 down.
     counter: u8,
     _reserved: [u8; 2],
 }

@@ -1,32 +1,36 @@
-//! What outlives the power: objects of the bus, calibrations, the accepted model.
+//! Nonvolatile store: objects of the bus, calibrations, the accepted model.
 //!
-//! Why: a leg that has to be calibrated and identified after each power cut is not used, and one that remembers wrongly pushes a
-//! person wrongly. So nothing is kept that was not accepted, nothing is believed because it was kept, and a cut of the power
-//! at any byte leaves the old value or the new one, never a mix.
+//! Why: a leg that needs calibration and identification after every power cut is not used, and one with wrong
+//! stored values pushes its wearer wrongly. Therefore only accepted values are stored, and stored values are
+//! checked before use. A power cut at any byte leaves the old value or the new one, never a mix.
 //!
 //! ```text
-//! value --Kept::to_layout--> bytes: schema (2), layout --sequential-storage--> header with CRCs | key | bytes    two sectors in turn
+//! value --Kept::to_layout--> bytes: schema (2), layout
+//!       --sequential-storage--> header with CRCs | key | bytes          two sectors in turn
 //! value <--Kept::from_layout (ranges)-- layout <--defaults for what an older schema lacks-- bytes
 //! ```
 //!
-//! | what is kept | key | taken back into use by |
+//! | stored value | key | taken back into use by |
 //! | --- | --- | --- |
 //! | objects of a node of the bus | 1, 2 | the bus |
 //! | calibration of an axis | 3, 4 | `motor::Calibration`, past a check at the motor |
 //! | model and where it comes from | 5 | `LegConfiguration::restore`, past the fingerprint |
 //!
-//! **Only while the bridges are released.** The one bank of the STM32F405's flash stands still while it is written (16 us a word)
-//! or erased (1 to 2 s for 128 KB), and with it every instruction fetched from it, the current loop's too. Whoever stores
-//! therefore shows a [`Permit`], which only a drive that is off gives. Reading may write as well: what a cut of the power left half done is
-//! repaired by the first read that comes across it (`MapStorage::fetch_item`: a sector is erased, records are copied). So a board reads
-//! at its start, before anything may switch, and its flash refuses whatever else (docs/store.md).
+//! **Only with the bridges off.** The STM32F405 has one bank of flash. It stalls while it is written (16 us a
+//! word) or erased (1 to 2 s for 128 KB), and with it every instruction fetch, including the current loop's.
+//! A write therefore needs a [`Permit`], which only a drive with its outputs off gives.
 //!
-//! **Wear.** A value that is already there is not written again. A sector is erased once per some 120 KB of records; measured
-//! in `tests/store.rs`.
+//! Reading may write as well. The first read that finds a write cut off by a power loss repairs it
+//! (`MapStorage::fetch_item`: a sector is erased, records are copied). A board therefore reads at its start,
+//! before any bridge may switch; its flash refuses all other accesses (docs/store.md).
 //!
-//! Cost: the crate `sequential-storage` (its wear levelling and repair are tested by fuzzing there) and `zerocopy` (layouts).
-//! Known limits: a record whose newest copy has rotted is answered by the copy before it, as after a cut; there is no clock,
-//! so records carry a generation instead of a date.
+//! **Wear.** An unchanged value is not written again. A sector is erased once per some 120 KB of records;
+//! measured in `tests/store.rs`.
+//!
+//! Cost: the crate `sequential-storage` (its wear levelling and repair are tested by fuzzing there) and
+//! `zerocopy` (layouts).
+//! Known limits: if the newest copy of a record has decayed, the copy before it is returned, as after a power
+//! cut. There is no clock, so records carry a generation instead of a date.
 
 mod calibration;
 mod keeper;
@@ -47,98 +51,98 @@ use sequential_storage::map::{MapConfig, MapStorage};
 use crate::leg::{DriveState, Permission};
 use record::{HEAD, LONGEST};
 
-/// A record as it lies in the flash, with its key, in whole words.
+/// Length of the longest record in the flash, with its key, in whole words.
 const BUFFER: usize = (LONGEST + HEAD + 1).next_multiple_of(8);
 
-/// What is kept. Numbers never change and are never used again.
+/// Keys of the stored values. Numbers never change and are never used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Key {
-    /// What a host changed of the first node's objects.
+    /// Objects of the first node that a host changed.
     Objects1 = 1,
-    /// Of the second node's.
+    /// Objects of the second node that a host changed.
     Objects2 = 2,
-    /// The first axis' calibration.
+    /// Calibration of the first axis.
     Calibration1 = 3,
-    /// The second axis'.
+    /// Calibration of the second axis.
     Calibration2 = 4,
-    /// The leg's model.
+    /// Model of the leg.
     Model = 5,
 }
 
 impl Key {
-    /// All of them.
+    /// All keys.
     pub const ALL: [Self; 5] =
         [Self::Objects1, Self::Objects2, Self::Calibration1, Self::Calibration2, Self::Model];
 }
 
-/// The bridges are released: given by a drive that is off, shown to whoever writes.
+/// Proof that the bridges are off: given by a drive with its outputs off, required for every write.
 #[derive(Debug)]
 pub struct Permit(());
 
 impl Permit {
-    /// Of a drive in this state; none where a bridge may switch.
+    /// Returns a permit for a drive in this state; `None` where a bridge may switch.
     #[must_use]
     pub fn of(state: DriveState) -> Option<Self> {
         Self::under(state.permission())
     }
 
-    /// Of a drive that has this permission.
+    /// Returns a permit for a drive with this permission; `None` where a bridge may switch.
     #[must_use]
     pub fn under(permission: Permission) -> Option<Self> {
         (permission == Permission::Released).then_some(Self(()))
     }
 }
 
-/// Why a range of flash cannot hold a store.
+/// Error for a range of flash that cannot hold a store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnfitRange;
 
-/// Why nothing was read.
+/// Reason why nothing was read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LoadError {
-    /// The flash holds something else, or what was kept is damaged beyond repair: only [`Store::forget_all`] helps.
+    /// The flash holds other data, or the store is damaged beyond repair: only [`Store::forget_all`] helps.
     Damaged,
     /// The flash did not answer.
     Flash,
-    /// The record was read and makes no sense.
+    /// The record was read but is invalid.
     Record(RecordError),
 }
 
-/// Why nothing was written; what was kept before is still there.
+/// Reason why nothing was written; the previous value is still there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SaveError {
-    /// As in [`LoadError::Damaged`].
+    /// See [`LoadError::Damaged`].
     Damaged,
-    /// The flash did not answer, or reads back otherwise than it was written.
+    /// The flash did not answer, or reads back something else.
     Flash,
-    /// More than fits a record.
+    /// The value exceeds the length of a record.
     TooLong,
-    /// The record would not be taken back.
+    /// The record would be refused when read back.
     Record(RecordError),
 }
 
-/// Whether the flash was touched.
+/// Effect of a save on the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Saved {
-    /// It was written.
+    /// The value was written.
     Written,
-    /// It was there already.
+    /// The value was there already.
     Unchanged,
 }
 
-/// What is kept, in a range of at least two sectors of a flash.
+/// Store in a range of at least two sectors of a flash.
 pub struct Store<F: NorFlash> {
     map: MapStorage<u8, F, Cache<Uncached, Uncached, Uncached, u8>>,
     buffer: [u8; BUFFER],
 }
 
 impl<F: NorFlash> Store<F> {
-    /// The store in these bytes of a flash. Nothing is read yet.
+    /// Opens a store in a range of flash addresses. Reads nothing yet.
     ///
     /// # Errors
-    /// [`UnfitRange`] unless the range begins and ends at sectors, holds two of them, and each of them holds two of the
-    /// longest records.
+    /// [`UnfitRange`] unless the range begins and ends at sectors, holds two of them, and each of them holds
+    /// two of the longest records.
     pub fn new(flash: F, range: Range<u32>) -> Result<Self, UnfitRange> {
         if F::ERASE_SIZE < 4 * BUFFER || range.end as usize > flash.capacity() || range.start > range.end {
             return Err(UnfitRange);
@@ -147,10 +151,10 @@ impl<F: NorFlash> Store<F> {
         Ok(Self { map: MapStorage::new(flash, config, Cache::new_uncached()), buffer: [0; BUFFER] })
     }
 
-    /// What is kept under a key; `None` where nothing ever was.
+    /// Reads the record of a key; `None` if there never was one.
     ///
     /// # Errors
-    /// See [`LoadError`]. A record that makes no sense stays where it is.
+    /// See [`LoadError`]. An invalid record stays where it is.
     pub async fn load<R: Kept>(&mut self, key: Key) -> Result<Option<R>, LoadError> {
         match self.fetch(key).await? {
             Some(bytes) => record::decode(bytes).map(Some).map_err(LoadError::Record),
@@ -158,7 +162,7 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Keeps a record in the place of what was there.
+    /// Writes a record and replaces the previous one.
     ///
     /// # Errors
     /// See [`SaveError`].
@@ -168,7 +172,7 @@ impl<F: NorFlash> Store<F> {
         self.keep(permit, key, bytes.get(..length).unwrap_or_default()).await
     }
 
-    /// Bytes that somebody else understands, no longer than `into`; how many there are.
+    /// Reads raw bytes, at most the length of `into`; returns their number.
     ///
     /// # Errors
     /// See [`LoadError`].
@@ -181,7 +185,7 @@ impl<F: NorFlash> Store<F> {
         Ok(Some(bytes.len()))
     }
 
-    /// Keeps bytes that somebody else understands.
+    /// Writes raw bytes.
     ///
     /// # Errors
     /// See [`SaveError`].
@@ -189,7 +193,7 @@ impl<F: NorFlash> Store<F> {
         self.keep(permit, key, bytes).await
     }
 
-    /// Erases everything that is kept: what a host asks for when it restores the defaults.
+    /// Erases the whole store, when a host restores the defaults.
     ///
     /// # Errors
     /// [`SaveError::Flash`].
@@ -197,7 +201,7 @@ impl<F: NorFlash> Store<F> {
         self.map.erase_all().await.map_err(|_| SaveError::Flash)
     }
 
-    /// The flash, for whoever lent it.
+    /// Returns the flash.
     pub fn into_flash(self) -> F {
         self.map.destroy().0
     }

@@ -1,8 +1,8 @@
-//! An accepted model as it is kept, with where it comes from.
+//! Stored form of an accepted model, with its provenance.
 //!
-//! The model says which leg it belongs to by its fingerprint; [`Provenance`] says to a person what it was found with, so that a
-//! model that looks odd a year later can be judged: which firmware, how often before, which random numbers, how warm, worn or
-//! not, with which lengths and torque constants, and how well each joint's torque was explained.
+//! The fingerprint says which leg the model belongs to. [`Provenance`] lets a person judge a model that looks
+//! odd a year later. It holds the firmware version, the number of earlier models, the random seed, the bridge
+//! temperature, and whether the leg was worn. For each joint it holds length, torque constant and fit.
 
 use core::borrow::BorrowMut;
 
@@ -16,49 +16,49 @@ use crate::leg::{
 };
 use crate::units::{Celsius, Metre, NewtonMetre, NewtonMetrePerAmpere};
 
-/// Where one joint's parameters come from.
+/// Provenance of one joint's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointProvenance {
     /// Distance to the joint before it, along the common normal.
     pub length: Metre,
-    /// At the joint.
+    /// Torque constant at the joint.
     pub torque_per_ampere: NewtonMetrePerAmpere,
-    /// Root mean square of measured minus predicted, on a motion that was not identified from.
+    /// Root mean square of measured minus predicted torque, on a held-out motion.
     pub rms: NewtonMetre,
-    /// Mean of the absolute torque on it.
+    /// Mean of the absolute torque on that motion.
     pub mean_absolute: NewtonMetre,
 }
 
-/// Where a model comes from.
+/// Provenance of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Provenance<const N: usize> {
-    /// Of the firmware: major, minor, patch.
+    /// Firmware version: major, minor, patch.
     pub firmware: [u8; 3],
-    /// Counts the models that were accepted on this board.
+    /// Number of models accepted on this board.
     pub generation: u32,
-    /// Of the swarm's random numbers.
+    /// Seed of the swarm's random generator.
     pub swarm_seed: u64,
-    /// Of the warmer bridge when it was accepted; unknown without a thermistor.
+    /// Temperature of the warmer bridge at acceptance; unknown without a thermistor.
     pub bridge: Option<Celsius>,
-    /// A person wore the leg; unknown unless the operator said so.
+    /// True if the leg was worn; unknown unless the operator said so.
     pub worn: Option<bool>,
-    /// From the base.
+    /// Provenance of each joint, from the base.
     pub joints: [JointProvenance; N],
 }
 
-/// A model and where it comes from.
+/// A model with its provenance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeptModel<const N: usize> {
-    /// As plain data.
+    /// The model as plain data.
     pub model: StoredModel<N>,
-    /// To be told to whoever asks.
+    /// Provenance, for reports.
     pub provenance: Provenance<N>,
 }
 
 /// Firmware version: major, minor, patch.
 const VERSION: [u8; 3] = version_of(env!("CARGO_PKG_VERSION").as_bytes());
 
-/// Numbers of a version, up to 255 each; what follows the third is ignored.
+/// Parses a version: numbers up to 255 each; text after the third is ignored.
 const fn version_of(text: &[u8]) -> [u8; 3] {
     let mut version = [0; 3];
     let (mut place, mut part) = (0, 0);
@@ -73,7 +73,8 @@ const fn version_of(text: &[u8]) -> [u8; 3] {
 }
 
 impl<const N: usize> KeptModel<N> {
-    /// A model that was just accepted, with what its identification tells of it; generation and seed are its own.
+    /// Builds the stored form of a newly accepted model from its identification, with
+    /// the given generation and seed.
     pub fn of<const B: usize, const TAPS: usize, const PENDING: usize, W>(
         configuration: &LegConfiguration<N, B>,
         identification: &Identification<N, B, TAPS, PENDING, W>,
@@ -113,14 +114,14 @@ impl<const N: usize> KeptModel<N> {
     }
 }
 
-/// One joint in the flash; 81 bytes.
+/// Layout of one joint in the flash, 81 bytes.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct JointLayout {
     parameters: [F32; PARAMETERS_PER_JOINT],
     stribeck_excess: F32,
     stribeck_velocity: F32,
-    /// 0 offset, 1 asymmetry.
+    /// Meaning of the constant torque: 0 offset, 1 asymmetry.
     constant: u8,
     length_m: F32,
     torque_per_ampere: F32,
@@ -128,7 +129,7 @@ pub struct JointLayout {
     mean_absolute_nm: F32,
 }
 
-/// In the flash; 28 bytes and the joints'.
+/// Layout in the flash, 28 bytes and the joints'.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct ModelLayout<const N: usize> {
@@ -136,9 +137,9 @@ pub struct ModelLayout<const N: usize> {
     firmware: [u8; 3],
     generation: U32,
     swarm_seed: U64,
-    /// NaN: unknown.
+    /// Bridge temperature; NaN if unknown.
     bridge_celsius: F32,
-    /// 0 no, 1 yes, 2 unknown.
+    /// Leg worn: 0 no, 1 yes, 2 unknown.
     worn: u8,
     joints: [JointLayout; N],
 }
@@ -200,7 +201,8 @@ impl<const N: usize> Kept for KeptModel<N> {
         }
     }
 
-    /// Numbers and curves are judged by `LegConfiguration::restore`, the only way of a kept model into use.
+    /// Checks only the closed lists: `LegConfiguration::restore`, the only way into
+    /// use, checks numbers and curves.
     fn from_layout(layout: &ModelLayout<N>) -> Result<Self, RecordError> {
         let worn = match layout.worn {
             0 => Some(false),

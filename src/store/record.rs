@@ -1,52 +1,54 @@
-//! A record's bytes: two of its schema, then a fixed layout that only ever grows at its end.
+//! Byte format of a record: two bytes of schema, then a fixed layout that only ever grows at its end.
 //!
-//! Migration follows from that rule and needs no code per version: a record of an older schema is the beginning of a newer
-//! one, and what it lacks takes the layout's default. One of a newer schema is refused, because nobody knows what it says.
-//! Its bits are guarded by the flash log's CRCs; its meaning by [`Kept::from_layout`], which refuses what is out of range.
+//! This rule gives migration without code per version. A record of an older schema is the beginning of a
+//! newer one; missing fields take the layout's default. A record of a newer schema is refused, because its
+//! meaning is unknown. The flash log's CRCs protect its bits. [`Kept::from_layout`] checks its meaning and
+//! refuses values out of range.
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
-/// Bytes before a layout.
+/// Bytes of the schema before a layout.
 pub(super) const HEAD: usize = 2;
 
-/// The longest layout there is room for.
+/// Largest supported layout.
 pub(super) const LONGEST: usize = 400;
 
-/// Why a record is not taken.
+/// Reason why a record is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RecordError {
-    /// Shorter or longer than its schema is.
+    /// The length differs from the schema's.
     Length,
-    /// Of a schema that this firmware does not know.
+    /// The schema is newer than this firmware.
     Newer {
-        /// Of the record.
+        /// Schema of the record.
         schema: u16,
     },
-    /// A value in it is not finite, not positive where it must be, or no member of its list.
+    /// A value is not finite, not positive where it must be, or not in its list.
     Range,
 }
 
-/// A value that can be kept.
+/// A value that can be stored.
 pub trait Kept: Sized {
-    /// As it lies in the flash: plain bytes, little-endian, without gaps. Its default stands for what older schemas lack.
+    /// Layout in the flash: plain bytes, little-endian, without gaps. Its default fills
+    /// fields that older schemas lack.
     type Layout: FromBytes + IntoBytes + Immutable + KnownLayout + Unaligned + Default;
-    /// Bytes of each schema's layout, from schema 1 on; the last is `Layout`'s.
+    /// Length of each schema's layout in bytes, from schema 1 on; the last is that of `Layout`.
     const LENGTHS: &'static [usize];
 
-    /// The value in bytes.
+    /// Converts the value to its layout.
     fn to_layout(&self) -> Self::Layout;
 
-    /// The value.
+    /// Converts a layout to the value.
     ///
     /// # Errors
     /// [`RecordError::Range`].
     fn from_layout(layout: &Self::Layout) -> Result<Self, RecordError>;
 }
 
-/// Writes a record of the newest schema; how long it is.
+/// Writes a record of the newest schema and returns its length.
 pub(super) fn encode<R: Kept>(kept: &R, out: &mut [u8]) -> Result<usize, RecordError> {
     let layout = kept.to_layout();
-    // What would not be taken back is not kept.
+    // A record that would be refused on reading is not stored.
     R::from_layout(&layout)?;
     let bytes = layout.as_bytes();
     let (head, rest) = out.split_at_mut_checked(HEAD).ok_or(RecordError::Length)?;
@@ -55,7 +57,7 @@ pub(super) fn encode<R: Kept>(kept: &R, out: &mut [u8]) -> Result<usize, RecordE
     Ok(HEAD + bytes.len())
 }
 
-/// Reads a record of any schema so far.
+/// Reads a record of any known schema.
 pub(super) fn decode<R: Kept>(bytes: &[u8]) -> Result<R, RecordError> {
     let Some((&[low, high], rest)) = bytes.split_first_chunk::<HEAD>() else {
         return Err(RecordError::Length);
@@ -81,9 +83,9 @@ mod tests {
     #[repr(C)]
     struct Layout {
         number: U16,
-        /// Since schema 2.
+        /// Added in schema 2.
         share: F32,
-        /// Since schema 3.
+        /// Added in schema 3.
         word: [u8; 3],
     }
 

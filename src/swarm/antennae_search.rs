@@ -1,16 +1,16 @@
-//! Beetle antennae search: one beetle, two whiskers, one step towards the better smell. A comparison.
+//! Beetle antennae search, for comparison: one beetle, two whiskers, one step towards the lower cost.
 //!
-//! Per iteration, d a random unit vector (Eq. 23: entries uniform in -1..1, then normalised):
+//! Per iteration, with d a random unit vector (Eq. 23: entries uniform in -1..1, then normalised):
 //!   x_l = x + l d, x_r = x - l d                       (Eq. 21)
 //!   x = x - delta d sgn(f(x_l) - f(x_r))               (Eq. 24)
 //!   delta = e1 delta + e0                              (Eq. 25)
-//!   l = delta / e2                                     (Eq. 26; it replaces Eq. 22, with which it cannot hold)
-//! Symbols: delta step length, l whisker length, both in the unit of the coordinates, as in the paper (a step of 1
-//! in a box of plus or minus 100); e1 decay, e0 offset of the step length, e2 ratio of step to whisker.
+//!   l = delta / e2                                     (Eq. 26; replaces Eq. 22, which contradicts it)
+//! Symbols: delta step length, l whisker length, both in the unit of the coordinates (in the paper a step of
+//! 1 in a box of plus or minus 100); e1 decay, e0 offset of the step length, e2 ratio of step to whisker.
 //!
 //! Source: beetle antennae search (Jiang, Li, 2017); the paper, Eqs (21)-(26), constants of its section 4.1.
 //! Cost: 3 evaluations and about 10 D operations per iteration; memory 5 D scalars.
-//! Known limits: the step ends at e0 / (1 - e1) = 0.1 and walks about 120 units in 1,000 iterations, whatever the
+//! Known limits: the step ends at e0 / (1 - e1) = 0.1 and covers about 120 units in 1,000 iterations, for any
 //! box; it does not reach the minimum in 30 dimensions.
 
 use crate::real::{Real, sign, sqrt};
@@ -44,7 +44,7 @@ impl<T: Real> Default for BasSettings<T> {
     }
 }
 
-/// What is evaluated next.
+/// Next evaluation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage<T> {
     Place,
@@ -53,13 +53,13 @@ enum Stage<T> {
     Move { smell: T },
 }
 
-/// One beetle with room for `D` coordinates.
+/// One beetle with capacity for `D` coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bas<T: Real, const D: usize> {
     settings: BasSettings<T>,
     ledger: Ledger<T, D>,
     random: Random,
-    /// In the objective's units, inside the box.
+    /// Position in the objective's units, inside the box.
     position: [T; D],
     direction: [T; D],
     step_length: T,
@@ -67,7 +67,7 @@ pub struct Bas<T: Real, const D: usize> {
 }
 
 impl<T: Real, const D: usize> Bas<T, D> {
-    /// A beetle somewhere in the objective's box; nothing is evaluated yet.
+    /// Places a beetle at random in the objective's box; nothing is evaluated yet.
     pub fn new(
         objective: &impl Objective<T>,
         settings: BasSettings<T>,
@@ -95,7 +95,7 @@ impl<T: Real, const D: usize> Bas<T, D> {
         })
     }
 
-    /// Eq. (23); a direction of zeros, should all entries be zero, costs one idle iteration.
+    /// Draws a direction by Eq. (23). Should all entries be zero, the iteration has no effect.
     fn turn(&mut self) {
         let direction = live_mut(&mut self.direction, self.ledger.dimension());
         for entry in direction.iter_mut() {
@@ -107,7 +107,7 @@ impl<T: Real, const D: usize> Bas<T, D> {
         }
     }
 
-    /// The position, moved by a signed length along the direction, at the nearest point of the box.
+    /// Position moved by a signed length along the direction, then to the nearest point of the box.
     fn shifted(&self, length: T) -> [T; D] {
         let mut position = self.position;
         let dimension = self.ledger.dimension();
@@ -171,7 +171,7 @@ mod tests {
     use super::*;
     use crate::real::abs;
 
-    /// A slope along a line; remembers where it was evaluated.
+    /// Cost with a slope along a line; stores the evaluated positions.
     struct Slope(RefCell<Vec<f64>>);
 
     impl Objective<f64> for Slope {
@@ -196,7 +196,7 @@ mod tests {
         let places = slope.0.borrow();
         let (mut at, mut step) = (places[0], 1.0);
         for iteration in places[1..].chunks(3) {
-            // positions up to 1e3 leave 1e-13 of rounding
+            // Positions up to 1e3 leave 1e-13 of rounding.
             assert!(abs(abs(iteration[0] - iteration[1]) - 0.2 * step) < 1e-12, "Eqs (21), (26)");
             assert!(abs(iteration[0] + iteration[1] - 2.0 * at) < 1e-12, "Eq. (21)");
             assert!(abs(iteration[2] - (at - step)) < 1e-12, "Eq. (24): downhill by one step");

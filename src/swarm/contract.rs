@@ -1,4 +1,4 @@
-//! What every search promises, tested on all of them: slices, seeds, box, costs that are not finite, errors.
+//! Common contract of all searches, tested on each: slices, seeds, box, costs that are not finite, errors.
 
 extern crate std;
 use core::cell::{Cell, RefCell};
@@ -25,7 +25,8 @@ macro_rules! on_every_search {
     }};
 }
 
-/// Ripples everywhere: the adaptive swarm is scattered anew several times within a few thousand evaluations.
+/// Function with ripples everywhere: the adaptive swarm is scattered several times
+/// within a few thousand evaluations.
 const RIPPLES: TestProblem = TestProblem::new(TestFunction::Rastrigin, 5);
 
 fn slices_leave_equal_searches<T: Real, S: Search<T> + Clone + PartialEq>(new: &impl Fn(u64) -> S) {
@@ -80,7 +81,7 @@ fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
     on_every_search!(f32, &RIPPLES, seeds_decide);
 }
 
-/// A box with sides of very different length; the least cost lies in its corner. Remembers all values.
+/// Cost in a box with sides of very different length, least in its corner. Stores all values.
 struct Watched {
     values: RefCell<Vec<f64>>,
 }
@@ -143,8 +144,8 @@ fn a_run_cancelled_anywhere_has_the_best_of_all_its_evaluations() {
     on_every_search!(f32, watched, knows_its_best);
 }
 
-/// A badly scaled bowl of which a slab is NaN, another infinite, a third minus infinite and a fourth the largest
-/// number; the minimum is between them.
+/// Badly scaled bowl with four slabs of NaN, infinity, minus infinity and the largest number;
+/// the minimum is between them.
 struct Holes;
 
 impl<T: Real> Objective<T> for Holes {
@@ -176,7 +177,8 @@ fn costs_that_are_not_finite_do_not_poison_the_adaptive_search() {
     fn run<T: Real>() {
         for seed in 0..20 {
             let mut swarm = Bso::<T, 20, CAPACITY>::new(&Holes, BsoSettings::default(), seed).unwrap();
-            // half as many iterations again as the slowest of these seeds needs, 97; a lost metric never gets there
+            // Half as many iterations again as the slowest of these seeds needs, 97. A
+            // corrupted metric never gets there.
             assert!(swarm.reach(&Holes, T::of(1e-3), 150), "seed {seed}: {:?}", swarm.best());
             assert!(swarm.best().is_some_and(|best| best.value >= T::zero()), "minus infinity is no best");
         }
@@ -185,7 +187,7 @@ fn costs_that_are_not_finite_do_not_poison_the_adaptive_search() {
     run::<f32>();
 }
 
-/// Nothing is possible anywhere, until it is.
+/// Cost that is NaN everywhere until `forbidden` is cleared.
 struct Nowhere {
     forbidden: Cell<bool>,
 }
@@ -219,7 +221,7 @@ fn a_cost_that_is_nowhere_finite_has_no_best_and_the_search_survives_it() {
     on_every_search!(f32, nowhere, finds_nothing_where_nothing_is);
 }
 
-/// Any dimension and any bounds for the last coordinate.
+/// Cost with any dimension and any bounds for the last coordinate.
 struct Shaped {
     dimension: usize,
     last: (f64, f64),

@@ -1,8 +1,8 @@
-//! Test functions whose minimum is known, over the boxes for which this room's figures hold.
+//! Test functions with a known minimum, over the boxes for which this module's figures hold.
 //!
-//! Why in the firmware: the same functions judge every search in both precisions, on the host and in the emulator.
-//! Every figure of a search depends on the box, so function and box are one value. Here i counts from 0 and
-//! c_i is the shift of coordinate i.
+//! Why in the firmware: the tests judge every search on these functions in both precisions, on the host and
+//! in the emulator. Every figure of a search depends on the box, so function and box are one value. Here i
+//! counts from 0 and c_i is the shift of coordinate i.
 //!
 //! | function | value | box | minimum |
 //! | --- | --- | --- | --- |
@@ -10,16 +10,25 @@
 //! | six-hump camel | (4 - 2.1 x^2 + x^4 / 3) x^2 + x y + (4 y^2 - 4) y^2 | 5 | -1.0316285 |
 //! | Branin | (y - 5.1 / (4 pi^2) x^2 + 5 / pi x - 6)^2 + 10 (1 - 1 / (8 pi)) cos x + 10 | 5 | 0.3978874 |
 //! | Ackley | 20 + e - 20 exp(-0.2 sqrt(mean x_i^2)) - exp(mean cos 2 pi x_i) | 32 | 0 |
-//! | Ackley, shifted, rotated | of y - 2 w (w.y) / (w.w), y = x - c, c_i = 11 + 7 ((37 i mod 11) / 11 - 1/2), w_i = sin(i + 1) | 32 | 0 |
-//! | ellipsoid, shifted | 1e-4 sum 10^(k i / (n - 1)) (x_i - c_i)^2, c_i = 60 - (29 i mod 31), k = 4 or 6 | 100 | 0 |
+//! | Ackley, shifted, rotated | see below | 32 | 0 |
+//! | ellipsoid, shifted | 1e-4 sum 10^(k i / (n - 1)) (x_i - c_i)^2, k = 4 or 6 | 100 | 0 |
 //! | Rosenbrock | sum 100 (x_(i+1) - x_i^2)^2 + (1 - x_i)^2 | 5 | 0 |
 //! | Griewank, shifted by 123 | 1 + sum y_i^2 / 4000 - prod cos(y_i / sqrt(i + 1)) | 600 | 0 |
 //! | Schwefel 1.2, shifted by 13 | sum_i (sum_(j <= i) y_j)^2 | 65 | 0 |
-//! | Levy | with u = 1 + (x - 1) / 4: sin^2(pi u_0) + sum (u_i - 1)^2 (1 + 10 sin^2(pi u_i + 1)) + (u_last - 1)^2 (1 + sin^2(2 pi u_last)) | 10 | 0 |
+//! | Levy | see below | 10 | 0 |
 //! | Rastrigin | 10 n + sum x_i^2 - 10 cos 2 pi x_i | 5 | 0 |
 //!
-//! The paper prints its f2, f3 and f4 differently (x^(4/3) for x^4 / 3, x and y exchanged and 5 for 5.1, no + e);
-//! these forms are kept as `...AsPrinted` so that the difference can be shown: minima -941.37, 0.397887, -2.718282.
+//! ```text
+//! ellipsoid, shifted         c_i = 60 - (29 i mod 31)
+//! Ackley, shifted, rotated   Ackley's function of y - 2 w (w.y) / (w.w),   y = x - c,   w_i = sin(i + 1),
+//!                            c_i = 11 + 7 ((37 i mod 11) / 11 - 1/2)
+//! Levy, u = 1 + (x - 1) / 4  sin^2(pi u_0) + sum (u_i - 1)^2 (1 + 10 sin^2(pi u_i + 1))
+//!                            + (u_last - 1)^2 (1 + sin^2(2 pi u_last))
+//! ```
+//!
+//! The paper prints its f2, f3 and f4 differently (x^(4/3) for x^4 / 3, x and y exchanged and 5
+//! for 5.1, without e). These forms exist as `...AsPrinted` to show the difference: minima
+//! -941.37, 0.397887, -2.718282.
 //!
 //! Source: Table III of the paper; standard collections (Hansen et al., 2009). Cost: D to 30 D operations.
 
@@ -40,11 +49,11 @@ pub enum TestFunction {
     Branin,
     /// Many ripples on a funnel.
     Ackley,
-    /// The same away from the centre and not along the axes.
+    /// Ackley's function away from the centre and not along the axes.
     ShiftedRotatedAckley,
     /// Unimodal, condition number 1e4.
     ShiftedEllipsoid,
-    /// The same with condition number 1e6.
+    /// Unimodal, condition number 1e6.
     ShiftedSteepEllipsoid,
     /// A narrow curved valley.
     Rosenbrock,
@@ -80,13 +89,13 @@ impl TestProblem {
         Self { function, dimension: if planar { 2 } else { dimension } }
     }
 
-    /// The function.
+    /// Function of this problem.
     #[must_use]
     pub const fn function(&self) -> TestFunction {
         self.function
     }
 
-    /// The box is plus and minus this in every coordinate.
+    /// Half the box's width: each coordinate reaches from minus to plus this value.
     #[must_use]
     pub const fn half_width(&self) -> f64 {
         use TestFunction as F;
@@ -100,7 +109,7 @@ impl TestProblem {
         }
     }
 
-    /// The least value in the box.
+    /// Least value in the box.
     #[must_use]
     pub const fn minimum(&self) -> f64 {
         use TestFunction as F;
@@ -148,7 +157,7 @@ fn square<T: Real>(value: T) -> T {
     value * value
 }
 
-/// The first two coordinates; zero for what is missing.
+/// First two coordinates; zero for missing ones.
 fn plane<T: Real>(position: &[T]) -> (T, T) {
     let coordinate = |index: usize| position.get(index).copied().unwrap_or(T::zero());
     (coordinate(0), coordinate(1))
@@ -267,7 +276,7 @@ mod tests {
 
     use super::*;
 
-    /// A position at which the minimum is reached, for `n` coordinates.
+    /// Position of the minimum, for `n` coordinates.
     fn minimiser(function: TestFunction, n: usize) -> Vec<f64> {
         use TestFunction as F;
         match function {
@@ -313,7 +322,7 @@ mod tests {
             let position = minimiser(function, Objective::<f64>::dimension(&problem));
             assert!(position.iter().all(|x| abs(*x) <= problem.half_width()));
             let value: f64 = problem.evaluate(&position);
-            // minimisers of the plane functions are given to 7 digits: the value follows to 1e-7
+            // Minimisers of the plane functions are given to 7 digits: the value follows to 1e-7.
             assert!(abs(value - problem.minimum()) < 1e-7, "{function:?}: {value}");
         }
     }
@@ -335,8 +344,8 @@ mod tests {
 
     #[test]
     fn the_rotation_keeps_lengths() {
-        // a reflection: Ackley's first term sees the length only, so two points as far from the centre differ in
-        // the cosines alone, by at most e - 1/e
+        // A reflection: Ackley's first term depends on the length only. Two points equally far from the
+        // centre differ in the cosines alone, by at most e - 1/e.
         let problem = TestProblem::new(TestFunction::ShiftedRotatedAckley, 30);
         let centre = minimiser(TestFunction::ShiftedRotatedAckley, 30);
         let plain = TestProblem::new(TestFunction::Ackley, 30);
@@ -359,7 +368,7 @@ mod tests {
             let n = Objective::<f64>::dimension(&problem);
             let double: f64 = problem.evaluate(&point[..n]);
             let single: f32 = problem.evaluate(&single[..n]);
-            // a few tens of single-precision roundings of the largest term
+            // A few tens of single-precision roundings of the largest term.
             let scale = 1e-5 * (1.0 + abs(double));
             assert!(abs(f64::from(single) - double) < scale, "{function:?}: {single} {double}");
         }

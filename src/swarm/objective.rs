@@ -1,10 +1,10 @@
-//! What a search sees of the world: a cost over a box.
+//! Interface of a search to its problem: a cost over a box.
 //!
-//! Why a trait: the swarm must not know a leg, and the identification must not know a beetle.
+//! Why a trait: the swarm is independent of the leg, and the identification of the swarm.
 
 use crate::real::{Real, is_finite};
 
-/// A cost to be minimised over a box. It knows no leg, and a search knows nothing else of it.
+/// A cost to minimise over a box, the only input of a search.
 pub trait Objective<T: Real> {
     /// Number of coordinates, 1 to the capacity of the search.
     fn dimension(&self) -> usize;
@@ -14,7 +14,7 @@ pub trait Objective<T: Real> {
 
     /// Cost at a position of [`dimension`](Self::dimension) coordinates, always inside the box.
     ///
-    /// A value that is not finite (or is the largest finite number) says "not possible": the candidate is
+    /// A value that is not finite (or is the largest finite number) means "not possible": the candidate is
     /// dropped and the search goes on.
     fn evaluate(&self, position: &[T]) -> T;
 }
@@ -31,33 +31,33 @@ impl<T: Real, O: Objective<T> + ?Sized> Objective<T> for &O {
     }
 }
 
-/// Why a search cannot begin.
+/// Reason why a search cannot begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SwarmError {
     /// The objective has no coordinate.
     NoDimension,
-    /// The objective has more coordinates than the search has room for.
+    /// The objective has more coordinates than the search's capacity.
     DimensionAboveCapacity {
         /// Coordinates of the objective.
         dimension: usize,
-        /// Coordinates the search has room for.
+        /// Capacity of the search in coordinates.
         capacity: usize,
     },
-    /// Bounds that are not finite, too far apart for the precision, or whose lowest is not below the highest.
+    /// The bounds are not finite, too far apart for the precision, or not ascending.
     Bounds {
-        /// The coordinate, counted from 0.
+        /// Coordinate, counted from 0.
         coordinate: usize,
     },
-    /// A setting that is negative or not finite, or a divisor that is zero.
+    /// A setting is negative or not finite, or a divisor is zero.
     Setting(&'static str),
 }
 
-/// A setting that must be finite and at least zero.
+/// Checks a setting that must be finite and at least zero.
 pub(super) fn not_negative<T: Real>(name: &'static str, value: T) -> Result<(), SwarmError> {
     if value >= T::zero() && is_finite(value) { Ok(()) } else { Err(SwarmError::Setting(name)) }
 }
 
-/// A setting that must be finite and above zero.
+/// Checks a setting that must be finite and above zero.
 pub(super) fn positive<T: Real>(name: &'static str, value: T) -> Result<(), SwarmError> {
     if value > T::zero() && is_finite(value) { Ok(()) } else { Err(SwarmError::Setting(name)) }
 }

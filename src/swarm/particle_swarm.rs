@@ -1,8 +1,8 @@
-//! Particle swarm search: the classical comparison, and the half of the beetle swarm that is not a beetle.
+//! Particle swarm search: the classical comparison, and the basis of the beetle swarm.
 //!
-//! Per iteration and particle: velocity by Eq. (19), then x = x + v (Eq. 18), clipped to the box; all particles
-//! move before the personal bests follow. Velocities are limited to a fifth of the box per coordinate (the paper
-//! demands a limit and gives none).
+//! Per iteration and particle: velocity by Eq. (19), then x = x + v (Eq. 18), clipped to the box. All
+//! particles move before the personal bests follow. Velocities are limited to a fifth of the box per
+//! coordinate (the paper requires a limit but gives no value).
 //!
 //! Source: Kennedy, Eberhart (1995); the paper, Eqs (18)-(20), constants of its section 4.1.
 //! Cost: N evaluations and 10 N D operations per iteration; memory N (3 D + 3) + 3 D scalars.
@@ -40,22 +40,22 @@ impl<T: Real> Default for PsoSettings<T> {
     }
 }
 
-/// Particle swarm of `N` particles with room for `D` coordinates.
+/// Particle swarm of `N` particles with capacity for `D` coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pso<T: Real, const N: usize, const D: usize> {
     settings: PsoSettings<T>,
     ledger: Ledger<T, D>,
     random: Random,
     particles: Particles<T, N, D>,
-    /// Values found by the moves of the running iteration.
+    /// Values found by the moves of the current iteration.
     found: [T; N],
-    /// The particle to be evaluated next.
+    /// Next particle to evaluate.
     next: usize,
     scattered: bool,
 }
 
 impl<T: Real, const N: usize, const D: usize> Pso<T, N, D> {
-    /// A swarm scattered over the objective's box; nothing is evaluated yet.
+    /// Scatters a swarm over the objective's box; nothing is evaluated yet.
     pub fn new(
         objective: &impl Objective<T>,
         settings: PsoSettings<T>,

@@ -1,31 +1,31 @@
-//! The state that particle swarm and beetle swarm share: positions, velocities, personal bests, and Eq. (19).
+//! State shared by particle swarm and beetle swarm: positions, velocities, personal bests, and Eq. (19).
 //!
-//! Why one type: what a beetle swarm inherits from the particle swarm is exactly this, and nothing is to differ.
+//! Why one type: the beetle swarm inherits exactly this from the particle swarm, without differences.
 //!
 //! Velocity, per coordinate with fresh random numbers r1, r2 in 0..1 (Eq. 19), limited to the velocity limit:
 //!   v = w v + c1 r1 (P_i - x) + c2 r2 (G - x)
-//! Inertia weight (Eq. 20): w = w_max - (w_max - w_min) t / M
-//! Symbols: x position, v velocity, P_i personal best, G best of the personal bests, all in box coordinates
-//! (0..1 per coordinate); w inertia weight, c1 and c2 individual and global learning factor; t iteration of M.
-//! Source: Kennedy, Eberhart (1995); the paper, Eqs (18)-(20). Cost: 8 D operations and 2 D random numbers per
-//! particle; memory N (3 D + 2) scalars.
+//! Inertia weight (Eq. 20): w = w_max - (w_max - w_min) t / M Symbols: x position, v velocity, P_i personal
+//! best, G best of the personal bests, all in box coordinates (0..1 per coordinate); w inertia weight, c1 and
+//! c2 individual and global learning factor; t iteration of M.
+//! Source: Kennedy, Eberhart (1995); the paper, Eqs (18)-(20). Cost: 8 D operations and 2 D random numbers
+//! per particle; memory N (3 D + 2) scalars.
 
 use crate::real::{Real, clamp};
 
 use super::random::Random;
 use super::rows::{clip_to_box, live, live_mut};
 
-/// First velocities are uniform in plus or minus this share of the box.
+/// Range of the first velocities, uniform, plus or minus this share of the box.
 const FIRST_VELOCITY: f64 = 0.1;
 
-/// Inertia weight that falls linearly with the iteration (Eq. 20), and stays at its last value afterwards.
+/// Inertia weight that falls linearly with the iteration (Eq. 20), then stays at its last value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InertiaWeight<T> {
     /// Weight at iteration 0.
     pub first: T,
     /// Weight from the last iteration on.
     pub last: T,
-    /// The iteration at which `last` is reached.
+    /// Iteration at which `last` is reached.
     pub iterations: u32,
 }
 
@@ -47,7 +47,7 @@ impl<T: Real> InertiaWeight<T> {
     }
 }
 
-/// The numbers of Eq. (19) at one iteration.
+/// Constants of Eq. (19) at one iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct VelocityRule<T> {
     pub inertia_weight: T,
@@ -70,10 +70,10 @@ pub(super) struct Particles<T, const N: usize, const D: usize> {
 }
 
 impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
-    /// A swarm needs two, and the searches index with what is limited to N - 1.
+    /// A swarm needs two particles, and the searches use indices limited to N - 1.
     const ENOUGH: () = assert!(N >= 2, "a swarm has at least two particles");
 
-    /// All particles in one corner of the box, at rest, until they are scattered.
+    /// All particles in one corner of the box, at rest, until [`Self::scatter`].
     pub fn new(dimension: usize) -> Self {
         const { Self::ENOUGH };
         Self {
@@ -86,7 +86,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
         }
     }
 
-    /// As new, in place.
+    /// Resets to the state of [`Self::new`], in place.
     pub fn restart(&mut self, dimension: usize) {
         self.dimension = dimension;
         for rows in [&mut self.position, &mut self.velocity, &mut self.personal_best] {
@@ -101,7 +101,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
         self.dimension
     }
 
-    /// New positions uniform in the box, velocities uniform and small; nothing is known any more.
+    /// Draws new positions uniform in the box and small uniform velocities; discards all values.
     pub fn scatter(&mut self, random: &mut Random) {
         for particle in 0..N {
             for entry in live_mut(&mut self.position[particle], self.dimension) {
@@ -116,7 +116,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
         self.personal_best_value = [T::LARGEST; N];
     }
 
-    /// The particle whose personal best is the best of all; the first of equals.
+    /// Particle with the best personal best; the first of equals.
     pub fn leader(&self) -> usize {
         let mut leader = 0;
         for particle in 1..N {
@@ -127,7 +127,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
         leader
     }
 
-    /// Eq. (19) for one particle.
+    /// Applies Eq. (19) to one particle.
     pub fn steer(&mut self, particle: usize, rule: &VelocityRule<T>, random: &mut Random) {
         let (particle, leader) = (particle.min(N - 1), self.leader().min(N - 1));
         let position = live(&self.position[particle], self.dimension);
@@ -142,7 +142,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
         }
     }
 
-    /// A value found at the particle's position; true where it is a new personal best.
+    /// Stores the value at the particle's position; true for a new personal best.
     pub fn record(&mut self, particle: usize, value: T) -> bool {
         let particle = particle.min(N - 1);
         self.value[particle] = value;
@@ -156,7 +156,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
         better
     }
 
-    /// Back to the personal best, at rest.
+    /// Moves the particle back to its personal best, at rest.
     pub fn retreat(&mut self, particle: usize) {
         let particle = particle.min(N - 1);
         self.position[particle] = self.personal_best[particle];
@@ -164,7 +164,7 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
         self.value[particle] = self.personal_best_value[particle];
     }
 
-    /// Best personal best first; equals keep their order.
+    /// Sorts by personal best, the best first; equals keep their order.
     pub fn sort(&mut self) {
         for end in 1..N {
             for place in (0..end).rev() {
@@ -189,7 +189,7 @@ mod tests {
     fn inertia_weight_falls_linearly_to_its_last_value() {
         let weight = InertiaWeight { first: 0.9_f64, last: 0.4, iterations: 100 };
         assert_eq!(weight.at(0), 0.9);
-        // single-precision share of the iterations: 6e-8 of 0.5
+        // Single-precision share of the iterations: 6e-8 of 0.5.
         assert!((weight.at(50) - 0.65).abs() < 1e-7);
         assert_eq!(weight.at(100), 0.4);
         assert_eq!(weight.at(u32::MAX), 0.4);

@@ -1,8 +1,8 @@
-//! Seeded random numbers: a thin cover over xoshiro128++ that makes scalars of either precision.
+//! Seeded random numbers: a thin wrapper of xoshiro128++ for scalars of either precision.
 //!
-//! Why a cover: the crate provides the generator, the searches need uniform and bell-shaped scalars without
-//! double precision, which a Cortex-M4F computes in software. Both precisions draw the same 24 bits, so a run in
-//! `f64` begins at the same places as the run in `f32` it checks.
+//! Why a wrapper: the crate provides the generator. The searches need uniform and bell-shaped scalars without
+//! double precision, which a Cortex-M4F computes in software. Both precisions draw the same 24 bits, so a run
+//! in `f64` starts from the positions of the `f32` run that it checks.
 //!
 //! Source: xoshiro128++ (Blackman, Vigna, 2019), seeded through SplitMix64. State 16 bytes.
 
@@ -14,36 +14,36 @@ use crate::real::Real;
 /// 2^-24: the spacing of the uniform numbers.
 const UNIFORM_SPACING: f32 = 1.0 / 16_777_216.0;
 
-/// A source of random numbers; the same seed gives the same numbers on every machine.
+/// Random generator; a seed gives the same numbers on every machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Random(Xoshiro128PlusPlus);
 
 impl Random {
-    /// A source that starts from a seed.
+    /// Generator that starts from a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(Xoshiro128PlusPlus::seed_from_u64(seed))
     }
 
-    /// Uniform in 0 (included) to 1 (excluded), in steps of 2^-24.
+    /// Uniform number in 0 (included) to 1 (excluded), in steps of 2^-24.
     pub fn uniform<T: Real>(&mut self) -> T {
         nalgebra::convert((self.0.next_u32() >> 8) as f32 * UNIFORM_SPACING)
     }
 
-    /// Uniform in -1 (included) to 1 (excluded).
+    /// Uniform number in -1 (included) to 1 (excluded).
     pub fn signed<T: Real>(&mut self) -> T {
         let uniform: T = self.uniform();
         uniform + uniform - T::one()
     }
 
-    /// Bell-shaped around 0 within -2..2, variance 1/3: the sum of four uniform numbers less 2.
-    /// Enough for a direction, whose length does not matter.
+    /// Bell-shaped number around 0 within -2..2, variance 1/3: the sum of four uniform numbers less 2. Enough
+    /// for a direction, whose length does not matter.
     pub fn bell<T: Real>(&mut self) -> T {
         let pair: T = self.uniform::<T>() + self.uniform();
         pair + self.uniform() + self.uniform() - T::of(2.0)
     }
 
-    /// Uniform in `0..count`; 0 where `count` is 0. Uneven by at most count / 2^32.
+    /// Uniform integer in `0..count`; 0 for a `count` of 0. Bias at most count / 2^32.
     pub fn below(&mut self, count: usize) -> usize {
         ((u64::from(self.0.next_u32()) * count as u64) >> 32) as usize
     }
@@ -63,7 +63,8 @@ mod tests {
 
     #[test]
     fn moments_are_those_of_the_named_distributions() {
-        // 100,000 draws: standard error of a mean is 0.0009 (uniform) and 0.0018 (bell); five of them allowed.
+        // 100,000 draws: standard error of a mean is 0.0009 (uniform) and 0.0018
+        // (bell); five of them allowed.
         let mut random = Random::new(11);
         let count = 100_000;
         let (mut uniform, mut signed, mut bell, mut bell_square) = (0.0, 0.0, 0.0, 0.0);

@@ -1,21 +1,20 @@
-//! Flat row arithmetic of the searches: the live part of a row, dot product, row plus a multiple of another.
+//! Row arithmetic of the searches: the used part of a row, dot product, row plus a multiple of another.
 //!
-//! Why not matrices of the linear algebra library: the dimension is known at run time only and is usually below
-//! the capacity; loops over the live part cost what the problem costs, not what the capacity would.
+//! Why not matrices of the linear algebra library: the dimension is known at run time only and is usually
+//! below the capacity. Loops over the used part have the cost of the problem, not of the capacity.
 
 use crate::real::{Real, clamp};
 
-/// The first `dimension` entries of a row (all of it, should the dimension exceed it).
+/// First `dimension` entries of a row (all of it if the dimension exceeds it).
 pub(super) fn live<T, const D: usize>(row: &[T; D], dimension: usize) -> &[T] {
     &row[..dimension.min(D)]
 }
 
-/// The same, to be changed.
+/// First `dimension` entries of a row, mutable.
 pub(super) fn live_mut<T, const D: usize>(row: &mut [T; D], dimension: usize) -> &mut [T] {
     &mut row[..dimension.min(D)]
 }
 
-/// Sum of products.
 pub(super) fn dot<T: Real>(one: &[T], other: &[T]) -> T {
     one.iter().zip(other).fold(T::zero(), |sum, (&a, &b)| sum + a * b)
 }
@@ -39,7 +38,7 @@ pub(super) fn clip_to_box<T: Real>(value: T) -> T {
     clamp(value, T::zero(), T::one())
 }
 
-/// The middle of some numbers, the upper one of two; 0 of none. Sorts them.
+/// Median of some numbers, the upper one of two; 0 for an empty slice. Sorts the slice.
 pub(super) fn median<T: Real>(values: &mut [T]) -> T {
     for end in 1..values.len() {
         for place in (0..end).rev() {

@@ -1,7 +1,7 @@
-//! What every search offers, and the ledger in which it keeps its box, its best and its counts.
+//! Common interface of the searches, and the ledger with their box, best value and counts.
 //!
-//! Why a ledger: that no evaluation leaves the box, that a cost which is not finite is dropped and that the best
-//! so far is available whenever a run is cancelled must hold for every search, so it is written once.
+//! Why a ledger: three rules hold for every search, so they are written once. No evaluation leaves the box, a
+//! cost that is not finite is dropped, and the best so far is available whenever a run is cancelled.
 //!
 //! Vocabulary: searches walk in box coordinates u, 0..1 per coordinate; the objective sees
 //! x = low + (high - low) clip(u, 0, 1), limited to low..high once more against rounding.
@@ -12,12 +12,12 @@ use crate::real::{Real, clamp, is_finite};
 use super::objective::{Objective, SwarmError};
 use super::rows::{live, live_mut};
 
-/// The best position evaluated so far and its cost.
+/// Best position evaluated so far, and its cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Best<'a, T> {
     /// Position in the objective's own units, one entry per coordinate.
     pub position: &'a [T],
-    /// Cost there; finite.
+    /// Cost at this position; finite.
     pub value: T,
 }
 
@@ -25,21 +25,22 @@ pub struct Best<'a, T> {
 ///
 /// Slicing never changes the result: `advance(60)` and sixty times `advance(1)` leave equal searches.
 pub trait Search<T: Real> {
-    /// Spends `evaluations` of the objective and returns how many were spent: all of them, or none where the
-    /// objective's dimension is not the one the search began with.
+    /// Spends `evaluations` of the objective and returns how many were spent. That is all of them, or none if
+    /// the objective's dimension has changed.
     fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32;
 
-    /// The best so far; `None` while no finite cost was seen.
+    /// Best so far; `None` until a finite cost was found.
     fn best(&self) -> Option<Best<'_, T>>;
 
     /// Completed iterations; the first evaluations of the scattered swarm are iteration 0.
     fn iterations(&self) -> u32;
 
-    /// Evaluations so far, all counted.
+    /// Number of evaluations so far.
     fn evaluations(&self) -> u32;
 
-    /// Advances by whole iterations until the best is at most `goal` or `iterations` are complete; true where the
-    /// goal was reached. The last iteration is completed, so that searches can be compared by their counts.
+    /// Advances by whole iterations until the best is at most `goal` or `iterations` are
+    /// complete; true if the goal was reached. The last iteration is completed, so that searches
+    /// can be compared by their counts.
     fn reach(&mut self, objective: &impl Objective<T>, goal: T, iterations: u32) -> bool {
         while self.iterations() < iterations {
             let before = self.iterations();
@@ -56,14 +57,14 @@ pub trait Search<T: Real> {
     }
 }
 
-/// Box, best and counts of one search.
+/// Box, best value and counts of one search.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Ledger<T, const D: usize> {
     dimension: usize,
     low: [T; D],
     high: [T; D],
     best_position: [T; D],
-    /// The largest finite number until a smaller value was seen.
+    /// The largest finite number until a smaller value was found.
     best_value: T,
     evaluations: u32,
     iterations: u32,
@@ -105,12 +106,12 @@ impl<T: Real, const D: usize> Ledger<T, D> {
         self.dimension
     }
 
-    /// Whether an objective still is of the dimension the search began with.
+    /// True if an objective has the dimension that the search began with.
     pub fn accepts(&self, objective: &impl Objective<T>) -> bool {
         objective.dimension() == self.dimension
     }
 
-    /// Box coordinate 0..1 to the objective's own unit; never outside the bounds.
+    /// Converts box coordinates 0..1 to the objective's units; never outside the bounds.
     pub fn place(&self, point: &[T; D]) -> [T; D] {
         let mut position = *point;
         for ((entry, &low), &high) in position.iter_mut().zip(&self.low).zip(&self.high) {
@@ -125,7 +126,7 @@ impl<T: Real, const D: usize> Ledger<T, D> {
         self.evaluate_position(objective, position)
     }
 
-    /// The point of the box that is nearest to a position, both in the objective's units.
+    /// Point of the box nearest to a position, both in the objective's units.
     pub fn nearest(&self, mut position: [T; D]) -> [T; D] {
         for ((entry, &low), &high) in position.iter_mut().zip(&self.low).zip(&self.high) {
             *entry = clamp(*entry, low, high);
@@ -166,7 +167,7 @@ impl<T: Real, const D: usize> Ledger<T, D> {
     }
 }
 
-/// Whether a value returned by the ledger was finite.
+/// True if a value returned by the ledger was finite.
 pub(super) fn is_usable<T: Real>(value: T) -> bool {
     value < T::LARGEST
 }

@@ -1,15 +1,15 @@
-//! Writes a record's line: the format's placeholders in order, each with its value.
+//! Writer of a record's line: the format's placeholders in order, each with its value.
 //!
-//! The format is `defmt`'s, of which three things are used: `{=type}`, `{=type:#x}` and text. On the device the same
-//! string is compiled into the image and never read; here it is read at run time, so that both write one line.
+//! The format is `defmt`'s; it uses only `{=type}`, `{=type:#x}` and text. On the device the same string is
+//! compiled into the image and never read. Here it is read at run time, so both ways write the same line.
 
 use core::fmt::{Result, Write};
 
-/// Something that stands behind a key.
+/// A value that can follow a key.
 pub trait Value {
-    /// As it is read back.
+    /// Writes the value as [`super::Line`] reads it back.
     fn put(&self, out: &mut dyn Write) -> Result;
-    /// The same in base 16, with `0x`; what is no whole number as ever.
+    /// Writes a whole number in base 16, with `0x`; other values as [`Self::put`].
     fn put_hex(&self, out: &mut dyn Write) -> Result {
         self.put(out)
     }
@@ -60,7 +60,7 @@ impl<V: Value, const N: usize> Value for [V; N] {
     }
 }
 
-/// Writes `format` with `values` in the place of its placeholders; those without a value stay empty.
+/// Writes `format` with `values` at its placeholders; a placeholder without a value stays empty.
 pub(super) fn fill(format: &str, values: &[&dyn Value], out: &mut dyn Write) -> Result {
     let mut values = values.iter();
     for (place, piece) in format.split('{').enumerate() {

@@ -1,20 +1,20 @@
-//! A line of a trace, read.
+//! Parser of one trace line.
 //!
-//! Nothing is copied: a [`Line`] looks at the text it was read from, and looks a key up by going through it. Keys that are not
-//! known are skipped by whoever does not ask for them, so an older reader understands a newer trace.
+//! Nothing is copied: a [`Line`] borrows the text and searches it for each key. Readers ignore unknown keys,
+//! so an older reader understands a newer trace.
 
 use core::str::FromStr;
 
-/// What is wrong with a line.
+/// Reason why a line or a value cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineError<'a> {
-    /// It does not begin with a kind.
+    /// The line does not begin with a kind.
     Kind,
-    /// This is no `key=value`, or a list without an end.
+    /// The text is not a `key=value` pair, or is a list without an end.
     Pair(&'a str),
-    /// The kind has no such key here.
+    /// The line has no such key.
     Missing(&'a str),
-    /// The value of this key is not what was asked for.
+    /// The value of this key has the wrong type.
     Value(&'a str),
 }
 
@@ -26,7 +26,7 @@ pub struct Line<'a> {
 }
 
 impl<'a> Line<'a> {
-    /// Reads a line; all of its pairs are checked.
+    /// Parses a line and checks all of its pairs.
     ///
     /// # Errors
     /// [`LineError::Kind`], [`LineError::Pair`].
@@ -44,16 +44,16 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// What it tells of.
+    /// Kind of the record.
     #[must_use]
     pub fn kind(&self) -> &'a str {
         self.kind
     }
 
-    /// Its number since the start.
+    /// Record number since the start.
     ///
     /// # Errors
-    /// There is none.
+    /// [`LineError::Missing`], [`LineError::Value`].
     pub fn number(&self) -> Result<u32, LineError<'a>> {
         self.value("n")
     }
@@ -74,7 +74,7 @@ impl<'a> Line<'a> {
         })
     }
 
-    /// What stands behind a key.
+    /// Value of a key as text.
     ///
     /// # Errors
     /// [`LineError::Missing`].
@@ -83,7 +83,7 @@ impl<'a> Line<'a> {
         pairs.find(|(found, _)| *found == key).map(|(_, value)| value).ok_or(LineError::Missing(key))
     }
 
-    /// What stands behind a key as a number or a truth value.
+    /// Value of a key as a number or a truth value.
     ///
     /// # Errors
     /// [`LineError::Missing`], [`LineError::Value`].
@@ -91,7 +91,7 @@ impl<'a> Line<'a> {
         self.text(key)?.parse().map_err(|_| LineError::Value(key))
     }
 
-    /// A whole number in base 16.
+    /// Value of a key as a whole number in base 16.
     ///
     /// # Errors
     /// [`LineError::Missing`], [`LineError::Value`].
@@ -100,7 +100,7 @@ impl<'a> Line<'a> {
         u32::from_str_radix(digits, 16).map_err(|_| LineError::Value(key))
     }
 
-    /// A list of `N`.
+    /// Value of a key as a list of `N` items.
     ///
     /// # Errors
     /// [`LineError::Missing`], [`LineError::Value`]; also for a list of another length.
@@ -124,7 +124,7 @@ fn is_word(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|byte| matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'_'))
 }
 
-/// Key, value, and what follows the space behind them.
+/// Splits off the first pair: key, value, and the rest after the following space.
 fn take_pair(text: &str) -> Result<(&str, &str, &str), LineError<'_>> {
     let whole = text.split(' ').next().unwrap_or(text);
     let (key, rest) = text.split_once('=').ok_or(LineError::Pair(whole))?;

@@ -1,6 +1,7 @@
-//! Everything that can be told.
+//! All records of the trace.
 //!
-//! A format string is written once and serves twice: with `defmt` the device sends index and values, without [`Record::write`] fills it in; first comes its number.
+//! Each format string is written once and used twice: with `defmt` the device sends index and values; without
+//! it [`Record::write`] fills the string in. The record's number comes first.
 
 use core::fmt::{self, Write};
 
@@ -10,53 +11,53 @@ use super::fill::{Value, fill};
 records! {
     /// The image has started.
     Boot "boot n={=u32} grammar={=u8} version={=str} leg={=str} joints={=u8} base={=u8} servo_hz={=u32} log_hz={=u32} reset={=str}" {
-        /// [`super::GRAMMAR`].
+        /// Version of the grammar, [`super::GRAMMAR`].
         grammar: u8,
-        /// Of the firmware.
+        /// Firmware version.
         version: &'static str,
-        /// Name of the leg it is built for.
+        /// Name of the leg that the image is built for.
         leg: &'static str,
-        /// Of the leg.
+        /// Number of joints.
         joints: u8,
-        /// Base parameters.
+        /// Number of base parameters.
         base: u8,
-        /// Ticks per second.
+        /// Servo ticks per second.
         servo_hz: u32,
         /// Logged samples per second.
         log_hz: u32,
-        /// Why the board started.
+        /// Cause of the last reset.
         reset: &'static str,
     }
-    /// Which board, and what it found of itself; all zero in the emulator.
+    /// Board identity and clock; all zero in the emulator.
     Board "board n={=u32} uid0={=u32:#x} uid1={=u32:#x} uid2={=u32:#x} version={=u8} version_minor={=u8} version_volt={=u8} clock_hz={=u32}" {
-        /// Lowest word of the unique number.
+        /// Lowest word of the chip's unique number.
         uid0: u32,
-        /// Middle word.
+        /// Middle word of the unique number.
         uid1: u32,
-        /// Highest word.
+        /// Highest word of the unique number.
         uid2: u32,
-        /// As burnt in at the factory; 255 where nothing is.
+        /// Board version, programmed at the factory; 255 if blank.
         version: u8,
-        /// The same.
+        /// Minor board version; 255 if blank.
         version_minor: u8,
-        /// The same: the voltage that decides the divider.
+        /// Voltage variant of the board, which decides the divider; 255 if blank.
         version_volt: u8,
-        /// Of the processor.
+        /// Clock of the processor.
         clock_hz: u32,
     }
-    /// How the image before this one ended. The drive stays refused until its fault is reset.
+    /// End of the previous image. The drive stays refused until its fault is reset.
     Crash "crash n={=u32} cause={=str} pc={=u32:#x} lr={=u32:#x} status={=u32:#x} address={=u32:#x} line={=u32} file={=str} released={=u32} kept={=u32}" {
-        /// `panic`, `hard_fault`, `stack_overflow`, `interrupt`, `clock`.
+        /// Cause: `panic`, `hard_fault`, `stack_overflow`, `interrupt`, `clock`.
         cause: &'static str,
-        /// Where; zero where the processor could not store it.
+        /// Program counter; zero where the processor could not store it.
         pc: u32,
-        /// Called from; of a stack overflow from where its deepest function may have been called.
+        /// Return address; for a stack overflow, a possible caller of the deepest function.
         lr: u32,
-        /// Fault status register, or the number of an interrupt nobody handles.
+        /// Fault status register, or the number of an unhandled interrupt.
         status: u32,
-        /// Address of a bus fault; all ones where there is none.
+        /// Address of a bus fault; all ones without one.
         address: u32,
-        /// Of a panic.
+        /// Line of a panic.
         line: u32,
         /// End of a panic's file name, or `-`.
         file: &'static str,
@@ -65,342 +66,343 @@ records! {
         /// Clock when this record was complete, before the reset.
         kept: u32,
     }
-    /// Why the drive may not be enabled at all until the board is started again or the cause is gone.
+    /// Reason why the drive cannot be enabled until a restart or until the cause is gone.
     Refused "refused n={=u32} why={=str} value={=u32:#x}" {
-        /// A word.
+        /// Word for the reason.
         why: &'static str,
-        /// What was found.
+        /// Measured value.
         value: u32,
     }
-    /// Status of a gate driver, once per driver when a cause of theirs forbids to enable.
+    /// Status of a gate driver, once per driver when one of its faults inhibits enabling.
     GateDriver "gate_driver n={=u32} why={=str} joint={=u8} status={=u32:#x}" {
-        /// `gate_fault` or `gate_configuration`.
+        /// Inhibit reason, `gate_fault` or `gate_configuration`.
         why: &'static str,
-        /// From 1.
+        /// Joint, from 1.
         joint: u8,
-        /// Status registers of the DRV8301, the first in the upper half; all ones if it does not answer.
+        /// Status registers of the DRV8301, the first in the upper half; all ones without an answer.
         status: u32,
     }
-    /// Drive or activity changed.
+    /// Change of drive state or activity.
     State "state n={=u32} tick={=u32} drive={=str} activity={=str} phase={=str} motion={=u8}" {
         /// Servo tick.
         tick: u32,
-        /// [`super::words::drive`].
+        /// Drive state, see [`super::words::drive`].
         drive: &'static str,
-        /// [`super::words::activity`].
+        /// Activity, see [`super::words::activity`].
         activity: &'static str,
-        /// The same.
+        /// Phase of the activity, see [`super::words::activity`].
         phase: &'static str,
-        /// The same.
+        /// Held-out motion from 1, see [`super::words::activity`].
         motion: u8,
     }
-    /// The operator asked.
+    /// Request of the operator.
     Request "request n={=u32} tick={=u32} name={=str} accepted={=bool}" {
         /// Servo tick.
         tick: u32,
-        /// What for.
+        /// Name of the request.
         name: &'static str,
-        /// Or refused.
+        /// False if refused.
         accepted: bool,
     }
-    /// The monitor did not enable the drive.
+    /// Refusal of the monitor to enable the drive.
     NotEnabled "not_enabled n={=u32} tick={=u32} joint={=u8} why={=str}" {
         /// Servo tick.
         tick: u32,
-        /// From 1.
+        /// Joint, from 1.
         joint: u8,
-        /// [`super::words::refusal`].
+        /// Reason, see [`super::words::refusal`].
         why: &'static str,
     }
-    /// A fault of the leg.
+    /// Fault of the leg.
     Fault "fault n={=u32} tick={=u32} code={=u16:#x} name={=str} joint={=u8}" {
-        /// Servo tick at which it was seen.
+        /// Servo tick of detection.
         tick: u32,
         /// CiA 402 error code.
         code: u16,
-        /// [`super::words::fault`].
+        /// Name, see [`super::words::fault`].
         name: &'static str,
-        /// From 1.
+        /// Joint, from 1.
         joint: u8,
     }
-    /// A fault that an axis or the board found by itself.
+    /// Fault that an axis or the board detected itself.
     AxisFault "axis_fault n={=u32} tick={=u32} joint={=u8} name={=str}" {
         /// Servo tick.
         tick: u32,
-        /// From 1; 0 is the board.
+        /// Joint, from 1; 0 for the board.
         joint: u8,
-        /// [`super::words::axis_fault`], or the board's word.
+        /// Word, see [`super::words::axis_fault`], or the board's word.
         name: &'static str,
     }
-    /// Something takes from the torque that is asked of a joint: no fault; told once a second at most.
+    /// Active torque limit of a joint: no fault; logged once a second at most.
     Limit "limit n={=u32} tick={=u32} code={=u8} name={=str} joint={=u8}" {
         /** Servo tick. */ tick: u32,
-        /** [`crate::leg::LimitCode`]. */ code: u8,
-        /** Its word. */ name: &'static str,
-        /** From 1. */ joint: u8,
+        /** Number of the [`crate::leg::LimitCode`]. */ code: u8,
+        /** Word for the limit. */ name: &'static str,
+        /** Joint, from 1. */ joint: u8,
     }
-    /// How a calibration ended.
+    /// Result of a calibration.
     Calibration "calibration n={=u32} joint={=u8} result={=str} number={=u32} resistance_ohm={=f32} direct_h={=f32} quadrature_h={=f32} offset_turns={=f32} zero_b={=f32} zero_c={=f32}" {
-        /// From 1.
+        /// Joint, from 1.
         joint: u8,
-        /// `done`, or [`super::words::calibration`].
+        /// Result: `done`, or see [`super::words::calibration`].
         result: &'static str,
-        /// Goes with a refusal.
+        /// Number that belongs to a refusal.
         number: u32,
-        /// Of one phase.
+        /// Resistance of one phase.
         resistance_ohm: f32,
         /// Inductance along the flux.
         direct_h: f32,
-        /// Across it.
+        /// Inductance across the flux.
         quadrature_h: f32,
-        /// Electrical angle where counts begin.
+        /// Electrical angle at encoder count zero.
         offset_turns: f32,
-        /// Shunt without current, converter codes.
+        /// Current-sensor offset of phase B, converter codes.
         zero_b: f32,
-        /// The same.
+        /// Current-sensor offset of phase C, converter codes.
         zero_c: f32,
     }
-    /// The search goes on.
+    /// Progress of the search.
     Progress "progress n={=u32} tick={=u32} iterations={=u32} evaluations={=u32} excess_chi2={=f32}" {
         /// Servo tick.
         tick: u32,
-        /// Of the swarm.
+        /// Iterations of the swarm.
         iterations: u32,
-        /// Of the swarm.
+        /// Evaluations of the swarm.
         evaluations: u32,
         /// Best cost so far above least squares.
         excess_chi2: f32,
     }
-    /// The solver of the identification.
+    /// Solver of the identification.
     Solver "solver n={=u32} plan={=str} swarm_seed={=u64} state={=str} iterations={=u32} evaluations={=u32} steps={=u32} rank={=u8} base={=u8} dropped={=u8} condition={=f32} consistency_chi2={=f32}" {
-        /// `one-time` or `sequential`.
+        /// Plan: `one-time` or `sequential`.
         plan: &'static str,
-        /// Of the swarm's random numbers.
+        /// Seed of the swarm's random generator.
         swarm_seed: u64,
-        /// `running`, `done` or `failed`.
+        /// State: `running`, `done` or `failed`.
         state: &'static str,
-        /// Of the swarm.
+        /// Iterations of the swarm.
         iterations: u32,
-        /// Of the swarm.
+        /// Evaluations of the swarm.
         evaluations: u32,
-        /// Of the completion.
+        /// Newton steps of the completion.
         steps: u32,
-        /// Base parameters that the data determine.
+        /// Number of base parameters that the data determine.
         rank: u8,
-        /// Base parameters there are.
+        /// Number of base parameters.
         base: u8,
-        /// Of them held at zero.
+        /// Number of base parameters held at zero.
         dropped: u8,
-        /// Of the scaled problem.
+        /// Condition number of the scaled problem.
         condition: f32,
-        /// What a leg that can exist costs above least squares.
+        /// Cost of the physically consistent leg above least squares.
         consistency_chi2: f32,
     }
     /// One of a joint's fourteen parameters.
     Parameter "parameter n={=u32} joint={=u8} symbol={=str} value={=f32} unit={=str} sigma={=f32} status={=str}" {
-        /// From 1.
+        /// Joint, from 1.
         joint: u8,
-        /// `XX`, `FC`, ...
+        /// Symbol, such as `XX` or `FC`.
         symbol: &'static str,
-        /// SI; NaN where nothing tells.
+        /// Value, SI; NaN where unknown.
         value: f32,
-        /// [`super::words::unit`].
+        /// Unit, see [`super::words::unit`].
         unit: &'static str,
         /// Standard deviation; NaN unless measured alone.
         sigma: f32,
-        /// `identified`, `grouped`, `weak` or `prior`.
+        /// Status: `identified`, `grouped`, `weak` or `prior`.
         status: &'static str,
     }
     /// One base parameter.
     Base "base n={=u32} index={=u8} joint={=u8} symbol={=str} grouped={=bool} dropped={=bool} value={=f32} unit={=str} sigma={=f32} least_squares={=f32}" {
-        /// From 0.
+        /// Index, from 0.
         index: u8,
-        /// Of the carrier, from 1.
+        /// Joint of the parameter that stands for it, from 1.
         joint: u8,
-        /// Of the carrier.
+        /// Symbol of that parameter.
         symbol: &'static str,
-        /// Others are regrouped into it.
+        /// True if other parameters are regrouped into it.
         grouped: bool,
-        /// Held at zero.
+        /// True if held at zero.
         dropped: bool,
-        /// SI; NaN where not determined.
+        /// Value, SI; NaN where not determined.
         value: f32,
-        /// [`super::words::unit`].
+        /// Unit, see [`super::words::unit`].
         unit: &'static str,
         /// Standard deviation; NaN where not determined.
         sigma: f32,
-        /// Of the closed form.
+        /// Closed-form value.
         least_squares: f32,
     }
     /// One element of the base parameters' covariance, on or below its diagonal.
     Covariance "covariance n={=u32} row={=u8} column={=u8} value={=f32}" {
-        /// From 0.
+        /// Row, from 0.
         row: u8,
-        /// From 0, at most the row.
+        /// Column, from 0, at most the row.
         column: u8,
-        /// SI.
+        /// Element, SI.
         value: f32,
     }
     /// Stribeck friction of a joint that shows it.
     Stribeck "stribeck n={=u32} joint={=u8} surplus_nm={=f32} surplus_sigma_nm={=f32} speed_rad_s={=f32} speed_sigma_rad_s={=f32} gain_chi2={=f32}" {
-        /// From 1.
+        /// Joint, from 1.
         joint: u8,
         /// Static friction less Coulomb's.
         surplus_nm: f32,
-        /// Standard deviation.
+        /// Standard deviation of the surplus.
         surplus_sigma_nm: f32,
-        /// Speed at which it has fallen to 1/e.
+        /// Speed at which the surplus has fallen to 1/e.
         speed_rad_s: f32,
-        /// Standard deviation.
+        /// Standard deviation of the speed.
         speed_sigma_rad_s: f32,
-        /// Chi-square that it explains.
+        /// Chi-square that the surplus explains.
         gain_chi2: f32,
     }
     /// A recorded motion.
     Motion "motion n={=u32} motion={=u8} samples={=u32} rejected={=u32} longest_common_s={=f32} row_information={=f32}" {
-        /// 0 is the one identified from.
+        /// Motion; 0 is the one identified from.
         motion: u8,
-        /// 500 Hz samples.
+        /// Number of 500 Hz samples.
         samples: u32,
-        /// Samples and rows that were not finite.
+        /// Number of samples and rows that were not finite.
         rejected: u32,
-        /// Longest time for which all joints' rows were disturbed at once.
+        /// Longest time with all joints' rows disturbed at once.
         longest_common_s: f32,
-        /// Of one row, in independent ones.
+        /// Information of one row, in independent ones.
         row_information: f32,
     }
-    /// One joint on one motion.
+    /// Fit of one joint in one motion.
     Fit "fit n={=u32} motion={=u8} joint={=u8} rows={=u32} rms_nm={=f32} mean_abs_nm={=f32} torque_rms_nm={=f32} speed_rms_rad_s={=f32} disturbed_share={=f32} disturbed_longest_s={=f32} replaced={=u32}" {
-        /// 0 is the one identified from.
+        /// Motion; 0 is the one identified from.
         motion: u8,
-        /// From 1.
+        /// Joint, from 1.
         joint: u8,
-        /// In which the joint moved.
+        /// Rows in which the joint moved.
         rows: u32,
-        /// Measured minus predicted torque.
+        /// Root mean square of measured minus predicted torque.
         rms_nm: f32,
-        /// Of the torque.
+        /// Mean absolute torque.
         mean_abs_nm: f32,
-        /// Of the torque.
+        /// Root mean square torque.
         torque_rms_nm: f32,
-        /// Of the speed.
+        /// Root mean square speed.
         speed_rms_rad_s: f32,
-        /// Of the rows.
+        /// Share of disturbed rows.
         disturbed_share: f32,
-        /// At a stretch.
+        /// Longest disturbed stretch.
         disturbed_longest_s: f32,
-        /// Wild samples.
+        /// Number of replaced outliers.
         replaced: u32,
     }
     /// One test of the verdict.
     Finding "finding n={=u32} reason={=str} test={=str} joint={=u8} motion={=u8} value={=f32} limit={=f32} passed={=bool}" {
-        /// Why the result is refused if it failed.
+        /// Reason of a refusal if the test failed.
         reason: &'static str,
-        /// Which.
+        /// Word for the test.
         test: &'static str,
-        /// From 1; 0 where it is not about one joint.
+        /// Joint, from 1; 0 for a test of all joints.
         joint: u8,
-        /// Of the validation, from 1; 0 is the motion identified from, or all.
+        /// Held-out motion, from 1; 0 is the motion identified from, or all.
         motion: u8,
-        /// What was seen.
+        /// Measured value.
         value: f32,
-        /// What is allowed.
+        /// Limit of the value.
         limit: f32,
-        /// Within it.
+        /// True if within the limit.
         passed: bool,
     }
     /// One reason against a result.
     Reason "reason n={=u32} reason={=str}" {
-        /// Of the closed list.
+        /// Word from the closed list.
         reason: &'static str,
     }
-    /// The last word on an identification.
+    /// Verdict of an identification.
     Verdict "verdict n={=u32} verdict={=str} reasons={=u8}" {
-        /// `accepted` or `refused`.
+        /// Verdict: `accepted` or `refused`.
         verdict: &'static str,
-        /// How many `reason` records stand before it.
+        /// Number of `reason` records before it.
         reasons: u8,
     }
-    /// The result has been told; a listener who counts another number of records has lost some.
+    /// End of a result; a listener with another count of records has lost some.
     End "end n={=u32} records={=u32}" {
-        /// Of this result, this one not included.
+        /// Number of records of this result, without this one.
         records: u32,
     }
-    /// The accepted model no longer fits.
+    /// Alarm: the accepted model no longer fits.
     Change "change n={=u32} since_s={=f32} joints={=?} statistic={=?} limit={=f32}" {
-        /// How long ago it began.
+        /// Time since the change began.
         since_s: f32,
-        /// Whose sum stands above half of the limit.
+        /// Joints whose sum is above half of the limit.
         joints: [bool; N],
-        /// Sums.
+        /// Cumulative sum of each joint.
         statistic: [f32; N],
-        /// What one of them reached.
+        /// Limit that a sum reached.
         limit: f32,
     }
-    /// What the change was taken for.
+    /// Explanation of a change.
     Update "update n={=u32} cause={=str} link={=u8} verdict={=str} offered={=bool}" {
-        /// [`super::words::cause`].
+        /// Cause, see [`super::words::cause`].
         cause: &'static str,
-        /// From 1.
+        /// Link of a payload, from 1.
         link: u8,
-        /// `accepted` or `refused`.
+        /// Verdict: `accepted` or `refused`.
         verdict: &'static str,
-        /// The operator may take it into use.
+        /// True if the operator may take the update into use.
         offered: bool,
     }
-    /// How the loops do, since the record before.
+    /// Timing, stack and losses of the loops since the previous record.
     Loops "loops n={=u32} tick={=u32} current_worst={=u32} servo_worst={=u32} current_missed={=u32} servo_missed={=u32} cycles_per_tick={=u32} stack_used={=u32} stack_bytes={=u32} samples_lost={=u32} records_lost={=u32}" {
         /// Servo tick.
         tick: u32,
         /// Longest current tick of either axis, processor cycles (instructions in the emulator).
         current_worst: u32,
-        /// Longest servo tick, the same; interrupted by current ticks.
+        /// Longest servo tick, processor cycles; includes interruptions by current ticks.
         servo_worst: u32,
         /// Current ticks that came late or not at all, since the start.
         current_missed: u32,
-        /// Servo ticks, the same.
+        /// Servo ticks that came late or not at all, since the start.
         servo_missed: u32,
-        /// Of the servo.
+        /// Processor cycles per servo tick.
         cycles_per_tick: u32,
-        /// Deepest so far.
+        /// Deepest stack use so far, bytes.
         stack_used: u32,
-        /// There are.
+        /// Size of the stack, bytes.
         stack_bytes: u32,
         /// Logged samples that identification did not take in time, since the start.
         samples_lost: u32,
-        /// Records that found no room on their way to the probe, since the start; what the probe itself lost, the gaps tell.
+        /// Records lost before the probe for lack of space, since the start. Gaps in the numbers show the
+        /// probe's own losses.
         records_lost: u32,
     }
     /// Supply and temperatures.
     Supply "supply n={=u32} tick={=u32} bus_v={=f32} bus_low_v={=f32} bus_high_v={=f32} bridge_c={=?} chopper_c={=f32} chopper_duty={=f32}" {
         /// Servo tick.
         tick: u32,
-        /// Now.
+        /// Present bus voltage.
         bus_v: f32,
-        /// Lowest since the record before.
+        /// Lowest bus voltage since the previous record.
         bus_low_v: f32,
-        /// Highest, the same.
+        /// Highest bus voltage since the previous record.
         bus_high_v: f32,
-        /// Of each axis' bridge, degrees Celsius.
+        /// Temperature of each axis' bridge, degrees Celsius.
         bridge_c: [f32; N],
-        /// Of the brake chopper, degrees Celsius.
+        /// Temperature of the brake chopper, degrees Celsius.
         chopper_c: f32,
-        /// Now, 0..1.
+        /// Present duty of the brake chopper, 0..1.
         chopper_duty: f32,
     }
     /// One sample of the 500 Hz log, on request.
     Log "log n={=u32} tick={=u32} segment={=str} motion={=u8} position_rad={=?} torque_nm={=?} counts={=?}" {
-        /// The last of its eight servo ticks.
+        /// Last of the sample's eight servo ticks.
         tick: u32,
-        /// [`super::words::segment`].
+        /// Use of the sample, see [`super::words::segment`].
         segment: &'static str,
-        /// Of the validation, from 1.
+        /// Held-out motion, from 1.
         motion: u8,
-        /// The model's angles.
+        /// Angles of the model.
         position_rad: [f32; N],
-        /// The model's torques.
+        /// Torques of the model.
         torque_nm: [f32; N],
-        /// Sums of eight encoder counts, the drive's sign: the same angles, exact.
+        /// Sums of eight encoder counts, with the drive's sign: the exact angles.
         counts: [i32; N],
     }
 }

@@ -1,11 +1,11 @@
-//! The result of an identification as a succession of records.
+//! Report of an identification's result as a sequence of records.
 //!
-//! One record at a time, so that whoever tells it can wait between two until the listener has caught up; nothing is copied but
-//! the tests of the verdict, eight at a time. The order is fixed: solver, parameters, base parameters, covariance, Stribeck
-//! friction, motions with their fits, findings, reasons, verdict, end.
+//! The caller takes one record at a time, so it can wait until the listener has caught up. Nothing is copied
+//! but the tests of the verdict, eight at a time. The order is fixed: solver, parameters, base parameters,
+//! covariance, Stribeck friction, motions with their fits, findings, reasons, verdict, end.
 //!
 //! Cost: one judgement for every eight findings, a copy of the covariance for each record.
-//! Limits: the identification must not be begun anew meanwhile; then the report is to be dropped.
+//! Limits: if the identification restarts meanwhile, the report must be dropped.
 
 use core::borrow::BorrowMut;
 
@@ -14,12 +14,11 @@ use crate::leg::{
     Estimate, Evidence, Identification, MotionWindow, Parameter, Plan, SearchState, VALIDATION_MOTIONS,
 };
 
-/// Parameters of a joint.
 const PARAMETERS: usize = Parameter::ALL.len();
-/// Findings that are kept at a time.
+/// Findings stored at a time.
 const CHUNK: usize = 8;
 
-/// Where the report stands.
+/// Section of the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     Solver,
@@ -35,7 +34,7 @@ enum Part {
     Told,
 }
 
-/// A report that is being told; see the module.
+/// A report in progress; see the module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     part: Part,
@@ -51,7 +50,7 @@ impl Default for Report {
 }
 
 impl Report {
-    /// The next record; `None` once all is told, or where nothing was identified.
+    /// Next record; `None` at the end, or without a result.
     pub fn advance<
         const N: usize,
         const B: usize,
@@ -91,7 +90,7 @@ impl Report {
     }
 }
 
-/// What is told, and the estimate that its records share.
+/// Identification to report, and the estimate that its records share.
 struct Source<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W> {
     identification: &'a Identification<N, B, TAPS, PENDING, W>,
     estimate: &'a Estimate<f32, B>,
@@ -102,7 +101,8 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>
 where
     W: BorrowMut<MotionWindow<f32, N, B>>,
 {
-    /// The record at `index` of this part: `None` where the part ends, `Some(None)` where there is none at this place.
+    /// Record at `index` of this section. `None` at the section's end; `Some(None)`
+    /// for an index without a record.
     fn record(&self, report: &mut Report) -> Option<Option<Record<N>>> {
         let index = report.index;
         match report.part {
@@ -225,7 +225,7 @@ where
         })
     }
 
-    /// Of each motion its own record, then one for each joint.
+    /// One record for each motion, then one for each of its joints.
     fn motion(&self, index: usize) -> Option<Record<N>> {
         let (motion, place) = (index / (N + 1), index % (N + 1));
         let Some(joint) = place.checked_sub(1) else {
@@ -254,7 +254,7 @@ where
     }
 }
 
-/// The word for a verdict.
+/// Word for a verdict.
 #[must_use]
 pub const fn judged(accepted: bool) -> &'static str {
     if accepted { "accepted" } else { "refused" }

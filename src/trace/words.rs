@@ -1,13 +1,13 @@
-//! The words of closed lists: one for each state, activity, fault and refusal, the same for ever.
+//! Words of the closed lists: one for each state, activity, fault and refusal. They never change.
 //!
-//! Every match is without a rest: who adds a state gives it a word.
+//! No match has a wildcard: a new state needs a word to compile.
 
 use crate::leg::{
     Activity, AxisFault, CalibrationRefusal, Cause, DriveState, FaultCode, IdentifyPhase, Parameter, Phase,
     RefusalReason, Segment, Step,
 };
 
-/// Where the drive stands.
+/// Word for the drive state.
 #[must_use]
 pub const fn drive(state: DriveState) -> &'static str {
     match state {
@@ -22,7 +22,7 @@ pub const fn drive(state: DriveState) -> &'static str {
     }
 }
 
-/// Activity, its phase (`-` for none), and the motion of the validation from 1 (0 for none).
+/// Words for the activity and its phase (`-` without one), and the held-out motion from 1 (0 without one).
 #[must_use]
 pub const fn activity(activity: Activity) -> (&'static str, &'static str, u8) {
     match activity {
@@ -46,7 +46,7 @@ pub const fn activity(activity: Activity) -> (&'static str, &'static str, u8) {
     }
 }
 
-/// What a logged sample is for, and the motion of the validation from 1.
+/// Word for the use of a logged sample, and the held-out motion from 1.
 #[must_use]
 pub const fn segment(segment: Option<Segment>) -> (&'static str, u8) {
     match segment {
@@ -57,13 +57,13 @@ pub const fn segment(segment: Option<Segment>) -> (&'static str, u8) {
     }
 }
 
-/// A fault of the leg.
+/// Word for a fault of the leg.
 #[must_use]
 pub const fn fault(code: FaultCode) -> &'static str {
     code.name()
 }
 
-/// Why the drive was not enabled.
+/// Word for the refusal to enable the drive.
 #[must_use]
 pub const fn refusal(reason: RefusalReason) -> &'static str {
     match reason {
@@ -73,7 +73,7 @@ pub const fn refusal(reason: RefusalReason) -> &'static str {
     }
 }
 
-/// Why an axis released its bridge by itself.
+/// Word for a fault by which an axis turned its outputs off.
 #[must_use]
 pub const fn axis_fault(fault: AxisFault) -> &'static str {
     match fault {
@@ -90,7 +90,7 @@ pub const fn axis_fault(fault: AxisFault) -> &'static str {
     }
 }
 
-/// What changed about a leg, and the link of a load from 1.
+/// Word for the cause of a change, and the link of a payload from 1.
 #[must_use]
 pub const fn cause(cause: Cause) -> (&'static str, u8) {
     match cause {
@@ -101,7 +101,7 @@ pub const fn cause(cause: Cause) -> (&'static str, u8) {
     }
 }
 
-/// A parameter's unit as one word.
+/// Unit of a parameter as one word.
 #[must_use]
 pub const fn unit(parameter: Parameter) -> &'static str {
     match parameter {
@@ -119,7 +119,8 @@ pub const fn unit(parameter: Parameter) -> &'static str {
     }
 }
 
-/// Why there is no calibration, and the number that goes with it: a phase from 1, pole pairs or counts that would fit.
+/// Word for the refusal of a calibration, and its number: a phase from 1, or pole
+/// pairs or counts that would fit.
 #[must_use]
 pub const fn calibration(refusal: CalibrationRefusal) -> (&'static str, u32) {
     use CalibrationRefusal as Why;

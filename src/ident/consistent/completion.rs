@@ -1,15 +1,17 @@
-//! Full parameters of every link from base values: in closed form where that is a leg, else by interior points.
+//! Full parameters of every link from base values: closed form where consistent, else interior points.
 //!
 //! ```text
 //! closed form allowed -> done (no step, base values untouched)
 //! else: y inside, mu = F(y) / 50 -> Newton steps at mu -> mu / 10 -> ... -> last mu
 //! ```
 //!
-//! Every place visited is strictly inside the allowed set, so that whatever is read at any time is a possible leg.
+//! Every iterate is strictly inside the allowed set, so a result read at any time is physically consistent.
 //!
-//! Cost: 30 to 60 steps ([`super::interior`]) where the closed form is no leg. Memory, two joints: 4.0 kB.
-//! Limits: at most [`LARGEST_STEPS`]. Where the data contradict every leg the prior's pull on hidden directions is
-//! heard: that chi-square then comes out up to twice as large as its least value, which changes no verdict.
+//! Cost: 30 to 60 steps ([`super::interior`]) where the closed form is
+//! inconsistent. Memory, two joints: 4.0 kB.
+//! Limits: at most [`LARGEST_STEPS`] steps. Where the data contradict every consistent leg, the
+//! prior's pull on hidden directions has some effect. Chi-square then comes out up to twice its least
+//! value, which changes no verdict.
 
 use super::super::bounds::LinkPrior;
 use super::super::completion::complete_within;
@@ -22,49 +24,49 @@ use super::limits::Limits;
 use crate::model::LegParameters;
 use crate::real::{self, Real};
 
-/// Newton steps, all barriers together.
+/// Newton steps, all barrier values together.
 pub const LARGEST_STEPS: u32 = 150;
-/// Steps at one barrier.
+/// Newton steps at one barrier value.
 const STEPS_PER_BARRIER: u32 = 12;
-/// Barriers of one joint, about: sets the first `mu`.
+/// Approximate number of barrier terms of one joint: sets the first `mu`.
 const BARRIERS_PER_JOINT: f64 = 21.0;
 
-/// How closely to solve.
+/// Accuracy of the solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort<T> {
-    /// Chi-square units that a deviation by one standard deviation of the prior costs where torque is silent. The
-    /// smaller, the less the prior is heard against the data where constraints bind.
+    /// Cost in chi-square units of one prior standard deviation in a direction that torque does not show. A
+    /// smaller value gives the prior less weight against the data where constraints bind.
     pub pull: T,
-    /// Last `mu`, chi-square units: the cost ends within 21 N times that of the minimum.
+    /// Last `mu`, chi-square units: the final cost is within 21 N times this value of the minimum.
     pub last_barrier: T,
 }
 
 impl<T: Real> Effort<T> {
-    /// For single precision. A neutral leg in place of a prior is only there to make the answer unique.
+    /// Settings for single precision. Without a prior the pull to a neutral leg only makes the answer unique.
     #[must_use]
     pub fn device(with_prior: bool) -> Self {
         Self { pull: T::of(if with_prior { 1e-3 } else { 1e-4 }), last_barrier: T::of(1e-5) }
     }
 
-    /// For double precision, as a reference.
+    /// Settings for double precision, as a reference.
     #[must_use]
     pub fn reference() -> Self {
         Self { pull: T::of(1e-5), last_barrier: T::of(1e-8) }
     }
 }
 
-/// Where it stands.
+/// Progress of a completion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// Base values are not known yet.
     Waiting,
-    /// Interior points.
+    /// Interior-point steps are running.
     Stepping,
-    /// Found.
+    /// Solution found, or out of steps.
     Done,
 }
 
-/// A completion under way.
+/// A completion in progress.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Completion<T: Real, const N: usize> {
     limits: Limits<T, N>,
@@ -79,7 +81,7 @@ pub struct Completion<T: Real, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Completion<T, N> {
-    /// Nothing to complete yet.
+    /// Prepares a completion; [`Self::start`] supplies the base values.
     #[must_use]
     pub fn new<const B: usize>(
         model: &RowModel<T, N, B>,
@@ -104,15 +106,15 @@ impl<T: Real, const N: usize> Completion<T, N> {
         }
     }
 
-    /// Holds what `selection` drops at zero, before it begins.
+    /// Holds at zero what `selection` drops. Call it before [`Self::start`].
     pub fn hold<const B: usize>(&mut self, model: &RowModel<T, N, B>, selection: &Selection<T, N, B>) {
         self.limits.hold(model, selection);
         self.cost = LegCost::new(&self.limits);
         self.place = self.cost.place(&self.limits.inside());
     }
 
-    /// Begins with base values that were found on `stage`; if no leg has them, the cost of others is counted from
-    /// `centre`.
+    /// Starts from the base values found on `stage`. If no consistent leg has these values, the cost of
+    /// others is counted from `centre`.
     pub fn start<const B: usize>(
         &mut self,
         model: &RowModel<T, N, B>,
@@ -131,7 +133,7 @@ impl<T: Real, const N: usize> Completion<T, N> {
         let closed = complete_within(model, &wanted, self.limits.origin(), self.limits.deviations());
         if let Some(closed) = closed.filter(|closed| self.limits.allow(closed)) {
             self.place = self.cost.place(&closed);
-            // Rounding of the scaling must not lead outside.
+            // Rounding in the scaling must not lead outside.
             if Limits::consistent(&self.parameters()) {
                 (self.phase, self.converged) = (Phase::Done, true);
                 return;
@@ -143,7 +145,7 @@ impl<T: Real, const N: usize> Completion<T, N> {
         self.phase = Phase::Stepping;
     }
 
-    /// One Newton step; true when there is nothing left to do.
+    /// Takes one Newton step; returns true when finished.
     pub fn step(&mut self) -> bool {
         if self.phase != Phase::Stepping {
             return self.phase == Phase::Done;
@@ -165,37 +167,37 @@ impl<T: Real, const N: usize> Completion<T, N> {
         self.phase == Phase::Done
     }
 
-    /// Base values are there and the leg is found.
+    /// True once base values were given and the completion has ended.
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.phase == Phase::Done
     }
 
-    /// It ended at the minimum, not because steps ran out or numbers overflowed.
+    /// True if the completion ended at the minimum, not for lack of steps or by overflow.
     #[must_use]
     pub fn converged(&self) -> bool {
         self.converged
     }
 
-    /// Whether base values were given.
+    /// True while base values are missing.
     #[must_use]
     pub fn is_waiting(&self) -> bool {
         self.phase == Phase::Waiting
     }
 
-    /// Newton steps so far; none where the closed form is a leg.
+    /// Newton steps so far; zero where the closed form is consistent.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.steps
     }
 
-    /// Parameters of a possible leg at any time.
+    /// Current parameters; physically consistent at any time.
     #[must_use]
     pub fn parameters(&self) -> LegParameters<T, N> {
         self.cost.parameters(&self.place)
     }
 
-    /// What is allowed.
+    /// Allowed set of the parameters.
     #[must_use]
     pub fn limits(&self) -> &Limits<T, N> {
         &self.limits

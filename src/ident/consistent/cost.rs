@@ -1,13 +1,14 @@
-//! The cost of full parameters as one triangular factor: what the data say, and a weak prior where they are silent.
+//! Cost of full parameters as one triangular factor: the data, and a weak prior in directions without data.
 //!
 //! ```text
-//! y = (p - p0) / w                                          each parameter in the prior's standard deviations
+//! y = (p - p0) / w                                  each parameter in the prior's standard deviations
 //! F(y) = |R K W^1/2 y - R (beta - K p0)|^2 + pull |N y|^2 = |A y - b|^2 + const
-//! N = E - Q Q'                                              Q: orthonormal rows of K W^1/2 (determined ones)
+//! N = E - Q Q'                                      Q: orthonormal rows of K W^1/2 (determined ones)
 //! ```
 //!
-//! With the projector `N` instead of the identity the prior has no say in what is measured: the minimum of `F` is
-//! `p0 + W K' (K W K')^-1 (beta - K p0)` for any `pull`. Columns that are not estimated are held at `p0`, which is 0.
+//! With the projector `N` instead of the identity the prior has no influence on what is measured.
+//! The minimum of `F` is `p0 + W K' (K W K')^-1 (beta - K p0)` for any `pull`. Columns not estimated
+//! are held at `p0`, which is 0.
 //!
 //! Cost: `28 + rank` rows into a factor of 28 columns (two joints), about 70,000 multiplications once; an
 //! evaluation 400. Memory: `14 N (14 N + 3)` scalars.
@@ -18,7 +19,7 @@ use super::limits::Limits;
 use crate::model::{INERTIAL_PARAMETERS, LegParameters, PARAMETERS_PER_JOINT, Parameter, row_torque};
 use crate::real::{self, Real};
 
-/// Parameters of a leg without any value.
+/// Parameters of a leg, all zero.
 pub(super) const fn zeros<T: Real, const N: usize>(zero: T) -> LegParameters<T, N> {
     [[zero; PARAMETERS_PER_JOINT]; N]
 }
@@ -36,7 +37,7 @@ pub struct LegCost<T: Real, const N: usize> {
 }
 
 impl<T: Real, const N: usize> LegCost<T, N> {
-    /// No rows yet; prior and its standard deviations are those of `limits`.
+    /// Cost without rows; prior and standard deviations come from `limits`.
     #[must_use]
     pub fn new(limits: &Limits<T, N>) -> Self {
         let zero = zeros(T::zero());
@@ -49,7 +50,8 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         }
     }
 
-    /// Takes the data's rows (`stage`, about the base values `centre`) and the prior's, the latter weighted by `pull`.
+    /// Takes the data's rows (`stage`, about the base values `centre`) and the
+    /// prior's rows with weight `pull`.
     #[inline(never)]
     pub fn fill<const B: usize>(
         &mut self,
@@ -82,7 +84,7 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         for (index, &base) in columns.iter().enumerate().take(B) {
             let mut row = *model.base.terms(base);
             multiply(&mut row, &self.scale);
-            // Twice is enough (Kahan): the rows are far from parallel.
+            // Two passes of Gram-Schmidt are enough (Kahan): the rows are far from parallel.
             for _ in 0..2 {
                 for other in seen.iter().take(index) {
                     let share = row_torque(&row, other);
@@ -114,7 +116,7 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         }
     }
 
-    /// Rotates one row in (Golub and Van Loan 5.1.8); leaves nothing of use in `row`.
+    /// Rotates one row in (Golub and Van Loan 5.1.8). Overwrites `row`.
     #[inline(never)]
     pub(super) fn insert(&mut self, row: &mut LegParameters<T, N>, mut right: T) {
         let row = row.as_flattened_mut();
@@ -137,7 +139,7 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         }
     }
 
-    /// The same problem about `place`: its unknown is the step from there.
+    /// Shifts the origin to `place`: the unknown becomes the step from there.
     pub(super) fn shift(&mut self, place: &LegParameters<T, N>) {
         let place = place.as_flattened();
         let rows = self.triangle.as_flattened().iter().zip(self.right.as_flattened_mut());
@@ -167,7 +169,7 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         solution
     }
 
-    /// `|b|^2` of the rotated problem: how far a step would lower the cost.
+    /// `|b|^2` of the rotated problem: the decrease in cost of a full step.
     pub(super) fn right_squared(&self) -> T {
         row_torque(&self.right, &self.right)
     }
@@ -184,7 +186,7 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         })
     }
 
-    /// Parameters at a place.
+    /// Converts scaled coordinates to parameters.
     #[must_use]
     pub fn parameters(&self, place: &LegParameters<T, N>) -> LegParameters<T, N> {
         let mut parameters = *place;
@@ -193,7 +195,7 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         parameters
     }
 
-    /// The place of parameters.
+    /// Converts parameters to scaled coordinates.
     #[must_use]
     pub fn place(&self, parameters: &LegParameters<T, N>) -> LegParameters<T, N> {
         let mut place = *parameters;
@@ -204,12 +206,12 @@ impl<T: Real, const N: usize> LegCost<T, N> {
         place
     }
 
-    /// Standard deviations by which parameters are scaled.
+    /// Standard deviations that scale the parameters.
     pub(super) fn scale(&self) -> &LegParameters<T, N> {
         &self.scale
     }
 
-    /// Where the prior stands.
+    /// Parameters of the prior.
     pub(super) fn origin(&self) -> &LegParameters<T, N> {
         &self.origin
     }

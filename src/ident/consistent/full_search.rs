@@ -1,8 +1,8 @@
-//! The beetle swarm over whole legs: log-Cholesky coordinates of every link, logarithms of the drives' parameters.
+//! Beetle swarm over physically consistent legs, in log-Cholesky coordinates and logarithms.
 //!
-//! Every point of the box is a possible leg, so the swarm cannot leave the set. It minimises the same cost as
-//! [`super::Completion`], from a cold start, uniform in the box of what the prior allows; kept beside it to show what
-//! such a search costs.
+//! Every point of the box is physically consistent, so the swarm cannot leave the set. It minimises the cost
+//! of [`super::Completion`] from a cold start, uniform in the box that the prior allows. The search exists
+//! beside the completion to show what such a search costs.
 //!
 //! ```text
 //! alpha        ln(mass) / 2           0.2 .. 5 of the prior's mass
@@ -13,10 +13,11 @@
 //! OFF          linear
 //! ```
 //!
-//! Every body carries a ball of the smallest extent beside: shear could make it thinner than its numbers can say.
+//! Every body includes a ball of the smallest extent: shear alone could make it thinner
+//! than single precision resolves.
 //!
-//! Cost: an evaluation 1,200 multiplications and 11 exponentials (two joints). Memory: a `Bso` of 14 N dimensions,
-//! 21.1 kB for two joints.
+//! Cost: an evaluation 1,200 multiplications and 11 exponentials (two joints). Memory: a `Bso` of 14 N
+//! dimensions, 21.1 kB for two joints.
 
 use super::cost::LegCost;
 use super::limits::Limits;
@@ -27,12 +28,12 @@ use crate::swarm::{Bso, BsoSettings, Objective, SwarmError};
 
 /// Extents over the prior's radius of gyration.
 const EXTENTS: (f64, f64) = (0.05, 1.58);
-/// Least mass over the largest where no prior gives one.
+/// Least mass over the largest, where no prior gives one.
 const SMALLEST_MASS_SHARE: f64 = 1e-3;
 /// Least rotor inertia and friction over the largest.
 const SMALLEST_DRIVE_SHARE: f64 = 1e-2;
 
-/// The cost of a leg in logarithmic coordinates; those of drive parameters that are not estimated are left out.
+/// Cost of a leg in logarithmic coordinates, without drive parameters that are not estimated.
 #[derive(Clone, Copy, Debug)]
 pub struct FullObjective<'a, T: Real, const N: usize> {
     limits: &'a Limits<T, N>,
@@ -40,13 +41,13 @@ pub struct FullObjective<'a, T: Real, const N: usize> {
 }
 
 impl<'a, T: Real, const N: usize> FullObjective<'a, T, N> {
-    /// The cost within the limits.
+    /// Cost within the limits.
     #[must_use]
     pub fn new(limits: &'a Limits<T, N>, cost: &'a LegCost<T, N>) -> Self {
         Self { limits, cost }
     }
 
-    /// Joint and place within the joint of every coordinate.
+    /// Joint and parameter index of every coordinate.
     fn coordinates(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.limits.links.iter().enumerate().flat_map(|(joint, link)| {
             (0..PARAMETERS_PER_JOINT)
@@ -57,7 +58,7 @@ impl<'a, T: Real, const N: usize> FullObjective<'a, T, N> {
         })
     }
 
-    /// The leg at a position: always a possible one.
+    /// Leg at a position: always physically consistent.
     #[must_use]
     pub fn parameters(&self, position: &[T]) -> LegParameters<T, N> {
         let mut coordinates = *self.cost.origin();
@@ -117,7 +118,7 @@ impl<T: Real, const N: usize> Objective<T> for FullObjective<'_, T, N> {
     }
 }
 
-/// A swarm of up to `D` coordinates on its way.
+/// A swarm of up to `D` coordinates in progress.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FullSearch<T: Real, const D: usize> {
     swarm: Bso<T, BEETLES, D>,
@@ -127,10 +128,10 @@ pub struct FullSearch<T: Real, const D: usize> {
 }
 
 impl<T: Real, const D: usize> FullSearch<T, D> {
-    /// A cold start.
+    /// Starts the search cold.
     ///
     /// # Errors
-    /// [`SwarmError`] when the box makes no sense or `D` has too little room.
+    /// [`SwarmError`] when the box is invalid or its dimension exceeds `D`.
     pub fn new<const N: usize>(
         objective: &FullObjective<'_, T, N>,
         settings: BsoSettings<T>,
@@ -140,7 +141,7 @@ impl<T: Real, const D: usize> FullSearch<T, D> {
         Ok(Self { swarm, watched_value: T::LARGEST, watched_iteration: 0, done: false })
     }
 
-    /// Spends up to `evaluations`; any slicing gives the same result. True when the search has ended.
+    /// Spends up to `evaluations`; any slicing gives the same result. Returns true when the search has ended.
     pub fn advance<const N: usize>(&mut self, objective: &FullObjective<'_, T, N>, evaluations: u32) -> bool {
         for _ in 0..evaluations {
             if self.done {

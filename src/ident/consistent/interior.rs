@@ -1,4 +1,4 @@
-//! One step of the interior-point method, in square-root form: every constraint is a row of the factor.
+//! One step of the interior-point method in square-root form: every constraint is a row of the factor.
 //!
 //! ```text
 //! G(y) = F(y) + 2 mu phi(y),    phi = -sum ln det P_link - sum ln slack
@@ -7,9 +7,9 @@
 //! pseudo-inertia:               rows sqrt(mu) M_ii,          right sqrt(mu);      sqrt(2 mu) M_ij, right 0
 //! ```
 //!
-//! No normal equations, so single precision keeps its digits. `phi` is self-concordant (Nesterov and Nemirovskii
-//! 1994): damped Newton steps converge from any point inside, and at the minimum of `G` the cost is at most
-//! `mu` times the number of barriers above the constrained minimum.
+//! Without normal equations single precision keeps its digits. `phi` is self-concordant (Nesterov and
+//! Nemirovskii 1994): damped Newton steps converge from any point inside. At the minimum of `G` the cost is
+//! at most `mu` times the number of barriers above the constrained minimum.
 //!
 //! Cost: 27 rows a joint into a factor of `14 N` columns, about 100,000 multiplications for two joints.
 
@@ -19,10 +19,10 @@ use super::pseudo_inertia::Factored;
 use crate::model::{LegParameters, PARAMETERS_PER_JOINT};
 use crate::real::{self, Real};
 
-/// Halvings of a step until it stays inside and does not go up by more than rounding.
+/// Most halvings of a step until it stays inside and raises the merit by no more than rounding.
 const HALVINGS: usize = 24;
 
-/// `G`; `None` outside.
+/// `G` at `place`; `None` outside.
 pub(super) fn merit<T: Real, const N: usize>(
     cost: &LegCost<T, N>,
     limits: &Limits<T, N>,
@@ -48,19 +48,18 @@ pub(super) fn merit<T: Real, const N: usize>(
     real::is_finite(merit).then_some(merit)
 }
 
-/// What a step did.
 pub(super) struct Step {
-    /// The place is where `G` is least, as far as it matters or can be resolved.
+    /// `place` minimises `G`, within what matters or can be resolved.
     pub settled: bool,
-    /// There is a merit to go down from; else it lies outside or numbers overflow, and nothing is settled.
+    /// False where the start has no finite merit: outside, or overflow. Such a step is not a valid end.
     pub inside: bool,
 }
 
-/// Decrement, in units of the barrier, from which on a place counts as the minimum: the cost is then within a twentieth of
-/// `mu` of it.
+/// Decrement, in units of the barrier, below which a point counts as the minimum. The cost is then within a
+/// twentieth of `mu` of the minimum.
 const SETTLED: f64 = 0.05;
 
-/// One damped Newton step from `place`, which must be inside.
+/// Takes one damped Newton step from `place`, which must be inside.
 #[inline(never)]
 pub(super) fn step<T: Real, const N: usize>(
     cost: &LegCost<T, N>,
@@ -87,7 +86,7 @@ pub(super) fn step<T: Real, const N: usize>(
         }
         share *= T::of(0.5);
     }
-    // Nothing lower can be told from rounding.
+    // Rounding hides any further decrease.
     Step { settled: true, inside: true }
 }
 

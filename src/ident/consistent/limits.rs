@@ -1,21 +1,22 @@
-//! What a leg may be at all: the set that completion and search stay in, convex in the parameters.
+//! Allowed set of a leg's parameters, convex; completion and search stay inside.
 //!
 //! ```text
 //! pseudo-inertia of every link positive definite
 //! mass              0.2 .. 5 of the prior's
 //! centre of mass    the prior's +- half the segment's length, each coordinate
-//! extent            second moment about the prior's centre of mass <= mass rho^2,  rho^2 = 15 k^2 + 3/4 length^2
+//! extent            second moment about the prior's centre <= mass rho^2,  rho^2 = 15 k^2 + 3/4 length^2
 //! rotor, Coulomb, viscous    0 .. 5 of the prior's;    offset +- 5 (|prior| + Coulomb)
 //! ```
 //!
-//! Every line but the first is linear in the 14 parameters. `k` is the prior's radius of gyration about the centre
-//! of mass (twice the trace of the inertia over mass), at least a tenth of the length.
+//! Every line but the first is linear in the 14 parameters. `k` is the prior's radius of gyration about the
+//! centre of mass, at least a tenth of the length. Twice its square is the trace of the inertia over mass.
 //!
-//! Without a prior the geometry and the torque speak: centre of mass within a segment's length of the joint (the
-//! last segment as long as the longest known one, 1 m where none is), masses up to what ten times the measured
-//! torque could need; rotor, friction and offset as in the box of the base set ([`super::super::bounds`]). A neutral
-//! leg stands in for the prior: a twentieth of all that, centres of mass at the joints. It is believed only to within
-//! its own size ([`Limits::deviations`]): a zero of it says nothing.
+//! Without a prior the limits come from geometry and torque. The centre of mass is within a segment's length
+//! of the joint. The last segment counts as long as the longest known one, 1 m where none is known. Masses
+//! reach up to what ten times the measured torque could need; rotor, friction and offset as in the box of the
+//! base set ([`super::super::bounds`]). A neutral leg replaces the prior: a twentieth of these limits,
+//! centres of mass at the joints. Its standard deviations equal its own size ([`Limits::deviations`]), so a
+//! zero in it carries no information.
 
 use super::super::bounds::{LinkPrior, measured_box, segment_length};
 use super::super::completion::prior_deviations;
@@ -29,33 +30,33 @@ use crate::real::{self, Real};
 
 /// Smallest and largest share of the prior's mass and drive parameters.
 const SHARE: (f64, f64) = (0.2, 5.0);
-/// Radius of gyration over length below which a prior's shape is not believed.
+/// Smallest credible radius of gyration of a prior, over length.
 const SMALLEST_SHAPE: f64 = 0.1;
-/// Where nothing tells how long a segment is, m.
+/// Length of a segment where the geometry gives none, m.
 const UNKNOWN_LENGTH_M: f64 = 1.0;
-/// What a neutral leg is given of the most the torque could need.
+/// Parameters of a neutral leg over the most that the torque could need.
 const NEUTRAL_SHARE: f64 = 0.05;
 /// Extent of a ball over its radius of gyration, 1 / sqrt(3).
 const ROUND: f64 = 0.577_350_269_189_626;
 /// Linear conditions of one joint.
 pub(super) const CONDITIONS: usize = 17;
 
-/// What one link and its drive may be.
+/// Allowed values of one link and its drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LinkLimits<T> {
     pub mass: (T, T),
     pub centre: [T; 3],
-    /// Half the segment's length: how far the centre of mass may be from `centre`, each coordinate.
+    /// Half the segment's length: largest distance of the centre of mass from `centre`, each coordinate.
     pub reach: T,
     /// Radius of gyration about the centre of mass.
     pub gyration: T,
-    /// IA, FC, FV, OFF.
+    /// Ranges of IA, FC, FV, OFF.
     pub drive: [(T, T); 4],
-    /// Whether each of them is estimated.
+    /// Drive parameters that are estimated, in the order of `drive`.
     pub estimated: [bool; 4],
 }
 
-/// What the links of a leg may be, and the leg that is believed in beforehand.
+/// Limits of all links, and the leg assumed before any measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits<T: Real, const N: usize> {
     pub(super) links: [LinkLimits<T>; N],
@@ -64,7 +65,7 @@ pub struct Limits<T: Real, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Limits<T, N> {
-    /// What `prior` allows, or without one what geometry and measured torque do.
+    /// Limits from `prior`, or from geometry and measured torque without one.
     #[must_use]
     pub fn new<const B: usize>(
         model: &RowModel<T, N, B>,
@@ -124,7 +125,7 @@ impl<T: Real, const N: usize> Limits<T, N> {
         Self { links, origin, deviations }
     }
 
-    /// Holds what `selection` drops at zero.
+    /// Holds at zero what `selection` drops.
     pub(super) fn hold<const B: usize>(&mut self, model: &RowModel<T, N, B>, selection: &Selection<T, N, B>) {
         for (joint, link) in self.links.iter_mut().enumerate() {
             for (index, estimated) in link.estimated.iter_mut().enumerate() {
@@ -134,13 +135,13 @@ impl<T: Real, const N: usize> Limits<T, N> {
         hold_at_zero(&self.links, &mut self.origin);
     }
 
-    /// What is believed beforehand, a neutral leg without a prior; zero what is not estimated.
+    /// Prior, or a neutral leg without one; zero for parameters that are not estimated.
     #[must_use]
     pub fn origin(&self) -> &LegParameters<T, N> {
         &self.origin
     }
 
-    /// Standard deviations of that belief.
+    /// Standard deviations of [`Self::origin`].
     #[must_use]
     pub fn deviations(&self) -> &LegParameters<T, N> {
         &self.deviations
@@ -168,7 +169,7 @@ impl<T: Real, const N: usize> Limits<T, N> {
         })
     }
 
-    /// Whether these are parameters of a leg: every link a body, no negative rotor inertia or friction.
+    /// True if physically consistent: every link a possible body, no negative rotor inertia or friction.
     #[must_use]
     pub fn consistent(parameters: &LegParameters<T, N>) -> bool {
         parameters.iter().all(|joint| {
@@ -178,7 +179,7 @@ impl<T: Real, const N: usize> Limits<T, N> {
         })
     }
 
-    /// Whether these are parameters of a leg that is allowed.
+    /// True if physically consistent and within the limits.
     #[must_use]
     pub fn allow(&self, parameters: &LegParameters<T, N>) -> bool {
         Self::consistent(parameters)
@@ -190,7 +191,7 @@ impl<T: Real, const N: usize> Limits<T, N> {
     }
 }
 
-/// What is not estimated is zero in the model of the torque, whatever the prior says: so is the leg's.
+/// Zeroes what is not estimated: the torque model has zero there, whatever the prior says.
 fn hold_at_zero<T: Real, const N: usize>(links: &[LinkLimits<T>; N], origin: &mut LegParameters<T, N>) {
     for (link, joint) in links.iter().zip(origin) {
         for (slot, estimated) in joint.iter_mut().skip(INERTIAL_PARAMETERS).zip(link.estimated) {
@@ -258,7 +259,7 @@ impl<T: Real> LinkLimits<T> {
     }
 }
 
-/// Length of a segment as far as the geometry tells.
+/// Length of a segment as far as the geometry gives it.
 fn known_length<T: Real, const N: usize, const B: usize>(model: &RowModel<T, N, B>, joint: usize) -> T {
     let length = |index: usize| model.chain.distance_to(index).unwrap_or(T::zero());
     let own = length(joint + 1);
@@ -272,7 +273,7 @@ fn known_length<T: Real, const N: usize, const B: usize>(model: &RowModel<T, N, 
     }
 }
 
-/// Links of which nothing is known but geometry and torque.
+/// Priors of links known only by geometry and torque.
 fn neutral<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     record: &Record<T, N, B>,
@@ -310,8 +311,8 @@ fn neutral<T: Real, const N: usize, const B: usize>(
     })
 }
 
-/// How large the parameters of a neutral link are, its zeros included: first moments and inertias of its mass at a
-/// segment's length, the offset of its Coulomb friction.
+/// Size of a neutral link's parameters, for those that are zero too: first moments and inertias of its mass
+/// at a segment's length, an offset as large as its Coulomb friction.
 fn sizes<T: Real>(link: &LinkPrior<T>, length: T) -> JointParameters<T> {
     let moment = link.body.mass * length;
     let mut body = [moment * length; INERTIAL_PARAMETERS];
@@ -323,7 +324,7 @@ fn sizes<T: Real>(link: &LinkPrior<T>, length: T) -> JointParameters<T> {
     crate::model::inertia::joint(&body, &[link.rotor_inertia, friction, link.viscous_friction, friction])
 }
 
-/// The most that measured torque could need of a drive parameter.
+/// Largest value of a drive parameter that the measured torque could need.
 fn widest<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     record: &Record<T, N, B>,

@@ -1,11 +1,11 @@
-//! Logarithm of the determinant of a link's pseudo-inertia and its derivatives: the barrier around possible bodies.
+//! Barrier around possible bodies: log-determinant of a link's pseudo-inertia and its derivatives.
 //!
 //! ```text
 //! P = L L',   phi = -ln det P,   dphi = -tr M,   d2phi = |M|^2,   M(dp) = L^-1 P(dp) L^-T
 //! ```
 //!
-//! `P` is linear in the ten parameters, so the second derivative is a sum of ten squares: a barrier is ten rows of a
-//! least-squares problem. Cost: 2,600 multiplications a link.
+//! `P` is linear in the ten parameters, so the second derivative is a sum of ten squares: a barrier is ten
+//! rows of a least-squares problem. Cost: 2,600 multiplications a link.
 
 use crate::model::{INERTIAL_PARAMETERS, JointParameters};
 use crate::real::{self, Real};
@@ -28,7 +28,7 @@ pub(super) struct Factored<T> {
 }
 
 impl<T: Real> Factored<T> {
-    /// `None` unless the parameters are those of a body.
+    /// Factors the pseudo-inertia; `None` if no body has these parameters.
     pub fn new(parameters: &JointParameters<T>) -> Option<Self> {
         let matrix = matrix(&crate::model::inertia::inertial(parameters));
         let mut lower = [[T::zero(); 4]; 4];
@@ -66,8 +66,8 @@ impl<T: Real> Factored<T> {
         Some(Self { inverse, log_determinant })
     }
 
-    /// The ten different elements of `M`, as functions of the ten parameters, each multiplied by `scale`: four of the
-    /// diagonal, then six beside it times sqrt(2).
+    /// Ten distinct elements of `M` as functions of the ten parameters, each multiplied by `scale`: four on
+    /// the diagonal, then six off-diagonal ones times sqrt(2).
     pub fn rows(&self, scale: &JointParameters<T>) -> [[T; INERTIAL_PARAMETERS]; 10] {
         let mut rows = [[T::zero(); INERTIAL_PARAMETERS]; 10];
         for parameter in 0..INERTIAL_PARAMETERS {

@@ -48,7 +48,7 @@ fn truth() -> [LinkPrior<f64>; 2] {
     ]
 }
 
-/// Off by up to `share` in every number, still a leg.
+/// Wrong by up to `share` in every number, still physically consistent.
 fn wrong(dice: &mut Dice, share: f64) -> [LinkPrior<f64>; 2] {
     truth().map(|link| LinkPrior {
         body: RigidBody {
@@ -103,7 +103,7 @@ fn record<const N: usize>(
     record
 }
 
-/// Least squares of a record completed, every step of the way looked at.
+/// Completes the least squares of a record and checks every step on the way.
 fn complete<T: Real, const N: usize>(
     mask: &ColumnMask<N>,
     record: &Record<f64, N, B>,
@@ -137,7 +137,7 @@ fn excess<T: Real, const N: usize>(
     Problem::new(record, &model).weighted().excess(&model.base.project(&found))
 }
 
-/// Base values of no leg: some inertia or friction of the true leg is negative.
+/// Base values of no possible leg: some inertia or friction of the true leg is negative.
 fn impossible(dice: &mut Dice, model: &RowModel<f64, 2, B>) -> [f64; B] {
     let mut parameters = prior_parameters(&truth());
     for _ in 0..2 {
@@ -169,15 +169,15 @@ fn no_impossible_leg_is_ever_visited_whatever_the_data_and_the_precision() {
         let same = excess(&ALL, &record, &double.parameters());
         // Single precision ends where double does: barriers leave 42 x 1e-4, rounding 1e-3 of large costs.
         assert!((found - same).abs() < 0.01 + 0.01 * same, "{found} {same}");
-        // Where data contradict every leg the pull on hidden directions is heard: less than the cost itself, which is
-        // refused by any such figure. Honest data pay nothing.
+        // Where data contradict every leg, the pull on hidden directions has an effect: less than the cost
+        // itself, which any such figure refuses. Consistent data pay nothing.
         assert!(found > least - 1e-3 - 1e-5 * least && found < 0.05 + 2.0 * least, "{found} {least}");
-        // The true leg is allowed and costs what 13 degrees of freedom of noise do.
+        // The true leg is allowed and costs no more than the noise of 13 degrees of freedom.
         if index % 2 == 1 {
             assert!(least < 20.0, "{least}");
             free += 1;
         } else {
-            // Where it is in a sum, a negative inertia of one link may be another's, the more so without a prior.
+            // In a sum a negative inertia of one link may belong to another, more so without a prior.
             forced += u32::from(least > 20.0);
         }
         assert_eq!(estimate.rank(), 13);
@@ -198,8 +198,8 @@ fn the_prior_has_no_say_in_what_is_measured() {
         let found = model.base.project(&completion.parameters().map(|joint| joint.map(f64::from)));
         for (base, found) in found.iter().enumerate() {
             let sigma = f64::from(estimate.sigma(base).unwrap());
-            // A twentieth of a standard deviation is seen by nobody; a prior term of one unit for each deviation of
-            // the prior would move the offsets by a third.
+            // A twentieth of a standard deviation is negligible. A prior term of one unit per standard
+            // deviation of the prior would move the offsets by a third.
             assert!((found - f64::from(estimate.values[base])).abs() < 0.05 * sigma, "{base}");
         }
     }
@@ -215,10 +215,10 @@ fn a_closed_form_that_is_a_leg_is_taken_as_it_is() {
     assert_eq!(completion.steps(), 0);
     let closed = crate::ident::complete(&model, &estimate.values, &prior_parameters(&truth())).unwrap();
     for (found, closed) in completion.parameters().as_flattened().iter().zip(closed.as_flattened()) {
-        // Rounding of a scaling and back.
+        // Rounding of scaling there and back.
         assert!((found - closed).abs() < 1e-12);
     }
-    // And it is the unconstrained minimum of the cost that steps would lower.
+    // The result is also the unconstrained minimum of the cost that steps would lower.
     let place = completion.cost().place(&closed);
     assert!(completion.cost().excess(&place) < 1e-12);
 }
@@ -244,7 +244,7 @@ fn no_allowed_leg_is_better_than_the_completion() {
             if !completion.limits().allow(&other) {
                 continue;
             }
-            // The set and the cost are convex: a better leg anywhere would make the way there lead downhill. The
+            // Set and cost are convex: with a better leg anywhere, the way there would lead downhill. The
             // barriers leave 42 x 1e-8, rounding 1e-12 of the cost.
             let toward = |share: f64| -> LegParameters<f64, 2> {
                 core::array::from_fn(|joint| {
@@ -266,13 +266,13 @@ fn without_a_prior_a_leg_that_can_exist_costs_nothing() {
     let parameters = prior_parameters(&truth());
     for _ in 0..10 {
         let mut record = record(&mut dice, &model, &model.base.project(&parameters));
-        // Every row counted a hundredfold, as in a long record: a pull toward the neutral leg would show.
+        // Every row has a hundredfold weight, as in a long record: a pull toward the neutral leg would show.
         record.row_information = 100.0;
         let (reference, _) = complete::<f64, 2>(&ALL, &record, None, Effort::reference());
         let (single, _) = complete::<f32, 2>(&ALL, &record, None, Effort::device(false));
         assert!(reference.limits().allow(&parameters));
         assert!(reference.converged() && single.converged());
-        // Nothing binds: pull and barriers leave less than a unit of the 13 + 5 sqrt(26) that are refused.
+        // No constraint binds: pull and barriers leave less than a unit, against a limit of 13 + 5 sqrt(26).
         for found in [reference.parameters(), single.parameters().map(|joint| joint.map(f64::from))] {
             let excess = excess(&ALL, &record, &found);
             assert!(excess < 1.0, "{excess}");
@@ -316,7 +316,7 @@ fn every_point_of_the_full_box_is_a_leg_and_slices_do_not_change_the_search() {
         for index in 0..500 {
             let position: [f32; 28] = core::array::from_fn(|coordinate| {
                 let (low, high) = objective.bounds(coordinate);
-                // Corners too.
+                // Includes the corners.
                 let share =
                     if index % 2 == 0 { 0.5 + dice.within(0.5) } else { dice.within(1.0).round().abs() };
                 low + (high - low) * share as f32

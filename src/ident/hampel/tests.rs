@@ -1,4 +1,4 @@
-//! Honest samples pass, isolated wild ones do not.
+//! Regular samples pass, isolated outliers do not.
 
 extern crate std;
 
@@ -77,7 +77,7 @@ fn three_percent_of_wild_torques_are_found_and_leave_errors_of_the_size_of_the_n
         let error = f64::from(cleaned.value) - clean;
         squared += error * error / 100_000.0;
     }
-    // Of some 2,200 beyond eight standard deviations; the few missed stand in crowds of their like.
+    // About 2,200 lie beyond eight standard deviations; the few missed stand in clusters.
     assert!(missed < 25, "{missed} missed");
     assert!(false_alarms < 20, "{false_alarms} false alarms");
     // Uncleaned the mean square is 0.03 * 30^2 / 3 = 9; the noise alone is 1.

@@ -1,4 +1,4 @@
-//! The limit against its theory, on rows that overlap as the filter makes them.
+//! Tests of the limit against its theory, on rows that overlap as the filter makes them.
 
 use super::*;
 
@@ -80,16 +80,16 @@ fn mean(lengths: impl Iterator<Item = f64>) -> f64 {
 
 #[test]
 fn false_alarms_are_as_rare_as_asked_for_and_not_much_rarer() {
-    // One in a minute, so that they can be counted; no clipping, which would make them rarer still.
+    // One a minute, so that they can be counted; no clipping, which would make them rarer still.
     let asked = 60.0;
     for margin in [1.0, 1.2] {
         let scale = real::sqrt(margin);
         let settings = settings(asked, margin, 0.0);
         let found = mean((0..60).map(|seed| run_length(&settings, seed, scale, 0.0)));
         std::println!("margin {margin}: {found} s, asked for {asked} s");
-        // The mean of 60 times with an exponential distribution is known to 13 %; Lorden's bound leaves out the overshoot
-        // and the reflections at zero, together worth a factor of 3 to 10 (a bound that was off by the row correlation
-        // would be off by e).
+        // The mean of 60 times with an exponential distribution is known to 13 %. Lorden's bound neglects the
+        // overshoot and the reflections at zero, together worth a factor of 3 to 10. A bound wrong by the row
+        // correlation would be off by a factor of e.
         assert!(found > 0.7 * asked && found < 12.0 * asked, "margin {margin}: {found} s");
     }
 }
@@ -101,7 +101,7 @@ fn a_change_is_noticed_after_the_time_that_is_stated() {
     for energy in [2.0, 3.0, 6.0] {
         let stated = monitor.delay_s(energy).expect("above the silent energy");
         let found = mean((100..130).map(|seed| run_length(&settings, seed, 1.0, real::sqrt(energy - 1.0))));
-        // Whole blocks: half a block on average, one for the overshoot.
+        // Whole blocks: half a block on average, plus one for the overshoot.
         assert!((found - stated).abs() < 0.15 * stated + 0.75, "{energy}: {found} s, stated {stated} s");
     }
     assert_eq!(monitor.delay_s(0.99 * settings.silent_energy()), None);
@@ -114,7 +114,7 @@ fn a_push_is_no_change_however_hard_and_a_load_that_stays_is() {
         (Monitor::<f64, 2>::new(&low_pass(), &settings), Monitor::<f64, 2>::new(&low_pass(), &settings));
     let mut noticed = None;
     for row in 0..180_000_u32 {
-        // A push of 0.3 s and the reach of both filters every 10 s; blocks begin anywhere in it.
+        // A push of 0.3 s plus the reach of both filters, every 10 s; it begins anywhere in a block.
         let square = if row % 501 < 35 { 1e6 } else { 1.0 };
         assert_eq!(pushed.take(&[Some(square), Some(1.0)]), None, "row {row}");
         if row >= 1000 && noticed.is_none() {
@@ -126,7 +126,7 @@ fn a_push_is_no_change_however_hard_and_a_load_that_stays_is() {
     let (rows, change) = noticed.expect("a load");
     assert_eq!(f64::from(rows) / ROW_RATE_HZ, settings.persistence_s);
     assert_eq!(change.joints, [false, true]);
-    // The block in which the sum was last zero.
+    // The alarm dates back to the block in which the sum was last zero.
     assert!((change.since_s - settings.persistence_s).abs() <= BLOCK_S);
 }
 
@@ -148,7 +148,7 @@ fn overlapping_rows_count_for_less() {
         let energy = mean((0..ROWS_PER_BLOCK).map(|_| rows.next()).map(|error| error * error));
         (energy - 1.0) * (energy - 1.0)
     }));
-    // 20,000 blocks know a variance to 1 % and a skewed one's a little worse.
+    // 20,000 blocks determine a variance to 1 %, that of a skewed distribution a little worse.
     assert!((2.0 / variance - freedom).abs() < 0.05 * freedom, "{freedom}, found {}", 2.0 / variance);
     assert!(freedom < 20.0);
     assert!((block_freedom(&[1.0_f64]) - 25.0).abs() < 1e-12);
@@ -160,7 +160,7 @@ fn the_exponent_solves_its_equation_in_single_precision() {
         let t = f64::from(exponent(ratio, margin));
         let (ratio, margin) = (f64::from(ratio), f64::from(margin));
         let left = t * real::ln(ratio) + real::ln(1.0 - t * margin * (1.0 - 1.0 / ratio));
-        // The curve's slope there is of the order of a tenth; single precision of t.
+        // The curve's slope there is of the order of a tenth; t has single precision.
         assert!(t > 0.05 && t < 1.0 && left.abs() < 1e-5, "{ratio} {margin}: {t} {left}");
     }
     assert_eq!(exponent(2.0_f32, 1.0), 1.0);

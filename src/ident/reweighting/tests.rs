@@ -1,4 +1,4 @@
-//! Pushes lose their weight, noise and whatever the columns explain do not.
+//! Pushes lose their weight; noise and torque that the columns explain do not.
 
 extern crate std;
 
@@ -19,7 +19,7 @@ fn columns(time: f64) -> [f64; COLUMNS] {
     [slow.0, slow.1, fast.0, 0.3 * fast.1, 1.0, real::sign(phase(1.1).0)]
 }
 
-/// So many rows with noise of one N m, each an independent one, and what `disturbance` adds at its time.
+/// Independent rows with noise of one N m, plus `disturbance` at each row's time.
 fn motion(rows: u32, seed: u64, disturbance: impl Fn(f64) -> f64) -> Blocks {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut normal =
@@ -47,7 +47,7 @@ fn push(time: f64, start: f64, peak: f64) -> f64 {
     if (0.0..1.0).contains(&phase) { peak * real::sin_cos(core::f64::consts::PI * phase).0 } else { 0.0 }
 }
 
-/// Six pushes in 18 s, a third of a minute's twenty, both signs.
+/// Six pushes in 18 s, both signs: a third of twenty a minute.
 fn pushes(time: f64) -> f64 {
     let starts = [1.3, 4.1, 6.9, 10.2, 13.6, 16.4];
     starts.iter().zip([12.0, -9.0, 15.0].iter().cycle()).map(|(&start, &peak)| push(time, start, peak)).sum()
@@ -84,7 +84,7 @@ fn pushes_lose_their_weight_and_the_parameters_come_back() {
             "seed {seed}: {plain:.1} sigma plain, {robust:.1} robust, {:.2} lost",
             lost(&window, &weights)
         );
-        // Six parameters of a sixth fewer rows: 4.5 sigma in one of ten thousand sets.
+        // Six parameters from a sixth fewer rows: 4.5 sigma in one of ten thousand sets.
         assert!(robust < 4.5 && plain > 2.0 * robust, "{robust} {plain}");
         // 2.4 of 18 s, in blocks of 0.16 and 0.32 s.
         assert!((0.1..0.35).contains(&lost(&window, &weights)));
@@ -106,7 +106,7 @@ fn noise_alone_loses_next_to_nothing() {
 
 #[test]
 fn what_the_columns_explain_is_never_set_aside() {
-    // Another leg moved in the same way: all of the torque is different, none of it disturbed.
+    // Another leg, moved equally: all of the torque differs, none of it is disturbed.
     let other = |time: f64| {
         columns(time).iter().zip([-6.0, 4.0, 8.0, 9.0, -3.0, 2.0]).map(|(y, p)| y * p).sum::<f64>()
     };
@@ -114,7 +114,7 @@ fn what_the_columns_explain_is_never_set_aside() {
         let (one, another) =
             (motion(900, seed, pushes), motion(900, seed, |time| pushes(time) + other(time)));
         for (one, another) in weigh(&one, 0, 1.0).iter().zip(weigh(&another, 0, 1.0)) {
-            // Rounding, and when the rounds of reweighting end.
+            // Rounding, and the round in which reweighting ends.
             assert!((one - another).abs() < 0.05, "{one} {another}");
         }
     }

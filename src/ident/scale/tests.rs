@@ -113,7 +113,7 @@ fn a_mass_on_the_last_link_tells_every_constant_in_either_precision() {
         assert!((found.ratio - RATIOS[joint]).abs() < 1e-10, "{}", found.ratio);
         assert!(found.is_consistent());
         let single = torque_constant_ratio(&device, &device_with, joint, &load.map(|value| value as f32));
-        // The same in single precision.
+        // Rounding of single precision.
         assert!((f64::from(single.expect("felt").ratio) - RATIOS[joint]).abs() < 1e-4);
     }
 }
@@ -208,7 +208,7 @@ fn a_widened_covariance_holds_the_spread_that_an_uncertain_constant_adds() {
     }
     for base in 0..BASE {
         let added = wide.covariance[base][base] - narrow.covariance[base][base];
-        // A variance of 400 draws spreads by 7 %; three of them, and what is not linear in a step of 2 %.
+        // A variance of 400 draws spreads by 7 %; three of them, plus the nonlinearity of a step of 2 %.
         assert!((squares[base] / added - 1.0).abs() < 0.27, "{base}: {} {added}", squares[base]);
     }
 }

@@ -20,7 +20,7 @@ fn within(dice: &mut Xoshiro256PlusPlus, bound: f64) -> f64 {
     (dice.next_u64() as f64 / u64::MAX as f64 * 2.0 - 1.0) * bound
 }
 
-/// Without the columns of `off`, and those of `choice` to be decided.
+/// Model without the columns of `off`, with those of `choice` to be decided.
 fn model<T: Real>(choice: Choice, off: &[(usize, Parameter)]) -> Model<T> {
     let length = |joint: usize| if joint == 0 { 0.0 } else { 0.45 };
     let geometry = core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
@@ -33,7 +33,7 @@ fn model<T: Real>(choice: Choice, off: &[(usize, Parameter)]) -> Model<T> {
     model
 }
 
-/// The knee's rotor inertia and both offsets: what may be dropped.
+/// Leg with the knee's rotor inertia and both offsets, the candidates for dropping.
 fn leg(rotor: f64, offsets: [f64; 2]) -> LegParameters<f64, 2> {
     let mut leg = [
         [0.03, 0.0, 0.0, 0.5, 0.0, 0.51, 1.7, 0.1, 0.0, 8.5, 0.12, 3.0, 1.2, offsets[0]],
@@ -43,7 +43,7 @@ fn leg(rotor: f64, offsets: [f64; 2]) -> LegParameters<f64, 2> {
     leg
 }
 
-/// Noisy torque of a leg on random states; `angle` makes the hip's angle of a random number in -1..1.
+/// Noisy torque of a leg on random states; `angle` maps a random number in -1..1 to the hip's angle.
 fn record_on<T: Real>(
     model: &Model<T>,
     leg: &LegParameters<f64, 2>,
@@ -102,7 +102,8 @@ fn what_is_not_there_is_kept_as_seldom_as_three_standard_deviations_say() {
     let (model, nothing) = (model::<f64>(Choice::Auto, &[]), leg(0.0, [0.0; 2]));
     let kept = (1..=300).map(|seed| select(&model, record(&model, &nothing, seed)));
     let kept: usize = kept.map(|record| 3 - record.selection.dropped_count()).sum();
-    // 0.27 % of 900 are 2.4; more than nine in one of 5,000 choices of seeds. A limit of two standard deviations keeps 41.
+    // 0.27 % of 900 are 2.4; more than nine in one of 5,000 choices of seeds. A limit of two standard
+    // deviations keeps 41.
     assert!(kept <= 9, "{kept} of 900 kept");
 }
 

@@ -1,10 +1,10 @@
-//! Curves of friction that falls with speed, each made of the fixed ones that the rows carry: (S1) and (S2).
+//! Curves of friction that falls with speed, as combinations of the fixed ones in the rows: (S1) and (S2).
 
 use super::{BANK, SLOWEST_RAD_S};
 use crate::ident::factor::Factor;
 use crate::real::{self, Real};
 
-/// Up to here curves are fitted to one another, rad/s.
+/// Upper end of the fit between curves, rad/s.
 const FASTEST_RAD_S: f64 = 1.5;
 
 /// The bank's columns at a speed, rad/s.
@@ -18,12 +18,12 @@ pub fn bank_columns<T: Real>(speed: T) -> [T; BANK] {
     [sign * fourth(middle), sign * middle, sign * fastest]
 }
 
-/// (S2): a curve made of the bank and of the columns of Coulomb and viscous friction.
+/// (S2): a curve as a combination of the bank with the columns of Coulomb and viscous friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Combination<T> {
-    /// Of the bank's columns.
+    /// Weights of the bank's columns.
     pub bank: [T; BANK],
-    /// Of the columns of Coulomb and viscous friction.
+    /// Weights of the columns of Coulomb and viscous friction.
     pub friction: [T; 2],
 }
 
@@ -36,7 +36,7 @@ impl<T: Real> Combination<T> {
     }
 }
 
-/// (S2): what makes the column of `speed` (rad/s).
+/// (S2): weights that give the column of `speed` (rad/s).
 #[must_use]
 pub fn combination<T: Real>(speed: T) -> Combination<T> {
     const COLUMNS: usize = BANK + 2;
@@ -44,7 +44,7 @@ pub fn combination<T: Real>(speed: T) -> Combination<T> {
     let bank: [T; BANK] =
         core::array::from_fn(|index| T::of(SLOWEST_RAD_S) * T::of(f64::from(1_u32 << index)));
     let product = |one: T, other: T| half_root_pi * one * other / real::sqrt(one * one + other * other);
-    // Of a curve of the family with the bank, a constant and a line.
+    // Inner products of a curve of the family with the bank, a constant and a line.
     let row = |speed: T| {
         let [one, two, three] = bank.map(|other| product(speed, other));
         [one, two, three, half_root_pi * speed, T::of(0.5) * speed * speed]
@@ -63,7 +63,7 @@ pub fn combination<T: Real>(speed: T) -> Combination<T> {
     Combination { bank: [one, two, three], friction: [coulomb, viscous] }
 }
 
-/// Change of [`combination`] with ln speed.
+/// Derivative of [`combination`] with respect to ln speed.
 pub(super) fn slope<T: Real>(speed: T) -> Combination<T> {
     let step = T::of(0.02);
     let (up, down) = (combination(speed * real::exp(step)), combination(speed * real::exp(-step)));

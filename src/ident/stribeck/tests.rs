@@ -1,4 +1,4 @@
-//! The bank stands for any speed in its range; surplus and speed come back from rows.
+//! The bank represents any speed in its range; surplus and speed are recovered from rows.
 
 extern crate std;
 
@@ -20,11 +20,11 @@ fn the_bank_makes_the_curve_of_any_speed_in_its_range() {
             let ratio = velocity / speed;
             let made = dot(&bank_columns(velocity), &bank) + friction[0] + friction[1] * velocity;
             let error = made - real::exp(-(ratio * ratio));
-            // What the header promises, where there are rows.
+            // The accuracy that the header states, in the range that the rows cover.
             assert!(velocity < 0.03 || error.abs() < 0.033, "{error} at {velocity} rad/s for {speed}");
             sum += 1e-3 * error;
         }
-        // Nothing is left for Coulomb friction to explain; the integral ends at 1.5 rad/s in both.
+        // No error is left for Coulomb friction to explain; both integrals end at 1.5 rad/s.
         assert!(sum.abs() < 1e-5, "{sum} for {speed}");
     }
 }
@@ -34,7 +34,7 @@ fn single_precision_makes_the_same_weights() {
     for speed in [0.05, 0.085, 0.17, 0.3] {
         let (single, double) = (combination(speed as f32), combination(speed));
         for (single, double) in single.bank.iter().zip(double.bank) {
-            // Condition of (S2) some 1e4, rounding 6e-8.
+            // The condition number of (S2) is some 1e4, rounding is 6e-8.
             assert!((f64::from(*single) - double).abs() < 2e-3, "{single} {double}");
         }
     }
@@ -51,8 +51,8 @@ const NOISE_NM: f64 = 0.5;
 const COULOMB_NM: f64 = 4.6;
 const VISCOUS: f64 = 3.3;
 
-/// What is found of 20 s of rows of a joint that swings at up to 1.2 rad/s: gravity, Coulomb, viscous, offset. The least
-/// gain and surplus are those of `auto`.
+/// Fit to 20 s of rows of a joint that swings at up to 1.2 rad/s: gravity, Coulomb, viscous, offset. The
+/// least gain and surplus are those of `auto`.
 fn found(surplus: f64, speed: f64, seed: u64) -> Option<(StribeckFit<f32, COLUMNS>, [f32; COLUMNS])> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut normal =
@@ -62,7 +62,7 @@ fn found(surplus: f64, speed: f64, seed: u64) -> Option<(StribeckFit<f32, COLUMN
         let (sine, cosine) = real::sin_cos(1.3 * 0.02 * f64::from(index));
         let velocity = 1.2 * cosine;
         if velocity.abs() < 0.03 {
-            continue; // the stillness rule
+            continue; // the standstill rule
         }
         let ratio = velocity / speed;
         let sign = real::sign(velocity);
@@ -104,9 +104,10 @@ fn surplus_and_speed_come_back_from_rows_with_the_sigma_they_claim() {
         }
         std::println!("{surplus} N m, {speed} rad/s: mean square {squares:.2?}, mean {biases:.2?} sigma");
         for place in 0..3 {
-            // 60 squares of standard normal numbers scatter by 0.18 about one; speed and surplus are not linear in the rows.
+            // 60 squares of standard normal numbers scatter by 0.18 about one; speed and surplus are not
+            // linear in the rows.
             assert!(place == 2 || (0.4..1.9).contains(&squares[place]), "{}", squares[place]);
-            // Their mean by 0.13; what the bank is off (3.2 % of the surplus) adds to it.
+            // Their mean scatters by 0.13; the bank's own error (3.2 % of the surplus) adds to it.
             assert!(biases[place].abs() < 0.6, "{}", biases[place]);
         }
     }

@@ -1,14 +1,14 @@
-//! One explanation of a change: few parameters free, the rest held, its chi-square beside the model's own uncertainty.
+//! One explanation of a change: few free parameters, a chi-square with the model's uncertainty.
 //!
-//! The rows after the change, weighted and triangularised, read `R beta = z + e` with `e` of unit covariance. The model
-//! says beta_0 with covariance C, so
+//! The rows after the change, weighted and triangularised, read `R beta = z + e` with `e` of unit covariance.
+//! The model gives beta_0 with covariance C, so
 //!
 //! ```text
-//! w = z - R beta_0 = R D theta - R delta + e,     delta = beta_0 - beta(before), covariance C
-//! S = E + R C R' = L L'                            covariance of w while theta = 0
-//! theta = argmin |L^-1 (w - R D theta)|^2          generalised least squares (Aitken 1935), its minimum is chi2   (W4)
-//! G = d theta / d w = P (R D)' S^-1,               P = ((R D)' S^-1 R D)^-1, the covariance of theta
-//! Cov(beta_0 + D theta) = C + D P D' - U P D' - D P U',     U = C R' S^-1 R D                                     (W5)
+//! w = z - R beta_0 = R D theta - R delta + e,   delta = beta_0 - beta(before), covariance C
+//! S = E + R C R' = L L'                       covariance of w while theta = 0
+//! theta = argmin |L^-1 (w - R D theta)|^2     generalised least squares (Aitken 1935), minimum chi2  (W4)
+//! G = d theta / d w = P (R D)' S^-1           P = ((R D)' S^-1 R D)^-1, the covariance of theta
+//! Cov(beta_0 + D theta) = C + D P D' - U P D' - D P U',   U = C R' S^-1 R D                          (W5)
 //! ```
 //!
 //! | symbol | meaning |
@@ -17,8 +17,8 @@
 //! | D | base values of a unit of each free parameter, B x k |
 //! | theta | change of the free parameters |
 //!
-//! (W5) counts that an error of the held parameters leaks into theta. Columns that the ones before explain to within
-//! 1e-3 of their length are dropped: theta is then zero there and not determined.
+//! (W5) includes the error that the held parameters pass on to theta. Columns that earlier ones explain to
+//! within 1e-3 of their length are dropped: theta is then zero there and not determined.
 //! Cost: `2 B^3 + k B^2` multiplications for S and each hypothesis. Stack: `3 B^2 + 3 k B` numbers.
 
 use super::super::estimate::Estimate;
@@ -28,39 +28,39 @@ use super::super::verdict::Thresholds;
 use crate::model::{PARAMETERS_PER_JOINT, Parameter};
 use crate::real::{self, Real};
 
-/// Free parameters at most: the ten of a rigid body.
+/// Most free parameters: the ten of a rigid body.
 pub const DIRECTIONS: usize = 10;
 
-/// A column whose part that no earlier column explains is a smaller share of its length is not told apart.
+/// Smallest independent share of a column's length for its parameter to be determined.
 const TOLD_SHARE: f64 = 1e-3;
 
-/// What one hypothesis makes of the rows.
+/// Result of one hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hypothesis<T> {
     /// Change of each parameter; zero where it is not determined.
     pub values: [T; DIRECTIONS],
-    /// Their standard deviations, the accepted model's uncertainty in them.
+    /// Standard deviations of `values`, including the accepted model's uncertainty.
     pub sigmas: [T; DIRECTIONS],
-    /// Whether the rows tell each.
+    /// Parameters that the rows determine.
     pub determined: [bool; DIRECTIONS],
-    /// What it leaves unexplained.
+    /// Chi-square of the remaining residual.
     pub chi_square: T,
-    /// Degrees of freedom of that.
+    /// Degrees of freedom of `chi_square`.
     pub freedom: T,
 }
 
-/// A hypothesis with all that follows from it.
+/// A hypothesis with its consequences for the model.
 pub struct Explanation<T, const B: usize> {
-    /// What is kept of it.
+    /// Summary of the hypothesis.
     pub hypothesis: Hypothesis<T>,
-    /// Covariance of its values.
+    /// Covariance of the hypothesis' values.
     pub covariance: [[T; DIRECTIONS]; DIRECTIONS],
     /// Base values after the change.
     pub estimate: Estimate<T, B>,
 }
 
 impl<T: Real> Hypothesis<T> {
-    /// Nothing is told.
+    /// Hypothesis without any determined parameter.
     #[must_use]
     pub fn nothing() -> Self {
         Self {
@@ -72,13 +72,13 @@ impl<T: Real> Hypothesis<T> {
         }
     }
 
-    /// Standard deviation of one value.
+    /// Standard deviation of one value; `None` where not determined.
     #[must_use]
     pub fn sigma(&self, index: usize) -> Option<T> {
         self.determined.get(index)?.then(|| self.sigmas.get(index).copied())?
     }
 
-    /// What is left over is noise.
+    /// True if the remaining residual is noise.
     #[must_use]
     pub fn explains(&self, thresholds: &Thresholds<T>) -> bool {
         self.chi_square <= thresholds.chance(self.freedom)
@@ -106,19 +106,19 @@ impl<T: Real, const B: usize> Explanation<T, B> {
     }
 }
 
-/// The rows after a change beside what the accepted model lets expect.
+/// Rows after a change, compared with the accepted model's prediction.
 pub struct Comparison<'a, T, const B: usize> {
     rows: &'a Factor<T, B>,
     before: &'a Estimate<T, B>,
     rank: usize,
-    /// L of S.
+    /// Factor L of S.
     cholesky: [[T; B]; B],
     /// `L^-1 w`.
     whitened: [T; B],
 }
 
 impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
-    /// `rows` in units of independent ones' standard deviation.
+    /// Prepares a comparison; `rows` are in units of an independent row's standard deviation.
     #[must_use]
     #[inline(never)]
     pub fn new(rows: &'a Factor<T, B>, before: &'a Estimate<T, B>, rank: usize) -> Self {
@@ -144,13 +144,13 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
         Self { rows, before, rank, cholesky, whitened }
     }
 
-    /// chi-square and degrees of freedom of the model as it was.
+    /// Chi-square and degrees of freedom of the old model.
     #[must_use]
     pub fn unchanged(&self) -> (T, T) {
         (dot(&self.whitened, &self.whitened), T::of(self.rank as f64))
     }
 
-    /// Frees these parameters.
+    /// Fits a hypothesis with these free parameters.
     #[must_use]
     #[inline(never)]
     pub fn explain<const N: usize>(
@@ -221,7 +221,7 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
         factor
     }
 
-    /// The accepted model moved by the hypothesis, with (W5); `columns` hold `L^-1 R D` and are used up.
+    /// Moves the accepted model by the hypothesis, with (W5). `columns` hold `L^-1 R D` and are overwritten.
     #[inline(never)]
     fn move_on(
         &self,
@@ -276,7 +276,8 @@ fn times<T: Real, const B: usize>(matrix: &[[T; B]; B], vector: &[T; B]) -> [T; 
     product
 }
 
-/// Cholesky's lower factor in place; the upper half becomes zero. At least one in every direction, so no pivot vanishes.
+/// Cholesky's lower factor in place; the upper half becomes zero. S is at least the
+/// identity, so no pivot vanishes.
 fn factorise<T: Real, const B: usize>(matrix: &mut [[T; B]; B]) {
     for column in 0..B {
         for row in column..B {

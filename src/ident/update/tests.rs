@@ -1,4 +1,4 @@
-//! The quick pass on rows made from a known change: noise of known size, gait-like postures, no filter.
+//! The quick update on rows made from a known change: noise of known size, gait-like postures, no filter.
 
 use super::*;
 use crate::ident::{Baseline, Factor, Plan, Problem, TorqueSize};
@@ -37,7 +37,8 @@ impl Dice {
     }
 }
 
-/// Independent rows of random states: `speed` and `acceleration` bound them, `bias` is a torque beyond the model.
+/// Independent rows of random states: `speed` and `acceleration` bound them, `bias`
+/// is a torque beyond the model.
 fn record<T: Real>(
     truth: &LegParameters<f64, 2>,
     states: u32,
@@ -182,8 +183,8 @@ fn the_updated_base_values_have_the_covariance_they_claim() {
             *sum += off * off / runs as f64;
         }
     }
-    // Mean square of 150 normal variables: 1 +- 0.115. Without what leaks from the held parameters into the payload one
-    // of them has 0.54.
+    // Mean square of 150 normal variables: 1 +- 0.115. Without the error that the held parameters pass on to
+    // the payload one of them has 0.54.
     assert!(squares.iter().all(|square| (0.65..=1.35).contains(square)), "{squares:?}");
 }
 
@@ -193,7 +194,7 @@ fn single_precision_agrees_with_double() {
     let (single, double) = (updated::<f32>(&after, WALKING, 7), updated::<f64>(&after, WALKING, 7));
     assert_eq!(single.cause, double.cause);
     for (base, (one, other)) in single.estimate.values.iter().zip(&double.estimate.values).enumerate() {
-        // Two triangular factors of condition some hundred, in units of the sigma.
+        // Two triangular factors with a condition number of some hundred, in units of the sigma.
         let sigma = double.estimate.sigma(base).expect("told");
         assert!((f64::from(*one) - other).abs() < 0.02 * sigma, "{base}: {one} {other} sigma {sigma}");
     }

@@ -1,16 +1,16 @@
-//! Whether the motion identified from was disturbed: for long and in all joints at once, or too often.
+//! Tests for a disturbed motion: for long and in all joints at once, or too often.
 //!
-//! What robust identification set aside ([`Outliers`]) does not spoil the result; but data of which much had to be set
-//! aside are not trusted, and a leg that stood on the floor was no open chain.
+//! Rows that robust identification excluded ([`Outliers`]) do not corrupt the result. But data with many
+//! exclusions are not trusted, and a leg that stood on the floor was not an open chain.
 
 use super::{Docket, Evidence, Reason, Test, Thresholds};
 use crate::ident::outliers::Outliers;
 use crate::real::{self, Real};
 
 impl<T: Real> Thresholds<T> {
-    /// Whether what was found on the rows that counted says something of those that were set aside too. Only where no other
-    /// motion is there to ask: a push is set aside rightly, but a machine that was pushed for most of its motion leaves a few
-    /// calm rows, and a model of these that fits nothing else.
+    /// Judges the parameters from the weighted rows on all rows of the motion. Used only without any held-out
+    /// motion. A push is rightly excluded. But a machine that was pushed for most of its motion leaves a few
+    /// calm rows, and a model that fits nothing else.
     pub fn judge_whole<const N: usize>(&self, outliers: &Outliers<T, N>, docket: &mut Docket<'_, T>) {
         for (joint, &share) in outliers.whole_error_share.iter().enumerate() {
             docket.at_most(
@@ -24,8 +24,8 @@ impl<T: Real> Thresholds<T> {
         }
     }
 
-    /// Contact is a single long stretch in which all joints missed together. Where more than half of the rows missed the
-    /// model is wrong, not the leg held: other tests say so.
+    /// Judges contact with the floor: a single long stretch with large errors in all joints. If more than
+    /// half of the rows have large errors, the model is wrong, not the leg held; other tests cover that.
     pub fn judge_disturbance<const N: usize>(&self, outliers: &Outliers<T, N>, docket: &mut Docket<'_, T>) {
         let mostly = outliers.disturbed_share.iter().any(|&share| share > T::of(0.5));
         docket.note(Evidence {
@@ -40,7 +40,8 @@ impl<T: Real> Thresholds<T> {
         self.judge_set_aside(outliers, None, docket);
     }
 
-    /// Whether too many samples were replaced or rows set aside, on the motion identified from or an unused one.
+    /// Judges the shares of replaced samples and disturbed rows, on the motion
+    /// identified from or a held-out one.
     pub fn judge_set_aside<const N: usize>(
         &self,
         outliers: &Outliers<T, N>,

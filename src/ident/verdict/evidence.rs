@@ -1,4 +1,4 @@
-//! What every test saw, where, and its limit: so that a refusal can be told in words and a pass shown.
+//! Evidence of every test: value, location and limit, so that a report can explain both refusal and pass.
 
 use super::{Reason, Verdict};
 use crate::real::Real;
@@ -6,56 +6,56 @@ use crate::real::Real;
 /// A test of the verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Test {
-    /// Rows of a joint.
+    /// Usable rows of a joint.
     Rows,
-    /// Samples and rows that were not finite.
+    /// Number of samples and rows that were not finite.
     NotFinite,
     /// Root mean square of a joint's torque, N m.
     Torque,
-    /// The search came to its end: 1, or 0.
+    /// Search ended: 1, or 0.
     Search,
-    /// The drive stayed enabled to the end: 1, or 0.
+    /// Drive enabled until the end: 1, or 0.
     Drive,
     /// Root mean square speed of a joint, rad/s.
     Speed,
-    /// Base parameters that the data determine.
+    /// Number of base parameters that the data determine.
     Determined,
     /// Condition number of the scaled problem.
     Condition,
-    /// Uncertainty of a held-out torque that the parameters' covariance leaves, over its root mean square.
+    /// Uncertainty of a held-out torque due to the parameters' covariance, over its root mean square.
     PredictedUncertainty,
-    /// A parameter that is not a number.
+    /// A parameter that is not finite.
     Finite,
-    /// Standard deviations by which a parameter that cannot be negative is so.
+    /// Negative excess of a parameter that cannot be negative, in standard deviations.
     NegativeParameter,
-    /// Standard deviations by which kinetic energy is negative.
+    /// Negative excess of the kinetic energy, in standard deviations.
     NegativeEnergy,
-    /// Chi-square by which the best leg that the prior allows is worse than least squares.
+    /// Chi-square of the best allowed leg above least squares.
     PriorBox,
-    /// Share of a joint's torque that inertia and friction make.
+    /// Share of inertia and friction in a joint's torque.
     DynamicShare,
     /// Error on the motion identified from, N m.
     TrainingError,
-    /// Error of all rows of the motion identified from, those set aside included, over their torque.
+    /// Error over torque on all rows of the motion identified from, excluded ones included.
     WholeError,
     /// Error on a held-out motion, N m.
     ValidationError,
-    /// Slow part of what is unexplained on a held-out motion, N m.
+    /// Slow part of the residual on a held-out motion, N m.
     SlowResidual,
-    /// Share by which the link before a joint seems longer than believed.
+    /// Apparent relative error of the length of the link before a joint.
     LinkLength,
-    /// Angle by which a joint's zero seems off, rad.
+    /// Apparent error of a joint's encoder zero, rad.
     EncoderZero,
-    /// Time for which all joints missed together, s.
+    /// Time with large errors in all joints at once, s.
     CommonDisturbance,
-    /// Share of a joint's samples that were wild and replaced.
+    /// Share of a joint's samples replaced as outliers.
     ReplacedShare,
     /// Share of a joint's rows that lost more than half of their weight.
     DisturbedShare,
 }
 
 impl Test {
-    /// All tests, in their order.
+    /// All tests, in the order of the enum.
     pub const ALL: [Self; 23] = [
         Self::Rows,
         Self::NotFinite,
@@ -82,7 +82,7 @@ impl Test {
         Self::DisturbedShare,
     ];
 
-    /// The word used in reports.
+    /// Word used in reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -113,44 +113,44 @@ impl Test {
     }
 }
 
-/// One test that was made.
+/// Result of one test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evidence<T> {
-    /// Why the result is refused if it failed.
+    /// Reason of a refusal if the test failed.
     pub reason: Reason,
-    /// Which.
+    /// Test performed.
     pub test: Test,
-    /// Of this joint, from 0.
+    /// Joint, from 0; `None` for all.
     pub joint: Option<usize>,
-    /// On this unused motion, from 0; `None` for the motion identified from, or for all.
+    /// Held-out motion, from 0; `None` for the motion identified from, or for all.
     pub motion: Option<usize>,
-    /// What was seen.
+    /// Measured value.
     pub value: T,
-    /// What is allowed.
+    /// Limit for the value.
     pub limit: T,
-    /// Within it.
+    /// True if the value is within the limit.
     pub passed: bool,
 }
 
-/// Collects evidence into a verdict, and hands each piece on.
+/// Collects evidence into a verdict, and forwards each piece.
 pub struct Docket<'a, T> {
     verdict: Verdict,
     hand_on: &'a mut dyn FnMut(&Evidence<T>),
 }
 
 impl<'a, T: Real> Docket<'a, T> {
-    /// Nothing tested yet; every piece of evidence goes to `hand_on` as well.
+    /// Empty docket; every piece of evidence goes to `hand_on` as well.
     pub fn new(hand_on: &'a mut dyn FnMut(&Evidence<T>)) -> Self {
         Self { verdict: Verdict::ACCEPTED, hand_on }
     }
 
-    /// The reasons so far.
+    /// Verdict of the evidence so far.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         self.verdict
     }
 
-    /// A value that must not exceed its limit; one that is not a number does.
+    /// Adds a value that must not exceed its limit; NaN fails.
     pub fn at_most(
         &mut self,
         reason: Reason,
@@ -163,12 +163,12 @@ impl<'a, T: Real> Docket<'a, T> {
         self.note(Evidence { reason, test, joint, motion, value, limit, passed: value <= limit });
     }
 
-    /// A value that must reach its limit; one that is not a number does not.
+    /// Adds a value that must reach its limit; NaN fails.
     pub fn at_least(&mut self, reason: Reason, test: Test, joint: Option<usize>, value: T, limit: T) {
         self.note(Evidence { reason, test, joint, motion: None, value, limit, passed: value >= limit });
     }
 
-    /// A test with a condition of its own.
+    /// Adds a test with a condition of its own.
     pub fn note(&mut self, evidence: Evidence<T>) {
         if !evidence.passed {
             self.verdict = self.verdict.and(Verdict::refused(evidence.reason));

@@ -1,14 +1,14 @@
-//! Whether the torque is explained: on the motion identified from, and on motions that were not used.
+//! Tests of the fit: on the motion identified from and on held-out motions.
 //!
 //! ```text
 //! expected^2 = v S + tr(R Cov R') / n         noise through the filter, and the parameters' uncertainty
 //! error^2   <= expected^2 q(n m S) + (harmless share * rms torque)^2
 //! ```
 //!
-//! v is the variance of a 500 Hz sample's noise, from its own scatter (`noise`), S the sum of h^2, n rows worth m S
-//! independent ones each, q the quantile of chi-square over its degrees of freedom. Neither side knows the training's
-//! residual, so a bad training loosens nothing. Only where v is not known (samples put on another grid) the training's
-//! residual takes its place, times `largest_error_ratio`.
+//! v is the variance of a 500 Hz sample's noise, from its own scatter (`noise`). S is the sum of h^2; n rows
+//! are worth m S independent ones each. q is the quantile of chi-square over its degrees of freedom. Neither
+//! side uses the training's residual, so a bad training widens no limit. Only where v is unknown (samples
+//! from another grid) the training's residual takes its place, times `largest_error_ratio`.
 
 use super::{Docket, Evidence, Reason, Test, Thresholds};
 use crate::ident::estimate::Estimate;
@@ -17,17 +17,17 @@ use crate::ident::residual::Residual;
 use crate::model::Parameter;
 use crate::real::{self, Real};
 
-/// A motion that was predicted.
+/// A held-out motion.
 #[derive(Clone, Copy, Debug)]
 pub struct Unused<'a, T, const N: usize, const B: usize> {
-    /// Its rows.
+    /// Record of the motion.
     pub record: &'a Record<T, N, B>,
-    /// What they left unexplained, in order of time.
+    /// Residual in order of time.
     pub residual: &'a Residual<T, N>,
 }
 
 impl<T: Real> Thresholds<T> {
-    /// Whether the motion identified from is explained by what was found on it.
+    /// Judges the fit to the motion identified from.
     pub fn judge_residual<const N: usize, const B: usize>(
         &self,
         training: &Record<T, N, B>,
@@ -35,7 +35,7 @@ impl<T: Real> Thresholds<T> {
         docket: &mut Docket<'_, T>,
     ) {
         for (joint, size) in training.torque.iter().enumerate() {
-            let Some(error) = training.torque_error(joint, values) else { continue }; // it never moved: unexcited
+            let Some(error) = training.torque_error(joint, values) else { continue }; // the joint never moved: unexcited
             let mut limit = self.largest_error_share * size.root_mean_square;
             if let Some(noise) = training.filtered_noise(joint) {
                 let allowed = self.allowed(training, joint, noise * noise, self.largest_misfit_share);
@@ -45,7 +45,7 @@ impl<T: Real> Thresholds<T> {
         }
     }
 
-    /// Largest error of a joint's filtered torque where `expected` is its variance by noise and uncertainty.
+    /// Largest error of a joint's filtered torque; `expected` is its variance by noise and uncertainty.
     fn allowed<const N: usize, const B: usize>(
         &self,
         record: &Record<T, N, B>,
@@ -58,7 +58,7 @@ impl<T: Real> Thresholds<T> {
         real::sqrt(expected * self.variance_ratio(freedom) + systematic * systematic)
     }
 
-    /// Whether an unused motion is predicted as well as noise and the parameters' uncertainty let expect.
+    /// Judges the prediction of a held-out motion: no worse than noise and parameter covariance predict.
     pub fn judge_validation<const N: usize, const B: usize>(
         &self,
         training: &Record<T, N, B>,
@@ -100,8 +100,8 @@ impl<T: Real> Thresholds<T> {
         }
     }
 
-    /// Whether the torque holds a trace of what cannot be computed from the angle alone: inertia and friction. A torque
-    /// that does not is a command that was recorded, or the joint carries nothing that moves.
+    /// Judges whether the torque shows inertia and friction, which the angle alone cannot give. A torque
+    /// without them is a recorded command, or the joint carries no moving load.
     pub fn judge_measurement<const N: usize, const B: usize>(
         &self,
         model: &RowModel<T, N, B>,
@@ -123,7 +123,7 @@ impl<T: Real> Thresholds<T> {
             let value =
                 if size.root_mean_square > T::zero() { part / size.root_mean_square } else { T::zero() };
             let limit = self.smallest_dynamic_share;
-            // A joint that did not move has been named already, with the right reason.
+            // A joint at rest already failed a test with the right reason.
             let moved = size.speed >= self.smallest_speed && training.rows[joint] > 0;
             docket.note(Evidence {
                 reason: Reason::NotAMeasurement,
@@ -159,13 +159,14 @@ mod tests {
             stribeck: [None],
             selection: Selection::all(),
         };
-        // 400 rows worth 0.25 independent ones each: 100 degrees of freedom; chi-square's 0.999 quantile is 149.449.
+        // 400 rows worth 0.25 independent ones each: 100 degrees of freedom;
+        // chi-square's 0.999 quantile is 149.449.
         let thresholds = Thresholds { noise_quantile: 3.090_2, ..Thresholds::<f64>::default() };
         let allowed = |information, harmless| thresholds.allowed(&record(information), 0, 0.04, harmless);
         let noise = 0.04 * 1.494_49;
         // Wilson and Hilferty's approximation is good to 0.6 % of the square.
         assert!((allowed(0.25, 0.0) / real::sqrt(noise) - 1.0).abs() < 4e-3);
-        // A harmless 2 % of 6 N m.
+        // A harmless share of 2 % of 6 N m.
         let both = real::sqrt(noise + 0.12 * 0.12);
         assert!((allowed(0.25, 0.02) / both - 1.0).abs() < 4e-3);
         // No row is worth more than one.

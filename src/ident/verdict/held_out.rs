@@ -1,12 +1,12 @@
-//! What the residual of unused motions looks like in time, and what it asks for.
+//! Tests of the held-out residual: its course in time and the geometry errors it shows.
 
 use super::{Docket, Evidence, Reason, Test, Thresholds, Unused};
 use crate::ident::alignment::{Direction, Misalignment};
 use crate::real::{self, Real};
 
 impl<T: Real> Thresholds<T> {
-    /// Whether what is left of an unused motion is noise, or small. Where noise is large this is the sharper test: a rest
-    /// that neighbouring half seconds share has no noise in it.
+    /// Judges the slow part of a held-out residual: noise, or small. With much noise this is the sharper
+    /// test: the part that neighbouring half seconds share contains no noise.
     pub fn judge_colour<const N: usize, const B: usize>(
         &self,
         motion: usize,
@@ -30,7 +30,8 @@ impl<T: Real> Thresholds<T> {
         }
     }
 
-    /// Whether all joints missed together, once and for long, on a motion that is predicted well otherwise.
+    /// Judges contact: one long stretch of errors in all joints, in a motion that
+    /// is otherwise predicted well.
     pub fn judge_contact<const N: usize, const B: usize>(
         &self,
         motion: usize,
@@ -42,7 +43,7 @@ impl<T: Real> Thresholds<T> {
             .joints
             .iter()
             .fold((0_u32, 0_u32), |(wild, rows), joint| (wild + joint.wild, rows + joint.rows));
-        // A wrong model misses everywhere: that is no contact.
+        // A wrong model has errors everywhere: that is not contact.
         let elsewhere = T::of(f64::from(rows)) * T::of(0.5) < T::of(f64::from(wild));
         let value = residual.longest_common_s;
         let limit = self.longest_disturbance_s;
@@ -57,11 +58,12 @@ impl<T: Real> Thresholds<T> {
         });
     }
 
-    /// Whether the unused motions ask for other lengths or zeros than the model has, significantly and by more than
-    /// lengths and zeros are known; alone or beside each other, whichever says more.
+    /// Judges the lengths and zeros that the held-out motions ask for: significant, and larger than the
+    /// tolerance with which lengths and zeros are known. The worse of the two values counts, alone or beside
+    /// the other directions.
     ///
-    /// Where the noise is not known, sigma comes from the model's own errors, which are not white: three times the
-    /// tolerance is allowed then.
+    /// With unknown noise, sigma comes from the model's own errors, which are not white; the tolerance is
+    /// then three times as wide.
     pub fn judge_alignment(&self, found: &Misalignment<T>, noise_is_known: bool, docket: &mut Docket<'_, T>) {
         let (test, tolerance) = match found.direction {
             Direction::Length => (Test::LinkLength, self.largest_length_error),
@@ -91,7 +93,7 @@ impl<T: Real> Thresholds<T> {
 mod tests {
     use super::*;
 
-    /// Value, limit and whether it passed, of a link's length found alone and beside the other directions.
+    /// Value, limit and pass for a link's length, from its estimates alone and beside the other directions.
     fn judged(alone: [f64; 2], beside: Option<[f64; 2]>, noise_is_known: bool) -> (f64, f64, bool) {
         let thresholds =
             Thresholds { noise_quantile: 5.0, largest_length_error: 0.03, ..Thresholds::default() };
@@ -113,7 +115,8 @@ mod tests {
 
     #[test]
     fn of_a_length_alone_and_beside_the_others_the_one_that_says_more_is_judged() {
-        // In shares of its limit: 0.5 alone, 2 beside; 0.8 alone, 0.5 beside; a tie is judged alone.
+        // As shares of the limit: 0.5 alone, 2 beside; 0.8 alone, 0.5 beside; in a
+        // tie the value alone is judged.
         assert_eq!(judged([0.015, 0.001], Some([-0.06, 0.002]), true), (-0.06, 0.03, false));
         assert_eq!(judged([0.024, 0.001], Some([0.05, 0.02]), true), (0.024, 0.03, true));
         assert_eq!(judged([0.015, 0.0], Some([-0.015, 0.0]), true), (0.015, 0.03, true));
@@ -122,7 +125,7 @@ mod tests {
 
     #[test]
     fn noise_widens_the_limit_of_a_length() {
-        // Five sigmas of 0.01; three times the tolerance where the noise is not known.
+        // Five sigmas of 0.01; three times the tolerance for unknown noise.
         assert_eq!(judged([0.04, 0.01], None, true), (0.04, 0.05, true));
         let (_, limit, passed) = judged([0.08, 0.001], None, false);
         assert!((limit - 0.09).abs() < 1e-12 && passed);

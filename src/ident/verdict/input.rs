@@ -1,4 +1,4 @@
-//! Whether a motion can be identified from at all, and whether it told the parameters apart.
+//! Tests of the motion itself: usable data, and enough excitation.
 
 use super::{Docket, Reason, Test, Thresholds};
 use crate::ident::estimate::Stage;
@@ -6,7 +6,7 @@ use crate::ident::record::{Record, RowModel};
 use crate::real::Real;
 
 impl<T: Real> Thresholds<T> {
-    /// Enough rows, finite samples, a torque that differs from zero, joints that move.
+    /// Judges the data: enough rows, finite samples, nonzero torque, joints that move.
     pub fn judge_input<const N: usize, const B: usize>(
         &self,
         model: &RowModel<T, N, B>,
@@ -15,12 +15,12 @@ impl<T: Real> Thresholds<T> {
     ) {
         let needed = (model.base.rank() as u32).saturating_mul(self.rows_per_parameter);
         let count = |rows: u32| T::of(f64::from(rows));
-        // Without samples nothing has a speed.
+        // Without samples no joint has a speed.
         let seen = record.rows.iter().any(|&rows| rows > 0)
             || record.torque.iter().any(|size| size.speed > T::zero());
         for (joint, (size, &rows)) in record.torque.iter().zip(&record.rows).enumerate() {
             let at = Some(joint);
-            // Rows that a joint has not because it stood still speak against the motion, not against the data.
+            // Rows missing because the joint stood still are a fault of the motion, not of the data.
             let still = seen && !(size.speed >= self.smallest_speed);
             let reason = if still { Reason::Unexcited } else { Reason::Input };
             docket.at_least(reason, Test::Rows, at, count(rows), count(needed));
@@ -34,8 +34,8 @@ impl<T: Real> Thresholds<T> {
         docket.at_most(Reason::Input, Test::NotFinite, None, None, count(record.rejected), T::zero());
     }
 
-    /// Whether a motion told all base parameters apart that are not held at zero, in all rows together (`stage`) and in the plan that was followed,
-    /// which found `determined` of them.
+    /// Judges whether the motion determines all base parameters that are not held at zero. This applies to
+    /// all rows together (`stage`) and to the plan used, which found `determined` of them.
     pub fn judge_excitation<const B: usize>(
         &self,
         stage: &Stage<T, B>,

@@ -1,19 +1,19 @@
-//! Accepted or refused, and why: the last word before a model may move anybody.
+//! Verdict on a model, with reasons: the last check before the model may move a wearer.
 //!
 //! | reason | refused when | file |
 //! | --- | --- | --- |
-//! | `input` | too few rows, samples that are not finite, a joint whose torque never differs from zero | `input` |
-//! | `unexcited` | a joint hardly moved, parameters are not told apart, or held-out torque is left uncertain | `input`, `fit` |
-//! | `unphysical` | negative friction, rotor inertia or kinetic energy; or the data contradict every leg that the prior allows | `physics` |
-//! | `residual` | the motion identified from is not explained, or held-out motions ask for other lengths and zeros | `fit`, `held_out` |
-//! | `validation` | torque on an unused motion is predicted worse than noise and the parameters' uncertainty let expect, or what is left of it is large and slow | `fit`, `held_out` |
-//! | `not_a_measurement` | the torque holds no trace of inertia and friction | `fit` |
-//! | `contact` | all joints miss together for a second or more | `disturbance`, `held_out` |
-//! | `outliers` | too many samples were wild, too many rows disturbed | `disturbance` |
+//! | `input` | too few rows, samples not finite, a joint whose torque is always zero | `input` |
+//! | `unexcited` | a joint hardly moved, undetermined parameters, uncertain prediction | `input`, `fit` |
+//! | `unphysical` | negative friction, rotor inertia or energy; no consistent leg fits | `physics` |
+//! | `residual` | poor fit to the motion identified from; wrong lengths and zeros | `fit`, `held_out` |
+//! | `validation` | held-out error above noise and covariance; large slow residual | `fit`, `held_out` |
+//! | `not_a_measurement` | the torque shows no inertia and friction | `fit` |
+//! | `contact` | large errors in all joints at once for a second or more | `disturbance`, `held_out` |
+//! | `outliers` | too many samples replaced, too many rows disturbed | `disturbance` |
 //!
-//! Every test leaves an [`Evidence`], passed or not: what was seen, where, and the limit. Every limit is a field of
-//! [`Thresholds`] with the reason for its default; where noise decides, it follows from degrees of freedom and one
-//! false-alarm rate.
+//! Every test leaves an [`Evidence`], passed or not: value, location and limit. Every limit is a field of
+//! [`Thresholds`] with the reason for its default. Where noise decides, the limit follows from degrees of
+//! freedom and one false-alarm rate.
 
 mod disturbance;
 mod evidence;
@@ -27,17 +27,17 @@ pub use evidence::{Docket, Evidence, Test};
 pub use fit::Unused;
 pub use thresholds::Thresholds;
 
-/// Why a result is refused; a closed list.
+/// Reason of a refusal; a closed list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Reason {
     /// No body can have these parameters.
     Unphysical,
-    /// The motion did not show what was asked for.
+    /// The motion excited too few parameters.
     Unexcited,
-    /// What the model leaves unexplained is not noise.
+    /// The residual on the motion identified from is not noise.
     Residual,
-    /// Another motion is predicted badly.
+    /// A held-out motion is predicted badly.
     Validation,
     /// The torque was computed, not measured.
     NotAMeasurement,
@@ -45,7 +45,7 @@ pub enum Reason {
     Outliers,
     /// The leg touched something.
     Contact,
-    /// The data cannot be used.
+    /// The data are not usable.
     Input,
 }
 
@@ -62,7 +62,7 @@ impl Reason {
         Self::Input,
     ];
 
-    /// The word used in reports.
+    /// Word used in reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -78,39 +78,39 @@ impl Reason {
     }
 }
 
-/// The reasons against a result; none means accepted.
+/// Reasons against a result; an empty set means accepted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Verdict(u8);
 
 impl Verdict {
-    /// Nothing speaks against it.
+    /// Verdict without any reason against the result.
     pub const ACCEPTED: Self = Self(0);
 
-    /// Refused for one reason.
+    /// Verdict with one reason.
     #[must_use]
     pub const fn refused(reason: Reason) -> Self {
         Self(1 << reason as u8)
     }
 
-    /// The reasons of both.
+    /// Union of the reasons of both.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// No reason against it.
+    /// True without any reason against the result.
     #[must_use]
     pub const fn is_accepted(self) -> bool {
         self.0 == 0
     }
 
-    /// Whether this is one of the reasons.
+    /// True if this is one of the reasons.
     #[must_use]
     pub const fn has(self, reason: Reason) -> bool {
         self.0 & (1 << reason as u8) != 0
     }
 
-    /// The reasons, in the order of [`Reason::ALL`].
+    /// Reasons in the order of [`Reason::ALL`].
     pub fn reasons(self) -> impl Iterator<Item = Reason> {
         Reason::ALL.into_iter().filter(move |reason| self.has(*reason))
     }

@@ -1,4 +1,4 @@
-//! Whether a body with these parameters can exist, as far as base parameters tell.
+//! Tests whether a body with these parameters can exist, as far as base parameters show.
 
 use nalgebra::{SMatrix, Vector3};
 
@@ -12,7 +12,8 @@ use crate::model::{JointState, PARAMETERS_PER_JOINT, Parameter, mass_matrix, reg
 use crate::real::{self, Real};
 
 impl<T: Real> Thresholds<T> {
-    /// No negative friction, rotor inertia, mass or kinetic energy beyond noise; every value finite.
+    /// Judges signs: no negative friction, rotor inertia, mass or kinetic energy
+    /// beyond noise; all values finite.
     pub fn judge_physics<const N: usize, const B: usize>(
         &self,
         model: &RowModel<T, N, B>,
@@ -60,15 +61,15 @@ impl<T: Real> Thresholds<T> {
         );
     }
 
-    /// Whether a leg that can exist explains the data as well as least squares does, up to what noise makes of so many
-    /// degrees of freedom: if not, the data contradict every leg that the prior allows.
+    /// Judges the loss of fit of the physically consistent leg against least squares. Beyond the noise of its
+    /// degrees of freedom, the data contradict every leg that the prior allows.
     pub fn judge_consistency(&self, consistency: &Consistency<T>, docket: &mut Docket<'_, T>) {
         let limit = self.chance(T::of(consistency.degrees_of_freedom as f64));
         docket.at_most(Reason::Unphysical, Test::PriorBox, None, None, consistency.excess, limit);
     }
 
-    /// Standard deviations by which the kinetic energy `v' M(q) v / 2` is negative in some direction, at worst, at
-    /// postures all over the circle; zero where it never is.
+    /// Largest negative kinetic energy `v' M(q) v / 2` over postures all over the circle, in standard
+    /// deviations; zero where it is never negative.
     fn negative_energy<const N: usize, const B: usize>(
         &self,
         model: &RowModel<T, N, B>,
@@ -85,7 +86,8 @@ impl<T: Real> Thresholds<T> {
     }
 }
 
-/// Standard deviations by which Coulomb friction with a level for each direction is negative in one of them.
+/// Negative excess of Coulomb friction in its lower direction, in standard
+/// deviations, for asymmetric friction.
 fn negative_direction_of_friction<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     estimate: &Estimate<T, B>,
@@ -106,7 +108,7 @@ fn negative_direction_of_friction<T: Real, const N: usize, const B: usize>(
 
 const POSTURES: usize = 16;
 
-/// A direction `v` in which `v' M v` is negative, and that number; `None` for a positive matrix.
+/// Direction `v` with negative `v' M v`, and that value; `None` for a positive matrix.
 ///
 /// With `M = L D L'` and a negative pivot `D_k`, `v = L^-T e_k` gives `v' M v = D_k`.
 fn negative_direction<T: Real, const N: usize>(matrix: &SMatrix<T, N, N>) -> Option<([T; N], T)> {
@@ -149,7 +151,7 @@ fn posture<T: Real, const N: usize>(index: usize) -> [T; N] {
     })
 }
 
-/// Twice the kinetic energy of unit base parameters at speed `direction`: its weights.
+/// Weights of the base parameters in twice the kinetic energy at speed `direction`.
 fn energy_weights<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     q: [T; N],

@@ -1,52 +1,54 @@
-//! What a result must keep to be accepted.
+//! Acceptance limits of a result.
 
 use crate::real::Real;
 
-/// Limits of all tests; each with the reason for its default.
+/// Limits of all tests, each with the reason for its default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds<T> {
-    /// Rows for each base parameter, at least: with five rows each, overlapping as they do, the residual still has
-    /// a degree of freedom or more for each parameter.
+    /// Fewest rows for each base parameter. Rows overlap; five each still leave a degree of freedom or more
+    /// of the residual for each parameter.
     pub rows_per_parameter: u32,
-    /// Root mean square speed of every joint, rad/s: below, the sign of the speed is the encoder's noise and
-    /// Coulomb friction cannot be told from an offset.
+    /// Least root mean square speed of every joint, rad/s. Below, the encoder's noise determines the sign of
+    /// the speed, and Coulomb friction looks like an offset.
     pub smallest_speed: T,
-    /// Condition number of the scaled problem: above, an error of 0.1 % in the rows moves the result by its size.
+    /// Largest condition number of the scaled problem. Above, an error of 0.1 % in the rows
+    /// moves the result by its size.
     pub largest_condition: T,
-    /// Standard deviations by which a quantity that cannot be negative may be so.
+    /// Negative excess that a nonnegative quantity may have, in standard deviations.
     pub largest_negative_sigmas: T,
-    /// Spreads of chi-square by which a leg that can exist may be worse than least squares: five are not noise.
+    /// Spreads of chi-square by which a consistent leg may be worse than least squares: five are not noise.
     pub largest_excess_spreads: T,
-    /// Quantile of the standard normal distribution at which noise is no longer believed: 5.2 is passed once in ten
-    /// million, and some fifty such tests are made of a run, so that noise refuses less than one run in a hundred
-    /// thousand.
+    /// Quantile of the standard normal distribution for all noise tests. Noise exceeds 5.2
+    /// once in ten million. A run has some fifty such tests, so noise alone refuses less than
+    /// one run in a hundred thousand.
     pub noise_quantile: T,
-    /// Where the noise is not known (samples put on another grid), error on an unused motion over that on the training
-    /// motion: noise alone gives one; twice leaves room for friction that depends on speed and load.
+    /// Largest error on a held-out motion over that on the training motion, where the noise is
+    /// unknown (samples from another grid). Noise alone gives one; two allows for friction
+    /// that depends on speed and load.
     pub largest_error_ratio: T,
-    /// Systematic error on an unused motion that is never held against a model, as a share of the motion's root mean
-    /// square torque: what a servo's feedback makes up for.
+    /// Harmless systematic error on a held-out motion, as a share of the motion's root mean square torque:
+    /// the servo's feedback makes up for it.
     pub harmless_error_share: T,
-    /// The same on the motion identified from, which is faster; only where the noise is known.
+    /// Harmless systematic error on the faster motion identified from; applies only with known noise.
     pub largest_misfit_share: T,
-    /// Error that is never accepted, as a share of the motion's root mean square torque: such a model explains less
-    /// than half of the power of the torque.
+    /// Largest error ever accepted, as a share of the motion's root mean square torque: such a model explains
+    /// about half of the power of the torque.
     pub largest_error_share: T,
-    /// Uncertainty (one standard deviation) of a held-out torque that the parameters leave, as a share of its root mean
-    /// square: beyond a third three of them are as large as the torque itself.
+    /// Largest uncertainty (one standard deviation) of a held-out torque due to the parameters, as a share of
+    /// its root mean square. Beyond a third, three of them are as large as the torque itself.
     pub largest_uncertainty_share: T,
-    /// Share of a joint's torque that inertia and friction make, at least: a drive's own friction is more; a torque
+    /// Least share of inertia and friction in a joint's torque. A drive's own friction is more; a torque
     /// computed from the angle has none.
     pub smallest_dynamic_share: T,
-    /// Share by which a link may seem longer or shorter than believed, whatever the significance.
+    /// Tolerated relative error of a link's length, whatever its significance.
     pub largest_length_error: T,
-    /// Angle by which an encoder's zero may seem off, rad, whatever the significance.
+    /// Tolerated error of an encoder's zero, rad, whatever its significance.
     pub largest_zero_error: T,
-    /// Time for which all joints may miss together, s: a push lasts half a second, a step on the floor longer.
+    /// Longest error in all joints at once, s: a push lasts half a second, a step on the floor longer.
     pub longest_disturbance_s: T,
-    /// Share of samples that may be wild: a sensor that is wrong more often is to be mended.
+    /// Largest share of samples that are outliers: a sensor with more needs repair.
     pub largest_replaced_share: T,
-    /// Share of rows that may be set aside: with a third of them gone nobody knows what the rest was chosen for.
+    /// Largest share of excluded rows: without a third of them the rest is a biased choice.
     pub largest_disturbed_share: T,
 }
 
@@ -75,14 +77,15 @@ impl<T: Real> Default for Thresholds<T> {
 }
 
 impl<T: Real> Thresholds<T> {
-    /// What chi-square of `freedom` degrees of freedom does not exceed by chance: so many of its spreads above its mean.
+    /// Limit of chi-square with `freedom` degrees of freedom by chance: a number
+    /// of its spreads above its mean.
     #[must_use]
     pub fn chance(&self, freedom: T) -> T {
         freedom + self.largest_excess_spreads * crate::real::sqrt(freedom + freedom)
     }
 
-    /// Quantile of chi-square over its `freedom` degrees of freedom, at [`Self::noise_quantile`]: what the ratio of a
-    /// measured to an expected variance does not exceed by chance (Wilson and Hilferty 1931).
+    /// Quantile of chi-square over its `freedom` degrees of freedom, at [`Self::noise_quantile`]: the limit
+    /// by chance of a measured over an expected variance (Wilson and Hilferty 1931).
     #[must_use]
     pub fn variance_ratio(&self, freedom: T) -> T {
         let part = T::of(2.0 / 9.0) / crate::real::max(freedom, T::one());
@@ -97,7 +100,8 @@ mod tests {
 
     #[test]
     fn the_variance_ratio_is_the_tabulated_quantile_of_chi_square() {
-        // Standard normal quantile 3.0902: probability 0.999. Tables: chi-square 29.588 of 10, 149.449 of 100.
+        // Standard normal quantile 3.0902: probability 0.999. Tables: chi-square
+        // 29.588 of 10, 149.449 of 100.
         let thresholds = Thresholds { noise_quantile: 3.090_2, ..Thresholds::<f64>::default() };
         for (freedom, tabulated) in [(10.0, 29.588), (100.0, 149.449)] {
             // Wilson and Hilferty's approximation is good to 0.6 % here.

@@ -75,10 +75,10 @@ fn blocks_keep_their_order_and_every_row_and_differ_by_two_levels_only() {
         assert!(blocks <= capacity);
         let rows: f32 = (0..blocks).filter_map(|block| window.part(block, 0)).map(|part| part.rows).sum();
         assert_eq!(rows, (index + 1) as f32);
-        // Older blocks are never shorter, the open one apart.
+        // Older blocks are never shorter, except for the open one.
         let lengths = (0..blocks.saturating_sub(1)).map(|block| window.outputs(block));
         assert!(lengths.clone().zip(lengths.skip(1)).all(|(older, younger)| older >= younger));
-        // Half of the room holds blocks of the two largest lengths.
+        // At least half of the blocks have one of the two largest lengths.
         let longest = window.outputs(0);
         let long = (0..blocks).filter(|&block| window.outputs(block) * 2 >= longest).count();
         assert!(blocks < capacity - 1 || 2 * long >= capacity, "{long} of {blocks}");

@@ -1,8 +1,8 @@
-//! Which combinations of parameters the torques of a leg can tell: rank and null space by numbers.
+//! Combinations of parameters that the torques of a leg determine: rank and null space, numerically.
 //!
-//! The closed form of [`super::regrouping`] does not know gravity, parallel axes or friction columns that are
-//! switched off. So the regressor itself is asked: many states, all joints, one factor, and what is left of each
-//! column once those preferred to it are taken out.
+//! The closed form of [`super::regrouping`] ignores gravity, parallel axes and disabled friction columns.
+//! This module therefore examines the regressor itself: many states, all joints, one factor. A column is
+//! independent by the part that remains after the columns preferred to it are removed.
 //!
 //! ```text
 //! torque = Y p = Y_B beta          beta_b = p_b + sum of terms(b) times dependent parameters
@@ -14,13 +14,13 @@
 //! | Y, Y_B | regressor; its independent columns |
 //! | beta | base parameters, as many as the rank |
 //!
-//! Order of preference, so that the base set reads as in the literature: XX XY XZ YZ ZZ HX HY of all links, then FC
-//! FV OFF, then IA, then YY HZ M. A link's XX thereby carries its -YY.
+//! Order of preference, so that the base set reads as in the literature: XX XY XZ YZ ZZ HX HY of all links,
+//! then FC FV OFF, then IA, then YY HZ M. A link's XX thereby carries its -YY.
 //!
 //! Source: M. Gautier, Numerical calculation of the base inertial parameters of robots, 1991.
-//! Cost: 64 states; once per leg, gravity and mask. For two joints in `f32` on a Cortex-M4F (emulated): 1.5 million
-//! instructions, 12 ms at 8 ns, and 6.2 kB of stack; the result takes about 60 N B bytes.
-//! Limits: what is independent here may still be weak on a given motion; that is for the statistics to say.
+//! Cost: 64 states; once per leg, gravity and mask. For two joints in `f32` on a Cortex-M4F (emulated): 1.5
+//! million instructions, 12 ms at 8 ns, and 6.2 kB of stack; the result takes about 60 N B bytes.
+//! Limits: a column that is independent here may still be weak in a given motion; the statistics show that.
 
 use nalgebra::Vector3;
 use rand_core::{Rng, SeedableRng};
@@ -33,69 +33,71 @@ use super::super::regressor::{regressor, row_torque};
 use super::echelon::{Factor, entry};
 use crate::real::{Real, abs, is_finite, max, sqrt};
 
-/// Which of the 14 N parameters are estimated at all; the others' columns are switched off.
+/// Mask of the 14 N parameters that are estimated at all; the columns of the others are disabled.
 pub type ColumnMask<const N: usize> = [[bool; PARAMETERS_PER_JOINT]; N];
 
-/// States asked; each gives one row per joint, so there are at least four rows per column.
+/// Number of random states. Each gives one row per joint, so there are at least four rows per column.
 const STATES: usize = 64;
 
-/// Speeds of the states asked, rad/s, and accelerations, rad/s2: gravity, inertia and friction columns of like size.
+/// Bounds of the states' speeds, rad/s, and accelerations, rad/s2: gravity, inertia and
+/// friction columns of like size.
 const SPEED_BOUND: f64 = 3.0;
 const ACCELERATION_BOUND: f64 = 10.0;
 
-/// Why there is no base set.
+/// Reason why there is no base set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BaseError {
-    /// There are `rank` base parameters, more than the type has room for.
+    /// The rank exceeds the capacity of the type.
     TooMany {
-        /// Room needed.
+        /// Capacity needed.
         rank: usize,
     },
-    /// No parameter that is switched on moves any torque.
+    /// No enabled parameter has an effect on any torque.
     NothingSeen,
     /// Gravity or a number of the chain is NaN or too large.
     NotFinite,
 }
 
-/// What the torques tell about one parameter.
+/// Identifiability of one parameter from the torques.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
     /// Determined by itself: it is this base parameter.
     Alone(usize),
-    /// Determined only together with others. The number is the first base parameter it stands in;
+    /// Determined only together with others. The number is the first base parameter that contains it;
     /// [`BaseParameters::carriers`] lists all.
     Grouped(usize),
     /// No torque depends on it.
     Unseen,
-    /// Switched off by the mask.
+    /// Disabled by the mask.
     Off,
 }
 
-/// How clearly the kept columns stand apart from the dropped ones, as shares of a column's length.
+/// Gap between kept and dropped columns, as shares of a column's length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation<T> {
-    /// Smallest share of a kept column that those before it do not explain; above the tolerance.
+    /// Smallest share of a kept column that earlier ones do not explain; above the tolerance.
     pub smallest_kept: T,
-    /// Largest such share of a dropped column; below the tolerance, and all of it rounding if the two are far apart.
+    /// Largest such share of a dropped column; below the tolerance. If the gap is wide, it is pure rounding.
     pub largest_dropped: T,
 }
 
-/// The base parameters of a leg of `N` joints, at most `B`.
+/// Base parameters of a leg of `N` joints, at most `B`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseParameters<T, const N: usize, const B: usize> {
     rank: usize,
-    /// The first `rank` are the independent columns: joint and parameter.
+    /// Joint and parameter of the independent columns; the first `rank` entries are valid.
     independent: [(usize, Parameter); B],
-    /// The first `rank` are rows of the reduced echelon form: 1 on their own independent column, 0 on all others'.
+    /// Rows of the reduced echelon form: 1 on their own independent column, 0 on all others'. The first
+    /// `rank` are valid.
     terms: [LegParameters<T, N>; B],
-    /// Terms of a base parameter that does not exist.
+    /// All-zero terms, for an index beyond the rank.
     nothing: LegParameters<T, N>,
     mask: ColumnMask<N>,
     separation: Separation<T>,
 }
 
 impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
-    /// Asks the chain under `gravity` (m/s2, base frame) for the parameters that `mask` switches on.
+    /// Analyses the chain under `gravity` (m/s2, base frame) for the parameters that `mask` enables.
     ///
     /// # Errors
     /// See [`BaseError`].
@@ -164,27 +166,27 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         self.rank
     }
 
-    /// How clearly the rank was decided.
+    /// Gap between kept and dropped columns: the margin of the rank.
     #[must_use]
     pub fn separation(&self) -> Separation<T> {
         self.separation
     }
 
-    /// Joint (from 0) and parameter whose column carries base parameter `b`; `None` from the rank on.
+    /// Joint (from 0) and parameter whose column stands for base parameter `b`; `None` from the rank on.
     #[must_use]
     pub fn independent(&self, b: usize) -> Option<(usize, Parameter)> {
         self.columns().get(b).copied()
     }
 
-    /// Factors by which parameters sum up to base parameter `b`: 1 on its independent column. All zero from the
-    /// rank on.
+    /// Factors by which parameters sum up to base parameter `b`: 1 on its independent
+    /// column. All zero from the rank on.
     #[must_use]
     pub fn terms(&self, b: usize) -> &LegParameters<T, N> {
         self.terms.get(b).unwrap_or(&self.nothing)
     }
 
-    /// The independent columns of a regressor row, so that `out` . beta = row . parameters (masked ones left out).
-    /// Entries from the rank on become 0.
+    /// Selects the independent columns of a regressor row, so that `out` . beta = row . parameters (without
+    /// masked ones). Entries from the rank on become 0.
     pub fn select(&self, row: &RegressorRow<T, N>, out: &mut [T; B]) {
         *out = [T::zero(); B];
         for (value, (joint, parameter)) in out.iter_mut().zip(self.columns()) {
@@ -198,8 +200,9 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         core::array::from_fn(|b| row_torque(self.terms(b), parameters))
     }
 
-    /// Full parameters with these base values: `others`, with the independent columns' parameters moved until the
-    /// projection fits. With `others` zero the base values themselves stand in the independent columns.
+    /// Full parameters with these base values. Starts from `others` and changes the independent
+    /// columns' parameters until the projection fits. With zero `others` the independent columns'
+    /// parameters are the base values.
     #[must_use]
     pub fn complete(&self, values: &[T; B], others: &LegParameters<T, N>) -> LegParameters<T, N> {
         let present = self.project(others);
@@ -213,7 +216,7 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         parameters
     }
 
-    /// What the torques tell about a parameter; [`Standing::Off`] where there is no such joint.
+    /// Identifiability of a parameter; [`Standing::Off`] for a joint that does not exist.
     #[must_use]
     pub fn standing(&self, joint: usize, parameter: Parameter) -> Standing {
         if !self.mask.get(joint).is_some_and(|block| block[parameter.index()]) {
@@ -227,7 +230,7 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
         if own && members == 1 { Standing::Alone(first) } else { Standing::Grouped(first) }
     }
 
-    /// The base parameters in which a parameter stands, ascending.
+    /// Base parameters that contain a parameter, ascending.
     pub fn carriers(&self, joint: usize, parameter: Parameter) -> impl Iterator<Item = usize> + '_ {
         (0..self.rank).filter(move |b| entry(self.terms(*b), joint, parameter) != T::zero())
     }
@@ -237,18 +240,19 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
     }
 }
 
-/// Rounding of an entry, in units of the last place of the largest column's. Terms that cancel in a short column leave
-/// their rounding in it, so a column is judged as if it were at least `ROUNDINGS` tolerances of the longest one long.
+/// Rounding of an entry, in units of the last place of the largest column's. Terms that cancel in a short
+/// column leave their rounding in it. A column therefore counts as at least `ROUNDINGS` tolerances of the
+/// longest one long.
 const ROUNDINGS: f64 = 4.0;
 
-/// Share of a column below which it counts as explained by others, and below which a contribution counts as zero.
+/// Share of a column below which others explain it, and below which a contribution counts as zero.
 ///
 /// Halfway, in digits, between 1 and rounding: 3.5e-4 in `f32`, 1.5e-8 in `f64`.
 fn tolerance<T: Real>() -> T {
     sqrt(T::EPSILON)
 }
 
-/// Takes the regressor rows of many states into the factor; the same states on every call.
+/// Collects the regressor rows of many states in the factor; every call uses equal states.
 fn collect<T: Real, const N: usize>(
     factor: &mut Factor<T, N>,
     chain: &Chain<T, N>,
@@ -256,7 +260,7 @@ fn collect<T: Real, const N: usize>(
     mask: &ColumnMask<N>,
 ) {
     let mut random = Xoshiro128PlusPlus::seed_from_u64(1);
-    // From the middle of all integers, so that single precision does it.
+    // From the middle of all integers, so that single precision suffices.
     let mut within = |bound: f64| {
         let number = random.next_u32() ^ (1 << 31);
         T::of(f64::from(number.cast_signed())) * (T::of(bound) / T::of(2_147_483_648.0))
@@ -278,10 +282,10 @@ fn collect<T: Real, const N: usize>(
     }
 }
 
-/// An echelon row with exact ones and zeros on the independent columns and without factors that are only rounding.
+/// Cleans an echelon row: exact ones and zeros on the independent columns, no factors that are only rounding.
 ///
-/// `own` is the norm of the row's independent column; a factor times it, what that column contributes to a dependent
-/// one, is rounding where it is not more than the dependent column's entry in `least`.
+/// `own` is the norm of the row's independent column. A factor times `own` is the contribution to a dependent
+/// column; up to that column's entry in `least` it is rounding.
 fn cleaned<T: Real, const N: usize>(
     row: &RegressorRow<T, N>,
     place: usize,

@@ -1,14 +1,14 @@
-//! Rows of a regressor collected in a triangular factor, and the factor brought to reduced echelon form.
+//! Regressor rows collected in a triangular factor, and its reduction to reduced echelon form.
 //!
-//! Orthogonal rotations only: the normal matrix would square the condition number, and `f32` has none to spare.
-//! The columns are eliminated in an order of preference, so that of two columns that say the same the preferred one
-//! stays and the other is expressed through it.
+//! Orthogonal rotations only: the normal matrix would square the condition number, and `f32` has no digits to
+//! spare. The columns are eliminated in an order of preference. Of two dependent columns the preferred one
+//! stays, and the other is expressed through it.
 //!
 //! ```text
 //! collect: | R |  rotated to | R' |        column by column in the order of preference
 //!          | y |             | 0  |
-//! reduce:  each column's part below the kept rows is rotated into one; kept if its share of the column exceeds the
-//!          tolerance; then back-substitution makes the kept columns unit vectors
+//! reduce:  each column's part below the kept rows is rotated into one; kept if its share of the column
+//!          exceeds the tolerance; then back-substitution makes the kept columns unit vectors
 //! ```
 //!
 //! Source: G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed. 2013, sections 5.1.8 and 5.2.
@@ -17,7 +17,7 @@
 use super::super::parameter::{LegParameters, PARAMETERS_PER_JOINT, Parameter, RegressorRow};
 use crate::real::{Real, abs, max, min, sqrt};
 
-/// Columns are preferred class by class, within a class from the proximal joint on.
+/// Order of preference: class by class, within a class from the proximal joint on.
 const PREFERENCE: [&[Parameter]; 4] = [
     &[
         Parameter::XX,
@@ -33,25 +33,25 @@ const PREFERENCE: [&[Parameter]; 4] = [
     &[Parameter::YY, Parameter::HZ, Parameter::M],
 ];
 
-/// Every column of a leg of `N` joints, the preferred first: joint and parameter.
+/// All columns of a leg of `N` joints, the preferred first: joint and parameter.
 fn in_order_of_preference<const N: usize>() -> impl Iterator<Item = (usize, Parameter)> {
     PREFERENCE.iter().flat_map(|class| {
         (0..N).flat_map(move |joint| class.iter().map(move |parameter| (joint, *parameter)))
     })
 }
 
-/// Square factor of all rows collected; row k was built for the k-th preferred column.
+/// Square factor of all collected rows; row k belongs to the k-th preferred column.
 pub(super) struct Factor<T, const N: usize> {
     rows: [[RegressorRow<T, N>; PARAMETERS_PER_JOINT]; N],
 }
 
-/// What a factor's columns turned out to be.
+/// Result of the reduction.
 pub(super) struct Echelon<T> {
-    /// Kept columns; the first so many rows of the factor belong to them.
+    /// Number of kept columns; the first `rank` rows of the factor belong to them.
     pub rank: usize,
-    /// Smallest share of a kept column that the columns before it do not explain.
+    /// Smallest share of a kept column that earlier ones do not explain.
     pub smallest_kept: T,
-    /// Largest such share of a column that was dropped.
+    /// Largest such share of a dropped column.
     pub largest_dropped: T,
 }
 
@@ -60,12 +60,12 @@ impl<T: Real, const N: usize> Factor<T, N> {
         Self { rows: [[[[T::zero(); PARAMETERS_PER_JOINT]; N]; PARAMETERS_PER_JOINT]; N] }
     }
 
-    /// The rows, in order of preference of the columns they were built for.
+    /// Rows, in the order of preference of their columns.
     pub fn rows(&self) -> &[RegressorRow<T, N>] {
         self.rows.as_flattened()
     }
 
-    /// Euclidean norms of the columns of everything collected; rotations do not change them.
+    /// Euclidean norms of the columns over all rows; rotations do not change them.
     pub fn column_norms(&self) -> LegParameters<T, N> {
         let mut norms = [[T::zero(); PARAMETERS_PER_JOINT]; N];
         for row in self.rows() {
@@ -76,7 +76,7 @@ impl<T: Real, const N: usize> Factor<T, N> {
         norms.map(|joint| joint.map(sqrt))
     }
 
-    /// Takes one more row in.
+    /// Rotates one more row in.
     pub fn collect(&mut self, mut row: RegressorRow<T, N>) {
         for (own, (joint, parameter)) in
             self.rows.as_flattened_mut().iter_mut().zip(in_order_of_preference::<N>())
@@ -85,10 +85,11 @@ impl<T: Real, const N: usize> Factor<T, N> {
         }
     }
 
-    /// Brings the factor to echelon form; calls `kept` with each column that is independent of those before it.
+    /// Brings the factor to echelon form; calls `kept` with each column that is
+    /// independent of those before it.
     ///
-    /// A column is dependent where what the kept ones leave of it is not more than `tolerance` of its entry in
-    /// `lengths`, all of which are more than zero.
+    /// A column is dependent if its part beyond the kept ones is at most `tolerance` of its entry in
+    /// `lengths`, all of which are positive.
     pub fn reduce(
         &mut self,
         tolerance: T,
@@ -118,7 +119,8 @@ impl<T: Real, const N: usize> Factor<T, N> {
         echelon
     }
 
-    /// Back-substitution for one kept column: its row is divided by the pivot, the rows before it lose the column.
+    /// Back-substitution for one kept column: divides its row by the pivot and
+    /// clears the column in earlier rows.
     pub fn substitute(&mut self, place: usize, joint: usize, parameter: Parameter) {
         let Some((pivot_row, before)) =
             self.rows.as_flattened_mut().get_mut(..=place).and_then(<[RegressorRow<T, N>]>::split_last_mut)
@@ -159,7 +161,7 @@ fn rotate<T: Real, const N: usize>(
     }
 }
 
-/// The entry of a row in one column; zero where there is no such joint.
+/// Entry of a row in one column; zero for a joint that does not exist.
 pub(super) fn entry<T: Real, const N: usize>(
     row: &RegressorRow<T, N>,
     joint: usize,

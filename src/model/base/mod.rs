@@ -1,13 +1,13 @@
-//! Base parameters: the combinations of parameters that torque can tell, and no others.
+//! Base parameters: the combinations of parameters that torque determines, and no others.
 //!
-//! Most parameters of a leg act only together: a thigh's inertia and a shank's mass at the knee cannot be told
-//! apart at the hip. Least squares needs the independent combinations, a report needs to say which parameter stands
-//! in which.
+//! Most parameters of a leg act only together: at the hip a thigh's inertia looks like a shank's mass at the
+//! knee. Least squares needs the independent combinations. A report needs to say which parameter is part of
+//! which combination.
 //!
-//! | file | what |
+//! | file | content |
 //! | --- | --- |
-//! | [`regrouping`] | Gautier's closed form: moves what a link shares with the one before it; exact, for any chain |
-//! | [`analysis`] | rank and null space by numbers: any chain, gravity and choice of columns, parallel axes included |
+//! | [`regrouping`] | Gautier's closed form: moves shared terms of a link to the one before it; exact |
+//! | [`analysis`] | numerical rank and null space: any chain, gravity, columns, parallel axes |
 
 pub mod analysis;
 mod echelon;

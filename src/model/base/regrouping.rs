@@ -1,7 +1,7 @@
-//! Gautier's closed-form regrouping: of every link but the first, YY, HZ and M move to the link before it.
+//! Gautier's closed-form regrouping: moves YY, HZ and M of every link but the first to the link before it.
 //!
-//! What a link shares with the one before it, however the joint between them turns, can be counted there. The
-//! result needs 7 (N - 1) + 3 inertial parameters and 4 of the drive per joint, and the torque stays the same.
+//! A term that a link shares with the one before it, at any joint angle, can be counted there. The result
+//! needs 7 (N - 1) + 3 inertial parameters and 4 of the drive per joint, and the torque is unchanged.
 //!
 //! ```text
 //! for i = N .. 2, with s = YY_i + 2 d HZ_i + d^2 M_i and t = HZ_i + d M_i:
@@ -20,17 +20,18 @@
 //! | alpha, a, d | Denavit-Hartenberg numbers of joint i | rad, m, m |
 //! | XX .. M, IA | parameters, tensor elements | kg m2, kg m, kg |
 //!
-//! Source: M. Gautier and W. Khalil, Direct calculation of minimum set of inertial parameters of serial robots,
-//! 1990; the paper's Eqs (8)-(17) with three corrections: 2 d HZ + d^2 M in (8) and (11)-(13), the minus sign in
-//! (10), XX - YY in (7). Cost: about 40 flops per joint.
-//! Limits: it knows neither gravity nor parallel axes. A first axis parallel to gravity hides HX1 and HY1, and
+//! Source: M. Gautier and W. Khalil, Direct calculation of minimum set of inertial parameters of serial
+//! robots, 1990; the paper's Eqs (8)-(17) with three corrections: 2 d HZ + d^2 M in (8) and (11)-(13), the
+//! minus sign in (10), XX - YY in (7). Cost: about 40 flops per joint.
+//! Limits: gravity and parallel axes are ignored. A first axis parallel to gravity hides HX1 and HY1, and
 //! parallel axes hide more; [`super::analysis`] finds those.
 
 use super::super::chain::Chain;
 use super::super::parameter::{LegParameters, Parameter};
 use crate::real::Real;
 
-/// The same leg with as few parameters as the closed form gives; torques of any motion are unchanged.
+/// Regroups a leg to the fewest parameters that the closed form allows; the
+/// torque of any motion is unchanged.
 #[must_use]
 pub fn regroup<T: Real, const N: usize>(
     chain: &Chain<T, N>,
@@ -75,7 +76,7 @@ mod tests {
     use super::super::super::testing::Dice;
     use super::*;
 
-    /// Greatest change of torque over random legs and motions when the parameters are changed so, N m.
+    /// Largest change of torque by a change of parameters, over random legs and motions, N m.
     fn torque_change<const N: usize>(
         seed: u64,
         change: impl Fn(&Chain<f64, N>, &LegParameters<f64, N>) -> LegParameters<f64, N>,

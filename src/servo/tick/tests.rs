@@ -1,5 +1,6 @@
-//! The tick against a joint that shares nothing with it: double precision, an inertia with viscous friction and
-//! gravity, a lagging drive and an encoder that counts.
+//! Tests of the tick on an independent joint in double precision.
+//!
+//! The joint is an inertia with viscous friction and gravity, a lagging drive and an encoder that counts.
 
 extern crate std;
 
@@ -43,7 +44,7 @@ fn closed_loop(frequency_hz: f64, with_velocity: bool) -> (f64, f64) {
     (sqrt(in_phase * in_phase + quadrature * quadrature) / amplitude, atan2(quadrature, in_phase))
 }
 
-/// The highest frequency at which the angle follows with at least half the power, Hz.
+/// Highest frequency at which the angle follows with at least half the power, Hz.
 fn bandwidth(with_velocity: bool) -> f64 {
     let (mut low, mut high) = (1.0, 64.0);
     for _ in 0..10 {
@@ -89,7 +90,7 @@ fn the_position_loop_follows_beyond_four_hertz() {
     }
 }
 
-/// A torque as feedforward, whatever is commanded.
+/// A torque as feedforward, independent of the command.
 struct Injected([f32; 2]);
 
 impl TorqueModel<2> for Injected {
@@ -98,8 +99,8 @@ impl TorqueModel<2> for Injected {
     }
 }
 
-/// The loop's gain and phase (rad) at a frequency, for a plant: a torque d injected where the controller's torque u
-/// leaves gives u = d / (1 + L), so L = d / u - 1.
+/// Gain and phase (rad) of the loop at a frequency, for a plant. A torque d injected where the controller's
+/// torque u leaves gives u = d / (1 + L), so L = d / u - 1.
 fn open_loop(frequency_hz: f64, plant: Plant) -> (f64, f64) {
     let mut bench = Bench::enabled(JOINTS, plant);
     let period_ticks = (f64::from(SERVO_RATE_HZ) / frequency_hz).round();
@@ -173,7 +174,8 @@ fn the_integral_is_empty_when_the_drive_does_not_follow() {
     assert!(output.wanted_torque[0].abs().0 < 1.0, "{:?}", output.wanted_torque);
 }
 
-/// The plant's own law, in the model's angles: the second joint's are the negative of its own, and so are its torques.
+/// Exact law of the plant, in the model's angles: the second joint's angles and
+/// torques have the opposite sign.
 struct Exact;
 
 impl TorqueModel<2> for Exact {
@@ -223,7 +225,7 @@ fn nothing_that_is_not_finite_passes_the_tick_and_nothing_of_it_stays() {
             let feedforward = if field == 3 { None } else { Some(&model) };
             let command = ServoCommand { motion, feedforward, power: None };
             let output = bench.servo.tick(&sample, &command, NOWHERE);
-            // An acceleration feeds nothing but observer and model; alone it must not get into the observer.
+            // An acceleration affects only observer and model; alone it must not get into the observer.
             if field == 3 {
                 assert!(output.drive().enabled);
                 assert_eq!(output.velocity[1], RadianPerSecond::ZERO);

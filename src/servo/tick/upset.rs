@@ -1,13 +1,13 @@
-//! A bit that flips in memory, on the host alone: what the checksum is tried against (row M2 of docs/safety.md). No image has it.
+//! Bit flips in memory, on the host only, to test the checksum (row M2 of docs/safety.md).
 
 use super::Servo;
 
 impl<const N: usize> Servo<N> {
-    /// Numbers of a joint that can be upset.
+    /// Numbers of a joint that can be flipped.
     pub const NUMBERS: u8 = 6;
 
-    /// Flips one bit (of 32, from the lowest) of a number that never changes of a joint: counts per radian, greatest acceleration,
-    /// current per torque, overspeed bound, either end of the range.
+    /// Flips one bit (of 32, from the lowest) of one of a joint's constants: counts per radian, largest
+    /// acceleration, current per torque, overspeed bound, either end of the range.
     pub fn upset(&mut self, joint: usize, number: u8, bit: u8) {
         let Some(this) = self.joints.get_mut(joint) else { return };
         let upset = match number {

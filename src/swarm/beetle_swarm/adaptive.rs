@@ -1,28 +1,30 @@
-//! The adaptive beetle swarm: whiskers that share a frame, learn a metric and retreat from bad moves.
+//! Rules of the adaptive beetle swarm: whiskers share a frame, learn a metric and retreat from bad moves.
 //!
-//! What does the work, said openly: the whiskers of the best beetles together make a Newton step in the subspace
-//! of their frame, in a metric they learn. The velocity of Eq. (19) is not the engine: without it most medians are
-//! the same; it trims the tails. In order of weight:
-//! 1. Shared scent: every beetle steps along all directions of the frame, not along its own only.
-//! 2. Learned metric: measured curvature stretches it; off where readings are not convex (ripples).
-//! 3. Retreat: a move that is worse than before and worse than the personal best is taken back.
+//! The main mechanism: the whiskers of the best beetles together make a Newton step in the subspace of their
+//! frame, in a metric they learn. The velocity of Eq. (19) contributes little: without it most medians stay
+//! equal; it shortens the tails. In order of importance:
+//! 1. Shared scent: every beetle steps along all directions of the frame, not only along its own.
+//! 2. Learned metric: measured curvature stretches it; disabled where readings are not convex (ripples).
+//! 3. Retreat: a move to a value worse than the previous one and the personal best is undone.
 //!
 //! Move of beetle i at x_i (frame.rs has s_j, d_j, w_j):
 //!   q_ij  = clip(s_j - w_j.(x_i - x_j)) om_i for j != i, q_ii = s_i
 //!   psi_i = sum_j q_ij d_j
-//!   x_i   = x_i + lambda v_i + (1 - lambda) psi_i            (Eq. 29 with this psi), at most 2 % outside the box
-//! om_i, the trust in the others' whiskers, is 1.6 om for every second beetle and om / 1.6 for the others; pairs are
-//! compared after the move and om follows the better. Of the beetles the min(2 n, N) best move, n = min(N, D) being those
-//! with whiskers: in few dimensions most evaluations would go into moving bad beetles. Whisker length follows sqrt(D) times the median |s|.
-//! Without progress for `patience` rounds the swarm leaps (leap.rs); where leaps lead nowhere it is scattered anew.
-//! `docs/bso.md` has the whole algorithm as pseudocode, with what each part is worth.
+//!   x_i   = x_i + lambda v_i + (1 - lambda) psi_i        (Eq. 29 with this psi), at most 2 % outside the box
+//! om_i is the trust in the other beetles' whiskers: 1.6 om for every second beetle, om / 1.6 for the others.
+//! Pairs are compared after the move, and om follows the better. The min(2 n, N) best beetles move; the best
+//! n = min(N, D) have whiskers. In few dimensions most evaluations would otherwise move bad beetles. Whisker
+//! length follows sqrt(D) times the median |s|. Without progress for `patience` rounds the swarm leaps
+//! (leap.rs); if leaps bring nothing it is scattered again. `docs/bso.md` has the whole algorithm as
+//! pseudocode, with the contribution of each part.
 //!
-//! Source: own experiments on test functions and identification problems; kept of the beetle swarm: x, v, P, G,
-//! Eq. (19), two whiskers, the weighted move.
-//! Cost: 2 n + min(2 n, N) evaluations per round, which is an iteration where 4 n >= N; the rest is counted in `docs/bso.md`;
-//! up to five square roots per direction are the only calls into `libm`.
-//! Known limits: a fast exploiter. Global search are the leaps and the restart: it fails on Rastrigin's function rotated
-//! in 10 dimensions and as it stands in 30. On a quadratic cost least squares is exact and instant. Noise in the cost of 1e-4 of its value spoils the last digits: meant for fixed data.
+//! Source: own experiments on test functions and identification problems. Taken from the beetle swarm: x, v,
+//! P, G, Eq. (19), two whiskers, the weighted move.
+//! Cost: 2 n + min(2 n, N) evaluations per round, which is an iteration where 4 n >= N; `docs/bso.md` counts
+//! the rest. Up to five square roots per direction are the only calls into `libm`.
+//! Known limits: the search exploits fast. Only leaps and restarts search globally: it fails on Rastrigin's
+//! function, rotated in 10 dimensions and unrotated in 30. On a quadratic cost least squares is exact and
+//! instant. A noise of 1e-4 of the cost's value corrupts the last digits: the search is meant for fixed data.
 
 use crate::real::{Real, abs, clamp, max, min};
 
@@ -37,14 +39,14 @@ use super::settings::{AdaptiveSettings, Part};
 
 /// Whisker length of a scattered swarm, metric coordinates.
 const FIRST_WHISKER: f64 = 0.1;
-/// Trust in the others' whiskers: first value, and factor between the two levels that are compared.
+/// Trust in other beetles' whiskers: first value, and factor between the two levels that are compared.
 const FIRST_TRUST: f64 = 0.3;
 const TRUST_LEVELS: f64 = 1.6;
-/// How far a beetle may stand outside the box (it is evaluated at the nearest point inside).
+/// Largest distance of a beetle outside the box (it is evaluated at the nearest point inside).
 const MARGIN: f64 = 0.02;
-/// Beetles that move per beetle with whiskers: a round reads as much as it moves.
+/// Moving beetles per beetle with whiskers: a round has as many whisker evaluations as moves.
 const MOVES_PER_READER: usize = 2;
-/// Progress below this share of the best value does not count.
+/// Least relative progress of the best value.
 const PROGRESS: f64 = 1e-7;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -56,14 +58,14 @@ pub(super) struct AdaptiveRules<T, const N: usize, const D: usize> {
     pub(super) gradient: Option<[T; D]>,
     /// Usual whisker length, metric coordinates.
     pub(super) whisker: T,
-    /// om.
+    /// Trust om.
     pub(super) trust: T,
     /// Smoothed share of convex readings; `None` before the first.
     pub(super) convex_share: Option<T>,
-    /// Rounds since the swarm was scattered, the running one included.
+    /// Rounds since the swarm was scattered, including the current one.
     pub(super) round: u32,
     pub(super) leap: Leap<T>,
-    /// The best value that counted as progress, and the rounds since.
+    /// Best value that counted as progress, and the rounds since.
     progress: T,
     waited: u32,
 }
@@ -85,7 +87,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
     }
 
-    /// As new, in place.
+    /// Resets to the state of [`Self::new`], in place.
     pub fn restart(&mut self, settings: AdaptiveSettings<T>, dimension: usize) {
         self.settings = settings;
         self.frame.restart(dimension);
@@ -94,7 +96,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.forget();
     }
 
-    /// Everything learned, when the swarm is scattered anew or has leapt.
+    /// Discards all learned values, when the swarm is scattered again or has leapt.
     pub(super) fn forget(&mut self) {
         self.metric.forget();
         self.gradient = None;
@@ -106,8 +108,8 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.waited = 0;
     }
 
-    /// The direction a beetle would like: the first downhill, some along the difference of two personal bests
-    /// (such differences point into narrow valleys), the others anywhere.
+    /// Wished direction of a beetle: downhill for the first. Some follow the difference of two personal bests
+    /// (such differences point into narrow valleys); the others have no wish.
     fn wish(&self, beetle: usize, beetles: &Particles<T, N, D>, random: &mut Random) -> Option<[T; D]> {
         match beetle {
             _ if self.leap.under_way => Some(self.axis(beetle, beetles.dimension())),
@@ -135,7 +137,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
     }
 
-    /// m: beetles that move in a round that is no leap.
+    /// Number m of beetles that move in a round without a leap.
     fn movers(&self) -> usize {
         if self.has(Part::BestMove) { N.min(MOVES_PER_READER * self.frame.count()) } else { N }
     }
@@ -144,7 +146,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.settings.without != Some(part)
     }
 
-    /// om_i: beetles take turns in trusting more and less.
+    /// Trust om_i: beetles alternate between more and less trust.
     fn trust_of(&self, beetle: usize) -> T {
         if !self.has(Part::TrustAdaptation) || self.leap.under_way {
             return T::one();
@@ -158,7 +160,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         (beetle as u32 ^ self.round) & 1 == 0
     }
 
-    /// psi_i, box coordinates.
+    /// Step psi_i, box coordinates.
     fn scent(&self, beetle: usize, position: &[T; D], dimension: usize) -> [T; D] {
         let mut psi = [T::zero(); D];
         let trust = self.trust_of(beetle);
@@ -278,7 +280,7 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
         self.learn_whisker(dimension);
     }
 
-    /// After so many rounds as evaluate N times, and after a leap, which has made the rounds begin anew.
+    /// An iteration takes the rounds that evaluate N times. A leap restarts the count of rounds.
     fn closes_iteration(&self) -> bool {
         let evaluations = 2 * self.frame.count() + self.movers();
         self.round.is_multiple_of(N.div_ceil(evaluations.max(1)) as u32)
@@ -292,7 +294,7 @@ mod tests {
     const N: usize = 6;
     const D: usize = 4;
 
-    /// A coupled bowl with its food at 0.3, 0.4, 0.5, 0.6 of the box.
+    /// Coupled bowl with its minimum at 0.3, 0.4, 0.5, 0.6 of the box.
     fn bowl(point: &[f64; D]) -> f64 {
         let offset = |index: usize| point[index] - (0.3 + 0.1 * index as f64);
         (0..D).map(|index| square(offset(index))).sum::<f64>() + 0.5 * square(offset(0) + offset(3))
@@ -304,7 +306,8 @@ mod tests {
 
     #[test]
     fn every_beetle_finds_the_food_of_a_bowl_by_the_whiskers_of_all() {
-        // Full trust and directions along the bowl's axes make the shared step Newton's: one move is enough.
+        // With full trust and directions along the bowl's axes the shared step is
+        // Newton's: one move is enough.
         let settings =
             AdaptiveSettings { velocity_share: 0.0, pair_directions: 0, ..AdaptiveSettings::default() };
         let mut rules = AdaptiveRules::<f64, N, D>::new(settings, D);
@@ -333,7 +336,7 @@ mod tests {
                 .all(|(index, &entry)| abs(entry - (0.3 + 0.1 * index as f64)) < 0.3);
             rules.displace(beetle, &mut beetles, &mut random);
             if within_reach {
-                // parabolas over whiskers of 0.1: 1e-16 / 0.01 of rounding
+                // Parabolas over whiskers of 0.1 leave 1e-16 / 0.01 of rounding.
                 assert!(bowl(&beetles.position[beetle]) < 1e-24, "beetle {beetle}");
             }
         }
@@ -351,7 +354,7 @@ mod tests {
             beetles.record(beetle, 1.0);
         }
         let before = beetles.clone();
-        // beetle 1 stands somewhere worse than its best
+        // Beetle 1 is somewhere worse than its best.
         beetles.value[1] = 3.0;
         for beetle in 0..N {
             beetles.position[beetle] = [0.5; D];

@@ -1,19 +1,20 @@
-//! The shared frame of whiskers: orthonormal directions in metric coordinates, and what was smelled along them.
+//! Shared frame of whiskers: orthonormal directions in metric coordinates, and the readings along them.
 //!
-//! Why: one beetle with two whiskers learns where the food is along one line. If the best beetles' whiskers point
-//! in orthonormal directions, each parabola gives one coordinate of the food, and together they give it to every
-//! beetle. This sharing is what the adaptive mode lives on.
+//! Why: one beetle with two whiskers locates the minimum along one line. If the best beetles' whiskers point
+//! in orthonormal directions, each parabola gives one coordinate of the minimum, and together they give it to
+//! every beetle. The adaptive mode depends on this sharing.
 //!
 //! Along direction j, with f_0 at beetle j and f_r, f_l at its whiskers l away (l in metric coordinates):
 //!   g = (f_r - f_l) / (2 l),   h = (f_r - 2 f_0 + f_l) / l^2
 //!   s = -g / h where h > 0, else -sgn(g) times the usual whisker;   |s| <= step limit / |A z_j|
-//! For beetle i at x_i the food is q_ij = s_j - w_j.(x_i - x_j) away along z_j.
-//! Symbols: z_j unit vector in metric coordinates y = A^-1 x; d_j = A z_j its image in box coordinates; w_j = A^-T z_j, so
-//! that w_j.x = z_j.y without y: one product with the metric per direction, none per beetle.
+//! For beetle i at x_i the minimum is q_ij = s_j - w_j.(x_i - x_j) away along z_j.
+//! Symbols: z_j unit vector in metric coordinates y = A^-1 x; d_j = A z_j its image in box coordinates;
+//! w_j = A^-T z_j, so that w_j.x = z_j.y without y: one product with the metric per direction, none per
+//! beetle.
 //!
 //! Source: own experiments; one parabola per direction is Newton's step in the subspace of the frame.
-//! Cost: per direction two or three products with the metric (2 D^2 each) and 4 D j operations of Gram-Schmidt,
-//! repeated per draw, at most 8 draws; memory N (3 D + 6) scalars.
+//! Cost: per direction two or three products with the metric (2 D^2 each) and 4 D j operations of
+//! Gram-Schmidt, repeated per draw, at most 8 draws; memory N (3 D + 6) scalars.
 
 use crate::real::{Real, abs, clamp, is_finite, min, sign, sqrt};
 
@@ -22,36 +23,36 @@ use super::super::rows::{add_scaled, dot, live, live_mut, scale};
 use super::super::search::is_usable;
 use super::metric::Metric;
 
-/// Draws per direction before a coordinate axis is taken.
+/// Most draws per direction before a coordinate axis is used.
 const DRAWS: u32 = 8;
-/// A direction whose part outside the frame is shorter than this share of it is drawn again.
+/// Least share of a direction outside the frame; with less it is drawn again.
 const LEAST_REMAINDER: f64 = 1e-2;
-/// A vector shorter than this has no direction.
+/// Least length of a vector with a direction.
 const LEAST_LENGTH: f64 = 1e-18;
 /// Curvature above minus this share of |f| / l^2 is rounding and counts as convex.
 const CURVATURE_ROUNDING: f64 = 1e-6;
 
-/// How far whiskers and steps may reach.
+/// Limits of whiskers and steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reach<T> {
     /// Usual whisker length, metric coordinates.
     pub whisker: T,
     /// Longest whisker and step, box coordinates.
     pub limit: T,
-    /// Whether a step is the parabola's, where that has a minimum.
+    /// True if a step is the parabola's, where that has a minimum.
     pub parabola: bool,
-    /// Whisker length in box coordinates, instead of the usual one.
+    /// Whisker length in box coordinates, in place of the usual one.
     pub long: Option<T>,
 }
 
-/// One direction of the frame and what its beetle smelled.
+/// One direction of the frame and its beetle's readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Whisker<T> {
-    /// |d_j|: box length of a metric step of 1.
+    /// Length |d_j| in the box of a metric step of 1.
     pub box_length: T,
-    /// l, metric coordinates.
+    /// Length l, metric coordinates.
     pub length: T,
-    /// w_j . x_j.
+    /// Coordinate w_j . x_j.
     pub coordinate: T,
     /// `None` until both whiskers were read, and where a value was not finite.
     pub reading: Option<Reading<T>>,
@@ -66,25 +67,25 @@ impl<T: Real> Whisker<T> {
 /// The parabola through a beetle and its two whiskers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reading<T> {
-    /// g.
+    /// Slope g.
     pub slope: T,
-    /// h.
+    /// Curvature h.
     pub curvature: T,
-    /// s, from the beetle to the food.
+    /// Step s from the beetle to the minimum.
     pub step: T,
-    /// Curved upwards, or flat within rounding.
+    /// True if curved upwards, or flat within rounding.
     pub convex: bool,
 }
 
-/// The directions of up to N beetles.
+/// Directions of up to N beetles.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Frame<T, const N: usize, const D: usize> {
     dimension: usize,
-    /// z_j, orthonormal, metric coordinates.
+    /// Directions z_j, orthonormal, metric coordinates.
     pub direction: [[T; D]; N],
-    /// d_j = A z_j, box coordinates.
+    /// Images d_j = A z_j, box coordinates.
     pub displacement: [[T; D]; N],
-    /// w_j = A^-T z_j: w_j.x is the metric coordinate along z_j of a point x in box coordinates.
+    /// Covectors w_j = A^-T z_j: w_j.x is the metric coordinate along z_j of a point x in box coordinates.
     pub covector: [[T; D]; N],
     pub whisker: [Whisker<T>; N],
 }
@@ -100,7 +101,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         }
     }
 
-    /// As new, in place.
+    /// Resets to the state of [`Self::new`], in place.
     pub fn restart(&mut self, dimension: usize) {
         self.dimension = dimension;
         self.direction.fill([T::zero(); D]);
@@ -109,13 +110,13 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         self.whisker.fill(Whisker::unaimed());
     }
 
-    /// Directions in use: one per beetle, never more than an orthonormal frame can have.
+    /// Number of directions in use: one per beetle, at most as many as an orthonormal frame can have.
     pub fn count(&self) -> usize {
         self.dimension.min(N)
     }
 
-    /// Points direction `index` along `wish` (metric coordinates) as far as it is orthogonal to the earlier ones;
-    /// otherwise along something random, at the very last along a coordinate axis.
+    /// Points direction `index` along `wish` (metric coordinates), as far as that is orthogonal to the
+    /// earlier ones. Otherwise it points along a random vector, in the last resort along a coordinate axis.
     ///
     /// The whisker has its usual length where that stays within the limit.
     pub fn aim(
@@ -152,7 +153,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
                 return direction;
             }
         }
-        // Of D axes, fewer than D directions leave at least one with a remainder of 1 / sqrt(D).
+        // Fewer than D directions leave at least one of the D axes with a remainder of 1 / sqrt(D).
         for axis in 0..self.dimension.min(D) {
             let mut candidate = [T::zero(); D];
             candidate[axis] = T::one();
@@ -171,8 +172,8 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         candidate
     }
 
-    /// The unit vector along the part of a candidate that is orthogonal to the first `index` directions;
-    /// `None` where too little is left.
+    /// Unit vector along the part of a candidate that is orthogonal to the first `index` directions; `None`
+    /// where too little remains.
     fn complement(&self, index: usize, mut candidate: [T; D]) -> Option<[T; D]> {
         let rest = live_mut(&mut candidate, self.dimension);
         if !normalise(rest, T::of(LEAST_LENGTH)) {
@@ -188,7 +189,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
 
     /// Fits the parabola of direction `index` through the values at the beetle and at its whiskers.
     ///
-    /// A value that is not finite leaves no reading: the direction then moves nobody and teaches nothing.
+    /// A value that is not finite leaves no reading: the direction then has no effect on moves or learning.
     pub fn read(&mut self, index: usize, centre: T, right: T, left: T, reach: Reach<T>) {
         let whisker = &mut self.whisker[index.min(N - 1)];
         whisker.reading = None;
@@ -216,7 +217,8 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     }
 }
 
-/// Scales a row to length 1; false, and the row as it was, where it is shorter than `least` or not finite.
+/// Scales a row to length 1. Returns false and leaves the row unchanged if it is
+/// shorter than `least` or not finite.
 fn normalise<T: Real>(row: &mut [T], least: T) -> bool {
     let length = sqrt(dot(row, row));
     let long_enough = length >= least && is_finite(length);
@@ -259,7 +261,7 @@ mod tests {
                     for other in 0..=one {
                         let product = dot(&frame.direction[one], &frame.direction[other]);
                         let expected = if one == other { 1.0 } else { 0.0 };
-                        // one pass of Gram-Schmidt with a remainder of at least 1e-2: 1e2 roundings
+                        // One pass of Gram-Schmidt with a remainder of at least 1e-2: 1e2 roundings.
                         assert!(abs(product - expected) < 1e-12, "{dimension} {wish:?}: {product}");
                     }
                     assert_eq!(frame.displacement[one], metric.to_box(&frame.direction[one]));
@@ -276,7 +278,7 @@ mod tests {
         let cost = |x: f64| 3.0 * (x - 0.02) * (x - 0.02) + 7.0;
         frame.read(1, cost(0.0), cost(length), cost(-length), REACH);
         let reading = frame.whisker[1].reading.expect("all values are finite");
-        // values around 7 leave 1e-15 of rounding, divided by l^2 h = 0.06
+        // Values around 7 leave 1e-15 of rounding, divided by l^2 h = 0.06.
         assert!(abs(reading.step - 0.02) < 1e-13 && abs(reading.curvature - 6.0) < 1e-11);
         assert!(reading.convex);
     }

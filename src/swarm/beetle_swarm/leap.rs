@@ -1,21 +1,23 @@
-//! The leap: where the swarm is stuck, very long whiskers read the slope below the ripples, and all go where it points.
+//! Leap of a stuck swarm: very long whiskers read the slope below the ripples, and all beetles follow it.
 //!
-//! Why: a swarm that has converged sits in one of many minima, and a swarm that is scattered anew falls into another one.
-//! From the bottom of a ripple, ripples look alike to both sides: they cancel in f_r - f_l, however long the whiskers are,
-//! and what is left is the slope of the funnel. They do not cancel in the curvature, which comes out too large, so that a
-//! leap is too short rather than too long; several leaps get there.
+//! Why: a converged swarm sits in one of many minima, and a scattered swarm falls into another one. From the
+//! bottom of a ripple, ripples look alike to both sides. They cancel in f_r - f_l for whiskers of any length,
+//! and the slope of the funnel remains. They do not cancel in the curvature, which comes out too large. A
+//! leap is therefore too short rather than too long; several leaps reach the funnel's bottom.
 //!
 //! One round, otherwise like any other (frame.rs, adaptive.rs):
 //!   z_j   along coordinate (j + round) mod D, each whisker L long with L uniform in 0.15..0.4 of the box
 //!   x_i   = the usual move with full trust, and up to 2 % of the box at random
-//! Nobody retreats, personal bests begin anew where the beetles land, everything learned is forgotten. A leap led somewhere
-//! if the next standstill is better by 1e-3 of its value; after `leaps` in a row that did not, the swarm is scattered.
+//! No beetle retreats; personal bests restart where the beetles land; all learned values are discarded. A
+//! leap succeeds if the next standstill is better by 1e-3 of its value. After more than `leaps` failures in a
+//! row the swarm is scattered.
 //!
-//! Source: own experiments; hopping between minima is Wales, Doye (1997), reading a funnel at a coarse scale is homotopy's.
+//! Source: own experiments; hopping between minima is from Wales, Doye (1997), the coarse
+//! scale from homotopy methods.
 //! Cost: nothing until progress has stopped, then 2 min(N, D) + N evaluations: all beetles leap.
-//! Known limits: axes. Along other directions ripples of several coordinates add up in the curvature, and a leap comes out
-//! too short: rotated ripples in 10 dimensions are not left. Directions of unlike ripples (not symmetric about their
-//! minima) do not cancel.
+//! Known limits: axes. Along other directions ripples of several coordinates add up in the curvature, and a
+//! leap comes out too short: the swarm does not leave rotated ripples in 10 dimensions. Ripples that are not
+//! symmetric about their minima do not cancel.
 
 use crate::real::{Real, abs, min};
 
@@ -26,19 +28,19 @@ use super::adaptive::AdaptiveRules;
 /// Shortest whisker of a leap and the range above it, box coordinates.
 const LEAP_WHISKER: f64 = 0.15;
 const LEAP_WHISKER_RANGE: f64 = 0.25;
-/// How far beetles land from where they leapt to, box coordinates.
+/// Random landing distance of a beetle from its target, box coordinates.
 pub(super) const LEAP_SPREAD: f64 = 0.02;
-/// A standstill better by less than this share of its value means that the leap led nowhere.
+/// Least relative improvement of a standstill for a successful leap.
 const LEAP_PROGRESS: f64 = 1e-3;
 
-/// Leaps since the swarm was scattered.
+/// State of the leaps since the swarm was scattered.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Leap<T> {
-    /// The running round is one.
+    /// True while the current round is a leap.
     pub under_way: bool,
     /// Best standstill so far.
     best: T,
-    /// Leaps in a row that led nowhere.
+    /// Failed leaps in a row.
     in_vain: u32,
 }
 
@@ -54,7 +56,7 @@ pub(super) fn leap_whisker<T: Real>(random: &mut Random) -> T {
 }
 
 impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
-    /// Whether a standstill at a best value is answered by a leap; otherwise all leaps are forgotten.
+    /// Decides at a standstill with this best value: true for a leap. Otherwise the leap state is reset.
     pub(super) fn leaps_from(&mut self, best: T) -> bool {
         let led_somewhere = self.leap.best - best > T::of(LEAP_PROGRESS) * abs(best);
         self.leap.in_vain = if led_somewhere { 0 } else { self.leap.in_vain + 1 };
@@ -66,7 +68,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.leap.under_way
     }
 
-    /// What a beetle's whisker is to lie along, metric coordinates: another axis in every leap.
+    /// Wished whisker direction in a leap, metric coordinates: another axis in every leap.
     pub(super) fn axis(&self, beetle: usize, dimension: usize) -> [T; D] {
         let mut axis = [T::zero(); D];
         let turn = beetle.wrapping_add(self.round as usize) % dimension.max(1);
@@ -76,7 +78,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.metric.to_metric(&axis)
     }
 
-    /// The beetles have leapt: where they are is all they know.
+    /// Ends a leap: the landing positions are all the beetles know.
     pub(super) fn land(&mut self, beetles: &mut Particles<T, N, D>, found: &[T]) {
         self.forget();
         self.leap.under_way = false;
@@ -100,7 +102,7 @@ mod tests {
         let mut rules = Rules::new(settings, 3);
         let standstills = [10.0, 10.0, 9.0, 9.0, 8.999, 9.5];
         let leaps = standstills.map(|best| rules.leaps_from(best));
-        // 10.0 in vain once, 9.0 led somewhere, then twice in vain, then given up
+        // 10.0 fails once, 9.0 succeeds, then two failures; the third one ends the leaps.
         assert_eq!(leaps, [true, true, true, true, true, false]);
         assert!(rules.leap == Leap::none() && rules.leaps_from(9.5), "scattered: leaps count anew");
         let mut never = Rules::new(AdaptiveSettings { leaps: 0, ..settings }, 3);

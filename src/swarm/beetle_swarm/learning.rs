@@ -1,16 +1,17 @@
-//! What the adaptive beetle swarm learns at the end of a round: trust, gradient, metric, whisker length.
+//! Learning of the adaptive beetle swarm at the end of a round: trust, gradient, metric, whisker length.
 //!
-//! Why apart from the moves: this is what makes one set of constants serve every function.
-//!   om    grows or shrinks by 10 % per pair of beetles in which the more or the less trusting one gained more
+//! Why separate from the moves: this learning lets one set of constants serve every function.
+//!   om    grows or shrinks by 10 % per pair of beetles, as the more or the less trusting one gained more
 //!   grad  = sum_j g_j w_j, the next frame's first direction
-//!   al_j  = 1 + rate gate (1 / sqrt(h_j / mean h) - 1), over its mean: stretch of A along z_j; gate is 0 up to
-//!           70 % of convex readings and 1 at 100 %, so that ripples teach nothing
+//!   al_j  = 1 + rate gate (1 / sqrt(h_j / mean h) - 1), over its mean: stretch of A along z_j; gate is 0
+//!           up to 70 % of convex readings and 1 at 100 %, so that ripples have no effect
 //!   l     = 0.7 l + 0.3 sqrt(D) median |s_j|: whiskers as long as the usual step average ripples of its size
 //! Symbols as in adaptive.rs and frame.rs; h_j relative to the mean of the positive ones, limited to 1/4..4.
 //!
 //! Source: own experiments. Cost: 4 D^2 min(N, D) operations, the metric's; two square roots per direction.
-//! Tried and left out: stretches by less than 5 % not made (as many iterations, few saved; at 10 % a tenth more
-//! iterations); rates of 0.85 and 1, curvature limited to 1/9..9 (faster by 3 % on one function, longer tails on another).
+//! Tried and rejected: no stretches below 5 % (equally many iterations, few stretches saved; at 10 % a tenth
+//! more iterations); rates of 0.85 and 1, curvature limited to 1/9..9 (3 % faster on one function, longer
+//! tails on another).
 
 use crate::real::{Real, abs, clamp, sqrt};
 
@@ -18,27 +19,27 @@ use super::super::rows::{add_scaled, live, live_mut, median};
 use super::adaptive::AdaptiveRules;
 use super::settings::Part;
 
-/// Least trust in the others' whiskers, and its change per compared pair.
+/// Least trust in other beetles' whiskers, and its change per compared pair.
 const LEAST_TRUST: f64 = 0.02;
 const TRUST_CHANGE: f64 = 0.1;
 /// Range of the usual whisker length, metric coordinates. Shorter ones cancel in single precision.
 const SHORTEST_WHISKER: f64 = 3e-4;
 const LONGEST_WHISKER: f64 = 0.3;
-/// Decay per round where the length follows nothing ([`Part::WhiskerAdaptation`]).
+/// Decay per round without adaptation of the length ([`Part::WhiskerAdaptation`]).
 const WHISKER_DECAY: f64 = 0.95;
 /// Weight of the latest round in whisker length and convex share.
 const SMOOTHING: f64 = 0.3;
-/// Share of convex readings from which the metric learns; in full at 1.
+/// Share of convex readings above which the metric learns; full effect at 1.
 const CONVEX_SHARE: f64 = 0.7;
-/// How far one round stretches towards the measured curvature, and the range of curvature over its mean.
+/// Share of one round's stretch towards the measured curvature, and the range of curvature over its mean.
 const METRIC_RATE: f64 = 0.7;
 const LEAST_CURVATURE: f64 = 0.25;
 const MOST_CURVATURE: f64 = 4.0;
-/// A metric step of 1 is never stretched beyond this many boxes.
+/// Longest image of a metric step of 1, in boxes.
 const LONGEST_AXIS: f64 = 100.0;
 
 impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
-    /// om follows the level whose beetles gained more, pair by pair.
+    /// Moves om towards the level whose beetles gained more, pair by pair.
     pub(super) fn learn_trust(&mut self, before: &[T; N], found: &[T]) {
         let mut vote = T::zero();
         let pairs = before.chunks_exact(2).zip(found.chunks_exact(2));
@@ -58,7 +59,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.trust = clamp(trust, T::of(LEAST_TRUST), T::one());
     }
 
-    /// Gradient in box coordinates from the slopes along the frame: A^-T sum_j g_j z_j.
+    /// Computes the gradient in box coordinates from the slopes along the frame: A^-T sum_j g_j z_j.
     pub(super) fn learn_gradient(&mut self, dimension: usize) {
         let mut gradient = [T::zero(); D];
         for (whisker, covector) in
@@ -71,7 +72,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.gradient = Some(gradient);
     }
 
-    /// Stretches the metric where the cost curves less than on average along the frame, and shrinks it where it
+    /// Stretches the metric where the cost curves less than the frame's average, and shrinks it where it
     /// curves more. Directions without a reading keep their length.
     pub(super) fn learn_metric(&mut self) {
         let count = self.frame.count();
@@ -120,7 +121,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
     }
 
-    /// The usual whisker follows the usual step.
+    /// Moves the usual whisker length towards the usual step.
     pub(super) fn learn_whisker(&mut self, dimension: usize) {
         if !self.has(Part::WhiskerAdaptation) {
             self.whisker =

@@ -1,17 +1,18 @@
-//! The learned metric of the adaptive beetle swarm: a matrix A with A A^T ~ H^-1 up to scale, and its inverse.
+//! Learned metric of the adaptive beetle swarm: a matrix A with A A^T ~ H^-1 up to scale, and its inverse.
 //!
-//! Why: in a badly scaled cost a step that suits one direction is far too long or too short in another. In metric
-//! coordinates, y = A^-1 u, the cost is to look equally curved in all directions. No covariance and no
-//! eigenproblem: every round stretches A along the directions in which curvature was just measured.
+//! Why: in a badly scaled cost a step that suits one direction is far too long or too short in another.
+//! In metric coordinates, y = A^-1 u, the cost should be equally curved in all directions. The method
+//! needs no covariance and no eigenproblem: every round stretches A along the directions in which
+//! curvature was just measured.
 //!
-//! Stretch by al along a unit vector z of metric coordinates, exactly rank 1, inverse kept likewise:
+//! Stretch by al along a unit vector z of metric coordinates, exactly rank 1, likewise for the inverse:
 //!   A = A + (al - 1) (A z) z^T,    A^-1 = A^-1 + z (1/al - 1) (z^T A^-1)
-//! Several stretches along orthonormal z commute; A z and A^-T z of the others do not change, so that both are known from
-//! when the frame was made.
+//! Several stretches along orthonormal z commute. They leave A z and A^-T z of the others unchanged, so both
+//! are known since the frame was made.
 //!
 //! Source: own experiments; the idea is that of a variable metric (Davidon, 1959) fed by measured curvature.
 //! Cost: 4 D^2 operations per stretch, 2 D^2 per product; memory 2 D^2 scalars.
-//! Known limits: a stretch that is not finite would be lost for ever; the caller sends none.
+//! Known limits: a stretch that is not finite would corrupt the metric permanently; the caller passes none.
 
 use crate::real::Real;
 
@@ -20,26 +21,26 @@ use super::super::rows::{add_scaled, dot, live, live_mut};
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Metric<T, const D: usize> {
     dimension: usize,
-    /// A: metric to box coordinates.
+    /// Matrix A: metric to box coordinates.
     shape: [[T; D]; D],
     inverse: [[T; D]; D],
 }
 
 impl<T: Real, const D: usize> Metric<T, D> {
-    /// Box coordinates themselves.
+    /// Starts with box coordinates.
     pub fn identity(dimension: usize) -> Self {
         let mut metric = Self { dimension, shape: [[T::zero(); D]; D], inverse: [[T::zero(); D]; D] };
         metric.forget();
         metric
     }
 
-    /// As new, in place.
+    /// Resets to the state of [`Self::identity`], in place.
     pub fn restart(&mut self, dimension: usize) {
         self.dimension = dimension;
         self.forget();
     }
 
-    /// Back to box coordinates.
+    /// Resets to box coordinates.
     pub fn forget(&mut self) {
         for matrix in [&mut self.shape, &mut self.inverse] {
             for (index, row) in matrix.iter_mut().enumerate() {
@@ -49,22 +50,22 @@ impl<T: Real, const D: usize> Metric<T, D> {
         }
     }
 
-    /// A z: a displacement in box coordinates.
+    /// Product A z: a displacement in box coordinates.
     pub fn to_box(&self, z: &[T; D]) -> [T; D] {
         product(&self.shape, z, self.dimension)
     }
 
-    /// A^-1 u: the metric coordinates of a point or displacement.
+    /// Product A^-1 u: the metric coordinates of a point or displacement.
     pub fn to_metric(&self, u: &[T; D]) -> [T; D] {
         product(&self.inverse, u, self.dimension)
     }
 
-    /// A^T g: a gradient with respect to box coordinates becomes one with respect to metric coordinates.
+    /// Product A^T g: converts a gradient from box to metric coordinates.
     pub fn gradient_to_metric(&self, g: &[T; D]) -> [T; D] {
         transposed_product(&self.shape, g, self.dimension)
     }
 
-    /// A^-T g: the way back.
+    /// Product A^-T g: converts a gradient from metric to box coordinates.
     pub fn gradient_to_box(&self, g: &[T; D]) -> [T; D] {
         transposed_product(&self.inverse, g, self.dimension)
     }
@@ -132,7 +133,7 @@ mod tests {
             }
             let u = unit(&mut random, dimension);
             let back = metric.to_box(&metric.to_metric(&u));
-            // 300 updates of double precision, condition below 1e3
+            // 300 updates in double precision, condition number below 1e3.
             assert!(u.iter().zip(&back).all(|(a, b)| abs(a - b) < 1e-9), "{u:?} {back:?}");
         }
     }

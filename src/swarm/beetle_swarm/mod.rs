@@ -1,8 +1,8 @@
-//! Beetle swarm search: particles with two whiskers each, in the paper's mode or, by default, the adaptive one.
+//! Beetle swarm search: particles with two whiskers each, in the adaptive (default) or the paper's mode.
 //!
-//! Why one type for both: swarm, whiskers, moves, budget and ledger are the same; a mode decides only where the
-//! whiskers point and what a beetle makes of their smell. One evaluation at a time is asked for and answered, so a
-//! run can be cut or cancelled anywhere, inside an iteration too:
+//! Why one type for both: swarm, whiskers, moves, budget and ledger are shared. A mode decides only the
+//! whiskers' directions and the use of their readings. Evaluations are requested one at a time, so a run can
+//! be sliced or cancelled anywhere, even inside an iteration:
 //!
 //! ```text
 //! Place 0..N --> [ Right 0, Left 0, Right 1, Left 1, ... --> Move 0, 1, ... ] --> next round
@@ -10,15 +10,16 @@
 //!     +------------------- leaps led nowhere: scatter anew ---------------------+
 //! ```
 //!
-//! A mode decides how many beetles put out whiskers and how many move in a round. An iteration is as many rounds as it
-//! takes to spend N evaluations, what one move of all costs: one round in the paper's mode, and in the other from five
-//! coordinates on.
+//! A mode decides how many beetles have whiskers and how many move in a round. An iteration takes as many
+//! rounds as spend N evaluations, the cost of one move of all beetles. That is one round in the paper's mode,
+//! and in the other from five coordinates on.
 //!
-//! Memory: 3 N D swarm, 2 D^2 metric, 3 N D frame (its first min(N, D) rows are in use), 4 D gradient, best and
-//! box, 11 N values and readings, in scalars; `size_of` is 8,768 bytes for `Bso<f32, 20, 13>` and 21,136 for
-//! `Bso<f32, 20, 28>`. Stack, Cortex-M4F, D = 28: `advance` about 1.5 kB; [`Bso::new`] builds the value there
-//! before it is moved (7 kB at opt-level 3, about 45 kB at "s"); [`Bso::restart`] begins anew in place, 1 kB.
-//! Cost: adaptive.rs, paper.rs. The longest piece of work between two evaluations is the end of an adaptive
+//! Memory in scalars: 3 N D swarm, 2 D^2 metric, 3 N D frame, 4 D gradient, best and box, 11 N values and
+//! readings. The frame uses its first min(N, D) rows. `size_of` is 8,768 bytes for `Bso<f32, 20, 13>` and
+//! 21,136 for `Bso<f32, 20, 28>`. Stack, Cortex-M4F, D = 28: `advance` about 1.5 kB. [`Bso::new`] builds the
+//! value on the stack before the move (7 kB at opt-level 3, about 45 kB at "s"); [`Bso::restart`] works in
+//! place with 1 kB.
+//! Cost: adaptive.rs, paper.rs. The longest computation between two evaluations is the end of an adaptive
 //! round, 4 D^2 min(N, D) operations (63,000 at D = 28).
 
 mod adaptive;
@@ -41,7 +42,7 @@ use paper::PaperRules;
 use rules::{Opening, Rules, Side};
 pub use settings::{AdaptiveSettings, BsoSettings, PaperSettings, Part};
 
-/// Beetle swarm of `N` beetles (at least 2) with room for `D` coordinates.
+/// Beetle swarm of `N` beetles (at least 2) with capacity for `D` coordinates.
 ///
 /// ```
 /// use scarab::swarm::{Bso, BsoSettings, TestFunction, TestProblem};
@@ -74,7 +75,7 @@ impl<T: Real, const N: usize, const D: usize> Mode<T, N, D> {
         }
     }
 
-    /// Apart, so that only a change of mode pays for a second copy on the stack.
+    /// Separate function, so that only a change of mode needs a second copy on the stack.
     #[inline(never)]
     fn replace(&mut self, settings: BsoSettings<T>, dimension: usize) {
         *self = Self::new(settings, dimension);
@@ -82,7 +83,7 @@ impl<T: Real, const N: usize, const D: usize> Mode<T, N, D> {
 }
 
 impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
-    /// A swarm scattered over the objective's box; nothing is evaluated yet.
+    /// Scatters a swarm over the objective's box; nothing is evaluated yet.
     pub fn new(
         objective: &impl Objective<T>,
         settings: BsoSettings<T>,
@@ -94,7 +95,7 @@ impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
         Ok(Self { swarm: Swarm::new(ledger, seed), mode })
     }
 
-    /// Begins anew in place; the swarm is then equal to a [`new`](Self::new) one, and unchanged on an error.
+    /// Restarts in place. The swarm then equals a [`new`](Self::new) one; on an error it is unchanged.
     pub fn restart(
         &mut self,
         objective: &impl Objective<T>,
@@ -113,8 +114,8 @@ impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
         Ok(())
     }
 
-    /// Spends `evaluations` of the objective and returns how many were spent: all of them, or none where the
-    /// objective's dimension is not the one the swarm began with. Slicing never changes the result.
+    /// Spends `evaluations` of the objective and returns how many were spent. That is all of them, or none if
+    /// the objective's dimension has changed. Slicing never changes the result.
     pub fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32 {
         if !self.swarm.ledger.accepts(objective) {
             return 0;
@@ -126,19 +127,19 @@ impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
         evaluations
     }
 
-    /// The best of all evaluations so far, restarts included; `None` while no finite cost was seen.
+    /// Best of all evaluations so far, across restarts; `None` until a finite cost was found.
     #[must_use]
     pub fn best(&self) -> Option<Best<'_, T>> {
         self.swarm.ledger.best()
     }
 
-    /// Completed iterations; placing the scattered swarm is iteration 0.
+    /// Completed iterations; the evaluation of the scattered swarm is iteration 0.
     #[must_use]
     pub fn iterations(&self) -> u32 {
         self.swarm.ledger.iterations()
     }
 
-    /// Evaluations so far, whiskers and restarts counted.
+    /// Evaluations so far, including whiskers and restarts.
     #[must_use]
     pub fn evaluations(&self) -> u32 {
         self.swarm.ledger.evaluations()
@@ -160,7 +161,7 @@ impl<T: Real, const N: usize, const D: usize> Search<T> for Bso<T, N, D> {
     }
 }
 
-/// What is evaluated next.
+/// Next evaluation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage<T> {
     Place { beetle: usize },
@@ -169,13 +170,13 @@ enum Stage<T> {
     Move { beetle: usize },
 }
 
-/// The part that is the same in both modes.
+/// State and order of evaluations shared by both modes.
 #[derive(Clone, Debug, PartialEq)]
 struct Swarm<T, const N: usize, const D: usize> {
     ledger: Ledger<T, D>,
     random: Random,
     beetles: Particles<T, N, D>,
-    /// Values found by the moves of the running round.
+    /// Values found by the moves of the current round.
     found: [T; N],
     stage: Stage<T>,
 }
@@ -203,7 +204,7 @@ impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
         }
     }
 
-    /// One evaluation and everything that follows from it.
+    /// Makes one evaluation and all its consequences.
     fn step(&mut self, rules: &mut impl Rules<T, N, D>, objective: &impl Objective<T>) {
         self.stage = match self.stage {
             Stage::Place { beetle } => {

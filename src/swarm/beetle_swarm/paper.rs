@@ -1,18 +1,19 @@
-//! The paper's beetle swarm: whiskers along the velocity, a step of fixed decay towards the better smell.
+//! Rules of the paper's beetle swarm: whiskers along the velocity, steps of fixed decay.
 //!
-//! Kept to show what the paper's rules do and do not do; the default mode is the adaptive one.
+//! Implemented to show the abilities and limits of the paper's rules; the default mode is the adaptive one.
 //!   x_r = x + v l,  x_l = x - v l                               (Eq. 27)
 //!   psi = -delta v sgn(f(x_r) - f(x_l))                         (Eq. 28)
 //!   v   = w v + c1 r1 (P - x) + c2 r2 (G - x)                   (Eq. 19, w by Eq. 20)
 //!   x   = x + lambda v + (1 - lambda) psi                       (Eq. 29, corrected)
 //!   delta = e1 delta + e0                                       (Eq. 25)
 //!   l   = delta / e2                                            (Eq. 26)
-//! Printed, Eq. (29) has v in place of psi, which is the plain particle swarm; the original beetle swarm (Wang,
-//! Yang, Liu, 2018) has psi. The order is that of the paper's Table II: psi uses the velocity before Eq. (19).
+//! As printed, Eq. (29) has v in place of psi, which is the plain particle swarm; the original
+//! beetle swarm (Wang, Yang, Liu, 2018) has psi. The order is that of the paper's Table II: psi uses
+//! the velocity before Eq. (19).
 //!
 //! Source: the paper, section 3.3.2. Cost: 3 N evaluations and 20 N D operations per iteration.
-//! Known limits: velocities collapse into the span of P - x and G - x, and the whiskers with them: no success in
-//! 30 dimensions.
+//! Known limits: velocities collapse into the span of P - x and G - x, and the whiskers with them: no success
+//! in 30 dimensions.
 
 use crate::real::{Real, sign};
 
@@ -25,9 +26,9 @@ use super::settings::PaperSettings;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PaperRules<T, const N: usize> {
     settings: PaperSettings<T>,
-    /// delta.
+    /// Step delta.
     step: T,
-    /// sgn(f(x_r) - f(x_l)) of each beetle.
+    /// Sign sgn(f(x_r) - f(x_l)) of each beetle.
     smell: [T; N],
     iteration: u32,
 }
@@ -109,7 +110,7 @@ mod tests {
 
     #[test]
     fn whiskers_moves_and_decay_follow_their_equations() {
-        // without pulls and with w = 0.5 the velocity is known
+        // Without pulls and with w = 0.5 the velocity is known.
         let settings = PaperSettings {
             inertia_weight: InertiaWeight::constant(0.5),
             individual_learning: 0.0,
@@ -124,7 +125,7 @@ mod tests {
         beetles.velocity = [[velocity]; 2];
         for smell in [1.0, -1.0, 0.0, 1.0] {
             let tip = |side| Rules::<f64, 2, 1>::tip(&rules, 0, side, &beetles)[0];
-            // sums of a few numbers below 1
+            // Sums of a few numbers below 1.
             let close = |one: f64, other: f64| abs(one - other) < 1e-15;
             assert!(close(tip(Side::Right), at + velocity * step / 10.0), "Eqs (26), (27)");
             assert!(close(tip(Side::Left), at - velocity * step / 10.0), "Eqs (26), (27)");

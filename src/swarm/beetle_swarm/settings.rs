@@ -1,19 +1,19 @@
-//! The two ways of a beetle swarm and their constants.
+//! Settings of the beetle swarm's two modes.
 //!
-//! Why so few are settings: one set of constants serves every function, every dimension and every identification
-//! problem; what the ablations varied can be set, everything else is a constant beside the code that uses it.
+//! Why so few settings: one set of constants serves every function, dimension and identification problem. The
+//! ablation experiments' variables are settings; all other constants are beside the code that uses them.
 
 use crate::real::Real;
 
 use super::super::objective::{SwarmError, not_negative, positive};
 use super::super::particles::InertiaWeight;
 
-/// Which rules the beetles follow.
+/// Choice of the beetles' rules.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BsoSettings<T> {
     /// Shared whisker frame, learned metric, retreat, restart: the default.
     Adaptive(AdaptiveSettings<T>),
-    /// Eqs (19)-(29) of the paper as printed, (29) corrected; kept for comparison.
+    /// Eqs (19)-(29) of the paper as printed, (29) corrected; for comparison.
     Paper(PaperSettings<T>),
 }
 
@@ -55,36 +55,37 @@ pub struct AdaptiveSettings<T> {
     pub step_limit: T,
     /// Directions of the frame (after the gradient's) that join two personal bests; default 12.
     pub pair_directions: usize,
-    /// Rounds without progress after which the swarm leaps or, at last, is scattered anew; default 8, at least 1.
+    /// Rounds without progress before the swarm leaps or, in the end, is scattered
+    /// again; default 8, at least 1.
     pub patience: u32,
-    /// Leaps in a row that may lead nowhere before the swarm is scattered anew; default 8.
+    /// Failed leaps in a row that are allowed before the swarm is scattered again; default 8.
     pub leaps: u32,
-    /// A part that is left out, to measure what it is worth; default none.
+    /// Part to disable, to measure its contribution; default none.
     pub without: Option<Part>,
 }
 
-/// What the adaptive mode can be measured without; the other parts are left out by their settings.
+/// Parts of the adaptive mode that can be disabled; the others are disabled through their settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Steps along the directions of the other beetles' whiskers.
     Sharing,
     /// The learned metric.
     Metric,
-    /// The metric's rest where readings are not convex.
+    /// Pause of the metric's learning where readings are not convex.
     ConvexityGate,
     /// The frame's first direction along the gradient.
     GradientDirection,
-    /// The way back from a bad move.
+    /// Undoing of a bad move.
     Retreat,
-    /// Trust in the others' whiskers that follows success: it is 1.
+    /// Trust in other beetles' whiskers that follows success; disabled it is 1.
     TrustAdaptation,
-    /// Whiskers for the best beetles: it is always the same ones.
+    /// Whiskers for the best beetles; disabled always for the same ones.
     Ranking,
-    /// Moves for the best beetles: all move in every round.
+    /// Moves for the best beetles; disabled all move in every round.
     BestMove,
-    /// Whisker length that follows the steps: it falls by 5 % per round.
+    /// Whisker length that follows the steps; disabled it falls by 5 % per round.
     WhiskerAdaptation,
-    /// Newton's step along a direction: it is one whisker downhill.
+    /// Newton's step along a direction; disabled it is one whisker downhill.
     Parabola,
 }
 
@@ -117,8 +118,8 @@ impl<T: Real> AdaptiveSettings<T> {
     }
 }
 
-/// Constants of the paper's mode (its section 4.1). Lengths are shares of the box; a whisker and a step are also
-/// multiplied by the velocity.
+/// Constants of the paper's mode (its section 4.1). Lengths are shares of the box; a whisker and a step are
+/// also multiplied by the velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PaperSettings<T> {
     /// w of Eqs (19), (20); default 0.8 throughout.

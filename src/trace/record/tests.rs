@@ -1,7 +1,7 @@
 use super::super::Line;
 use super::*;
 
-/// A line's worth of text without a heap.
+/// Fixed buffer for one line of text, without a heap.
 struct Text {
     bytes: [u8; 512],
     length: usize,
@@ -28,7 +28,7 @@ impl Write for Text {
     }
 }
 
-/// Keys of a format, its kind before them.
+/// Kind and keys of a format, the kind first.
 fn keys(format: &str) -> impl Iterator<Item = &str> {
     format.split(' ').map(|pair| pair.split('=').next().expect("a key"))
 }
@@ -48,17 +48,18 @@ fn every_format_is_a_line_whose_first_key_is_its_number() {
             let (key, value) = pair.split_once('=').expect("key=value");
             assert!(value.starts_with("{=") && value.ends_with('}'), "{kind} {key}: {value}");
         }
-        // With any text in the placeholders it is read back.
+        // Any text in the placeholders can be read back.
         let mut text = Text { bytes: [0; 512], length: 0 };
         fill(format, &[&7_u32; 24].map(|value| value as &dyn Value), &mut text).expect("fits");
         assert_eq!(Line::parse(text.as_str()).and_then(|line| line.number()), Ok(7), "{format}");
     }
 }
 
-/// The keys of the format are the fields, in the same order: a value behind the wrong key would be read as another.
+/// Keys of the format are the fields, in the same order: a value behind the wrong key would be misread.
 #[test]
 fn keys_are_the_fields_in_their_order() {
-    // The debug form of a struct variant lists its fields; one record of every shape that has more than one field.
+    // The debug form of a struct variant lists its fields; one record of every
+    // shape with more than one field.
     let text = |record: &Record<2>| {
         let mut text = Text { bytes: [0; 512], length: 0 };
         write!(text, "{record:?}").expect("fits");
@@ -108,7 +109,7 @@ fn registers_are_written_in_base_sixteen() {
     assert_eq!(line.value::<u32>("line"), Ok(77));
 }
 
-/// One of each kind, in the order of the list.
+/// One example of each kind, in the order of the list.
 const EXAMPLES: [Record<2>; 29] = [
     Record::Boot {
         grammar: 1,

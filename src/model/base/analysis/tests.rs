@@ -6,7 +6,7 @@ use crate::model::parameter::rounded;
 use crate::model::testing::{Dice, down_along_x, paper_chain, planar_leg, rounded_state};
 use Parameter::{FC, FV, HX, HY, HZ, IA, M, OFF, XX, XY, XZ, YY, YZ, ZZ};
 
-/// Everything is estimated but these.
+/// Mask of all parameters but these.
 fn all_but<const N: usize>(off: &[Parameter]) -> ColumnMask<N> {
     let mut mask = [[true; PARAMETERS_PER_JOINT]; N];
     for joint in &mut mask {
@@ -25,7 +25,7 @@ fn down_along_z<T: Real>() -> Vector3<T> {
 fn rank<T: Real, const N: usize>(chain: &Chain<T, N>, gravity: Vector3<T>, off: &[Parameter]) -> usize {
     let base = BaseParameters::<T, N, 42>::analyse(chain, &gravity, &all_but(off)).unwrap();
     let separation = base.separation();
-    // Measured on these legs: kept 0.43 of a column or more; dropped up to 4e-10 (f64) and 1e-5 (f32), where the
+    // Measured on these legs: kept 0.43 of a column or more; dropped up to 4e-10 (f64) and 1e-5 (f32). The
     // tolerances are 1.5e-8 and 3.5e-4.
     let tolerance = sqrt(T::EPSILON);
     assert!(separation.smallest_kept > T::of(0.3), "{separation:?}");
@@ -59,7 +59,8 @@ fn ranks_of_known_chains_in_single_precision() {
     known_ranks::<f32>();
 }
 
-/// The base set is the expected one: for each base parameter its terms, the independent column first.
+/// Compares the base set with the expected one: for each base parameter its terms,
+/// the independent column first.
 fn assert_terms<T: Real, const N: usize, const B: usize>(
     base: &BaseParameters<T, N, B>,
     expected: &[&[(usize, Parameter, f64)]],
@@ -72,7 +73,7 @@ fn assert_terms<T: Real, const N: usize, const B: usize>(
             wanted[joint - 1][parameter.index()] = *factor;
         }
         for (found, wanted) in base.terms(b).iter().flatten().zip(wanted.iter().flatten()) {
-            // Rounding of a factor well conditioned to within a few tens (measured 3e-7 in f32).
+            // Rounding of a factor with a condition number of a few tens (measured 3e-7 in f32).
             let bound = T::EPSILON.to_double() * 20.0;
             assert!((found.to_double() - wanted).abs() < bound, "base {b}: {:?}", base.terms(b));
             assert_eq!(*found == T::zero(), *wanted == 0.0, "base {b}: {:?}", base.terms(b));
@@ -154,17 +155,17 @@ fn the_paper_chain_has_the_set_of_table_six_with_minus_yy_in_xx() {
     assert_eq!(base.standing(0, IA), Standing::Off);
 }
 
-/// Ranks of random chains; what is dropped must be far below the tolerance.
+/// Ranks of random chains; dropped columns must be far below the tolerance.
 fn ranks_without_special_angles<T: Real, const N: usize>() {
     let mut dice = Dice::new(21);
     for _ in 0..100 {
         let (chain, gravity) = (dice.chain::<N>().convert::<T>(), dice.gravity().map(T::of));
         let base = BaseParameters::<T, N, 42>::analyse(&chain, &gravity, &all_but(&[FC, FV, OFF])).unwrap();
         let separation = base.separation();
-        // 3 of the first link, 7 of every other, rotors of all but the first.
+        // Three parameters of the first link, seven of every other, rotors of all but the first.
         assert_eq!(base.rank(), 3 + 8 * (N - 1), "{separation:?}");
-        // Measured over 600 chains in f32: kept 6e-4 or more, on a chain that is nearly special, dropped 5e-7 or
-        // less; the tolerance is 3.5e-4.
+        // Measured over 600 chains in f32: kept 6e-4 or more, on a nearly special chain; dropped 5e-7 or
+        // less. The tolerance is 3.5e-4.
         let tolerance = sqrt(T::EPSILON);
         assert!(separation.largest_dropped < tolerance * T::of(0.05), "{separation:?}");
     }
@@ -215,7 +216,7 @@ fn torque_from_base_values<T: Real>(bound: f64) {
 
 #[test]
 fn base_values_times_independent_columns_give_the_torque() {
-    // Twenty-odd products of factors known to about ten roundings.
+    // About twenty products of factors known to about ten roundings.
     torque_from_base_values::<f64>(1e-13);
     torque_from_base_values::<f32>(1e-4);
 }

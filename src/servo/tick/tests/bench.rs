@@ -1,12 +1,13 @@
-//! The bench that ticks are tested on: two joints in double precision that share nothing with the servo, each an inertia with
-//! viscous friction and gravity, a lagging drive and an encoder that counts.
+//! Test bench for ticks: two joints in double precision, independent of the servo.
+//!
+//! Each is an inertia with viscous friction and gravity, a lagging drive and an encoder that counts.
 
 use super::*;
 
 pub(super) const NOWHERE: [f32; 3] = [0.0; 3];
 pub(super) const BANDWIDTH: Hertz = Hertz(6.0);
 
-/// Two joints that do not feel each other, both with the knee's inertia; the second turns against its drive.
+/// Two independent joints, both with the knee's inertia; the second turns against its drive.
 pub(super) const JOINTS: [JointConfiguration; 2] = [
     JointConfiguration {
         scale: HIP,
@@ -30,7 +31,7 @@ pub(super) const JOINTS: [JointConfiguration; 2] = [
     },
 ];
 
-/// One joint as the world has it: its own (anatomical) angle and torque.
+/// One joint of the physical world, in its own (anatomical) angle and torque.
 #[derive(Clone, Copy)]
 pub(super) struct Plant {
     pub(super) inertia: f64,
@@ -46,7 +47,7 @@ impl Plant {
     pub(super) const KNEE: Self =
         Self { inertia: 2.53, viscous: 3.26, gravity: 0.0, angle: 0.0, velocity: 0.0, torque: 0.0 };
 
-    /// One tick of 0.25 ms in 8 steps; the drive follows its target with 1 ms.
+    /// Advances one tick of 0.25 ms in 8 steps; the drive follows its target with 1 ms.
     pub(super) fn advance(&mut self, command: &DriveCommand<2>, joint: usize) {
         let target = if command.enabled { 1.5 * f64::from(command.currents[joint].0) } else { 0.0 };
         for _ in 0..8 {
@@ -82,7 +83,7 @@ impl Bench {
         bench
     }
 
-    /// The model's angles: the second joint turns against its own.
+    /// Angles of the model: the second joint's have the opposite sign.
     pub(super) fn pose(&self) -> [f32; 2] {
         [self.plants[0].angle as f32, -self.plants[1].angle as f32]
     }
