@@ -19,11 +19,11 @@
 //! | one shunt inverted | signs of the phase currents | [`Refusal::ShuntInverted`] |
 //! | both shunts inverted | signs of the phase currents | [`Refusal::ShuntsInverted`] |
 //! | shunts exchanged | signs of the phase currents | [`Refusal::ShuntsSwapped`] |
-//! | two motor leads, or A and B of the encoder exchanged | counter against the field | [`Refusal::Direction`] |
+//! | two motor leads, or A and B of the encoder exchanged | runs against field | [`Refusal::Direction`] |
 //! | encoder without counts, rotor blocked | travel | [`Refusal::NoCounts`] |
 //! | pole pairs | counts per electrical turn | [`Refusal::PolePairs`] |
 //! | counts per turn | counts per electrical turn | [`Refusal::CountsPerTurn`] |
-//! | index missing, or at several positions | index | [`Refusal::NoIndex`], [`Refusal::IndexMoved`] |
+//! | no index, or at several positions | index | [`Refusal::NoIndex`], [`Refusal::IndexMoved`] |
 //! | load, friction or cogging too large | travel and deviation, both ways | [`Refusal::Slipped`] |
 //! | encoder moved on its shaft since it was stored | offset at the index | [`Refusal::StoredOffset`] |
 //! | not the stored motor | resistance, inductances | [`Refusal::OtherMotor`] |
