@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! V_bus = code * 3.3 / 4096 * ratio           ratio 19 on 56 V boards, 11 on 24 V boards (board.h:120-126)
-//! T = ((a x + b) x + c) x + d, x = code / 4096      thermistor and divider, 0..120 degrees C (board.cpp:53-54)
+//! T = ((a x + b) x + c) x + d, x = code / 4096    thermistor and divider, 0..120 degrees C (board.cpp:53-54)
 //! ```
 
 use crate::motor::SenseScale;

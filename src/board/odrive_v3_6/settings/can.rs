@@ -1,7 +1,7 @@
 //! CAN1 controller: bit rates, filters, interrupts, pins.
 //!
 //! ```text
-//! bit = 21 quanta of prescaler / 42 MHz:  1 synchronisation, 16 before sampling (81 %), 4 after, jump width 4
+//! bit = 21 quanta of prescaler / 42 MHz: 1 synchronisation, 16 before sampling (81 %), 4 after, jump width 4
 //! prescaler = 2,000,000 / bit rate: 2, 4, 8, 16 for 1000, 500, 250, 125 kbit/s, all without a remainder
 //! ```
 //!

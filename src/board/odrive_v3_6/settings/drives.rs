@@ -41,8 +41,8 @@ pub const fn bus(divider: f32) -> [Volt; 2] {
 }
 
 /// Ramps that reduce torque on a board with this bus-voltage divider. They cover the last 20 degrees of a
-/// bridge and the bus near both limits: below 1.2 of the lower one, and between the chopper's end and the
-/// upper one.
+/// bridge, and the bus voltage below 1.2 of its lower limit. A third one lies between the chopper's end and
+/// the upper limit.
 #[must_use]
 pub const fn derating(divider: f32) -> DeratingRamps {
     let ([low, high], [_, full]) = (bus(divider), chopper(divider));

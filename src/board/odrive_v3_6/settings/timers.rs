@@ -3,7 +3,7 @@
 //! ```text
 //! counter   0 -> 3500 -> 0, 168 MHz              f = 168 MHz / (2 * 3500) = 24 kHz
 //! high side on while counter >= compare          compare = (1 - duty) * 3500          PWM mode 2
-//! trigger   when the counter rises to 20         the converters sample from there: low sides on, 0.12 us after 0
+//! trigger   when the counter rises to 20     the converters sample from there: low sides on, 0.12 us after 0
 //! ```
 //!
 //! Why half a period: with centred duties the edges of a bridge lie around a quarter and three quarters of
