@@ -6,10 +6,10 @@
 //!  axis 0 begins                             axis 1 begins
 //! ```
 //!
-//! An axis begins its own period half a period after the preceding axis, as on the board, or by as many
-//! quarters as its description states. At that instant its sensors are read and the given command acts. The
-//! answer to a sample is applied a period later. Held constant: speed of the rotors and brake duty within a
-//! period of the first axis, bus voltage within a quarter.
+//! An axis begins its own period half a period after the preceding axis, as on the board; the description can
+//! change that shift. At that instant its sensors are read and the given command acts. The answer to a sample
+//! is applied a period later. Held constant: speed of the rotors and brake duty within a period of the first
+//! axis, bus voltage within a quarter.
 //!
 //! **Coupling.** Where coupling is described, an edge of another axis' bridge shortly before an axis'
 //! converter holds falsifies both of its shunts. Known limit: an axis that begins at the same instant does

@@ -2,10 +2,10 @@
 //!
 //! The trigger time of the shunts' converters is the firmware's constant, as in the board's registers.
 //!
-//! Defaults are those of a board of the ODrive v3.6 class (48 V and more): 500 uOhm shunts, amplifiers at 40
-//! V/V, 12 bits over 3.3 V, bus divider 19, dead time of 20 clocks at 168 MHz, 3,500 timer clocks per half
-//! period. Amplifier settling, rails, noise, diode drop and capacitance are typical values of such parts, not
-//! measurements.
+//! Defaults are those of a board of the ODrive v3.6 class (48 V and more). Facts: 500 uOhm shunts, amplifiers
+//! at 40 V/V, 12 bits over 3.3 V, bus divider 19. Further: dead time of 20 clocks at 168 MHz, 3,500 timer
+//! clocks per half period. Amplifier settling, rails, noise, diode drop and capacitance are typical values of
+//! such parts, not measurements.
 
 use super::complete::SHIFT_QUARTERS;
 use scarab::hal::{BRIDGE_CLOCK_HZ, SHUNT_TRIGGER_CLOCKS};
@@ -159,9 +159,9 @@ pub enum EncoderWiring {
     /// Counts up with the rotor's angle.
     #[default]
     Forward,
-    /// Counts down.
+    /// Counts down with the rotor's angle.
     Reversed,
-    /// Counts nothing.
+    /// Does not count.
     Missing,
 }
 

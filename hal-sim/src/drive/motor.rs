@@ -1,7 +1,7 @@
 //! Permanent-magnet motor by the flux linkages of its windings, in the stator's frame.
 //!
 //! Why another formulation than the firmware's: the simulator does not share the rotating frame. States are
-//! the flux linkages themselves, inductances depend on the rotor's position, and the back-EMF has no term of
+//! the flux linkages themselves, and inductances depend on the rotor's position. The back-EMF has no term of
 //! its own: it is the magnets' part in the change of flux. Fluxes, currents and voltages of the three phases
 //! less their mean are two numbers, one along phase 0 and one across:
 //!

@@ -3,7 +3,7 @@
 //! Why: tests a current loop and its calibration without a leg.
 //!
 //! ```text
-//! free   inertia dw/dt = torque - viscous w - dry friction - load     a rotor at rest sticks up to the dry friction
+//! free   inertia dw/dt = torque - viscous w - dry friction - load;  at rest it sticks up to the dry friction
 //! turned w is given
 //! ```
 //!
