@@ -1,16 +1,15 @@
 //! Level 5 on the board: the interrupt around `operation::BusRound`. Runs when frames came, a mailbox is
 //! empty, or the servo has ticked.
 //!
-//! Why its own level and no executor: any level below the servo could afford a poll (0.8 thousand
-//! instructions) and a frame (up to 2.4 thousand). But a repeated block takes 81 thousand in one call (0.6
-//! ms), and a reset that recalls full records 219 thousand. So this level is below the one that empties the
-//! controller's queue of three frames. The housekeeping is below this level; its rounds of 2 ms tolerate the
-//! delay.
+//! Why its own level and no executor: any level below the servo could afford a poll (800 instructions) and a
+//! frame (up to 2,400). But a repeated block takes 81 thousand in one call (0.6 ms), and a reset that recalls
+//! full records 219 thousand. So this level is below the one that empties the controller's queue of three
+//! frames. The housekeeping is below this level; its rounds of 2 ms tolerate the delay.
 //!
 //! ```text
 //! level 4  frames of the controller --queue of 32-->       a frame without space is reported as an overrun
-//! level 1  servo --reports, log-->  bus  --orders--> servo  one of each in progress; the next has new targets
-//! thread   identification --results--> bus;  bus --data to store--> storage  lent, or `Handover`
+//! level 1  servo --reports, log--> bus --orders--> servo  one of each in progress; the next has new targets
+//! thread   identification --results--> bus;  bus --data to store--> storage  lent or `Handover`
 //! ```
 //!
 //! Frames of one node reach the other node when they are given to the controller, which does not receive its
