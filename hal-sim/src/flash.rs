@@ -2,7 +2,7 @@
 //! fail at any byte of either.
 //!
 //! ```text
-//! program: byte := byte AND data      erase: every byte of a sector := FF      both from the lowest address up
+//! program: byte := byte AND data     erase: every byte of a sector := FF     both from the lowest address up
 //! power fails at byte k: below k done, above k unchanged, k a random mix of both
 //! ```
 //!
