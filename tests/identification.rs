@@ -106,8 +106,8 @@ fn noise_free_torque_gives_the_base_parameters_back() {
     for plan in [Plan::OneTime, Plan::Sequential] {
         let found = estimate(22.0, 0.0, 1, plan);
         for (value, truth) in found.values.iter().zip(true_base()) {
-            // Tolerance: flatness of the filter 1.6e-4, single precision, and a sign change between two
-            // samples.
+            // Tolerance: flatness of the filter 1.6e-4, single precision, and a sign change
+            // between two samples.
             assert!((f64::from(*value) - truth).abs() < 2e-3 * truth.abs().max(0.5), "{value} {truth}");
         }
     }

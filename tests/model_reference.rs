@@ -1,5 +1,4 @@
-//! The chain compared with torques and regressors of an independent rigid-body library
-//! (`tests/data/planar_hip_knee`).
+//! The chain compared with an independent rigid-body library (`tests/data/planar_hip_knee`).
 
 use nalgebra::Vector3;
 use scarab::model::{
@@ -72,8 +71,8 @@ fn leg() -> (Chain<f64, 2>, LegParameters<f64, 2>, Vector3<f64>) {
     (Chain::new(&geometry).unwrap(), parameters, gravity)
 }
 
-/// Greatest deviations from the reference in precision `T`, relative to the greatest torque and the greatest
-/// entry.
+/// Greatest deviations from the reference in precision `T`, relative to the greatest torque and
+/// the greatest entry.
 fn deviations<T: Real>() -> (f64, f64) {
     let (chain, parameters, gravity) = leg();
     let chain = chain.convert::<T>();

@@ -122,7 +122,7 @@ fn learned_metric_copes_with_bad_scaling_valleys_and_coupling() {
 
 #[test]
 fn restarts_leave_local_minima() {
-    gate_both(TestFunction::Levy, 10, 60, 25, 160); // 15 / 77: the tail are runs that were scattered anew
+    gate_both(TestFunction::Levy, 10, 60, 25, 160); // 15 / 77, the tail being restarted runs
     gate_both(TestFunction::Rastrigin, 2, 60, 30, 120); // 15 / 64
 }
 
@@ -243,8 +243,8 @@ fn particle_swarm_does_what_its_table_says() {
 
 #[test]
 fn antennae_search_does_what_its_table_says() {
-    // Known success: 45, 79, 100 (median 22 iterations), 3 %. 200 runs: standard error 3.5 %, four of them
-    // allowed.
+    // Known success: 45, 79, 100 (median 22 iterations), 3 %. 200 runs: standard error 3.5 %, four
+    // of them allowed.
     for (function, least, most) in [
         (TestFunction::Sphere, 0.28, 0.60),
         (TestFunction::SixHumpCamel, 0.63, 0.93),

@@ -11,8 +11,8 @@ pub struct LegDescription<const N: usize> {
     pub gravity: [f64; 3],
     /// Joints, proximal first.
     pub joints: [JointDescription; N],
-    /// Whether drives are mounted mirrored, as on a left leg: motors and encoders turn against the anatomical
-    /// sense.
+    /// Whether drives are mounted mirrored, as on a left leg: motors and encoders turn against
+    /// the anatomical sense.
     pub mirrored: bool,
     /// Pushes by the wearer, if any.
     pub pushes: Option<PushDescription>,

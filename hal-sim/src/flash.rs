@@ -1,5 +1,6 @@
-//! Flash memory of a microcontroller: programming clears bits, erasing a sector sets them, and the power may
-//! fail at any byte of either.
+//! Flash memory of a microcontroller, with a power failure at any byte.
+//!
+//! Programming clears bits, erasing a sector sets them:
 //!
 //! ```text
 //! program: byte := byte AND data     erase: every byte of a sector := FF     both from the lowest address up

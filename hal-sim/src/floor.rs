@@ -13,8 +13,10 @@
 //! Up is against gravity. The foot is a point of the last link in its D-H frame. The trunk is fixed here, so
 //! the rise of the floor stands for the weight with which the wearer presses the foot down. That is up to 300
 //! N on a leg at rest. Stiffness, damping and friction are assumptions about a soft shoe, not measurements.
-//! SI units. Source: penalty contact (Moore and Wilhelms 1988) with regularised Coulomb friction. Cost: one
-//! pose of the mechanism per tick, only during contact. Known limits: one point, no rolling foot.
+//! SI units.
+//! Source: penalty contact (Moore and Wilhelms 1988) with regularised Coulomb friction.
+//! Cost: one pose of the mechanism per tick, only during contact.
+//! Known limits: one point, no rolling foot.
 
 use nalgebra::Vector3;
 

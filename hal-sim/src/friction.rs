@@ -9,17 +9,17 @@
 //! at rest    |applied| <= static: v stays 0 and friction balances the applied torque
 //! ```
 //!
-//! Joints are coupled: one that breaks away may drag another along or set it free. Over one time step the end
-//! rates u obey A u = b - f with friction impulses f. Each joint slides (f = level sign(u)) or sticks (u = 0
-//! and the magnitude of f at most static). For N <= 3 the 3^N assignments are few, so the consistent one is
-//! found exactly. The search begins with the one that continues the present motion. A is the inertia matrix
-//! with small additions of the order of the step, so exactly one assignment is consistent where static =
-//! coulomb. With Stribeck's surplus both sticking and sliding may be consistent, and then the present motion
-//! continues.
+//! Joints are coupled: one that breaks away may drag another along or set it free. Over one time step the
+//! end rates u obey A u = b - f with friction impulses f. Each joint slides (f = level sign(u)) or sticks (u
+//! = 0 and the magnitude of f at most static). For N <= 3 the 3^N assignments are few, so the consistent one
+//! is found exactly. The search begins with the one that continues the present motion. A is the inertia
+//! matrix with small additions of the order of the step, so exactly one assignment is consistent where
+//! static = coulomb. With Stribeck's surplus both sticking and sliding may be consistent, and then the
+//! present motion continues.
 //!
 //! Source: Moreau's time stepping in its box-constrained form (Stewart and Trinkle, 1996); Stribeck's curve
-//! in the Gaussian form of Armstrong-Helouvry et al. (1994). Cost for two joints: about 30 operations while
-//! nothing changes, at most ten times that.
+//! in the Gaussian form of Armstrong-Helouvry et al. (1994).
+//! Cost for two joints: about 30 operations while nothing changes, at most ten times that.
 
 use crate::description::FrictionDescription;
 use crate::maths::exp;
@@ -100,8 +100,8 @@ impl<const N: usize> Slide<N> {
         if violation <= 0.0 { rates } else { self.search(present) }
     }
 
-    /// Tries every other assignment, sticking ones first. Where rounding leaves none consistent, returns the
-    /// nearest.
+    /// Tries every other assignment, sticking ones first. Where rounding leaves none consistent,
+    /// returns the nearest.
     #[cold]
     fn search(&self, present: &[Contact; N]) -> [f64; N] {
         const CHOICES: [Contact; 3] = [Contact::Sticks, Contact::Forward, Contact::Backward];

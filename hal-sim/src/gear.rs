@@ -2,8 +2,8 @@
 //!
 //! motor angle = ratio * joint angle. Inertia on the motor side acts at the joint multiplied by the ratio
 //! squared, and is described there (`rotor_inertia`). So the gear converts angles only, and
-//! `torque_per_ampere` is stated at the joint. Known limits: no elasticity, no backlash, no load-dependent
-//! loss.
+//! `torque_per_ampere` is stated at the joint.
+//! Known limits: no elasticity, no backlash, no load-dependent loss.
 
 /// Motor turns per joint turn.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,8 +6,8 @@
 //!
 //! Why: a resisting wearer is a spring-damper, not a fixed torque pulse: the reaction depends on the drive.
 //! The held position is the joint's at the start of the grip; a hand that is too weak is pulled along and
-//! goes on pulling. Stiffness and damping are assumptions about a firm grip. N m, rad, s, anatomical. Cost: a
-//! few operations per step during the grip.
+//! goes on pulling. Stiffness and damping are assumptions about a firm grip. N m, rad, s, anatomical.
+//! Cost: a few operations per step during the grip.
 
 /// Stiffness, N m/rad: a degree at 35 N m.
 const STIFFNESS: f64 = 2000.0;

@@ -16,10 +16,11 @@
 //! within one step only. A servo tick with such an instant is repeated in [`FINE_STEPS`] steps.
 //!
 //! Measured bias on a driven leg: inertias 7e-5 of their value, viscous friction 3e-5, Coulomb friction 2e-5.
-//! The reference is eighth-order differences of the leg's own motion, turning points included. Symbols: rad,
-//! rad/s, N m, s. Source: Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), for symmetric
-//! steps; Kahan (1993) for the bilinear treatment of quadratic terms. Cost: one evaluation of the mechanism
-//! per step.
+//! The reference is eighth-order differences of the leg's own motion, turning points included.
+//! Symbols: rad, rad/s, N m, s.
+//! Source: Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), for symmetric steps; Kahan
+//! (1993) for the bilinear treatment of quadratic terms.
+//! Cost: one evaluation of the mechanism per step.
 
 use crate::description::{FrictionDescription, LegDescription};
 use crate::friction::{Contact, Slide};

@@ -19,8 +19,9 @@
 //! torque = M qdd + C(q, v) v + G
 //! ```
 //!
-//! Angles rad, torques N m. Source: any text on analytical mechanics; the closed derivatives are derived
-//! above. The rotor turns with its own joint only (no gyroscopic torque of a rotor carried by another link).
+//! Angles rad, torques N m.
+//! Source: any text on analytical mechanics; the closed derivatives are derived above. The rotor turns with
+//! its own joint only (no gyroscopic torque of a rotor carried by another link).
 //! Cost for two joints: about 700 floating-point operations and two sine-cosine pairs.
 
 use crate::conventions::links_at_reference;

@@ -7,9 +7,10 @@
 //! sigma   = sqrt(8) * noise    noise is stated for the mean of eight 4 kHz samples, as logged at 500 Hz
 //! ```
 //!
-//! Count 0 is centred on the anatomical zero (the reference pose). Known limits: no missed counts, no
-//! eccentricity, no saturation of the converter; other modules inject faults. Cost: one random number per
-//! joint and tick while noise is on.
+//! Count 0 is centred on the anatomical zero (the reference pose).
+//! Known limits: no missed counts, no eccentricity, no saturation of the converter; other modules inject
+//! faults.
+//! Cost: one random number per joint and tick while noise is on.
 
 use crate::description::{CurrentSensorDescription, EncoderDescription, EncoderSide, OutlierDescription};
 use crate::gear::Gear;

@@ -6,8 +6,8 @@
 //!
 //! Pauses between pushes are exponential with the mean 1 / rate, and peaks uniform in -torque..=torque.
 //! Durations are uniform in half to one and a half of the mean, joints equally likely. The generator is the
-//! wearer's own, so sensor noise does not change with the pushes. Known limits: no stiffness, no intention,
-//! one joint at a time.
+//! wearer's own, so sensor noise does not change with the pushes.
+//! Known limits: no stiffness, no intention, one joint at a time.
 
 use crate::description::PushDescription;
 use crate::maths::{ln, sin_cos};

@@ -1,5 +1,6 @@
-//! Memory copies of several words at a time. The compiler calls these functions for each move of a value
-//! longer than a few words.
+//! Memory copies of several words at a time.
+//!
+//! The compiler calls these functions for each move of a value longer than a few words.
 //!
 //! Why: the compiler's own library copies one word in five instructions, which took a third of the servo's
 //! tick. Eight words in four instructions need multi-register loads and stores, which no Rust code generates.
@@ -10,8 +11,8 @@
 //! otherwise      16 bytes a round in 10 instructions, then as above; memory allows unaligned words
 //! ```
 //!
-//! Not for registers of peripherals, where a word must be aligned. Source: Arm, Run-time ABI for the Arm
-//! Architecture (IHI 0043), section 4.3.4.
+//! Not for registers of peripherals, where a word must be aligned.
+//! Source: Arm, Run-time ABI for the Arm Architecture (IHI 0043), section 4.3.4.
 #![expect(unsafe_code, reason = "the compiler calls these functions by their names")]
 
 use core::arch::naked_asm;

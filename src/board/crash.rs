@@ -1,5 +1,6 @@
-//! Handling of a panic, hard fault, stack overflow or unhandled interrupt: outputs off first, then a record,
-//! then a reset.
+//! Handling of a panic, hard fault, stack overflow or unhandled interrupt.
+//!
+//! The order is: outputs off, then a record, then a reset.
 //!
 //! The record lies in memory that survives a reset. The next start finds it, reports it, and refuses to
 //! enable until the operator has reset the fault. Nothing is reported from here: the output of a record may
@@ -14,9 +15,9 @@
 //! where little of the stack is left. The processor could not store the fault's address. Instead the record
 //! names the caller of the deepest function, found at the bottom of the stack.
 //!
-//! Cost: `cargo emulate --crash`, in docs/board.md. Known limit: after an overflow the caller is the first
-//! word at the stack's bottom that may be a return address. A code address in an array would be mistaken for
-//! it.
+//! Cost: `cargo emulate --crash`, in docs/board.md.
+//! Known limit: after an overflow the caller is the first word at the stack's bottom that may be a return
+//! address. A code address in an array would be mistaken for it.
 #![expect(
     unsafe_code,
     reason = "memory that outlives a reset, the stack pointer, and what the linker provides"
@@ -248,7 +249,7 @@ extern "C" fn unhandled() -> ! {
 }
 
 fn load(register: *const u32) -> u32 {
-    // SAFETY: the callers pass registers of the processor's system control block, readable without a side
-    // effect.
+    // SAFETY: the callers pass registers of the processor's system control block, readable without
+    // a side effect.
     unsafe { ptr::read_volatile(register) }
 }

@@ -1,5 +1,4 @@
-//! The stack, painted at the start to find its deepest use; and the core-coupled memory, cleared at the
-//! start.
+//! The stack, painted at the start to find its deepest use; clearing of the core-coupled memory.
 //!
 //! The stack lies at the bottom of the memory (memory.x). An overflow reaches below the memory and faults in
 //! the same instruction; a board's crash handler resets the stack pointer.

@@ -39,9 +39,9 @@ impl Frame {
         (self.length == 8).then_some(self.data)
     }
 
-    /// Fewest and most bits on the wire, including the three of the intermission: 47 and 8 for each byte. At
-    /// most a stuff bit is added after every four of the 34 bits, and 8 for each byte, between start and
-    /// checksum.
+    /// Fewest and most bits on the wire, including the three of the intermission: 47 and 8 for each
+    /// byte. At most a stuff bit is added after every four of the 34 bits, and 8 for each byte, between
+    /// start and checksum.
     #[must_use]
     pub const fn bits(&self) -> [u32; 2] {
         let data = 8 * self.length as u32;

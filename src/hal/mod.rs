@@ -25,9 +25,9 @@ pub const BRIDGE_CLOCK_HZ: u32 = 168_000_000;
 /// docs/motor.md, section 1.
 pub const SHUNT_TRIGGER_CLOCKS: i16 = 20;
 
-/// Readings of one axis' converter and counter in one PWM period, at the middle of the zero vector in which
-/// all low sides conduct. A board samples the shunts later by the lag of their amplifiers
-/// ([`SHUNT_TRIGGER_CLOCKS`]).
+/// Readings of one axis' converter and counter in one PWM period, at the middle of the zero
+/// vector in which all low sides conduct. A board samples the shunts later by the lag of
+/// their amplifiers ([`SHUNT_TRIGGER_CLOCKS`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AxisSample {
     /// Codes of the shunt amplifiers of the phases B and C, 12 bits; half of the range is zero current.

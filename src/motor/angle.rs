@@ -165,9 +165,9 @@ pub struct CountScale {
 }
 
 impl CountScale {
-    /// Scale of an encoder with `counts_per_turn` (16..=65,536) and a motor with `pole_pairs` (1..=64).
-    /// Returns `None` outside these ranges, and where a count is not less than a quarter of an electrical
-    /// turn.
+    /// Scale of an encoder with `counts_per_turn` (16..=65,536) and a motor with `pole_pairs`
+    /// (1..=64). Returns `None` outside these ranges, and where a count is not less than a quarter of
+    /// an electrical turn.
     #[must_use]
     pub fn new(counts_per_turn: u32, pole_pairs: u8) -> Option<Self> {
         let possible = (16..=65_536).contains(&counts_per_turn)
@@ -231,8 +231,8 @@ mod tests {
             let half = scale.angle(counts.cast_signed() / 2).since(scale.angle(0)).abs();
             // Tolerance: rounding of half a turn's counts.
             assert!((half - if pairs % 2 == 1 { 0.5 } else { 0.0 }).abs() < 4e-6, "{half}");
-            // One mechanical turn is `pairs` electrical turns; the last step closes it to a hundredth of a
-            // count.
+            // One mechanical turn is `pairs` electrical turns; the last step closes it to a hundredth
+            // of a count.
             let last = scale.angle(counts.cast_signed() - 1);
             let step = scale.angle(0).since(last);
             assert!((step * counts as f32 / f32::from(pairs) - 1.0).abs() < 1e-2, "{step}");

@@ -23,7 +23,8 @@
 //!
 //! During one tick of tolerance the previous tick's duties are repeated. A single implausible encoder step
 //! marks the joint sample as doubtful; three within 10 ms are a fault of the servo (`safety::Monitor`). The
-//! index is also checked while the outputs are off. Outputs stay off until [`Axis::clear_fault`].
+//! index is also checked while the outputs are off. Outputs stay off until [`Axis::clear_fault`]; with a lost
+//! rotor position the motor brakes instead, unless the outputs are requested off.
 //!
 //! Once per joint sample the voltages are compared with currents and speed ([`ModelWatch`]). An open phase
 //! and a drifted current-sensor offset turn the outputs off. A frozen counter turns the motor into a passive
@@ -38,9 +39,9 @@
 //! to rest a quarter of an electrical turn further. The index shows it where too few counts are left between
 //! pulses. Without an index, lost counts are not detected.
 //!
-//! **Signs.** Inside, positive current makes torque towards growing electrical angle. Outside, counts and
-//! current both grow with the joint's flexion: [`AxisConfiguration::flexion`] states the counter's direction
-//! then.
+//! **Signs.** Inside, positive current makes torque towards growing electrical angle. Outside, counts
+//! and current both grow with the joint's flexion: [`AxisConfiguration::flexion`] states the
+//! counter's direction then.
 //!
 //! Cost: `scripts/count-instructions`.
 

@@ -12,8 +12,9 @@
 //! lies above every no-load voltage of the supply, `full` below the voltage at which the bridges turn off.
 //! Capacitor and ramp form a loop with the time constant C R (full - begin) / V. With 2 ohm and 4 V that is
 //! 0.25 ms, or six periods. The limit of 0.95 is the greatest duty that ODrive's firmware allows the
-//! resistor. A bus voltage that is not finite gives duty 0; the axes turn off on it. Source: the ramp of
-//! ODrive v0.5.6 (`dc_bus_overvoltage_ramp`). Cost: 4 operations.
+//! resistor. A bus voltage that is not finite gives duty 0; the axes turn off on it.
+//! Source: the ramp of ODrive v0.5.6 (`dc_bus_overvoltage_ramp`).
+//! Cost: 4 operations.
 
 use super::SenseScale;
 use crate::hal::CURRENT_RATE_HZ;

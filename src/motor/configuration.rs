@@ -73,21 +73,21 @@ pub struct AxisConfiguration {
 pub enum AxisError {
     /// Amplifiers, converter or divider.
     Sense,
-    /// Dead time, settling or conversion leave less than half of the period, or the compensation's band is
-    /// invalid.
+    /// Dead time, settling or conversion leave less than half of the period, or the compensation's
+    /// band is invalid.
     Timing,
     /// Counts per turn or pole pairs.
     Encoder,
-    /// Greatest speed: must be positive, below a quarter of an electrical turn and below 32,767 counts per
-    /// tick.
+    /// Greatest speed: must be positive, below a quarter of an electrical turn and below 32,767
+    /// counts per tick.
     Speed,
     /// Flux, inductances, resistance or bandwidth.
     Motor,
-    /// The current limit must be positive and below the overcurrent bound, the latter within the amplifiers'
-    /// range.
+    /// The current limit must be positive and below the overcurrent bound, the latter within
+    /// the amplifiers' range.
     Current,
-    /// Bus voltages: the first must be at least 5 V and below the second, the second within the converter's
-    /// range.
+    /// Bus voltages: the first must be at least 5 V and below the second, the second within
+    /// the converter's range.
     Bus,
     /// At the greatest speed the outputs, when off, rectify more than the greatest bus voltage: sqrt(3) pole
     /// pairs speed flux.
@@ -143,8 +143,8 @@ impl AxisConfiguration {
 
 const SQRT_3: f32 = 1.732_050_8;
 
-/// Greatest distance of a current-sensor offset from the middle of the converter's range: 6 A on the board's
-/// scale.
+/// Greatest distance of a current-sensor offset from the middle of the converter's range: 6 A on
+/// the board's scale.
 pub const ZERO_SPREAD_CODES: u16 = 150;
 
 /// Values that a tick reads and never writes.

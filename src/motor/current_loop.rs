@@ -21,8 +21,8 @@
 //! phase margin = 90 - 360 * 1.5 f T degrees          1000 Hz: 67.5,  2000 Hz: 45 at 24 kHz
 //! ```
 //!
-//! Known limits: the flux is the nameplate's. Iron saturates, and with a smaller L the crossover rises in
-//! proportion.
+//! Known limits: the flux is the nameplate's. Iron saturates, and with a smaller L the crossover
+//! rises in proportion.
 //!
 //! **At the voltage limit** the field has priority: the direct current stays at its target of zero while the
 //! quadrature current gives way. If both gave way in proportion, the direct voltage would be short first at
@@ -30,13 +30,13 @@
 //! positive, still more voltage. The share of 0.87 leaves half of the voltage to q, against the back-EMF,
 //! even while d requests all of it.
 //!
-//! **Anti-windup** is back-calculation with the gain 1/kp (the conditioned form of Hanus, 1987), written out.
-//! At the limit the integral converges to its value for a target that the voltage could realise, with the
-//! motor's own time constant L/R. This needs no case distinction, and leaving the limit costs no more than a
-//! step.
+//! **Anti-windup** is back-calculation with the gain 1/kp (the conditioned form of Hanus, 1987), written
+//! out. At the limit the integral converges to its value for a target that the voltage could realise, with
+//! the motor's own time constant L/R. This needs no case distinction, and leaving the limit costs no more
+//! than a step.
 //!
-//! Cross-coupling uses measured currents: they lag the motor's by 1.5 periods; targets would lead by 1/(2 pi
-//! f).
+//! Cross-coupling uses measured currents: they lag the motor's by 1.5 periods; targets would lead by
+//! 1/(2 pi f).
 
 use super::Rotating;
 use crate::checksum::Checksum;

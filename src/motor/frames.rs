@@ -1,8 +1,8 @@
 //! The three frames of a motor's currents and voltages, as types.
 //!
-//! Why types: the same two or three numbers mean different things in each frame, and only the type shows
-//! which. A value changes its frame only through the functions here, and through an angle where one is
-//! needed.
+//! Why types: the same two or three numbers mean different things in each frame, and only the type
+//! shows which. A value changes its frame only through the functions here, and through an angle where
+//! one is needed.
 //!
 //! ```text
 //! alpha = (2 a - b - c) / 3          a = alpha                         (Clarke, amplitude invariant)
@@ -15,7 +15,8 @@
 //! `d` along the magnets' flux, `q` a quarter turn ahead of it; sin and cos of the electrical angle from
 //! phase A to d. Amplitude invariant: a balanced sine of amplitude 1 is a vector of length 1, and power is
 //! 3/2 (v_d i_d + v_q i_q).
-//! Source: Park (1929), Clarke (1943). Cost: 5 operations for each Clarke, 6 for each Park.
+//! Source: Park (1929), Clarke (1943).
+//! Cost: 5 operations for each Clarke, 6 for each Park.
 
 use core::ops::{Add, Mul, Neg, Sub};
 

@@ -1,5 +1,6 @@
-//! Checks an axis' voltages against its current and speed: detects a frozen counter, an open phase, a drifted
-//! current-sensor offset.
+//! Checks an axis' voltages against its current and speed.
+//!
+//! Detected are a frozen counter, an open phase and a drifted current-sensor offset.
 //!
 //! Why no term with di/dt: the current loop's integral `s` is the realised voltage less feedforward,
 //! low-passed with the motor's own time constant. That is the resistance times the current that this voltage
@@ -51,9 +52,9 @@
 //! with a reversal are not evaluated.
 //!
 //! False alarms: those of the simulated hours in docs/safety.md. The margin between a healthy motor's
-//! residual and the limits has not been measured on a motor. Source: parity equation of a linear model,
-//! Isermann, Fault-Diagnosis Systems (2006), chapter 10. Cost: `scripts/count-instructions`, joint sample; 44
-//! bytes.
+//! residual and the limits has not been measured on a motor.
+//! Source: parity equation of a linear model, Isermann, Fault-Diagnosis Systems (2006), chapter 10.
+//! Cost: `scripts/count-instructions`, joint sample; 44 bytes.
 
 use super::axis::AxisFault;
 use super::configuration::AxisConfiguration;
@@ -82,8 +83,8 @@ const DEAD_VECTORS: f32 = 2.0 * 4.0 / 3.0;
 const RESISTANCE_SHARE: f32 = 0.35;
 const FLUX_SHARE: f32 = 0.2;
 const INDUCTANCE_SHARE: f32 = 0.3;
-/// Limit of the mean over a turn: shares of V, and of R times the greatest current, which changes within the
-/// turn.
+/// Limit of the mean over a turn: shares of V, and of R times the greatest current, which changes
+/// within the turn.
 const MEAN_SHARE: f32 = 0.4;
 const MEAN_RESISTANCE_SHARE: f32 = 0.06;
 
@@ -190,7 +191,7 @@ pub struct ModelWatch {
     square: f32,
 }
 
-/// A counter at rest, and the range of currents meanwhile.
+/// A counter at rest, and the range of currents since then.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Still {
     place: i32,

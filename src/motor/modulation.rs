@@ -34,8 +34,8 @@
 //! the loop would have to outweigh.
 //!
 //! The circle leaves up to 1 - sqrt(3)/2 of the hexagon unused at its corners; using it would put a sixth
-//! harmonic on the torque. Source: van der Broeck, Skudelny, Stanke (1988); dead time: Sukegawa et al.
-//! (1991).
+//! harmonic on the torque.
+//! Source: van der Broeck, Skudelny, Stanke (1988); dead time: Sukegawa et al. (1991).
 
 use super::{Phases, Stationary};
 use crate::hal::{BRIDGE_CLOCK_HZ, CURRENT_RATE_HZ, SHUNT_TRIGGER_CLOCKS};
@@ -300,8 +300,8 @@ mod tests {
     fn the_circle_touches_the_hexagon() {
         let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, PLAIN).expect("usual");
         let limit = modulator.voltage_limit(Volt(48.0)).0;
-        // The tightest direction is between two phases' axes: at 30 degrees the span is sqrt(3) of the
-        // length.
+        // The tightest direction is between two phases' axes: at 30 degrees the span is sqrt(3)
+        // of the length.
         let [a, _, c] = modulator.duties(at(limit, 30), 1.0 / 48.0, NO_CURRENT);
         assert!((a - modulator.greatest_duty()).abs() < 1e-5 && c.abs() < 1e-5, "{a} {c}");
         assert!((limit * sqrt(3.0) / 48.0 - modulator.greatest_duty()).abs() < 1e-5);

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! Currents flow into the motor. `ampere_per_code` is signed, one for each shunt; `zero` is the
-//! current-sensor offset that calibration measures.
-//! Source of the board's numbers: ODrive v3.6 firmware (0.5 mOhm, 40 V/V, 3.3 V of 4,096 codes, divider 19).
+//! current-sensor offset that calibration measures. Source of the board's numbers: ODrive v3.6 firmware (0.5
+//! mOhm, 40 V/V, 3.3 V of 4,096 codes, divider 19).
 //! Cost: 45 instructions, rails included (`scripts/count-instructions`).
 
 use super::Stationary;
@@ -40,8 +40,8 @@ impl SenseScale {
         self.volt_per_code * f32::from(code)
     }
 
-    /// Current vector of the codes of B and C, with their current-sensor offsets; `None` where a code is at a
-    /// rail.
+    /// Current vector of the codes of B and C, with their current-sensor offsets; `None` where a code is
+    /// at a rail.
     #[must_use]
     #[inline(always)]
     pub fn currents(&self, codes: [u16; 2], zeros: [f32; 2]) -> Option<Stationary<Ampere>> {
@@ -55,8 +55,8 @@ impl SenseScale {
         Some(Stationary::from_two_phases(b, c))
     }
 
-    /// Largest phase current that both shunts can measure, for any offsets within `spread` codes of the
-    /// middle.
+    /// Largest phase current that both shunts can measure, for any offsets within `spread` codes
+    /// of the middle.
     #[must_use]
     pub fn range(&self, spread: u16) -> Ampere {
         let below = 2048_u16.saturating_sub(self.rails[0]);

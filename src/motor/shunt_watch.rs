@@ -69,8 +69,8 @@ impl ShuntWatch {
         self.zero.beta += ZERO_SHARE * (currents.beta.0 - self.zero.beta);
     }
 
-    /// Before the bridge switches: whether the offset is within its limit. Also restarts the check for stuck
-    /// codes.
+    /// Before the bridge switches: whether the offset is within its limit. Also restarts the check
+    /// for stuck codes.
     pub fn begins_at_zero(&mut self) -> bool {
         self.shunts = Self::EMPTY.shunts;
         let Stationary { alpha, beta } = self.zero;
@@ -84,8 +84,8 @@ impl ShuntWatch {
         Ampere(max(ASKED_A, BEYOND_DEAD_TIME * dead.0 / ohm))
     }
 
-    /// Whether a code is stuck, in a tick in which the bridge switches; `asked_a` is the change of
-    /// [`Self::asked`].
+    /// Whether a code is stuck, in a tick in which the bridge switches; `asked_a` is the
+    /// change of [`Self::asked`].
     #[inline(always)]
     pub fn is_stuck(&mut self, codes: [u16; 2], target: Stationary<Ampere>, asked_a: f32) -> bool {
         let phases = target.to_phases();

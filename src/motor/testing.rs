@@ -1,7 +1,7 @@
 //! A small motor for unit tests: averaged over the PWM period, in the rotor's frame, double precision.
 //!
-//! Tests against the simulated hardware, which resolves every edge and shares no code with this crate, are in
-//! `hal-sim/tests/`.
+//! Tests against the simulated hardware, which resolves every edge and shares no code with this crate,
+//! are in `hal-sim/tests/`.
 
 use super::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale, Sine};
 use crate::hal::{AxisCommand, AxisSample};

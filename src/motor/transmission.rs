@@ -7,13 +7,13 @@
 //! ```
 //!
 //! The loss of a gear acts against the driving side. A motor that lifts a leg delivers less than ratio times
-//! its torque, a motor that brakes it holds more. Within `band` of zero joint speed the loss changes linearly
-//! between both. Otherwise the torque would jump with the sign of a noisy speed. At rest it is the mean of
-//! both.
+//! its torque, a motor that brakes it holds more. Within `band` of zero joint speed the loss changes
+//! linearly between both. Otherwise the torque would jump with the sign of a noisy speed. At rest it is the
+//! mean of both.
 //!
-//! Signs: current, torque and speed grow with the joint's flexion, as [`super::Axis`] provides. Source: the
-//! usual one-parameter loss of a gear, e.g. Giberti, Cinquemani, Legnani (2010). Known limits: losses that do
-//! not grow with load belong to friction, which identification estimates.
+//! Signs: current, torque and speed grow with the joint's flexion, as [`super::Axis`] provides.
+//! Source: the usual one-parameter loss of a gear, e.g. Giberti, Cinquemani, Legnani (2010).
+//! Known limits: losses that do not grow with load belong to friction, which identification estimates.
 
 use crate::real::clamp;
 use crate::units::{Ampere, NewtonMetre, NewtonMetrePerAmpere, RadianPerSecond, Weber};

@@ -1,5 +1,6 @@
-//! Level 5 on the board: the interrupt around `operation::BusRound`. Runs when frames came, a mailbox is
-//! empty, or the servo has ticked.
+//! Level 5 on the board: the interrupt around `operation::BusRound`.
+//!
+//! Runs when frames came, a mailbox is empty, or the servo has ticked.
 //!
 //! Why its own level and no executor: any level below the servo could afford a poll (800 instructions) and a
 //! frame (up to 2,400). But a repeated block takes 81 thousand in one call (0.6 ms), and a reset that recalls
@@ -12,8 +13,8 @@
 //! thread   identification --results--> bus;  bus --data to store--> storage  lent or `Handover`
 //! ```
 //!
-//! Frames of one node reach the other node when they are given to the controller, which does not receive its
-//! own.
+//! Frames of one node reach the other node when they are given to the controller, which does not
+//! receive its own.
 
 use core::mem::MaybeUninit;
 

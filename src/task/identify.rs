@@ -1,5 +1,4 @@
-//! Thread level on the board: the task around `operation::IdentificationLevel`, and all records that the
-//! board sends.
+//! Thread level on the board: the task around `operation::IdentificationLevel`, and the board's records.
 //!
 //! Urgent records are sent at once, the others at most once in 2 ms, so that the probe keeps up.
 

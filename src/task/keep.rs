@@ -1,5 +1,6 @@
-//! Thread: persistent storage on the board. Connects flash, watchdog, inhibits and queues to
-//! `operation::Storing` and `store::Keeper`.
+//! Thread: persistent storage on the board.
+//!
+//! Connects flash, watchdog, inhibits and queues to `operation::Storing` and `store::Keeper`.
 //!
 //! During a flash write all software stalls, and with it every clock (`board::odrive_v3_6::flash`). The
 //! current loops do not count the gap while `storing` is raised (`operation::CurrentLoops`). An emergency
@@ -66,8 +67,8 @@ impl Keeper {
         core::array::from_fn(|axis| at_once(self.keeper.calibration(axis))?)
     }
 
-    /// Stored model and its generation, if there is one; `None` where it cannot be read or belongs to another
-    /// leg.
+    /// Stored model and its generation, if there is one; `None` where it cannot be read or belongs
+    /// to another leg.
     pub fn model(&mut self, leg: &Leg) -> Option<Option<(IdentifiedModel<JOINTS>, u32)>> {
         match at_once(self.keeper.model())?? {
             Some(kept) => Some(Some((leg.restore(&kept.model).ok()?, kept.provenance.generation))),

@@ -1,5 +1,6 @@
-//! The leg this image is built for. The host tool writes the constant from a leg file, which `build.rs`
-//! selects.
+//! The leg this image is built for.
+//!
+//! The host tool writes the constant from a leg file, which `build.rs` selects.
 
 use crate::leg::{Identification, LegConfiguration, MotionWindow};
 

@@ -1,5 +1,4 @@
-//! The board's registers after the start, derived from the record of writes and compared with the board's
-//! facts.
+//! The board's registers after the start, from the record of writes, compared with the board's facts.
 //!
 //! `cargo test --test board_registers -- --nocapture` prints the record. The facts are those of ODrive's
 //! firmware v0.5.6 (`Firmware/Board/v3`, `Drivers`, `MotorControl`); the meaning of the bits is RM0090's. The

@@ -1,5 +1,4 @@
-//! Instants of both bridges and of both converters' samples, from the start's writes replayed on simulated
-//! timers.
+//! Instants of both bridges and both converters' samples, by replaying the start on simulated timers.
 
 use core::f64::consts::TAU;
 
@@ -149,8 +148,8 @@ fn the_bridges_run_half_a_period_apart() {
     assert_eq!(PERIOD * i64::from(SHIFT_QUARTERS) / 4, PERIOD / 2, "the simulated drives");
     for axis in 0..2 {
         assert_eq!(instants.middles[axis].len(), 2, "one lower zero vector a period");
-        // Duties of one half: up at a quarter, down at three quarters of the period, which begins at the
-        // middle.
+        // Duties of one half: up at a quarter, down at three quarters of the period, which begins
+        // at the middle.
         let middle = instants.middles[axis][0];
         let mut switchings: Vec<i64> =
             instants.switchings[axis].iter().map(|instant| after(*instant, middle)).collect();
@@ -238,8 +237,8 @@ impl Count {
         shares.fold(0.0, f64::max)
     }
 
-    /// Highest voltage (in steps of 0.1 V) up to which no period is disturbed, and the greatest share above
-    /// it.
+    /// Highest voltage (in steps of 0.1 V) up to which no period is disturbed, and the greatest
+    /// share above it.
     fn quiet_up_to(&self) -> (f64, f64) {
         let steps = (10.0 * self.limit()) as u32;
         let shares: Vec<f64> = (0..=steps).map(|step| self.share(0.1 * f64::from(step))).collect();
@@ -283,9 +282,9 @@ fn a_quarter_of_a_period_puts_the_other_bridge_s_edges_on_the_sample() {
     assert!((0.34..0.39).contains(&old.share(5.0)), "{}", old.share(5.0));
 }
 
-/// Effective ripple of the capacitor's current, over all pairs of electrical angles. The phase current is 1 A
-/// (peak) along the voltage in both bridges. Also the largest charge that flows in and out within a period,
-/// C.
+/// Effective ripple of the capacitor's current, over all pairs of electrical angles. The phase current
+/// is 1 A (peak) along the voltage in both bridges. Also the largest charge that flows in and out within
+/// a period, C.
 fn ripple(volt: f64, shift: i64) -> (f64, f64) {
     const POINTS: i64 = 500;
     const ANGLES: u32 = 18;
@@ -340,8 +339,8 @@ fn half_a_period_costs_the_capacitor_twice_the_ripple_of_a_quarter() {
             "{volt:>4}   {:.3}, {none_mv:.2}   {:.3}, {quarter_mv:.2}   {:.3}, {half_mv:.2}",
             none.0, quarter.0, half.0
         );
-        // Each bridge draws two pulses a period, half a period apart, so a shift of half a period has no
-        // effect.
+        // Each bridge draws two pulses a period, half a period apart, so a shift of half a period
+        // has no effect.
         assert!((half.0 / none.0 - 1.0).abs() < 0.02, "{none:?} {half:?}");
     }
     println!("most   {most:.3?}");

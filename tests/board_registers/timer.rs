@@ -9,8 +9,8 @@
 //! mode 1    rising: active below the compare value; falling: inactive above it     mode 2 is the inverse
 //! ```
 //!
-//! Known limits: no prescaler, no edge-aligned counting, no break; the only slave mode is the start by a
-//! trigger.
+//! Known limits: no prescaler, no edge-aligned counting, no break; the only slave mode is the start
+//! by a trigger.
 
 use std::collections::BTreeMap;
 
@@ -170,8 +170,8 @@ impl Bridges {
                 timer.apply(write);
             }
             let [master, slave] = &mut self.timers;
-            // Master mode 001 sends the enable; slave mode 110 starts at the trigger, number 0 of which is
-            // TIM1's.
+            // Master mode 001 sends the enable; slave mode 110 starts at the trigger, number 0 of
+            // which is TIM1's.
             let enable_is_sent = master.at(CR2) >> 4 & 0b111 == 0b001;
             let slave_waits = slave.at(SMCR) & 0b111_0111 == 0b110;
             if !ran && master.is_running() && enable_is_sent && slave_waits {

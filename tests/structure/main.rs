@@ -323,9 +323,9 @@ fn rooms_used(source: &str, depth: usize) -> Vec<Token<'_>> {
             used.extend(names_at(&all[after..]).into_iter().filter(|name| name.text != "*"));
         }
     }
-    // The crate's own items (macros, constants) are not modules. In an inline module `super` may mean the
-    // module itself, so there only a module's name counts. `crate::*` would allow everything and always
-    // counts.
+    // The crate's own items (macros, constants) are not modules. In an inline module `super` may
+    // mean the module itself, so there only a module's name counts. `crate::*` would allow
+    // everything and always counts.
     used.retain(|name| name.text == "*" || HOUSE.iter().any(|(room, _)| *room == name.text));
     used
 }

@@ -59,8 +59,8 @@ fn pushed(per_minute: f64, torque_nm: f64) -> Result<RunReport, String> {
 #[test]
 fn a_wearer_who_pushes_hard_is_refused_with_every_number_known() {
     let report = pushed(60.0, 60.0).expect("the drive holds against 60 N m");
-    // With a push every second, too much of the training motion is excluded; of the held-out motions it is
-    // not.
+    // With a push every second, too much of the training motion is excluded; of the held-out motions
+    // it is not.
     assert_eq!(report.reasons, ["outliers"]);
     let known = |number: &Number| number.known().is_some();
     for base in &report.base_parameters {

@@ -121,8 +121,8 @@ fn noise_free_torque_leaves_a_bias_below_a_seventh_of_the_sigma_of_noisy_torque(
         let error = quiet.value.known().expect("known") - quiet.truth.known().expect("simulated");
         let sigma = noisy.sigma.known().expect("determined");
         println!("{}: bias {error:+.2e}, {:+.2} sigma at 7 %", quiet.name, error / sigma);
-        // Remaining effects: encoder steps, sticking and the instants of reversal; measured at most 0.06
-        // sigma.
+        // Remaining effects: encoder steps, sticking and the instants of reversal; measured at
+        // most 0.06 sigma.
         assert!(error.abs() < sigma / 7.0, "{}: {error} of sigma {sigma}", quiet.name);
     }
 }

@@ -105,8 +105,8 @@ fn an_update_is_taken_on_request_without_a_step_of_torque_and_is_what_is_watched
     let unfaded = largest(&mut pair, None);
     let faded = largest(&mut same_phase, Some(ControlRequest::TakeUpdate));
     println!("largest step of torque in one tick: {unfaded} N m without, {faded} N m with the update");
-    // One count of the encoder steps the torque by some tenths of a N m, the fading by a 2000th of some 10 N
-    // m.
+    // One count of the encoder steps the torque by some tenths of a N m, the fading by a 2000th of some
+    // 10 N m.
     assert!(faded < unfaded + 0.2, "{faded} against {unfaded}");
     let mut pair = same_phase;
     assert_ne!(pair.leg.control().model(), Some(&old));

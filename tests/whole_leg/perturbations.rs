@@ -118,8 +118,8 @@ fn exchanged_connectors_and_wrong_directions_are_refused() {
 
 #[test]
 fn what_torque_cannot_see_is_accepted() {
-    // A wrong torque constant scales everything; an error of the last joint's zero turns that link's own
-    // frame.
+    // A wrong torque constant scales everything; an error of the last joint's zero turns that
+    // link's own frame.
     for perturbation in ["torque-constant=1.2", "zero=5@knee"] {
         let report = perturbed(perturbation, 1);
         assert!(report.accepted(), "{perturbation}: {:?}", report.reasons);

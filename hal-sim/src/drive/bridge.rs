@@ -11,10 +11,11 @@
 //!
 //! While both switches of a leg are off, its diodes conduct. A positive current then sees a pulse shorter by
 //! the dead time, a negative one a longer pulse. Nothing is averaged: [`Bridge::next_edge`] returns the next
-//! change, and between edges everything is constant. The duty is rounded to the timer's steps. Source:
-//! centre-aligned PWM with preload and dead time, as in the advanced timers of the STM32F405 (reference
-//! manual RM0090, chapter 17). Cost: some 20 operations per edge, 12 edges per period. Known limits: switches
-//! change instantly.
+//! change, and between edges everything is constant. The duty is rounded to the timer's steps.
+//! Source: centre-aligned PWM with preload and dead time, as in the advanced timers of the STM32F405
+//! (reference manual RM0090, chapter 17).
+//! Cost: some 20 operations per edge, 12 edges per period.
+//! Known limits: switches change instantly.
 
 use super::description::BridgeDescription;
 use super::motor::Terminal;

@@ -5,7 +5,8 @@
 //! index   : where (angle - index) / 2 pi passes a whole number; the counter is captured there
 //! ```
 //!
-//! Angles are the rotor's in rad, over all turns. Cost: one multiplication and one comparison per sample.
+//! Angles are the rotor's in rad, over all turns.
+//! Cost: one multiplication and one comparison per sample.
 
 use super::description::{CounterDescription, EncoderWiring};
 use crate::maths::floor;

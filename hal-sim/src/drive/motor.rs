@@ -21,9 +21,9 @@
 //! A step is the midpoint rule with constant terminal voltages and speed. For an output with both switches
 //! off, the diode that its current keeps open sets the voltage. Where the current could end within the step,
 //! the voltage is the one that ends the step at zero current, clamped to the diodes' limits. That is a
-//! complementarity problem, solved by implicit Euler, for several such outputs by Gauss-Seidel. Cost: two
-//! evaluations of the currents, some 60 operations. Known limits: sinusoidal flux, no saturation, no iron
-//! losses, magnets at constant temperature.
+//! complementarity problem, solved by implicit Euler, for several such outputs by Gauss-Seidel.
+//! Cost: two evaluations of the currents, some 60 operations.
+//! Known limits: sinusoidal flux, no saturation, no iron losses, magnets at constant temperature.
 
 use super::description::MotorDescription;
 use crate::maths::sin_cos;

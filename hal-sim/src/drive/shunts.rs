@@ -10,8 +10,9 @@
 //! by its time constant; the converter holds its output `delay` after the middle of the lower zero vector.
 //! After the edge the amplifier first has to settle. A duty that leaves the low side too little time reads
 //! wrong, here as on the board. Half of the range is zero current; a higher code is a current from the bridge
-//! into the motor. Sources: board facts in `description`. Cost: two exponentials and two random numbers per
-//! axis and period.
+//! into the motor.
+//! Sources: board facts in `description`.
+//! Cost: two exponentials and two random numbers per axis and period.
 
 use super::description::ShuntDescription;
 use crate::maths::{exp, nearest};

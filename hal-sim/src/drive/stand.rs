@@ -8,7 +8,8 @@
 //! ```
 //!
 //! The rotor moves once per PWM period by the mean torque of the period (symplectic Euler: 42 us). Angles and
-//! speeds are the rotor's, rad and rad/s; N m, kg m^2. Known limits: no elasticity.
+//! speeds are the rotor's, rad and rad/s; N m, kg m^2.
+//! Known limits: no elasticity.
 
 use super::axis::{Axis, PERIOD_S};
 use super::complete::{CompleteDrives, Rotor};

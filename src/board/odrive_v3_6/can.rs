@@ -103,8 +103,8 @@ pub fn give_up() {
     store(TSR, GIVE_UP);
 }
 
-/// State of the controller; an overrun is reported once. A controller that did not answer at the start is
-/// off.
+/// State of the controller; an overrun is reported once. A controller that did not answer at the
+/// start is off.
 pub fn status() -> Controller {
     if !TAKES_PART.load(Ordering::Relaxed) {
         return Controller::Off;

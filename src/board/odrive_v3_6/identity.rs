@@ -12,8 +12,8 @@ const STATED: [u8; 3] = stated(option_env!("SCARAB_BOARD_VOLTS"));
 pub struct Identity {
     /// Unique number, lowest word first.
     pub unique: [u32; 3],
-    /// Factory version: major, minor, voltage. Without a factory entry the version stated for the image, else
-    /// 255.
+    /// Factory version: major, minor, voltage. Without a factory entry the version stated for the
+    /// image, else 255.
     pub version: [u8; 3],
     /// Reason of the last reset.
     pub reset: Reset,

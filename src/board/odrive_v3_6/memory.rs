@@ -1,5 +1,7 @@
-//! Placement of large objects. The identification lies in core-coupled memory; its window of blocks, half of
-//! the total, in the other memory.
+//! Placement of large objects.
+//!
+//! The identification lies in core-coupled memory; its window of blocks, half of the total, in
+//! the other memory.
 #![expect(unsafe_code, reason = "a section of the linker's")]
 
 use static_cell::{ConstStaticCell, StaticCell};

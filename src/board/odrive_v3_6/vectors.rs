@@ -10,8 +10,8 @@ use super::hardware::Odrive;
 use super::{can, contacts, encoder};
 use crate::task;
 
-/// Enables the interrupts of emergency stop, converters, index pulses, bus and servo; their data must be in
-/// place.
+/// Enables the interrupts of emergency stop, converters, index pulses, bus and servo; their data must
+/// be in place.
 pub fn enable() {
     // SAFETY: called once, from `main`, outside any critical section. Levels are set, and the handlers take
     // their locks only by trying.
@@ -49,8 +49,8 @@ fn EXTI15_10() {
     encoder::index_came(1);
 }
 
-/// Moves received frames on. The controller holds three; a frame that arrives meanwhile raises this interrupt
-/// again.
+/// Moves received frames on. The controller holds three; a frame that arrives meanwhile raises
+/// this interrupt again.
 #[interrupt]
 fn CAN1_RX0() {
     for _ in 0..3 {

@@ -34,7 +34,7 @@ pub fn tighten() -> bool {
     set(0, 127)
 }
 
-/// Requests 8 s (5.4 to 15), longer than the flash may stall. The bridges are off meanwhile. Returns whether
+/// Requests 8 s (5.4 to 15), longer than the flash may stall. The bridges must be off. Returns whether
 /// they apply, as [`tighten`].
 pub fn stretch() -> bool {
     set(6, 1000)

@@ -38,7 +38,7 @@ impl Axis {
     }
 
     /// Resumes after a time without ticks, in which the outputs were off while the counter ran on. The
-    /// present count is accepted, whatever the step.
+    /// present count is accepted with any step.
     ///
     /// Set `long` where the counter may have wrapped. The position within a turn then stays valid only where
     /// the counter's range is a multiple of the turn, as 65,536 of 8,192; otherwise it is lost. Counts may be

@@ -7,8 +7,8 @@ impl Axis {
     pub const NUMBERS: u8 = 6;
 
     /// Flips one bit (of 32, from the lowest) of a constant. In order: current limit, square of the
-    /// overcurrent bound, both current-sensor offsets, sign of the current, proportional gain of the current
-    /// loop.
+    /// overcurrent bound, both current-sensor offsets, sign of the current, proportional gain of
+    /// the current loop.
     pub fn upset(&mut self, number: u8, bit: u8) {
         let constants = &mut self.constants;
         let [zero_b, zero_c] = &mut constants.zeros;

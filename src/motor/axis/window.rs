@@ -1,5 +1,4 @@
-//! Means of count and current between two joint samples. Both cover the same ticks and so belong to one
-//! instant.
+//! Means of count and current between two joint samples, over the same ticks and so for one instant.
 
 use crate::hal::JointSample;
 use crate::units::Ampere;

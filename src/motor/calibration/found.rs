@@ -99,8 +99,8 @@ impl Calibration {
         self.offset
     }
 
-    /// Electrical angle at a counter reading; since the calibration the counter may have moved by half of its
-    /// range.
+    /// Electrical angle at a counter reading; since the calibration the counter may have moved by half
+    /// of its range.
     #[must_use]
     pub fn angle_at(&self, scale: &CountScale, direction: Direction, counter: u16) -> ElectricalAngle {
         scale.angle(self.place_of(scale, direction, counter)).plus(self.offset)
@@ -118,8 +118,8 @@ impl Calibration {
         })
     }
 
-    /// This calibration for a counter that began so many counts further. For tests of its wrapping, host
-    /// only.
+    /// This calibration for a counter that began so many counts further. For tests of its
+    /// wrapping, host only.
     #[cfg(not(target_os = "none"))]
     #[must_use]
     pub fn with_counter_moved(&self, offset: u16) -> Self {

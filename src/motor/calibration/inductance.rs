@@ -1,5 +1,4 @@
-//! Inductances along and across the flux, measured by a square wave on top of the current that holds the
-//! rotor.
+//! Inductances along and across the flux, by a square wave on top of the current that holds the rotor.
 //!
 //! The voltage is offset by +u for two periods and by -u for two, first along the flux, then across it:
 //!

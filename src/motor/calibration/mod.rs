@@ -19,7 +19,7 @@
 //! | one shunt inverted | signs of the phase currents | [`Refusal::ShuntInverted`] |
 //! | both shunts inverted | signs of the phase currents | [`Refusal::ShuntsInverted`] |
 //! | shunts exchanged | signs of the phase currents | [`Refusal::ShuntsSwapped`] |
-//! | two motor leads, or A and B of the encoder exchanged | runs against field | [`Refusal::Direction`] |
+//! | two motor leads or A and B of the encoder exchanged | runs against field | [`Refusal::Direction`] |
 //! | encoder without counts, rotor blocked | travel | [`Refusal::NoCounts`] |
 //! | pole pairs | counts per electrical turn | [`Refusal::PolePairs`] |
 //! | counts per turn | counts per electrical turn | [`Refusal::CountsPerTurn`] |
@@ -43,9 +43,9 @@
 //! Results are valid for the calibrated configuration only: [`super::Axis::new`] refuses another direction,
 //! other pole pairs and other counts.
 //!
-//! Known limits: gain errors of shunts and of the bus divider scale R and L. A constant torque (gravity)
-//! shifts the offset by asin(torque / holding torque), friction does not. Calibrate with the leg hanging or
-//! unloaded.
+//! Known limits: gain errors of shunts and of the bus divider scale R and L. A constant torque
+//! (gravity) shifts the offset by asin(torque / holding torque), friction does not. Calibrate with the
+//! leg hanging or unloaded.
 
 mod field;
 mod found;

@@ -34,8 +34,8 @@ const RELEASE_TICKS: u32 = CURRENT_RATE_HZ / 10;
 const LEVEL_TICKS: u32 = 4 * CURRENT_RATE_HZ;
 /// Greatest relative difference of two means of a settled rotor.
 const SETTLED_SHARE: f32 = 0.002;
-/// A backward current beyond this share of the holding current is refused at once: the hold would drive it
-/// further.
+/// A backward current beyond this share of the holding current is refused at once: the hold would
+/// drive it further.
 const JUDGED_SHARE: f32 = 0.25;
 /// Tangent of 15 degrees, the greatest angle between voltage and current.
 const GREATEST_BEND: f32 = 0.268;

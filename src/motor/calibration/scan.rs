@@ -13,8 +13,8 @@
 //! Checks of the forward pass, in this order:
 //!
 //! 1. The counter moved at all, and in the field's direction.
-//! 2. Equal travel in every electrical turn of the field. Otherwise the rotor slipped, and its counts mean
-//!    nothing.
+//! 2. Equal travel in every electrical turn of the field. Otherwise the rotor slipped, and its
+//!    counts mean nothing.
 //! 3. Travel of one turn's counts to 0.4 of an electrical turn: detects other pole pairs.
 //! 4. Drift of the deviation: detects slightly different counts per turn.
 //! 5. Deviations within 90 degrees of the first.

@@ -50,8 +50,8 @@ impl Track {
 /// drift per turn = sum(x deviation) / sum(x^2)           x field turns from the middle of the way
 /// ```
 ///
-/// Sums are integers, in 2^-32 turns for the mean, in 2^-12 and 2^-16 for the line: exact for the longest
-/// pass.
+/// Sums are integers, in 2^-32 turns for the mean, in 2^-12 and 2^-16 for the line: exact for
+/// the longest pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Deviation {
     first: ElectricalAngle,

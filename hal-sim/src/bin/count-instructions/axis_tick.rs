@@ -1,5 +1,4 @@
-//! One axis' tick as the 24 kHz interrupt calls it: calibrated, with noise, at four speeds, up to the voltage
-//! limit.
+//! One axis' tick, calibrated, with noise, at four speeds up to the voltage limit.
 
 use core::hint::black_box;
 

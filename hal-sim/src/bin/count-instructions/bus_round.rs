@@ -1,5 +1,6 @@
-//! Cost of a board's bus rounds on a full wire: the interrupt of level 5 with its queues, without the
-//! controller's registers.
+//! Cost of a board's bus rounds on a full wire.
+//!
+//! Counted is the interrupt of level 5 with its queues, without the controller's registers.
 //!
 //! Each received frame raises a round, each sent frame another, and every second servo tick a third. A wire
 //! at 1 Mbit/s limits the number: frames without data have 47 bits, those of eight bytes 111, stuff bits not

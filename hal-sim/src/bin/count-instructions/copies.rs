@@ -1,5 +1,4 @@
-//! Memory copies (`scarab::board::copy`): correct at every length and alignment without touching other bytes,
-//! and their cost.
+//! Memory copies (`scarab::board::copy`): correctness at every length and alignment, and cost.
 
 use core::hint::black_box;
 

@@ -1,7 +1,8 @@
-//! TIM5's counter as QEMU models it: 1 GHz without being enabled, which at `-icount shift=0` is one per
-//! instruction.
+//! Instruction counter: TIM5 as QEMU models it.
 //!
-//! No documentation promises that. So [`start`] first counts a hundred `nop`, and nothing is measured where
+//! The timer runs at 1 GHz without being enabled, which at `-icount shift=0` is one count per instruction.
+//!
+//! No documentation promises that, so [`start`] first counts a hundred `nop`, and nothing is measured where
 //! they are not a hundred.
 
 use core::hint::black_box;

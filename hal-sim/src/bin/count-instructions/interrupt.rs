@@ -1,6 +1,7 @@
-//! The whole current interrupt, from its vector to its return. The work: read converters, contacts and
-//! counters, decide, run both axes' current loops, update queues and counters of the levels, write compare
-//! values and outputs.
+//! The whole current interrupt, from its vector to its return.
+//!
+//! Counted work: read converters, contacts and counters, decide, run both axes' current loops, update queues
+//! and counters of the levels, write compare values and outputs.
 //!
 //! Why: one axis' tick alone is little more than half of it. The handler is the flash image's own, with
 //! memory words in place of registers ([`crate::machine`]). Since this machine has no such converters, the
@@ -171,8 +172,8 @@ impl Bench {
         Self { motors, samples: [AxisSample::default(); AXES], ends, tally: Tally::default() }
     }
 
-    /// Sets the motors' speed and starts the axes with bridges off. Returns the dearest interrupt with an
-    /// order.
+    /// Sets the motors' speed and starts the axes with bridges off. Returns the dearest interrupt
+    /// with an order.
     fn begin(&mut self, calibrations: &[Calibration; AXES], speed_rad_per_s: f32) -> Option<u32> {
         SIGNALS.set_targets(&DriveCommand::RELEASED);
         self.tally = Tally::default();

@@ -1,5 +1,4 @@
-//! The default leg (`hal-sim/legs/x2-wearer-75kg.toml`) in the device's precision, and the motion designed
-//! for it.
+//! The default leg (`hal-sim/legs/x2-wearer-75kg.toml`) in the device's precision, and its designed motion.
 
 use nalgebra::{Matrix3, Vector3};
 use scarab::ident::{

@@ -1,5 +1,6 @@
-//! The 4 kHz tick of a leg, following a motion with its model in the feedforward, or following a host. The
-//! tick comprises motion, model, observers, controllers, monitor and log.
+//! The 4 kHz tick of a leg, following a motion with its model in the feedforward, or following a host.
+//!
+//! The tick comprises motion, model, observers, controllers, monitor and log.
 //!
 //! One function does all of it, as in the image: code with a second caller would be compiled differently.
 

@@ -1,6 +1,8 @@
-//! Counts instructions on the emulated microcontroller. It counts one axis' tick and its parts, the same
-//! steps of the crate `foc`, the whole current interrupt and a leg's 4 kHz tick. Further, the steps of its
-//! identification, the iterations of the default swarm and the frames of the bus.
+//! Counts instructions on the emulated microcontroller.
+//!
+//! Counted work: one axis' tick and its parts, the same steps of the crate `foc`, the whole current
+//! interrupt, a leg's 4 kHz tick. Further work: the steps of its identification, the iterations of the
+//! default swarm, the frames of the bus.
 //!
 //! Why instructions: the emulator executes exactly the same number every time, and models neither flash wait
 //! states nor pipeline. `scripts/count-instructions` builds and runs this image

@@ -1,5 +1,4 @@
-//! Compares the published crate `foc` (16.16 fixed point) with the same steps of this firmware in single
-//! precision.
+//! Compares the crate `foc` (16.16 fixed point) with the same steps of this firmware in single precision.
 //!
 //! Its update is sine and cosine (CORDIC), Clarke, Park, two PI controllers, Park back and space vectors. The
 //! crate targets processors without floating point; the comparison uses it because it is what a crate

@@ -6,7 +6,7 @@
 //! | module | replaces |
 //! | --- | --- |
 //! | [`clock`] | timers: SysTick at 24 kHz, the executors' time, a clock that counts instructions |
-//! | [`axes`] | converters and bridges: two axes on simulated sensors, no output |
+//! | [`axes`] | converters and bridges: two axes on simulated sensors |
 //! | [`machine`] | registers: only the servo can be requested |
 //! | [`plant`] | the leg: `hal_sim::world` with ideal drives, one step per servo tick, outside firmware time |
 //! | [`vectors`] | interrupts and their levels |

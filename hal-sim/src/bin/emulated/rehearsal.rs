@@ -1,5 +1,4 @@
-//! Crashes on request: one, in the middle of a run, selected on the emulator's command line
-//! (`cargo emulate --crash`).
+//! One crash per run, selected on the emulator's command line (`cargo emulate --crash`).
 //!
 //! Why in this image: current loops, servo, executors and identification run as usual, and the crash handler
 //! must work at their levels. After the crash the image starts again, as on the board. This module determines
@@ -60,8 +59,8 @@ struct Kept {
 #[unsafe(link_section = ".uninit.rehearsal")]
 static mut KEPT: MaybeUninit<Kept> = MaybeUninit::uninit();
 
-/// Servo tick from which on the crash is due, at thread level or in the servo's interrupt; without one the
-/// largest.
+/// Servo tick from which on the crash is due, at thread level or in the servo's interrupt; without
+/// one the largest.
 static DUE_IN_THREAD: AtomicU32 = AtomicU32::new(u32::MAX);
 static DUE_IN_SERVO: AtomicU32 = AtomicU32::new(u32::MAX);
 /// Kind of the crash at thread level.

@@ -10,8 +10,8 @@
 //! goes first). A controller in bus-off recovers by itself after 128 times eleven recessive bits; recovery
 //! enables nothing.
 //!
-//! Source: `Board/v3/Src/can.c:62-66, 111-119`, `communication/can/odrive_can.cpp:76-80`; registers RM0090
-//! 32.9.
+//! Source: `Board/v3/Src/can.c:62-66, 111-119`, `communication/can/odrive_can.cpp:76-80`;
+//! registers RM0090 32.9.
 
 use super::Write;
 use super::pins::{Mode, Pin, Pull, port};

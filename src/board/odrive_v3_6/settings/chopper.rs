@@ -6,9 +6,9 @@
 //! 84 MHz / (2 * 4096) = 10.25 kHz
 //! ```
 //!
-//! No hardware separates both sides, only the compare values do. Source: `Board/v3/Inc/main.h:72-74`,
-//! `Src/tim.c:158-186`, `MotorControl/low_level.cpp:97-136`; registers RM0090 18.4. Without a brake resistor
-//! the off state remains.
+//! No hardware separates both sides, only the compare values do.
+//! Source: `Board/v3/Inc/main.h:72-74`, `Src/tim.c:158-186`, `MotorControl/low_level.cpp:97-136`; registers
+//! RM0090 18.4. Without a brake resistor the off state remains.
 
 use super::Write;
 

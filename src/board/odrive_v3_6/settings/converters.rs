@@ -1,5 +1,4 @@
-//! ADC1 to ADC3: currents of both axes at the middle of their zero vectors, supply and temperatures beside
-//! them.
+//! ADC1 to ADC3: currents of both axes at the middle of their zero vectors, supply and temperatures.
 //!
 //! ```text
 //! TIM1 trigger -> injected: ADC2 B, ADC3 C of axis 0; ADC1 bus voltage, thermistors   interrupt from ADC3

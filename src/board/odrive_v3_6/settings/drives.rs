@@ -1,6 +1,7 @@
-//! Axis configurations of a leg on this board, and limits for their motors. Check these numbers before the
-//! first power-on of another machine (docs/board.md). The calibration measures what it can, and refuses
-//! contradictions.
+//! Axis configurations of a leg on this board, and limits for their motors.
+//!
+//! Check these numbers before the first power-on of another machine (docs/board.md). The calibration measures
+//! what it can, and refuses contradictions.
 
 use super::analog;
 use crate::leg::{DeratingRamps, LegDescription, MotorDescription};

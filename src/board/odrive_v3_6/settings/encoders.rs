@@ -1,5 +1,6 @@
-//! TIM3 and TIM4 count the encoders of axis 0 and 1, all four edges of a line. The index pulses use external
-//! interrupts (`external`).
+//! TIM3 and TIM4 count the encoders of axis 0 and 1, all four edges of a line.
+//!
+//! The index pulses use external interrupts (`external`).
 //!
 //! An edge counts when its level has lasted for six samples of half the timer's clock: 0.14 us.
 //! Source: `Board/v3/board.cpp:98-107,218-221`, `Src/tim.c:195-246`; registers RM0090 18.4.

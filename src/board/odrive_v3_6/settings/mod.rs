@@ -68,8 +68,8 @@ const RCC: u32 = 0x4002_3800;
 const FLASH: u32 = 0x4002_3C00;
 const DEBUG: u32 = 0xE004_2000;
 
-/// Flash prefetch and both caches, which reset and `embassy-stm32` leave off (RM0090 3.9.1: PRFTEN, ICEN,
-/// DCEN).
+/// Flash prefetch and both caches, which reset and `embassy-stm32` leave off (RM0090 3.9.1:
+/// PRFTEN, ICEN, DCEN).
 pub const CACHES: [Write; 1] = [Write::bits("FLASH_ACR", FLASH, 7 << 8, 7 << 8)];
 
 /// Clock enables of the used peripherals (RM0090 7.3): ports A to D; TIM2, TIM3, TIM4; TIM1, TIM8, ADC1 to

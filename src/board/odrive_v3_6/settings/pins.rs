@@ -1,5 +1,6 @@
-//! Function of every used pin. Source: `Board/v3/Inc/main.h:77-156`, `board.cpp:35-254`; registers RM0090
-//! 8.4.
+//! Function of every used pin.
+//!
+//! Source: `Board/v3/Inc/main.h:77-156`, `board.cpp:35-254`; registers RM0090 8.4.
 //!
 //! Pins of the bus: [`super::can`]. Unused and left in their reset state: UART_A (PA0, PA1), USB (PA11,
 //! PA12), GPIO6 to 8 (PB2, PA15, PB3).
@@ -15,8 +16,8 @@ pub enum Mode {
     Input(Pull),
     /// Digital output, initially high or low.
     Output(bool),
-    /// Alternate function, by number; the pull acts on inputs, and on outputs until the peripheral drives
-    /// them.
+    /// Alternate function, by number; the pull acts on inputs, and on outputs until the
+    /// peripheral drives them.
     Alternate(u32, Pull),
 }
 

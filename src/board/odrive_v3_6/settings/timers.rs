@@ -111,8 +111,8 @@ pub const fn ready() -> [Write; 4] {
     ]
 }
 
-/// Starts both: TIM1's enable starts TIM8 in the same cycle (its internal trigger 0 is TIM1, RM0090 table
-/// 93).
+/// Starts both: TIM1's enable starts TIM8 in the same cycle (its internal trigger 0 is TIM1,
+/// RM0090 table 93).
 pub const LOCK_AND_START: [Write; 3] = [
     Write::whole("TIM1_CR2", BASES[0] + 0x04, 0b001 << 4),
     Write::whole("TIM8_SMCR", BASES[1] + 0x08, 0b110),
