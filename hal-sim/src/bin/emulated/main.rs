@@ -8,7 +8,7 @@
 //! | [`clock`] | timers: SysTick at 24 kHz, the executors' time, a clock that counts instructions |
 //! | [`axes`] | converters and bridges: two axes on simulated sensors |
 //! | [`machine`] | registers: only the servo can be requested |
-//! | [`plant`] | the leg: `hal_sim::world` with ideal drives, one step per servo tick, outside firmware time |
+//! | [`plant`] | the leg: `hal_sim::world` with ideal drives, a step per servo tick, outside firmware time |
 //! | [`vectors`] | interrupts and their levels |
 //! | [`bridges`] | the bridges' main outputs, which only a crash writes |
 //! | [`rehearsal`] | causes of crashes |
