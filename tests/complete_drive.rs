@@ -1,4 +1,4 @@
-//! A leg identified through its board's current loops, motors and converters, beside the same with ideal drives.
+//! A leg identified through its board's current loops, motors and converters, compared with ideal drives.
 
 use hal_sim::tool::identify::{identify_many, identify_one};
 use hal_sim::tool::leg_file::{DEFAULT_LEG, LegFile};
@@ -19,7 +19,7 @@ fn identified(options: &SimulationOptions) -> RunReport {
     identify_one::<2, 13>(&leg(), options, None).expect("it runs").0
 }
 
-/// Name of each base parameter and how far it lies from that of ideal drives, in sigma of the latter.
+/// Name of each base parameter, and its deviation from that of ideal drives in sigma of the latter.
 fn deviations(ideal: &RunReport, full: &RunReport) -> Vec<(String, f64)> {
     let known = |number: Number| number.known().expect("solved");
     let pairs = ideal.base_parameters.iter().zip(&full.base_parameters);
@@ -39,7 +39,7 @@ fn parameters_found_through_complete_drives_are_those_of_ideal_ones_within_half_
     let (ideal, full) = (identified(&options(DriveModel::Ideal)), identified(&options(DriveModel::Full)));
     assert!(full.accepted(), "{:?}", full.reasons);
     assert_eq!((ideal.drive, full.drive), (Some("ideal"), Some("full")));
-    // The noise of the logged torque is the same in both runs: only drives and sensors differ.
+    // The noise of the logged torque is identical in both runs: only drives and sensors differ.
     let found = deviations(&ideal, &full);
     assert!(largest(&found) < 0.5, "{found:?}");
     // A trigger 40 clocks before the middle of the zero vector reads as viscous friction of the knee.
@@ -52,7 +52,7 @@ fn parameters_found_through_complete_drives_are_those_of_ideal_ones_within_half_
     assert!((3.0..6.0).contains(friction), "{found:?}");
 }
 
-/// `cargo test --release --test complete_drive -- --ignored --nocapture twenty` takes some two minutes.
+/// Run: `cargo test --release --test complete_drive -- --ignored --nocapture twenty`, some two minutes.
 #[test]
 #[ignore = "forty runs, half of them through complete drives"]
 fn twenty_legs_through_complete_drives_are_those_of_ideal_ones_within_half_a_sigma() {
@@ -102,7 +102,7 @@ fn a_leg_with_its_board_is_one_value_that_repeats_to_the_bit() {
     let torque = pair.world.motor_torque();
     let held = pair.world.inverse_dynamics(&pair.world.anatomical_position(), &[0.0; 2], &[0.0; 2]);
     for joint in 0..2 {
-        // The drive holds the leg against gravity; friction takes what it can.
+        // The drive holds the leg against gravity; friction may take its share.
         assert!((torque[joint] - held[joint]).abs() < 6.0, "{torque:?} {held:?}");
     }
     assert!(pair.board.as_ref().is_some_and(|board| board.fault().is_none()));

@@ -1,4 +1,4 @@
-//! What held-out motions say of a model: synthetic torque of one leg, identified with the geometry of another.
+//! Findings of held-out motions: synthetic torque of one leg, identified with the geometry of another.
 
 use nalgebra::Vector3;
 use rand_core::{Rng, SeedableRng};
@@ -12,7 +12,7 @@ const GRAVITY: Vector3<f64> = Vector3::new(9.81, 0.0, 0.0);
 const LENGTH_M: f64 = 0.42;
 const NOISE_NM: [f64; 2] = [0.4, 0.15];
 
-/// XX XY XZ YY YZ ZZ HX HY HZ M IA FC FV OFF of a thigh and a shank.
+/// Parameters XX XY XZ YY YZ ZZ HX HY HZ M IA FC FV OFF of a thigh and a shank.
 const TRUTH: LegParameters<f64, 2> = [
     [0.03, -0.016, 0.0, 0.5, 0.0, 0.506, 1.7, 0.10, 0.0, 8.5, 0.12, 3.0, 1.2, 0.4],
     [0.013, 0.011, 0.0, 0.25, 0.0, 0.2546, 0.864, -0.072, 0.0, 4.8, 0.08, 2.0, 0.8, -0.3],
@@ -50,8 +50,8 @@ struct Found {
     residual: Residual<f32, 2>,
 }
 
-/// Identifies with a believed length (m) and zeros (rad off), and looks at two held-out motions, on which `disturbed`
-/// adds to the torque of both joints.
+/// Identifies with an assumed length (m) and zero errors (rad), and evaluates two held-out motions. On these
+/// `disturbed` adds to the torque of both joints.
 fn look(length_m: f64, zeros: [f64; 2], noise: [f64; 2], seed: u64, disturbed: impl Fn(f64) -> f64) -> Found {
     let model = believed(length_m);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -115,7 +115,7 @@ fn the_first_joints_zero_is_seen_and_the_last_ones_is_not() {
     println!("{:?}", found.misalignments);
     let (delta, sigma) = of(&found, Direction::Zero, 0).expect("seen");
     assert!((delta.abs() - 0.087).abs() < 0.03 && delta.abs() > 5.2 * sigma, "{delta} {sigma}");
-    // The zero of the last joint turns that link's own frame: its first moments absorb it.
+    // An error of the last joint's zero turns that link's own frame: its first moments absorb it.
     assert_eq!(of(&found, Direction::Zero, 1), None);
 }
 
@@ -126,13 +126,13 @@ fn a_leg_as_believed_asks_for_nothing() {
         let found = look(LENGTH_M, [0.0; 2], NOISE_NM, seed, |_| 0.0);
         for found in &found.misalignments {
             worst = worst.max(f64::from((found.delta / found.sigma).abs()));
-            // A direction may leave nothing of another.
+            // A direction may be fully explained by another.
             let (delta, sigma) = found.beside.unwrap_or((0.0, 1.0));
             worst = worst.max(f64::from((delta / sigma).abs()));
         }
     }
     println!("{worst}");
-    // Of 40 standard normal numbers one in 15 sets has one beyond 3.
+    // Among sets of 40 standard normal numbers, one in 15 has a number beyond 3.
     assert!(worst < 4.0, "{worst} sigma");
 }
 
@@ -142,7 +142,7 @@ fn a_disturbance_of_both_joints_is_timed() {
     let found = look(LENGTH_M, [0.0; 2], NOISE_NM, 3, pushed);
     let seen = f64::from(found.residual.longest_common_s);
     println!("{seen} s");
-    // Rows in which a joint rests are no part of it; the filter adds its flanks.
+    // Rows of a resting joint are excluded; the filter adds its flanks.
     assert!((1.5..=2.6).contains(&seen), "{seen} s");
     let quiet = look(LENGTH_M, [0.0; 2], NOISE_NM, 3, |_| 0.0);
     assert!(quiet.residual.longest_common_s < 0.1);
@@ -164,8 +164,8 @@ fn noise_is_not_slow_and_a_forgotten_swing_is() {
         let residual = &swing.residual.joints[joint];
         let slow = f64::from(residual.slow(true));
         println!("{slow} of {} pairs, by chance {}", residual.pairs(true), by_chance(joint, &swing));
-        // 2 N m of amplitude are 1.41 rms; half a second's mean of it loses 1 %, neighbours 12 %, and 9.5 s are not a
-        // whole number of periods.
+        // An amplitude of 2 N m is 1.41 rms. Its mean over half a second loses 1 %, the product of neighbours
+        // 12 %, and 9.5 s are not a whole number of periods.
         assert!(
             residual.pairs(true) > 10 && (slow - 1.35).abs() < 0.3 && slow > 3.0 * by_chance(joint, &swing)
         );

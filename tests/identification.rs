@@ -1,6 +1,6 @@
 //! Identification on synthetic motion: torque from Newton-Euler in double precision, noise of known size.
 //!
-//! No plant here: the question is whether the filter chain, the factor and the statistics keep their promises.
+//! Without a plant: these tests check the filter chain, the information factor and the statistics alone.
 
 use nalgebra::Vector3;
 use rand_core::{Rng, SeedableRng};
@@ -26,7 +26,7 @@ fn model<T: scarab::real::Real>() -> RowModel<T, 2, BASE> {
     RowModel::new(chain, gravity, base)
 }
 
-/// XX XY XZ YY YZ ZZ HX HY HZ M IA FC FV OFF of a thigh and a shank.
+/// Parameters XX XY XZ YY YZ ZZ HX HY HZ M IA FC FV OFF of a thigh and a shank.
 const TRUTH: LegParameters<f64, 2> = [
     [0.03, -0.016, 0.0, 0.5, 0.0, 0.506, 1.7, 0.10, 0.0, 8.5, 0.12, 3.0, 1.2, 0.4],
     [0.013, 0.011, 0.0, 0.25, 0.0, 0.2546, 0.864, -0.072, 0.0, 4.8, 0.08, 2.0, 0.8, -0.3],
@@ -106,7 +106,8 @@ fn noise_free_torque_gives_the_base_parameters_back() {
     for plan in [Plan::OneTime, Plan::Sequential] {
         let found = estimate(22.0, 0.0, 1, plan);
         for (value, truth) in found.values.iter().zip(true_base()) {
-            // Flatness of the filter 1.6e-4, single precision, and a sign that changes between two samples.
+            // Tolerance: flatness of the filter 1.6e-4, single precision, and a sign change
+            // between two samples.
             assert!((f64::from(*value) - truth).abs() < 2e-3 * truth.abs().max(0.5), "{value} {truth}");
         }
     }
@@ -127,7 +128,7 @@ fn reported_sigma_has_the_coverage_it_claims() {
             }
         }
         let share = |count: u32| f64::from(count) / f64::from(all);
-        // 780 correlated draws: the binomial spread of 68 % is 1.7 %, of parameters within a run about 4 %.
+        // The 780 draws are correlated: the binomial spread of 68 % is 1.7 %, within a run about 4 %.
         assert!((0.60..=0.76).contains(&share(within_one)), "{plan:?}: {}", share(within_one));
         assert!(share(within_three) >= 0.98, "{plan:?}: {}", share(within_three));
     }
@@ -198,7 +199,7 @@ fn a_joint_that_does_not_move_is_refused_as_unexcited() {
         let mut state = motion(f64::from(index) / 500.0);
         (state.q[0], state.qd[0], state.qdd[0]) = (0.4, 0.0, 0.0);
         let noisy = torque(&state).map(|exact| (exact + 0.3 * normal.next()) as f32);
-        // The encoder of the joint that stands still shows the last bit of a 14-bit disc.
+        // The encoder of the resting joint flickers in the last bit of a 14-bit disc.
         let flicker = (3.8e-4 * (0.5 + 0.5 * normal.next()).round()) as f32;
         recorder.push(&model, &[state.q[0] as f32 + flicker, state.q[1] as f32], &noisy);
     }

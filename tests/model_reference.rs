@@ -1,4 +1,4 @@
-//! The chain against torques and regressors of an independent rigid-body library (`tests/data/planar_hip_knee`).
+//! The chain compared with an independent rigid-body library (`tests/data/planar_hip_knee`).
 
 use nalgebra::Vector3;
 use scarab::model::{
@@ -14,7 +14,7 @@ struct Sample {
     state: JointState<f64, 2>,
     rigid: [f64; 2],
     friction: [f64; 2],
-    /// Per torque: ten columns of link 1, ten of link 2.
+    /// Rows for each torque: ten columns of link 1, ten of link 2.
     rows: [[f64; 20]; 2],
 }
 
@@ -71,7 +71,8 @@ fn leg() -> (Chain<f64, 2>, LegParameters<f64, 2>, Vector3<f64>) {
     (Chain::new(&geometry).unwrap(), parameters, gravity)
 }
 
-/// Greatest deviations from the reference in precision `T`, relative to the greatest torque and the greatest entry.
+/// Greatest deviations from the reference in precision `T`, relative to the greatest torque and
+/// the greatest entry.
 fn deviations<T: Real>() -> (f64, f64) {
     let (chain, parameters, gravity) = leg();
     let chain = chain.convert::<T>();
@@ -106,14 +107,14 @@ fn deviations<T: Real>() -> (f64, f64) {
 #[test]
 fn torque_and_regressor_agree_with_the_reference_in_double_precision() {
     let (torque, entry) = deviations::<f64>();
-    // The files carry 15 digits.
+    // Tolerance: the files have 15 digits.
     assert!(torque < 1e-9 && entry < 1e-9, "torque {torque:e}, regressor {entry:e}");
 }
 
 #[test]
 fn torque_and_regressor_agree_with_the_reference_in_single_precision() {
     let (torque, entry) = deviations::<f32>();
-    // About ten roundings of 6e-8, on angles that are rounded themselves.
+    // Tolerance: about ten roundings of 6e-8, on angles that are rounded themselves.
     assert!(torque < 1e-4 && entry < 1e-4, "torque {torque:e}, regressor {entry:e}");
 }
 

@@ -1,4 +1,4 @@
-//! What is remembered over the power, against a flash whose power fails at any byte.
+//! Persistent data, tested on a flash with a power failure at any byte.
 
 use embassy_futures::block_on;
 use hal_sim::flash::{Flash, FlashError};
@@ -15,7 +15,7 @@ use scarab::units::{Celsius, Henry, Metre, NewtonMetre, NewtonMetrePerAmpere, Oh
 /// Short sectors, so that every byte of every operation can be the last one.
 const SECTOR: usize = 2048;
 type Small = Flash<SECTOR, 2>;
-/// As on the board: two sectors of 128 KB.
+/// Flash as on the board: two sectors of 128 KB.
 type Board = Flash<{ 128 * 1024 }, 2>;
 
 fn permit() -> Permit {
@@ -61,7 +61,7 @@ fn store<const BYTES: usize>(flash: Flash<BYTES, 2>) -> Store<Flash<BYTES, 2>> {
     Store::new(flash, 0..2 * BYTES as u32).expect("two sectors")
 }
 
-/// All that is kept in a flash, read by a firmware that has just started.
+/// All data stored in a flash, as read by a firmware that has just started.
 #[derive(Clone, Debug, PartialEq)]
 struct Content {
     calibrations: [Option<KeptCalibration>; 2],
@@ -81,7 +81,7 @@ fn content<const BYTES: usize>(flash: Flash<BYTES, 2>) -> Result<(Content, Flash
     Ok((Content { calibrations, model, objects }, store.into_flash()))
 }
 
-/// The `number`th thing an operator has kept.
+/// Stores the operator's `number`th change.
 fn keep<const BYTES: usize>(store: &mut Store<Flash<BYTES, 2>>, number: u32) -> Result<Saved, SaveError> {
     let permit = permit();
     match number % 5 {
@@ -161,7 +161,7 @@ fn a_power_cut_at_any_byte_leaves_the_old_or_the_new() {
             let new = found == after;
             assert!(new || found == before, "{number}, byte {cut}: neither old nor new:\n{found:?}");
             torn[usize::from(new)] += 1;
-            // And what is kept after it is kept.
+            // Data stored afterwards is stored correctly.
             let mut again = self::store(next);
             keep(&mut again, number + 1).unwrap_or_else(|error| panic!("{number}, byte {cut}: {error:?}"));
             let (last, _) = content(again.into_flash()).unwrap();
@@ -179,7 +179,7 @@ fn a_power_cut_at_any_byte_leaves_the_old_or_the_new() {
     assert!(flash.erasures().iter().all(|erased| *erased >= 1), "{:?}", flash.erasures());
 }
 
-/// A second cut while what the first one left is being repaired.
+/// A second cut during the repair after the first one.
 #[test]
 fn a_cut_during_the_repair_of_a_cut_leaves_the_old_or_the_new() {
     let mut flash = Small::new(11);
@@ -199,7 +199,7 @@ fn a_cut_during_the_repair_of_a_cut_leaves_the_old_or_the_new() {
         let mut first = store(dying);
         let _ = keep(&mut first, number);
         let mut dead = first.into_flash();
-        // Twice more, within what a repair may need: a sector erased and records copied.
+        // Cuts the power twice more, within the work of a repair: a sector erased and records copied.
         for _ in 0..2 {
             dead.fail_after(Some(1 + draw(3 * SECTOR as u64)));
             let mut again = store(dead);
@@ -213,7 +213,7 @@ fn a_cut_during_the_repair_of_a_cut_leaves_the_old_or_the_new() {
     }
 }
 
-/// Corrupt, foreign, older, newer: refused by name or read rightly, never something in between, never a panic.
+/// Corrupt, foreign, older or newer data: refused by name or read correctly, never a mixture, never a panic.
 #[test]
 fn spoilt_flash_gives_what_was_kept_or_an_error() {
     let mut kept = store(Small::new(3));
@@ -229,7 +229,7 @@ fn spoilt_flash_gives_what_was_kept_or_an_error() {
         match content(spoilt) {
             Ok((found, _)) if found == whole => whole_count += 1,
             Ok((found, _)) => {
-                // What is still there is what was kept once.
+                // Remaining data equals data that was stored once.
                 assert!(found.calibrations[0].is_none() || found.calibrations[0] == whole.calibrations[0]);
                 assert!(found.calibrations[1].is_none() || found.calibrations[1] == whole.calibrations[1]);
                 assert!(found.model.is_none() || found.model == Some(model(2)) || found.model == whole.model);
@@ -311,7 +311,7 @@ fn a_flash_without_power_is_an_error_of_the_flash() {
     let _: FlashError = FlashError::NoPower;
 }
 
-/// 10,000 accepted models on the board's sectors.
+/// Stores 10,000 accepted models on the board's sectors.
 #[test]
 fn ten_thousand_models_wear_a_sector_little() {
     let mut store = store(*Box::new(Board::new(1)));
@@ -325,7 +325,7 @@ fn ten_thousand_models_wear_a_sector_little() {
         "10,000 models: {worked} bytes programmed, erasures {:?} of 10,000 that a sector stands",
         flash.erasures()
     );
-    // 204 bytes a record with its log's: some 640 in a sector.
+    // A record with its log's header has 204 bytes: some 640 in a sector.
     assert!(flash.erasures().iter().all(|&erased| erased <= 15), "{:?}", flash.erasures());
 }
 
@@ -333,7 +333,7 @@ fn keeper(flash: Small) -> Keeper<Small, 2> {
     Keeper::new(store(flash))
 }
 
-/// What a keeper that has just started finds: calibrations, generation of the model, bytes of the first node.
+/// Data found by a keeper after a start: calibrations, generation of the model, bytes of the first node.
 fn found(flash: Small) -> ([Option<StoredCalibration>; 2], Option<u32>, Vec<u8>, Small) {
     let mut keeper = keeper(flash);
     let calibrations = [0, 1].map(|axis| block_on(keeper.calibration(axis)));
@@ -347,7 +347,7 @@ fn found(flash: Small) -> ([Option<StoredCalibration>; 2], Option<u32>, Vec<u8>,
 fn a_host_that_saves_keeps_objects_calibrations_and_the_model() {
     let stored = [1, 2].map(|number| calibration(number).0);
     let mut first = keeper(Small::new(1));
-    // One axis passed: its calibration waits for the other's.
+    // Only one axis passed: its calibration waits for the other's.
     first.calibrated(0, Some(stored[0]));
     assert_eq!(block_on(first.keep(&permit(), [b"hip", b"knee"], 4)), Some(4));
     let (calibrations, generation, objects, flash) = found(first.into_flash());
@@ -357,7 +357,7 @@ fn a_host_that_saves_keeps_objects_calibrations_and_the_model() {
     stored.iter().enumerate().for_each(|(axis, stored)| second.calibrated(axis, Some(*stored)));
     second.accept(model(9));
     assert_eq!(block_on(second.keep(&permit(), [b"HIP", b"knee"], 4)), Some(5));
-    // Kept once.
+    // Nothing changed, so nothing new is stored.
     assert_eq!(block_on(second.keep(&permit(), [b"HIP", b"knee"], 5)), Some(5));
     let (calibrations, generation, objects, _) = found(second.into_flash());
     assert_eq!((calibrations, generation, &objects[..]), (stored.map(Some), Some(5), &b"HIP"[..]));

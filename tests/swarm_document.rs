@@ -1,4 +1,4 @@
-//! `docs/bso.md` says what the code does: constants and settings; and the example's objective can be solved.
+//! Compares `docs/bso.md` with the code's constants and settings, and solves the example's objective.
 
 #[path = "../examples/damped_oscillation/objective.rs"]
 mod objective;
@@ -9,7 +9,7 @@ use std::fs;
 use objective::{BOX, DampedOscillation, UNKNOWNS, oscillation};
 use scarab::swarm::{AdaptiveSettings, Bso, BsoSettings, Search};
 
-/// The files whose constants make up the default swarm.
+/// Files with the constants of the default swarm.
 const FILES: [&str; 5] = [
     "particles.rs",
     "beetle_swarm/adaptive.rs",
@@ -37,7 +37,7 @@ fn documented() -> BTreeMap<String, f64> {
     document.lines().filter_map(row).collect()
 }
 
-/// `const NAME: f64 = number;` of the code, tests left out.
+/// Constants `const NAME: f64 = number;` of the code, without tests.
 fn constants() -> BTreeMap<String, f64> {
     let mut constants = BTreeMap::new();
     for file in FILES {
@@ -103,7 +103,7 @@ fn a_damped_oscillation_is_found_in_either_precision_from_any_seed() {
         let cost = DampedOscillation { samples: &samples, interval: T::of(0.02) };
         let mut swarm =
             Bso::<T, 20, UNKNOWNS>::new(&cost, BsoSettings::default(), seed).expect("the box is valid");
-        // 1e-5 V^2 is 3 mV of 2 V: only the right frequency and phase come so near
+        // A cost of 1e-5 V^2 is 3 mV of 2 V: only the right frequency and phase reach it.
         swarm.reach(&cost, T::of(1e-5), 500)
     }
     assert!(BOX.iter().all(|&(_, _, low, high)| low < high));

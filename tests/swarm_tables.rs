@@ -1,8 +1,8 @@
-//! The searches against the tables they were published with: iterations to within 0.1 of the known minimum.
+//! The searches compared with their published tables: iterations to within 0.1 of the known minimum.
 //!
-//! Known figures (median / 95 % iterations of 200 to 1,000 runs on other seeds) stand beside each gate. Gates leave
-//! room for the spread of the few runs made here: about half as many iterations again for a 95th percentile.
-//! All swarms have 20 beetles and room for 30 coordinates, whatever the dimension.
+//! Known figures (median / 95 % iterations of 200 to 1,000 runs on other seeds) stand beside each gate. Gates
+//! leave a margin for the spread of the few runs made here: about half as many iterations again for a 95th
+//! percentile. All swarms have 20 beetles and capacity for 30 coordinates in every dimension.
 
 use scarab::real::Real;
 use scarab::swarm::{
@@ -70,7 +70,7 @@ fn bas(problem: TestProblem, runs: u64) -> Tally {
     Tally::of(problem, 0.1, runs, new)
 }
 
-/// Median and 95th percentile at most as given, all runs successful, in one precision.
+/// Checks median and 95th percentile against limits, and that all runs succeed, in one precision.
 fn gate<T: Real>(function: TestFunction, dimension: usize, runs: u64, median: u32, most: u32) {
     let tally = bso::<T>(TestProblem::new(function, dimension), 0.1, runs, BsoSettings::default());
     let (middle, high, success) = (tally.quantile(0.5), tally.quantile(0.95), tally.success());
@@ -102,7 +102,7 @@ fn adaptive_swarm_meets_its_table_in_thirty_dimensions() {
 
 #[test]
 fn rotation_and_shift_do_not_stop_the_adaptive_swarm() {
-    // Known: 25 / 28 iterations, 100 % of 1,000 runs; without sharing 0 %.
+    // Known: 25 / 28 iterations, 100 % of 1,000 runs; 0 % without sharing.
     let problem = TestProblem::new(TestFunction::ShiftedRotatedAckley, 30);
     for tally in [
         bso::<f64>(problem, 0.1, 100, BsoSettings::default()),
@@ -122,13 +122,13 @@ fn learned_metric_copes_with_bad_scaling_valleys_and_coupling() {
 
 #[test]
 fn restarts_leave_local_minima() {
-    gate_both(TestFunction::Levy, 10, 60, 25, 160); // 15 / 77: the tail are runs that were scattered anew
+    gate_both(TestFunction::Levy, 10, 60, 25, 160); // 15 / 77, the tail being restarted runs
     gate_both(TestFunction::Rastrigin, 2, 60, 30, 120); // 15 / 64
 }
 
 #[test]
 fn leaps_leave_the_ripples_that_scattering_anew_does_not() {
-    // Known: 320 to 390 / 500 to 720 iterations, 97 to 100 %; without leaps none of 200.
+    // Known: 320 to 390 / 500 to 720 iterations, 97 to 100 %; without leaps 0 of 200 runs.
     let problem = TestProblem::new(TestFunction::Rastrigin, 10);
     let scattered =
         BsoSettings::Adaptive(AdaptiveSettings { leaps: 0, patience: 25, ..AdaptiveSettings::default() });
@@ -144,8 +144,8 @@ fn leaps_leave_the_ripples_that_scattering_anew_does_not() {
 
 #[test]
 fn double_precision_goes_on_to_a_millionth() {
-    // Known medians: sphere 31, Ackley 61, Rosenbrock 105 iterations. Single precision cannot represent the last
-    // on Ackley's function, whose terms are about 20.
+    // Known medians: sphere 31, Ackley 61, Rosenbrock 105 iterations. Single precision cannot reach this
+    // tolerance on Ackley's function, with terms of about 20.
     for (function, dimension, most) in
         [(TestFunction::Sphere, 30, 42), (TestFunction::Ackley, 30, 80), (TestFunction::Rosenbrock, 10, 135)]
     {
@@ -157,7 +157,7 @@ fn double_precision_goes_on_to_a_millionth() {
 
 #[test]
 fn adaptive_swarm_needs_fewer_evaluations_than_a_particle_swarm() {
-    // Known medians: 65 against 470, 106 against 750, 960 against 9,400. Half is asked.
+    // Known medians: 65 against 470, 106 against 750, 960 against 9,400. The test requires half.
     for (function, dimension) in
         [(TestFunction::Sphere, 2), (TestFunction::Ackley, 2), (TestFunction::Sphere, 30)]
     {
@@ -170,7 +170,8 @@ fn adaptive_swarm_needs_fewer_evaluations_than_a_particle_swarm() {
 
 #[test]
 fn in_the_plane_moving_the_best_only_saves_evaluations() {
-    // Known medians, best against all: 106 and 173, 362 and 772. Three quarters are asked; from 10 dimensions on all move.
+    // Known medians, best against all: 106 and 173, 362 and 772. The test requires three quarters. From 10
+    // dimensions on all beetles move.
     let all = BsoSettings::Adaptive(AdaptiveSettings {
         without: Some(Part::BestMove),
         ..AdaptiveSettings::default()
@@ -242,7 +243,8 @@ fn particle_swarm_does_what_its_table_says() {
 
 #[test]
 fn antennae_search_does_what_its_table_says() {
-    // Known success: 45, 79, 100 (median 22 iterations), 3 %. 200 runs: standard error 3.5 %, four of them allowed.
+    // Known success: 45, 79, 100 (median 22 iterations), 3 %. 200 runs: standard error 3.5 %, four
+    // of them allowed.
     for (function, least, most) in [
         (TestFunction::Sphere, 0.28, 0.60),
         (TestFunction::SixHumpCamel, 0.63, 0.93),

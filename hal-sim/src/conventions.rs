@@ -1,14 +1,15 @@
-//! The only place where the plant's conventions meet anybody else's.
+//! Conversion between the plant's conventions and those of its users; the only such module.
 //!
-//! Two translations live here.
-//! 1. **Frames.** Links are described in modified Denavit-Hartenberg frames. The plant wants, in the base
-//!    (world) frame and at the reference pose (all joint angles 0): the unit vector of each axis, the vector from
-//!    one joint's point to the next, the vector from the joint to the link's centre of mass, and the inertia
-//!    tensor. With A(i) = A(i-1) Rx(alpha_i) the link's orientation at the reference pose, axis = A e_z,
-//!    point = previous point + A(i-1) e_x a + axis d, everything of the link turned by A. At other poses a link
-//!    has been turned about its own axis and all axes before it; no frame is carried along.
-//! 2. **Signs.** Ports speak anatomical angles (flexion positive), the plant joint angles: joint angle =
-//!    direction * anatomical angle + zero offset, torque likewise without the offset.
+//! Two translations:
+//!
+//! 1. **Frames.** Links are described in modified Denavit-Hartenberg frames. The plant needs them in the base
+//!    (world) frame at the reference pose (all joint angles 0). Each link needs the axis' unit vector,
+//!    vectors from the previous joint's point and to the centre of mass, and the inertia tensor. Let A(i) =
+//!    A(i-1) Rx(alpha_i) be the link's orientation at the reference pose. Then axis = A e_z, point = previous
+//!    point + A(i-1) e_x a + axis d, and A turns all other quantities of the link. At other poses a link has
+//!    been turned about its own axis and all axes before it; no frame is carried along.
+//! 2. **Signs.** Ports use anatomical angles (flexion positive), the plant joint angles. Joint angle =
+//!    direction * anatomical angle + zero offset; torques have no offset.
 
 use crate::description::{DenavitHartenberg, JointDescription};
 use crate::maths::sin_cos;
@@ -43,7 +44,7 @@ fn turn_about_x(angle: f64) -> Matrix3<f64> {
     Matrix3::new(1.0, 0.0, 0.0, 0.0, cosine, -sine, 0.0, sine, cosine)
 }
 
-/// Anatomical and joint (D-H) quantities of one joint, both ways.
+/// Conversion between anatomical and joint (D-H) quantities of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anatomy {
     direction: f64,
@@ -51,25 +52,25 @@ pub struct Anatomy {
 }
 
 impl Anatomy {
-    /// From a joint's direction (+1 or -1) and zero offset.
+    /// Conversion from a joint's direction (+1 or -1) and zero offset.
     #[must_use]
     pub fn of(joint: &JointDescription) -> Self {
         Self { direction: joint.direction, zero_offset: joint.zero_offset }
     }
 
-    /// Joint angle of an anatomical one, rad.
+    /// Joint angle for an anatomical angle, rad.
     #[must_use]
     pub fn to_joint_angle(&self, anatomical: f64) -> f64 {
         self.direction * anatomical + self.zero_offset
     }
 
-    /// Anatomical angle of a joint's, rad.
+    /// Anatomical angle for a joint angle, rad.
     #[must_use]
     pub fn to_anatomical_angle(&self, joint: f64) -> f64 {
         self.direction * (joint - self.zero_offset)
     }
 
-    /// Rates and torques change their sign with `direction`, the same way in both directions.
+    /// Converts a rate or torque, in either direction: the sign changes with `direction`.
     #[must_use]
     pub fn flip(&self, rate_or_torque: f64) -> f64 {
         self.direction * rate_or_torque

@@ -1,36 +1,37 @@
-//! Everything a simulated leg is made from, as plain numbers without heap or text.
+//! Description of a simulated leg as plain numbers, without heap or text.
 //!
-//! A host tool fills these from a leg file, an emulated image from constants. Bodies are stated as the
-//! firmware's users state them, in modified Denavit-Hartenberg frames; `conventions` translates. Nothing is
-//! checked here: whoever reads numbers from outside checks them (`tool::leg_file` does).
+//! A host tool fills these structures from a leg file, an emulated image from constants. Bodies are given as
+//! the firmware's users state them, in modified Denavit-Hartenberg frames; `conventions` translates. Nothing
+//! is checked here: readers of external numbers check them (`tool::leg_file` does).
 
 /// One leg of `N` joints (1 to 3), proximal first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LegDescription<const N: usize> {
     /// Gravity's acceleration in the base frame, m/s^2.
     pub gravity: [f64; 3],
-    /// Proximal first.
+    /// Joints, proximal first.
     pub joints: [JointDescription; N],
-    /// Drives are mounted mirrored, as on a left leg: motors and encoders turn against the anatomical sense.
+    /// Whether drives are mounted mirrored, as on a left leg: motors and encoders turn against
+    /// the anatomical sense.
     pub mirrored: bool,
-    /// Pushes by the wearer; none by default.
+    /// Pushes by the wearer, if any.
     pub pushes: Option<PushDescription>,
 }
 
 /// One joint with the link it moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointDescription {
-    /// Where the joint's frame lies in the previous one.
+    /// Position of the joint's frame in the previous one.
     pub frame: DenavitHartenberg,
-    /// +1 or -1: sign of the joint (D-H) angle's rate in the anatomical one's.
+    /// Sign (+1 or -1) of the joint (D-H) angle's rate in the anatomical one.
     pub direction: f64,
     /// D-H angle at the anatomical zero, rad.
     pub zero_offset: f64,
     /// The link beyond the joint.
     pub body: BodyDescription,
-    /// Rotor inertia as the joint feels it (gear ratio squared times the rotor's own), kg m^2.
+    /// Rotor inertia reflected to the joint (gear ratio squared times the rotor's own), kg m^2.
     pub rotor_inertia: f64,
-    /// What resists the joint.
+    /// Friction of the joint.
     pub friction: FrictionDescription,
     /// Motor and current loop.
     pub drive: DriveDescription,
@@ -63,8 +64,8 @@ pub struct BodyDescription {
 }
 
 impl BodyDescription {
-    /// The body with a point mass (kg) fixed to it at a place (m) in its D-H frame; inertia by the parallel axis
-    /// theorem about the common centre of mass. A negative mass takes one off again.
+    /// The body with a point mass (kg) fixed at a position (m) in its D-H frame. The inertia follows from the
+    /// parallel axis theorem about the common centre of mass. A negative mass removes one.
     #[must_use]
     pub fn with_point_mass(&self, mass: f64, at: [f64; 3]) -> Self {
         let whole = self.mass + mass;
@@ -89,13 +90,13 @@ pub struct FrictionDescription {
     pub coulomb: f64,
     /// Viscous coefficient, N m s/rad.
     pub viscous: f64,
-    /// Constant torque the motor must add whatever the motion, N m.
+    /// Constant torque that the motor must add at any motion, N m.
     pub offset: f64,
-    /// A higher level at rest, if there is one.
+    /// Higher level at rest, if there is one.
     pub stribeck: Option<Stribeck>,
 }
 
-/// Level at rest and how fast it falls to Coulomb's with speed.
+/// Friction level at rest, and its fall to Coulomb's with speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stribeck {
     /// Torque at which a resting joint breaks away, N m; at least the Coulomb level.
@@ -109,13 +110,13 @@ pub struct Stribeck {
 pub struct DriveDescription {
     /// Torque at the joint per ampere of motor current, N m/A.
     pub torque_per_ampere: f64,
-    /// The current never exceeds this, A.
+    /// Greatest magnitude of the current, A.
     pub current_limit: f64,
     /// Time constant of the first-order lag, s; 0 for none.
     pub lag: f64,
 }
 
-/// On which side of the gear the encoder sits.
+/// Mounting side of the encoder, relative to the gear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EncoderSide {
     /// On the motor, which turns `ratio` times per joint turn.
@@ -127,7 +128,7 @@ pub enum EncoderSide {
 /// Encoder; its count 0 lies at the anatomical zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EncoderDescription {
-    /// Motor or joint.
+    /// Mounting side.
     pub side: EncoderSide,
     /// Counts per encoder turn.
     pub counts: f64,
@@ -138,32 +139,32 @@ pub struct EncoderDescription {
 /// Motor current sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CurrentSensorDescription {
-    /// Standard deviation of the mean of eight samples, that is per logged 500 Hz sample, A. A single 4 kHz
+    /// Standard deviation of the mean of eight samples, that is of a logged 500 Hz sample, A. A single 4 kHz
     /// sample has sqrt(8) times as much; the noise is white and Gaussian.
     pub noise: f64,
     /// Constant error, A.
     pub offset: f64,
     /// Width of a conversion step, A; 0 for none.
     pub step: f64,
-    /// Isolated wild readings; none by default.
+    /// Isolated outliers, if any.
     pub outliers: Option<OutlierDescription>,
 }
 
-/// Wild readings of a current sensor: each lasts for the eight ticks of one logged 500 Hz sample.
+/// Outliers of a current sensor: each lasts for the eight ticks of one logged 500 Hz sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OutlierDescription {
     /// Share of the logged samples, 0..1.
     pub share: f64,
-    /// Largest error, A; errors are uniform in minus this to this.
+    /// Largest error, A; errors are uniform between minus and plus this value.
     pub current: f64,
 }
 
 /// Pushes by the wearer: half-sine torque pulses on random joints at random instants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PushDescription {
-    /// Mean number of pushes per second (between the end of one and the start of the next).
+    /// Mean number of pushes per second, from the end of one to the start of the next.
     pub rate: f64,
-    /// Largest peak, N m; peaks are uniform in 0..=this, of either sign.
+    /// Largest peak, N m; peaks are uniform in magnitude up to this value, of either sign.
     pub torque: f64,
     /// Mean duration, s; durations are uniform in half to one and a half of this.
     pub duration: f64,

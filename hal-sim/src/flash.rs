@@ -1,14 +1,15 @@
-//! A flash memory as a microcontroller has it: bits fall when they are programmed, a sector's rise when it is erased, and the
-//! power may fail at any byte of either.
+//! Flash memory of a microcontroller, with a power failure at any byte.
+//!
+//! Programming clears bits, erasing a sector sets them:
 //!
 //! ```text
-//! program: byte := byte AND data          erase: every byte of a sector := FF          both from the lowest address up
-//! power fails at byte k: below k done, above k as before, k itself any bits between the two, by the seed
+//! program: byte := byte AND data     erase: every byte of a sector := FF     both from the lowest address up
+//! power fails at byte k: below k done, above k unchanged, k a random mix of both
 //! ```
 //!
-//! Why: what is remembered over a power cut can only be tested by cutting it everywhere. A byte that was caught in the middle
-//! reads as it fell; that it may read otherwise the next time, as a real cell that is half programmed, is not modelled.
-//! Wear is counted, not modelled: erasures and bytes programmed of each sector.
+//! Why: persistence over a power cut can only be tested by cutting everywhere. A byte that was caught in the
+//! middle always reads the same; a real half-programmed cell may read differently each time, which is not
+//! modelled. Wear is counted, not modelled: erasures of each sector, and all bytes programmed or erased.
 
 use embedded_storage_async::nor_flash::{
     ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
@@ -17,10 +18,10 @@ use rand_core::Rng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
-/// Why a flash does not do what it is asked.
+/// Reason for which a flash operation failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashError {
-    /// Address or length are not its own, or not whole words or sectors.
+    /// Address or length out of bounds, or not in whole words or sectors.
     Request(NorFlashErrorKind),
     /// The power failed, now or before.
     NoPower,
@@ -54,7 +55,7 @@ pub struct Flash<const BYTES: usize, const SECTORS: usize> {
 }
 
 impl<const BYTES: usize, const SECTORS: usize> Flash<BYTES, SECTORS> {
-    /// Erased, powered.
+    /// An erased flash with power.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self {
@@ -66,7 +67,8 @@ impl<const BYTES: usize, const SECTORS: usize> Flash<BYTES, SECTORS> {
         }
     }
 
-    /// The power fails when so many more bytes have been programmed or erased, in the middle of the next one; `None`: it stays.
+    /// Makes the power fail after so many more bytes have been programmed or erased, in the middle of the
+    /// next one. `None` keeps it on.
     pub fn fail_after(&mut self, bytes: Option<u64>) {
         self.left = bytes;
     }
@@ -83,13 +85,13 @@ impl<const BYTES: usize, const SECTORS: usize> Flash<BYTES, SECTORS> {
         self.worked
     }
 
-    /// How often each sector was erased.
+    /// Number of erasures of each sector.
     #[must_use]
     pub fn erasures(&self) -> &[u32; SECTORS] {
         &self.erased
     }
 
-    /// Every byte, to be read or spoilt.
+    /// All bytes, for reading or corrupting.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         self.cells.as_flattened_mut()
     }
@@ -104,7 +106,7 @@ impl<const BYTES: usize, const SECTORS: usize> Flash<BYTES, SECTORS> {
         Ok(())
     }
 
-    /// One byte on its way to `aim`; fails with the power.
+    /// Changes one byte to `aim`; fails with the power.
     fn work(&mut self, address: usize, aim: u8) -> Result<(), FlashError> {
         let Some(cell) = self.cells.as_flattened_mut().get_mut(address) else {
             return Err(NorFlashErrorKind::OutOfBounds.into());
@@ -115,7 +117,7 @@ impl<const BYTES: usize, const SECTORS: usize> Flash<BYTES, SECTORS> {
             None => {}
         }
         if self.left == Some(0) {
-            // Of the bits that were to change some did.
+            // A random part of the bits to change did change.
             *cell ^= (*cell ^ aim) & self.random.next_u32() as u8;
             return Err(FlashError::NoPower);
         }

@@ -1,20 +1,22 @@
 //! The floor under the foot: a contact that closes the chain.
 //!
-//! Why: a leg that stands is no open chain. What the floor pushes goes through every joint and no motor current shows
-//! it; identification must notice.
+//! Why: a standing leg is not an open chain. The floor's force passes through every joint and no motor
+//! current shows it; identification must detect it.
 //!
 //! ```text
 //! depth   = level(t) - height of the foot,   level rises by RISE from where the foot is, within RISE_TIME
-//! normal  = max(0, STIFFNESS depth - DAMPING speed upwards)        while depth > 0: it pushes, it never pulls
+//! normal  = max(0, STIFFNESS depth - DAMPING speed upwards)        while depth > 0: pushes, never pulls
 //! along   = -FRICTION normal v / sqrt(|v|^2 + SLIP^2)              v the foot's velocity along the floor
 //! torque  = J' (normal up + along),          J_j = axis_j x (foot - point_j)
 //! ```
 //!
-//! Up is against gravity. The foot is a point of the last link in its D-H frame. That the floor rises stands for the
-//! weight with which the wearer presses the foot down, since the trunk is fixed here: up to 300 N on a leg that holds
-//! still. Stiffness, damping and friction are assumptions about a soft shoe, not measurements. SI units.
+//! Up is against gravity. The foot is a point of the last link in its D-H frame. The trunk is fixed here, so
+//! the rise of the floor stands for the weight with which the wearer presses the foot down. That is up to 300
+//! N on a leg at rest. Stiffness, damping and friction are assumptions about a soft shoe, not measurements.
+//! SI units.
 //! Source: penalty contact (Moore and Wilhelms 1988) with regularised Coulomb friction.
-//! Cost: one pose of the mechanism per tick, only while there is contact. Known limits: one point, no rolling foot.
+//! Cost: one pose of the mechanism per tick, only during contact.
+//! Known limits: one point, no rolling foot.
 
 use nalgebra::Vector3;
 
@@ -22,34 +24,34 @@ use crate::leg::LegState;
 use crate::maths::sqrt;
 use crate::mechanism::Mechanism;
 
-/// Of shoe and foot, N/m.
+/// Stiffness of shoe and foot, N/m.
 const STIFFNESS: f64 = 10e3;
-/// N s/m: critical for some 15 kg.
+/// Damping, N s/m: critical for some 15 kg.
 const DAMPING: f64 = 700.0;
-/// Of rubber on a hall's floor.
+/// Friction coefficient of rubber on a hall's floor.
 const FRICTION: f64 = 0.7;
 /// Speed at which friction has reached 71 % of its level, m/s.
 const SLIP: f64 = 0.01;
-/// How far the floor rises into the foot, m.
+/// Rise of the floor into the foot, m.
 const RISE: f64 = 0.03;
-/// How long that takes, s.
+/// Duration of the rise, s.
 const RISE_TIME: f64 = 0.2;
 
-/// A foot that touches the floor from one instant to another.
+/// Contact of the foot with the floor during one interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Floor {
-    /// From the last joint to the foot, world frame at the reference pose, m.
+    /// Vector from the last joint to the foot, world frame at the reference pose, m.
     foot: Vector3<f64>,
-    /// When it touches, s.
+    /// Start of the contact, s.
     start: f64,
-    /// For how long, s.
+    /// Duration of the contact, s.
     duration: f64,
     /// Height of the foot at the first touch, m; against gravity from the base's origin.
     height: Option<f64>,
 }
 
 impl Floor {
-    /// Not touched yet; `foot` from the last joint, in the world frame at the reference pose.
+    /// A floor before contact; `foot` from the last joint, in the world frame at the reference pose.
     #[must_use]
     pub fn new(foot: Vector3<f64>, start: f64, duration: f64) -> Self {
         Self { foot, start, duration, height: None }

@@ -1,24 +1,24 @@
-//! Joint friction: Coulomb that really sticks, viscous, Stribeck, and a constant offset.
+//! Joint friction: Coulomb with true sticking, viscous, Stribeck, and a constant offset.
 //!
-//! Why not a steep tanh: identification is judged by what it makes of rows near zero speed, so there the
-//! plant must do what a machine does. A joint stays exactly where it is while less than the breakaway torque
-//! acts on it.
+//! Why not a steep tanh: identification depends on rows near zero speed, so the plant must be realistic
+//! there. A joint stays exactly at its position while less than the breakaway torque acts on it.
 //!
 //! ```text
 //! torque(v)  = level(v) sign(v) + viscous v + offset                         v != 0
 //! level(v)   = coulomb + (static - coulomb) exp(-(v / speed)^2)              Stribeck; else coulomb
-//! at rest    |applied| <= static: v stays 0 and friction is whatever balances
+//! at rest    |applied| <= static: v stays 0 and friction balances the applied torque
 //! ```
 //!
-//! Joints are coupled: one that breaks away may drag another along or set it free. Over one time step the end
-//! rates u obey A u = b - f with friction impulses f, where each joint slides (f = level sign(u)) or sticks
-//! (u = 0 and the magnitude of f at most static). All 3^N assignments are few for N <= 3, so the consistent one
-//! is found exactly, trying first the one that continues the present motion. A is the inertia matrix with small
-//! additions of the order of the step, so exactly one assignment is consistent where static = coulomb; with
-//! Stribeck's surplus both sticking and sliding may be, and then the present motion goes on.
+//! Joints are coupled: one that breaks away may drag another along or set it free. Over one time step the
+//! end rates u obey A u = b - f with friction impulses f. Each joint slides (f = level sign(u)) or sticks (u
+//! = 0 and the magnitude of f at most static). For N <= 3 the 3^N assignments are few, so the consistent one
+//! is found exactly. The search begins with the one that continues the present motion. A is the inertia
+//! matrix with small additions of the order of the step, so exactly one assignment is consistent where
+//! static = coulomb. With Stribeck's surplus both sticking and sliding may be consistent, and then the
+//! present motion continues.
 //!
-//! Source: Moreau's time stepping in its box-constrained form (Stewart and Trinkle, 1996); Stribeck's curve in
-//! the Gaussian form of Armstrong-Helouvry et al. (1994).
+//! Source: Moreau's time stepping in its box-constrained form (Stewart and Trinkle, 1996); Stribeck's curve
+//! in the Gaussian form of Armstrong-Helouvry et al. (1994).
 //! Cost for two joints: about 30 operations while nothing changes, at most ten times that.
 
 use crate::description::FrictionDescription;
@@ -38,7 +38,7 @@ impl FrictionDescription {
         }
     }
 
-    /// Friction and offset of a moving joint, N m; at rest the dry part is undetermined and left out.
+    /// Friction and offset of a moving joint, N m. At rest the dry part is undetermined and omitted.
     #[must_use]
     pub fn torque(&self, rate: f64) -> f64 {
         let dry = if rate == 0.0 { 0.0 } else { self.dry_level(rate) * rate.signum() };
@@ -46,7 +46,7 @@ impl FrictionDescription {
     }
 }
 
-/// What one joint does over a step.
+/// Friction state of one joint over a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Contact {
     Sticks,
@@ -55,7 +55,7 @@ pub(crate) enum Contact {
 }
 
 impl Contact {
-    /// What a joint at this rate does now.
+    /// Friction state of a joint at this rate.
     #[inline(always)]
     pub(crate) fn of(rate: f64) -> Self {
         if rate > 0.0 {
@@ -77,7 +77,7 @@ impl Contact {
     }
 }
 
-/// A u = b - f: find the rates u that friction within its bounds allows.
+/// Problem A u = b - f: find the rates u that friction within its bounds allows.
 pub(crate) struct Slide<const N: usize> {
     /// A: near the inertia matrix, kg m^2.
     pub matrix: [[f64; N]; N],
@@ -85,23 +85,23 @@ pub(crate) struct Slide<const N: usize> {
     pub momentum: [f64; N],
     /// Impulse of the dry friction of a sliding joint, N m s.
     pub sliding: [f64; N],
-    /// Largest impulse that dry friction takes from a resting joint, N m s.
+    /// Greatest impulse that dry friction can hold at a resting joint, N m s.
     pub breakaway: [f64; N],
-    /// Joints whose dry friction is known whatever comes out, because they are moving already.
+    /// Joints with dry friction known in advance, because they are moving already.
     pub committed: [bool; N],
 }
 
 impl<const N: usize> Slide<N> {
-    /// The rates; those of sticking joints are exactly 0. `present` is tried first and kept by committed
-    /// joints.
+    /// Solves for the rates; those of sticking joints are exactly 0. Tries `present` first; committed joints
+    /// stay with it.
     #[inline(always)]
     pub(crate) fn solve(&self, present: &[Contact; N]) -> [f64; N] {
         let (rates, violation) = self.attempt(present);
         if violation <= 0.0 { rates } else { self.search(present) }
     }
 
-    /// Every other assignment, sticking ones first; rounding may leave none consistent, then the nearest is
-    /// taken.
+    /// Tries every other assignment, sticking ones first. Where rounding leaves none consistent,
+    /// returns the nearest.
     #[cold]
     fn search(&self, present: &[Contact; N]) -> [f64; N] {
         const CHOICES: [Contact; 3] = [Contact::Sticks, Contact::Forward, Contact::Backward];
@@ -124,7 +124,7 @@ impl<const N: usize> Slide<N> {
         best.0
     }
 
-    /// Rates under an assignment and by how much (N m s) they contradict it; 0 where they do not.
+    /// Rates under an assignment, and the violation of its conditions (N m s); 0 where consistent.
     #[inline(always)]
     fn attempt(&self, contacts: &[Contact; N]) -> ([f64; N], f64) {
         let mut matrix = self.matrix;
@@ -158,7 +158,7 @@ impl<const N: usize> Slide<N> {
     }
 }
 
-/// Gauss elimination without exchange of rows: the matrices here are dominated by a positive definite part.
+/// Gauss elimination without exchange of rows: a positive definite part dominates the matrices here.
 #[inline(always)]
 fn eliminate<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; N]) -> [f64; N] {
     for pivot in 0..N {

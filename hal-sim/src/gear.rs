@@ -1,9 +1,9 @@
 //! Rigid gear between motor and joint.
 //!
-//! motor angle = ratio * joint angle. Whatever turns with the motor is felt at the joint multiplied by the
-//! ratio squared, and is described there (`rotor_inertia`), so the gear carries angles only, and
-//! `torque_per_ampere` is stated at the joint. Known limits: no elasticity, no backlash, no loss that depends
-//! on load.
+//! motor angle = ratio * joint angle. Inertia on the motor side acts at the joint multiplied by the ratio
+//! squared, and is described there (`rotor_inertia`). So the gear converts angles only, and
+//! `torque_per_ampere` is stated at the joint.
+//! Known limits: no elasticity, no backlash, no load-dependent loss.
 
 /// Motor turns per joint turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,13 +12,13 @@ pub struct Gear {
 }
 
 impl Gear {
-    /// Of a ratio (motor turns per joint turn), not 0.
+    /// A gear of a ratio (motor turns per joint turn), not 0.
     #[must_use]
     pub const fn new(ratio: f64) -> Self {
         Self { ratio }
     }
 
-    /// Angle on the fast side, same unit as the joint's.
+    /// Motor angle, same unit as the joint's.
     #[must_use]
     pub fn motor_angle(&self, joint_angle: f64) -> f64 {
         self.ratio * joint_angle

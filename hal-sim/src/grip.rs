@@ -1,19 +1,20 @@
-//! A hand that holds a joint where it is.
+//! Hand that holds a joint at its position.
 //!
 //! ```text
-//! torque = -(STIFFNESS (angle - held) + DAMPING rate), at most the hand's strength        from the first instant to the last
+//! torque = -(STIFFNESS (angle - held) + DAMPING rate), clamped to the hand's strength, during the grip
 //! ```
 //!
-//! Why: a wearer who does not want to be moved is no pulse of torque; what he gives depends on what the drive does. Held is where the
-//! joint was at the first instant; a hand that is too weak is pulled along and goes on pulling. Stiffness and damping are assumptions
-//! about a firm grip. N m, rad, s, anatomical. Cost: a few operations per step while it holds.
+//! Why: a resisting wearer is a spring-damper, not a fixed torque pulse: the reaction depends on the drive.
+//! The held position is the joint's at the start of the grip; a hand that is too weak is pulled along and
+//! goes on pulling. Stiffness and damping are assumptions about a firm grip. N m, rad, s, anatomical.
+//! Cost: a few operations per step during the grip.
 
-/// N m/rad: a degree at 35 N m.
+/// Stiffness, N m/rad: a degree at 35 N m.
 const STIFFNESS: f64 = 2000.0;
-/// N m s/rad: critical for some 1 kg m^2.
+/// Damping, N m s/rad: critical for some 1 kg m^2.
 const DAMPING: f64 = 90.0;
 
-/// A hand on one joint.
+/// Grip of a hand on one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
     joint: usize,
@@ -24,13 +25,13 @@ pub struct Grip {
 }
 
 impl Grip {
-    /// From `start` on, for `duration`, with at most `strength`.
+    /// A grip from `start` on, for `duration`, with at most `strength`.
     #[must_use]
     pub fn new(joint: usize, strength: f64, start: f64, duration: f64) -> Self {
         Self { joint, strength, start, duration, held: None }
     }
 
-    /// On each joint, of joints that are and move so.
+    /// Torque on each joint at the joints' positions and velocities.
     pub fn torque<const N: usize>(
         &mut self,
         position: &[f64; N],
@@ -61,7 +62,7 @@ mod tests {
         assert_eq!(grip.torque(&[0.3, 0.5], &[1.0, 1.0], 0.9), [0.0; 2]);
         assert_eq!(grip.torque(&[0.3, 0.5], &[0.0, 0.0], 1.0), [0.0; 2]);
         let [hip, knee] = grip.torque(&[0.4, 0.51], &[0.0, 0.0], 1.5);
-        // The angle's difference is rounded.
+        // Tolerance: rounding of the angle's difference.
         assert!(hip == 0.0 && (knee + 0.01 * STIFFNESS).abs() < 1e-9, "{knee}");
         assert_eq!(grip.torque(&[0.4, 0.4], &[0.0, 0.0], 1.5), [0.0, 50.0]);
         assert_eq!(grip.torque(&[0.4, 0.4], &[0.0, 0.0], 3.0), [0.0; 2]);

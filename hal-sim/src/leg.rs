@@ -1,4 +1,4 @@
-//! Mechanism and friction moved through time.
+//! Time integration of mechanism and friction.
 //!
 //! One step of length h, from angles q and rates v to q', u (position Verlet with Coriolis torque bilinear in
 //! the two rates):
@@ -9,23 +9,24 @@
 //! q' = q_half + h/2 u
 //! ```
 //!
-//! Torque is the mean over the step. Since C(q, v) u = C(q, u) v the step is its own inverse under reversed
-//! time, so it is of second order and the energy of a frictionless leg does not drift; dry friction enters as
-//! an impulse bounded by its level (`friction`), so a stuck joint stays put to the last bit and no friction
-//! level makes a step unstable. Instants at which a joint starts, stops or turns round are met to within one
-//! step only: a servo tick in which that happens is done again in [`FINE_STEPS`] steps.
+//! Torque is the mean over the step. Since C(q, v) u = C(q, u) v, the step is its own inverse under reversed
+//! time. So it is of second order, and the energy of a frictionless leg does not drift. Dry friction enters
+//! as an impulse bounded by its level (`friction`). So a stuck joint keeps its position to the last bit, and
+//! no friction level makes a step unstable. Instants at which a joint starts, stops or reverses are met to
+//! within one step only. A servo tick with such an instant is repeated in [`FINE_STEPS`] steps.
 //!
-//! Measured on a driven leg against eighth-order differences of its own motion, turning points included:
-//! inertias are biased by 7e-5 of their value, viscous friction by 3e-5, Coulomb friction by 2e-5.
-//! Symbols: rad, rad/s, N m, s. Source: Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), for
-//! symmetric steps; Kahan (1993) for the bilinear treatment of quadratic terms.
+//! Measured bias on a driven leg: inertias 7e-5 of their value, viscous friction 3e-5, Coulomb friction 2e-5.
+//! The reference is eighth-order differences of the leg's own motion, turning points included.
+//! Symbols: rad, rad/s, N m, s.
+//! Source: Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), for symmetric steps; Kahan
+//! (1993) for the bilinear treatment of quadratic terms.
 //! Cost: one evaluation of the mechanism per step.
 
 use crate::description::{FrictionDescription, LegDescription};
 use crate::friction::{Contact, Slide};
 use crate::mechanism::{Mechanism, times};
 
-/// Steps of a tick in which some joint starts, stops or turns round.
+/// Steps of a tick in which some joint starts, stops or reverses.
 pub const FINE_STEPS: u32 = 8;
 
 /// Rigid bodies with friction in their joints; all angles and torques are joint (D-H) ones.
@@ -33,7 +34,7 @@ pub const FINE_STEPS: u32 = 8;
 pub struct Leg<const N: usize> {
     mechanism: Mechanism<N>,
     friction: [FrictionDescription; N],
-    /// Joints that something blocks: no torque moves them.
+    /// Blocked joints: no torque moves them.
     blocked: [bool; N],
 }
 
@@ -57,26 +58,26 @@ impl<const N: usize> Leg<N> {
         }
     }
 
-    /// The same leg with these joints mechanically blocked; their rates must be 0.
+    /// This leg with some joints mechanically blocked; their rates must be 0.
     #[must_use]
     pub fn with_blocked(mut self, blocked: [bool; N]) -> Self {
         self.blocked = blocked;
         self
     }
 
-    /// What it takes to move a resting joint; a blocked one never does.
+    /// Breakaway levels of the joints; infinite for blocked ones.
     fn breakaway(&self, levels: [f64; N]) -> [f64; N] {
         core::array::from_fn(|joint| if self.blocked[joint] { f64::INFINITY } else { levels[joint] })
     }
 
-    /// The rigid bodies alone.
+    /// Rigid bodies without friction.
     #[must_use]
     pub fn mechanism(&self) -> &Mechanism<N> {
         &self.mechanism
     }
 
-    /// Torque at the joints that makes a motion, friction and offset included, N m. Of a joint at rest the
-    /// dry friction is undetermined and left out.
+    /// Joint torques for a motion, friction and offset included, N m. At rest the dry friction of a joint is
+    /// undetermined and omitted.
     #[must_use]
     pub fn inverse_dynamics(
         &self,
@@ -108,7 +109,7 @@ impl<const N: usize> Leg<N> {
         slide.solve(&state.rates.map(Contact::of))
     }
 
-    /// Moves the leg over `duration` s under a torque (N m) that goes linearly from one value to another.
+    /// Advances the leg by `duration` s under a torque (N m) that changes linearly between two values.
     pub fn advance(&self, state: &mut LegState<N>, from: &[f64; N], to: &[f64; N], duration: f64) {
         let mean = core::array::from_fn(|joint| 0.5 * (from[joint] + to[joint]));
         let coarse = self.step(state, &mean, duration);
@@ -151,7 +152,7 @@ impl<const N: usize> Leg<N> {
         let mut slide = Slide { matrix, momentum, sliding: impulse(rates), breakaway, committed: [false; N] };
         let mut after = slide.solve(&present);
         if self.friction.iter().any(|friction| friction.stribeck.is_some()) {
-            // The level at the mean rate keeps the second order where friction depends on speed.
+            // Using the level at the mean rate preserves the second order where friction depends on speed.
             slide.sliding = impulse(&core::array::from_fn(|joint| 0.5 * (rates[joint] + after[joint])));
             after = slide.solve(&present);
         }

@@ -1,21 +1,21 @@
-//! Scarab's simulated hardware: the physical world a leg's drive board meets, in double precision.
+//! Scarab's simulated hardware: the physical world of a leg's drive board, in double precision.
 //!
-//! Why it is written this way: a firmware tested against its own equations proves nothing. The plant
-//! therefore uses another formulation (Lagrange instead of Newton-Euler), other frames (axes and points in
-//! the world instead of Denavit-Hartenberg frames) and its own door to `libm`; of the firmware it knows
-//! `scarab::hal` and `scarab::units` only.
+//! Why separate mathematics: a firmware tested against its own equations proves nothing. So the plant uses
+//! another formulation: Lagrange instead of Newton-Euler. Its frames are axes and points in the world instead
+//! of Denavit-Hartenberg frames, and it has its own access to `libm`. From the firmware it imports only
+//! `scarab::hal` and `scarab::units`.
 //!
-//! | module | what lives there |
+//! | module | content |
 //! | --- | --- |
-//! | [`description`] | everything a world is made from, as plain numbers |
+//! | [`description`] | parameters of a world, as plain numbers |
 //! | [`conventions`] | modified Denavit-Hartenberg to world frame; anatomical to joint angles and back |
 //! | [`mechanism`] | rigid bodies: inertia matrix, Christoffel symbols, gravity, energies |
 //! | [`friction`] | Coulomb that sticks, viscous, Stribeck, offset; which joint sticks and which slides |
-//! | [`leg`] | mechanism and friction moved through time |
+//! | [`leg`] | time integration of mechanism and friction |
 //! | [`floor`] | contact under the foot |
 //! | [`drive`] | ideal: a current with lag; complete: motor, bridge, shunts, counter, supply |
-//! | [`faults`] | what crosses a board's ports, spoilt at a tick |
-//! | [`flash`] | a flash memory whose power fails at any byte |
+//! | [`faults`] | faults injected into a board's ports at given ticks |
+//! | [`flash`] | flash memory with a power cut at any byte |
 //! | [`gear`], [`sensors`], [`wearer`] | ratio; encoder and current sensor; pushes |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 //!

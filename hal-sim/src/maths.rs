@@ -1,7 +1,8 @@
-//! The plant's own door to `libm`, apart from the firmware's.
+//! The plant's own access to `libm`, separate from the firmware's.
 //!
-//! Double precision throughout. The same functions run on the host, in the emulator and without `std`, so a
-//! seed gives the same bits everywhere.
+//! Double precision throughout. The functions are identical on the host, in the emulator and without `std`,
+//! so a
+//! seed gives identical bits everywhere.
 
 /// Sine and cosine of an angle in rad.
 #[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]
@@ -9,7 +10,7 @@ pub(crate) fn sin_cos(angle: f64) -> (f64, f64) {
     libm::sincos(angle)
 }
 
-/// e to the power of `value`.
+/// Exponential function.
 #[expect(clippy::disallowed_methods, reason = "this file is the plant's door to libm")]
 pub(crate) fn exp(value: f64) -> f64 {
     libm::exp(value)
@@ -27,13 +28,13 @@ pub(crate) fn sqrt(value: f64) -> f64 {
     libm::sqrt(value)
 }
 
-/// Largest whole number that is not above; saturates at the ends of `i64`, 0 for NaN.
+/// Largest integer not above the value; saturates at the ends of `i64`, 0 for NaN.
 pub(crate) fn floor(value: f64) -> i64 {
     let truncated = value as i64;
     if (truncated as f64) > value { truncated.saturating_sub(1) } else { truncated }
 }
 
-/// Nearest whole number, halves upward; saturates at the ends of `i64`, 0 for NaN.
+/// Nearest integer, halves upward; saturates at the ends of `i64`, 0 for NaN.
 pub(crate) fn nearest(value: f64) -> i64 {
     floor(value + 0.5)
 }

@@ -1,25 +1,27 @@
 //! Rigid bodies of a leg by Lagrange's equations, in world coordinates.
 //!
-//! Why another formulation than the firmware's: where Newton-Euler recursion and a D-H frame go wrong,
-//! energies and world vectors do not go wrong with them.
+//! Why another formulation than the firmware's: an error in Newton-Euler recursion or in a D-H frame cannot
+//! repeat itself in energies and world vectors.
 //!
-//! At joint angles q, with z_j the unit vector of axis j, p_j a point on it, c_i the centre of mass of link i
-//! and I_i its tensor about it, all in the world frame, and g gravity's acceleration:
+//! Quantities at joint angles q, all in the world frame. The vector z_j is the unit vector of axis j, p_j a
+//! point on it, c_i the centre of mass of link i. Further, I_i is the link's tensor about c_i, and g
+//! gravity's acceleration.
 //!
 //! ```text
-//! a_ij   = z_j x (c_i - p_j)                                  how c_i moves with q_j (j <= i)
+//! a_ij   = z_j x (c_i - p_j)                                  derivative of c_i by q_j (j <= i)
 //! w_ij   = I_i z_j
 //! M_jk   = sum_i m_i a_ij . a_ik + z_j . w_ik   (+ rotor inertia where j = k)
 //! dM_jk/dq_l from  d(z_j)/dq_l  = z_l x z_j for l < j, else 0
 //!                  d(a_ij)/dq_l = z_min(j,l) x a_i,max(j,l) for l <= i
-//!                  d(I_i)/dq_l  = [z_l] I_i - I_i [z_l] for l <= i;  all of it cancels for l <= min(j, k)
+//!                  d(I_i)/dq_l = [z_l] I_i - I_i [z_l] for l <= i;  all terms cancel for l <= min(j, k)
 //! C_jl   = sum_k 1/2 (dM_jl/dq_k + dM_jk/dq_l - dM_kl/dq_j) v_k         Christoffel symbols times velocity
 //! G_j    = dV/dq_j = -sum_i m_i g . a_ij,   V = -sum_i m_i g . c_i
 //! torque = M qdd + C(q, v) v + G
 //! ```
 //!
-//! Angles rad, torques N m. Source: any text on analytical mechanics; the closed derivatives are derived
-//! above. The rotor turns with its own joint only (no gyroscopic torque of a rotor carried by another link).
+//! Angles rad, torques N m.
+//! Source: any text on analytical mechanics; the closed derivatives are derived above. The rotor turns with
+//! its own joint only (no gyroscopic torque of a rotor carried by another link).
 //! Cost for two joints: about 700 floating-point operations and two sine-cosine pairs.
 
 use crate::conventions::links_at_reference;
@@ -32,15 +34,15 @@ use nalgebra::{Matrix3, Vector3};
 pub struct RigidLink {
     /// Unit vector of the joint's axis.
     pub axis: Vector3<f64>,
-    /// From the previous joint's point (the base's origin for the first) to this joint's, m.
+    /// Vector from the previous joint's point (the base's origin for the first) to this joint's, m.
     pub from_previous: Vector3<f64>,
-    /// From the joint's point to the centre of mass, m.
+    /// Vector from the joint's point to the centre of mass, m.
     pub to_centre: Vector3<f64>,
     /// Mass, kg.
     pub mass: f64,
-    /// About the centre of mass, kg m^2.
+    /// Inertia tensor about the centre of mass, kg m^2.
     pub inertia: Matrix3<f64>,
-    /// At the joint, kg m^2.
+    /// Rotor inertia at the joint, kg m^2.
     pub rotor_inertia: f64,
 }
 
@@ -62,7 +64,7 @@ pub struct Dynamics<const N: usize> {
     pub gravity: [f64; N],
 }
 
-/// Where everything is, in the world frame. Entries `[i][j]` are filled for j <= i.
+/// Positions and axes in the world frame. Entries `[i][j]` are filled for j <= i.
 struct Pose<const N: usize> {
     axis: [Vector3<f64>; N],
     centre: [Vector3<f64>; N],
@@ -71,7 +73,7 @@ struct Pose<const N: usize> {
 }
 
 impl<const N: usize> Mechanism<N> {
-    /// The rigid bodies of a described leg.
+    /// Rigid bodies of a described leg.
     #[must_use]
     pub fn new(description: &LegDescription<N>) -> Self {
         const { assert!(1 <= N && N <= 3) };
@@ -108,7 +110,7 @@ impl<const N: usize> Mechanism<N> {
         let pose = self.pose(angles);
         let mut inertia = [[0.0; N]; N];
         let mut gravity = [0.0; N];
-        // slope[l][j][k] = dM_jk/dq_l
+        // `slope[l][j][k]` is dM_jk/dq_l.
         let mut slope = [[[0.0; N]; N]; N];
         for i in 0..N {
             let mass = self.links[i].mass;
@@ -144,7 +146,7 @@ impl<const N: usize> Mechanism<N> {
         Dynamics { inertia, coriolis: christoffel_times(&slope, rates), gravity }
     }
 
-    /// Torque of the rigid bodies and rotors (no friction) for a motion: rad, rad/s, rad/s^2 to N m.
+    /// Torque of the rigid bodies and rotors for a motion, without friction: rad, rad/s, rad/s^2 to N m.
     #[must_use]
     pub fn inverse_dynamics(
         &self,
@@ -158,8 +160,8 @@ impl<const N: usize> Mechanism<N> {
         core::array::from_fn(|j| inertial[j] + coriolis[j] + dynamics.gravity[j])
     }
 
-    /// A point of the last link, given from its joint in the world frame at the reference pose (m): where it is at joint
-    /// angles (rad), and how it moves with each joint, m/rad.
+    /// Position of a point of the last link at joint angles (rad), and its derivative by each joint, m/rad.
+    /// The point is given from the last joint in the world frame at the reference pose, m.
     #[must_use]
     pub fn point_of_last_link(
         &self,

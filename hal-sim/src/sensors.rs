@@ -1,15 +1,16 @@
 //! Encoder and current sensor of one joint, read at the same instant.
 //!
 //! ```text
-//! counts  = nearest whole number of  angle / 2 pi * counts per turn * turns per joint turn, 32 bits, wrapping
-//! current = nearest step of (true current + offset + sigma * standard normal)
-//!           + wild error, uniform in -size..=size, in a share of the logged samples, the same for their eight ticks
+//! counts  = nearest integer of  angle / 2 pi * counts per turn * turns per joint turn, 32 bits, wrapping
+//! current = nearest step of (true current + offset + sigma * standard normal + outlier)
+//! outlier = uniform in -size..=size in a share of the logged samples, constant over eight ticks, else 0
 //! sigma   = sqrt(8) * noise    noise is stated for the mean of eight 4 kHz samples, as logged at 500 Hz
 //! ```
 //!
-//! Count 0 is centred on the anatomical zero (the reference pose). Known limits: no missed counts, no
-//! eccentricity, no saturation of the converter; other modules inject faults. Cost: one draw per joint and
-//! tick while noise is on.
+//! Count 0 is centred on the anatomical zero (the reference pose).
+//! Known limits: no missed counts, no eccentricity, no saturation of the converter; other modules inject
+//! faults.
+//! Cost: one random number per joint and tick while noise is on.
 
 use crate::description::{CurrentSensorDescription, EncoderDescription, EncoderSide, OutlierDescription};
 use crate::gear::Gear;
@@ -18,10 +19,10 @@ use core::f64::consts::{SQRT_2, TAU};
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// sqrt(8): eight samples make a logged one.
+/// Square root of 8: eight samples make a logged one.
 const SAMPLES_PER_LOGGED_ROOT: f64 = 2.0 * SQRT_2;
 
-/// Incremental encoder counted since the reference pose.
+/// Incremental encoder, counting from the reference pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encoder {
     gear: Option<Gear>,
@@ -29,8 +30,8 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// On the motor side the gear's ratio multiplies the joint's angle; on the joint side an encoder that
-    /// turns faster than the joint has its ratio in its counts.
+    /// Creates an encoder. On the motor side the gear's ratio multiplies the joint's angle. On the joint side
+    /// the ratio of a faster encoder is part of its counts.
     #[must_use]
     pub fn new(description: &EncoderDescription) -> Self {
         let (gear, counts) = match description.side {
@@ -49,7 +50,7 @@ impl Encoder {
     }
 }
 
-/// Sensor of the motor current that makes torque.
+/// Sensor of the torque-producing motor current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentSensor {
     sigma: f64,
@@ -60,7 +61,7 @@ pub struct CurrentSensor {
 }
 
 impl CurrentSensor {
-    /// As described.
+    /// A sensor by its description.
     #[must_use]
     pub fn new(description: &CurrentSensorDescription) -> Self {
         let mut sensor = Self {
@@ -74,12 +75,12 @@ impl CurrentSensor {
         sensor
     }
 
-    /// Standard deviation of the mean of eight samples, A.
+    /// Sets the standard deviation of the mean of eight samples, A.
     pub fn set_noise(&mut self, noise: f64) {
         self.sigma = noise * SAMPLES_PER_LOGGED_ROOT;
     }
 
-    /// A logged sample begins: is it a wild one?
+    /// Starts a logged sample and decides whether it is an outlier.
     pub fn begin_logged(&mut self, generator: &mut Xoshiro256PlusPlus) {
         let Some(outliers) = self.outliers else { return };
         let [chance, size]: [f64; 2] = core::array::from_fn(|_| StandardUniform.sample(generator));

@@ -1,13 +1,13 @@
-//! The wearer's pushes: torque pulses that no sensor sees.
+//! The wearer's pushes: torque pulses that no sensor measures.
 //!
 //! ```text
 //! torque(t) = peak sin(pi (t - start) / duration)    while start <= t <= start + duration, on one joint
 //! ```
 //!
-//! Pauses between pushes are exponential with the mean 1 / rate, peaks uniform in -torque..=torque, durations
-//! uniform in half to one and a half of the mean, joints equally likely. The generator is the wearer's own,
-//! so sensor noise does not change with the pushes. Known limits: no stiffness, no intention, one joint at a
-//! time.
+//! Pauses between pushes are exponential with the mean 1 / rate, and peaks uniform in -torque..=torque.
+//! Durations are uniform in half to one and a half of the mean, joints equally likely. The generator is the
+//! wearer's own, so sensor noise does not change with the pushes.
+//! Known limits: no stiffness, no intention, one joint at a time.
 
 use crate::description::PushDescription;
 use crate::maths::{ln, sin_cos};
@@ -23,7 +23,7 @@ struct Push {
     joint: usize,
 }
 
-/// A wearer who pushes now and then, or never.
+/// A wearer with occasional pushes, or without.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wearer {
     habits: Option<PushDescription>,
@@ -32,7 +32,7 @@ pub struct Wearer {
 }
 
 impl Wearer {
-    /// At time 0, with a generator of their own.
+    /// A wearer at time 0, with a separate generator.
     #[must_use]
     pub fn new(habits: Option<PushDescription>, joints: usize, generator: Xoshiro256PlusPlus) -> Self {
         let mut wearer = Self { habits, next: None, generator };
@@ -40,13 +40,13 @@ impl Wearer {
         wearer
     }
 
-    /// Other habits from this time (s) on; a push that is under way ends.
+    /// Changes the habits from this time (s) on; a push in progress ends.
     pub fn change_habits(&mut self, habits: Option<PushDescription>, now: f64, joints: usize) {
         (self.habits, self.next) = (habits, None);
         self.plan(now, joints);
     }
 
-    /// Pushes once, from `now` (s) on, instead of what was planned next.
+    /// Pushes once from `now` (s) on, replacing the next planned push.
     pub fn push(&mut self, joint: usize, peak: f64, now: f64, duration: f64) {
         self.next = Some(Push { start: now, duration, peak, joint });
     }
@@ -78,7 +78,7 @@ impl Wearer {
         self.next = Some(Push { start: now + pause, duration, peak, joint });
     }
 
-    /// Uniform in 0..1 with 53 bits.
+    /// Uniform random number in 0..1 with 53 bits.
     fn uniform(&mut self) -> f64 {
         const UNIT: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.generator.next_u64() >> 11) as f64 * UNIT

@@ -1,26 +1,30 @@
-//! Copies of memory by several words at a time: what the compiler calls for each move of a value that is longer than a few words.
+//! Memory copies of several words at a time.
 //!
-//! Why: the compiler's own library copies one word in five instructions, and did so for a third of the servo's tick. Eight words in four instructions
-//! need load and store of several registers, which no Rust code asks for. The library's functions are weak symbols, so these take their place.
+//! The compiler calls these functions for each move of a value longer than a few words.
+//!
+//! Why: the compiler's own library copies one word in five instructions, which took a third of the servo's
+//! tick. Eight words in four instructions need multi-register loads and stores, which no Rust code generates.
+//! The library's functions are weak symbols, so these replace them.
 //!
 //! ```text
 //! both aligned   32 bytes a round in 4 instructions, then 16, 8, 4, 2, 1
-//! else           16 bytes a round in 10 instructions, then as above; this processor loads and stores words at any address of memory
+//! otherwise      16 bytes a round in 10 instructions, then as above; memory allows unaligned words
 //! ```
 //!
-//! Never for registers of peripherals, where a word has to be aligned. Source: Arm, Run-time ABI for the Arm Architecture (IHI 0043), section 4.3.4.
+//! Not for registers of peripherals, where a word must be aligned.
+//! Source: Arm, Run-time ABI for the Arm Architecture (IHI 0043), section 4.3.4.
 #![expect(unsafe_code, reason = "the compiler calls these functions by their names")]
 
 use core::arch::naked_asm;
 
-/// Copies `length` bytes between aligned places that do not overlap.
+/// Copies `length` bytes between aligned ranges that do not overlap.
 ///
-/// # Safety
-/// The caller is the compiler: both places are valid for `length` bytes and aligned to 4.
+/// # Safety The compiler is the caller: both ranges are valid for `length` bytes and aligned to 4.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn __aeabi_memcpy4(to: *mut u8, from: *const u8, length: usize) {
-    // r3 and r12 belong to the callee, r4 to r9 are given back as they were. The low five bits of the length stay when 32 is subtracted.
+    // Registers r3 and r12 are the callee's; r4 to r9 are restored. Subtracting 32 leaves the low five bits
+    // of the length.
     naked_asm!(
         "subs r2, #32",
         "blo 2f",
@@ -58,7 +62,7 @@ pub unsafe extern "C" fn __aeabi_memcpy4(to: *mut u8, from: *const u8, length: u
     )
 }
 
-/// Copies `length` bytes between places that are aligned to 8 and do not overlap.
+/// Copies `length` bytes between ranges that are aligned to 8 and do not overlap.
 ///
 /// # Safety
 /// As for [`__aeabi_memcpy4`].
@@ -68,10 +72,9 @@ pub unsafe extern "C" fn __aeabi_memcpy8(to: *mut u8, from: *const u8, length: u
     naked_asm!("b {aligned}", aligned = sym __aeabi_memcpy4)
 }
 
-/// Copies `length` bytes between places that do not overlap.
+/// Copies `length` bytes between ranges that do not overlap.
 ///
-/// # Safety
-/// The caller is the compiler: both places are valid for `length` bytes.
+/// # Safety The compiler is the caller: both ranges are valid for `length` bytes.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn __aeabi_memcpy(to: *mut u8, from: *const u8, length: usize) {

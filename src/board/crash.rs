@@ -1,17 +1,23 @@
-//! Panic, hard fault, stack overflow, an interrupt nobody handles: outputs off first, then a record, then a reset.
+//! Handling of a panic, hard fault, stack overflow or unhandled interrupt.
 //!
-//! The record lies in memory that a reset leaves alone. The next start finds it, tells it, and refuses to enable until the
-//! operator has reset the fault. Nothing is told from here: a record to the probe may be what crashed.
+//! The order is: outputs off, then a record, then a reset.
 //!
-//! **Off, and staying off.** A current loop that interrupts a handler would switch its bridge on again. So a handler that can be
-//! interrupted masks interrupts, which is one instruction, and releases; nothing comes before, nothing in between. The release is
-//! the board's, found by the linker: a pointer to it would be memory that what crashed may have overwritten.
+//! The record lies in memory that survives a reset. The next start finds it, reports it, and refuses to
+//! enable until the operator has reset the fault. Nothing is reported from here: the output of a record may
+//! be what crashed.
 //!
-//! **A stack that ran out** cannot be used to handle that: the hard fault's entry takes the stack anew where little is left of it.
-//! The processor could not store where it happened; what is found is the caller of the deepest function, at the bottom of the stack.
+//! **Off, and staying off.** A current loop that interrupts a handler would switch its bridge on again. So an
+//! interruptible handler first masks interrupts, which is one instruction, then turns the outputs off. The
+//! function for that is the board's, found by the linker: a pointer to it would be memory that the crash may
+//! have overwritten.
 //!
-//! Cost: `cargo emulate --crash`, in docs/board.md. Known limit: of an overflow the caller is the first word at the stack's bottom
-//! that may be a return address; a function that keeps one in an array would be taken for it.
+//! **Stack overflow** cannot be handled on the same stack: the hard fault's entry resets the stack pointer
+//! where little of the stack is left. The processor could not store the fault's address. Instead the record
+//! names the caller of the deepest function, found at the bottom of the stack.
+//!
+//! Cost: `cargo emulate --crash`, in docs/board.md.
+//! Known limit: after an overflow the caller is the first word at the stack's bottom that may be a return
+//! address. A code address in an array would be mistaken for it.
 #![expect(
     unsafe_code,
     reason = "memory that outlives a reset, the stack pointer, and what the linker provides"
@@ -27,65 +33,66 @@ use zerocopy::{FromBytes, Immutable, IntoBytes};
 use super::stack;
 use crate::checksum::Checksum;
 
-/// Active vector of the processor, and its fault status and address registers.
+/// Active vector of the processor, its fault status and address registers.
 const ACTIVE: *const u32 = 0xE000_ED04 as *const u32;
 const FAULT_STATUS: *const u32 = 0xE000_ED28 as *const u32;
 const BUS_FAULT_ADDRESS: *const u32 = 0xE000_ED38 as *const u32;
-/// The address register holds the address of the fault (BFARVALID).
+/// Set where the address register holds the address of the fault (BFARVALID).
 const ADDRESS_IS_VALID: u32 = 1 << 15;
 
 const MAGIC: u32 = 0x4352_5348;
-/// Of a panic's file name so much is kept: its end.
+/// Stored length of a panic's file name, taken from its end.
 const NAME: usize = 40;
-/// Words at the stack's bottom among which a return address is looked for.
+/// Number of words at the stack's bottom that are searched for a return address.
 const SEARCHED: u32 = 512;
 
 unsafe extern "C" {
-    /// Provided by the image's board: both bridges off, now, without lock or wait; then its clock, as in records.
+    /// Turns both bridges off without lock or wait, and returns the clock as in records. Provided by the
+    /// image's board.
     safe fn scarab_release() -> u32;
     static __stext: u32;
     static __etext: u32;
 }
 
-/// What ended the image before this one.
+/// Crash record of the previous run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, Immutable)]
 #[repr(C)]
 pub struct Crash {
     magic: u32,
     cause: u32,
-    /// Where; zero where the processor could not store it.
+    /// Program counter; zero where the processor could not store it.
     pub pc: u32,
-    /// Called from.
+    /// Return address.
     pub lr: u32,
     /// Fault status, or the number of an interrupt.
     pub status: u32,
     /// Address of a bus fault, or all ones.
     pub address: u32,
-    /// Of a panic.
+    /// Line of a panic.
     pub line: u32,
-    /// Clock when the bridges were off.
+    /// Clock when the outputs were off.
     pub released: u32,
-    /// Clock when this record was complete but for its check.
+    /// Clock when this record was complete except for its checksum.
     pub kept: u32,
     length: u32,
     name: [u8; NAME],
     check: u32,
 }
 
-/// Words of a record; the last is its check.
+/// Words of a record; the last is its checksum.
 const WORDS: usize = size_of::<Crash>() / 4;
 
-/// Kinds of crashes.
+/// Kind of crash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Cause {
-    /// Of the language.
+    /// Rust panic.
     Panic = 1,
-    /// Of the processor.
+    /// Hard fault of the processor.
     HardFault,
-    /// Nobody handles it.
+    /// Interrupt without a handler.
     Interrupt,
-    /// The crystal failed.
+    /// Failure of the crystal.
     Clock,
     /// The stack left its memory.
     StackOverflow,
@@ -111,13 +118,13 @@ impl Crash {
         Self { cause: cause as u32, released, ..Self::NONE }
     }
 
-    /// Of all words but the check.
+    /// Checksum over all words but the last.
     fn sum(&self) -> u32 {
         let words: [u32; WORDS] = zerocopy::transmute!(*self);
         words.iter().take(WORDS - 1).fold(Checksum::EMPTY, |sum, &word| sum.word(word)).value()
     }
 
-    /// The word in records.
+    /// Name used in records.
     #[must_use]
     pub const fn cause(&self) -> &'static str {
         match self.cause {
@@ -142,12 +149,13 @@ impl Crash {
 #[unsafe(link_section = ".uninit.crash")]
 static mut RECORD: core::mem::MaybeUninit<Crash> = core::mem::MaybeUninit::uninit();
 
-/// The record of the image before this one, once.
+/// Takes the crash record of the previous run, if there is one.
 pub fn take() -> Option<&'static Crash> {
     static FOUND: StaticCell<Crash> = StaticCell::new();
     let place = (&raw mut RECORD).cast::<u32>();
-    // SAFETY: the static is there, aligned, of so many words, and every pattern of bits is one; volatile, because what it holds was
-    // written before this image began. Nobody else reaches it but a crash, which never returns.
+    // SAFETY: the static exists, is aligned, has so many words, and any bit pattern is a valid word. The read
+    // is volatile because the content was written before this image began. The only other access is a crash,
+    // which never returns.
     let words = core::array::from_fn::<u32, WORDS, _>(|word| unsafe { ptr::read_volatile(place.add(word)) });
     // SAFETY: as above; the first word is the magic number.
     unsafe { ptr::write_volatile(place, 0) };
@@ -162,14 +170,14 @@ fn end(mut crash: Crash) -> ! {
     let words: [u32; WORDS] = zerocopy::transmute!(crash);
     let place = (&raw mut RECORD).cast::<u32>();
     for (place, word) in (0..WORDS).map(|word| place.wrapping_add(word)).zip(words) {
-        // SAFETY: the static is there, aligned, of so many words; whoever else might be writing it was interrupted by this and
-        // never returns.
+        // SAFETY: the static exists, is aligned and has so many words. Any other writer was interrupted by
+        // this one and never resumes.
         unsafe { ptr::write_volatile(place, word) };
     }
     SCB::sys_reset()
 }
 
-/// What a panic does.
+/// Panic handler: outputs off, record, reset.
 pub fn panic(information: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
     let mut crash = Crash::of(Cause::Panic, scarab_release());
@@ -184,13 +192,14 @@ pub fn panic(information: &PanicInfo<'_>) -> ! {
     end(crash)
 }
 
-/// What a board's own handler does that cannot go on; `status` is its to choose.
+/// Ends the run from a board's own handler; the caller chooses the meaning of `status`.
 pub fn give_up(cause: Cause, status: u32) -> ! {
     cortex_m::interrupt::disable();
     end(Crash { status, ..Crash::of(cause, scarab_release()) })
 }
 
-/// Takes the frame's address, and the stack anew where less than half a kilobyte of it is left; then handles the fault.
+/// Passes the frame's address to [`hard_fault`], resetting the stack pointer where less than half a kilobyte
+/// is left.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 unsafe extern "C" fn hard_fault_entry() {
@@ -206,10 +215,10 @@ unsafe extern "C" fn hard_fault_entry() {
     )
 }
 
-/// No interrupt reaches this level.
+/// Runs at a level that no interrupt reaches, so masking is not needed.
 extern "C" fn hard_fault(frame: u32) -> ! {
     let released = scarab_release();
-    // Of a frame outside the stack nothing was stored.
+    // A frame outside the stack was never stored.
     let stored = stack::word(frame).is_some();
     let cause = if stored { Cause::HardFault } else { Cause::StackOverflow };
     let word = |place: u32| stack::word(frame.wrapping_add(4 * place));
@@ -223,7 +232,7 @@ extern "C" fn hard_fault(frame: u32) -> ! {
     })
 }
 
-/// The first word at the stack's bottom that may be a return address: odd, and among the instructions.
+/// Returns the first word at the stack's bottom that may be a return address: odd, and within the code.
 fn deepest_caller() -> Option<u32> {
     let code = (&raw const __stext as u32)..(&raw const __etext as u32);
     (0..SEARCHED)
@@ -240,6 +249,7 @@ extern "C" fn unhandled() -> ! {
 }
 
 fn load(register: *const u32) -> u32 {
-    // SAFETY: the callers pass registers of the processor's system control block, readable without a side effect.
+    // SAFETY: the callers pass registers of the processor's system control block, readable without
+    // a side effect.
     unsafe { ptr::read_volatile(register) }
 }

@@ -1,6 +1,6 @@
-//! The boards Scarab runs on, one file each with its parts; everything above is the same on all of them.
+//! Supported boards, one file each with its parts; the layers above are the same on all of them.
 //!
-//! What a board must provide, and how to port: docs/board.md.
+//! Requirements on a board, and how to port: docs/board.md.
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 pub mod copy;

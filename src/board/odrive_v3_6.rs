@@ -1,12 +1,14 @@
 //! The ODrive v3.6 (and v3.5) joint drive board: STM32F405RG, two bridges with DRV8301, one board per leg.
 //!
-//! Why register tables: the drivers of `embassy-stm32` end where this board begins (two timers locked in phase, conversions
-//! triggered by both, a chopper). What is written there is a list of plain values ([`settings`]) that a test on the host holds
-//! against the board's facts; on the device one loop writes the list. Clocks, SPI, time and executors are `embassy`'s.
+//! Why register tables: the drivers of `embassy-stm32` lack what this board needs (two timers locked in
+//! phase, conversions triggered by both, a chopper). The register writes are a list of plain values
+//! ([`settings`]) that a test on the host compares with the board's facts. On the device one loop writes the
+//! list. Clocks, SPI, time and executors are `embassy`'s.
 //!
-//! Order of start (`start`): bridges off by reset, gate drivers off, watchdog, interrupt priorities, clocks, caches, timers
-//! without outputs, gate drivers configured and read back, timers in phase, triggers, interrupts. No output is ever
-//! switched on here: that is the current loop's, for an axis with a calibration, as long as nothing speaks against it.
+//! Order of start (`start`): bridges off by reset, gate drivers off, watchdog, interrupt priorities, clocks,
+//! caches, timers without outputs. Then gate drivers configured and read back, timers in phase, triggers,
+//! interrupts. The start never switches an output on. Only the current loop does, for a calibrated axis
+//! without an inhibit reason.
 //!
 //! Source of every constant: ODrive firmware v0.5.6 (`Board/v3`, MIT) and ST's RM0090; each names its own.
 

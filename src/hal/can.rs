@@ -1,6 +1,6 @@
-//! A frame of classic CAN with an 11-bit identifier, and the state of the controller that sends and receives it.
+//! CAN frame with an 11-bit identifier, and the state of the bus controller.
 
-/// Identifier and up to eight bytes.
+/// Classic CAN frame: identifier and up to eight bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
     id: u16,
@@ -9,7 +9,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A data frame; of `data` the first eight bytes, of `id` the lowest eleven bits.
+    /// A data frame. Longer `data` is cut to eight bytes, `id` to its lowest eleven bits.
     #[must_use]
     pub fn new(id: u16, data: &[u8]) -> Self {
         let mut bytes = [0; 8];
@@ -21,26 +21,27 @@ impl Frame {
         Self { id: id & 0x7FF, length, data: bytes }
     }
 
-    /// The identifier.
+    /// Identifier, 11 bits.
     #[must_use]
     pub const fn id(&self) -> u16 {
         self.id
     }
 
-    /// The bytes.
+    /// Data bytes.
     #[must_use]
     pub fn data(&self) -> &[u8] {
         self.data.get(..usize::from(self.length)).unwrap_or(&self.data)
     }
 
-    /// The bytes of a frame that has all eight.
+    /// Data bytes of a frame that has all eight.
     #[must_use]
     pub fn full(&self) -> Option<[u8; 8]> {
         (self.length == 8).then_some(self.data)
     }
 
-    /// Fewest and most bits on the wire, the three of the intermission included: 47 and 8 for each byte, and a stuffed one
-    /// after at most every four of the 34 and 8 for each byte between start and check sum.
+    /// Fewest and most bits on the wire, including the three of the intermission: 47 and 8 for each
+    /// byte. At most a stuff bit is added after every four of the 34 bits, and 8 for each byte, between
+    /// start and checksum.
     #[must_use]
     pub const fn bits(&self) -> [u32; 2] {
         let data = 8 * self.length as u32;
@@ -51,13 +52,13 @@ impl Frame {
 /// State of the bus controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Controller {
-    /// Takes part.
+    /// Error active: takes part in the bus.
     Active,
     /// Error passive: too many errors to disturb others.
     Passive,
     /// Bus off.
     Off,
-    /// Frames came faster than they were read. Reported once.
+    /// Frames arrived faster than they were read. Reported once.
     Overrun,
 }
 
@@ -70,8 +71,8 @@ mod tests {
         let frame = Frame::new(0xF81, &[1, 2, 3]);
         assert_eq!((frame.id(), frame.data(), frame.full()), (0x781, &[1, 2, 3][..], None));
         assert_eq!(Frame::new(1, &[7; 12]).full(), Some([7; 8]));
-        // 1 + 11 + 1 + 1 + 1 + 4 + 15 + 1 + 1 + 1 + 7 + 3: start, id, RTR, IDE, r0, DLC, CRC, its delimiter, ACK, its
-        // delimiter, end, intermission.
+        // 1 + 11 + 1 + 1 + 1 + 4 + 15 + 1 + 1 + 1 + 7 + 3. Fields: start, id, RTR, IDE, r0, DLC, CRC, CRC
+        // delimiter, ACK, ACK delimiter, end, intermission.
         assert_eq!((Frame::new(0, &[]).bits(), Frame::new(0, &[0; 8]).bits()), ([47, 55], [111, 135]));
     }
 }

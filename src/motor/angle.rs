@@ -1,21 +1,22 @@
-//! Electrical angle: from encoder counts to sine and cosine, and how fast it turns.
+//! Electrical angle and speed, sine and cosine from encoder counts.
 //!
-//! Why an integer: a turn is 2^32, so that angles wrap for free and need no reduction. Counts are kept modulo one mechanical
-//! turn before they are scaled, so that no error grows with the way.
+//! Why an integer: a turn is 2^32, so angles wrap for free and need no reduction. Counts are reduced to one
+//! mechanical turn before they are scaled, so no error grows with the distance travelled.
 //!
 //! ```text
 //! angle = pole pairs / counts per turn * (counts + 1/2) + offset          turns; a count covers [n, n+1)
-//! e = angle - estimate;  speed += (w T)^2 e;  estimate += speed + 2 w T e          tracking loop, w = 1000 rad/s
+//! e = angle - estimate;  speed += (w T)^2 e;  estimate += speed + 2 w T e      tracking loop, w = 1000 rad/s
 //! ```
 //!
-//! The loop's speed (double pole at w) feeds the back-EMF forward and turns the voltage by the delay; the angle itself is the
-//! counter's, not the loop's. A constant speed is tracked without lag, a constant acceleration with 2/w times itself: at
-//! 20,000 rad/s^2 electrical 40 rad/s, 0.2 V of back-EMF at 5 mV s. Noise: 8,192 counts and 7 pole pairs make
-//! 0.31 electrical degrees per count, uniform to +-0.15: a quadrature current of 1 A reads as 2.7 mA of direct current.
+//! The loop's speed (double pole at w) feeds the back-EMF forward and turns the voltage by the delay. The
+//! angle itself comes from the counter, not from the loop. A constant speed is tracked without lag, a
+//! constant acceleration with a speed error of 2/w times itself. At 20,000 rad/s^2 electrical that is 40
+//! rad/s, or 0.2 V of back-EMF at 5 mV s. Quantisation: 8,192 counts and 7 pole pairs make 0.31 electrical
+//! degrees per count, uniform to +-0.15. A quadrature current of 1 A then reads as 2.7 mA of direct current.
 //!
-//! [`Sine::Exact`] is wrong by up to 1.2e-7, [`Sine::Fast`] by up to 1.1e-3. Because the angle is an integer nothing is left to
-//! reduce, and on a processor that multiplies in one cycle the exact one is the cheaper (a tick turns two vectors: 500
-//! instructions with it, 522 with the other), so it is the default.
+//! [`Sine::Exact`] errs by up to 1.2e-7, [`Sine::Fast`] by up to 1.1e-3. The angle is an integer, so no range
+//! reduction remains. On a processor with single-cycle multiplication the exact sine is the cheaper one and
+//! therefore the default. A tick turns two vectors in 500 instructions with it, in 522 with the fast one.
 
 use crate::hal::CURRENT_RATE_HZ;
 use crate::real::{fast_sin_cos, sin_cos_of_turns};
@@ -29,12 +30,12 @@ const TRACKING_RAD_PER_S: f32 = 1000.0;
 const TRACKING_POSITION: f32 = 2.0 * TRACKING_RAD_PER_S * TICK_S;
 const TRACKING_SPEED: f32 = (TRACKING_RAD_PER_S * TICK_S) * (TRACKING_RAD_PER_S * TICK_S);
 
-/// Which sine turns the current loop's vectors.
+/// Selects the sine and cosine used in the current loop's rotations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sine {
-    /// Parabolas of `micromath`, wrong by up to 1.1e-3.
+    /// Parabolas of `micromath`, error up to 1.1e-3.
     Fast,
-    /// Minimax polynomials, wrong by up to 1.2e-7.
+    /// Minimax polynomials, error up to 1.2e-7.
     #[default]
     Exact,
 }
@@ -56,7 +57,7 @@ impl ElectricalAngle {
     /// Flux along phase A.
     pub const ZERO: Self = Self(0);
 
-    /// From turns, of which the whole ones count for nothing; -32,768..=32,767.
+    /// Converts turns; whole turns are dropped. Valid for -32,768..=32,767.
     #[must_use]
     pub fn from_turns(turns: f32) -> Self {
         let whole = turns as i32;
@@ -69,19 +70,19 @@ impl ElectricalAngle {
         self.0.cast_signed() as f32 * (1.0 / TURN)
     }
 
-    /// The way from `other` to here, turns from -0.5 to 0.5.
+    /// Signed difference from `other` to this angle, turns from -0.5 to 0.5.
     #[must_use]
     pub fn since(self, other: Self) -> f32 {
         Self(self.0.wrapping_sub(other.0)).turns()
     }
 
-    /// Turned on by another angle.
+    /// Sum of both angles, modulo one turn.
     #[must_use]
     pub const fn plus(self, other: Self) -> Self {
         Self(self.0.wrapping_add(other.0))
     }
 
-    /// Turned back by another angle.
+    /// Difference of both angles, modulo one turn.
     #[must_use]
     pub const fn minus(self, other: Self) -> Self {
         Self(self.0.wrapping_sub(other.0))
@@ -98,17 +99,17 @@ impl ElectricalAngle {
         Rotation { sine, cosine }
     }
 
-    /// Units of 2^-32 turns, from half a turn back to half a turn on.
+    /// Signed angle from minus to plus half a turn, in units of 2^-32 turns.
     pub const fn units(self) -> i32 {
         self.0.cast_signed()
     }
 
-    /// From units of 2^-32 turns.
+    /// Creates an angle from units of 2^-32 turns.
     pub const fn from_units(units: i32) -> Self {
         Self(units.cast_unsigned())
     }
 
-    /// Turned on by less than half a turn, given in units of 2^-32 turns.
+    /// This angle advanced by less than half a turn, given in units of 2^-32 turns.
     fn turned_by(self, units: f32) -> Self {
         Self(self.0.wrapping_add((units as i32).cast_unsigned()))
     }
@@ -123,19 +124,19 @@ pub struct SpeedTracker {
 }
 
 impl SpeedTracker {
-    /// At rest at an angle.
+    /// A tracker at rest at an angle.
     #[must_use]
     pub const fn at(angle: ElectricalAngle) -> Self {
         Self { estimate: angle, speed: 0.0 }
     }
 
-    /// Turning at an angle, electrical rad/s.
+    /// A tracker that starts at an angle with a speed, electrical rad/s.
     #[must_use]
     pub const fn turning(angle: ElectricalAngle, rad_per_s: f32) -> Self {
         Self { estimate: angle, speed: rad_per_s / (RADIAN_PER_UNIT * CURRENT_RATE_HZ as f32) }
     }
 
-    /// Takes in the angle of one tick.
+    /// Updates angle and speed with the angle of one tick.
     pub fn track(&mut self, angle: ElectricalAngle) {
         let error = angle.0.wrapping_sub(self.estimate.0).cast_signed() as f32;
         self.speed += TRACKING_SPEED * error;
@@ -148,24 +149,25 @@ impl SpeedTracker {
         self.speed * (RADIAN_PER_UNIT * CURRENT_RATE_HZ as f32)
     }
 
-    /// Where an angle will be some ticks later.
+    /// Predicted angle some ticks later, at the tracked speed.
     #[must_use]
     pub fn ahead(&self, angle: ElectricalAngle, ticks: f32) -> ElectricalAngle {
         angle.turned_by(self.speed * ticks)
     }
 }
 
-/// Counts of one turn to the electrical angle.
+/// Scale from encoder counts of one mechanical turn to the electrical angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CountScale {
     counts_per_turn: i32,
-    /// Electrical angle of one count: rounded, which makes 7.6e-6 turns after 65,536 counts.
+    /// Electrical angle of one count. Rounding accumulates to 7.6e-6 turns after 65,536 counts.
     units_per_count: u32,
 }
 
 impl CountScale {
-    /// Of an encoder with `counts_per_turn` (16..=65,536) and a motor with `pole_pairs` (1..=64), so that a count is less
-    /// than a quarter of an electrical turn; `None` otherwise.
+    /// Scale of an encoder with `counts_per_turn` (16..=65,536) and a motor with `pole_pairs`
+    /// (1..=64). Returns `None` outside these ranges, and where a count is not less than a quarter of
+    /// an electrical turn.
     #[must_use]
     pub fn new(counts_per_turn: u32, pole_pairs: u8) -> Option<Self> {
         let possible = (16..=65_536).contains(&counts_per_turn)
@@ -183,7 +185,7 @@ impl CountScale {
         self.counts_per_turn
     }
 
-    /// A place within one turn moved on by less than one turn, within one turn again.
+    /// Moves a position within one turn by less than one turn and wraps the result.
     #[must_use]
     pub const fn moved(&self, place: i32, step: i32) -> i32 {
         let place = place + step;
@@ -196,14 +198,14 @@ impl CountScale {
         }
     }
 
-    /// Any number of counts within one turn.
+    /// Reduces any number of counts to one turn.
     #[must_use]
     pub fn within_turn(&self, counts: i32) -> i32 {
-        // A turn is 16 counts at least; said so that nothing is left that could panic.
+        // A turn has at least 16 counts. The checked form leaves no panic in the image.
         counts.checked_rem_euclid(self.counts_per_turn).unwrap_or_default()
     }
 
-    /// The electrical angle of the middle of a count.
+    /// Electrical angle at the middle of a count.
     #[must_use]
     pub const fn angle(&self, place: i32) -> ElectricalAngle {
         ElectricalAngle(
@@ -227,9 +229,10 @@ mod tests {
             place = scale.moved(place, counts.cast_signed() - 3 * steps);
             assert_eq!(place, 0);
             let half = scale.angle(counts.cast_signed() / 2).since(scale.angle(0)).abs();
-            // Rounding of half a turn's counts.
+            // Tolerance: rounding of half a turn's counts.
             assert!((half - if pairs % 2 == 1 { 0.5 } else { 0.0 }).abs() < 4e-6, "{half}");
-            // Over one turn pole pairs electrical turns: the last step closes it, to a hundredth of a count.
+            // One mechanical turn is `pairs` electrical turns; the last step closes it to a hundredth
+            // of a count.
             let last = scale.angle(counts.cast_signed() - 1);
             let step = scale.angle(0).since(last);
             assert!((step * counts as f32 / f32::from(pairs) - 1.0).abs() < 1e-2, "{step}");
@@ -261,7 +264,7 @@ mod tests {
                 tracker.track(scale.angle(count.rem_euclid(8192)));
             }
             let true_speed = counts_per_tick * 7.0 / 8192.0 * core::f64::consts::TAU * 24_000.0;
-            // Steps of a count, filtered: below half a count over the loop's 1 ms, 2.7 rad/s.
+            // Filtered steps of one count: below half a count over the loop's 1 ms, 2.7 rad/s.
             assert!((f64::from(tracker.rad_per_s()) - true_speed).abs() < 2.7, "{}", tracker.rad_per_s());
         }
     }

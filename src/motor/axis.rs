@@ -1,4 +1,4 @@
-//! One axis: what the 24 kHz interrupt calls.
+//! One axis: the code that the 24 kHz interrupt calls.
 //!
 //! ```text
 //! count -> turn -> electrical angle -> speed ----------------------------------+
@@ -6,30 +6,42 @@
 //! bus code -> voltage limit, duties per volt --^                                  ^
 //! ```
 //!
-//! An [`Axis`] exists only with a [`Calibration`], and a calibration only where every check of the wiring was passed: there is
-//! no way to torque around it. The configuration and what follows from it never change; what a tick changes is [`Axis`]'s few state words.
+//! An [`Axis`] requires a [`Calibration`], and a calibration exists only after every wiring check has passed.
+//! So no torque is possible without these checks. The configuration and the constants derived from it never
+//! change; a tick changes only [`Axis`]'s few state words.
 //!
-//! **Borders.** A target that is not a number, a voltage that is none, a current beyond the bound release the bridge in the
-//! same tick. A saturated amplifier, a bus voltage out of range and an encoder step that no motor makes have one tick of
-//! patience, in which the duties of the tick before are kept; the second in a row releases, and so does the third of shunts or bus in
-//! every other tick. A single step that was not believed is
-//! told with the joint's sample, and three of them in 10 ms are the servo's fault (`safety::Monitor`). A code that stays while its
-//! phase is asked for something else, and shunts that do not begin at zero, release as well ([`ShuntWatch`]). Released stays released
-//! until [`Axis::clear_fault`]. Two wrong index pulses at one place, or more than two turns without a right one, release, switching or not
-//! (`index.rs`): looked at with the joint's sample.
+//! **Limits.** These conditions turn the outputs off:
 //!
-//! Once per joint sample the voltages are held against currents and speed ([`ModelWatch`]): an open phase and a drifted zero
-//! release, a frozen counter makes the motor a passive brake ([`Axis::brake`]), since a leg whose encoder is gone should not drop.
+//! | condition | reaction |
+//! | --- | --- |
+//! | target or voltage not finite, current beyond the bound | same tick |
+//! | shunt amplifier saturated, bus voltage out of range | second in a row, or third of every other tick |
+//! | encoder step that no motor makes | second in a row |
+//! | shunt code constant while its phase's target changes ([`ShuntWatch`]) | fourth tick |
+//! | current offset wrong at enabling ([`ShuntWatch`]) | not enabled |
+//! | two wrong index pulses at one position, or none for over two turns (`index.rs`) | next joint sample |
 //!
-//! **A brake has bounds.** A shorted motor carries `w flux / sqrt(R^2 + w^2 L^2)`. Where that is more than the overcurrent bound, above
-//! 2.5 rad/s of a joint of the default leg, it is released instead, as an overcurrent; so it is when its current passes the bound.
+//! During one tick of tolerance the previous tick's duties are repeated. A single implausible encoder step
+//! marks the joint sample as doubtful; three within 10 ms are a fault of the servo (`safety::Monitor`). The
+//! index is also checked while the outputs are off. Outputs stay off until [`Axis::clear_fault`]; with a lost
+//! rotor position the motor brakes instead, unless the outputs are requested off.
 //!
-//! **Known limit.** At a lower speed than [`ModelWatch`] derives, and a current that hardly changes, a counter that stops looks
-//! like a rotor that is held: the torque falls with the cosine of what is missed, the rotor comes to rest a quarter of an electrical
-//! turn further. The index sees it where counts come back too few. Without an index lost counts are not seen.
+//! Once per joint sample the voltages are compared with currents and speed ([`ModelWatch`]). An open phase
+//! and a drifted current-sensor offset turn the outputs off. A frozen counter turns the motor into a passive
+//! brake ([`Axis::brake`]), so that a leg does not drop when its encoder fails.
 //!
-//! **Signs.** Inside, positive current makes torque towards growing electrical angle. Outside, counts and current both grow
-//! with the joint's flexion: [`AxisConfiguration::flexion`] says which way the counter runs then.
+//! **Limit of braking.** A shorted motor carries `w flux / sqrt(R^2 + w^2 L^2)`. The outputs go off with an
+//! overcurrent fault where that exceeds the overcurrent bound, or where the measured current does. On the
+//! default leg the first happens above 2.5 rad/s of the joint.
+//!
+//! **Known limit.** Below the speed that [`ModelWatch`] derives, at nearly constant current, a counter that
+//! stops looks like a held rotor. The torque falls with the cosine of the missed angle, and the rotor comes
+//! to rest a quarter of an electrical turn further. The index shows it where too few counts are left between
+//! pulses. Without an index, lost counts are not detected.
+//!
+//! **Signs.** Inside, positive current makes torque towards growing electrical angle. Outside, counts
+//! and current both grow with the joint's flexion: [`AxisConfiguration::flexion`] states the
+//! counter's direction then.
 //!
 //! Cost: `scripts/count-instructions`.
 
@@ -53,8 +65,8 @@ pub use asked::{AxisFault, AxisRequest, Wish};
 use index::IndexWatch;
 use window::Window;
 
-/// What a reading of shunts or bus that is not believed adds to the doubts; each that is believed takes one away. Beyond so many it is a fault:
-/// the third of three in every other tick, or the sixth of one in four.
+/// Weight of a rejected shunt or bus reading. Each accepted reading subtracts one. A sum above
+/// [`MOST_DOUBTS`] is a fault: the third rejection of every other tick, or the sixth of one in four.
 const DOUBT: u8 = 4;
 const MOST_DOUBTS: u8 = 8;
 
@@ -66,40 +78,39 @@ pub struct Axis {
     speed: SpeedTracker,
     /// Counter at the last plausible sample.
     counter: u16,
-    /// Of the counter, to that sample.
+    /// Change of the counter at that sample.
     step: i32,
     index: IndexWatch,
-    /// Within one turn, in the electrical sense.
+    /// Rotor position within one turn, electrical sense, counts.
     place: i32,
-    /// Unwrapped, in the joint's sense.
+    /// Unwrapped counts, joint's sense.
     counts: i32,
     measured: Rotating<Ampere>,
     window: Window,
     model_watch: ModelWatch,
-    /// It has not looked since the bridge began to switch.
+    /// The model watch has not run since the bridge began to switch.
     begins: bool,
     shunt_watch: ShuntWatch,
-    /// Of the constants as they were made.
+    /// Checksum of the constants at construction.
     checksum: Checksum,
-    /// Joint samples until they are looked at.
+    /// Joint samples since the last check of that checksum; wraps at 256.
     unchecked: u8,
     last: AxisCommand,
     doubtful: bool,
-    /// About shunts and bus, see [`DOUBT`].
+    /// Weighted count of rejected shunt and bus readings, see [`DOUBT`].
     doubts: u8,
-    /// A count since the last joint sample was not believed.
+    /// An encoder step since the last joint sample was implausible.
     disbelieved: bool,
     fault: Option<AxisFault>,
-    /// Of place or parameters, whatever was found since.
+    /// Rotor position or parameters are lost; [`Self::clear_fault`] has no effect.
     lost: bool,
 }
 
 impl Axis {
-    /// An axis at rest with its bridge released; counts begin at zero. `sample` is the newest there is: since the calibration
-    /// the counter may not have moved by more than half of its range.
+    /// Creates an axis at rest with outputs off; counts begin at zero. `sample` is the newest one. Since the
+    /// calibration the counter may not have moved by more than half of its range.
     ///
-    /// # Errors
-    /// The part of the configuration that makes no sense.
+    /// # Errors Names the invalid part of the configuration.
     pub fn new(
         configuration: &AxisConfiguration,
         calibration: &Calibration,
@@ -132,25 +143,25 @@ impl Axis {
         })
     }
 
-    /// States that the joint now stands at `counts`.
+    /// Sets the joint's count at its present position.
     pub fn set_counts(&mut self, counts: i32) {
         self.index.shift(counts.wrapping_sub(self.counts));
         self.counts = counts;
         self.window = Window::EMPTY;
     }
 
-    /// One PWM period: what the bridge does in the next one.
+    /// Runs one PWM period and returns the bridge's command for the next one.
     pub fn tick(&mut self, sample: &AxisSample, request: AxisRequest) -> AxisCommand {
         self.act(sample, request.into())
     }
 
-    /// One PWM period in which the motor is a passive brake, below the overcurrent bound.
+    /// Runs one PWM period with the motor as a passive brake, below the overcurrent bound.
     pub fn brake(&mut self, sample: &AxisSample) -> AxisCommand {
         self.act(sample, Wish::Brake)
     }
 
-    /// Either; with a fault released, but for a counter that is frozen or lost its place, with which a motor that is to do anything
-    /// brakes.
+    /// Runs one PWM period of either kind. During a fault the outputs are off. With a frozen counter or a
+    /// lost rotor position, however, the motor brakes unless the outputs are requested off.
     #[inline(always)]
     pub fn act(&mut self, sample: &AxisSample, wish: Wish) -> AxisCommand {
         let wish = match (wish, self.fault) {
@@ -159,7 +170,7 @@ impl Axis {
             (_, Some(AxisFault::EncoderFrozen | AxisFault::Encoder)) => Wish::Brake,
             _ => Wish::Released,
         };
-        // Field by field: a copy of the whole would carry the bytes between the fields, one by one.
+        // Field by field: copying the whole struct would also carry the padding, byte by byte.
         let AxisCommand { enabled, duty } = match self.step(sample, wish) {
             Ok(command) => command,
             Err(fault) => {
@@ -176,7 +187,7 @@ impl Axis {
     #[inline(never)]
     fn found(&mut self, fault: AxisFault) {
         self.fault = Some(fault);
-        // A counter that froze may show itself as something else first.
+        // A frozen counter may first show as another fault.
         let doubted =
             self.last.enabled && !self.begins && self.model_watch.doubts(&self.constants.model, self.place);
         self.lost |=
@@ -187,7 +198,7 @@ impl Axis {
     fn step(&mut self, sample: &AxisSample, wish: Wish) -> Result<AxisCommand, AxisFault> {
         let constants = &self.constants;
         let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
-        // The way back from a wrong reading that was just small enough to be believed is no jump.
+        // A return from a wrong reading just small enough to be accepted is no jump.
         let plausible =
             step.abs() <= constants.greatest_step || (step + self.step).abs() <= constants.greatest_step;
         if plausible {
@@ -203,7 +214,7 @@ impl Axis {
         }
         let angle = self.angle();
         self.speed.track(angle);
-        // Both rotations of a tick side by side: they share their polynomials' constants.
+        // Both rotations of a tick together share the constants of their polynomials.
         let [rotor, acting] =
             [angle, self.speed.ahead(angle, DELAY_PERIODS)].map(|angle| angle.rotation(constants.sine));
         let currents = constants.sense.currents(sample.shunt_codes, constants.zeros);
@@ -216,7 +227,7 @@ impl Axis {
         self.window.push(self.counts, self.measured.q.0 * constants.current_sign);
 
         let [low, high] = constants.bus_codes;
-        // A motor that brakes needs neither place nor bus.
+        // Braking needs neither rotor position nor bus voltage.
         let doubt = if !plausible && wish != Wish::Brake {
             Some(AxisFault::Encoder)
         } else if switching && currents.is_none() {
@@ -228,7 +239,7 @@ impl Axis {
         };
         if let Some(fault) = doubt {
             self.disbelieved |= !plausible;
-            // Who is about to switch has no command to keep until the next reading.
+            // When switching starts there is no previous command to repeat.
             self.doubts = self.doubts.saturating_add(u8::from(plausible) * DOUBT);
             if self.doubtful || self.doubts > MOST_DOUBTS || switching && !self.last.enabled {
                 return Err(fault);
@@ -283,41 +294,42 @@ impl Axis {
             return Err(AxisFault::StuckConversion);
         }
         let duty = constants.modulator.duties(voltage.to_stationary(acting), 1.0 / bus.0, target);
-        // They are within 0..1 or no numbers.
+        // Duties are within 0..1 or NaN.
         if !(duty[0] + duty[1] + duty[2] >= 0.0) {
             return Err(AxisFault::NotANumber);
         }
         Ok(AxisCommand { enabled: true, duty })
     }
 
-    /// Of the place.
+    /// Electrical angle of the current rotor position.
     #[inline(always)]
     fn angle(&self) -> ElectricalAngle {
         self.constants.scale.angle(self.place).plus(self.constants.offset)
     }
 
-    /// Whether index pulses say that the place is lost.
+    /// Whether the index pulses show a lost rotor position.
     fn is_off_the_index(&mut self) -> bool {
         let Constants { indexed, unindexed, scale, .. } = &self.constants;
         *indexed && self.index.is_lost(self.counts, scale, *unindexed)
     }
 
-    /// Means of count and current since the last call, in the joint's sense; both of the same ticks, so that they belong to one
-    /// instant, 2.5 ticks (104 us) before the last of six. Without a tick since then the newest values.
+    /// Takes the means of count and current since the last call, in the joint's sense. Both cover the same
+    /// ticks and so belong to one instant, 2.5 ticks (104 us) before the last of six. Without a tick since
+    /// then, returns the newest values.
     ///
-    /// Holds the voltages against currents and speed meanwhile, once per call: what is found is a fault from here on, and acts from
-    /// the next tick on.
+    /// Each call also compares the voltages with currents and speed ([`ModelWatch`]). A fault found here acts
+    /// from the next tick on.
     pub fn joint_sample(&mut self) -> JointSample {
-        // Every 64 ms.
+        // Checked every 64 ms.
         self.unchecked = self.unchecked.wrapping_add(1);
         if self.unchecked == 0 && self.constants.checksum() != self.checksum {
             self.found(AxisFault::Parameters);
         }
-        // A motor that brakes needs no place.
+        // Braking needs no rotor position.
         if self.is_off_the_index() && self.fault.is_none() && self.last != AxisCommand::BRAKE {
             self.found(AxisFault::Encoder);
         }
-        // A motor that brakes is given no voltage that could be held against anything.
+        // While braking, no commanded voltage exists to compare with.
         let follows = self.last.enabled && self.last != AxisCommand::BRAKE;
         if follows && self.fault.is_none() && self.window.ticks > 0 {
             if core::mem::take(&mut self.begins) {
@@ -334,7 +346,7 @@ impl Axis {
             };
             if let Some(fault) = self.model_watch.look(&self.constants.model, &shown) {
                 if fault == AxisFault::EncoderFrozen {
-                    // Whether a brake may begin is a matter of the speed that was not counted.
+                    // The brake's speed limit needs the speed that the frozen counter did not show.
                     self.speed =
                         SpeedTracker::turning(angle, self.model_watch.uncounted(&self.constants.model));
                 }

@@ -1,24 +1,27 @@
-//! The brake chopper: what the leg gives back and the supply does not take is burnt in a resistor.
+//! Brake chopper: burns energy that the leg regenerates and the supply cannot absorb.
 //!
-//! Why: a supply's diode takes no energy back, and the bus capacitor alone is too small. A knee of 2.5 kg m^2 that is stopped
-//! from 4.5 rad/s gives back 25 J, less what the windings take; 1.5 mF at 48 V would go to 190 V.
+//! Why: a supply's diode takes no energy back, and the bus capacitor alone is too small. A knee of 2.5 kg m^2
+//! stopped from 4.5 rad/s returns 25 J, less what the windings take. That would charge 1.5 mF from 48 V to
+//! 190 V.
 //!
 //! ```text
 //! duty = clamp((V_bus - begin) / (full - begin), 0, 0.95)
 //! ```
 //!
-//! A ramp and no switch, so that the bus neither hunts nor fights a supply that is set a little high; `begin` lies above every
-//! voltage of the supply without load, `full` below the voltage at which the bridges are released. The loop of capacitor and
-//! ramp has the time constant C R (full - begin) / V, 0.25 ms with 2 ohm and 4 V: six periods. 0.95 is the greatest duty that
-//! ODrive's firmware allows the resistor. A voltage that is not a number makes no duty: the axes release on it.
-//! Source: the ramp of ODrive v0.5.6 (`dc_bus_overvoltage_ramp`). Cost: 4 operations.
+//! A ramp instead of a switch: the bus neither hunts nor fights a supply that is set a little high. `begin`
+//! lies above every no-load voltage of the supply, `full` below the voltage at which the bridges turn off.
+//! Capacitor and ramp form a loop with the time constant C R (full - begin) / V. With 2 ohm and 4 V that is
+//! 0.25 ms, or six periods. The limit of 0.95 is the greatest duty that ODrive's firmware allows the
+//! resistor. A bus voltage that is not finite gives duty 0; the axes turn off on it.
+//! Source: the ramp of ODrive v0.5.6 (`dc_bus_overvoltage_ramp`).
+//! Cost: 4 operations.
 
 use super::SenseScale;
 use crate::hal::CURRENT_RATE_HZ;
 use crate::real::{clamp, is_finite};
 use crate::units::Volt;
 
-/// Greatest share of time for which the resistor is on.
+/// Greatest duty of the resistor.
 pub const GREATEST_BRAKE_DUTY: f32 = 0.95;
 
 /// The chopper's ramp; see the module.
@@ -29,8 +32,9 @@ pub struct Chopper {
 }
 
 impl Chopper {
-    /// `None` unless 5 V <= begin, and full lies at least half a volt above it and within what the board's divider can tell
-    /// ([`SenseScale::greatest_bus`], 59.6 V): beyond, the ramp would never be reached.
+    /// Returns `None` unless `begin` is at least 5 V and `full` at least half a volt above it. `full` must
+    /// also lie within the range of the board's divider ([`SenseScale::greatest_bus`], 59.6 V); beyond, the
+    /// ramp would never be reached.
     #[must_use]
     pub fn new(begin: Volt, full: Volt) -> Option<Self> {
         let sensible =
@@ -38,7 +42,7 @@ impl Chopper {
         sensible.then(|| Self { begin, per_volt: 1.0 / (full.0 - begin.0) })
     }
 
-    /// Share of time for which the resistor is on, 0..=0.95.
+    /// Duty of the resistor at a bus voltage, 0..=0.95.
     #[must_use]
     pub fn duty(&self, bus: Volt) -> f32 {
         if !is_finite(bus.0) {
@@ -48,15 +52,16 @@ impl Chopper {
     }
 }
 
-/// What a brake resistor that is not watched by a thermometer of its own may take: half a second of full duty, given back at a
+/// Energy budget of a brake resistor without a temperature sensor: half a second of full duty, refilled at a
 /// fiftieth of the time.
 ///
-/// Why: a supply above `begin`, or a voltage that reads too high, keeps the resistor on without end, at over a kilowatt with
-/// 2 ohm. A stop of the leg takes some tens of milliseconds. Once used up the resistor stays off until half of it is there
-/// again (12 s); what the leg gives back meanwhile raises the bus until the axes release.
+/// Why: a supply above `begin`, or a voltage that reads too high, keeps the resistor on without end, at over
+/// a kilowatt with 2 ohm. A stop of the leg takes some tens of milliseconds. Once exhausted, the resistor
+/// stays off until half of the budget is refilled (12 s). Energy regenerated in that time raises the bus
+/// until the axes turn off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrakeBudget {
-    /// Seconds of full duty.
+    /// Remaining time at full duty.
     left_s: f32,
     used_up: bool,
 }
@@ -66,10 +71,10 @@ impl BrakeBudget {
     const GIVEN_BACK: f32 = 0.02;
     const TICK_S: f32 = 1.0 / CURRENT_RATE_HZ as f32;
 
-    /// All of it.
+    /// The full budget.
     pub const FULL: Self = Self { left_s: Self::WHOLE_S, used_up: false };
 
-    /// Of a wanted duty what the resistor may do in a current tick.
+    /// Returns the duty the resistor may have in a current tick, and subtracts it from the budget.
     #[must_use]
     pub fn spend(&mut self, wanted: f32) -> f32 {
         let duty = if self.used_up { 0.0 } else { wanted };
@@ -83,7 +88,7 @@ impl BrakeBudget {
 mod tests {
     use super::*;
 
-    /// Seconds until a duty that is always wanted is no longer given, at most ten.
+    /// Seconds until a constantly requested duty is cut off, at most ten.
     fn time_on(duty: f32) -> f32 {
         let mut budget = BrakeBudget::FULL;
         let ticks = (0..10 * CURRENT_RATE_HZ).take_while(|_| budget.spend(duty) == duty).count();
@@ -96,7 +101,7 @@ mod tests {
         assert!(time_on(0.01) >= 9.99, "a mean of two per cent is for ever");
         let mut budget = BrakeBudget::FULL;
         let given: f32 = (0..60 * CURRENT_RATE_HZ).map(|_| budget.spend(0.95)).sum();
-        // In a minute: the whole of it, and a fiftieth of the rest.
+        // Expected in a minute: the full budget, and a fiftieth of the rest.
         assert!((1.0..1.8).contains(&(given / CURRENT_RATE_HZ as f32)), "{given}");
         let mut budget = BrakeBudget::FULL;
         assert!((0..CURRENT_RATE_HZ).all(|_| budget.spend(f32::NAN).is_nan() || budget.used_up));

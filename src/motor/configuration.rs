@@ -1,4 +1,4 @@
-//! What an axis must be told, the refusal of what makes no sense, and the constants that follow.
+//! Configuration of an axis, its validation, and the constants derived from it.
 
 use super::{
     BridgeTiming, Calibration, CountScale, CurrentGains, DeadTime, ElectricalAngle, EncoderSetting,
@@ -9,13 +9,13 @@ use crate::hal::CURRENT_RATE_HZ;
 use crate::real::{min, sqrt};
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
 
-/// Which way something runs.
+/// Direction of a counter or a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Direction {
-    /// It grows.
+    /// Growing.
     #[default]
     Up,
-    /// It falls.
+    /// Falling.
     Down,
 }
 
@@ -30,71 +30,76 @@ impl Direction {
     }
 }
 
-/// One axis: board, motor, encoder, limits.
+/// Configuration of one axis: board, motor, encoder, limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisConfiguration {
-    /// Amplifiers and converter.
+    /// Scales of the shunt amplifiers and the converter.
     pub sense: SenseScale,
-    /// What a PWM period has to leave room for.
+    /// Times that a PWM period has to leave free.
     pub timing: BridgeTiming,
     /// Compensation of the bridge's dead time.
     pub dead_time: DeadTime,
-    /// Of the motor, 1..=64.
+    /// Pole pairs of the motor, 1..=64.
     pub pole_pairs: u8,
     /// Flux linkage of the magnets: torque per ampere of the motor is 3/2 pole pairs times this.
     pub flux: Weber,
-    /// Of the encoder at the motor, 16..=65,536, four per line.
+    /// Counts per turn of the encoder at the motor, 16..=65,536, four per line.
     pub counts_per_turn: u32,
-    /// The encoder has an index pulse.
+    /// Whether the encoder has an index pulse.
     pub index: bool,
-    /// How the counter runs while the field turns from A over B to C, as the axis was commissioned.
+    /// Direction of the counter while the field turns from A over B to C, as the axis was commissioned.
     pub counter: Direction,
-    /// How the counter runs while the joint flexes.
+    /// Direction of the counter while the joint flexes.
     pub flexion: Direction,
-    /// Of the current loop, 50..=2000 Hz.
+    /// Bandwidth of the current loop, 50..=2000 Hz.
     pub bandwidth: Hertz,
-    /// Cross-coupling and back-EMF are fed forward.
+    /// Whether cross-coupling and back-EMF are fed forward.
     pub feedforward: bool,
-    /// Of the Park angles.
+    /// Sine used for the Park rotations.
     pub sine: Sine,
-    /// Largest current that is asked of the motor.
+    /// Greatest quadrature current the axis requests from the motor.
     pub current_limit: Ampere,
-    /// Length of the current vector at which the bridge is released.
+    /// Length of the current vector above which the outputs go off.
     pub overcurrent: Ampere,
-    /// Bus voltage within which the bridge may switch; the second no more than [`SenseScale::greatest_bus`].
+    /// Range of bus voltage in which the bridge may switch; at most [`SenseScale::greatest_bus`].
     pub bus: [Volt; 2],
-    /// No motor of this axis turns faster; there a released bridge must not rectify more than the greatest bus voltage.
+    /// Greatest speed of the motor. At this speed a bridge with outputs off must not rectify more than the
+    /// greatest bus voltage.
     pub greatest_speed: RadianPerSecond,
 }
 
-/// The part of a configuration that makes no sense.
+/// Invalid part of a configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisError {
     /// Amplifiers, converter or divider.
     Sense,
-    /// Dead time, settling or conversion leave less than half of the period, or the compensation's band.
+    /// Dead time, settling or conversion leave less than half of the period, or the compensation's
+    /// band is invalid.
     Timing,
-    /// Counts per turn and pole pairs.
+    /// Counts per turn or pole pairs.
     Encoder,
-    /// Greatest speed: positive, less than a quarter of an electrical turn and 32,767 counts per tick.
+    /// Greatest speed: must be positive, below a quarter of an electrical turn and below 32,767
+    /// counts per tick.
     Speed,
     /// Flux, inductances, resistance or bandwidth.
     Motor,
-    /// Current limit positive, below the overcurrent bound, that within the amplifiers' range.
+    /// The current limit must be positive and below the overcurrent bound, the latter within
+    /// the amplifiers' range.
     Current,
-    /// Bus voltages: from 5 V on, the first below the second, that within the converter's range.
+    /// Bus voltages: the first must be at least 5 V and below the second, the second within
+    /// the converter's range.
     Bus,
-    /// At the greatest speed a released bridge rectifies more than the greatest bus voltage: sqrt(3) pole pairs speed flux.
+    /// At the greatest speed the outputs, when off, rectify more than the greatest bus voltage: sqrt(3) pole
+    /// pairs speed flux.
     BackEmf,
-    /// The calibration was found with another direction of the counter, other pole pairs or other counts per turn.
+    /// The calibration was made with another counter direction, other pole pairs or other counts per turn.
     Calibration,
 }
 
 impl AxisConfiguration {
-    /// Everything that can be told without a calibration.
+    /// Checks everything that needs no calibration.
     ///
-    /// # Errors
-    /// The first part that makes no sense.
+    /// # Errors Names the first invalid part.
     pub fn check(&self) -> Result<(), AxisError> {
         let must = |holds: bool, error| if holds { Ok(()) } else { Err(error) };
         must(self.sense.is_sensible(), AxisError::Sense)?;
@@ -122,7 +127,7 @@ impl AxisConfiguration {
         Modulator::new(self.timing, self.dead_time).ok_or(AxisError::Timing)
     }
 
-    /// Counts per tick that no motor of this axis exceeds, one of rounding included.
+    /// Greatest plausible step, counts per tick, with margin for rounding.
     pub(super) fn greatest_step(&self) -> Result<i32, AxisError> {
         let turns = self.greatest_speed.0 / (core::f32::consts::TAU * CURRENT_RATE_HZ as f32);
         let counts = turns * self.counts_per_turn as f32;
@@ -130,7 +135,7 @@ impl AxisConfiguration {
         if sensible { Ok(counts as i32 + 2) } else { Err(AxisError::Speed) }
     }
 
-    /// The bus voltages as codes.
+    /// Bus voltage limits as converter codes.
     pub(super) fn bus_codes(&self) -> [u16; 2] {
         self.bus.map(|voltage| (voltage.0 / self.sense.volt_per_code.0) as u16)
     }
@@ -138,10 +143,11 @@ impl AxisConfiguration {
 
 const SQRT_3: f32 = 1.732_050_8;
 
-/// How far a shunt's zero may lie from the middle of the converter's range: 6 A on the board's scale.
+/// Greatest distance of a current-sensor offset from the middle of the converter's range: 6 A on
+/// the board's scale.
 pub const ZERO_SPREAD_CODES: u16 = 150;
 
-/// What a tick reads and never writes.
+/// Values that a tick reads and never writes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Constants {
     pub sense: SenseScale,
@@ -149,29 +155,29 @@ pub(super) struct Constants {
     pub bus_codes: [u16; 2],
     pub scale: CountScale,
     pub offset: ElectricalAngle,
-    /// Places count from an index.
+    /// Rotor positions count from the index.
     pub indexed: bool,
-    /// Counts within which an index has to come; without one any number.
+    /// Greatest travel without an index pulse, counts; unlimited without an index.
     pub unindexed: u32,
     pub counter_sign: i32,
     pub flexion_sign: i32,
-    /// Joint's sense to the electrical one.
+    /// Sign from the joint's sense to the electrical one.
     pub current_sign: f32,
     pub greatest_step: i32,
     pub sine: Sine,
     pub gains: CurrentGains,
     pub modulator: Modulator,
     pub model: ModelLimits,
-    /// Of a phase, A: its code has to show it.
+    /// Target current of a phase beyond which its shunt code must change, A.
     pub stuck_asked: f32,
     pub current_limit: f32,
     pub overcurrent_square: f32,
-    /// Electrical, rad/s; of a shorted motor that carries the overcurrent bound.
+    /// Electrical speed at which a shorted motor carries the overcurrent bound, rad/s.
     pub brake_speed: f32,
 }
 
 impl Constants {
-    /// Over gains, limits, zeros, directions and the place of the flux.
+    /// Checksum of gains, limits, current-sensor offsets, directions and the flux offset.
     pub(super) fn checksum(&self) -> Checksum {
         let words = [
             self.offset.units().cast_unsigned(),
@@ -220,7 +226,7 @@ impl Constants {
             scale,
             offset: calibration.offset(),
             indexed: calibration.indexed(),
-            // One that was not captured is nobody's fault.
+            // Without a captured index, its absence is no fault.
             unindexed: if calibration.indexed() {
                 scale.counts_per_turn().unsigned_abs() / 8 * 17
             } else {
@@ -242,7 +248,8 @@ impl Constants {
     }
 }
 
-/// Electrical speed at which a shorted motor carries a current, rad/s: `i R / sqrt(flux^2 - (i L)^2)`; infinite where none does.
+/// Electrical speed at which a shorted motor carries a current, rad/s: `i R / sqrt(flux^2 - (i L)^2)`.
+/// Infinite where the current never reaches that value.
 fn brake_speed(motor: &MotorConstants, current: Ampere) -> f32 {
     let reactance = current.0 * min(motor.direct_inductance.0, motor.quadrature_inductance.0);
     let square = motor.flux.0 * motor.flux.0 - reactance * reactance;

@@ -1,37 +1,42 @@
-//! Current control of one motor in the frame of its rotor.
+//! Current control of one motor in the rotor's frame.
 //!
 //! ```text
 //! e = i_target - i                                                            d and q, A
 //! u_d = kp_d e_d + s_d - w L_q i_q                                            cross-coupling fed forward
 //! u_q = kp_q e_q + s_q + w (L_d i_d + flux)                                   and back-EMF
 //! v = u within |v| <= V,  d first:  |v_d| <= 0.87 V,  |v_q| <= sqrt(V^2 - v_d^2)
-//! s += (1 - exp(-R T / L)) (v - fed forward - s)                              integral of what was realised
+//! s += (1 - exp(-R T / L)) (v - fed forward - s)                            integral of the realised voltage
 //!
 //! kp = 2 pi f T R / (1 - exp(-R T / L))                   2 pi f L for R T << L
 //! ```
 //!
-//! Where the limit leaves v = u alone the last line is s += ki e with ki = kp (1 - exp(-R T / L)), so the controller's
-//! zero lies on the pole of the motor as it is sampled, and what is left is `2 pi f T / (z (z - 1))` whatever R and L are.
+//! Where the limit leaves v = u alone, the last line is s += ki e with ki = kp (1 - exp(-R T / L)). The
+//! controller's zero then lies on the pole of the sampled motor. The open loop becomes
+//! `2 pi f T / (z (z - 1))` for every R and L.
 //!
-//! `w` electrical speed, rad/s; `f` bandwidth (crossover of the open loop), Hz; `T` PWM period. Open loop:
-//! `2 pi f / s exp(-1.5 T s)`, one period of computing and half of one of holding, so
+//! `w` electrical speed, rad/s; `f` bandwidth (crossover of the open loop), Hz; `T` PWM period. The open loop
+//! is `2 pi f / s exp(-1.5 T s)`: one period of computing and half of one of holding. So
 //!
 //! ```text
 //! phase margin = 90 - 360 * 1.5 f T degrees          1000 Hz: 67.5,  2000 Hz: 45 at 24 kHz
 //! ```
 //!
-//! Known limits: the flux is the nameplate's; iron saturates, and with a smaller L the crossover rises in proportion.
+//! Known limits: the flux is the nameplate's. Iron saturates, and with a smaller L the crossover
+//! rises in proportion.
 //!
-//! **At the voltage limit** the field has priority: the direct current stays at its target of zero while the quadrature
-//! current gives way. If both gave way in proportion, the direct voltage would be short first at speed, and a direct
-//! current of either sign would grow with it, taking current range and, where positive, still more voltage. The share of
-//! 0.87 leaves half of the voltage to q, against the back-EMF, even while d asks for all of it.
+//! **At the voltage limit** the field has priority: the direct current stays at its target of zero while the
+//! quadrature current gives way. If both gave way in proportion, the direct voltage would be short first at
+//! speed. A direct current of either sign would then grow with speed, taking current range and, where
+//! positive, still more voltage. The share of 0.87 leaves half of the voltage to q, against the back-EMF,
+//! even while d requests all of it.
 //!
-//! **Anti-windup** is back-calculation with the gain 1/kp (the conditioned form of Hanus, 1987), written out: at the limit
-//! the integral becomes what it would be if the target had been one that the voltage could realise, with the motor's own
-//! time constant L/R. It needs no case distinction, and leaving the limit costs no more than a step.
+//! **Anti-windup** is back-calculation with the gain 1/kp (the conditioned form of Hanus, 1987), written
+//! out. At the limit the integral converges to its value for a target that the voltage could realise, with
+//! the motor's own time constant L/R. This needs no case distinction, and leaving the limit costs no more
+//! than a step.
 //!
-//! Cross-coupling from the measured currents: they lag the motor's by 1.5 periods, the targets would lead by 1/(2 pi f).
+//! Cross-coupling uses measured currents: they lag the motor's by 1.5 periods; targets would lead by
+//! 1/(2 pi f).
 
 use super::Rotating;
 use crate::checksum::Checksum;
@@ -39,26 +44,26 @@ use crate::hal::CURRENT_RATE_HZ;
 use crate::real::{clamp, exp, min, sqrt};
 use crate::units::{Ampere, Henry, Hertz, Ohm, Volt, Weber};
 
-/// From a sample to the middle of the period in which its answer acts, in periods.
+/// Delay from a sample to the middle of the period in which its command acts, in PWM periods.
 pub const DELAY_PERIODS: f32 = 1.5;
 
-/// Share of the voltage limit that the direct axis may take.
+/// Share of the voltage limit available to the direct axis.
 const DIRECT_SHARE: f32 = 0.866_025_4;
 
-/// What the loop has to know of a motor.
+/// Motor constants that the current loop needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorConstants {
-    /// Of one phase.
+    /// Resistance of one phase.
     pub resistance: Ohm,
-    /// Along the flux.
+    /// Inductance along the flux.
     pub direct_inductance: Henry,
-    /// Across the flux.
+    /// Inductance across the flux.
     pub quadrature_inductance: Henry,
-    /// Of the magnets with one phase, peak.
+    /// Flux linkage of the magnets with one phase, peak.
     pub flux: Weber,
 }
 
-/// The constants of one loop; see the module's equations.
+/// Constants of one loop; see the module's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentGains {
     proportional_ohm: Rotating<f32>,
@@ -70,9 +75,9 @@ pub struct CurrentGains {
 }
 
 impl CurrentGains {
-    /// Gains of a motor for a bandwidth of 50..=2000 Hz; `None` for another one and for constants that no motor of
-    /// this class has (1 mOhm..10 Ohm, 1 uH..10 mH, flux to 1 V s).
-    /// Without `feedforward` the integrals do what cross-coupling and back-EMF ask for.
+    /// Derives the gains for a bandwidth of 50..=2000 Hz. Returns `None` for other bandwidths and for
+    /// implausible motor constants (allowed: 1 mOhm..10 Ohm, 1 uH..10 mH, flux to 1 V s). Without
+    /// `feedforward` the integrals supply cross-coupling and back-EMF.
     #[must_use]
     pub fn new(motor: &MotorConstants, bandwidth: Hertz, feedforward: bool) -> Option<Self> {
         let inductance_h = Rotating { d: motor.direct_inductance.0, q: motor.quadrature_inductance.0 };
@@ -96,18 +101,18 @@ impl CurrentGains {
         })
     }
 
-    /// The smaller of both proportional gains, ohm.
+    /// Smaller of both proportional gains, ohm.
     pub(super) fn least_ohm(&self) -> f32 {
         min(self.proportional_ohm.d, self.proportional_ohm.q)
     }
 
-    /// The gain across the flux, for a bit that flips in it.
+    /// Quadrature gain, for injecting a bit flip.
     #[cfg(not(target_os = "none"))]
     pub(super) const fn proportional_mut(&mut self) -> &mut f32 {
         &mut self.proportional_ohm.q
     }
 
-    /// With what the tick computes with.
+    /// Adds the constants that the tick uses to a checksum.
     #[must_use]
     pub(super) fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { proportional_ohm, renewal, inductance_h, flux_vs, bandwidth: _ } = *self;
@@ -123,21 +128,21 @@ impl CurrentGains {
     }
 }
 
-/// What the loop remembers: the integrals.
+/// State of the loop: the integrals.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CurrentLoop {
     integral_v: Rotating<f32>,
 }
 
 impl CurrentLoop {
-    /// A loop that takes over from something that held a current at rest with a voltage.
+    /// A loop that takes over from a voltage that held a current at rest.
     #[must_use]
     pub(super) fn holding(voltage: Rotating<Volt>) -> Self {
         Self { integral_v: Rotating { d: voltage.d.0, q: voltage.q.0 } }
     }
 
-    /// The voltage for a quadrature current `target`, with a direct one of zero, no longer than `limit`;
-    /// `speed` electrical, rad/s.
+    /// Computes the voltage for a quadrature current `target` and zero direct current, no longer than
+    /// `limit`; `speed_rad_per_s` is electrical.
     #[inline(always)]
     pub fn voltage(
         &mut self,
@@ -161,27 +166,27 @@ impl CurrentLoop {
         Rotating { d: Volt(given.d), q: Volt(given.q) }
     }
 
-    /// The integrals: what the voltages given so far, less what is fed forward, make of the current, times the resistance.
+    /// Integrals: the realised voltages less feedforward, filtered as resistance times current.
     #[must_use]
     pub(super) fn integral_v(&self) -> Rotating<f32> {
         self.integral_v
     }
 
-    /// Empties the integrals.
+    /// Sets the integrals to zero.
     pub fn reset(&mut self) {
         *self = Self::default();
     }
 }
 
-/// The wanted voltage where it is no longer than the limit.
+/// Applies the voltage limit; a shorter vector stays unchanged.
 #[inline(always)]
 fn limited(wanted: Rotating<f32>, limit: f32) -> Rotating<f32> {
     let square = limit * limit;
     if wanted.d * wanted.d + wanted.q * wanted.q <= square { wanted } else { shortened(wanted, limit) }
 }
 
-/// Direct voltage first, the quadrature voltage in what is left of the circle. A function of its own, so that a tick within the limit does not
-/// carry its registers.
+/// Limits the direct voltage first, then the quadrature voltage to the rest of the circle. A separate
+/// function, so that a tick within the limit does not save its registers.
 #[inline(never)]
 fn shortened(wanted: Rotating<f32>, limit: f32) -> Rotating<f32> {
     let square = limit * limit;

@@ -1,19 +1,22 @@
-//! The three frames in which a motor's currents and voltages are written down, as types.
+//! The three frames of a motor's currents and voltages, as types.
 //!
-//! Why types: the same two or three numbers mean different things in each frame, and nothing but the type tells. A
-//! value changes its frame only through the functions here, and through an angle where one is needed.
+//! Why types: the same two or three numbers mean different things in each frame, and only the type
+//! shows which. A value changes its frame only through the functions here, and through an angle where
+//! one is needed.
 //!
 //! ```text
-//! alpha = (2 a - b - c) / 3          a = alpha                                    (Clarke, amplitude kept)
+//! alpha = (2 a - b - c) / 3          a = alpha                         (Clarke, amplitude invariant)
 //! beta  = (b - c) / sqrt(3)          b, c = -alpha / 2 +- sqrt(3) / 2 beta
 //! d =  cos alpha + sin beta          alpha = cos d - sin q                        (Park)
 //! q = -sin alpha + cos beta          beta  = sin d + cos q
 //! ```
 //!
-//! `a`, `b`, `c` phase quantities against the star point; `alpha` along phase A, `beta` a quarter turn ahead; `d` along the
-//! magnets' flux, `q` a quarter turn ahead of it; sin and cos of the electrical angle from phase A to d. Amplitude
-//! invariant: a balanced sine of amplitude 1 is a vector of length 1, and power is 3/2 (v_d i_d + v_q i_q).
-//! Source: Park (1929), Clarke (1943). Cost: 5 operations for each Clarke, 6 for each Park.
+//! `a`, `b`, `c` phase quantities against the star point; `alpha` along phase A, `beta` a quarter turn ahead;
+//! `d` along the magnets' flux, `q` a quarter turn ahead of it; sin and cos of the electrical angle from
+//! phase A to d. Amplitude invariant: a balanced sine of amplitude 1 is a vector of length 1, and power is
+//! 3/2 (v_d i_d + v_q i_q).
+//! Source: Park (1929), Clarke (1943).
+//! Cost: 5 operations for each Clarke, 6 for each Park.
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -22,7 +25,7 @@ use super::Rotation;
 const ONE_OVER_SQRT_3: f32 = 0.577_350_26;
 const HALF_SQRT_3: f32 = 0.866_025_4;
 
-/// What can be split into components: any of the unit newtypes, and bare numbers.
+/// A quantity with vector components: any of the unit newtypes, and bare numbers.
 pub trait Quantity:
     Copy + Add<Output = Self> + Sub<Output = Self> + Neg<Output = Self> + Mul<f32, Output = Self>
 {
@@ -44,7 +47,7 @@ pub struct Phases<Q> {
     pub c: Q,
 }
 
-/// A vector that the stator sees.
+/// Vector in the stator's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stationary<Q> {
     /// Along phase A.
@@ -53,17 +56,17 @@ pub struct Stationary<Q> {
     pub beta: Q,
 }
 
-/// A vector that the rotor sees.
+/// Vector in the rotor's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rotating<Q> {
     /// Along the magnets' flux.
     pub d: Q,
-    /// A quarter of an electrical turn ahead: makes the torque.
+    /// A quarter of an electrical turn ahead: produces the torque.
     pub q: Q,
 }
 
 impl<Q: Quantity> Phases<Q> {
-    /// Clarke's transformation; what is common to the three phases is lost.
+    /// Clarke's transformation; the common-mode component is lost.
     #[must_use]
     pub fn to_stationary(self) -> Stationary<Q> {
         Stationary {
@@ -74,20 +77,20 @@ impl<Q: Quantity> Phases<Q> {
 }
 
 impl<Q: Quantity> Stationary<Q> {
-    /// Clarke's transformation of two phases whose sum the third takes back, as currents without a neutral do.
+    /// Clarke's transformation of two phases, for a sum of zero over all three: currents without a neutral.
     #[must_use]
     pub fn from_two_phases(b: Q, c: Q) -> Self {
         Self { alpha: -(b + c), beta: (b - c) * ONE_OVER_SQRT_3 }
     }
 
-    /// The three phases; their sum is zero.
+    /// Inverse Clarke's transformation; the three phases sum to zero.
     #[must_use]
     pub fn to_phases(self) -> Phases<Q> {
         let (half, beta) = (self.alpha * -0.5, self.beta * HALF_SQRT_3);
         Phases { a: self.alpha, b: half + beta, c: half - beta }
     }
 
-    /// Park's transformation to a rotor at an angle.
+    /// Park's transformation into the frame of a rotor at an angle.
     #[must_use]
     pub fn to_rotating(self, rotor: Rotation) -> Rotating<Q> {
         Rotating {
@@ -98,7 +101,7 @@ impl<Q: Quantity> Stationary<Q> {
 }
 
 impl<Q: Quantity> Rotating<Q> {
-    /// Park's transformation back, from a rotor at an angle.
+    /// Inverse Park's transformation, from the frame of a rotor at an angle.
     #[must_use]
     pub fn to_stationary(self, rotor: Rotation) -> Stationary<Q> {
         Stationary {
@@ -128,7 +131,7 @@ mod tests {
             let angle = (step as f32).to_radians();
             let vector = balanced(7.0, angle).to_stationary();
             let (sine, cosine) = sin_cos(angle);
-            // Six roundings of numbers of 7.
+            // Tolerance: six roundings of numbers of 7.
             assert!(
                 (vector.alpha.0 - 7.0 * cosine).abs() < 3e-6 && (vector.beta.0 - 7.0 * sine).abs() < 3e-6
             );

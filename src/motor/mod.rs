@@ -1,21 +1,21 @@
-//! Field-oriented current control of one axis, and the calibration without which there is none.
+//! Field-oriented current control of one axis, and the calibration that it requires.
 //!
 //! ```text
 //! AxisSample -> sense -> frames -> current loop -> frames -> modulation -> AxisCommand        24 kHz
-//! Calibrator: zeros -> resistance, wiring -> inductances -> scan of the encoder -> Calibration -> Axis
+//! Calibrator: offsets -> resistance, wiring -> inductances -> scan of the encoder -> Calibration -> Axis
 //! ```
 //!
 //! | part | what it is |
 //! | --- | --- |
 //! | [`Phases`], [`Stationary`], [`Rotating`] | Clarke and Park as types |
 //! | [`ElectricalAngle`], [`SpeedTracker`] | counts to angle and speed; fast and exact sine |
-//! | [`SenseScale`] | two shunts to a current vector, or an error at the rails |
+//! | [`SenseScale`] | two shunt codes to a current vector, or an error at the rails |
 //! | [`CurrentLoop`] | PI in d and q, feedforward, voltage limit, anti-windup |
-//! | [`Modulator`] | space vectors, room for the sample, dead time |
-//! | [`Axis`] | all of it in one tick, with the borders that release |
-//! | [`ModelWatch`], [`ShuntWatch`] | what voltages, currents and codes say about each other |
+//! | [`Modulator`] | space vectors, sampling window for the shunts, dead time |
+//! | [`Axis`] | all of these in one tick, with the limits that turn the outputs off |
+//! | [`ModelWatch`], [`ShuntWatch`] | plausibility of voltages, currents and codes against each other |
 //! | [`calibration`] | measures and refuses; the only source of a [`Calibration`] |
-//! | [`Chopper`] | what the supply does not take back, into the brake resistor |
+//! | [`Chopper`] | burns regenerated energy in the brake resistor |
 //! | [`mod@reference`] | the joint's zero: an end stop or a stated pose |
 //! | [`Transmission`] | current to joint torque and back |
 //!

@@ -1,43 +1,60 @@
-//! What the voltage of an axis says about its current and its speed: a frozen counter, an open phase, a drifted zero.
+//! Checks an axis' voltages against its current and speed.
 //!
-//! Why no term with di/dt: the current loop's integral `s` is the voltage that was given, less what is fed forward, through a
-//! low-pass with the motor's own time constant. That is resistance times the current that this voltage makes, so what is left
-//! when the measured current is taken away is wrong: the back-EMF of a speed that was not counted, a phase that does not conduct, a
-//! current that does not flow.
+//! Detected are a frozen counter, an open phase and a drifted current-sensor offset.
+//!
+//! Why no term with di/dt: the current loop's integral `s` is the realised voltage less feedforward,
+//! low-passed with the motor's own time constant. That is the resistance times the current that this voltage
+//! produces. Subtracting the measured current leaves the errors: back-EMF of an uncounted speed, a phase that
+//! does not conduct, a current that does not flow.
 //!
 //! ```text
-//! r = s - R i - (coupling and back-EMF, where they are not fed forward)                       d and q, each servo period
-//! |r| > V + 0.35 R |i| + |w| (0.2 flux + 0.3 L |i|)     32 periods more often than not         open, or frozen
-//! |mean of r, turned back to the stator, over an electrical turn| > 0.4 V + 0.06 R I           drifted zero
-//! max q - min q > I / 2 since the counter last moved by more than 2 counts, less what fell within 12 periods      64 periods later: frozen
-//! V = 2 * 4/3 t_d f V_bus                               what dead time and switches take, twice; 0.44 V on the board
+//! r = s - R i - (coupling and back-EMF, where they are not fed forward)          d and q, each servo period
+//! |r| > V + 0.35 R |i| + |w| (0.2 flux + 0.3 L |i|)       open or frozen: 32 more periods with than without
+//! |mean of r in the stator's frame over an electrical turn| > 0.4 V + 0.06 R I    drifted offset
+//! max q - min q > I / 2 while the counter moved by at most 2 counts,
+//!     without the first 12 periods there                             frozen, 64 periods later
+//! V = 2 * 4/3 t_d f V_bus                    twice the loss of dead time and switches; 0.44 V on the board
 //! ```
 //!
-//! `i` measured current as |d| + |q|, `I` the axis' limit, `w` electrical speed of the counts. 0.35: copper 90 K warmer than at
-//! the calibration; 0.2: magnets 80 K warmer, and the nameplate; 0.3: iron that saturates.
+//! `i` measured current as |d| + |q|, `I` the axis' current limit, `w` electrical speed of the counts.
+//! Shares: 0.35 for copper 90 K warmer than at the calibration; 0.2 for magnets 80 K warmer and the
+//! nameplate's error; 0.3 for iron that saturates.
 //!
-//! **Frozen counter** (E1): r is the whole back-EMF, seen where `w flux > V + 0.35 R |i|` ([`ModelLimits::frozen_speed`]): on the
-//! default leg 0.44 rad/s of the joint without current, 1.3 rad/s with the greatest, 8 ms after the loop's speed has followed
-//! the counts to zero (1 ms). It is told apart by counts that stand still; a residual beyond the back-EMF of the greatest speed is
-//! none.
+//! **Frozen counter** (E1): r is the whole back-EMF, detected where `w flux > V + 0.35 R |i|`
+//! ([`ModelLimits::frozen_speed`]). On the default leg that is 0.44 rad/s of the joint without current, 1.3
+//! rad/s with the greatest current. Detection takes 8 ms after the loop's speed has followed the counts to
+//! zero (1 ms). Counts at rest distinguish this fault from an open phase. A residual beyond the back-EMF of
+//! the greatest speed is never a frozen counter.
 //!
-//! **Slower, or at rest**: whoever controls a place that no longer changes pulls harder and harder. A current that has changed by
-//! half of its limit (28 A, 42 N m on the default leg) moves a rotor by more than 2 counts (0.03 mrad of that joint) within
-//! 16 ms, unless it has more than 100 kg m^2 to move, friction takes more than 42 N m from one side to the other (9 here), what
-//! holds it is stiffer than 1e6 N m/rad (gears have 1e4 to 1e5, a hand 2e3), or a push grows as the torque does, to within friction: with
-//! a third of the limit and 8 ms that happened once in 75 pushes of up to 70 N m. Up to that change, and so up to a torque that is wrong by
-//! 42 N m, a frozen counter is not seen. In the first 3 ms a current that falls does not count: that of a joint that is brought to rest is
-//! given back then, and a leg that was damped hard was taken for one with a frozen counter by that. A rotor that is clamped itself, as on a test bench, is taken for a frozen counter.
+//! **Slower, or at rest**: a controller whose measured position no longer changes pulls harder and harder. A
+//! change of the current by half of its limit moves a rotor by more than 2 counts within 16 ms. On the
+//! default leg these are 28 A (42 N m) and 0.03 mrad of the joint. Exceptions:
 //!
-//! **Open phase** (P1): what is asked of the open phase cannot flow, the integral runs away and passes any limit; without current
-//! nothing is asked and nothing is seen. At rest it may be taken for a frozen counter: two phases brake as well. **Drifted zero** (C1): an offset o of one shunt leaves 2/sqrt(3) |R + j w L| o, at rest in the
-//! stator, while all that is wrong with resistance, flux and dead time turns with the rotor and is gone from the mean of a
-//! turn: 6.7 A on the default leg, 12 N m at most. Below 3 A, which dead time alone
-//! looks like while nothing is asked of the phases, none is seen. Turns that take longer than 25 ms or less than
-//! 3 ms, or turn back, are not judged.
+//! - An inertia above 100 kg m^2.
+//! - Friction that takes more than 42 N m from one side to the other (9 here).
+//! - A constraint stiffer than 1e6 N m/rad (gears have 1e4 to 1e5, a hand 2e3).
+//! - A push that grows as the torque does, to within friction. With a third of the limit and 8 ms that
+//!   happened once in 75 pushes of up to 70 N m.
 //!
-//! False alarms: those of the simulated hours in docs/safety.md; the margin between a healthy motor's residual and the limits has not been
-//! measured on a motor. Source: parity equation of a linear model, Isermann, Fault-Diagnosis Systems (2006), chapter 10. Cost: `scripts/count-instructions`, joint sample; 44 bytes.
+//! Up to that change, and so up to a torque that is wrong by 42 N m, a frozen counter is not detected. A
+//! current that falls within the first 3 ms at rest does not count: a joint that comes to rest loses its
+//! braking current then. Otherwise a hard-damped leg would show a frozen counter. A rotor that is itself
+//! clamped, as on a test bench, is reported as a frozen counter.
+//!
+//! **Open phase** (P1): the open phase's target current cannot flow, so the integral grows past any limit.
+//! Without a target current nothing is detected. At rest the fault may be reported as a frozen counter: two
+//! phases brake as well.
+//!
+//! **Drifted offset** (C1): an offset o of one shunt leaves a residual 2/sqrt(3) |R + j w L| o that rests in
+//! the stator's frame. All errors of resistance, flux and dead time turn with the rotor and vanish from the
+//! mean of a turn. The limit is 6.7 A on the default leg, 12 N m at most. Offsets below 3 A are not detected:
+//! without target currents dead time alone looks like that. Turns longer than 25 ms, shorter than 3 ms or
+//! with a reversal are not evaluated.
+//!
+//! False alarms: those of the simulated hours in docs/safety.md. The margin between a healthy motor's
+//! residual and the limits has not been measured on a motor.
+//! Source: parity equation of a linear model, Isermann, Fault-Diagnosis Systems (2006), chapter 10.
+//! Cost: `scripts/count-instructions`, joint sample; 44 bytes.
 
 use super::axis::AxisFault;
 use super::configuration::AxisConfiguration;
@@ -46,34 +63,36 @@ use crate::hal::CURRENT_RATE_HZ;
 use crate::real::{abs, clamp, max, min, sqrt};
 use crate::units::Ampere;
 
-/// Periods of the servo that a residual has to be too large more often than not: 8 ms.
+/// Servo periods by which those with too large a residual must outnumber the others: 8 ms.
 const PATIENCE: u8 = 32;
-/// Longest electrical turn that is judged, servo periods: 25 ms.
+/// Longest electrical turn that is evaluated, servo periods: 25 ms.
 const LONGEST_TURN: u8 = 100;
-/// Fewer servo periods than this are no circle: from 2,094 rad/s on, 6 rad/s of a joint of the default leg.
+/// Shortest electrical turn that is evaluated, servo periods. Fewer samples do not cover a circle: above
+/// 2,094 rad/s, or 6 rad/s of a joint of the default leg.
 const SHORTEST_TURN: u8 = 12;
-/// Counts within which a counter stands still: an edge that a sensor sits on.
+/// Counts within which a counter counts as standing still: an edge on which a sensor rests.
 const STANDSTILL: i32 = 2;
-/// Of the greatest current: a change that no rotor takes without moving, and periods in which it has moved: 16 ms.
+/// Share of the greatest current whose change moves any rotor, and periods until it has moved: 16 ms.
 const SWING_SHARE: f32 = 0.5;
 const SWING_PATIENCE: u8 = 64;
-/// Periods within which a joint that came to rest gives back the current that braked it: 3 ms.
+/// Periods in which a joint that came to rest loses its braking current: 3 ms.
 const SETTLED: u8 = 12;
-/// Both halves of the vector that dead time makes, and as much again.
+/// Length of the vector that dead time makes (4/3), with a margin of two.
 const DEAD_VECTORS: f32 = 2.0 * 4.0 / 3.0;
-/// Shares by which constants may be off.
+/// Uncertainty of the constants, as shares.
 const RESISTANCE_SHARE: f32 = 0.35;
 const FLUX_SHARE: f32 = 0.2;
 const INDUCTANCE_SHARE: f32 = 0.3;
-/// Of the mean over a turn: share of V, and of R times the greatest current, which changes within the turn.
+/// Limit of the mean over a turn: shares of V, and of R times the greatest current, which changes
+/// within the turn.
 const MEAN_SHARE: f32 = 0.4;
 const MEAN_RESISTANCE_SHARE: f32 = 0.06;
 
-/// What is expected of an axis' voltages, and how far they may be from it.
+/// Expected voltages of an axis, and their tolerances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelLimits {
     resistance_ohm: f32,
-    /// What the loop does not feed forward.
+    /// Inductances that the loop does not feed forward; zero with feedforward.
     inductance_h: Rotating<f32>,
     flux_vs: f32,
     still_v: f32,
@@ -89,7 +108,7 @@ pub struct ModelLimits {
 }
 
 impl ModelLimits {
-    /// Of a motor as it was calibrated.
+    /// Limits of a motor as it was calibrated.
     #[must_use]
     pub fn new(configuration: &AxisConfiguration, motor: &MotorConstants, scale: CountScale) -> Self {
         let [_, bus] = configuration.bus;
@@ -119,13 +138,13 @@ impl ModelLimits {
         }
     }
 
-    /// Electrical speed above which a counter that stands still is seen with so much current, rad/s.
+    /// Electrical speed above which a frozen counter is detected at a current, rad/s.
     #[must_use]
     pub fn frozen_speed(&self, current: Ampere) -> f32 {
         (self.still_v + self.volt_per_ampere * current.0) / self.back_emf_per_speed
     }
 
-    /// Change of the current above which a counter that stands still is seen at any speed.
+    /// Change of the current above which a frozen counter is detected at any speed.
     #[must_use]
     pub fn frozen_swing(&self) -> Ampere {
         Ampere(self.swing_a)
@@ -137,50 +156,50 @@ impl ModelLimits {
     }
 }
 
-/// What an axis shows once per servo period while its bridge switches.
+/// State of an axis once per servo period while its bridge switches.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown<'a> {
-    /// After its last tick.
+    /// Current loop after its last tick.
     pub current_loop: &'a CurrentLoop,
-    /// Measured.
+    /// Measured current.
     pub current: Rotating<Ampere>,
-    /// Of the counts, electrical, rad/s.
+    /// Electrical speed of the counts, rad/s.
     pub speed_rad_per_s: f32,
-    /// Within one turn.
+    /// Rotor position within one turn, counts.
     pub place: i32,
-    /// Of that place.
+    /// Electrical angle of that position.
     pub angle: ElectricalAngle,
-    /// Of the axis.
+    /// Sine that the axis uses.
     pub sine: Sine,
 }
 
-/// Watches one axis; see the module's equations.
+/// Model check of one axis; see the module's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelWatch {
     /// Periods with too large a residual, less those without.
     suspicion: u8,
-    /// Where the counter stood before the first of them.
+    /// Rotor position before the first of them.
     place: i32,
     /// Integral of the residual over the angle, stator's frame, V turns.
     sum: Stationary<f32>,
-    /// Of the turn under way, turns; of either sign.
+    /// Travel within the current electrical turn, turns, signed.
     way: f32,
     periods: u8,
     angle: Option<ElectricalAngle>,
     still: Still,
-    /// Of the last period's residual, V^2.
+    /// Square of the last period's residual, V^2.
     square: f32,
 }
 
-/// A counter that stands still, and what its motor was given meanwhile.
+/// A counter at rest, and the range of currents since then.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Still {
     place: i32,
-    /// Periods at that place, no more than it takes to settle.
+    /// Periods at that position, capped at the settling time.
     periods: u8,
     least_a: f32,
     most_a: f32,
-    /// Periods since the current changed too much.
+    /// Periods since the current's range exceeded the limit.
     overdue: u8,
 }
 
@@ -189,14 +208,14 @@ impl Still {
         Self { place, periods: 0, least_a: current_a, most_a: current_a, overdue: 0 }
     }
 
-    /// One servo period: whether nothing moved although it should have.
+    /// Runs one servo period; returns whether the counter should have moved but did not.
     fn look(&mut self, limits: &ModelLimits, place: i32, current_a: f32) -> bool {
         if !limits.is_still(place, self.place) {
             *self = Self::at(place, current_a);
         }
         if self.periods < SETTLED {
             self.periods += 1;
-            // As near to nothing as it has come.
+            // Least current, by magnitude, since the counter came to rest.
             let least_a = if self.least_a < 0.0 {
                 clamp(current_a, self.least_a, 0.0)
             } else {
@@ -215,7 +234,7 @@ impl Still {
 }
 
 impl ModelWatch {
-    /// Nothing seen yet.
+    /// State before the first servo period.
     pub const EMPTY: Self = Self {
         suspicion: 0,
         place: 0,
@@ -227,20 +246,20 @@ impl ModelWatch {
         square: 0.0,
     };
 
-    /// Whether the counter has stood still since voltages and currents no longer agreed: whatever else is found then, the place cannot be
-    /// believed.
+    /// Whether the counter has stood still since voltages and currents began to disagree. Any fault found
+    /// then also makes the rotor position doubtful.
     #[must_use]
     pub fn doubts(&self, limits: &ModelLimits, place: i32) -> bool {
         self.suspicion > 0 && limits.is_still(place, self.place)
     }
 
-    /// Electrical speed of which the last period's residual would be the back-EMF, rad/s.
+    /// Electrical speed whose back-EMF equals the last period's residual, rad/s.
     #[must_use]
     pub fn uncounted(&self, limits: &ModelLimits) -> f32 {
         sqrt(self.square) / limits.back_emf_per_speed
     }
 
-    /// One servo period: what is wrong, if anything.
+    /// Runs one servo period and returns the fault, if any.
     #[must_use]
     pub fn look(&mut self, limits: &ModelLimits, now: &Shown<'_>) -> Option<AxisFault> {
         let residual = residual(limits, now);
@@ -254,7 +273,7 @@ impl ModelWatch {
         if self.suspicion == 0 {
             self.place = now.place;
         }
-        // What is no number is no model either.
+        // A residual that is not finite exceeds every limit.
         if square <= limit * limit {
             self.suspicion = self.suspicion.saturating_sub(1);
         } else {
@@ -271,7 +290,7 @@ impl ModelWatch {
         self.turn(limits, now, residual).then_some(AxisFault::CurrentZero)
     }
 
-    /// Goes on with the mean over an electrical turn; whether one ended with too large a mean.
+    /// Updates the mean over an electrical turn; returns whether a turn ended with too large a mean.
     fn turn(&mut self, limits: &ModelLimits, now: &Shown<'_>, residual: Rotating<f32>) -> bool {
         let step = self.angle.map_or(0.0, |before| now.angle.since(before));
         self.angle = Some(now.angle);

@@ -1,36 +1,41 @@
 //! Space-vector modulation: from a voltage to the duties of three half-bridges.
 //!
-//! Why a common shift: only differences between phases reach the motor, so all three may be moved together. Centring the
-//! largest and the smallest about one half gives the waveform of space-vector modulation and 2/sqrt(3) times the voltage of
-//! a sine against the middle.
+//! Why a common shift: only differences between phases reach the motor, so all three may be moved together.
+//! Centring the largest and the smallest about one half gives the waveform of space-vector modulation. The
+//! voltage gain over a sine against the midpoint is 2/sqrt(3).
 //!
 //! ```text
 //! x = phases(v) / V_bus
-//! shift = 1/2 - (max x + min x) / 2,   lowered by what max x + shift exceeds d_max
-//! duty = x + shift + t_d f clamp(i_target / band)                        dead time given back
+//! shift = 1/2 - (max x + min x) / 2,   lowered where max x + shift exceeds d_max
+//! duty = x + shift + t_d f clamp(i_target / band)                        dead-time compensation
 //! |v| <= V_bus (d_max - 2 t_d f) / sqrt(3)                               largest circle within that hexagon
 //! ```
 //!
-//! **Minimum zero vector.** The shunts lie below the low sides, and the sample is taken in the middle of the time in which all
-//! three conduct. From the last high side's turning off to that middle the dead time and the amplifier's settling have to
-//! pass, and from there the converter's sampling and conversion:
+//! **Minimum zero vector.** The shunts lie below the low sides, and are sampled in the middle of the time in
+//! which all three conduct. Dead time and the amplifier's settling must fit between the last high side's
+//! turn-off and that middle. The converter's sampling and conversion must fit after it:
 //!
 //! ```text
 //! (1 - d_max) / (2 f) >= max(t_d + t_settle, t_adc)
 //! ```
 //!
-//! 119 ns + 1.2 us (assumed for the DRV8301 at 40 V/V to 1 % of 2 V, to be measured on the board: 0.3 us more would
-//! lower d_max by 0.0144, 1.5 % of the voltage); [`SHUNT_TRIGGER_CLOCKS`] and 3 + 12 cycles of 21 MHz: 0.83 us;
-//! so at 24 kHz d_max = 0.9367. Centred about one half and not about d_max / 2, because only equal zero vectors make the
-//! sample the mean of the ripple: by the shift the error is v s / (2 L f) at most, s the shift. It arises above
-//! 0.873 of the largest voltage only.
+//! Numbers: 119 ns + 1.2 us settling. The settling time is assumed for the DRV8301 at 40 V/V to 1 % of 2 V
+//! and to be measured on the board. If it were 0.3 us longer, it would lower d_max by 0.0144, 1.5 % of the
+//! voltage. After the middle, [`SHUNT_TRIGGER_CLOCKS`] and 3 + 12 cycles of 21 MHz: 0.83 us. So at 24 kHz
+//! d_max = 0.9367.
 //!
-//! **Dead time** takes t_d f V_bus from a phase whose current flows out of the bridge and adds it where it flows in: 0.14 V of 48 V
-//! at 119 ns. It is given back by the sign of the *target's* current, smooth within `band`: the measured one would make a
-//! negative resistance of V_d / band out of it, which the loop would have to outweigh.
+//! Duties are centred about one half and not about d_max / 2: only equal zero vectors make the sample the
+//! mean of the ripple. With a shift s the error is v s / (2 L f) at most; a shift arises only above 0.873 of
+//! the largest voltage.
 //!
-//! The circle leaves up to 1 - sqrt(3)/2 of the hexagon unused at its corners; using it would put a sixth harmonic on
-//! the torque. Source: van der Broeck, Skudelny, Stanke (1988); dead time: Sukegawa et al. (1991).
+//! **Dead time** takes t_d f V_bus from a phase with current out of the bridge, and adds it to one with
+//! current into it. At 119 ns that is 0.14 V of 48 V. Compensation uses the sign of the *target* current,
+//! smooth within `band`. With the measured current it would act as a negative resistance of V_d / band, which
+//! the loop would have to outweigh.
+//!
+//! The circle leaves up to 1 - sqrt(3)/2 of the hexagon unused at its corners; using it would put a sixth
+//! harmonic on the torque.
+//! Source: van der Broeck, Skudelny, Stanke (1988); dead time: Sukegawa et al. (1991).
 
 use super::{Phases, Stationary};
 use crate::hal::{BRIDGE_CLOCK_HZ, CURRENT_RATE_HZ, SHUNT_TRIGGER_CLOCKS};
@@ -39,22 +44,22 @@ use crate::units::{Ampere, Second, Volt};
 
 const ONE_OVER_SQRT_3: f32 = 0.577_350_26;
 
-/// What the bridge and the converter need of a PWM period.
+/// Times that the bridge and the converter need in a PWM period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BridgeTiming {
-    /// Both sides off at every edge.
+    /// Dead time: both sides are off for this long at every edge.
     pub dead_time: Second,
-    /// From a phase current's change of path to a settled shunt amplifier.
+    /// Time from a phase current's commutation to a settled shunt amplifier.
     pub settling: Second,
     /// From the middle of the lower zero vector to the end of the conversion.
     pub conversion: Second,
-    /// Share of a period by which the timer can change a duty.
+    /// Resolution of a duty, as share of a period.
     pub duty_step: f32,
 }
 
 impl BridgeTiming {
-    /// ODrive v3.6: 20 cycles of 168 MHz, DRV8301 at 40 V/V, the trigger and 15 cycles of 21 MHz from there, 3,500 steps up
-    /// and as many down.
+    /// ODrive v3.6. Dead time: 20 cycles of 168 MHz. Settling: DRV8301 at 40 V/V. Conversion: the trigger and
+    /// 15 cycles of 21 MHz. Duty: 3,500 steps up and as many down.
     pub const ODRIVE_3_6: Self = Self {
         dead_time: Second(119e-9),
         settling: Second(1.2e-6),
@@ -63,31 +68,31 @@ impl BridgeTiming {
     };
 }
 
-/// How dead time is treated.
+/// Treatment of the bridge's dead time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DeadTime {
-    /// Left to the current controllers.
+    /// No compensation; the current loop corrects it.
     Uncompensated,
-    /// Given back by the sign of the target's phase currents, smooth within a band.
+    /// Compensated by the sign of the target's phase currents, smooth within a band.
     Compensated {
         /// Half the width of the transition, positive.
         band: Ampere,
     },
 }
 
-/// The modulator's constants; see the module's equations.
+/// Constants of the modulator; see the module's equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modulator {
     greatest_duty: f32,
     circle_per_bus: f32,
-    /// Duty that the dead time takes; 0 where it is not given back.
+    /// Duty lost to dead time; 0 without compensation.
     dead_duty: f32,
     per_band: f32,
     duty_step: f32,
 }
 
 impl Modulator {
-    /// `None` unless at least half of the period is left to conduct and the band is positive.
+    /// Returns `None` unless at least half of the period remains for conduction and the band is positive.
     #[must_use]
     pub fn new(timing: BridgeTiming, dead_time: DeadTime) -> Option<Self> {
         let rate = CURRENT_RATE_HZ as f32;
@@ -113,26 +118,26 @@ impl Modulator {
         })
     }
 
-    /// Largest duty at which the shunts can still be read.
+    /// Largest duty at which the shunts can still be sampled.
     #[must_use]
     pub const fn greatest_duty(&self) -> f32 {
         self.greatest_duty
     }
 
-    /// Share of a period by which a duty changes at least.
+    /// Smallest change of a duty, as share of a period.
     #[must_use]
     pub const fn duty_step(&self) -> f32 {
         self.duty_step
     }
 
-    /// Longest voltage vector in any direction.
+    /// Longest voltage vector that is available in any direction.
     #[must_use]
     pub fn voltage_limit(&self, bus: Volt) -> Volt {
         bus * self.circle_per_bus
     }
 
-    /// Duties of A, B and C for a voltage; `per_bus` is one over the bus voltage, `target` the current that is wanted while
-    /// they act. Of a voltage that is not a number duties are none.
+    /// Computes the duties of A, B and C for a voltage. `per_bus` is one over the bus voltage, `target` the
+    /// target current while they act. A voltage that is not finite gives duties that are NaN.
     #[must_use]
     #[inline(always)]
     pub fn duties(&self, voltage: Stationary<Volt>, per_bus: f32, target: Stationary<Ampere>) -> [f32; 3] {
@@ -153,19 +158,20 @@ impl Modulator {
             wanted + shift + self.dead_duty * clamp(current_in_bands, -1.0, 1.0)
         };
         let duties = [given(a, current.a), given(b, current.b), given(c, current.c)];
-        // No sum is below that of the smallest with the whole dead time, none above that of the largest: mostly all three are within.
+        // Bounds on all three duties: smallest minus and largest plus the full dead time. Mostly these are
+        // within range.
         let within =
             low + shift - self.dead_duty >= 0.0 && high + shift + self.dead_duty <= self.greatest_duty;
         if within { duties } else { duties.map(|duty| self.limited(duty)) }
     }
 
-    /// None of the numbers is one any more; on the host alone, row N1 of docs/safety.md.
+    /// Makes every further duty NaN. Host only; row N1 of docs/safety.md.
     #[cfg(not(target_os = "none"))]
     pub(super) const fn spoil(&mut self) {
         self.dead_duty = f32::NAN;
     }
 
-    /// Within 0 and the greatest duty; one that is not a number stays so, for the caller's check.
+    /// Clamps to 0 and the greatest duty. NaN stays NaN, for the caller's check.
     #[inline(always)]
     fn limited(&self, duty: f32) -> f32 {
         if duty < 0.0 {
@@ -211,7 +217,7 @@ mod tests {
     fn the_low_sides_always_conduct_long_enough_to_be_read_and_no_duty_leaves_its_range() {
         for dead_time in [PLAIN, DeadTime::Compensated { band: Ampere(0.5) }] {
             let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, dead_time).expect("usual");
-            // 2 * (0.119 + 1.2) us of 41.667 us.
+            // Expected: 2 * (0.119 + 1.2) us of 41.667 us.
             assert!((modulator.greatest_duty() - 0.9367).abs() < 1e-4, "{}", modulator.greatest_duty());
             for length in [5.0, 25.0, 1000.0, f32::INFINITY, f32::NAN] {
                 for degrees in 0..360 {
@@ -221,7 +227,7 @@ mod tests {
                     if length.is_finite() {
                         assert!(duties.iter().all(within), "{duties:?}");
                     } else {
-                        // What is no voltage is told by what is no duty.
+                        // An invalid voltage shows as an invalid duty.
                         assert!(duties.iter().any(|duty| duty.is_nan()), "{duties:?}");
                     }
                 }
@@ -245,7 +251,7 @@ mod tests {
         let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, DeadTime::Compensated { band: Ampere(0.5) })
             .expect("usual");
         let duties = |current| modulator.duties(at(0.0, 0), 1.0 / 48.0, current);
-        // 119 ns of 41.667 us.
+        // Expected: 119 ns of 41.667 us.
         let full = 119e-9 * 24_000.0;
         let [a, b, c] = duties(Stationary { alpha: Ampere(10.0), beta: Ampere::ZERO });
         assert!((a - 0.5 - full).abs() < 1e-6 && (b - 0.5 + full).abs() < 1e-6 && (c - b).abs() < 1e-7);
@@ -294,7 +300,8 @@ mod tests {
     fn the_circle_touches_the_hexagon() {
         let modulator = Modulator::new(BridgeTiming::ODRIVE_3_6, PLAIN).expect("usual");
         let limit = modulator.voltage_limit(Volt(48.0)).0;
-        // Least room in the direction between two phases' axes: 30 degrees, where the span is sqrt(3) of the length.
+        // The tightest direction is between two phases' axes: at 30 degrees the span is sqrt(3)
+        // of the length.
         let [a, _, c] = modulator.duties(at(limit, 30), 1.0 / 48.0, NO_CURRENT);
         assert!((a - modulator.greatest_duty()).abs() < 1e-5 && c.abs() < 1e-5, "{a} {c}");
         assert!((limit * sqrt(3.0) / 48.0 - modulator.greatest_duty()).abs() < 1e-5);

@@ -1,71 +1,73 @@
-//! The joint's zero: by running gently against an end stop, or by a pose that somebody states.
+//! The joint's zero, found at an end stop or from a pose that the operator states.
 //!
-//! The encoder at the motor knows its place within a turn of the motor, not which of the gear's turns it is: the joint's zero
-//! has to be shown once after every power-up. Both machines are ticked at the servo's rate with the joint's samples and
-//! answer with a current; both end with the count at the pose, from which [`super::Axis::set_counts`] follows.
+//! The encoder at the motor measures the position within a turn of the motor, but not the number of turns
+//! behind the gear. So the joint's zero must be referenced once after every power-up. Both state machines run
+//! at the servo's rate on the joint's samples and return a current. Both end with the count at the pose, from
+//! which [`super::Axis::set_counts`] follows.
 //!
-//! **End stop.** A target runs ahead of the joint at constant speed, never further than `lead`, and pulls it like a spring:
+//! **End stop.** A target runs ahead of the joint at constant speed, never further than `lead`, and pulls it
+//! like a spring:
 //!
 //! ```text
 //! i = limit * clamp((target - count) / lead, -1, 1) - damping * d count / dt
 //! ```
 //!
-//! Where the joint has not moved for 0.25 s although the spring is at its end, there is something. It backs off by `back_off`
-//! and comes again; both places must agree to `tolerance`, or it was friction, a knee in the way, a cable. Limits: current,
-//! way, time.
+//! A joint that has not moved for 0.25 s at full spring deflection has met an obstacle. The search backs off
+//! by `back_off` and approaches again. Both positions must agree to `tolerance`; otherwise it was friction, a
+//! knee in the way, or a cable. Current, travel and time are limited.
 //!
-//! **Stated pose.** The joint has stood still for half a second without current: where it stands is what was stated.
+//! **Stated pose.** The pose is accepted where the joint stood still for half a second without current.
 
 use crate::hal::JointSample;
 use crate::real::clamp;
 use crate::units::{Ampere, Hertz};
 
-/// What an end-stop search may do, in the joint's sense; positive speed searches the stop in flexion.
+/// Limits of an end-stop search, in the joint's sense; with positive speed it searches the stop in flexion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EndStopSettings {
-    /// Ticks per second with which the machine is called.
+    /// Call rate of the state machine.
     pub rate: Hertz,
-    /// Speed of the approach, counts per second, of either sign.
+    /// Speed of the approach, counts per second, signed.
     pub counts_per_s: f32,
-    /// Largest current.
+    /// Greatest current.
     pub current: Ampere,
-    /// Counts of lag at which the current is largest.
+    /// Lag of the joint at which the current is greatest, counts.
     pub lead: f32,
-    /// Current per speed, A s per count.
+    /// Damping: current per speed, A s per count.
     pub damping: f32,
-    /// Furthest way to the stop, counts, up to 2^24.
+    /// Longest travel to the stop, counts, up to 2^24.
     pub way: i32,
-    /// Counts by which it backs off.
+    /// Counts by which the search backs off.
     pub back_off: i32,
-    /// Counts by which the two places may differ.
+    /// Greatest difference of the two positions, counts.
     pub tolerance: i32,
 }
 
-/// Why there is no reference; no current flows any more.
+/// Reason for which there is no reference; no current flows any more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReferenceRefusal {
-    /// A setting makes no sense.
+    /// A setting is invalid.
     Settings,
-    /// No stop on the way allowed.
+    /// No stop within the allowed travel.
     NoStop,
-    /// The joint does not come away from where it stopped.
+    /// The joint does not come away from its stop.
     Stuck,
-    /// Two approaches stopped at different places.
+    /// Two approaches stopped at different positions.
     Unrepeatable,
-    /// It took too long.
+    /// The search took too long.
     TimeOut,
-    /// The joint moved although it was said to stand.
+    /// The joint moved although it should stand still.
     Moved,
 }
 
-/// What a tick answers.
+/// Result of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ReferenceStep {
-    /// Goes on with this current.
+    /// Still running, with this current.
     Running(Ampere),
-    /// The count at the stop or pose.
+    /// Found: the count at the stop or pose.
     Found(i32),
-    /// No reference.
+    /// Refused: no reference.
     Refused(ReferenceRefusal),
 }
 
@@ -88,19 +90,20 @@ pub struct EndStopSearch {
     count: i32,
     /// Counts per tick, smoothed.
     speed: f32,
-    /// Where the joint was when it last moved, and for how many ticks it has not.
+    /// Count where the joint last moved, and ticks since then.
     resting_at: i32,
     resting: u32,
 }
 
-/// Counts of way and tolerance: exact in single precision, and no sum of them overflows.
+/// Greatest travel and tolerance, counts: exact in single precision, and no sum of them overflows.
 const GREATEST_WAY: i32 = 1 << 24;
-/// Counts within which a joint rests.
+/// Counts within which a joint counts as resting.
 const REST_COUNTS: i32 = 4;
 
 impl EndStopSearch {
-    /// # Errors
-    /// [`ReferenceRefusal::Settings`].
+    /// Starts a search.
+    ///
+    /// # Errors [`ReferenceRefusal::Settings`] for invalid settings.
     pub fn new(settings: EndStopSettings) -> Result<Self, ReferenceRefusal> {
         let sensible = (100.0..=100_000.0).contains(&settings.rate.0)
             && (1.0..=1e6).contains(&settings.counts_per_s.abs())
@@ -128,10 +131,10 @@ impl EndStopSearch {
         })
     }
 
-    /// One servo tick.
+    /// Runs one servo tick.
     pub fn tick(&mut self, sample: &JointSample) -> ReferenceStep {
         let begin = *self.begin.get_or_insert(sample.encoder_counts);
-        // Relative to the beginning, so that single precision is enough.
+        // Relative to the start, so that single precision is enough.
         let count = sample.encoder_counts.wrapping_sub(begin);
         self.observe(count);
         if let Approach::Ended(end) = self.approach {
@@ -154,7 +157,7 @@ impl EndStopSearch {
     }
 
     fn observe(&mut self, count: i32) {
-        // Double pole is not needed: this damps, it does not measure. Time constant of 32 ticks.
+        // First order is enough: this speed only damps. Time constant of 32 ticks.
         self.speed += (count.wrapping_sub(self.count) as f32 - self.speed) * (1.0 / 32.0);
         self.count = count;
         self.ticks = self.ticks.saturating_add(1);
@@ -166,7 +169,7 @@ impl EndStopSearch {
 
     fn decide(&mut self, count: i32) -> Option<Result<i32, ReferenceRefusal>> {
         let EndStopSettings { rate, counts_per_s, lead, way, back_off, tolerance, .. } = self.settings;
-        // Twice what the way takes, and five seconds to stand.
+        // Twice the time of the travel, and five seconds to rest.
         if self.ticks as f32 > rate.0 * (2.0 * way as f32 / counts_per_s.abs() + 5.0) {
             return Some(Err(ReferenceRefusal::TimeOut));
         }
@@ -202,7 +205,7 @@ impl EndStopSearch {
     }
 }
 
-/// A pose that somebody states; see the module.
+/// Reference by a pose that the operator states; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StatedPose {
     stand_ticks: u32,
@@ -211,14 +214,14 @@ pub struct StatedPose {
 }
 
 impl StatedPose {
-    /// To be called `rate` times per second; `None` for a rate outside 100 Hz..100 kHz.
+    /// Creates a reference called `rate` times per second; `None` for a rate outside 100 Hz..100 kHz.
     #[must_use]
     pub fn new(rate: Hertz) -> Option<Self> {
         let stand_ticks = (0.5 * rate.0) as u32;
         (100.0..=100_000.0).contains(&rate.0).then_some(Self { stand_ticks, first: None, ticks: 0 })
     }
 
-    /// One servo tick, without current.
+    /// Runs one servo tick, without current.
     pub fn tick(&mut self, sample: &JointSample) -> ReferenceStep {
         let first = *self.first.get_or_insert(sample.encoder_counts);
         if sample.encoder_counts.wrapping_sub(first).wrapping_abs() > REST_COUNTS {

@@ -1,25 +1,26 @@
-//! Codes of the converter to currents and bus voltage.
+//! Converts ADC codes to currents and bus voltage.
 //!
-//! Two phases have shunts; what flows in through them flows out through the third. A code near a rail says that the amplifier
-//! is saturated, so the current is unknown: an error, never a number that is too small.
+//! Two phases have shunts; the third carries the negative sum. A code near a rail means a saturated amplifier
+//! and so an unknown current. That is an error, never a number that is too small.
 //!
 //! ```text
 //! i = ampere_per_code * (code - zero)          i_A = -(i_B + i_C)          V_bus = volt_per_code * code
 //! ```
 //!
-//! Currents flow into the motor. `ampere_per_code` is signed, one for each shunt; `zero` is found by calibration.
-//! Source of the board's numbers: ODrive v3.6 firmware (0.5 mOhm, 40 V/V, 3.3 V of 4,096 codes, divider 19).
+//! Currents flow into the motor. `ampere_per_code` is signed, one for each shunt; `zero` is the
+//! current-sensor offset that calibration measures. Source of the board's numbers: ODrive v3.6 firmware (0.5
+//! mOhm, 40 V/V, 3.3 V of 4,096 codes, divider 19).
 //! Cost: 45 instructions, rails included (`scripts/count-instructions`).
 
 use super::Stationary;
 use crate::units::{Ampere, Volt};
 
-/// The board's amplifiers, divider and converter.
+/// Scales of the board's amplifiers, divider and converter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SenseScale {
     /// Current per code of the shunts of B and C.
     pub ampere_per_code: [Ampere; 2],
-    /// Smallest and largest code that is no saturation.
+    /// Smallest and largest code without saturation.
     pub rails: [u16; 2],
     /// Bus voltage per code.
     pub volt_per_code: Volt,
@@ -39,7 +40,8 @@ impl SenseScale {
         self.volt_per_code * f32::from(code)
     }
 
-    /// Current vector of the codes of B and C, with their zeros; `None` where one is at a rail.
+    /// Current vector of the codes of B and C, with their current-sensor offsets; `None` where a code is
+    /// at a rail.
     #[must_use]
     #[inline(always)]
     pub fn currents(&self, codes: [u16; 2], zeros: [f32; 2]) -> Option<Stationary<Ampere>> {
@@ -53,7 +55,8 @@ impl SenseScale {
         Some(Stationary::from_two_phases(b, c))
     }
 
-    /// Largest phase current that both shunts can tell, whatever their zeros within `spread` codes of the middle.
+    /// Largest phase current that both shunts can measure, for any offsets within `spread` codes
+    /// of the middle.
     #[must_use]
     pub fn range(&self, spread: u16) -> Ampere {
         let below = 2048_u16.saturating_sub(self.rails[0]);
@@ -63,14 +66,14 @@ impl SenseScale {
         Ampere(f32::from(codes) * b.min(c))
     }
 
-    /// Greatest bus voltage that a border may be set to: 95 % of the converter's range, so that what lies beyond it is still told
-    /// apart with a divider that is 3 % off.
+    /// Greatest permissible bus-voltage limit: 95 % of the converter's range. A voltage beyond the limit then
+    /// still shows with a divider that is 3 % off.
     #[must_use]
     pub fn greatest_bus(&self) -> Volt {
         self.bus(4095) * 0.95
     }
 
-    /// Rails in order, constants finite and not zero.
+    /// Whether the rails are in order and the scales plausible.
     pub(super) fn is_sensible(&self) -> bool {
         self.rails[0] < 2048
             && 2048 < self.rails[1]
@@ -94,7 +97,7 @@ mod tests {
         let (b, c) = (0.040_283 * 99.5, -0.040_283 * 50.0);
         assert!((vector.alpha.0 + b + c).abs() < 1e-3, "{vector:?}");
         assert!((vector.beta.0 - (b - c) / sqrt(3.0)).abs() < 1e-3, "{vector:?}");
-        // 1675 codes of 40.3 mA on the narrower side, less 100.
+        // Expected: 1675 codes of 40.3 mA on the narrower side, less 100.
         assert!((scale.range(100).0 - 63.4).abs() < 0.1, "{:?}", scale.range(100));
         assert!((scale.bus(3000).0 - 45.92).abs() < 0.01);
     }

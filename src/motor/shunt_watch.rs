@@ -1,19 +1,24 @@
-//! Shunts that say the same for too long, and zeros that are none any more.
+//! Detects shunts whose code is stuck, and drifted current-sensor offsets.
 //!
 //! ```text
-//! stuck:  code as it was, while what is asked of its phase has changed by more than 1.25 * 4/3 t_d f V_bus / K_p, 1 A at least: 4 ticks of it
-//! zero:   i0 += (i - i0) / 64 while the bridge is released;   |i0| > 2 A when it is to switch: refused
+//! stuck:  code unchanged for 4 ticks in which the phase's target differs from that at the code's last change
+//!         by more than 1.25 * 4/3 t_d f V_bus / K_p, 1 A at least
+//! zero:   i0 += (i - i0) / 64 while the outputs are off;   enabling refused where |i0| > 2 A
 //! ```
 //!
-//! **Stuck** (C3). A phase whose current is zero stays there until its voltage outweighs the dead time, 4/3 t_d f V_bus (0.22 V on the board at
-//! its highest bus): what is asked for has to be so much more that the loop's proportional part K_p (0.094 ohm on the default leg) gives that and a quarter more
-//! at once, 2.9 A. (With 1 A a leg that stood still under its host was released once in 500 times.) After such a change the loop (1 kHz) has
-//! moved a code by 17 in its third tick, so codes that agree in all four do so by noise with less than 1e-9 each time. A code that is stuck while nothing is asked to
-//! change is right, and is not seen; slow changes are worth their voltage ([`super::ModelWatch`]).
+//! **Stuck** (C3). A phase at zero current stays there until its voltage outweighs the dead time's, 4/3 t_d f
+//! V_bus. On the board at its highest bus that is 0.22 V. So the target must change until the loop's
+//! proportional part gives that voltage and a quarter more at once. With K_p = 0.094 ohm of the default leg
+//! that is 2.9 A. (With 1 A, a leg at rest under host control was turned off once in 500 times.)
 //!
-//! **Zero** (C1). With the bridge released no current flows: the low-pass (2.7 ms, settled to 2 % in 10 ms) has the shunts' drift
-//! since the calibration, 43 codes of one shunt. DRV8301: 10 uV/K of drift are 1.2 A after 60 K, so 2 A is not yet a defect, and 3 N m at a
-//! joint of the default leg. Noise of a code leaves 4 mA.
+//! After such a change the loop (1 kHz) has moved a code by 17 in its third tick. Codes that agree in all
+//! four ticks do so by noise with a probability below 1e-9 each time. A stuck code with a constant target is
+//! right and not detected. Slow changes show in the voltage ([`super::ModelWatch`]).
+//!
+//! **Offset** (C1). With the outputs off no current flows, so the low-pass (2.7 ms, settled to 2 % in 10 ms)
+//! measures the offset's drift since the calibration. The limit is 43 codes of one shunt. DRV8301: 10 uV/K of
+//! drift are 1.2 A after 60 K. So 2 A, 3 N m at a joint of the default leg, is not yet a defect. Noise of one
+//! code leaves 4 mA.
 //!
 //! Cost: two comparisons and two differences per tick.
 
@@ -21,28 +26,28 @@ use super::Stationary;
 use crate::real::{abs, max};
 use crate::units::{Ampere, Volt};
 
-/// Ticks for which a code may stay while it should have moved, counted until it moves, less one.
+/// Ticks for which a code may stay unchanged while it should move.
 const PATIENCE: u8 = 4;
-/// Least that a phase has to be asked for anew, A.
+/// Least change of a phase's target current that is evaluated, A.
 const ASKED_A: f32 = 1.0;
-/// Of the voltage that dead time takes from a phase; a quarter more.
+/// Factor on the mean dead-time voltage: its vector of 4/3, and a quarter more.
 const BEYOND_DEAD_TIME: f32 = 1.25 * 4.0 / 3.0;
-/// Share of the low-pass.
+/// Share of a new sample in the low-pass.
 const ZERO_SHARE: f32 = 1.0 / 64.0;
-/// Longest vector that is no current, A.
+/// Longest offset vector at which enabling is allowed, A.
 const ZERO_A: f32 = 2.0;
 
-/// One shunt.
+/// State of one shunt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Shunt {
     code: u16,
-    /// What was asked of its phase when the code was last another one.
+    /// Target current of its phase at the code's last change.
     asked: f32,
     /// Ticks since it should have moved.
     overdue: u8,
 }
 
-/// The shunts of one axis.
+/// Shunt checks of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShuntWatch {
     shunts: [Shunt; 2],
@@ -50,35 +55,37 @@ pub struct ShuntWatch {
 }
 
 impl ShuntWatch {
-    /// Nothing seen yet.
+    /// State before the first tick.
     pub const EMPTY: Self = Self {
-        // No code is that large.
+        // Larger than any code.
         shunts: [Shunt { code: u16::MAX, asked: 0.0, overdue: 0 }; 2],
         zero: Stationary { alpha: 0.0, beta: 0.0 },
     };
 
-    /// A tick in which the bridge is released.
+    /// Updates the offset in a tick with the outputs off.
     #[inline(always)]
     pub fn released(&mut self, currents: Stationary<Ampere>) {
         self.zero.alpha += ZERO_SHARE * (currents.alpha.0 - self.zero.alpha);
         self.zero.beta += ZERO_SHARE * (currents.beta.0 - self.zero.beta);
     }
 
-    /// Before the bridge switches: whether what no current makes is none; the codes are looked at anew.
+    /// Before the bridge switches: whether the offset is within its limit. Also restarts the check
+    /// for stuck codes.
     pub fn begins_at_zero(&mut self) -> bool {
         self.shunts = Self::EMPTY.shunts;
         let Stationary { alpha, beta } = self.zero;
         alpha * alpha + beta * beta <= ZERO_A * ZERO_A
     }
 
-    /// What a phase has to be asked for anew before its code has to move: see the module; `dead` is the mean of what dead time takes, `ohm`
-    /// the loop's gain.
+    /// Change of a phase's target current beyond which its code must move; see the module. `dead` is the mean
+    /// voltage that dead time takes, `ohm` the loop's proportional gain.
     #[must_use]
     pub fn asked(dead: Volt, ohm: f32) -> Ampere {
         Ampere(max(ASKED_A, BEYOND_DEAD_TIME * dead.0 / ohm))
     }
 
-    /// A tick in which the bridge switches, with what is asked of the phases and how much of it has to show: whether a code is stuck.
+    /// Whether a code is stuck, in a tick in which the bridge switches; `asked_a` is the
+    /// change of [`Self::asked`].
     #[inline(always)]
     pub fn is_stuck(&mut self, codes: [u16; 2], target: Stationary<Ampere>, asked_a: f32) -> bool {
         let phases = target.to_phases();

@@ -1,7 +1,7 @@
 //! A small motor for unit tests: averaged over the PWM period, in the rotor's frame, double precision.
 //!
-//! The joint tests with the simulated hardware, which resolves every edge and shares nothing with this room, are in
-//! `hal-sim/tests/`.
+//! Tests against the simulated hardware, which resolves every edge and shares no code with this crate,
+//! are in `hal-sim/tests/`.
 
 use super::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale, Sine};
 use crate::hal::{AxisCommand, AxisSample};
@@ -37,31 +37,31 @@ pub(crate) struct TestMotor {
     pub flux: f64,
     pub pole_pairs: f64,
     pub counts_per_turn: f64,
-    /// kg m^2, N m s, N m.
+    /// Inertia, kg m^2; viscous friction, N m s; Coulomb friction, N m.
     pub inertia: f64,
     pub viscous: f64,
     pub coulomb: f64,
     pub load: f64,
     pub bus: f64,
-    /// Fraction of a period in which the bridge does what the current wants.
+    /// Dead time as a fraction of a period: the current's sign then sets the voltage.
     pub dead: f64,
     pub zeros: [f64; 2],
     pub noise_codes: f64,
-    /// Encoder's zero against the flux, mechanical turns; -1 where it counts backwards.
+    /// Encoder position at zero flux angle, mechanical turns; `encoder_sign` is -1 where it counts backwards.
     pub encoder_zero: f64,
     pub encoder_sign: f64,
     pub encoder_dead: bool,
     /// The wire of phase A is broken.
     pub open: bool,
-    /// Width of the index pulse, counts: its other end is seen on the way back.
+    /// Width of the index pulse, counts; backwards its other edge is captured.
     pub index_width: i64,
-    /// What the converter makes of the currents of B and C.
+    /// Converts the true currents of B and C to the measured ones.
     pub shunts: fn([f64; 2]) -> [f64; 2],
-    /// d and q, A.
+    /// Currents d and q, A.
     pub current: [f64; 2],
     pub angle: f64,
     pub speed: f64,
-    /// Held by a machine at its speed.
+    /// The speed is held by an external machine.
     pub driven: bool,
     pub pending: AxisCommand,
     pub seed: u64,
@@ -110,7 +110,7 @@ impl TestMotor {
         self.encoder_sign * self.angle / core::f64::consts::TAU + self.encoder_zero
     }
 
-    /// Sum of twelve uniform numbers: a normal one, nearly.
+    /// Nearly normal noise: the sum of twelve uniform numbers.
     fn noise(&mut self) -> f64 {
         let mut sum = -6.0;
         for _ in 0..12 {
@@ -129,7 +129,7 @@ impl TestMotor {
         [alpha, -0.5 * alpha + turned, -0.5 * alpha - turned]
     }
 
-    /// One PWM period: the command given acts in the next one.
+    /// Runs one PWM period; the command acts in the next one.
     pub(crate) fn period(&mut self, command: AxisCommand) -> AxisSample {
         let acting = core::mem::replace(&mut self.pending, command);
         for _ in 0..SUBSTEPS {
@@ -178,7 +178,7 @@ impl TestMotor {
             self.current[1] +=
                 STEP_S * (vq - self.resistance * iq - electrical_speed * (ld * id + self.flux)) / lq;
             if self.open {
-                // What flows in at B flows out at C.
+                // With phase A open, the current in at B flows out at C.
                 let across = sine * self.current[0] + cosine * self.current[1];
                 self.current = [sine * across, cosine * across];
             }

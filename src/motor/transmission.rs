@@ -1,23 +1,24 @@
-//! Motor current to joint torque and back.
+//! Converts motor current to joint torque and back.
 //!
 //! ```text
 //! motor torque = 3/2 pole pairs flux * current
-//! joint torque = ratio * motor torque * loss             power from motor to joint:  loss = efficiency
-//!                                                        power from joint to motor:  loss = 1 / efficiency of backdriving
+//! joint torque = ratio * motor torque * loss   power from motor to joint:  loss = efficiency
+//!                                              power from joint to motor:  loss = 1 / backdriving efficiency
 //! ```
 //!
-//! A gear takes its loss from whoever drives: a motor that lifts a leg delivers less than ratio times its torque, one that
-//! brakes it holds more. Between the two, within `band` of no power's direction (joint speed), the loss goes over
-//! in a straight line, or the torque would jump with the sign of a speed that is noise. At rest neither drives: the mean.
+//! The loss of a gear acts against the driving side. A motor that lifts a leg delivers less than ratio times
+//! its torque, a motor that brakes it holds more. Within `band` of zero joint speed the loss changes
+//! linearly between both. Otherwise the torque would jump with the sign of a noisy speed. At rest it is the
+//! mean of both.
 //!
-//! Signs: current, torque and speed grow with the joint's flexion; [`super::Axis`] has seen to that. Source: the usual
-//! one-parameter loss of a gear, e.g. Giberti, Cinquemani, Legnani (2010). Known limits: losses that do not grow with load are
-//! friction, which identification finds by itself.
+//! Signs: current, torque and speed grow with the joint's flexion, as [`super::Axis`] provides.
+//! Source: the usual one-parameter loss of a gear, e.g. Giberti, Cinquemani, Legnani (2010).
+//! Known limits: losses that do not grow with load belong to friction, which identification estimates.
 
 use crate::real::clamp;
 use crate::units::{Ampere, NewtonMetre, NewtonMetrePerAmpere, RadianPerSecond, Weber};
 
-/// The way from a motor to its joint.
+/// Transmission from a motor to its joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transmission {
     torque_per_ampere: f32,
@@ -26,25 +27,25 @@ pub struct Transmission {
     per_band: f32,
 }
 
-/// What a transmission consists of.
+/// Constants of a transmission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TransmissionConfiguration {
-    /// Of the motor, 1..=64.
+    /// Pole pairs of the motor, 1..=64.
     pub pole_pairs: u8,
     /// Flux linkage of the magnets.
     pub flux: Weber,
     /// Motor turns per joint turn, at least 1.
     pub ratio: f32,
-    /// Share of the motor's power that the joint gets, above 0.3, at most 1.
+    /// Share of the motor's power that reaches the joint, above 0.3, at most 1.
     pub efficiency: f32,
-    /// Share of the joint's power that the motor gets, above 0.3, at most 1.
+    /// Share of the joint's power that reaches the motor, above 0.3, at most 1.
     pub backdriving_efficiency: f32,
-    /// Joint speed at which the direction of power counts in full, positive.
+    /// Joint speed beyond which the loss has its full direction, positive.
     pub band: RadianPerSecond,
 }
 
 impl Transmission {
-    /// `None` for what no transmission is.
+    /// Returns `None` for constants outside their ranges.
     #[must_use]
     pub fn new(configuration: &TransmissionConfiguration) -> Option<Self> {
         let TransmissionConfiguration { pole_pairs, flux, ratio, efficiency, backdriving_efficiency, band } =
@@ -66,25 +67,25 @@ impl Transmission {
         })
     }
 
-    /// Joint torque per motor current of a gear without loss.
+    /// Joint torque per motor current of a lossless gear.
     #[must_use]
     pub fn torque_per_ampere(&self) -> NewtonMetrePerAmpere {
         NewtonMetrePerAmpere(self.torque_per_ampere)
     }
 
-    /// Joint torque that a current makes at a joint speed.
+    /// Joint torque of a current at a joint speed.
     #[must_use]
     pub fn torque(&self, current: Ampere, speed: RadianPerSecond) -> NewtonMetre {
         NewtonMetre(self.torque_per_ampere * current.0 * self.loss(current.0, speed))
     }
 
-    /// Current that makes a joint torque at a joint speed.
+    /// Current for a joint torque at a joint speed.
     #[must_use]
     pub fn current(&self, torque: NewtonMetre, speed: RadianPerSecond) -> Ampere {
         Ampere(torque.0 / (self.torque_per_ampere * self.loss(torque.0, speed)))
     }
 
-    /// Factor between torque without loss and torque, for an effort of either unit and its sign.
+    /// Factor between torque and lossless torque; `effort` only gives the sign of torque or current.
     fn loss(&self, effort: f32, speed: RadianPerSecond) -> f32 {
         let towards_joint = clamp(speed.0 * self.per_band, -1.0, 1.0);
         let driving = if effort < 0.0 { -towards_joint } else { towards_joint };
@@ -96,7 +97,7 @@ impl Transmission {
 mod tests {
     use super::*;
 
-    /// 270 rpm/V, 7 pole pairs, a gear of 50.
+    /// Motor of 270 rpm/V with 7 pole pairs, gear of 50.
     const KNEE: TransmissionConfiguration = TransmissionConfiguration {
         pole_pairs: 7,
         flux: Weber(2.917e-3),
@@ -119,7 +120,7 @@ mod tests {
                 |speed: f32| knee().torque(Ampere(10.0 * sign), RadianPerSecond(speed * sign)).0 * sign;
             assert!((torque(1.0) - 10.0 * plain * 0.8).abs() < 1e-4);
             assert!((torque(-1.0) - 10.0 * plain / 0.75).abs() < 1e-4);
-            // Motor's power less joint's power is what the gear takes: never negative.
+            // The gear's loss, motor power less joint power, is never negative.
             for speed in [-2.0, -0.1, 0.1, 2.0] {
                 assert!((10.0 * plain - torque(speed)) * speed >= 0.0);
             }

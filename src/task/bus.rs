@@ -1,16 +1,20 @@
-//! Level 5 on the board: the interrupt around `operation::BusRound`, run whenever frames came, a mailbox is empty, or the servo has ticked.
+//! Level 5 on the board: the interrupt around `operation::BusRound`.
 //!
-//! Why its own level and no executor: a poll takes 0.8 thousand instructions and a frame up to 2.4, which any level below the servo could
-//! give. But a block that is sent again takes 81 thousand in one call (0.6 ms), and a reset that recalls full records 219 thousand. So it
-//! stands below the level that empties the controller's queue of three frames, and above the housekeeping, whose rounds of 2 ms allow for it.
+//! Runs when frames came, a mailbox is empty, or the servo has ticked.
+//!
+//! Why its own level and no executor: any level below the servo could afford a poll (800 instructions) and a
+//! frame (up to 2,400). But a repeated block takes 81 thousand in one call (0.6 ms), and a reset that recalls
+//! full records 219 thousand. So this level is below the one that empties the controller's queue of three
+//! frames. The housekeeping is below this level; its rounds of 2 ms tolerate the delay.
 //!
 //! ```text
-//! level 4  frames of the controller --queue of 32-->                        a frame without room is reported as an overrun
-//! level 1  servo --reports, log-->  bus  --orders--> servo                   one of each under way; the newest targets are in the next
-//! thread   identification --results--> bus;  bus --what to store--> storage   large values: lent, or passed in turn (`Handover`)
+//! level 4  frames of the controller --queue of 32-->       a frame without space is reported as an overrun
+//! level 1  servo --reports, log--> bus --orders--> servo  one of each in progress; the next has new targets
+//! thread   identification --results--> bus;  bus --data to store--> storage  lent or `Handover`
 //! ```
 //!
-//! Frames of one node are heard by the other as they are given to the controller, which does not hear itself.
+//! Frames of one node reach the other node when they are given to the controller, which does not
+//! receive its own.
 
 use core::mem::MaybeUninit;
 
@@ -25,7 +29,7 @@ use crate::operation::{BusEnds, BusQueues, BusRound, Handover, HostEnds, Keep};
 use crate::place::{each, fill};
 use crate::store::KeptModel;
 
-/// Samples of the log that wait for a host: 384 ms of it.
+/// Length of the log's queue to a host, samples: 384 ms.
 pub const LOG: usize = 192;
 
 /// Nodes and axes of this board.
@@ -33,7 +37,7 @@ pub type BoardStation = Station<JOINTS, LOG>;
 /// Results of this board's leg.
 pub type BoardFound = Found<JOINTS, BASE>;
 
-/// Queues of the bus, and what is lent.
+/// Queues of the bus, and buffers that are lent.
 pub struct Memory {
     queues: BusQueues<JOINTS>,
     found: Queue<&'static mut BoardFound, 2>,
@@ -43,22 +47,22 @@ pub struct Memory {
     storage: Handover<Keep<JOINTS>>,
 }
 
-/// The identification's end.
+/// The identification's end of the queues.
 pub struct ThreadEnd {
     found: Producer<'static, &'static mut BoardFound>,
     spare: Consumer<'static, &'static mut BoardFound>,
     accepted: Producer<'static, KeptModel<JOINTS>>,
 }
 
-/// The storage's end.
+/// The storage's end of the queues.
 pub struct KeeperEnd {
-    /// What is to be stored.
+    /// Data to store.
     pub storage: &'static Handover<Keep<JOINTS>>,
-    /// Models that were accepted.
+    /// Accepted models.
     pub accepted: Consumer<'static, KeptModel<JOINTS>>,
 }
 
-/// What level 5 works on.
+/// State of level 5.
 pub struct BusLoop {
     station: &'static mut BoardStation,
     fresh: Consumer<'static, &'static mut BoardFound>,
@@ -69,13 +73,13 @@ pub struct BusLoop {
     storage: &'static Handover<Keep<JOINTS>>,
 }
 
-/// What level 5 works on, once the start has set it.
+/// State of level 5, once the start has set it.
 pub static BUS: spin::Mutex<Option<&'static mut BusLoop>> = spin::Mutex::new(None);
-/// Where level 4 puts frames, once the start has set it.
+/// Queue of frames from level 4, once the start has set it.
 pub static FRAMES_IN: spin::Mutex<Option<Producer<'static, Frame>>> = spin::Mutex::new(None);
 
 impl Memory {
-    /// Empty, built in its place.
+    /// Builds an empty memory in its place.
     pub fn place(slot: &mut MaybeUninit<Self>) -> &mut Self {
         fill!(
             slot,
@@ -90,7 +94,7 @@ impl Memory {
         )
     }
 
-    /// All ends; the frames' first.
+    /// Returns all ends; the frames' first.
     pub fn split(
         &'static mut self,
         station: &'static mut BoardStation,
@@ -108,14 +112,14 @@ impl Memory {
 }
 
 impl ThreadEnd {
-    /// Has the bus answer with other results; whether there was room.
+    /// Replaces the results that the bus answers with; returns whether a buffer was free.
     pub fn publish(&mut self, fill: impl FnOnce(&mut BoardFound)) -> bool {
         let Some(found) = self.spare.dequeue() else { return false };
         fill(found);
         self.found.enqueue(found).is_ok()
     }
 
-    /// Passes on a model that may be stored, in the place of one that was not.
+    /// Passes on a model that may be stored, replacing one that was not.
     pub fn accept(&mut self, model: KeptModel<JOINTS>) {
         let _ = self.accepted.enqueue(model);
     }
@@ -131,7 +135,7 @@ impl BusLoop {
     }
 }
 
-/// Level 5.
+/// Interrupt of level 5.
 #[inline(always)]
 pub fn interrupt(hardware: &mut impl Hardware<JOINTS>) {
     if let Some(mut bus) = BUS.try_lock()
@@ -141,7 +145,7 @@ pub fn interrupt(hardware: &mut impl Hardware<JOINTS>) {
     }
 }
 
-/// Level 4: a frame came; whether there was room for it.
+/// Interrupt of level 4: queues a received frame; returns whether there was space.
 #[inline(always)]
 pub fn received(frame: Frame) -> bool {
     match FRAMES_IN.try_lock() {

@@ -1,4 +1,4 @@
-//! What the ODrive v3.6's image is put together from: every value to its level.
+//! Composition of the ODrive v3.6 image: hands every value to its level.
 
 use embassy_executor::Executor;
 use heapless::spsc::{Consumer, Producer};
@@ -26,10 +26,10 @@ use crate::safety::Cause;
 use crate::trace::Record;
 use cortex_m::peripheral::DWT;
 
-/// What the housekeeping's task is started with.
+/// Arguments of the housekeeping's task.
 type Housekeeping = (Housekeeper<JOINTS>, HousekeepingEnds<'static, JOINTS>, Odrive);
 
-/// Builds the leg, hands everything to its level and starts them; does not return.
+/// Builds the leg, hands everything to its level and starts the levels; does not return.
 pub fn run(board: Board) -> ! {
     let (thread, keeping, keeper) = hand_out(board);
     vectors::enable();
@@ -54,7 +54,7 @@ pub fn run(board: Board) -> ! {
     })
 }
 
-/// Everything in its place; apart from [`run`], whose frame stays on the stack for ever.
+/// Builds and hands out everything. Separate from [`run`], whose frame stays on the stack for ever.
 #[inline(never)]
 fn hand_out(board: Board) -> (Option<identify::Thread>, Housekeeping, Option<&'static mut keep::Keeper>) {
     judge(&board);
@@ -67,7 +67,7 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, Housekeeping, Option<&'s
         volt_per_code: Some(analog::sense(divider).volt_per_code),
         temperatures_c: || converter::thermistors().map(|code| temperature_c(code).unwrap_or(f32::NAN)),
         chopper_duty: brake::duty,
-        // Whoever listens has all the time there is.
+        // The probe reads at its own pace; nothing to do.
         told: || (),
     };
     identify::introduce(&introduction(&board), board.clock_hz);
@@ -114,13 +114,13 @@ fn hand_out(board: Board) -> (Option<identify::Thread>, Housekeeping, Option<&'s
     (thread, (housekeeper, housekeeping_ends, Odrive::new(board.gate_drivers)), keeper)
 }
 
-/// The numbers of hip and knee, where nothing else is kept.
+/// Default node numbers of hip and knee.
 const NODES: [NodeId; JOINTS] = match (NodeId::new(1), NodeId::new(2)) {
     (Some(hip), Some(knee)) => [hip, knee],
     _ => panic!("both are numbers of nodes"),
 };
 
-/// Ends of the bus: the servo's, the identification's, the storage; and the stored calibrations.
+/// Ends of the bus for servo, identification and storage; and the stored calibrations.
 #[derive(Default)]
 struct Joined {
     host: Option<HostEnds<'static, JOINTS>>,
@@ -130,7 +130,7 @@ struct Joined {
     stored: [Option<StoredCalibration>; JOINTS],
 }
 
-/// The bus, with what was kept before; the controller takes part from here on.
+/// Builds the bus with the stored parameters; from here on the controller takes part.
 #[inline(never)]
 fn join(
     configuration: &leg::Leg,
@@ -151,14 +151,15 @@ fn join(
     let station = memory::station(|| bus::BoardStation::new(NODES, told, constants, plan, seed));
     let mut keeper = memory::keeper();
     let mut calibrations = [None; JOINTS];
-    // Reading may repair what a cut of the power left, which erases: nothing may switch yet, and the watchdog still has the start's 4 s.
+    // Reading may repair the effects of a power loss, which erases flash. Nothing may switch yet, and the
+    // watchdog still has the 4 s of the start.
     if let Some(keeper) = &mut keeper {
         calibrations = keeper.calibrations();
         for joint in 0..JOINTS {
             let mut bytes = [0; LONGEST];
             match keeper.objects(joint, &mut bytes) {
                 Some(length) => station.recall(joint, bytes.get(..length).unwrap_or_default()),
-                // Hosts are told that what was kept is lost.
+                // Reports to hosts that stored parameters are lost.
                 None => station.storing(Storing::Failed),
             }
         }
@@ -168,7 +169,8 @@ fn join(
             _ => station.storing(Storing::Failed),
         }
     }
-    // One that does not answer is off the bus for good (`can::status`): the leg is its operator's, and who listens is told.
+    // A controller that does not answer stays off (`can::status`): the operator keeps the leg, and a record
+    // reports the fault.
     if !can::start(station.bit_rate().unwrap_or(USUAL_KBIT)) {
         let _ = notes.enqueue(Record::AxisFault { tick: 0, joint: 0, name: "bus_controller" });
     }
@@ -183,7 +185,7 @@ fn join(
     Joined { host: Some(servo), following, results: Some(thread), keeper, stored: calibrations }
 }
 
-/// Of a board whose version is not known: no voltage is then taken for a smaller one, and nothing is enabled.
+/// Divider for a board of unknown version: no voltage reads too low with it, and nothing is enabled.
 const LARGEST_DIVIDER: f32 = 19.0;
 
 fn introduction(board: &Board) -> Introduction {
@@ -192,7 +194,7 @@ fn introduction(board: &Board) -> Introduction {
     Introduction { unique: identity.unique, version: identity.version, reset: identity.reset.name(), crash }
 }
 
-/// What the start found that speaks against enabling.
+/// Raises the inhibit reasons that the start found.
 fn judge(board: &Board) {
     let found = [
         (board.crash.is_some(), Cause::Crash),
@@ -206,7 +208,7 @@ fn judge(board: &Board) {
     }
 }
 
-/// Nobody else holds the lock: the interrupts that take it are not enabled yet.
+/// Fills a lock. No other code holds it: the interrupts that take it are not enabled yet.
 fn place<T>(home: &spin::Mutex<Option<T>>, value: T) {
     if let Some(mut home) = home.try_lock() {
         *home = Some(value);

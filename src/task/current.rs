@@ -1,4 +1,4 @@
-//! Level 0 on the board: converters and counters read for `operation::CurrentLoops`.
+//! Level 0 on the board: reads converters and counters for `operation::CurrentLoops`.
 
 use core::num::NonZeroU32;
 
@@ -13,23 +13,23 @@ use crate::hal::{AxisSample, CURRENT_RATE_HZ};
 use crate::motor::Chopper;
 use crate::operation::{CurrentEnds, CurrentLoops, Stage, Tick};
 
-/// A brake resistor is connected: set when the image is built.
+/// Whether a brake resistor is connected; set when the image is built.
 const HAS_BRAKE_RESISTOR: bool = option_env!("SCARAB_BRAKE_RESISTOR").is_some();
 
 /// Processor cycles between two ticks of one axis.
 const CYCLES: NonZeroU32 = NonZeroU32::new(CLOCK_HZ / CURRENT_RATE_HZ).expect("more than one");
 
-/// What level 0 works on.
+/// State of level 0.
 pub struct Current {
     loops: CurrentLoops<JOINTS>,
     ends: CurrentEnds<'static, JOINTS>,
 }
 
-/// What level 0 works on, once the start has set it.
+/// State of level 0, once the start has set it.
 pub static LOOPS: spin::Mutex<Option<&'static mut Current>> = spin::Mutex::new(None);
 
 impl Current {
-    /// Both axes off, on a board with this divider of the bus voltage.
+    /// Both axes off, on a board with this bus-voltage divider.
     #[must_use]
     pub fn new(ends: CurrentEnds<'static, JOINTS>, divider: f32) -> Self {
         let [begin, full] = drives::chopper(divider);
@@ -39,7 +39,7 @@ impl Current {
         Self { loops, ends }
     }
 
-    /// One tick of one axis; `complete` if both of its shunts were converted.
+    /// Runs one tick of one axis; `complete` if both of its shunts were converted.
     #[inline(never)]
     fn tick(&mut self, axis: usize, complete: bool) {
         let begun = DWT::cycle_count();
@@ -61,11 +61,11 @@ impl Current {
     }
 }
 
-/// The converters' vector.
+/// Interrupt of the converters.
 #[inline(always)]
 pub fn interrupt() {
     let finished = converter::finished();
-    // Nothing else takes this lock once the interrupt is enabled.
+    // Once the interrupt is enabled, only this handler takes the lock.
     if let Some(mut current) = LOOPS.try_lock()
         && let Some(current) = current.as_mut()
     {

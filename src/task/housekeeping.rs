@@ -8,20 +8,20 @@ use crate::board::odrive_v3_6::hardware::Odrive;
 use crate::operation::{Housekeeper, HousekeepingEnds, RATE_HZ, Watch};
 use crate::safety::GUARD_RATE_HZ;
 
-/// Releases both bridges where current ticks stop, and feeds the watchdog as long as everything else runs.
+/// Turns both bridges off where current ticks stop, and feeds the watchdog while everything else runs.
 #[embassy_executor::task]
 pub async fn watch() -> ! {
     let mut ticker = Ticker::every(Duration::from_hz(u64::from(GUARD_RATE_HZ)));
     let mut watch = Watch::new(&SIGNALS);
     loop {
         ticker.next().await;
-        // A look that came late is not made up for: two in a row would see the same count.
+        // Late checks are not made up for: two in a row would read the same count.
         ticker.reset();
         watch.look(&SIGNALS, &mut Odrive);
     }
 }
 
-/// Runs everything else of this level.
+/// Runs all other work of this level.
 #[embassy_executor::task]
 pub async fn run(
     mut keeper: Housekeeper<JOINTS>,

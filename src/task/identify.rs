@@ -1,6 +1,6 @@
-//! Thread level on the board: the task around `operation::IdentificationLevel`, and all records that leave the board.
+//! Thread level on the board: the task around `operation::IdentificationLevel`, and the board's records.
 //!
-//! Records that cannot wait leave at once; what can wait leaves at most once in 2 ms, so that the probe keeps up.
+//! Urgent records are sent at once, the others at most once in 2 ms, so that the probe keeps up.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -16,15 +16,15 @@ use crate::servo::{LOG_RATE_HZ, SERVO_RATE_HZ};
 use crate::store::KeptModel;
 use crate::trace::{GRAMMAR, Record, Report, words};
 
-/// Evaluations of the search in one slice: some 0.25 ms.
+/// Evaluations of the search per slice: some 0.25 ms.
 const EVALUATIONS: u32 = 4;
-/// Shortest time between two records that can wait.
+/// Shortest interval between two records that are not urgent.
 const PACE: Duration = Duration::from_millis(2);
-/// Time between two records of the search's progress.
+/// Interval of the records of the search's progress.
 const PROGRESS: Duration = Duration::from_millis(250);
-/// Time between two records of loops and supply.
+/// Interval of the records of loops and supply.
 const LOOPS: Duration = Duration::from_secs(1);
-/// Every sample of the log is sent: set when the image is built.
+/// Whether every sample of the log is sent; set when the image is built.
 const SENDS_LOG: bool = option_env!("SCARAB_TRACE_LOG").is_some();
 
 static NUMBER: AtomicU32 = AtomicU32::new(0);
@@ -33,19 +33,19 @@ fn tell(record: &Record<JOINTS>) {
     record.emit(NUMBER.fetch_add(1, Ordering::Relaxed));
 }
 
-/// What the thread works on.
+/// State of the thread.
 pub struct Thread {
-    /// The half of the leg that identifies.
+    /// Identification half of the leg.
     pub identification: &'static mut LegIdentification,
-    /// Its ends of the queues.
+    /// The thread's ends of the queues.
     pub ends: IdentificationEnds<'static, JOINTS>,
-    /// The board.
+    /// Access to the board.
     pub surroundings: Surroundings,
-    /// The bus, where there is one, and what the leg was built from.
+    /// Results for the bus, if there is one, and the leg's configuration.
     pub bus: Option<(ThreadEnd, &'static Leg)>,
 }
 
-/// What changes.
+/// Mutable state of the task.
 struct State {
     level: IdentificationLevel,
     report: Option<Report>,
@@ -54,7 +54,7 @@ struct State {
     next_loops: Instant,
 }
 
-/// What is told once at the start.
+/// Sends the records of the start.
 pub fn introduce(introduction: &Introduction, clock_hz: u32) {
     let Introduction { unique, version, reset, crash } = introduction;
     let ([uid0, uid1, uid2], [version, version_minor, version_volt]) = (*unique, *version);
@@ -74,7 +74,7 @@ pub fn introduce(introduction: &Introduction, clock_hz: u32) {
     }
 }
 
-/// Runs for ever.
+/// Task of the thread level.
 #[embassy_executor::task]
 pub async fn run(mut thread: Thread) -> ! {
     let now = Instant::now();
@@ -98,7 +98,7 @@ pub async fn run(mut thread: Thread) -> ! {
     }
 }
 
-/// Sends a sample of the log, if the image does.
+/// Sends a sample of the log, if the image is built for it.
 fn log(logged: &LoggedSample<JOINTS>) {
     if SENDS_LOG {
         let (segment, motion) = words::segment(logged.segment);
@@ -114,7 +114,7 @@ fn log(logged: &LoggedSample<JOINTS>) {
     }
 }
 
-/// Gives others of this executor their turn.
+/// Yields to other tasks of this executor.
 async fn embassy_futures_yield() {
     let mut yielded = false;
     core::future::poll_fn(|context| {
@@ -128,7 +128,7 @@ async fn embassy_futures_yield() {
 }
 
 impl Thread {
-    /// One slice; whether there was anything to do.
+    /// Runs one slice; returns whether there was work.
     #[inline(never)]
     fn work(&mut self, state: &mut State) -> bool {
         match state.level.work(self.identification, EVALUATIONS, &mut self.ends, &SIGNALS, tell) {
@@ -144,7 +144,7 @@ impl Thread {
         }
     }
 
-    /// Results as the bus answers with them.
+    /// Publishes results to the bus.
     #[inline(never)]
     fn publish(&mut self, state: &mut State) {
         let Some(verdict) = state.level.unpublished() else { return };
@@ -162,7 +162,7 @@ impl Thread {
         }
     }
 
-    /// What can wait.
+    /// Sends at most one record that is not urgent.
     #[inline(never)]
     fn speak(&mut self, state: &mut State) {
         let now = Instant::now();

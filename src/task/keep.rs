@@ -1,7 +1,10 @@
-//! Thread: what outlives the power, on the board: flash, watchdog, interlock and queues beneath `operation::Storing` and `store::Keeper`.
+//! Thread: persistent storage on the board.
 //!
-//! Time stands for everybody who counts it while the flash is written (`board::odrive_v3_6::flash`), and the current loops do not count the
-//! gap while `storing` is raised (`operation::CurrentLoops`). What an emergency stop does to bridges that are off is what it does after.
+//! Connects flash, watchdog, inhibits and queues to `operation::Storing` and `store::Keeper`.
+//!
+//! During a flash write all software stalls, and with it every clock (`board::odrive_v3_6::flash`). The
+//! current loops do not count the gap while `storing` is raised (`operation::CurrentLoops`). An emergency
+//! stop finds the bridges off; it takes effect after the write.
 
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
@@ -20,20 +23,20 @@ use crate::leg::{IdentifiedModel, StoredCalibration};
 use crate::operation::{Calibrated, Keep, Storing};
 use crate::store::{self, Permit, Store};
 
-/// Looks for something to do so often, ms.
+/// Polling interval of the task, ms.
 const ROUND_MS: u64 = 10;
 
-/// A change of the flash takes a step so often, ms.
+/// Interval between the steps of a flash write, ms.
 const STEP_MS: u64 = 1;
 
-/// The store and who asks for it.
+/// The store and the ends of its queues.
 pub struct Keeper {
     keeper: store::Keeper<Flash, JOINTS>,
     storing: Storing,
     ends: Option<(KeeperEnd, Consumer<'static, Calibrated>)>,
 }
 
-/// Runs to its end at once: the flash never lets anybody wait.
+/// Polls a future that must complete at once: the flash driver never waits.
 fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
     match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(value) => Some(value),
@@ -42,29 +45,30 @@ fn at_once<T>(future: impl Future<Output = T>) -> Option<T> {
 }
 
 impl Keeper {
-    /// Of this flash; `None` where it does not fit, which no board of this kind is.
+    /// Creates a keeper on this flash; `None` where its size is invalid, which no board of this kind has.
     #[must_use]
     pub fn new(flash: Flash, bytes: u32) -> Option<Self> {
         let store = Store::new(flash, 0..bytes).ok()?;
         Some(Self { keeper: store::Keeper::new(store), storing: Storing::new(), ends: None })
     }
 
-    /// Who asks for it from now on, and who calibrates.
+    /// Sets the sources of requests and of calibrations.
     pub fn serve(&mut self, end: KeeperEnd, calibrated: Consumer<'static, Calibrated>) {
         self.ends = Some((end, calibrated));
     }
 
-    /// What is kept of a node: so many bytes; `None` where it cannot be read.
+    /// Reads the stored objects of a node; returns their length, or `None` where they cannot be read.
     pub fn objects(&mut self, joint: usize, into: &mut [u8; LONGEST]) -> Option<usize> {
         at_once(self.keeper.objects(joint, into))?
     }
 
-    /// The calibrations that are kept.
+    /// Stored calibrations.
     pub fn calibrations(&mut self) -> [Option<StoredCalibration>; JOINTS] {
         core::array::from_fn(|axis| at_once(self.keeper.calibration(axis))?)
     }
 
-    /// The model that is kept and its generation, if there is one; `None` where it cannot be read or is not this leg's.
+    /// Stored model and its generation, if there is one; `None` where it cannot be read or belongs
+    /// to another leg.
     pub fn model(&mut self, leg: &Leg) -> Option<Option<(IdentifiedModel<JOINTS>, u32)>> {
         match at_once(self.keeper.model())?? {
             Some(kept) => Some(Some((leg.restore(&kept.model).ok()?, kept.provenance.generation))),
@@ -73,7 +77,7 @@ impl Keeper {
     }
 }
 
-/// Whether it was done.
+/// Stores or resets; returns `None` on failure.
 #[inline(never)]
 fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep<JOINTS>) -> Option<()> {
     let permit = Permit::under(SIGNALS.permission())?;
@@ -91,7 +95,7 @@ fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep<JOINTS>) ->
     Some(())
 }
 
-/// Runs for ever.
+/// Task of the storage.
 #[embassy_executor::task]
 pub async fn run(keeper: &'static mut Keeper) -> ! {
     let Keeper { keeper, storing, ends } = keeper;

@@ -1,4 +1,6 @@
-//! The leg this image is built for. The constant is written by the host tool from a leg file; `build.rs` says which.
+//! The leg this image is built for.
+//!
+//! The host tool writes the constant from a leg file, which `build.rs` selects.
 
 use crate::leg::{Identification, LegConfiguration, MotionWindow};
 
@@ -6,16 +8,16 @@ include!(env!("SCARAB_LEG_SOURCE"));
 
 /// Joints of a leg, and axes of the board.
 pub const JOINTS: usize = 2;
-/// Room for base parameters: two parallel axes.
+/// Capacity for base parameters: two parallel axes.
 pub const BASE: usize = 13;
 /// Taps of the filters.
 pub const TAPS: usize = 256;
-/// Open outputs that go with them.
+/// Filter outputs in progress for these taps.
 pub const PENDING: usize = 26;
 
-/// What a leg is built from.
+/// Configuration of the leg.
 pub type Leg = LegConfiguration<JOINTS, BASE>;
-/// The half that finds out.
+/// Identification half of the leg.
 pub type LegIdentification = Identification<JOINTS, BASE, TAPS, PENDING, &'static mut LegWindow>;
-/// Its window.
+/// Window of motion blocks of the identification.
 pub type LegWindow = MotionWindow<f32, JOINTS, BASE>;

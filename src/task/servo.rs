@@ -6,22 +6,22 @@ use crate::hal::Hardware;
 use crate::leg::Control;
 use crate::operation::{ServoEnds, ServoLevel};
 
-/// What level 1 works on.
+/// State of level 1.
 pub struct ServoLoop {
-    /// The half of the leg that moves.
+    /// Control half of the leg.
     pub control: Control<JOINTS>,
-    /// The level around it.
+    /// The servo level.
     pub level: ServoLevel<JOINTS>,
-    /// Its ends of the queues.
+    /// The level's ends of the queues.
     pub ends: ServoEnds<'static, JOINTS>,
-    /// Processor cycles; wraps.
+    /// Clock in processor cycles; wraps.
     pub clock: fn() -> u32,
 }
 
-/// What level 1 works on, once the start has set it.
+/// State of level 1, once the start has set it.
 pub static SERVO: spin::Mutex<Option<&'static mut ServoLoop>> = spin::Mutex::new(None);
 
-/// The servo's vector.
+/// Interrupt of the servo.
 #[inline(always)]
 pub fn interrupt(hardware: &mut impl Hardware<JOINTS>) {
     let statistics = &SIGNALS.statistics;

@@ -1,7 +1,8 @@
-//! The board's registers as the start leaves them, derived from the record of what is written, against the board's facts.
+//! The board's registers after the start, from the record of writes, compared with the board's facts.
 //!
-//! `cargo test --test board_registers -- --nocapture` prints the record. The facts are those of ODrive's firmware v0.5.6
-//! (`Firmware/Board/v3`, `Drivers`, `MotorControl`); the meaning of the bits is RM0090's. What silicon does with them, only silicon shows.
+//! `cargo test --test board_registers -- --nocapture` prints the record. The facts are those of ODrive's
+//! firmware v0.5.6 (`Firmware/Board/v3`, `Drivers`, `MotorControl`); the meaning of the bits is RM0090's. The
+//! silicon's behaviour needs a test on the board.
 
 mod sampling;
 mod timer;
@@ -15,7 +16,7 @@ use scarab::board::odrive_v3_6::settings::{
 };
 use timer::Timer;
 
-/// Registers by address; what was never written is zero, as after a reset (but for the debug pins' modes).
+/// Registers by address. Unwritten ones are zero, as after a reset (except the debug pins' modes).
 #[derive(Default)]
 struct Registers {
     values: BTreeMap<u32, u32>,
@@ -41,7 +42,7 @@ impl Registers {
     }
 }
 
-/// All that the start writes, in its order.
+/// Registers after all writes of the start, in order.
 fn started() -> Registers {
     let mut registers = Registers::default();
     registers.apply(&CLOCKS);
@@ -114,7 +115,7 @@ fn no_conversion_is_triggered_and_no_pin_connected_before_the_timers_hold_both_o
     let order: Vec<_> = registers.record.iter().map(|write| write.register).collect();
     let place = |name: &str| order.iter().rposition(|register| *register == name).expect(name);
     let begins = |name: &str| order.iter().position(|register| *register == name).expect(name);
-    // TIM8 waits for TIM1 before TIM1 starts, and is let go before either triggers.
+    // TIM8 waits for TIM1 before TIM1 starts, and is detached before either triggers.
     let lock = timers::LOCK_AND_START;
     assert_eq!((lock[1].register, lock[1].value), ("TIM8_SMCR", 0b110));
     assert_eq!((lock[2].register, lock[2].value & 1), ("TIM1_CR1", 1));
@@ -128,7 +129,8 @@ fn the_converters_sample_the_shunts_of_the_board() {
     let registers = started();
     assert_eq!(f64::from(SLOW_TIMER_HZ) / f64::from(converters::CLOCK_HZ), 4.0);
     assert_eq!(registers.bits(0x4001_2304, 16, 2), 0b01, "84 MHz / 4");
-    // M0: B on IN10 by ADC2, C on IN11 by ADC3, injected by TIM1's trigger. M1: B on IN13, C on IN12, regular by TIM8's.
+    // M0: B on IN10 by ADC2, C on IN11 by ADC3, injected by TIM1's trigger. M1: B on IN13, C on IN12, regular
+    // by TIM8's.
     for (adc, injected, regular) in [(ADC[1], 10, 13), (ADC[2], 11, 12)] {
         assert_eq!((registers.bits(adc + 0x38, 20, 2), registers.bits(adc + 0x38, 15, 5)), (0, injected));
         assert_eq!((registers.bits(adc + 0x2C, 20, 4), registers.bits(adc + 0x34, 0, 5)), (0, regular));
@@ -136,7 +138,7 @@ fn the_converters_sample_the_shunts_of_the_board() {
         assert_eq!((registers.bits(adc + 0x08, 24, 4), registers.bits(adc + 0x08, 28, 2)), (0b1110, 0b01));
         assert_eq!((registers.at(adc + 0x0C), registers.at(adc + 0x10)), (0, 0), "3 cycles");
     }
-    // Bus voltage IN6, thermistors IN15, IN4, IN5: four injected ones in a row.
+    // Bus voltage IN6, thermistors IN15, IN4, IN5: four injected conversions in a row.
     let sequence = registers.at(ADC[0] + 0x38);
     assert_eq!(registers.bits(ADC[0] + 0x38, 20, 2), 3);
     assert_eq!([0, 5, 10, 15].map(|place| sequence >> place & 0x1F), [6, 15, 4, 5]);
@@ -154,11 +156,11 @@ fn the_converters_sample_the_shunts_of_the_board() {
 fn currents_volts_and_degrees_are_the_board_s() {
     let sense = analog::sense(19.0);
     assert_eq!(sense, scarab::motor::SenseScale::ODRIVE_3_6);
-    // 500 uOhm, 40 V/V, 3.3 V of 4096 codes: 0.0403 A a code, 60.75 A at 0.9 of 1.35 V.
+    // 500 uOhm, 40 V/V, 3.3 V of 4096 codes: 0.0403 A per code, 60.75 A at 0.9 of 1.35 V.
     for scale in sense.ampere_per_code {
         assert!((scale.0 - 3.3 / 4096.0 / gate_driver::GAIN / 500e-6).abs() < 1e-6, "{scale:?}");
     }
-    // 0.3 V and 3.0 V.
+    // Rails of 0.3 V and 3.0 V.
     assert_eq!(sense.rails, [372, 3723]);
     assert!((analog::sense(11.0).volt_per_code.0 - 3.3 * 11.0 / 4096.0).abs() < 1e-7);
     for (version, ratio) in [
@@ -173,7 +175,7 @@ fn currents_volts_and_degrees_are_the_board_s() {
     }
     assert_eq!(analog::divider(analog::stated(Some("24"))), Some(11.0));
     assert_eq!([None, Some("48")].map(|volts| analog::divider(analog::stated(volts))), [None; 2]);
-    // It grows with the code, without a turn.
+    // The temperature grows monotonically with the code.
     let degrees: Vec<f32> = (0..4096_u16).filter_map(analog::temperature_c).collect();
     assert!(degrees.windows(2).all(|pair| pair[0] < pair[1]), "not monotonous");
     assert!(degrees[0] < 0.0 && *degrees.last().expect("some") > 120.0);
@@ -190,7 +192,7 @@ fn encoders_count_every_edge_behind_a_filter_and_their_index_pulses_interrupt() 
         assert_eq!(registers.at(base + 0x20), 0, "not inverted");
         assert_eq!(registers.bits(base, 0, 1), 1);
     }
-    // PC9 and PC15.
+    // Index lines PC9 and PC15.
     assert_eq!(registers.bits(0x4001_3810, 4, 4), 2);
     assert_eq!(registers.bits(0x4001_3814, 12, 4), 2);
     assert_eq!(registers.at(0x4001_3C08), 1 << 9 | 1 << 15, "as they rise");
@@ -199,7 +201,7 @@ fn encoders_count_every_edge_behind_a_filter_and_their_index_pulses_interrupt() 
 #[test]
 fn the_emergency_stop_interrupts_as_its_contact_opens() {
     let registers = started();
-    // PC4, closed to 3.3 V.
+    // Contact on PC4, closed to 3.3 V.
     assert_eq!(registers.bits(0x4001_380C, 0, 4), 2);
     assert_eq!(registers.at(0x4001_3C0C), 1 << 4, "as it falls");
     assert_eq!(registers.at(0x4001_3C00), 1 << 4 | 1 << 9 | 1 << 15, "no other line");
@@ -211,7 +213,7 @@ fn the_chopper_stays_off() {
     let top = registers.at(TIM2 + 0x2C);
     let frequency = f64::from(SLOW_TIMER_HZ) / (2.0 * f64::from(top));
     assert!((frequency - 10_254.0).abs() < 1.0, "{frequency}");
-    // Low side on below 0, high side on from above the top: neither ever.
+    // Low side on below 0, high side on from above the top: never.
     assert_eq!((registers.at(TIM2 + 0x3C), registers.at(TIM2 + 0x40)), (0, top + 1));
     assert_eq!(registers.at(TIM2 + 0x1C), 0x7878, "PWM mode 2 on channels 3 and 4, buffered");
     assert_eq!(registers.bits(TIM2 + 0x20, 8, 8), 0b0001_0011, "channel 3 active low, 4 high");
@@ -223,7 +225,8 @@ fn the_chopper_stays_off() {
     }
 }
 
-/// Neither side of the chopper is driven at any place of the counter: channel 3 is active low, channel 4 active high.
+/// Whether neither side of the chopper is driven at any counter value: channel 3 is active low, channel 4
+/// active high.
 fn is_off(chopper: &Timer) -> bool {
     // Rising from zero on, falling from the top on.
     let rising = (0..chopper.top()).map(|counter| (counter, false));
@@ -234,7 +237,7 @@ fn is_off(chopper: &Timer) -> bool {
     })
 }
 
-/// Replays writes on the chopper's timer; the first after which a side is let through while it is driven.
+/// Replays writes on the chopper's timer; returns the first after which an enabled side is driven.
 fn driven_after(writes: &[Write]) -> Option<&'static str> {
     let mut chopper = Timer::new(TIM2);
     for write in writes {
@@ -244,7 +247,7 @@ fn driven_after(writes: &[Write]) -> Option<&'static str> {
             return Some(write.register);
         }
     }
-    // Nor is it after the counter's ends, where buffered values are taken over.
+    // Also none after the counter's ends, where buffered values are taken over.
     (0..4 * chopper::TOP).for_each(|_| chopper.clock());
     (!is_off(&chopper)).then_some("end of the counter")
 }
@@ -253,13 +256,13 @@ fn driven_after(writes: &[Write]) -> Option<&'static str> {
 fn the_chopper_s_sides_are_off_after_each_write_of_the_start() {
     let record = started().record;
     assert_eq!(driven_after(&record), None);
-    // Without the update the outputs are let through with the compare values of a reset.
+    // Without the update the outputs are enabled with the compare values of a reset.
     let without: Vec<Write> = record.iter().copied().filter(|write| write.register != "TIM2_EGR").collect();
     assert_eq!(driven_after(&without), Some("TIM2_CCER"));
 }
 
-/// Pins and functions of `Board/v3/Inc/main.h` for version 3.5 and later: analog `a`, input `i`, output `o`, or the
-/// alternate function's number.
+/// Pins and functions of `Board/v3/Inc/main.h` for version 3.5 and later: analog `a`, input `i`, output `o`,
+/// or the alternate function's number.
 const BOARD_PINS: &str = "A8:1 A9:1 A10:1 B13:1 B14:1 B15:1 C6:3 C7:3 C8:3 A7:3 B0:3 B1:3 C0:a C1:a C2:a C3:a A6:a C5:a A4:a A5:a \
      B4:2 B5:2 B6:2 B7:2 C9:i C15:i D2:i C4:i A2:i A3:i B10:1 B11:1 B12:o C13:o C14:o";
 
@@ -286,9 +289,9 @@ fn every_pin_is_what_the_board_wires_it_to() {
     // Contacts and outputs that must be low without their driver are pulled down, the fault line up.
     let pull = |port: u32, number: u32| registers.bits(0x4002_000C + 0x400 * port, 2 * number, 2);
     assert_eq!([pull(2, 4), pull(0, 2), pull(0, 3), pull(3, 2), pull(0, 8), pull(1, 1)], [2, 2, 2, 1, 2, 2]);
-    // Debug port untouched: PA13, PA14.
+    // The debug port PA13, PA14 is untouched.
     assert!(PINS.iter().all(|pin| pin.port != b'A' || !(13..=14).contains(&pin.number)));
-    // The first levels written: enable low, selects high.
+    // First levels written: enable low, selects high.
     let levels: Vec<u32> = GATES_OFF.iter().map(|pin| pin.writes()[0].value).collect();
     assert_eq!(levels, [1 << (12 + 16), 1 << 13, 1 << 14]);
 }
@@ -298,7 +301,7 @@ fn a_duty_is_the_share_of_the_period_above_its_compare_value() {
     for (duty, compare) in [(0.0, 3500), (0.5, 1750), (1.0, 0), (0.9367, 222), (2.0, 0), (-1.0, 3500)] {
         assert_eq!(timers::compare(duty), compare, "{duty}");
     }
-    // What is no number leaves the low side on.
+    // NaN leaves the low side on.
     assert_eq!(timers::compare(f32::NAN), 3500);
     assert_eq!(timers::compare(f32::INFINITY), 0);
 }
@@ -325,7 +328,7 @@ fn clocks_and_caches_are_on_and_a_failed_crystal_is_noticed() {
     assert_eq!(registers.at(0x4002_3830), 0b1111);
     assert_eq!(registers.at(0x4002_3840), 0b111);
     assert_eq!(registers.at(0x4002_3844), 1 | 1 << 1 | 0b111 << 8 | 1 << 14);
-    // Watchdog and both bridges' timers stand while a debugger holds the processor.
+    // Watchdog and both bridges' timers stop while a debugger halts the processor.
     assert_eq!((registers.at(0xE004_2008), registers.at(0xE004_200C)), (1 << 12, 0b11));
 }
 
@@ -339,7 +342,7 @@ fn the_bus_runs_at_the_rate_that_is_kept_and_hears_every_frame_of_eleven_bits() 
         can::PINS.iter().for_each(|pin| registers.apply(&pin.writes()));
         registers.apply(&can::EDGES);
         registers.apply(&can::BEGIN);
-        // Timing is taken while the controller asks to be set up, and then it no longer does.
+        // Timing is written in initialisation mode, which is left afterwards.
         assert_eq!(registers.bits(CAN1, 0, 2), 0b01);
         registers.apply(&can::set_up(kbit));
         registers.apply(&can::TAKE_PART);
@@ -349,16 +352,16 @@ fn the_bus_runs_at_the_rate_that_is_kept_and_hears_every_frame_of_eleven_bits() 
         let [before, after] = [(16, 4), (20, 3)].map(|(low, count)| registers.bits(timing, low, count) + 1);
         let quanta = f64::from(1 + before + after);
         assert_eq!(42e6 / f64::from(registers.bits(timing, 0, 10) + 1) / quanta, bits_per_s);
-        // ODrive's 16 and 4, jump width 4.
+        // Values of ODrive: 16 and 4, jump width 4.
         assert_eq!((before, after, registers.bits(timing, 24, 2) + 1), (16, 4, 4));
         assert_eq!(registers.bits(timing, 30, 2), 0, "neither loop back nor silent");
-        // Mailboxes in their order, back on the bus by itself, repeats.
+        // Mailboxes in order, automatic recovery from bus-off, retransmission.
         assert_eq!(registers.bits(CAN1, 2, 5), 0b10011);
-        // Filter 0: one mask of 32 bits into the first queue, identifiers not looked at, IDE and RTR must be 0.
+        // Filter 0: one mask of 32 bits into the first queue; identifiers ignored, IDE and RTR must be 0.
         assert_eq!((registers.bits(CAN1 + 0x21C, 0, 28), registers.bits(CAN1 + 0x200, 0, 1)), (1, 0));
         assert_eq!((registers.bits(CAN1 + 0x204, 0, 1), registers.bits(CAN1 + 0x20C, 0, 1)), (0, 1));
         assert_eq!((registers.at(CAN1 + 0x240), registers.at(CAN1 + 0x244)), (0, 0b110));
-        // PB8 and PB9 are function 9, pulled up, driven with medium edges.
+        // PB8 and PB9: function 9, pulled up, driven with medium edges.
         assert_eq!((registers.bits(0x4002_0424, 0, 8), registers.bits(0x4002_0400, 16, 4)), (0x99, 0b1010));
         assert_eq!((registers.bits(0x4002_040C, 16, 4), registers.bits(0x4002_0408, 18, 2)), (0b0101, 0b01));
     }

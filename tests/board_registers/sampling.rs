@@ -1,4 +1,4 @@
-//! Instants of both bridges and of both converters' samples, from the writes of the start replayed on timers.
+//! Instants of both bridges and both converters' samples, by replaying the start on simulated timers.
 
 use core::f64::consts::TAU;
 
@@ -22,20 +22,20 @@ const PERIOD: i64 = 7000;
 const BUS: f64 = 48.0;
 /// Time before the hold in which an edge still shows, clocks: 1.2 us, in which an amplifier settles to 1 %.
 const WINDOW: i64 = 202;
-/// Clocks from an edge of a timer to the switch that turns on: the dead time.
+/// Delay from a timer's edge to the turning-on switch, clocks: the dead time.
 const DEAD: i64 = 20;
 
 /// Instants of each bridge in two PWM periods, in clocks.
 struct Instants {
-    /// The counter is at zero: the middle of the lower zero vector.
+    /// Counter at zero: the middle of the lower zero vector.
     middles: [Vec<i64>; 2],
-    /// The converters are triggered.
+    /// Triggers of the converters.
     triggers: [Vec<i64>; 2],
-    /// The high side of output A is asked for, or no longer.
+    /// Edges of the reference of output A's high side.
     switchings: [Vec<i64>; 2],
 }
 
-/// Replays the start, and then some other writes.
+/// Replays the start, then some other writes.
 fn instants(others: &[Write]) -> Instants {
     let mut bridges = Bridges::new([TIM1, TIM8]);
     prepare(|writes| bridges.apply(writes));
@@ -50,7 +50,8 @@ fn instants(others: &[Write]) -> Instants {
     }
     bridges.apply(others);
     (0..2 * PERIOD).for_each(|_| bridges.clock());
-    // Edge of the trigger: bits 20 and 21 of CR2 for the injected ones by TIM1, 28 and 29 for the regular ones by TIM8.
+    // Edge of the trigger: bits 20 and 21 of CR2 for TIM1's injected conversions, 28 and 29 for TIM8's
+    // regular ones.
     let registers = started();
     let edges = [registers.bits(ADC[2] + 0x08, 20, 2), registers.bits(ADC[2] + 0x08, 28, 2)];
     let mut found = Instants {
@@ -85,12 +86,12 @@ fn levels(bridges: &Bridges) -> [[bool; 2]; 2] {
     [0, 1].map(|axis| [bridges.timers[axis].reference(3), bridges.timers[axis].reference(0)])
 }
 
-/// Clocks from `middle` to `instant`, modulo the period, from half a period before to half a period after.
+/// Clocks from `middle` to `instant`, modulo the period, from minus to plus half a period.
 fn after(instant: i64, middle: i64) -> i64 {
     (instant - middle + PERIOD / 2).rem_euclid(PERIOD) - PERIOD / 2
 }
 
-/// Clocks from the middle of an axis' lower zero vector to the trigger, negative before it; one trigger a period.
+/// Clocks from the middle of an axis' lower zero vector to the trigger, signed; one trigger a period.
 fn trigger_of(instants: &Instants, axis: usize) -> i64 {
     let [first, second] = instants.triggers[axis][..] else {
         panic!("axis {axis}: {} triggers in two periods", instants.triggers[axis].len());
@@ -117,7 +118,7 @@ fn converters_are_triggered_119_ns_after_the_middle_of_the_lower_zero_vector() {
         let trigger = trigger_of(&instants, axis);
         assert_eq!(trigger, i64::from(SHUNT_TRIGGER_CLOCKS), "axis {axis}");
         assert!((trigger as f64 / clock - 119e-9).abs() < 1e-10, "axis {axis}: {trigger} clocks");
-        // Plant and modulator reckon with the same instant.
+        // Plant and modulator use the same instant.
         let hold = (trigger + sampling()) as f64 / clock;
         assert!((hold - ShuntDescription::default().delay).abs() < 1e-12, "axis {axis}: hold after {hold} s");
         let converted = trigger as f64 / clock + 15.0 / f64::from(converters::CLOCK_HZ);
@@ -127,7 +128,7 @@ fn converters_are_triggered_119_ns_after_the_middle_of_the_lower_zero_vector() {
 
 #[test]
 fn a_trigger_before_the_middle_is_seen_as_negative() {
-    // The board of old: mode 1, compare value 40, which the falling counter reaches first.
+    // Previous setting of the board: mode 1, compare value 40, which the falling counter reaches first.
     let old = [TIM1, TIM8]
         .map(|base| [Write::whole("CCMR2", base + 0x1C, 0x6878), Write::whole("CCR4", base + 0x40, 40)])
         .concat();
@@ -147,7 +148,8 @@ fn the_bridges_run_half_a_period_apart() {
     assert_eq!(PERIOD * i64::from(SHIFT_QUARTERS) / 4, PERIOD / 2, "the simulated drives");
     for axis in 0..2 {
         assert_eq!(instants.middles[axis].len(), 2, "one lower zero vector a period");
-        // Duties of one half: up at a quarter, down at three quarters, the period's beginning being the middle.
+        // Duties of one half: up at a quarter, down at three quarters of the period, which begins
+        // at the middle.
         let middle = instants.middles[axis][0];
         let mut switchings: Vec<i64> =
             instants.switchings[axis].iter().map(|instant| after(*instant, middle)).collect();
@@ -161,7 +163,7 @@ fn the_bridges_run_half_a_period_apart() {
     assert!(!timers::half_a_period_apart([2000, 250, 1960]));
 }
 
-/// How edges of the other bridge are counted.
+/// Conditions for counting edges of the other bridge.
 #[derive(Clone, Copy)]
 struct Count {
     /// Clocks between the middles of both bridges.
@@ -169,12 +171,12 @@ struct Count {
     /// Clocks from the middle to the hold.
     hold: i64,
     dead_time: DeadTime,
-    /// Clocks from a timer's edge to those of the output that are counted.
+    /// Delays from a timer's edge to the counted output edges, clocks.
     switching: &'static [i64],
 }
 
 impl Count {
-    /// The board: dead time given back, both instants at which a half bridge may switch.
+    /// The board: dead time compensated, both instants at which a half bridge may switch.
     fn of_the_board() -> Self {
         let instants = instants(&[]);
         Self {
@@ -193,7 +195,7 @@ impl Count {
         f64::from(self.modulator().voltage_limit(Volt(BUS as f32)).0)
     }
 
-    /// Compare values for a voltage and a current of 60 A, by their directions; a direction of `None` is no current.
+    /// Compare values for a voltage and a current of 60 A, by their directions; `None` is no current.
     fn compare(&self, modulator: &Modulator, volt: f64, angle: f64, current: Option<f64>) -> [i64; 3] {
         let at = |length: f64, angle: f64| {
             let (sine, cosine) = sin_cos(angle);
@@ -206,8 +208,8 @@ impl Count {
         duties.map(|duty| i64::from(timers::compare(duty)))
     }
 
-    /// An edge of a bridge with these compare values lies in the window before the hold of the other, whose middles come
-    /// so many clocks before its own.
+    /// Whether an edge of a bridge with these compare values lies in the other bridge's window before its
+    /// hold. The other's middles come `shift` clocks before its own.
     fn disturbs(&self, compare: [i64; 3], shift: i64) -> bool {
         let edges = compare.into_iter().filter(|value| (1..3500).contains(value));
         edges.flat_map(|value| [value, PERIOD - value]).any(|edge| {
@@ -216,8 +218,8 @@ impl Count {
         })
     }
 
-    /// Share of periods in which the other bridge disturbs, the greatest of both axes, no current and currents of all
-    /// directions.
+    /// Share of periods in which the other bridge disturbs: greatest of both axes, without current and with
+    /// currents of all directions.
     fn share(&self, volt: f64) -> f64 {
         const ANGLES: u32 = 720;
         let modulator = self.modulator();
@@ -235,7 +237,8 @@ impl Count {
         shares.fold(0.0, f64::max)
     }
 
-    /// Highest voltage (in tenths of a volt) up to which no period is disturbed, and the greatest share above it.
+    /// Highest voltage (in steps of 0.1 V) up to which no period is disturbed, and the greatest
+    /// share above it.
     fn quiet_up_to(&self) -> (f64, f64) {
         let steps = (10.0 * self.limit()) as u32;
         let shares: Vec<f64> = (0..=steps).map(|step| self.share(0.1 * f64::from(step))).collect();
@@ -257,7 +260,7 @@ fn edges_of_the_other_bridge_stay_away_from_the_sample_up_to_24_volts() {
         board.limit(),
         1e2 * most
     );
-    // Edges of the timers alone, with the duties of a bridge that needs no dead time given back.
+    // Edges of the timers alone, with the duties of a bridge without dead-time compensation.
     let plain = Count { dead_time: DeadTime::Uncompensated, switching: &[0], ..board };
     let (timers_alone, most_alone) = plain.quiet_up_to();
     println!("timers' edges alone: {timers_alone:.1} V of {:.2} V, {:.1} %", plain.limit(), 1e2 * most_alone);
@@ -273,14 +276,15 @@ fn a_quarter_of_a_period_puts_the_other_bridge_s_edges_on_the_sample() {
     println!("a quarter of a period: {shares:?}");
     assert!(shares[..3].iter().all(|(_, share)| *share == 1.0), "{shares:?}");
     assert!(shares.iter().all(|(_, share)| *share > 0.15), "{shares:?}");
-    // With the old trigger, of the timers' edges alone: all periods up to 3 V, a third at 5 V.
+    // With the previous trigger, the timers' edges alone disturb all periods up to 3 V, a third at 5 V.
     let old = Count { hold: sampling() - 40, dead_time: DeadTime::Uncompensated, switching: &[0], ..quarter };
     assert_eq!([1.0, 2.0, 3.0].map(|volt| old.share(volt)), [1.0; 3]);
     assert!((0.34..0.39).contains(&old.share(5.0)), "{}", old.share(5.0));
 }
 
-/// Effective ripple of the capacitor's current for a phase current of 1 A (peak) along the voltage in both bridges, over
-/// all pairs of electrical angles, and the largest charge that comes and goes within a period, C.
+/// Effective ripple of the capacitor's current, over all pairs of electrical angles. The phase current
+/// is 1 A (peak) along the voltage in both bridges. Also the largest charge that flows in and out within
+/// a period, C.
 fn ripple(volt: f64, shift: i64) -> (f64, f64) {
     const POINTS: i64 = 500;
     const ANGLES: u32 = 18;
@@ -335,7 +339,8 @@ fn half_a_period_costs_the_capacitor_twice_the_ripple_of_a_quarter() {
             "{volt:>4}   {:.3}, {none_mv:.2}   {:.3}, {quarter_mv:.2}   {:.3}, {half_mv:.2}",
             none.0, quarter.0, half.0
         );
-        // Each bridge draws two pulses a period, half a period apart: a shift by that changes nothing.
+        // Each bridge draws two pulses a period, half a period apart, so a shift of half a period
+        // has no effect.
         assert!((half.0 / none.0 - 1.0).abs() < 0.02, "{none:?} {half:?}");
     }
     println!("most   {most:.3?}");

@@ -1,14 +1,16 @@
-//! A timer of the STM32F405 by its registers: buffered values, centre-aligned counting, compare outputs.
+//! Model of an STM32F405 timer by its registers: buffered values, centre-aligned counting, compare outputs.
 //!
-//! Source: RM0090 chapters 17 and 18 (TIM1 and TIM8, TIM2). A recorded write goes in as the start makes it, a clock at a time follows.
+//! Source: RM0090 chapters 17 and 18 (TIM1 and TIM8, TIM2). The test applies recorded writes in order and
+//! then clocks the model.
 //!
 //! ```text
-//! counter   0, 1 .. top - 1, top, top - 1 .. 1, 0          it falls from the top on and rises from zero on
+//! counter   0, 1 .. top - 1, top, top - 1 .. 1, 0          falls from the top on and rises from zero on
 //! update    every (repetition + 1)th end, or EGR.UG: compare values, top and repetition are taken over
-//! mode 1    rising: active below the compare value; falling: inactive above it          mode 2 is the inverse
+//! mode 1    rising: active below the compare value; falling: inactive above it     mode 2 is the inverse
 //! ```
 //!
-//! Known limits: no prescaler, no edge-aligned counting, no break, of the slave modes only the start by a trigger.
+//! Known limits: no prescaler, no edge-aligned counting, no break; the only slave mode is the start
+//! by a trigger.
 
 use std::collections::BTreeMap;
 
@@ -25,14 +27,14 @@ const ARR: u32 = 0x2C;
 const RCR: u32 = 0x30;
 const CCR1: u32 = 0x34;
 
-/// Registers of one timer, and what its hardware works with.
+/// Registers of one timer, and its internal state.
 #[derive(Clone, Default)]
 pub struct Timer {
     base: u32,
     registers: BTreeMap<u32, u32>,
     pub counter: u32,
     pub falling: bool,
-    /// Values in force: those of the registers since the last update where the registers are buffered.
+    /// Active values: those of the registers at the last update where the registers are buffered.
     top: u32,
     compare: [u32; 4],
     /// Ends of the counter until the next update.
@@ -40,19 +42,19 @@ pub struct Timer {
 }
 
 impl Timer {
-    /// A timer as a reset leaves it.
+    /// A timer after a reset.
     pub fn new(base: u32) -> Self {
         Self { base, ..Self::default() }
     }
 
-    /// Takes a write; one to another peripheral changes nothing. Returns whether it was for this timer.
+    /// Applies a write; one to another peripheral has no effect. Returns whether it was for this timer.
     pub fn apply(&mut self, write: &Write) -> bool {
         let Some(offset) = write.address.checked_sub(self.base).filter(|offset| *offset < 0x400) else {
             return false;
         };
         let value = write.applied_to(self.at(offset));
         match offset {
-            // The direction is the software's only while the counter is edge-aligned.
+            // Software sets the direction only while the counter is edge-aligned.
             CR1 if !self.is_centred() => self.falling = value >> 4 & 1 == 1,
             CNT => {
                 self.counter = value;
@@ -80,7 +82,7 @@ impl Timer {
         true
     }
 
-    /// One clock passes.
+    /// Advances by one clock.
     pub fn clock(&mut self) {
         if !self.is_running() {
             return;
@@ -108,7 +110,7 @@ impl Timer {
         self.registers.get(&offset).copied().unwrap_or(0)
     }
 
-    /// Mode and buffering of a channel from 0, the eight bits of CCMR1 or CCMR2.
+    /// Mode and buffering of a channel (from 0): its eight bits of CCMR1 or CCMR2.
     fn mode(&self, channel: u32) -> u32 {
         self.at(CCMR1 + 4 * (channel / 2)) >> (8 * (channel % 2)) & 0xFF
     }
@@ -117,22 +119,22 @@ impl Timer {
         self.at(CR1) >> 5 & 0b11 != 0
     }
 
-    /// The counter is enabled.
+    /// Whether the counter is enabled.
     pub fn is_running(&self) -> bool {
         self.at(CR1) & 1 == 1
     }
 
-    /// An output of a channel is let through to its pin.
+    /// Whether an output of a channel is enabled.
     pub fn is_let_through(&self, channel: u32) -> bool {
         self.at(CCER) >> (4 * channel) & 0b101 != 0
     }
 
-    /// The channel's reference output now.
+    /// Present reference output of a channel.
     pub fn reference(&self, channel: u32) -> bool {
         self.reference_at(channel, self.counter, self.falling)
     }
 
-    /// The channel's reference output at a place of the counter, with the compare value in force.
+    /// Reference output of a channel at a counter value, with the active compare value.
     pub fn reference_at(&self, channel: u32, counter: u32, falling: bool) -> bool {
         let compare = self.compare[channel as usize];
         let below = if falling { counter <= compare } else { counter < compare };
@@ -143,7 +145,7 @@ impl Timer {
         }
     }
 
-    /// Value of the counter at which it turns, as it is in force.
+    /// Active top of the counter.
     pub fn top(&self) -> u32 {
         self.top
     }
@@ -168,7 +170,8 @@ impl Bridges {
                 timer.apply(write);
             }
             let [master, slave] = &mut self.timers;
-            // Master mode 001 sends the enable; slave mode 110 starts at the trigger, number 0 of which is TIM1's.
+            // Master mode 001 sends the enable; slave mode 110 starts at the trigger, number 0 of
+            // which is TIM1's.
             let enable_is_sent = master.at(CR2) >> 4 & 0b111 == 0b001;
             let slave_waits = slave.at(SMCR) & 0b111_0111 == 0b110;
             if !ran && master.is_running() && enable_is_sent && slave_waits {

@@ -1,8 +1,8 @@
-//! Keeps the house in order: which room may use which, and a few rules no compiler checks.
+//! Checks of the architecture: allowed dependencies between modules, and a few rules that no compiler checks.
 //!
-//! A room is a module at the top of `src/`. The table below is the design's; a change to it is a change of the
-//! architecture and belongs in a commit of its own. Comments do not count as a use, unit tests do: a test that
-//! needs more rooms than its own may use lives in `tests/`.
+//! A module here is one at the top of `src/`. The table below is the design's; a change to it is a change of
+//! the architecture and belongs in a commit of its own. Comments do not count as a use, unit tests do. A test
+//! that needs more modules than its own may use lives in `tests/`.
 
 mod tokens;
 
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use scarab::safety::{FaultCode, NoticeCode};
 use tokens::{Token, tokens};
 
-/// Each room and the rooms it may use beside itself and the open ones.
+/// Each module and its allowed dependencies, besides itself and the open ones.
 const HOUSE: [(&str, &[&str]); 19] = [
     ("units", &[]),
     ("real", &[]),
@@ -35,17 +35,17 @@ const HOUSE: [(&str, &[&str]); 19] = [
     ("task", &["hal", "motor", "leg", "operation", "safety", "servo", "trace", "store", "bus", "board"]),
 ];
 
-/// Rooms every other room may use.
+/// Modules that every other module may use.
 const OPEN: [&str; 4] = ["units", "real", "place", "checksum"];
 
-/// What the simulated hardware may see of the firmware. The tool and the programs may see everything.
+/// Firmware modules that the simulated hardware may use. The tool and the programs may use all.
 const PLANT: [&str; 2] = ["hal", "units"];
 
-/// The files that may name the maths library, relative to the workspace.
+/// Files that may name the maths library, relative to the workspace.
 const MATHS_DOORS: [&str; 2] = ["src/real.rs", "hal-sim/src/maths.rs"];
 
-/// The files (and the folder) that may contain `unsafe`: the hardware square root, the counter of the image that counts
-/// instructions, and the boards' layers.
+/// Files (and folders) that may contain `unsafe`: the hardware square root, in-place construction, the
+/// boards' layers, and the two images for the emulator.
 const UNSAFE_ALLOWED: [&str; 5] = [
     "src/real.rs",
     "src/place.rs",
@@ -54,14 +54,14 @@ const UNSAFE_ALLOWED: [&str; 5] = [
     "hal-sim/src/bin/emulated/",
 ];
 
-/// Absolute folders that no other machine has; split, so that this file does not name one itself.
+/// Absolute folders that exist on one machine only; split, so that this file does not name one itself.
 const FOLDERS_OF_ONE_MACHINE: [&str; 4] =
     [concat!("/", "tmp/"), concat!("/", "work/"), concat!("/", "root/"), concat!("/", "home/")];
 
-/// The list of all fault and emergency codes.
+/// File with the list of all fault and emergency codes.
 const CODE_LIST: &str = "src/safety/fault.rs";
 
-/// Longer files are split by meaning.
+/// Longest permitted file, lines; longer files are split by meaning.
 const LARGEST_LINE_COUNT: usize = 900;
 
 #[test]
@@ -181,7 +181,7 @@ fn no_file_but_the_list_writes_a_fault_or_emergency_code() {
     assert_none(&offences);
 }
 
-/// Hexadecimal numbers of a source and the lines they stand on.
+/// Hexadecimal numbers of a source, with their lines.
 fn hexadecimals(source: &str) -> Vec<(u32, usize)> {
     let digits = |pair: &[Token<'_>]| {
         let text = pair[1].text.strip_prefix('x').filter(|_| pair[0].text == "0")?;
@@ -253,7 +253,7 @@ struct File {
     text: String,
 }
 
-/// The Rust files below a folder of the workspace; at least one, or the test would check nothing.
+/// Rust files below a folder of the workspace; at least one, or the test would check nothing.
 fn source_files(folder: &str) -> Vec<File> {
     let mut files = Vec::new();
     collect(&workspace().join(folder), &["rs"], &mut files);
@@ -261,7 +261,7 @@ fn source_files(folder: &str) -> Vec<File> {
     files
 }
 
-/// What people read or run: sources, documents, settings and scripts.
+/// Files that people read or run: sources, documents, settings and scripts.
 fn text_files() -> Vec<File> {
     let mut files = Vec::new();
     for folder in ["src", "hal-sim", "tests", "docs", "scripts", ".cargo"] {
@@ -299,18 +299,18 @@ fn read(path: &Path, files: &mut Vec<File>) {
     }
 }
 
-/// `src/model/chain.rs` and `src/model/mod.rs` belong to `model`, `src/hal.rs` to `hal`.
+/// Module of a file: `src/model/chain.rs` and `src/model/mod.rs` belong to `model`, `src/hal.rs` to `hal`.
 fn room_of(path: &str) -> &str {
     let inside = path.strip_prefix("src/").unwrap_or(path);
     inside.split(['/', '.']).next().unwrap_or(inside)
 }
 
-/// How many modules a file lies below the crate's root: 1 for a room, 2 for a file in it.
+/// Depth of a file's module below the crate's root: 1 for a top module, 2 for a file in it.
 fn module_depth(path: &str) -> usize {
     path.split('/').count() - if path.ends_with("/mod.rs") { 2 } else { 1 }
 }
 
-/// Every room that a file at `depth` names from the crate's root, by `crate::` or by enough `super::`.
+/// Every module that a file at `depth` names from the crate's root, by `crate::` or by enough `super::`.
 fn rooms_used(source: &str, depth: usize) -> Vec<Token<'_>> {
     let all = tokens(source);
     let mut used = named_below(&all, "crate");
@@ -323,13 +323,14 @@ fn rooms_used(source: &str, depth: usize) -> Vec<Token<'_>> {
             used.extend(names_at(&all[after..]).into_iter().filter(|name| name.text != "*"));
         }
     }
-    // The crate's own items (macros, constants) are no rooms. In an inline module `super` may mean the room itself,
-    // so there only a room's name counts, while `crate::*` would open every door.
+    // The crate's own items (macros, constants) are not modules. In an inline module `super` may
+    // mean the module itself, so there only a module's name counts. `crate::*` would allow
+    // everything and always counts.
     used.retain(|name| name.text == "*" || HOUSE.iter().any(|(room, _)| *room == name.text));
     used
 }
 
-/// The names that follow `root::` anywhere: one, or each at the top level of a group in braces.
+/// Names that follow `root::` anywhere: one, or each at the top level of a group in braces.
 fn named_below<'a>(all: &[Token<'a>], root: &str) -> Vec<Token<'a>> {
     (0..all.len().saturating_sub(2))
         .filter(|&at| all[at].text == root && all[at + 1].text == "::")
@@ -337,7 +338,7 @@ fn named_below<'a>(all: &[Token<'a>], root: &str) -> Vec<Token<'a>> {
         .collect()
 }
 
-/// The name that `rest` begins with, or the first name of each member of the group it begins with.
+/// Name at the beginning of `rest`, or the first name of each member of a group there.
 fn names_at<'a>(rest: &[Token<'a>]) -> Vec<Token<'a>> {
     if rest.first().is_none_or(|first| first.text != "{") {
         return rest.first().copied().into_iter().collect();
@@ -358,7 +359,7 @@ fn names_at<'a>(rest: &[Token<'a>]) -> Vec<Token<'a>> {
     names
 }
 
-/// The first folder in a line that exists on one machine only, unless it is part of an address.
+/// First folder in a line that exists on one machine only, unless it is part of an address.
 fn machine_path(line: &str) -> Option<&'static str> {
     FOLDERS_OF_ONE_MACHINE.into_iter().find(|folder| {
         line.match_indices(folder)

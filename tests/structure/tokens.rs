@@ -1,9 +1,9 @@
-//! Just enough of Rust's grammar to see which modules a source file names.
+//! Minimal lexer that finds the modules which a Rust source names.
 //!
-//! Comments, doc comments, strings and characters are dropped, so that mentioning a room in prose is not a use.
-//! Identifiers and `::` stay whole; every other character is a token of its own.
+//! Comments, doc comments, strings and characters are dropped, so that mentioning a module in prose is not a
+//! use. Identifiers and `::` stay whole; every other character is a token of its own.
 
-/// A word or a sign of the source, and the line it stands on (from 1).
+/// A word or a sign of the source, and its line (from 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Token<'a> {
     pub text: &'a str,
@@ -26,7 +26,7 @@ pub fn tokens(source: &str) -> Vec<Token<'_>> {
     found
 }
 
-/// Length in bytes of what `rest` begins with, and whether it is a token.
+/// Length in bytes of the first element of `rest`, and whether it is a token.
 fn next(rest: &str) -> (usize, bool) {
     let first = rest.chars().next().unwrap_or(' ');
     if rest.starts_with("//") {
@@ -64,7 +64,7 @@ fn block_comment(rest: &str) -> usize {
     rest.len()
 }
 
-/// `"..."`, `b"..."`, `c"..."` with escapes, and the raw forms with any number of `#`.
+/// Length of a string: `"..."`, `b"..."`, `c"..."` with escapes, and the raw forms with any number of `#`.
 fn string(rest: &str) -> Option<usize> {
     let body = rest.trim_start_matches(['b', 'c']);
     let prefix = rest.len() - body.len();
@@ -82,7 +82,7 @@ fn string(rest: &str) -> Option<usize> {
     Some(prefix + 1 + escaped_until(&rest[prefix + 1..], '"'))
 }
 
-/// `'x'` and `'\n'`, but not the lifetime `'a`.
+/// Length of a character: `'x'` and `'\n'`, but not the lifetime `'a`.
 fn character(rest: &str) -> Option<usize> {
     let body = rest.strip_prefix('\'')?;
     let mut characters = body.chars();
@@ -90,7 +90,7 @@ fn character(rest: &str) -> Option<usize> {
     (first == '\\' || characters.next() == Some('\'')).then(|| 1 + escaped_until(body, '\''))
 }
 
-/// Bytes up to and with the first `end` that no backslash escapes.
+/// Bytes up to and including the first unescaped `end`.
 fn escaped_until(body: &str, end: char) -> usize {
     let mut escaped = false;
     for (at, character) in body.char_indices() {

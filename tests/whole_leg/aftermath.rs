@@ -1,11 +1,11 @@
-//! What an identification that was refused, broken off or outrun leaves behind: nothing.
+//! An identification that was refused, aborted or overtaken leaves no trace.
 
 use hal_sim::tool::leg_file::StribeckFile;
 use scarab::safety::PowerRequest;
 
 use super::*;
 
-/// Damping lasts 300 ms.
+/// Ticks of damping: 300 ms.
 const DAMPING: u64 = 1200;
 
 #[test]
@@ -19,7 +19,7 @@ fn after_a_stop_the_model_comes_back_into_use_without_a_step_of_torque() {
     }
     let in_motion = tick(&mut pair, None).servo.wanted_torque.map(|torque| torque.0.abs());
     tick(&mut pair, Some(ControlRequest::Power(PowerRequest::QuickStop)));
-    // Until the released leg hangs still: what its speed asks of the damping is not the model's.
+    // Wait until the leg hangs still: the damping due to its speed is not the model's.
     for _ in 0..DAMPING + 5 * SECOND {
         tick(&mut pair, None);
     }
@@ -28,8 +28,8 @@ fn after_a_stop_the_model_comes_back_into_use_without_a_step_of_torque() {
     for ticks in 0..SECOND {
         let torque = tick(&mut pair, None).servo.decision.torque.map(|torque| torque.0);
         for joint in 0..JOINTS {
-            // The whole torque of the model, gravity first of all, fades in over 2000 ticks: 0.02 N m in each; a count of
-            // the encoder adds what the feedback makes of it.
+            // The whole torque of the model, gravity above all, fades in over 2000 ticks: 0.02 N m in each.
+            // One encoder count adds the feedback's response.
             let step = (torque[joint] - before[joint]).abs();
             assert!(step < 0.6, "joint {joint}, tick {ticks}: {step} N m, {in_motion:?} in motion");
         }
@@ -72,7 +72,7 @@ fn a_refused_result_leaves_no_friction_curve_in_what_is_watched() {
     let accepted = pair.leg.identification().model().stribeck;
     assert!(accepted.iter().all(|curve| curve.excess > 0.1), "{accepted:?}");
 
-    // Again, with a current sensor that shows twice the current of the slow passages.
+    // Identify again, with a current sensor that shows twice the current of the slow passages.
     tick(&mut pair, Some(ControlRequest::Identify));
     while matches!(activity(&pair), Activity::Identify(_)) {
         if activity(&pair) == Activity::Identify(IdentifyPhase::Excite) {

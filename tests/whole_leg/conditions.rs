@@ -1,4 +1,4 @@
-//! Legs that are not as the firmware believes, and wearers who do not hold still.
+//! Legs that differ from the firmware's assumptions, and wearers who move.
 
 use hal_sim::tool::leg_file::PushesFile;
 use hal_sim::tool::report::{Number, RunReport};
@@ -7,7 +7,7 @@ use scarab::ident::Reason;
 
 use super::*;
 
-/// The firmware of the default leg on another leg.
+/// Runs the firmware of the default leg on another leg.
 fn outcome(leg: &LegFile) -> (Option<Verdict>, DriveState) {
     let mut pair = enabled(leg, 1);
     let verdict = identify(&mut pair);
@@ -31,7 +31,7 @@ fn a_dead_motor_is_never_accepted() {
 fn a_seized_joint_is_refused_as_unexcited() {
     for joint in 0..JOINTS {
         let mut leg = default_leg();
-        // More than its motor can overcome.
+        // Friction beyond the motor's torque.
         leg.joints[joint].truth.as_mut().expect("simulated").coulomb = 1000.0;
         let (verdict, _) = outcome(&leg);
         assert!(verdict.is_some_and(|verdict| verdict.has(Reason::Unexcited)), "joint {joint}");
@@ -59,7 +59,8 @@ fn pushed(per_minute: f64, torque_nm: f64) -> Result<RunReport, String> {
 #[test]
 fn a_wearer_who_pushes_hard_is_refused_with_every_number_known() {
     let report = pushed(60.0, 60.0).expect("the drive holds against 60 N m");
-    // Pushed at once a second, too much of the motion identified from is set aside; what is held out is not.
+    // With a push every second, too much of the training motion is excluded; of the held-out motions
+    // it is not.
     assert_eq!(report.reasons, ["outliers"]);
     let known = |number: &Number| number.known().is_some();
     for base in &report.base_parameters {
@@ -71,7 +72,7 @@ fn a_wearer_who_pushes_hard_is_refused_with_every_number_known() {
         assert!(numbers.iter().all(known), "{} {}", fit.motion, fit.joint);
     }
     assert!(known(&report.condition) && known(&report.bso.excess_chi2));
-    // No model, so nothing was tracked with it.
+    // Without a model there is no tracking with it.
     assert!(report.tracking.iter().all(|joint| !known(&joint.rms_deg_with_model)));
 }
 

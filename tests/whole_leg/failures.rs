@@ -6,10 +6,10 @@ use scarab::units::Ampere;
 
 use super::*;
 
-/// Damping lasts 300 ms.
+/// Ticks of damping: 300 ms.
 const DAMPING: u64 = 1200;
 
-/// While the swarm searches: slowly enough to be met at it.
+/// During the swarm's search, made slow enough for the test to reach it.
 fn during_the_search() -> Pair {
     let mut pair = before_the_search();
     pair.evaluations = 1;
@@ -19,7 +19,7 @@ fn during_the_search() -> Pair {
     pair
 }
 
-/// A second identification in the middle of its exciting motion, the first one's model in use.
+/// In the exciting motion of a second identification, with the first one's model in use.
 fn identifying_again() -> Pair {
     static PAIR: OnceLock<Pair> = OnceLock::new();
     PAIR.get_or_init(|| {
@@ -34,7 +34,7 @@ fn identifying_again() -> Pair {
     .clone()
 }
 
-/// Ticks on and sees that nothing comes of what was broken off, and that no command is absurd.
+/// Ticks on and checks that the aborted identification has no effect and no command is absurd.
 fn nothing_comes_of_it(pair: &mut Pair, ticks: u64) {
     let before = (pair.leg.control().model().copied(), pair.leg.control().verdict());
     let found = pair.leg.identification().clone();
@@ -44,7 +44,7 @@ fn nothing_comes_of_it(pair: &mut Pair, ticks: u64) {
         assert_eq!(activity(pair), Activity::Idle);
     }
     assert_eq!((pair.leg.control().model().copied(), pair.leg.control().verdict()), before);
-    // Not a single evaluation is spent on it.
+    // Not a single evaluation is spent on the aborted run.
     assert_eq!(*pair.leg.identification(), found);
 }
 
@@ -57,7 +57,7 @@ fn a_quick_stop_at_any_phase_damps_then_releases_and_a_later_identification_work
         assert_eq!(activity(&pair), Activity::Idle, "{phase}");
         assert!(matches!(output.servo.decision.state, DriveState::QuickStopActive { .. }), "{phase}");
         for _ in 0..DAMPING {
-            // Damping takes energy out: torque against motion, or none.
+            // Damping removes energy: torque against motion, or zero.
             let output = tick(&mut pair, None);
             for (torque, speed) in output.servo.decision.torque.iter().zip(output.servo.velocity) {
                 assert!(torque.0 * speed.0 <= 0.0, "{phase}: {torque:?} at {speed:?}");
@@ -67,7 +67,7 @@ fn a_quick_stop_at_any_phase_damps_then_releases_and_a_later_identification_work
         nothing_comes_of_it(&mut pair, 4 * SECOND);
         assert_eq!((pair.leg.control().verdict(), pair.leg.control().model()), (None, None), "{phase}");
         pair.evaluations = pair::EVALUATIONS_PER_TICK;
-        // The released leg has come to rest within its range.
+        // With its outputs off the leg has come to rest within its range.
         assert!(pair.enable(context().gravity), "{phase}");
         assert!(identify(&mut pair).is_some_and(Verdict::is_accepted), "{phase}");
     }
@@ -121,7 +121,7 @@ fn absurd_counts_end_the_identification_within_three_ticks_and_keep_the_old_mode
 
 #[test]
 fn a_single_absurd_count_is_bridged_and_never_accepted_wrong() {
-    // 30,000 counts are 26 degrees: a mean of eight that held them would move parameters by 20 sigma.
+    // 30,000 counts are 26 degrees: a mean of eight with such a reading would move parameters by 20 sigma.
     for (joint, glitch) in [(1, i32::MAX), (0, 30_000), (1, -30_000), (0, 10_000), (1, 3_000)] {
         glitch_is_bridged(joint, glitch);
     }
@@ -158,7 +158,7 @@ fn a_refused_result_leaves_the_model_that_was_there() {
     tick(&mut pair, Some(ControlRequest::Identify));
     while matches!(activity(&pair), Activity::Identify(_)) {
         if let Activity::Identify(IdentifyPhase::Validate { .. }) = activity(&pair) {
-            // A sensor that changes its mind after the excitation.
+            // A sensor fault that begins after the excitation.
             pair.sample.joints[1].current = pair.sample.joints[1].current * 2.0;
         }
         tick(&mut pair, None);
@@ -198,7 +198,8 @@ fn commanded_speed_and_torque_never_jump_from_power_up_to_tracking_with_the_mode
                 // The gait's largest acceleration is 25 rad/s2: 0.006 rad/s in a tick.
                 assert!(speed.abs() < 0.008, "joint {joint}, tick {}: {speed}", pair.ticks);
                 let torque = output.servo.decision.torque[joint].0 - before.servo.decision.torque[joint].0;
-                // Coulomb friction's feedforward turns round by 9.3 N m within 0.04 rad/s; gravity is 20 N m and more.
+                // The feedforward of Coulomb friction reverses by 9.3 N m within 0.04 rad/s; gravity is 20 N
+                // m and more.
                 assert!(torque.abs() < 4.0, "joint {joint}, tick {}: {torque}", pair.ticks);
             }
             before = output;

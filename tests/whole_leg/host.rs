@@ -1,4 +1,4 @@
-//! A leg that a host commands tick by tick, in every mode of CiA 402 that it follows.
+//! A leg under tick-by-tick host control, in every supported mode of CiA 402.
 
 use scarab::leg::{Fault, FaultCode, JointCommand, JointStatus, SetPoint, Target};
 use scarab::safety::PowerRequest;
@@ -113,7 +113,7 @@ fn a_set_point_that_does_not_interrupt_waits_for_the_end_of_the_one_before() {
     assert!((hosted.status[0].position_demand.0 - from - 0.2).abs() < 0.05);
     hosted.run(2 * SECOND);
     assert!((hosted.position(0) - from).abs() < 0.01);
-    // One that does turns round at once.
+    // An interrupting set-point reverses at once.
     hosted.point(0, from + 0.2, true);
     hosted.run(400);
     hosted.point(0, from, true);
@@ -185,7 +185,7 @@ fn the_largest_torque_holds_in_every_mode_and_nothing_winds_up_against_it() {
         assert!(hosted.status[0].torque_demand.0.abs() <= weight + 1.001, "{:?}", hosted.status[0]);
     }
     assert!(limited);
-    // Given back, it arrives and does not shoot beyond.
+    // Once the torque is allowed again, the joint arrives without overshoot.
     hosted.commands[0].largest_torque = NewtonMetre(1000.0);
     let mut farthest = 0.0_f32;
     for _ in 0..2 * SECOND {
@@ -199,7 +199,7 @@ fn the_largest_torque_holds_in_every_mode_and_nothing_winds_up_against_it() {
 fn a_joint_that_is_held_again_keeps_the_torque_it_had() {
     let mut hosted = Hosted::new();
     hosted.run(2 * SECOND);
-    // The torque that keeps it up, given by the host.
+    // The host commands the torque that holds the joint up.
     let weight = hosted.status[0].torque_demand;
     hosted.commands[0].target = Target::CyclicTorque(weight);
     hosted.run(200);
@@ -243,7 +243,7 @@ fn cyclic_positions_of_two_milliseconds_are_followed_by_both_joints() {
 
 #[test]
 fn a_target_beyond_the_window_is_a_fault_and_never_a_jump() {
-    // At once when the mode begins, and after its time later.
+    // At once when the mode begins, and after the time-out later.
     for later in [false, true] {
         let mut hosted = Hosted::new();
         let from = hosted.position(0);
@@ -262,10 +262,10 @@ fn a_target_beyond_the_window_is_a_fault_and_never_a_jump() {
         assert_eq!(fault, Some(Fault { code: FaultCode::FollowingError, joint: 0 }));
         assert!(if later { (38..=44).contains(&ticks) } else { ticks <= 2 }, "{later} {ticks}");
         hosted.run(SECOND / 10);
-        // 10 ms at the speed limit are 0.045 rad, from standing still far less.
+        // 10 ms at the speed limit are 0.045 rad, from rest far less.
         assert!((hosted.position(0) - from).abs() < 0.03, "{}", hosted.position(0) - from);
     }
-    // Within the window it is led there along the profile.
+    // A target within the window is approached along the profile.
     let mut hosted = Hosted::new();
     let from = hosted.position(0);
     hosted.cyclic(0, from + 0.06);
@@ -288,7 +288,7 @@ fn homing_takes_the_place_for_the_offset_and_moves_nothing() {
     assert!(hosted.status[1].homed && !hosted.status[1].deviates);
     assert!((hosted.position(1) - place - 0.05).abs() < 0.002, "{}", hosted.position(1));
     assert!((hosted.truth(1) - truth).abs() < 0.003, "{} {truth}", hosted.truth(1));
-    // An offset out of the range is an error and changes nothing.
+    // An offset out of range is an error and has no effect.
     hosted.commands[1].target = Target::Homing { offset: Radian(9.0) };
     hosted.commands[1].asked += 1;
     hosted.run(SECOND / 10);
@@ -337,7 +337,7 @@ fn an_identification_begins_from_rest_and_gives_the_leg_back_to_the_host() {
     hosted.run(SECOND);
     assert!(matches!(activity(&hosted.pair), Activity::Identify(_)));
     assert_eq!(hosted.status[0].mode, 0);
-    // Given up in motion, it comes to rest along the profile.
+    // An identification cancelled in motion comes to rest along the profile.
     hosted.run(3 * SECOND);
     assert!(matches!(activity(&hosted.pair), Activity::Identify(_)));
     let before = hosted.status[1].velocity_demand.0;

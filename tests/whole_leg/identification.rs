@@ -33,7 +33,7 @@ fn a_leg_is_identified_validated_and_accepted_within_four_sigma() {
         assert!(report.accepted(), "seed {seed}: {:?}", report.reasons);
         assert_eq!((report.rank, report.base_parameters.len(), report.validation.len()), (13, 13, 6));
         for (name, error) in errors_in_sigma(&report) {
-            // Of 39 normal errors one exceeds four sigma in 0.25 % of all choices of seeds.
+            // One of 39 normal errors exceeds four sigma for 0.25 % of all choices of seeds.
             assert!(error.abs() < 4.0, "seed {seed}, {name}: {error:.1} sigma");
         }
     }
@@ -51,7 +51,7 @@ fn the_model_in_the_feedforward_tracks_gait_three_times_better() {
     }
 }
 
-/// All of a report but the time it took.
+/// A report as text, without its run time.
 fn text(mut report: RunReport) -> String {
     report.wall_s = 0.0;
     serde_json::to_string(&report).expect("plain data")
@@ -65,7 +65,7 @@ fn the_same_seed_gives_the_same_report_bit_for_bit_and_another_seed_another() {
     let other_swarm = SimulationOptions { swarm_seed: 8, ..SimulationOptions::of_seed(7) };
     let other_swarm = simulate::<JOINTS, BASE>(&default_leg(), &other_swarm).expect("it runs").report;
     let same_swarm = run(7);
-    // The data are the same, the way of the search is not.
+    // The data are identical; the path of the search differs.
     assert_eq!(same_swarm.least_squares, other_swarm.least_squares);
     assert_ne!(same_swarm.bso.evaluations, other_swarm.bso.evaluations);
 }
@@ -121,7 +121,8 @@ fn noise_free_torque_leaves_a_bias_below_a_seventh_of_the_sigma_of_noisy_torque(
         let error = quiet.value.known().expect("known") - quiet.truth.known().expect("simulated");
         let sigma = noisy.sigma.known().expect("determined");
         println!("{}: bias {error:+.2e}, {:+.2} sigma at 7 %", quiet.name, error / sigma);
-        // What encoder steps, sticking and the instants of reversal leave; measured: at most 0.06 sigma.
+        // Remaining effects: encoder steps, sticking and the instants of reversal; measured at
+        // most 0.06 sigma.
         assert!(error.abs() < sigma / 7.0, "{}: {error} of sigma {sigma}", quiet.name);
     }
 }
@@ -149,8 +150,8 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
         let sigma = online.sigma.known().expect("determined");
         let of = |report: &RunReport| report.least_squares.base_parameters[&online.name].known();
         let difference = of(&report).expect("known") - of(&replayed.run).expect("known");
-        // The log holds each angle exactly where the board rounds it to single precision, and weights of blocks follow
-        // such differences smoothly; 1.5e-3 sigma here.
+        // The log has each angle exactly where the board rounds it to single precision, and weights of blocks
+        // follow such differences smoothly; 1.5e-3 sigma here.
         assert!(difference.abs() < 5e-3 * sigma, "{}: {:.1e} sigma", online.name, difference / sigma);
         let difference = online.value.known().expect("known") - offline.value.known().expect("known");
         // Both searches end within 2e-6 chi-square units of the optimum, which is 1e-3 sigma.

@@ -1,7 +1,7 @@
 //! The whole firmware of a leg against the simulated leg, from the first tick to the verdict.
 //!
-//! Leg and plant are one value that can be cloned at any tick: tests that begin in the middle of an identification
-//! share the way there.
+//! Leg and plant are one value that can be cloned at any tick. So tests that begin in the middle of an
+//! identification share the preceding part.
 
 mod aftermath;
 mod conditions;
@@ -34,7 +34,7 @@ type Context = pair::Context<JOINTS, BASE>;
 
 /// Ticks of one second.
 const SECOND: u64 = 4000;
-/// An identification takes 53 s.
+/// Limit for an identification, which takes 53 s.
 const LONGEST_IDENTIFICATION: u64 = 100 * SECOND;
 
 fn default_leg() -> LegFile {
@@ -49,7 +49,7 @@ fn context() -> &'static Context {
     })
 }
 
-/// Enabled, at rest, in a world with this seed.
+/// A pair that is enabled and at rest, in a world with this seed.
 fn enabled(leg: &LegFile, seed: u64) -> Pair {
     let mut pair = Pair::new(leg, context(), seed).expect("the firmware takes the default leg");
     assert!(pair.enable(context().gravity));
@@ -64,7 +64,7 @@ fn activity(pair: &Pair) -> Activity {
     pair.leg.control().activity()
 }
 
-/// Ticks until `reached`, at most as long as an identification takes; tells whether it was.
+/// Ticks until `reached`, at most as long as an identification takes; returns whether it was.
 fn run_until(pair: &mut Pair, reached: impl Fn(&Pair) -> bool) -> bool {
     for _ in 0..LONGEST_IDENTIFICATION {
         if reached(pair) {
@@ -82,7 +82,7 @@ fn identify(pair: &mut Pair) -> Option<Verdict> {
     pair.leg.control().verdict()
 }
 
-/// In the middle of the exciting motion.
+/// A pair in the middle of the exciting motion.
 fn during_excitation() -> Pair {
     static PAIR: OnceLock<Pair> = OnceLock::new();
     PAIR.get_or_init(|| {
@@ -97,7 +97,7 @@ fn during_excitation() -> Pair {
     .clone()
 }
 
-/// At the first tick after the training motion was closed, the search not yet begun.
+/// A pair at the first tick after the training motion was closed, before the search.
 fn before_the_search() -> Pair {
     static PAIR: OnceLock<Pair> = OnceLock::new();
     PAIR.get_or_init(|| {
@@ -109,7 +109,7 @@ fn before_the_search() -> Pair {
     .clone()
 }
 
-/// In the second motion of the validation.
+/// A pair in the second motion of the validation.
 fn during_validation() -> Pair {
     static PAIR: OnceLock<Pair> = OnceLock::new();
     PAIR.get_or_init(|| {
@@ -125,7 +125,7 @@ fn during_validation() -> Pair {
     .clone()
 }
 
-/// With an accepted model.
+/// A pair with an accepted model.
 fn identified() -> Pair {
     static PAIR: OnceLock<Pair> = OnceLock::new();
     PAIR.get_or_init(|| {

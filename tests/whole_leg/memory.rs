@@ -1,4 +1,4 @@
-//! What the device has to hold.
+//! Memory that a leg needs on the device.
 
 use std::mem::size_of;
 
@@ -9,11 +9,11 @@ use scarab::leg::{Control, Identification, Leg, Upkeep};
 
 use super::*;
 
-/// Static memory of the board, beside 64 KB that only the processor reaches; on the host pointers are wider, but a leg
-/// holds none.
+/// Static memory of the board, besides 64 KB of core-coupled memory. Pointers are wider on the host, but a
+/// leg has none.
 const STATIC_BYTES: usize = 48 * 1024;
 
-/// The window of blocks, which only the processor works on.
+/// Window of blocks, which only the processor accesses.
 const WINDOW_BYTES: usize = size_of::<Window<f32, JOINTS, BASE, ROOM>>();
 const _: () = assert!(WINDOW_BYTES <= 34 * 1024);
 

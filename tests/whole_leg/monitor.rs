@@ -1,4 +1,4 @@
-//! After acceptance: the load changes while the leg walks.
+//! Monitoring after acceptance: the load changes while the leg walks.
 
 use scarab::ident::Cause;
 use scarab::leg::UPDATE_ROWS;
@@ -9,11 +9,11 @@ use scarab::units::Second;
 
 use super::*;
 
-/// 3 kg at 0.2 m of the shank.
+/// Payload of 3 kg at 0.2 m of the shank.
 const MASS: f64 = 3.0;
 const PLACE: f64 = 0.2;
 
-/// The 3 s gait for three minutes.
+/// Request to walk the 3 s gait for three minutes.
 fn walk(with_model: bool) -> ControlRequest<JOINTS> {
     let curve = *context().motions.validation[1].curve();
     let motion = Periodic::new(curve, Second(1.0), 60, SERVO_RATE_HZ).expect("a motion");
@@ -23,7 +23,7 @@ fn walk(with_model: bool) -> ControlRequest<JOINTS> {
     }
 }
 
-/// Ten seconds into the walk with the model.
+/// A pair ten seconds into the walk with the model.
 fn walking() -> Pair {
     static PAIR: OnceLock<Pair> = OnceLock::new();
     PAIR.get_or_init(|| {
@@ -39,7 +39,7 @@ fn walking() -> Pair {
     .clone()
 }
 
-/// Just after an update was offered.
+/// A pair just after an update was offered.
 fn offered() -> Pair {
     static PAIR: OnceLock<Pair> = OnceLock::new();
     PAIR.get_or_init(|| {
@@ -64,7 +64,7 @@ fn a_payload_is_noticed_in_seconds_and_found() {
     let noticed = seconds_until(&mut pair, |pair| pair.leg.control().change().is_some());
     let change = *pair.leg.control().change().expect("noticed");
     println!("noticed after {noticed} s, {change:?}");
-    // Six seconds of persistence, of which the knee stands still a share; the filter's reach.
+    // Expected: six seconds of persistence, of which the knee rests a part, and the filter's length.
     assert!((6.0..9.0).contains(&noticed), "{noticed} s");
     assert!((f64::from(change.since_s) - noticed).abs() < 1.5, "{change:?}");
     assert!(change.joints[1]);
@@ -81,7 +81,7 @@ fn a_payload_is_noticed_in_seconds_and_found() {
         assert!((f64::from(found.values[index]) - truth).abs() < 3.0 * sigma, "{found:?}");
         assert!(sigma < 0.01 * truth, "sigma {sigma} of {truth}");
     }
-    // Nothing was taken into use by itself.
+    // No update was taken into use without a request.
     assert_eq!(pair.leg.control().model(), identified().leg.control().model());
 }
 
@@ -105,12 +105,13 @@ fn an_update_is_taken_on_request_without_a_step_of_torque_and_is_what_is_watched
     let unfaded = largest(&mut pair, None);
     let faded = largest(&mut same_phase, Some(ControlRequest::TakeUpdate));
     println!("largest step of torque in one tick: {unfaded} N m without, {faded} N m with the update");
-    // One count of the encoder steps the torque by some tenths of a N m, the fading by a 2000th of some 10 N m.
+    // One count of the encoder steps the torque by some tenths of a N m, the fading by a 2000th of some
+    // 10 N m.
     assert!(faded < unfaded + 0.2, "{faded} against {unfaded}");
     let mut pair = same_phase;
     assert_ne!(pair.leg.control().model(), Some(&old));
     assert_eq!(pair.leg.control().change(), None);
-    // Taken once.
+    // An update can be taken only once.
     assert!(tick(&mut pair, Some(ControlRequest::TakeUpdate)).refused);
     for _ in 0..60 * SECOND {
         tick(&mut pair, None);
@@ -148,7 +149,7 @@ fn a_stop_while_rows_are_collected_forgets_them() {
         tick(&mut pair, None);
         assert!(!pair.leg.control().is_update_offered());
     }
-    // On its feet again it is noticed anew.
+    // After enabling again the change is detected again.
     assert!(pair.enable(context().gravity));
     tick(&mut pair, Some(walk(true)));
     assert_eq!(pair.leg.control().change(), None);

@@ -1,4 +1,4 @@
-//! Things made wrong on purpose: each is refused for its reason, and honest runs are accepted.
+//! Deliberate errors: each is refused for its reason, and honest runs are accepted.
 
 use hal_sim::tool::leg_file::PushesFile;
 use hal_sim::tool::perturb::Perturbation;
@@ -13,7 +13,7 @@ fn perturbed(perturbation: &str, seed: u64) -> RunReport {
     simulate::<JOINTS, BASE>(&default_leg(), &options).expect("it ends in a verdict").report
 }
 
-/// Refused for exactly these reasons, each told in a sentence.
+/// Checks that the run is refused for exactly these reasons, each with a finding as a sentence.
 fn refused(perturbation: &str, reasons: &[&str]) {
     for seed in [1, 2] {
         let report = perturbed(perturbation, seed);
@@ -25,7 +25,7 @@ fn refused(perturbation: &str, reasons: &[&str]) {
     }
 }
 
-/// Refused, with one of these reasons among others.
+/// Checks that the run is refused, with one of these reasons among others.
 fn refused_with_one_of(perturbation: &str, reasons: &[&str]) {
     let report = perturbed(perturbation, 1);
     println!("{perturbation}: {:?}", report.reasons);
@@ -95,7 +95,7 @@ fn pushes_while_motions_are_predicted_are_set_aside_and_hide_nothing() {
 
 #[test]
 fn a_wrong_length_or_zero_is_refused_as_residual_alone() {
-    // Both are predicted within 2.1 % of the torque: only what they ask for gives them away.
+    // Both predict the torque within 2.1 %: only the residual's direction shows them.
     for perturbation in ["length=1.1", "length=0.9", "zero=5", "zero=-5"] {
         refused(perturbation, &["residual"]);
     }
@@ -118,7 +118,8 @@ fn exchanged_connectors_and_wrong_directions_are_refused() {
 
 #[test]
 fn what_torque_cannot_see_is_accepted() {
-    // A wrong torque constant scales everything, the last joint's zero turns that link's own frame.
+    // A wrong torque constant scales everything; an error of the last joint's zero turns that
+    // link's own frame.
     for perturbation in ["torque-constant=1.2", "zero=5@knee"] {
         let report = perturbed(perturbation, 1);
         assert!(report.accepted(), "{perturbation}: {:?}", report.reasons);
@@ -126,7 +127,7 @@ fn what_torque_cannot_see_is_accepted() {
     let scaled = perturbed("torque-constant=1.2", 1);
     for base in scaled.base_parameters.iter().filter(|base| base.name.starts_with("HX")) {
         let ratio = base.value.known().expect("determined") / base.truth.known().expect("simulated");
-        // First moments are known to half a per cent: three sigma, and what the servo does otherwise.
+        // First moments are known to half a per cent: three sigma, and the servo's different motion.
         assert!((ratio * 1.2 - 1.0).abs() < 0.02, "{}: {ratio}", base.name);
     }
 }

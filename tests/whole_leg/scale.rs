@@ -1,4 +1,4 @@
-//! Torque constants that are not what the firmware believes, known masses that tell them, known loads.
+//! Torque constants that differ from the firmware's, known masses that reveal them, known loads.
 
 use hal_sim::tool::leg_file::BodySide;
 use hal_sim::tool::posture::on_side;
@@ -13,7 +13,7 @@ use super::*;
 
 const ON_THE_KNEE: Payload<f64> = Payload { joint: 1, mass: 5.0, place: Vector3::new(0.2, 0.0, 0.0) };
 
-/// The default leg whose motors make `factors` times the torque that the firmware believes.
+/// The default leg with motors that make `factors` times the torque of the firmware's constants.
 fn leg_with_constants(factors: [f64; JOINTS]) -> LegFile {
     let mut leg = default_leg();
     for (joint, factor) in leg.joints.iter_mut().zip(factors) {
@@ -26,7 +26,7 @@ fn leg_with_constants(factors: [f64; JOINTS]) -> LegFile {
 /// A leg that has identified itself once.
 struct FirstRun {
     pair: Pair,
-    /// On that alone.
+    /// Verdict on that run alone.
     verdict: Option<Verdict>,
     log: Vec<LoggedSample<JOINTS>>,
 }
@@ -52,7 +52,7 @@ fn corrected(
     (scale, corrected)
 }
 
-/// The second run with one mass on the leg and another, or the same, stated.
+/// Second run with a mass `carried` on the leg and a mass `stated` to the firmware.
 fn second_run(pair: &Pair, carried: &Payload<f64>, stated: &Payload<f64>) -> Scale<JOINTS, BASE> {
     Scale::find_with(context(), pair, carried, stated).expect("the drive holds 5 kg")
 }
@@ -90,12 +90,12 @@ fn a_wrong_torque_constant_is_not_seen_in_one_run_and_found_with_a_known_mass() 
                 "seed {seed}: {constant:.4} N m/A, sigma {:.4}",
                 constant * f64::from(ratio.sigma / ratio.ratio)
             );
-            // 1.8 N m/A within 1 %: four sigma of 0.22 %.
+            // Expected 1.8 N m/A within 1 %: four sigma of 0.22 %.
             assert!((constant / 1.8 - 1.0).abs() < 0.01, "{constant}");
         }
         let corrected = corrected.expect("to be corrected");
         assert!(corrected.verdict.is_accepted());
-        // Of 39 pulls one beyond 4 is a chance of 0.2 %.
+        // Among 39 pulls, one beyond 4 has a probability of 0.2 %.
         assert!(worst_pull(&corrected) < 4.0, "{}", worst_pull(&corrected));
     }
 }
@@ -147,7 +147,7 @@ fn a_model_with_a_known_load_predicts_as_one_that_was_identified_with_it() {
         [*model, model.with_load(&load.convert()), *again].map(|model| prediction_error(&model, &plant));
     println!("N m rms without {without:?}, added {with:?}, identified again {identified_again:?}");
     for joint in 0..JOINTS {
-        // Both are estimates of one noise level; they differ by what that noise did, never by several times.
+        // Both are estimates at one noise level; they may differ by that noise, never by several times.
         assert!(with[joint] < 2.0 * identified_again[joint], "joint {joint}");
         assert!(without[joint] > 10.0 * with[joint], "the load is felt, or this shows nothing");
     }
@@ -179,6 +179,6 @@ fn prediction_error(model: &IdentifiedModel<JOINTS>, plant: &World<JOINTS>) -> [
 fn the_firmware_of_a_right_leg_refuses_to_drive_a_left_one() {
     let left = on_side(&default_leg(), BodySide::Left).expect("parallel axes");
     let mut pair = Pair::new(&left, context(), 1).expect("the firmware takes the default leg");
-    // A bent leg reads as one bent backwards, outside its range.
+    // A bent leg reads as bent backwards, outside its range.
     assert!(!pair.enable(context().gravity) && !is_enabled(&pair));
 }

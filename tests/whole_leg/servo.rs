@@ -1,4 +1,4 @@
-//! How well the leg follows.
+//! Tracking performance of the leg.
 
 use scarab::motion::{Fourier, HARMONICS, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
@@ -9,7 +9,7 @@ use super::*;
 const AMPLITUDE_RAD: f32 = 0.01;
 const CYCLES: u32 = 12;
 
-/// Commanded sine of one joint about the pose at which it is enabled, and what the joint makes of it: amplitude ratio.
+/// Amplitude ratio of a joint's response to a commanded sine, about the pose at which it is enabled.
 ///
 /// The last eight cycles are projected on the command, so friction's harmonics do not count.
 fn amplitude_ratio(joint: usize, frequency_hz: f32) -> f64 {
@@ -61,7 +61,7 @@ fn feedback_alone_follows_a_sine_of_four_hertz_by_more_than_half_its_power() {
     }
 }
 
-/// A board stops ticking when a place is lost, in whatever state the drive is, and begins again with other zeros.
+/// A board stops ticking when a rotor position is lost, in any drive state, and restarts with other zeros.
 #[test]
 fn control_that_is_begun_anew_in_the_middle_of_a_motion_is_off_wherever_the_joints_are() {
     let mut pair = enabled(&default_leg(), 1);

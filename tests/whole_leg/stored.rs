@@ -1,11 +1,11 @@
-//! A model that was kept and is offered to a leg again.
+//! A stored model that is offered to a leg again.
 
 use scarab::leg::{RestoreError, StoredModel};
 use scarab::units::{NewtonMetrePerAmpere, Radian};
 
 use super::*;
 
-/// Of the leg that was identified.
+/// Stored model of the identified leg.
 fn kept() -> StoredModel<JOINTS> {
     let pair = identified();
     context().configuration.keep(pair.leg.control().model().expect("accepted"))
@@ -18,7 +18,7 @@ fn a_kept_model_comes_back_as_it_was_and_serves_the_next_start() {
     let restored = context().configuration.restore(&kept()).expect("the same leg");
     assert_eq!(&restored, found);
 
-    // The next start knows nothing until the model is adopted.
+    // The next start has no model until one is adopted.
     let mut pair = enabled(&default_leg(), 2);
     assert_eq!(pair.leg.control().model(), None);
     assert!(pair.leg.adopt(restored));
@@ -53,7 +53,7 @@ fn a_model_of_another_leg_length_or_torque_constant_is_refused() {
     configuration.joints.iter_mut().for_each(|joint| joint.scale.mirrored = true);
     assert!(matches!(configuration.restore(&stored), Err(RestoreError::AnotherLeg { .. })), "the other side");
 
-    // What does not change what the parameters mean does not refuse them.
+    // Changes that leave the parameters' meaning unchanged do not refuse the model.
     let mut configuration = context().configuration.clone();
     configuration.joints[0].low = Radian(0.1);
     configuration.joints[0].scale.radian_per_count = Radian(1e-5);

@@ -1,11 +1,11 @@
-//! What the trace tells of an identification is what the identification holds.
+//! The trace of an identification reports the identification's values.
 
 use scarab::model::Parameter;
 use scarab::trace::{Line, Record, Report};
 
 use super::*;
 
-/// All lines of the report on what this leg identified, as they are written.
+/// All lines of the report on this leg's identification, as written.
 fn told(pair: &Pair) -> Vec<String> {
     let mut report = Report::default();
     let mut lines = Vec::new();
@@ -66,7 +66,7 @@ fn a_report_tells_every_parameter_finding_and_fit_and_its_own_length() {
         assert_eq!((line.value("joint"), line.value("motion")), (Ok(joint), Ok(motion)));
     }
 
-    // The motion identified from and three others, each with both joints.
+    // The training motion and three others, each with both joints.
     assert_eq!((of("motion").len(), of("fit").len()), (4, 4 * JOINTS));
     let word = if verdict.is_accepted() { "accepted" } else { "refused" };
     assert_eq!(of("verdict")[0].text("verdict"), Ok(word));
@@ -81,7 +81,7 @@ fn a_report_tells_every_parameter_finding_and_fit_and_its_own_length() {
 #[test]
 fn nothing_is_told_before_there_is_something() {
     assert_eq!(told(&during_excitation()), [""; 0]);
-    // Before the search is at its end values are there already, a verdict is not.
+    // Before the end of the search values are present, a verdict is not.
     let lines = told(&before_the_search());
     assert!(lines.iter().any(|line| line.starts_with("solver ") && line.contains(" state=running ")));
     assert!(!lines.iter().any(|line| line.starts_with("verdict ")));

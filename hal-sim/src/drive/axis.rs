@@ -1,9 +1,10 @@
 //! One axis: motor, bridge, shunts and counter, moved a quarter of a PWM period at a time.
 //!
-//! Switching is not averaged. Within a quarter the step goes from edge to edge of the bridge, each with constant
-//! terminal voltages; bus voltage is held within the quarter, the rotor's speed as long as [`Axis::set_rotor`] is not called.
-//! Against steps a hundred times finer the currents differ by 4 mA and the torque by 4e-5 of its size, at 50 A, 250 Hz
-//! electrical and 48 V (`cargo test -p hal-sim --test plant edges_alone`): a tenth of a converter's step.
+//! Switching is not averaged. Within a quarter the step goes from edge to edge of the bridge, each with
+//! constant terminal voltages. The bus voltage is constant within the quarter, the rotor's speed between
+//! calls of [`Axis::set_rotor`]. Compared with steps a hundred times finer, currents differ by 4 mA and the
+//! torque by 4e-5 of its size. Conditions: 50 A, 250 Hz electrical and 48 V. Test:
+//! `cargo test -p hal-sim --test plant edges_alone`. The difference is a tenth of a converter's step.
 //!
 //! ```text
 //! sample, command acts                                  sample, next command acts
@@ -20,21 +21,21 @@ use super::shunts::ShuntState;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ};
 
-/// Of the PWM, s.
+/// PWM period, s.
 pub const PERIOD_S: f64 = 1.0 / CURRENT_RATE_HZ as f64;
-/// Parts of a period.
+/// Quarters per period.
 pub const QUARTERS: u32 = 4;
-/// One of them, s.
+/// Length of a quarter, s.
 pub const QUARTER_S: f64 = PERIOD_S / QUARTERS as f64;
-/// An amplifier whose low side conducts since ever, s.
+/// Conduction time at which an amplifier has long settled, s.
 const SETTLED: f64 = 1.0;
 
-/// What a stretch of time moved.
+/// Transfers during a time step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisFlow {
     /// Torque on the rotor integrated over time, N m s.
     pub impulse: f64,
-    /// Charge out of the bus, C.
+    /// Charge drawn from the bus, C.
     pub charge: f64,
     /// Heat of windings and switches, J.
     pub heat: f64,
@@ -44,27 +45,28 @@ pub struct AxisFlow {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
     description: AxisDescription,
-    /// The bridge's output on each of the motor's phases.
+    /// Bridge output connected to each of the motor's phases.
     output_of: [usize; 3],
     motor: Motor,
     bridge: Bridge,
     counter: Counter,
-    /// Quarters of the axis' own period that are over.
+    /// Elapsed quarters of the axis' own period.
     quarter: u32,
-    /// Angle of the rotor now, rad; its speed, rad/s.
+    /// Present angle of the rotor, rad, and its speed, rad/s.
     angle: f64,
     speed: f64,
     cogging: f64,
-    /// Change of the phases' currents at the end of the last step, A/s.
+    /// Slopes of the phase currents at the end of the last step, A/s.
     slopes: [f64; 3],
-    /// Error of both shunts at the next sample [A].
+    /// Error of both shunts at the next sample, A.
     disturbance: f64,
-    /// Since the period began, J.
+    /// Heat since the period began, J.
     heat: f64,
 }
 
 impl Axis {
-    /// Released and without current, the rotor at `angle` (rad); the axis' own period began `quarter` quarters ago.
+    /// An axis without current, outputs off, with the rotor at `angle` (rad). Its own period began `quarter`
+    /// quarters ago.
     #[must_use]
     pub fn new(description: &AxisDescription, angle: f64, quarter: u32) -> Self {
         let electrical = electrical_angle(description, angle);
@@ -90,21 +92,21 @@ impl Axis {
         }
     }
 
-    /// The rotor is at `angle` (rad) and turns at `speed` (rad/s) until this is called again.
+    /// Sets the rotor's angle (rad), and its speed (rad/s) until the next call.
     pub fn set_rotor(&mut self, angle: f64, speed: f64) {
         (self.angle, self.speed) = (angle, speed);
         self.motor.set_angle(electrical_angle(&self.description, angle));
         self.cogging = self.motor.cogging(angle + 0.5 * speed * PERIOD_S);
     }
 
-    /// Puts the rotor elsewhere without current.
+    /// Moves the rotor to an angle, at rest and without current.
     pub fn place(&mut self, angle: f64) {
         self.set_rotor(angle, 0.0);
         self.motor.place(electrical_angle(&self.description, angle));
         self.slopes = [0.0; 3];
     }
 
-    /// The wire of an output breaks.
+    /// Breaks the wire of an output.
     pub fn break_wire(&mut self, output: usize) {
         self.description.wiring.open = Some(output);
     }
@@ -127,13 +129,13 @@ impl Axis {
         &self.motor
     }
 
-    /// What the axis is made from.
+    /// Description of this axis.
     #[must_use]
     pub fn description(&self) -> &AxisDescription {
         &self.description
     }
 
-    /// Rising less falling edges of the bridge between two instants within its period [s from now].
+    /// Rising less falling edges of the bridge between two instants of its period, s from now.
     #[must_use]
     pub fn edges(&self, from: f64, to: f64) -> i32 {
         let now = f64::from(self.quarter) * QUARTER_S;
@@ -145,7 +147,7 @@ impl Axis {
         self.disturbance = ampere;
     }
 
-    /// The axis' own period begins: its sensors are read and a command acts.
+    /// Starts the axis' own period: reads its sensors and applies a command.
     pub fn begin(
         &mut self,
         command: &AxisCommand,
@@ -159,7 +161,7 @@ impl Axis {
         for (channel, code) in codes.iter_mut().enumerate() {
             let output = channel + 1;
             let phase = wiring.phases[output];
-            // Without its low side a shunt still carries what the low diode does: currents into the motor.
+            // With the low switch off, a shunt carries the low diode's current, which flows into the motor.
             let by_diode = if currents[phase] > 0.0 { SETTLED } else { 0.0 };
             let sign = if wiring.shunts_inverted[channel] { -1.0 } else { 1.0 };
             let state = ShuntState {
@@ -180,7 +182,7 @@ impl Axis {
         AxisSample { shunt_codes: codes, bus_code, encoder_count, index_count }
     }
 
-    /// A quarter of a period with this voltage on the bus.
+    /// Advances by a quarter of a period at this bus voltage.
     pub fn advance(&mut self, bus: f64) -> AxisFlow {
         let mut now = f64::from(self.quarter) * QUARTER_S;
         self.quarter += 1;
@@ -200,7 +202,7 @@ impl Axis {
         flow
     }
 
-    /// From one edge to the next.
+    /// Advances from one edge to the next.
     fn step(&mut self, bus: f64, now: f64, duration: f64) -> AxisFlow {
         let terminals = self.output_of.map(|output| {
             if self.description.wiring.open == Some(output) {

@@ -1,4 +1,4 @@
-//! Three half bridges: which switch conducts when, to the nanosecond.
+//! Three half bridges: conduction of each switch, to the nanosecond.
 //!
 //! ```text
 //!  one PWM period of length T, from one middle of the lower zero vector (all low sides conduct) to the next
@@ -9,33 +9,35 @@
 //!             ^ sample, new duty                        ^
 //! ```
 //!
-//! While both switches of a leg are off its diodes conduct, so that a positive current sees a pulse shorter by the dead
-//! time, a negative one a pulse longer by it. Nothing is averaged: [`Bridge::next_edge`] says when something changes, and between
-//! edges everything is constant. The duty is rounded to the timer's steps. Source: centre-aligned PWM with preload and dead
-//! time as the advanced timers of the STM32F405 have it (reference manual RM0090, chapter 17).
-//! Cost: some 20 operations per edge, 12 edges per period. Known limits: switches change at once.
+//! While both switches of a leg are off, its diodes conduct. A positive current then sees a pulse shorter by
+//! the dead time, a negative one a longer pulse. Nothing is averaged: [`Bridge::next_edge`] returns the next
+//! change, and between edges everything is constant. The duty is rounded to the timer's steps.
+//! Source: centre-aligned PWM with preload and dead time, as in the advanced timers of the STM32F405
+//! (reference manual RM0090, chapter 17).
+//! Cost: some 20 operations per edge, 12 edges per period.
+//! Known limits: switches change instantly.
 
 use super::description::BridgeDescription;
 use super::motor::Terminal;
 use crate::maths::nearest;
 use scarab::hal::AxisCommand;
 
-/// One half bridge within a period; times from the period's beginning, s.
+/// One half bridge within a period; times from the beginning of the period, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct HalfBridge {
-    /// The reference: the high side is asked for.
+    /// State of the reference: high side requested.
     high: bool,
-    /// When the switch that is asked for begins to conduct; negative if it does since the last period.
+    /// Time from which the requested switch conducts; negative if it conducts since an earlier period.
     conducts_from: f64,
-    /// The reference rises.
+    /// Time at which the reference rises.
     rise: f64,
-    /// The reference falls.
+    /// Time at which the reference falls.
     fall: f64,
     /// Both edges of the period, past ones too: rise and fall.
     edges: [f64; 2],
 }
 
-/// Three half bridges and where they are in their period.
+/// Three half bridges and their state within the period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bridge {
     description: BridgeDescription,
@@ -44,11 +46,11 @@ pub struct Bridge {
     legs: [HalfBridge; 3],
 }
 
-/// Long ago, s; more than amplifiers need.
+/// A time long enough for amplifiers to settle, s.
 const LONG: f64 = 1.0;
 
 impl Bridge {
-    /// Released, for a period of so many s.
+    /// A bridge with outputs off, for a period of so many s.
     #[must_use]
     pub fn new(description: &BridgeDescription, period: f64) -> Self {
         let never = f64::INFINITY;
@@ -57,7 +59,7 @@ impl Bridge {
         Self { description: *description, period, enabled: false, legs: [leg; 3] }
     }
 
-    /// A period begins and a command acts; a duty that is not a number counts as 0.
+    /// Starts a period and applies a command; a duty of NaN counts as 0.
     pub fn begin(&mut self, command: &AxisCommand) {
         let dead_time = self.description.dead_time;
         let enabling = command.enabled && !self.enabled;
@@ -80,7 +82,7 @@ impl Bridge {
         }
     }
 
-    /// Lets edges up to `now` happen.
+    /// Processes edges up to `now`.
     pub fn pass(&mut self, now: f64) {
         for leg in &mut self.legs {
             if leg.rise <= now {
@@ -94,7 +96,7 @@ impl Bridge {
         }
     }
 
-    /// When something changes after `now`; `end` at the latest.
+    /// Time of the next change after `now`, at most `end`.
     #[must_use]
     pub fn next_edge(&self, now: f64, end: f64) -> f64 {
         if !self.enabled {
@@ -106,7 +108,7 @@ impl Bridge {
         })
     }
 
-    /// What an output is connected to just after `now`, with this voltage on the bus.
+    /// Connection of an output just after `now`, at this bus voltage.
     #[must_use]
     pub fn output(&self, output: usize, now: f64, bus: f64) -> Terminal {
         let Some(leg) = self.legs.get(output) else { return Terminal::Held(0.0) };
@@ -116,15 +118,15 @@ impl Bridge {
         Terminal::Held(if leg.high { bus } else { 0.0 })
     }
 
-    /// For how long an output's low side has been conducting at `now`, s; `None` if it does not.
+    /// Time for which an output's low side has been conducting at `now`, s; `None` if it does not.
     #[must_use]
     pub fn low_side_time(&self, output: usize, now: f64) -> Option<f64> {
         let leg = self.legs.get(output)?;
         (self.enabled && !leg.high && leg.conducts_from <= now).then_some(now - leg.conducts_from)
     }
 
-    /// Rising less falling edges between two instants of the period, s. An edge takes as long as the dead time: which end
-    /// of it the output switches at depends on the current.
+    /// Rising less falling edges between two instants of the period, s. An edge takes as long as the dead
+    /// time: the current decides at which end of it the output switches.
     #[must_use]
     pub fn edges(&self, from: f64, to: f64) -> i32 {
         let within = |edge: f64| i32::from(edge <= to && edge + self.description.dead_time >= from);
@@ -173,7 +175,7 @@ mod tests {
         shares(&mut bridge, [0.5; 3]);
         let times = shares(&mut bridge, [0.25, 0.5, 0.8]);
         for (times, duty) in times.iter().zip([0.25, 0.5, 0.8]) {
-            // Both edges cost a dead time, one of the high and one of the low side.
+            // Both edges cost a dead time, one on the high and one on the low side.
             let expected =
                 [duty * PERIOD - description.dead_time, (1.0 - duty) * PERIOD - description.dead_time];
             assert!((times[0] - expected[0]).abs() < 1e-15, "{times:?}");

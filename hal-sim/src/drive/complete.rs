@@ -1,4 +1,4 @@
-//! The complete drives of a leg: every axis with its motor, on one supply.
+//! Complete drives of a leg: every axis with its motor, on one supply.
 //!
 //! ```text
 //! one PWM period of the first axis
@@ -6,13 +6,14 @@
 //!  axis 0 begins                             axis 1 begins
 //! ```
 //!
-//! An axis begins its own period half a period after the one before, as on the board, or by as many quarters as its
-//! description says. When an axis begins, its sensors are read and the command handed over acts; what is computed
-//! from the sample is handed over a period later. Held constant: speed of the rotors and brake duty within a period of the
-//! first axis, bus voltage within a quarter.
+//! An axis begins its own period half a period after the preceding axis, as on the board; the description can
+//! change that shift. At that instant its sensors are read and the given command acts. The answer to a sample
+//! is applied a period later. Held constant: speed of the rotors and brake duty within a period of the first
+//! axis, bus voltage within a quarter.
 //!
-//! **Coupling.** Where it is described, every edge of another axis' bridge in the window before an axis' converter holds
-//! falsifies both of its shunts. Known limit: an axis that begins at the same instant does not disturb.
+//! **Coupling.** Where coupling is described, an edge of another axis' bridge shortly before an axis'
+//! converter holds falsifies both of its shunts.
+//! Known limit: an axis that begins at the same instant does not disturb.
 
 use super::axis::{Axis, AxisFlow, PERIOD_S, QUARTER_S, QUARTERS};
 use super::description::{CompleteDescription, CouplingDescription};
@@ -28,12 +29,12 @@ pub const SHIFT_QUARTERS: u32 = 2;
 /// Standard deviation of the bus voltage's code.
 const BUS_NOISE_CODES: f64 = 1.0;
 
-/// Where a rotor is and how fast it turns.
+/// Angle and speed of a rotor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rotor {
-    /// rad.
+    /// Angle, rad.
     pub angle: f64,
-    /// rad/s.
+    /// Speed, rad/s.
     pub speed: f64,
 }
 
@@ -49,7 +50,7 @@ pub struct CompleteDrives<const N: usize> {
 }
 
 impl<const N: usize> CompleteDrives<N> {
-    /// Released, rotors at rest at these angles (rad).
+    /// Drives with outputs off and rotors at rest at these angles, rad.
     #[must_use]
     pub fn new(description: &CompleteDescription<N>, angles: &[f64; N], seed: u64) -> Self {
         let begins = core::array::from_fn(|axis| axis as u32 * description.shift_quarters % QUARTERS);
@@ -64,8 +65,8 @@ impl<const N: usize> CompleteDrives<N> {
         }
     }
 
-    /// One PWM period of the first axis: samples as they come, and the mean torque of each rotor, N m. `brake` is the share
-    /// of time for which the brake resistor is on.
+    /// Runs one PWM period of the first axis. Returns the samples taken, and the mean torque of each rotor, N
+    /// m. `brake` is the duty of the brake resistor.
     pub fn period(
         &mut self,
         rotors: &[Rotor; N],
@@ -98,7 +99,7 @@ impl<const N: usize> CompleteDrives<N> {
         (samples, torque)
     }
 
-    /// Error of an axis' shunts by the edges of the others in the window before its converter holds, A.
+    /// Error of an axis' shunts by edges of the others in the window before its converter holds, A.
     fn disturbance(&self, axis: usize) -> f64 {
         if self.coupling.ampere_per_edge == 0.0 {
             return 0.0;
@@ -109,33 +110,33 @@ impl<const N: usize> CompleteDrives<N> {
         self.coupling.ampere_per_edge * f64::from(edges)
     }
 
-    /// Puts the rotors elsewhere, without current.
+    /// Moves the rotors to these angles, at rest and without current.
     pub fn place(&mut self, angles: &[f64; N]) {
         for (axis, angle) in self.axes.iter_mut().zip(angles) {
             axis.place(*angle);
         }
     }
 
-    /// One axis each.
+    /// All axes.
     #[must_use]
     pub fn axes(&self) -> &[Axis; N] {
         &self.axes
     }
 
-    /// The wire of an axis' output (A, B, C from 0) breaks.
+    /// Breaks the wire of an axis' output (A, B, C from 0).
     pub fn break_wire(&mut self, axis: usize, output: usize) {
         if let Some(axis) = self.axes.get_mut(axis) {
             axis.break_wire(output);
         }
     }
 
-    /// What feeds them.
+    /// Supply of the drives.
     #[must_use]
     pub fn supply(&self) -> &Supply {
         &self.supply
     }
 
-    /// What feeds them, to be changed.
+    /// Supply of the drives, mutable.
     pub fn supply_mut(&mut self) -> &mut Supply {
         &mut self.supply
     }

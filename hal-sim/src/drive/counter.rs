@@ -1,11 +1,12 @@
-//! Quadrature counter of the motor's encoder, with its index pulse.
+//! Quadrature counter of the motor's encoder, with index pulse.
 //!
 //! ```text
 //! counter = start + floor(sense * angle / 2 pi * counts)      16 bits, wrapping
 //! index   : where (angle - index) / 2 pi passes a whole number; the counter is captured there
 //! ```
 //!
-//! Angles of the rotor in rad, over all its turns. Cost: one multiplication and one comparison per sample.
+//! Angles are the rotor's in rad, over all turns.
+//! Cost: one multiplication and one comparison per sample.
 
 use super::description::{CounterDescription, EncoderWiring};
 use crate::maths::floor;
@@ -16,12 +17,12 @@ use core::f64::consts::TAU;
 pub struct Counter {
     description: CounterDescription,
     wiring: EncoderWiring,
-    /// Turns since the index at the last sample.
+    /// Whole turns from the index at the last sample.
     turns: i64,
 }
 
 impl Counter {
-    /// As described, the rotor at `angle`.
+    /// A counter by its description, with the rotor at `angle`.
     #[must_use]
     pub fn new(description: &CounterDescription, wiring: EncoderWiring, angle: f64) -> Self {
         let mut counter = Self { description: *description, wiring, turns: 0 };
@@ -29,7 +30,7 @@ impl Counter {
         counter
     }
 
-    /// The counter at an angle, and what it was when the index came since the last reading.
+    /// Reads the counter at an angle, and its value at the index pulse if one came since the last reading.
     pub fn read(&mut self, angle: f64) -> (u16, Option<u16>) {
         if self.wiring == EncoderWiring::Missing {
             return (self.description.start, None);

@@ -1,10 +1,11 @@
-//! What a complete drive is made from, as plain numbers; nothing is checked here.
+//! Description of a complete drive as plain numbers, without validation.
 //!
-//! The instant of the shunts' trigger is the firmware's constant, as the board's registers have it.
+//! The trigger time of the shunts' converters is the firmware's constant, as in the board's registers.
 //!
-//! Defaults are those of a board of the ODrive v3.6 class (48 V and more): 500 uOhm shunts, amplifiers at 40 V/V, 12 bits
-//! over 3.3 V, bus divider 19, dead time of 20 clocks at 168 MHz, 3,500 timer clocks per half period. Amplifier settling,
-//! rails, noise, diode drop and capacitance are typical values of such parts, not measurements.
+//! Defaults are those of a board of the ODrive v3.6 class (48 V and more). Facts: 500 uOhm shunts, amplifiers
+//! at 40 V/V, 12 bits over 3.3 V, bus divider 19. Further: dead time of 20 clocks at 168 MHz, 3,500 timer
+//! clocks per half period. Amplifier settling, rails, noise, diode drop and capacitance are typical values of
+//! such parts, not measurements.
 
 use super::complete::SHIFT_QUARTERS;
 use scarab::hal::{BRIDGE_CLOCK_HZ, SHUNT_TRIGGER_CLOCKS};
@@ -12,11 +13,11 @@ use scarab::hal::{BRIDGE_CLOCK_HZ, SHUNT_TRIGGER_CLOCKS};
 /// A permanent-magnet synchronous motor, star connected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorDescription {
-    /// Of one phase at 20 degrees Celsius, ohm.
+    /// Resistance of one phase at 20 degrees Celsius, ohm.
     pub resistance: f64,
-    /// Along the magnets' axis, H.
+    /// Inductance along the magnets' axis, H.
     pub inductance_d: f64,
-    /// Across it, H.
+    /// Inductance across the magnets' axis, H.
     pub inductance_q: f64,
     /// Peak of the magnets' flux linkage with a phase, V s.
     pub flux: f64,
@@ -28,20 +29,20 @@ pub struct MotorDescription {
     pub cogging: f64,
     /// Periods of the cogging torque per turn of the rotor.
     pub cogging_periods: u32,
-    /// Winding to surroundings, K/W.
+    /// Thermal resistance from winding to surroundings, K/W.
     pub thermal_resistance: f64,
-    /// Of the winding's warming, s.
+    /// Thermal time constant of the winding, s.
     pub thermal_time: f64,
 }
 
 /// Three half bridges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BridgeDescription {
-    /// Both switches of a leg off at each edge, s.
+    /// Dead time: both switches of a leg are off at each edge, s.
     pub dead_time: f64,
-    /// Of a switch that is on, ohm.
+    /// Resistance of a switch that is on, ohm.
     pub on_resistance: f64,
-    /// Of a diode that conducts, V.
+    /// Forward voltage of a diode, V.
     pub diode_drop: f64,
     /// Steps of the duty.
     pub duty_steps: f64,
@@ -56,15 +57,15 @@ impl Default for BridgeDescription {
 /// Shunts of the outputs B and C with amplifiers and converter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShuntDescription {
-    /// Ohm.
+    /// Shunt resistance, ohm.
     pub resistance: f64,
-    /// Of the amplifier, V/V.
+    /// Amplifier gain, V/V.
     pub gain: f64,
-    /// Of the amplifier's first-order settling, s: 1 % after 1.2 us.
+    /// Time constant of the amplifier's first-order settling, s: 1 % after 1.2 us.
     pub settling: f64,
-    /// From the middle of the lower zero vector to what the converter holds, s.
+    /// Delay from the middle of the lower zero vector to the converter's hold, s.
     pub delay: f64,
-    /// Between which the amplifier's output stays, V.
+    /// Range of the amplifier's output, V.
     pub rails: [f64; 2],
     /// Code without current, less half of the range.
     pub offset_codes: [f64; 2],
@@ -90,8 +91,8 @@ impl Default for ShuntDescription {
 }
 
 impl ShuntDescription {
-    /// From the middle of the lower zero vector to the hold, s, for a trigger so many timer clocks after that middle:
-    /// the converter samples for three of its clocks of 21 MHz.
+    /// Delay from the middle of the lower zero vector to the hold, s, for a trigger so many timer clocks
+    /// after that middle. The converter samples for three of its clocks of 21 MHz.
     #[must_use]
     pub fn delay_of(trigger_clocks: f64) -> f64 {
         trigger_clocks / f64::from(BRIDGE_CLOCK_HZ) + 3.0 / 21e6
@@ -101,14 +102,14 @@ impl ShuntDescription {
 /// Disturbance of an axis' shunts by the edges of other axes' bridges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingDescription {
-    /// Added to the current that is read for each rising edge in the window, subtracted for each falling one, A.
+    /// Added to the measured current for each rising edge in the window, subtracted for each falling one, A.
     pub ampere_per_edge: f64,
-    /// Time before the converter holds in which an edge disturbs, s.
+    /// Time before the converter's hold in which an edge disturbs, s.
     pub window: f64,
 }
 
 impl Default for CouplingDescription {
-    /// No disturbance; the window is that in which an amplifier settles to 1 %.
+    /// No disturbance; the window is the time in which an amplifier settles to 1 %.
     fn default() -> Self {
         Self { ampere_per_edge: 0.0, window: 1.2e-6 }
     }
@@ -117,26 +118,26 @@ impl Default for CouplingDescription {
 /// Quadrature counter of the motor's encoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CounterDescription {
-    /// Per turn of the rotor.
+    /// Counts per turn of the rotor.
     pub counts: f64,
-    /// The counter where the rotor's angle is 0.
+    /// Counter value at rotor angle 0.
     pub start: u16,
     /// Rotor angle at which the index pulse comes, rad.
     pub index: f64,
 }
 
-/// What is connected to what.
+/// Electrical connections of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wiring {
     /// The motor's phase (0 to 2) on each of the bridge's outputs A, B and C.
     pub phases: [usize; 3],
-    /// An output whose wire is broken.
+    /// Output with a broken wire.
     pub open: Option<usize>,
-    /// Codes of B and C exchanged.
+    /// Whether the codes of B and C are exchanged.
     pub shunts_exchanged: bool,
-    /// Shunts whose sign is wrong, B and C.
+    /// Shunts with a wrong sign, B and C.
     pub shunts_inverted: [bool; 2],
-    /// How the encoder is connected.
+    /// Connection of the encoder.
     pub encoder: EncoderWiring,
 }
 
@@ -152,19 +153,19 @@ impl Default for Wiring {
     }
 }
 
-/// How an encoder is connected.
+/// Connection of an encoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EncoderWiring {
     /// Counts up with the rotor's angle.
     #[default]
     Forward,
-    /// Counts down.
+    /// Counts down with the rotor's angle.
     Reversed,
-    /// Counts nothing.
+    /// Does not count.
     Missing,
 }
 
-/// One axis.
+/// Complete description of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisDescription {
     /// Motor.
@@ -181,14 +182,14 @@ pub struct AxisDescription {
     pub ratio: f64,
 }
 
-/// What feeds the bridges.
+/// Supply of the bridges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SupplyDescription {
-    /// Without load, V.
+    /// Voltage without load, V.
     pub voltage: f64,
-    /// Of source and cable, ohm.
+    /// Resistance of source and cable, ohm.
     pub resistance: f64,
-    /// Of the bus, F.
+    /// Capacitance of the bus, F.
     pub capacitance: f64,
     /// Brake resistor, ohm; infinite for none.
     pub brake_resistance: f64,
@@ -205,11 +206,11 @@ impl Default for SupplyDescription {
 /// Complete drives of a leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompleteDescription<const N: usize> {
-    /// Proximal first.
+    /// Axes, proximal first.
     pub axes: [AxisDescription; N],
-    /// Common to all axes.
+    /// Supply, common to all axes.
     pub supply: SupplyDescription,
-    /// Quarters of a PWM period by which each axis begins after the one before.
+    /// Quarters of a PWM period by which each axis begins after the preceding one.
     pub shift_quarters: u32,
     /// Disturbance of each axis by the edges of the others.
     pub coupling: CouplingDescription,

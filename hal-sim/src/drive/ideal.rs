@@ -5,11 +5,12 @@
 //! torque at the joint = torque per ampere * current
 //! ```
 //!
-//! Why no more: the servo and the identification are meant to be tested apart from a current loop. Between
-//! servo ticks the current is taken as the straight line between its exact values at the ticks, so that the
-//! current read at the ticks and the torque the leg feels belong together without a shift in time (the
-//! exponential would shift the torque by 4 % of a tick at the default lag). Known limits: no bus voltage, no
-//! back-EMF limit, no saturation. Cost: 4 operations per tick.
+//! Why no more: this drive tests servo and identification apart from a current loop. Between servo ticks the
+//! current is the straight line between its exact values at the ticks. So the current read at the ticks and
+//! the torque on the leg belong together without a time shift. (The exponential would shift the torque by 4 %
+//! of a tick at the default lag.)
+//! Known limits: no bus voltage, no back-EMF limit, no saturation.
+//! Cost: 4 operations per tick.
 
 use crate::description::DriveDescription;
 use crate::maths::exp;
@@ -19,14 +20,14 @@ use crate::maths::exp;
 pub struct Drive {
     torque_per_ampere: f64,
     current_limit: f64,
-    /// What is left of a deviation after one tick, 0..=1.
+    /// Share of a deviation that remains after one tick, 0..=1.
     remainder: f64,
     current: f64,
     target: f64,
 }
 
 impl Drive {
-    /// A released drive without current, to be ticked every `tick` s.
+    /// A drive without current, outputs off, for ticks of `tick` s.
     #[must_use]
     pub fn new(description: &DriveDescription, tick: f64) -> Self {
         let remainder = if description.lag > 0.0 { exp(-tick / description.lag) } else { 0.0 };
@@ -39,8 +40,8 @@ impl Drive {
         }
     }
 
-    /// Sets the target, A, limited; what is not a number counts as 0. A released bridge carries no current,
-    /// so release acts at once.
+    /// Sets the target, A, clamped; NaN counts as 0. With outputs off no current flows, so switching off acts
+    /// at once.
     pub fn command(&mut self, enabled: bool, target: f64) {
         let target = if enabled && !target.is_nan() { target } else { 0.0 };
         self.target = target.clamp(-self.current_limit, self.current_limit);
@@ -49,18 +50,18 @@ impl Drive {
         }
     }
 
-    /// One tick later.
+    /// Advances by one tick.
     pub fn advance(&mut self) {
         self.current = self.target + (self.current - self.target) * self.remainder;
     }
 
-    /// Motor current now, A.
+    /// Present motor current, A.
     #[must_use]
     pub fn current(&self) -> f64 {
         self.current
     }
 
-    /// Torque at the joint now, N m, anatomical sign.
+    /// Present torque at the joint, N m, anatomical sign.
     #[must_use]
     pub fn torque(&self) -> f64 {
         self.torque_per_ampere * self.current

@@ -1,11 +1,11 @@
 //! Joint drives: an ideal one, and a complete one down to switches and converter codes.
 //!
-//! | module | what lives there |
+//! | module | content |
 //! | --- | --- |
 //! | [`ideal`] | a current that follows its target with a lag |
-//! | [`description`] | what a complete drive is made from |
+//! | [`description`] | parameters of a complete drive |
 //! | [`motor`] | three phases by their flux linkages: currents, torque, heat |
-//! | [`bridge`] | which switch conducts when: centred pulses, dead time |
+//! | [`bridge`] | conduction of each switch: centred pulses, dead time |
 //! | [`shunts`] | amplifiers and converter: the codes that the firmware reads |
 //! | [`counter`] | encoder counter with its index pulse |
 //! | [`supply`] | bus capacitor, source that takes nothing back, brake resistor |
@@ -13,8 +13,8 @@
 //! | [`complete`] | all axes on their supply |
 //! | [`stand`] | one axis on a test stand |
 //!
-//! The ideal drive serves identification apart from a current loop; the complete drive serves the firmware's current loop
-//! and its calibration, which see nothing but [`scarab::hal::AxisSample`].
+//! The ideal drive tests identification apart from a current loop. The complete drive tests the firmware's
+//! current loop and its calibration, which use only [`scarab::hal::AxisSample`].
 
 pub mod axis;
 pub mod bridge;

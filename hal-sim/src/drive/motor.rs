@@ -1,44 +1,45 @@
-//! Permanent-magnet motor by the flux linkages of its windings, at rest with the stator.
+//! Permanent-magnet motor by the flux linkages of its windings, in the stator's frame.
 //!
-//! Why another formulation than the firmware's: its rotating frame appears nowhere here. States are the flux linkages
-//! themselves, inductances depend on the rotor's position, and the back-EMF is nothing apart: it is the part of the
-//! flux's change that the magnets make. Fluxes, currents and voltages of the three phases less their mean are two numbers,
-//! one along phase 0 and one across:
+//! Why another formulation than the firmware's: the simulator does not share the rotating frame. States are
+//! the flux linkages themselves, and inductances depend on the rotor's position. The back-EMF has no term of
+//! its own: it is the magnets' part in the change of flux. Fluxes, currents and voltages of the three phases
+//! less their mean are two numbers, one along phase 0 and one across:
 //!
 //! ```text
-//! x_a = (2 x_0 - x_1 - x_2) / 3,   x_b = (x_1 - x_2) / sqrt 3;       x_0 = x_a,  x_1,2 = -x_a/2 +- sqrt 3/2 x_b
+//! x_a = (2 x_0 - x_1 - x_2) / 3,   x_b = (x_1 - x_2) / sqrt 3;    x_0 = x_a,  x_1,2 = -x_a/2 +- sqrt 3/2 x_b
 //! d psi / dt = v - R i
 //! i_a = (m + s cos 2 angle) f_a + s sin 2 angle f_b          f = psi - flux (cos angle, sin angle)
 //! i_b = s sin 2 angle f_a + (m - s cos 2 angle) f_b          m, s = (1/Ld +- 1/Lq) / 2
 //! torque = 3/2 pole pairs (psi_a i_b - psi_b i_a)
 //! ```
 //!
-//! `v` terminal voltages (V), `R` of winding and switch (ohm), angle electrical (rad), `Ld`, `Lq` along and across the
-//! magnets' axis (H). With i_k = -i sin(angle - 120 k) the torque is 1.5 pole pairs flux i.
-//! Source: Park 1929 in quantities of the stator, as in Krause, Wasynczuk and Sudhoff, Analysis of Electric Machinery,
-//! chapter 1.
+//! `v` terminal voltages (V), `R` of winding and switch (ohm), angle electrical (rad), `Ld`, `Lq` along and
+//! across the magnets' axis (H). With i_k = -i sin(angle - 120 k) the torque is 1.5 pole pairs flux i.
+//! Source: Park 1929 in quantities of the stator, as in Krause, Wasynczuk and Sudhoff, Analysis of Electric
+//! Machinery, chapter 1.
 //!
-//! A step is the midpoint rule with terminal voltages and speed held. An output with both switches off is led by the diode that
-//! its current keeps open; where the current could end within the step, its voltage is that which ends the step without
-//! current, kept between the diodes' limits (complementarity, implicit Euler; several such outputs by Gauss-Seidel).
-//! Cost: two evaluations of the currents, some 60 operations. Known limits: sinusoidal flux, no saturation, no iron losses,
-//! magnets that do not warm.
+//! A step is the midpoint rule with constant terminal voltages and speed. For an output with both switches
+//! off, the diode that its current keeps open sets the voltage. Where the current could end within the step,
+//! the voltage is the one that ends the step at zero current, clamped to the diodes' limits. That is a
+//! complementarity problem, solved by implicit Euler, for several such outputs by Gauss-Seidel.
+//! Cost: two evaluations of the currents, some 60 operations.
+//! Known limits: sinusoidal flux, no saturation, no iron losses, magnets at constant temperature.
 
 use super::description::MotorDescription;
 use crate::maths::sin_cos;
 
-/// Copper, 1/K.
+/// Temperature coefficient of copper, 1/K.
 const RESISTANCE_PER_KELVIN: f64 = 0.003_93;
-/// Surroundings, and where resistance is stated, degrees Celsius.
+/// Temperature of the surroundings and of the stated resistance, degrees Celsius.
 const AMBIENT: f64 = 20.0;
 /// Half the square root of 3.
 const SIN_60: f64 = 0.866_025_403_784_438_6;
-/// Sweeps over outputs that are off; each reduces what is left by four.
+/// Sweeps over outputs that are off; each reduces the remaining error by a factor of four.
 const SWEEPS: usize = 6;
-/// Below this a current is none, A.
+/// Currents below this count as zero, A.
 const NO_CURRENT: f64 = 1e-6;
 
-/// The electrical angle as a direction, turned in small steps.
+/// Electrical angle as a direction, advanced in small steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Direction {
     cosine: f64,
@@ -46,14 +47,14 @@ pub struct Direction {
 }
 
 impl Direction {
-    /// Of an angle in rad.
+    /// Direction of an angle in rad.
     #[must_use]
     pub fn of(angle: f64) -> Self {
         let (sine, cosine) = sin_cos(angle);
         Self { cosine, sine }
     }
 
-    /// Turned by a small angle (rad): exact to 1e-9 for 0.1 rad.
+    /// Direction after a small turn (rad): exact to 1e-9 for 0.1 rad.
     #[must_use]
     pub fn turned(&self, angle: f64) -> Self {
         let square = angle * angle;
@@ -71,7 +72,7 @@ impl Direction {
     }
 }
 
-/// A quantity of the three phases less their mean: along phase 0 and across.
+/// Quantity of the three phases less their mean: along phase 0 and across.
 type Pair = [f64; 2];
 
 fn pair(phases: &[f64; 3]) -> Pair {
@@ -83,16 +84,16 @@ fn phases(pair: &Pair) -> [f64; 3] {
     [pair[0], along + across, along - across]
 }
 
-/// What a terminal is connected to during a step.
+/// Connection of a terminal during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Terminal {
-    /// To a voltage, V.
+    /// Connected to a voltage, V.
     Held(f64),
-    /// To nothing but diodes: lowest and highest voltage, V.
+    /// Connected to diodes only: lowest and highest voltage, V.
     Off(f64, f64),
 }
 
-/// What a step moved.
+/// Transfers during a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Flow {
     /// Torque integrated over time, N m s.
@@ -103,29 +104,30 @@ pub struct Flow {
     pub heat: f64,
 }
 
-/// One motor.
+/// State of one motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motor {
     description: MotorDescription,
-    /// Of the inverse inductances, mean and swing: m and s, 1/H.
+    /// Inverse inductances, mean and swing: m and s, 1/H.
     mean: f64,
     swing: f64,
-    /// Of winding at its temperature and switch, ohm.
+    /// Resistance of winding at its temperature and switch, ohm.
     resistance: f64,
     on_resistance: f64,
     torque_factor: f64,
-    /// Winding, degrees Celsius.
+    /// Temperature of the winding, degrees Celsius.
     temperature: f64,
-    /// V s.
+    /// Flux linkage, V s.
     flux: Pair,
-    /// Electrical angle now.
+    /// Present electrical angle.
     angle: Direction,
-    /// What follows from both, A.
+    /// Currents that follow from flux and angle, A.
     currents: Pair,
 }
 
 impl Motor {
-    /// Cold and without current, rotor at `angle` (electrical); `on_resistance` of a switch comes on top of the winding's.
+    /// A cold motor without current, rotor at `angle` (electrical); `on_resistance` of a switch is added to
+    /// the winding's.
     #[must_use]
     pub fn new(description: &MotorDescription, on_resistance: f64, angle: Direction) -> Self {
         let (along, across) = (1.0 / description.inductance_d, 1.0 / description.inductance_q);
@@ -143,23 +145,23 @@ impl Motor {
         }
     }
 
-    /// Puts the rotor elsewhere, without current.
+    /// Moves the rotor to an angle, without current.
     pub fn place(&mut self, angle: Direction) {
         (self.angle, self.flux, self.currents) = (angle, self.of_magnets(&angle), [0.0; 2]);
     }
 
-    /// Puts right what small turns have added up; fluxes stay.
+    /// Replaces the angle accumulated by small turns with the exact one; fluxes stay.
     pub fn set_angle(&mut self, angle: Direction) {
         (self.angle, self.currents) = (angle, self.currents_of(&self.flux, &angle));
     }
 
-    /// Winding, degrees Celsius.
+    /// Temperature of the winding, degrees Celsius.
     #[must_use]
     pub fn temperature(&self) -> f64 {
         self.temperature
     }
 
-    /// Of a phase with its switch, warm, ohm.
+    /// Resistance of a phase with its switch at the present temperature, ohm.
     #[must_use]
     pub fn resistance(&self) -> f64 {
         self.resistance
@@ -178,7 +180,7 @@ impl Motor {
         [cosine * along + sine * across, cosine * across - sine * along]
     }
 
-    /// Energy of the currents' field, J.
+    /// Energy of the field that the currents produce, J.
     #[must_use]
     pub fn field_energy(&self) -> f64 {
         let magnets = self.of_magnets(&self.angle);
@@ -195,7 +197,7 @@ impl Motor {
             + self.on_resistance;
     }
 
-    /// One step of `duration` s with the rotor turning at `speed` (electrical, rad/s).
+    /// Advances by `duration` s with the rotor turning at `speed` (electrical, rad/s).
     pub fn advance(&mut self, terminals: &[Terminal; 3], speed: f64, duration: f64) -> Flow {
         let mut voltages = [0.0; 3];
         let currents = phases(&self.currents);
@@ -216,13 +218,13 @@ impl Motor {
         self.driven(&voltages, speed, duration)
     }
 
-    /// No current changes by more within a step, A: twice what the bus makes of the smaller inductance; infinite where the wire
-    /// is broken.
+    /// Upper bound on the change of a current within a step, A: twice what the bus produces in the smaller
+    /// inductance. Infinite where the wire is broken.
     fn largest_change(&self, bus: f64, duration: f64) -> f64 {
         2.0 * bus * duration * (self.mean + self.swing.abs())
     }
 
-    /// All terminals at known voltages: midpoint rule.
+    /// Step with all terminals at known voltages: midpoint rule.
     fn driven(&mut self, voltages: &[f64; 3], speed: f64, duration: f64) -> Flow {
         let driving = pair(voltages);
         let middle = self.angle.turned(0.5 * speed * duration);
@@ -238,7 +240,7 @@ impl Motor {
         self.flow(&half, &currents, duration)
     }
 
-    /// Some terminal is off and its current may end: implicit in its voltage.
+    /// Step with a terminal off whose current may end: implicit in its voltage.
     #[inline(never)]
     fn partly_off(&mut self, terminals: &[Terminal; 3], speed: f64, duration: f64) -> Flow {
         let start = self.currents;
@@ -283,7 +285,7 @@ impl Motor {
         self.flow(&half, &currents, duration)
     }
 
-    /// No diode begins to conduct by the magnets' voltage alone.
+    /// Whether the magnets' voltage alone opens no diode.
     fn stays_dark(&self, terminals: &[Terminal; 3], speed: f64) -> bool {
         let between = 2.0 * SIN_60 * self.description.flux * speed.abs();
         terminals.iter().all(|terminal| match terminal {
@@ -315,7 +317,8 @@ impl Motor {
         [(self.mean + swing) * along + coupling * across, coupling * along + (self.mean - swing) * across]
     }
 
-    /// Cogging torque at a rotor angle (rad), N m: the negative slope of a potential, so it does no work over a turn.
+    /// Cogging torque at a rotor angle (rad), N m: the negative slope of a potential, so it does no work over
+    /// a turn.
     #[must_use]
     pub fn cogging(&self, rotor: f64) -> f64 {
         if self.description.cogging == 0.0 {

@@ -1,15 +1,17 @@
 //! Shunts under the low sides of B and C, their amplifiers and the converter.
 //!
 //! ```text
-//! seen    = (i + (delay - settling) di/dt) (1 - exp(-t / settling)) + disturbance     t since the low side began to conduct
+//! seen    = (i + (delay - settling) di/dt) (1 - exp(-t / settling)) + disturbance
 //! volt    = middle + gain (1 + error) shunt seen,                within the rails
 //! code    = nearest whole number of volt / 3.3 * 4096 + offset + noise,    0..=4095
 //! ```
 //!
-//! A first-order amplifier that follows a ramp is late by its time constant; the converter holds `delay` after the middle of
-//! the lower zero vector what it sees. After the edge the amplifier first has to get there: a
-//! duty that leaves the low side too little time is read wrong, here as on the board. Half of the range is no current; a
-//! higher code is a current from the bridge into the motor. Sources: board facts in `description`.
+//! Here t is the time since the low side began to conduct. A first-order amplifier that follows a ramp lags
+//! by its time constant; the converter holds its output `delay` after the middle of the lower zero vector.
+//! After the edge the amplifier first has to settle. A duty that leaves the low side too little time reads
+//! wrong, here as on the board. Half of the range is zero current; a higher code is a current from the bridge
+//! into the motor.
+//! Sources: board facts in `description`.
 //! Cost: two exponentials and two random numbers per axis and period.
 
 use super::description::ShuntDescription;
@@ -22,20 +24,20 @@ pub const CONVERTER_VOLT: f64 = 3.3;
 /// Codes of the converter.
 pub const CODES: f64 = 4096.0;
 
-/// What one shunt sees at the sample.
+/// Input of one shunt at the sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ShuntState {
-    /// From the bridge into the motor, A.
+    /// Current from the bridge into the motor, A.
     pub current: f64,
-    /// Its change, A/s.
+    /// Slope of the current, A/s.
     pub slope: f64,
     /// Time for which the low side has been conducting, s; 0 if it does not.
     pub conducting: f64,
-    /// Added to what is seen by the edges of other bridges, A.
+    /// Error added by the edges of other bridges, A.
     pub disturbance: f64,
 }
 
-/// A voltage at the converter as its code.
+/// Converts a voltage at the converter to its code.
 #[must_use]
 pub fn convert(volt: f64, error_codes: f64) -> u16 {
     nearest(volt / CONVERTER_VOLT * CODES + error_codes).clamp(0, CODES as i64 - 1) as u16

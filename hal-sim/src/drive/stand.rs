@@ -1,14 +1,15 @@
 //! One motor on a test stand: free with its inertia and friction, or turned by another machine.
 //!
-//! Why: a current loop and its calibration are looked at without a leg.
+//! Why: tests a current loop and its calibration without a leg.
 //!
 //! ```text
-//! free   inertia dw/dt = torque - viscous w - dry friction - load       a rotor that stops sticks up to the dry friction
-//! turned w as told
+//! free   inertia dw/dt = torque - viscous w - dry friction - load;  at rest it sticks up to the dry friction
+//! turned w is given
 //! ```
 //!
-//! The rotor is moved once per PWM period by the mean torque of the period (symplectic Euler: 42 us). Angles and speeds are the rotor's, rad and
-//! rad/s; N m, kg m^2. Known limits: no elasticity.
+//! The rotor moves once per PWM period by the mean torque of the period (symplectic Euler: 42 us). Angles and
+//! speeds are the rotor's, rad and rad/s; N m, kg m^2.
+//! Known limits: no elasticity.
 
 use super::axis::{Axis, PERIOD_S};
 use super::complete::{CompleteDrives, Rotor};
@@ -16,25 +17,25 @@ use super::description::{AxisDescription, CompleteDescription, SupplyDescription
 use super::supply::Supply;
 use scarab::hal::{AxisCommand, AxisSample};
 
-/// What holds or moves the rotor.
+/// Mechanical load of the rotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Load {
-    /// Nothing but itself.
+    /// Free rotor with inertia and friction.
     Free {
-        /// Of the rotor and what turns with it, kg m^2.
+        /// Inertia of the rotor and its load, kg m^2.
         inertia: f64,
         /// Dry friction, N m.
         coulomb: f64,
-        /// N m s/rad.
+        /// Viscous friction, N m s/rad.
         viscous: f64,
         /// Constant torque against the positive direction, N m.
         torque: f64,
     },
-    /// Another machine turns it at this speed, rad/s.
+    /// Turned by another machine at this speed, rad/s.
     Turned(f64),
 }
 
-/// An axis on its stand.
+/// An axis on its test stand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stand {
     drives: CompleteDrives<1>,
@@ -44,7 +45,7 @@ pub struct Stand {
 }
 
 impl Stand {
-    /// Rotor at rest at `angle` (rad), bridge released.
+    /// Creates a stand with the rotor at rest at `angle` (rad), outputs off.
     #[must_use]
     pub fn new(
         axis: &AxisDescription,
@@ -62,17 +63,17 @@ impl Stand {
         }
     }
 
-    /// Another load from now on.
+    /// Changes the load.
     pub fn set_load(&mut self, load: Load) {
         self.load = load;
     }
 
-    /// The wire of an output (A, B, C from 0) breaks.
+    /// Breaks the wire of an output (A, B, C from 0).
     pub fn break_wire(&mut self, output: usize) {
         self.drives.break_wire(0, output);
     }
 
-    /// One PWM period: the command acts from its beginning, where the sample is taken.
+    /// Runs one PWM period: the command acts from its beginning, where the sample is taken.
     pub fn period(&mut self, command: &AxisCommand, brake: f64) -> AxisSample {
         if let Load::Turned(speed) = self.load {
             self.rotor.speed = speed;
@@ -89,7 +90,7 @@ impl Stand {
         sample
     }
 
-    /// Where the rotor is.
+    /// Angle and speed of the rotor.
     #[must_use]
     pub fn rotor(&self) -> Rotor {
         self.rotor
@@ -101,7 +102,7 @@ impl Stand {
         self.torque
     }
 
-    /// Currents along and across the magnets' axis now, A: what no sensor of the board measures.
+    /// Present currents along and across the magnets' axis, A; no sensor of the board measures them.
     #[must_use]
     pub fn rotor_currents(&self) -> [f64; 2] {
         self.axis().motor().rotor_currents()
@@ -114,13 +115,13 @@ impl Stand {
         axis
     }
 
-    /// The bus.
+    /// Supply of the stand.
     #[must_use]
     pub fn supply(&self) -> &Supply {
         self.drives.supply()
     }
 
-    /// The bus, to be changed.
+    /// Supply of the stand, mutable.
     pub fn supply_mut(&mut self) -> &mut Supply {
         self.drives.supply_mut()
     }

@@ -1,43 +1,43 @@
-//! How a signal goes wrong, and when.
+//! Forms of a signal fault, and its timing.
 //!
 //! ```text
-//! off        0                                stuck     as it was when the fault began
+//! off        0                                stuck     value when the fault began
 //! garbage    uniform over the channel         rail      a given value
 //! offset     value + o                        scale     middle + s (value - middle)
-//! delayed    as it was n readings ago         slow      y += share (value - y)
+//! delayed    value of n readings ago          slow      y += share (value - y)
 //! ```
 //!
-//! A signal of whole numbers is rounded and wrapped or clamped by its channel afterwards.
+//! The channel afterwards rounds integer signals, and wraps or clamps them.
 
 use crate::maths::nearest;
 use rand_distr::{Distribution, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Readings that are remembered for a delay.
+/// Readings stored for a delay.
 const HISTORY: usize = 32;
 
-/// How a signal goes wrong.
+/// Form of a signal fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
-    /// Nothing comes: 0, an open contact, no pulse.
+    /// No signal: 0, an open contact, no pulse.
     Off,
     /// The last value for ever.
     Stuck,
-    /// Anything the channel can show.
+    /// Random values over the channel's range.
     Garbage,
-    /// Always this value; not a number, where the channel can carry that.
+    /// Constant value; also NaN where the channel can carry it.
     Rail(f64),
-    /// So much is added.
+    /// Adds this value.
     Offset(f64),
-    /// The distance from the channel's middle times this.
+    /// Scales the distance from the channel's middle.
     Scale(f64),
-    /// So many readings late, 31 at most.
+    /// Delays by so many readings, at most 31.
     Delayed(u8),
-    /// A lag of first order: this share of the way per reading.
+    /// First-order lag: this share of the difference per reading.
     Slow(f64),
 }
 
-/// When: from a tick on, for some ticks, and if intermittent `on` of every `on + off`.
+/// Timing: from a tick on, for some ticks; an intermittent fault acts in `on` of every `on + off` ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
     /// First tick.
@@ -46,7 +46,7 @@ pub struct Timing {
     pub duration: u64,
     /// Ticks on.
     pub on: u64,
-    /// Ticks off between; 0 for a fault that stays.
+    /// Ticks off in between; 0 for a permanent fault.
     pub off: u64,
 }
 
@@ -57,7 +57,7 @@ impl Timing {
         Self { begin, duration: u64::MAX, on: 1, off: 0 }
     }
 
-    /// From a tick on, for so many.
+    /// From a tick on, for so many ticks.
     #[must_use]
     pub const fn lasting(begin: u64, duration: u64) -> Self {
         Self { begin, duration, on: 1, off: 0 }
@@ -71,7 +71,7 @@ impl Timing {
     }
 }
 
-/// What a spoilt channel remembers.
+/// State of a faulted channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Memory {
     history: [f64; HISTORY],
@@ -83,7 +83,7 @@ pub(super) struct Memory {
 impl Memory {
     pub(super) const EMPTY: Self = Self { history: [0.0; HISTORY], next: 0, lagged: 0.0, begun: false };
 
-    /// A reading as it was goes in; as it is seen comes out.
+    /// Takes the true reading and returns the faulted one.
     pub(super) fn pass(
         &mut self,
         form: Form,
@@ -128,12 +128,12 @@ impl Memory {
     }
 }
 
-/// The nearest whole number, wrapped to 16 bits.
+/// Nearest integer, wrapped to 16 bits.
 pub(super) fn wrapped(value: f64) -> u16 {
     nearest(value) as u16
 }
 
-/// The nearest code of a 12-bit converter.
+/// Nearest code of a 12-bit converter.
 pub(super) fn code(value: f64) -> u16 {
     nearest(value).clamp(0, 4095) as u16
 }

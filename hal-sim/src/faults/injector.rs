@@ -1,4 +1,4 @@
-//! The ports of one board with what spoils them.
+//! Fault injection into the ports of one board.
 
 use super::form::{Form, Memory, Timing, code, wrapped};
 use rand_core::SeedableRng;
@@ -6,15 +6,15 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::{AxisSample, JointSample};
 use scarab::units::Ampere;
 
-/// Injections at once.
+/// Greatest number of simultaneous injections.
 pub const MOST: usize = 4;
 
-/// What is spoilt.
+/// Faulted signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// Counter of the motor's encoder, 16 bits.
     Counter,
-    /// Index pulse: `Off` hides it, anything else moves what was captured; `Garbage` makes pulses.
+    /// Index pulse: `Off` hides it, `Offset` moves the captured count, any other form makes pulses.
     Index,
     /// Shunt code of phase B.
     ShuntB,
@@ -34,36 +34,36 @@ pub enum Channel {
     EmergencyStop,
     /// A gate driver reports a fault.
     GateFault,
-    /// A gate driver's registers are not what was written.
+    /// A gate driver's registers differ from their written values.
     GateRegisters,
     /// Code of a bridge's thermistor.
     Thermistor,
     /// A shunt's conversion does not end.
     Conversion,
-    /// Those of bus voltage and thermistors do not, and their codes stay as they are.
+    /// The conversions of bus voltage and thermistors do not end, and their codes stay.
     SupplyConversion,
-    /// An axis' tick does not come.
+    /// An axis' tick is missing.
     Tick,
-    /// The servo does not come to its tick.
+    /// The servo misses its tick.
     Servo,
-    /// The housekeeping does not come to its round.
+    /// The housekeeping misses its round.
     Housekeeping,
 }
 
 /// One fault of one channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Injection {
-    /// What.
+    /// Faulted signal.
     pub channel: Channel,
-    /// Of which joint; meaningless for what the board has once.
+    /// Joint of the signal; ignored for signals that the board has once.
     pub joint: usize,
-    /// How; of a contact or of time every form means that it happens.
+    /// Form of the fault; for contacts and timing every form means that the event occurs.
     pub form: Form,
-    /// When, in PWM periods.
+    /// Timing, in PWM periods.
     pub timing: Timing,
 }
 
-/// Everything that is spoilt.
+/// All injections into one board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Injector {
     slots: [Option<(Injection, Memory)>; MOST],
@@ -77,13 +77,13 @@ const AMPERES: [f64; 2] = [-100.0, 100.0];
 const DUTY: [f64; 2] = [0.0, 1.0];
 
 impl Injector {
-    /// Nothing is spoilt.
+    /// An injector without faults.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self { slots: [None; MOST], generator: Xoshiro256PlusPlus::seed_from_u64(seed) }
     }
 
-    /// Adds a fault; `false` where there are [`MOST`] already.
+    /// Adds a fault; returns `false` where there are [`MOST`] already.
     pub fn add(&mut self, injection: Injection) -> bool {
         let free = self.slots.iter_mut().find(|slot| slot.is_none());
         free.map(|slot| *slot = Some((injection, Memory::EMPTY))).is_some()
@@ -99,7 +99,7 @@ impl Injector {
         value
     }
 
-    /// Whether a contact, or time, is spoilt at this tick.
+    /// Whether an event (contact or timing) is injected at this tick.
     #[must_use]
     pub fn happens(&self, channel: Channel, joint: usize, tick: u64) -> bool {
         self.slots.iter().flatten().any(|(injection, _)| {
@@ -107,10 +107,10 @@ impl Injector {
         })
     }
 
-    /// An axis' sample on its way to the axis.
+    /// Applies faults to an axis' sample.
     pub fn sample(&mut self, joint: usize, tick: u64, sample: &mut AxisSample) {
         let counter = self.pass(Channel::Counter, joint, tick, f64::from(sample.encoder_count), COUNTER);
-        // A counter that lost counts is captured with them lost: what is added to the one is added to the other.
+        // A counter that lost counts captures the index with the same loss: both get the same addition.
         let moved = wrapped(counter).wrapping_sub(sample.encoder_count);
         sample.encoder_count = wrapped(counter);
         sample.index_count = sample.index_count.map(|at| at.wrapping_add(moved));
@@ -122,7 +122,7 @@ impl Injector {
                 (false, _) => sample.index_count,
                 (true, Form::Off) => None,
                 (true, Form::Offset(offset)) => sample.index_count.map(|at| wrapped(f64::from(at) + offset)),
-                // A pulse out of nowhere.
+                // A spurious pulse at the present count.
                 (true, _) => Some(sample.encoder_count.wrapping_sub(slot as u16)),
             };
         }
@@ -132,7 +132,7 @@ impl Injector {
         sample.bus_code = code(self.pass(Channel::Bus, 0, tick, f64::from(sample.bus_code), CODES));
     }
 
-    /// A joint's sample on its way to the servo.
+    /// Applies faults to a joint's sample on its way to the servo.
     pub fn joint(&mut self, joint: usize, tick: u64, sample: &mut JointSample) {
         let counts = self.pass(Channel::JointCounts, joint, tick, f64::from(sample.encoder_counts), COUNTS);
         sample.encoder_counts = counts as i32;
@@ -140,17 +140,17 @@ impl Injector {
         sample.current = Ampere(current as f32);
     }
 
-    /// A target on its way to its axis.
+    /// Applies faults to a target on its way to its axis.
     pub fn target(&mut self, joint: usize, tick: u64, target: Ampere) -> Ampere {
         Ampere(self.pass(Channel::Target, joint, tick, f64::from(target.0), AMPERES) as f32)
     }
 
-    /// A thermistor's code on its way to the housekeeping.
+    /// Applies faults to a thermistor's code.
     pub fn thermistor(&mut self, joint: usize, tick: u64, value: u16) -> u16 {
         code(self.pass(Channel::Thermistor, joint, tick, f64::from(value), CODES))
     }
 
-    /// The brake resistor's duty on its way to the resistor.
+    /// Applies faults to the brake resistor's duty.
     pub fn brake(&mut self, tick: u64, duty: f32) -> f64 {
         self.pass(Channel::Brake, 0, tick, f64::from(duty), DUTY)
     }

@@ -1,17 +1,17 @@
-//! Faults of sensors, contacts, time and commands, laid over the ports of a board.
+//! Faults of sensors, contacts, timing and commands, injected into the ports of a board.
 //!
-//! Why as middleware: world and firmware stay as they are. What crosses a port passes through an [`Injector`] on its way,
-//! and comes out as it went in unless an [`Injection`] names its channel at that tick. An injector is a value: it is cloned with
-//! the world it belongs to, and the same seed spoils the same bits.
+//! Why as middleware: world and firmware stay unchanged. Every value that crosses a port passes through an
+//! [`Injector`], and leaves unchanged unless an [`Injection`] names its channel at that tick. An injector is
+//! a value: it is cloned with its world, and the same seed changes the same bits.
 //!
 //! ```text
 //! world -- AxisSample --> injector --> axis -- JointSample --> injector --> servo
 //!   ^--- brake duty <---- injector <----- target current <---- injector <-----'
 //! ```
 //!
-//! Broken supplies and phases, a wearer who kicks, a foot on the floor are not signals: they are the world's own
-//! ([`crate::drive`], [`crate::wearer`], [`crate::floor`]). Time is counted in PWM periods. Cost where nothing is injected: one
-//! comparison per channel.
+//! Failed supplies and phases, a kicking wearer and a foot on the floor are not signals; the world simulates
+//! them ([`crate::drive`], [`crate::wearer`], [`crate::floor`]). Time is counted in PWM periods. Cost without
+//! an injection: one comparison per channel.
 
 pub mod form;
 pub mod injector;

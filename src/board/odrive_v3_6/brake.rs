@@ -1,7 +1,8 @@
-//! The brake resistor's half bridge, for boards that have one connected.
+//! Half bridge of the brake resistor, for boards with one connected.
 //!
-//! Both compare values are taken over at an end of the counter, which may come between the two writes: so the one that moves
-//! away from the other is written first, and at no end are the sides closer than their gap.
+//! The timer takes over both compare values at an end of the counter, which may come between the two writes.
+//! So the value that moves away from the other is written first, and at no end are the sides closer than
+//! their gap.
 
 use super::registers::{load, store};
 use super::settings::chopper::{BASE, TOP, compare};
@@ -9,7 +10,7 @@ use super::settings::chopper::{BASE, TOP, compare};
 const LOW: u32 = BASE + 0x3C;
 const HIGH: u32 = BASE + 0x40;
 
-/// Share of time for which the resistor is on.
+/// Sets the duty of the resistor.
 #[inline(always)]
 pub fn set(duty: f32) {
     let [low, high] = compare(duty);
@@ -22,12 +23,12 @@ pub fn set(duty: f32) {
     }
 }
 
-/// Share of time for which the resistor is on now.
+/// Present duty of the resistor.
 pub fn duty() -> f32 {
     TOP.saturating_sub(load(HIGH)) as f32 / TOP as f32
 }
 
-/// The resistor has a duty.
+/// Whether the resistor has a duty.
 pub fn is_on() -> bool {
     load(HIGH) < TOP
 }

@@ -1,33 +1,34 @@
-//! Both bridges: three compare values, and the main output that lets them through.
+//! Both bridges: three compare values each, and the main output enable.
 //!
-//! Switching off is one store for each bridge, needs nothing else to work, and may be done from anywhere, also from a fault
-//! handler. Switching on is the current loop's alone.
+//! Switching off is one store for each bridge, has no preconditions, and is allowed anywhere, also in a fault
+//! handler. Only the current loop switches on.
 
 use super::registers::{load, store};
 use super::settings::timers::{BASES, BDTR, CCR1, MOE, TOP, bridge, compare};
 
-/// Register with the main output as the start wrote it: output off.
+/// BDTR as the start wrote it: main output off.
 const RELEASED: u32 = bridge(0)[0].value;
 
-/// All three outputs half of the time.
+/// All three duties one half.
 const NO_VOLTAGE: u32 = TOP as u32 / 2;
 
-/// Both bridges off, now.
+/// Turns both bridges off at once.
 #[inline]
 pub fn release_all() {
     store(BASES[0] + BDTR, RELEASED);
     store(BASES[1] + BDTR, RELEASED);
 }
 
-/// Neither bridge lets anything through.
+/// Whether both bridges are off.
 pub fn are_released() -> bool {
     BASES.iter().all(|base| load(base + BDTR) & MOE == 0)
 }
 
-/// One bridge off, now.
+/// Turns one bridge off at once.
 ///
-/// Compare values are taken over once a period, the main output at once: the first period after the bridge is enabled would have the
-/// duties of the last one before it was released. So the duties are set to half, which is no voltage.
+/// Compare values are taken over once a period, the main output at once. So the first period after enabling
+/// would have the duties of the last period before. This function therefore sets the duties to one half,
+/// which is no voltage.
 #[inline]
 pub fn release(axis: usize) {
     let Some(&base) = BASES.get(axis) else { return };
@@ -47,8 +48,8 @@ pub fn set_duty(axis: usize, duty: &[f32; 3]) {
     store(base + CCR1 + 8, compare(c).into());
 }
 
-/// Switches the outputs of a bridge on. Only with interrupts masked, and after a look at the inhibit word: a stop that comes after
-/// the look switches them off again.
+/// Switches the outputs of a bridge on. Call only with interrupts masked and after reading the inhibit word:
+/// a stop that comes after the read then switches the outputs off again.
 #[inline]
 pub fn enable(axis: usize) {
     if let Some(&base) = BASES.get(axis) {

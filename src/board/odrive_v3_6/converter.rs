@@ -1,4 +1,4 @@
-//! What the converters found, read in the interrupt at their end.
+//! Results of the converters, read in the interrupt at the end of conversion.
 
 use super::registers::{load, store};
 use super::settings::converters::{BASES, DR, EOC, JDR1, JEOC, SR, cleared};
@@ -7,10 +7,12 @@ const ADC1: u32 = BASES[0];
 const ADC2: u32 = BASES[1];
 const ADC3: u32 = BASES[2];
 
-/// Which axes' conversions have ended since the last call, for each whether both shunts' did; clears what it saw.
+/// Axes with conversions finished since the last call; `Some(true)` where both shunts are. Clears the flags
+/// it returns.
 #[inline(always)]
 pub fn finished() -> [Option<bool>; 2] {
-    // The one that is waited for first: a conversion that ends between the two loads is then seen as a whole at the next call.
+    // ADC3, whose interrupt is awaited, is read first: a conversion that ends between both loads is then seen
+    // whole at the next call.
     let status = load(ADC3 + SR);
     let other = load(ADC2 + SR);
     let seen = status & (JEOC | EOC);
@@ -19,8 +21,8 @@ pub fn finished() -> [Option<bool>; 2] {
     [JEOC, EOC].map(|flag| (status & flag != 0).then_some(other & flag != 0))
 }
 
-/// Whether bus voltage and thermistors were converted since this was asked last. Their scan ends after the shunts' of axis 0, so in its
-/// interrupt it is the one before that is seen.
+/// Whether bus voltage and thermistors were converted since the last call. Their scan ends after the shunts'
+/// of axis 0, so in that axis' interrupt this is the preceding scan.
 #[inline(always)]
 pub fn supply_finished() -> bool {
     let seen = load(ADC1 + SR) & JEOC;
@@ -28,7 +30,7 @@ pub fn supply_finished() -> bool {
     seen != 0
 }
 
-/// Codes of the shunts of B and C of an axis.
+/// Shunt codes of B and C of an axis.
 #[inline(always)]
 pub fn shunts(axis: usize) -> [u16; 2] {
     let result = if axis == 0 { JDR1 } else { DR };

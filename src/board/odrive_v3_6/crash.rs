@@ -1,4 +1,4 @@
-//! What a crash does on this board: both bridges off by two stores; and the crystal's failure, which is a crash.
+//! Crash handling of this board: both bridges off by two stores. A failure of the crystal counts as a crash.
 #![expect(unsafe_code, reason = "a name that the crash handler finds at link time, and a vector")]
 
 use cortex_m::peripheral::DWT;
@@ -9,14 +9,15 @@ use super::registers::apply;
 use super::settings::CLOCK_FAILURE_SEEN;
 use crate::board::crash::{Cause, give_up};
 
-/// Called by every crash, before anything else.
+/// First step of every crash.
 #[unsafe(no_mangle)]
 extern "C" fn scarab_release() -> u32 {
     bridge::release_all();
     DWT::cycle_count()
 }
 
-/// The crystal failed: the processor runs on its own oscillator, and so do the bridges' timers until they are released here.
+/// Failure of the crystal: the processor and the bridges' timers run on the internal oscillator until the
+/// outputs are off.
 #[exception]
 unsafe fn NonMaskableInt() {
     bridge::release_all();

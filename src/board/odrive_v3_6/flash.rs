@@ -1,12 +1,14 @@
-//! The flash that keeps what outlives the power, behind `embedded-storage`'s trait.
+//! Flash for persistent data, behind `embedded-storage`'s trait.
 //!
-//! **What a write costs.** The chip has one bank: while it is written (16 us a word, 100 at most) or erased (1 s a sector, 2 at most), whoever
-//! fetches from it stands still, and that is everything: current loops, servo, bus, watchdog. So nothing is touched unless both
-//! bridges' main outputs are off and the brake resistor's duty is none, by their own registers, whatever the caller believes: a duty would stay
-//! for as long as the flash stands. The rest is `operation::Storing`'s: the interlock raised before, hosts told, the watchdog stretched.
+//! **What a write costs.** The chip has one bank. A write takes 16 us a word (100 at most), an erase 1 s a
+//! sector (2 at most). Every fetch from flash stalls meanwhile: current loops, servo, bus, watchdog. So
+//! nothing is changed unless the registers show both main outputs off and the brake resistor's duty zero. The
+//! caller's word is not enough: a duty would stay on during the stall. `operation::Storing` does the rest: it
+//! raises the inhibit first, informs hosts and stretches the watchdog.
 //!
-//! An erase stops the executors' time (TIM5): a timer that overflowed unseen would count half a period wrong for ever, and with
-//! time that stands nobody is late afterwards. It also empties the data cache, which an erase leaves as it was.
+//! An erase stops the executors' timer (TIM5). An overflow missed during the stall would leave the time half
+//! a period wrong for ever; with stopped time no deadline passes. The driver also empties the data cache,
+//! which an erase does not invalidate.
 //!
 //! Source: RM0090 3.6, 3.9; times DS8626 table 42 (words of 32 bits).
 
@@ -22,23 +24,23 @@ use super::settings::flash::{
 };
 use super::{brake, bridge, watchdog};
 
-/// Longest wait, processor cycles: for an erased sector 5 s, for a word 1 ms.
+/// Longest wait, processor cycles: 5 s for an erased sector, 1 ms for a word.
 const ERASED: u32 = 5 * CLOCK_HZ;
 const WRITTEN: u32 = CLOCK_HZ / 1000;
-/// Control register of the executors' timer, and the bit that has it count.
+/// Control register of the executors' timer, and its enable bit.
 const TIM5_CR1: u32 = 0x4000_0C00;
 const COUNTS: u32 = 1;
 
-/// Why nothing was written.
+/// Reason for which nothing was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashError {
-    /// Beyond both sectors.
+    /// Range beyond both sectors.
     OutOfBounds,
-    /// Not in whole words, or sectors.
+    /// Range not in whole words or sectors.
     NotAligned,
-    /// A bridge is on, or the brake resistor.
+    /// A bridge or the brake resistor is on.
     Armed,
-    /// The flash says so, or does not answer.
+    /// The flash reports an error or does not answer.
     Failed,
 }
 
@@ -52,16 +54,16 @@ impl NorFlashError for FlashError {
     }
 }
 
-/// Both sectors as one range that begins at 0; there is one.
+/// Both sectors as one range that begins at 0. Only one instance exists.
 pub struct Flash(());
 
 impl Flash {
-    /// For whoever keeps the store; two of them would undo each other's writes.
+    /// For the owner of the store; two instances would undo each other's writes.
     pub(super) const fn new() -> Self {
         Self(())
     }
 
-    /// Opens the flash for one change and closes it again.
+    /// Unlocks the flash for one change and locks it again.
     fn change(
         &mut self,
         control: u32,
@@ -86,7 +88,7 @@ impl Flash {
     }
 }
 
-/// Where it begins, if all of it lies within both sectors.
+/// Address of a range, if it lies within both sectors.
 fn place(offset: u32, length: usize) -> Result<u32, FlashError> {
     match offset.checked_add(length as u32) {
         Some(end) if end <= BYTES => Ok(FIRST + offset),
@@ -121,7 +123,7 @@ impl NorFlash for Flash {
         }
         place(from, (to - from) as usize)?;
         for number in NUMBERS.into_iter().skip((from / SECTOR) as usize).take(((to - from) / SECTOR) as usize) {
-            // A sector's time is within the stretched watchdog's, two might not be.
+            // The stretched watchdog covers the time of one sector, perhaps not of two.
             watchdog::feed();
             store(TIM5_CR1, load(TIM5_CR1) & !COUNTS);
             let chosen = erase(number);

@@ -1,7 +1,7 @@
-//! Two DRV8301 on one SPI: reset, configured, read back, and read back again while they run.
+//! Two DRV8301 on one SPI: reset, configuration and read-back, which is repeated in operation.
 //!
-//! Both share their enable line and their fault line: what resets one resets the other. A transfer takes 6 us and is waited for;
-//! it runs below the servo.
+//! Both share their enable line and their fault line: a reset affects both. A transfer takes 6 us of busy
+//! waiting, below the servo's level.
 
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::spi::{Config, MODE_1, Spi, mode::Master};
@@ -22,7 +22,7 @@ pub struct GateDrivers {
     spi: Spi<'static, Blocking, Master>,
 }
 
-/// SPI as the drivers want it: second edge, 42 MHz / 16 (`spi.c:71-76`, `drv8301.cpp:7-19`).
+/// SPI settings of the drivers: second edge, 42 MHz / 16 (`spi.c:71-76`, `drv8301.cpp:7-19`).
 pub(super) fn configuration() -> Config {
     let mut configuration = Config::default();
     configuration.mode = MODE_1;
@@ -36,17 +36,17 @@ impl GateDrivers {
         Self { spi }
     }
 
-    /// Both off, for at least 40 us; the bridges must be released.
+    /// Turns both off, for at least 40 us; the bridges must be off.
     pub fn off(&mut self) {
         drive(b'B', ENABLE, false);
     }
 
-    /// Both on; they answer 20 ms later.
+    /// Turns both on; they answer 20 ms later.
     pub fn on(&mut self) {
         drive(b'B', ENABLE, true);
     }
 
-    /// Off and on again, waiting: for the start.
+    /// Turns both off and on again with busy waiting; for the start.
     pub(super) fn restart(&mut self) {
         self.off();
         cortex_m::asm::delay(40 * CYCLES_PER_US);
@@ -54,7 +54,7 @@ impl GateDrivers {
         cortex_m::asm::delay(20_000 * CYCLES_PER_US);
     }
 
-    /// Tells both what they are to do; whether each axis' driver holds it. Takes 0.3 ms.
+    /// Writes both configurations; returns whether each axis' driver holds its own. Takes 0.3 ms.
     pub fn configure(&mut self) -> [bool; 2] {
         for axis in 0..2 {
             for _ in 0..TIMES {
@@ -66,7 +66,7 @@ impl GateDrivers {
         [self.holds(0), self.holds(1)]
     }
 
-    /// Whether a driver still holds what it was told; one disturbed frame is read again.
+    /// Whether a driver still holds its configuration; a disturbed frame is read a second time.
     pub fn holds(&mut self, axis: usize) -> bool {
         self.reads_back(axis) || self.reads_back(axis)
     }
@@ -77,7 +77,7 @@ impl GateDrivers {
         first == Some(CONTROL_1) && second == Some(CONTROL_2)
     }
 
-    /// Both status registers of a driver, the first in the upper half; all ones of one that does not answer.
+    /// Both status registers of a driver, the first in the upper half; all ones where it does not answer.
     pub fn status(&mut self, axis: usize) -> u32 {
         let mut status = |register| u32::from(self.register(axis, register).unwrap_or(u16::MAX));
         status(Register::Status1) << 16 | status(Register::Status2)
@@ -95,7 +95,7 @@ impl GateDrivers {
         drive(b'C', select, false);
         let sent = self.spi.blocking_transfer_in_place(&mut word);
         drive(b'C', select, true);
-        // 400 ns between frames at least (DRV8301, tHI_SCS).
+        // Minimum of 400 ns between frames (DRV8301, tHI_SCS).
         cortex_m::asm::delay(CYCLES_PER_US);
         sent.ok().map(|()| word[0])
     }

@@ -1,4 +1,4 @@
-//! The board as the levels see it: every method is a few register accesses.
+//! The board as `hal::Hardware`: every method is a few register accesses.
 
 use embassy_time::Instant;
 use spin::Mutex;
@@ -8,15 +8,15 @@ use super::settings::analog::temperature_c;
 use super::{brake, bridge, can, contacts, converter, encoder, interrupts, watchdog};
 use crate::hal::{Contacts, Controller, Frame, Hardware};
 
-/// The gate drivers' bus, from the start on; only the housekeeping uses it.
+/// Gate drivers, available after the start; only the housekeeping uses them.
 static GATE_DRIVERS: Mutex<Option<GateDrivers>> = Mutex::new(None);
 
-/// The registers of this board. One value at each level.
+/// Access to the registers of this board; each level has its own value.
 #[derive(Clone, Copy, Debug)]
 pub struct Odrive;
 
 impl Odrive {
-    /// The board, with its gate drivers.
+    /// Creates the access and stores the gate drivers.
     #[must_use]
     pub fn new(gate_drivers: GateDrivers) -> Self {
         if let Some(mut home) = GATE_DRIVERS.try_lock() {
@@ -26,7 +26,7 @@ impl Odrive {
     }
 }
 
-/// Asks the gate drivers; `None` before the start has set them.
+/// Calls a function with the gate drivers; `None` before the start has stored them.
 fn gates<R>(ask: impl FnOnce(&mut GateDrivers) -> R) -> Option<R> {
     GATE_DRIVERS.try_lock()?.as_mut().map(ask)
 }

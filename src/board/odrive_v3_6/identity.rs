@@ -1,42 +1,43 @@
-//! Which board this is, and why it started.
+//! Identity of the board, and the reason of its last reset.
 
 use super::registers::{apply, byte, load};
 use super::settings::RESET_REASONS;
 use super::settings::analog::{BLANK, VERSION_ADDRESS, stated};
 
-/// Of a board on which the factory has written nothing: as said when the image was built.
+/// Version of a board without a factory entry, as stated when the image was built.
 const STATED: [u8; 3] = stated(option_env!("SCARAB_BOARD_VOLTS"));
 
-/// What a board knows of itself.
+/// Identity of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity {
     /// Unique number, lowest word first.
     pub unique: [u32; 3],
-    /// Factory's version: major, minor, voltage; where nothing was written what the image was built for, else 255.
+    /// Factory version: major, minor, voltage. Without a factory entry the version stated for the
+    /// image, else 255.
     pub version: [u8; 3],
-    /// Why it started.
+    /// Reason of the last reset.
     pub reset: Reset,
 }
 
-/// Why the processor started.
+/// Reason of a processor reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reset {
-    /// The supply came.
+    /// Power-on.
     PowerOn,
-    /// The supply sagged.
+    /// Supply sagged.
     BrownOut,
-    /// By its pin, as a debug probe does.
+    /// Reset pin, as used by a debug probe.
     Pin,
-    /// By itself, after a crash.
+    /// Software reset after a crash.
     Software,
-    /// Something hung.
+    /// Watchdog expired.
     Watchdog,
-    /// Something else.
+    /// Any other reason.
     Other,
 }
 
 impl Reset {
-    /// The word in records.
+    /// Name used in records.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -51,12 +52,12 @@ impl Reset {
 }
 
 impl Identity {
-    /// Reads it, and clears the reset reasons for the next time.
+    /// Reads the identity, and clears the reset reasons for the next time.
     pub(super) fn read() -> Self {
         let reasons = load(RESET_REASONS.address);
         apply(&[RESET_REASONS]);
         let has = |bit: u32| reasons >> bit & 1 == 1;
-        // The pin's bit comes with every other; brown-out's with power-on (RM0090 7.3.21).
+        // The pin's bit accompanies every other; brown-out's accompanies power-on (RM0090 7.3.21).
         let reset = match () {
             () if has(29) || has(30) => Reset::Watchdog,
             () if has(28) => Reset::Software,

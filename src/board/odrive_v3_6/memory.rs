@@ -1,4 +1,7 @@
-//! Where the identification lies: in the memory that only the processor reaches; its window of blocks, half of it all, in the other.
+//! Placement of large objects.
+//!
+//! The identification lies in core-coupled memory; its window of blocks, half of the total, in
+//! the other memory.
 #![expect(unsafe_code, reason = "a section of the linker's")]
 
 use static_cell::{ConstStaticCell, StaticCell};
@@ -16,7 +19,7 @@ static IDENTIFICATION: StaticCell<LegIdentification> = StaticCell::new();
 #[unsafe(link_section = ".ccm.configuration")]
 static CONFIGURATION: StaticCell<Leg> = StaticCell::new();
 
-/// What this leg is built from, and its identification, once; `None` where the description makes no leg.
+/// Configuration and identification of this leg, once; `None` where the description is invalid.
 #[inline(never)]
 pub fn identification() -> Option<(&'static Leg, &'static mut LegIdentification)> {
     static WINDOW: ConstStaticCell<LegWindow> = ConstStaticCell::new(LegWindow::EMPTY);
@@ -30,7 +33,7 @@ pub fn identification() -> Option<(&'static Leg, &'static mut LegIdentification)
 #[unsafe(link_section = ".ccm.told")]
 static EVENTS: StaticCell<EventQueue<JOINTS>> = StaticCell::new();
 
-/// The queue from the servo to the identification, once.
+/// Queue from the servo to the identification, once.
 pub fn events() -> &'static mut EventQueue<JOINTS> {
     EVENTS.init_with(EventQueue::new)
 }
@@ -38,7 +41,7 @@ pub fn events() -> &'static mut EventQueue<JOINTS> {
 #[unsafe(link_section = ".ccm.station")]
 static STATION: StaticCell<bus::BoardStation> = StaticCell::new();
 
-/// The nodes and axes, once.
+/// Nodes and axes of the bus, once.
 #[inline(never)]
 pub fn station(build: impl FnOnce() -> bus::BoardStation) -> &'static mut bus::BoardStation {
     STATION.init_with(build)
@@ -47,13 +50,13 @@ pub fn station(build: impl FnOnce() -> bus::BoardStation) -> &'static mut bus::B
 #[unsafe(link_section = ".ccm.bus")]
 static BUS: StaticCell<bus::Memory> = StaticCell::new();
 
-/// What passes between the bus and the others, once.
+/// Data exchanged between the bus and the other levels, once.
 #[inline(never)]
 pub fn bus() -> &'static mut bus::Memory {
     bus::Memory::place(BUS.uninit())
 }
 
-/// Whoever keeps what outlives the power, once; `None` where the flash cannot.
+/// Keeper of the stored parameters, once; `None` where the flash has no valid size.
 #[inline(never)]
 pub fn keeper() -> Option<&'static mut Keeper> {
     static KEEPER: StaticCell<Keeper> = StaticCell::new();

@@ -1,23 +1,23 @@
-//! The one place where addresses become memory.
+//! Register and memory access by address; the only such place.
 #![expect(unsafe_code, reason = "registers are reached by their addresses")]
 
 use super::settings::Write;
 
-/// What a register holds.
+/// Reads a register.
 pub(super) fn load(address: u32) -> u32 {
-    // SAFETY: every caller in this board's layer passes the address of a register of the STM32F405 or of a word of its system
-    // memory, all aligned and readable without a side effect on memory.
+    // SAFETY: every caller in this board layer passes the address of a register of the STM32F405 or of a word
+    // of its system memory. All are aligned and readable without a side effect on memory.
     unsafe { core::ptr::read_volatile(address as *const u32) }
 }
 
 /// Writes a register.
 pub(super) fn store(address: u32, value: u32) {
-    // SAFETY: as for `load`; none of these registers is the address of a variable, and none starts DMA. The words of the flash that
-    // `flash` programs lie beyond the image.
+    // SAFETY: as for `load`; no such address belongs to a variable, and no write starts DMA. The flash words
+    // that `flash` programs lie beyond the image.
     unsafe { core::ptr::write_volatile(address as *mut u32, value) }
 }
 
-/// Writes a list in its order. One copy of the loop: in line it would be as long as the lists.
+/// Applies a list of writes in order. One copy of the loop: inlined it would be as long as the lists.
 #[inline(never)]
 pub(super) fn apply(writes: &[Write]) {
     for write in writes {
@@ -26,13 +26,14 @@ pub(super) fn apply(writes: &[Write]) {
     }
 }
 
-/// One byte of system memory or of the flash.
+/// Reads one byte of system memory or of the flash.
 pub(super) fn byte(address: u32) -> u8 {
-    // SAFETY: the callers read one-time programmable memory and the flash beyond the image, which are there and readable.
+    // SAFETY: the callers read one-time programmable memory and the flash beyond the image, which exist and
+    // are readable.
     unsafe { core::ptr::read_volatile(address as *const u8) }
 }
 
-/// Bytes of the flash.
+/// Copies bytes of the flash.
 pub(super) fn copy(address: u32, into: &mut [u8]) {
     for (place, byte) in into.iter_mut().enumerate() {
         *byte = self::byte(address + place as u32);

@@ -1,4 +1,4 @@
-//! The start, in the only order that is safe: nothing here switches an output on.
+//! Start of the board in the only safe order: nothing here switches an output on.
 
 use embassy_stm32::interrupt::Priority;
 use embassy_stm32::rcc::{
@@ -18,29 +18,29 @@ use super::{interrupts, watchdog};
 use crate::board::crash::{self, Crash};
 use crate::board::stack;
 
-/// A board that has started, all outputs off.
+/// A started board, all outputs off.
 pub struct Board {
-    /// To be asked again and again.
+    /// Gate drivers, for repeated checks.
     pub gate_drivers: GateDrivers,
-    /// Which board it is.
+    /// Identity of the board.
     pub identity: Identity,
-    /// What ended the image before this one.
+    /// Crash record of the previous run.
     pub crash: Option<&'static Crash>,
-    /// Of the processor, as it turned out, Hz.
+    /// Clock of the processor, Hz.
     pub clock_hz: u32,
-    /// Each axis' gate driver holds its configuration.
+    /// Whether each axis' gate driver holds its configuration.
     pub gates_configured: [bool; 2],
-    /// Both bridges' timers run half a period apart and take compare values over at zero.
+    /// Whether both bridges' timers run half a period apart and take compare values over at zero.
     pub timers_in_phase: bool,
 }
 
-/// Longest wait for something of the timers: two of their periods, and then some.
+/// Longest wait for a timer event: more than two periods.
 const PATIENCE: u32 = 100_000;
 
-/// Readings of the bridges' shift, one of which has to be right: an interrupt between the loads falsifies one.
+/// Readings of the bridges' shift, one of which must be right: an interrupt between the loads falsifies one.
 const SHIFT_READINGS: u32 = 4;
 
-/// Starts everything but the interrupts of the current loops; to be called once, first of all.
+/// Starts everything but the interrupts of the current loops. Call once, before anything else.
 pub fn start() -> Board {
     stack::prepare();
     apply(&CLOCKS);
@@ -80,11 +80,11 @@ pub fn start() -> Board {
     Board { gate_drivers, identity, crash, clock_hz: CLOCK_HZ, gates_configured, timers_in_phase }
 }
 
-/// 8 MHz crystal, 168 MHz, buses at 42 and 84 MHz (`Board/v3/Src/main.c:170-197`). A crystal that does not swing is waited
-/// for until the watchdog bites.
+/// 8 MHz crystal, 168 MHz, buses at 42 and 84 MHz (`Board/v3/Src/main.c:170-197`). Without oscillation the
+/// wait lasts until the watchdog resets.
 fn configuration() -> embassy_stm32::Config {
     let mut configuration = embassy_stm32::Config::default();
-    // No DMA is used; its vectors would be at level 0 otherwise.
+    // DMA is not used; its vectors would otherwise be at level 0.
     configuration.dma_interrupt_priority = Priority::P6;
     // Missed current ticks are counted in cycles, and the cycle counter stands in sleep without DBG_SLEEP.
     configuration.enable_debug_during_sleep = true;
@@ -105,15 +105,15 @@ fn configuration() -> embassy_stm32::Config {
     configuration
 }
 
-/// Starts both bridges' timers in one cycle, half a period apart, and has them take compare values over at zero.
-/// Returns whether they do both.
+/// Starts both bridges' timers in one cycle, half a period apart, and makes them take compare values over at
+/// zero. Returns whether both conditions hold.
 fn start_timers() -> bool {
     apply(&timers::LOCK_AND_START);
     let running = wait(|| BASES.iter().all(|base| load(base + CR1) & 1 == 1));
     apply(&timers::TRIGGERS);
     let mut in_phase = running;
     for (axis, &base) in BASES.iter().enumerate() {
-        // Well inside the falling half: neither end may pass between this and the write.
+        // Well inside the falling half, so that no end passes before the write.
         in_phase &= wait(|| is_falling(base) && (TOP / 4..3 * (TOP / 4)).contains(&count(base)));
         apply(&[timers::repetition(axis)]);
         in_phase &= takes_over_at_zero(base);
@@ -121,7 +121,7 @@ fn start_timers() -> bool {
     in_phase && (0..SHIFT_READINGS).any(|_| half_a_period_apart())
 }
 
-/// Reads both counters while TIM1's falls in the middle of its range and TIM8's has to rise there.
+/// Reads both counters while TIM1's falls in the middle of its range; TIM8's must rise there.
 fn half_a_period_apart() -> bool {
     let [first, second] = BASES;
     let reached = wait(|| is_falling(first) && (TOP / 4..3 * (TOP / 4)).contains(&count(first)));
@@ -129,9 +129,9 @@ fn half_a_period_apart() -> bool {
     reached && !is_falling(second) && timers::half_a_period_apart(counts)
 }
 
-/// An update flag that is cleared while the counter rises must not come at the top and must come at zero.
+/// An update flag cleared while the counter rises must not return at the top and must return at zero.
 fn takes_over_at_zero(base: u32) -> bool {
-    // One period later the repetition counter has been loaded.
+    // One period later the repetition counter is loaded.
     let settled = wait(|| !is_falling(base)) && wait(|| is_falling(base)) && wait(|| !is_falling(base));
     store(base + SR, !1);
     let top_is_silent = wait(|| is_falling(base)) && load(base + SR) & 1 == 0;

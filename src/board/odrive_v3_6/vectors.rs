@@ -1,4 +1,4 @@
-//! The interrupt vectors of this board, each one call.
+//! Interrupt vectors of this board, each one call.
 #![expect(unsafe_code, reason = "to unmask a vector, and to tell an executor of its own interrupt")]
 
 use embassy_stm32::interrupt;
@@ -10,10 +10,11 @@ use super::hardware::Odrive;
 use super::{can, contacts, encoder};
 use crate::task;
 
-/// From now on the emergency stop, converters, index pulses and the servo interrupt; what they work on must be in its place.
+/// Enables the interrupts of emergency stop, converters, index pulses, bus and servo; their data must
+/// be in place.
 pub fn enable() {
-    // SAFETY: called once, from `main`, outside any critical section; levels are set, and the handlers' data is behind locks
-    // that are only tried.
+    // SAFETY: called once, from `main`, outside any critical section. Levels are set, and the handlers take
+    // their locks only by trying.
     unsafe {
         for vector in [EXTI4, EXTI9_5, EXTI15_10, OTG_HS, CAN1_RX0, CAN1_TX, ADC] {
             vector.enable();
@@ -48,7 +49,8 @@ fn EXTI15_10() {
     encoder::index_came(1);
 }
 
-/// The controller keeps three frames; whatever comes meanwhile raises this again.
+/// Moves received frames on. The controller holds three; a frame that arrives meanwhile raises
+/// this interrupt again.
 #[interrupt]
 fn CAN1_RX0() {
     for _ in 0..3 {
@@ -66,10 +68,10 @@ fn CAN1_TX() {
     task::bus::interrupt(&mut Odrive);
 }
 
-/// The executor of the housekeeping.
+/// Executor of the housekeeping.
 pub static HOUSEKEEPING: embassy_executor::InterruptExecutor = embassy_executor::InterruptExecutor::new();
 
-/// Its vector.
+/// Interrupt vector of the housekeeping.
 pub const HOUSEKEEPING_VECTOR: interrupt::Interrupt = I2C3_EV;
 
 #[interrupt]

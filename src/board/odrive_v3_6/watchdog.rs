@@ -1,4 +1,4 @@
-//! The independent watchdog, by its registers: it has to run before the clocks do, which the driver cannot.
+//! Independent watchdog on registers: it must run before the clocks do, which the driver cannot provide.
 //!
 //! Its oscillator runs at 17 to 47 kHz (32 nominal): 16 ms are 11 to 30 ms. Registers RM0090 21.4.
 
@@ -13,33 +13,35 @@ const UNLOCK: u32 = 0x5555;
 const FEED: u32 = 0xAAAA;
 const START: u32 = 0xCCCC;
 
-/// Longest wait where nobody else runs yet: 0.1 s of a loop of eight cycles at 168 MHz. A time that was written counts after six cycles of
-/// the oscillator behind the divider, 91 ms at the slowest.
+/// Longest wait before other levels run: 0.1 s of a loop of eight cycles at 168 MHz. A new time applies after
+/// six cycles of the oscillator behind the divider, 91 ms at the slowest.
 const PATIENCE: u32 = 2_000_000;
 
-/// Runs with 4 s: as long as a start may take, and a crystal that does not swing.
+/// Starts the watchdog with 4 s: enough for the start and a crystal that does not oscillate.
 pub(super) fn start() {
     store(KEY, START);
-    // One that does not take them has half a second, and bites in it.
+    // A watchdog that rejects these values runs with half a second, and resets within it.
     let _ = (0..PATIENCE).any(|_| set(6, 500));
 }
 
-/// From now on 16 ms; waits until they hold. Whether they do.
+/// Sets 16 ms and waits until they apply. Returns whether they do.
 pub fn tighten_at_once() -> bool {
     (0..PATIENCE).any(|_| tighten())
 }
 
-/// Asks for 16 ms; whether it has them: to be asked again until it has.
+/// Requests 16 ms. Returns whether they apply; call again until they do.
 pub fn tighten() -> bool {
     set(0, 127)
 }
 
-/// Asks for 8 s (5.4 to 15): as long as the flash may stand still. The bridges are released meanwhile. Whether it has them, as above.
+/// Requests 8 s (5.4 to 15), longer than the flash may stall. The bridges must be off. Returns whether
+/// they apply, as [`tighten`].
 pub fn stretch() -> bool {
     set(6, 1000)
 }
 
-/// While an earlier write is under way (PVU, RVU) another is ignored and what is read means nothing: then nothing is done.
+/// Writes prescaler and reload. While an earlier write is in progress (PVU, RVU) a write is ignored and reads
+/// are invalid, so nothing is done.
 fn set(prescaler: u32, reload: u32) -> bool {
     if load(STATUS) != 0 {
         return false;
@@ -57,7 +59,7 @@ fn set(prescaler: u32, reload: u32) -> bool {
     false
 }
 
-/// All is well.
+/// Restarts the watchdog's count.
 pub fn feed() {
     store(KEY, FEED);
 }

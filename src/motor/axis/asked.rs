@@ -1,53 +1,54 @@
-//! What an axis is asked for, and why it stops by itself.
+//! Requests to an axis, and the faults by which it stops by itself.
 
 use crate::units::Ampere;
 
-/// What an axis is asked for in one tick.
+/// Request to an axis for one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisRequest {
-    /// The bridge switches.
+    /// Whether the bridge switches.
     pub enabled: bool,
-    /// Quadrature current in the joint's sense, limited to the configuration's.
+    /// Quadrature current in the joint's sense, clamped to the configuration's limit.
     pub current: Ampere,
 }
 
 impl AxisRequest {
-    /// Bridge released.
+    /// Outputs off.
     pub const RELEASED: Self = Self { enabled: false, current: Ampere::ZERO };
 }
 
-/// Why an axis released its bridge by itself.
+/// Why an axis turned its outputs off or brakes by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisFault {
-    /// A shunt amplifier at its rail: two ticks in a row, or too many of a few.
+    /// A shunt amplifier at its rail: two ticks in a row, or too many within few ticks.
     CurrentSense,
-    /// The current vector is longer than the bound.
+    /// Current vector longer than the bound.
     Overcurrent,
-    /// Bus voltage out of its range, as above.
+    /// Bus voltage out of range, as often as in [`Self::CurrentSense`].
     BusVoltage,
-    /// Two encoder steps in a row that no motor makes, two index pulses at one wrong place, or none at the right one. The
-    /// place is lost: only a new calibration helps.
+    /// Two implausible encoder steps in a row, two index pulses at one wrong position, or none at the right
+    /// one. The rotor position is lost and requires a new calibration.
     Encoder,
-    /// Target, voltage or duty not a number.
+    /// Target, voltage or duty not finite.
     NotANumber,
-    /// The counter stands still while the motor turns. The motor is a brake until the fault is cleared; the place is lost.
+    /// The counter stands still while the motor turns. The motor brakes until the fault is cleared; the rotor
+    /// position is lost.
     EncoderFrozen,
-    /// The voltage is not that of the current: a phase does not conduct.
+    /// Voltage and current disagree: a phase does not conduct.
     OpenPhase,
-    /// The shunts' zeros drifted.
+    /// The current-sensor offsets drifted.
     CurrentZero,
-    /// A shunt's code stays while its phase is asked for another current.
+    /// A shunt code does not change while its phase's target current does.
     StuckConversion,
-    /// Gains or limits are not what they were.
+    /// Checksum of gains and limits changed.
     Parameters,
 }
 
-/// What the bridge is to do in a tick.
+/// Requested state of the bridge for one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wish {
-    /// Nothing.
+    /// Outputs off.
     Released,
-    /// Quadrature current in the joint's sense.
+    /// Follow a quadrature current in the joint's sense.
     Follow(Ampere),
     /// Low sides on: a passive brake.
     Brake,

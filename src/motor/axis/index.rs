@@ -1,68 +1,69 @@
-//! Index pulses held against the counts: a glitch on the index line is told apart from lost counts.
+//! Index pulses checked against the counts: distinguishes a glitch on the index line from lost counts.
 //!
 //! ```text
-//! wrong    |place of the pulse| > 4 counts + travel in 10 us            the index is place 0
-//! lost     a second wrong pulse at the same place (the same bound), after a quarter of a turn away from it
+//! wrong    |position of the pulse| > 4 counts + travel in 10 us         the index is position 0
+//! lost     a second wrong pulse at that position (the same bound), after a quarter of a turn away from it
 //!          or no right pulse for 2 1/8 turns
 //! ```
 //!
-//! Why two pulses: a lost place brakes both motors and takes the calibration and the reference, and one glitch is noise.
-//! Lost counts move every later pulse to the same wrong place, so the second one comes within two turns of the rotor.
-//! A right pulse ends the suspicion, and only a right pulse restarts the 2 1/8 turns. A wrong pulse at rest is
-//! ignored: no index passes a rotor that stands.
+//! Why two pulses: a lost position brakes both motors and invalidates calibration and reference, while one
+//! glitch is noise. Lost counts move every later pulse to the same wrong position, so the second one comes
+//! within two turns of the rotor. A right pulse ends the suspicion, and only a right pulse restarts the 2 1/8
+//! turns. A wrong pulse at rest is ignored: no index passes a rotor at rest.
 //!
-//! Until the second pulse the angle is off by `e = counts lost * pole pairs / counts per turn` electrical turns. Of a
-//! wanted current `i` the torque keeps `i cos(2 pi e)`, and `i sin(2 pi e)` flows along the flux. Figures: docs/motor.md.
+//! Until the second pulse the angle is off by `e = counts lost * pole pairs / counts per turn` electrical
+//! turns. For a target current `i` the torque falls to that of `i cos(2 pi e)`, and `i sin(2 pi e)` flows
+//! along the flux. Figures: docs/motor.md.
 //!
-//! Known limits: a rotor slower than two counts in 4 ms counts as standing, so lost counts are then seen by the 2 1/8
-//! turns alone. A counter that froze looks like rest; `ModelWatch` sees it.
+//! Known limits: a rotor slower than two counts in 4 ms counts as resting, so lost counts then show only by
+//! the 2 1/8 turns. A frozen counter looks like rest; `ModelWatch` detects it.
 
 use crate::motor::CountScale;
 use crate::motor::calibration::INDEX_WIDTH;
 
-/// The interrupt that captures the count may be late by one part in this many of a PWM period: 10 us.
+/// The capturing interrupt may be late by a PWM period divided by this: 10 us.
 const LATENCY: i32 = 4;
-/// Joint samples within two counts after which the rotor stands: 4 ms.
+/// Joint samples within two counts after which the rotor counts as resting: 4 ms.
 const REST_SAMPLES: u8 = 16;
 
-/// A pulse, or the place at which wrong ones are expected.
+/// An index pulse, or the position where wrong ones are expected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pulse {
-    /// Within a turn, or less than a turn beyond it.
+    /// Position within a turn, or less than a turn beyond it.
     place: i32,
     /// Counts by which the capture may be late.
     late: i32,
 }
 
-/// What the index pulses have shown; see the module.
+/// State of the index check; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct IndexWatch {
-    /// The newest pulse since the last look.
+    /// Newest pulse since the last check.
     pulse: Option<Pulse>,
-    /// Counts at the last right pulse, or at the beginning.
+    /// Counts at the last right pulse, or at the start.
     right_at: i32,
-    /// The first wrong pulse, and the counts at it.
+    /// First wrong pulse, and the counts at which it came.
     suspect: Option<(Pulse, i32)>,
     /// The rotor was a quarter of a turn away from the suspect.
     left: bool,
-    /// Counts at which the rotor rests, and for how many looks it has.
+    /// Counts at which the rotor rests, and the number of checks since.
     rests_at: i32,
     resting: u8,
 }
 
 impl IndexWatch {
-    /// Nothing is suspected; the last right pulse came at `counts`.
+    /// Starts without suspicion; the last right pulse came at `counts`.
     pub(super) const fn at(counts: i32) -> Self {
         Self { pulse: None, right_at: counts, suspect: None, left: false, rests_at: counts, resting: 0 }
     }
 
-    /// Notes a pulse at a place, in a period in which the counter moved by `step`.
+    /// Records a pulse at a rotor position, in a period in which the counter moved by `step`.
     #[inline(always)]
     pub(super) fn came(&mut self, place: i32, step: i32) {
         self.pulse = Some(Pulse { place, late: step.abs() / LATENCY });
     }
 
-    /// Moves the counts at which things happened with the joint's zero.
+    /// Shifts the stored counts after the joint's zero was set.
     pub(super) fn shift(&mut self, counts: i32) {
         self.right_at = self.right_at.wrapping_add(counts);
         self.rests_at = self.rests_at.wrapping_add(counts);
@@ -71,7 +72,8 @@ impl IndexWatch {
         }
     }
 
-    /// Whether the place is lost, as seen with each joint sample; `longest` counts may pass without a right pulse.
+    /// Whether the rotor position is lost. Called with each joint sample; `longest` counts may pass without a
+    /// right pulse.
     pub(super) fn is_lost(&mut self, counts: i32, scale: &CountScale, longest: u32) -> bool {
         let since = |at: i32| counts.wrapping_sub(at).unsigned_abs();
         self.resting = if since(self.rests_at) < 2 { self.resting.saturating_add(1) } else { 0 };
@@ -111,7 +113,7 @@ mod tests {
     const TURN: i32 = 8192;
     const LONGEST: u32 = 17_408;
 
-    /// A watch and a rotor that has turned since it began.
+    /// An index check and a rotor that has turned since it began.
     struct Turning {
         watch: IndexWatch,
         scale: CountScale,
@@ -124,7 +126,7 @@ mod tests {
             Self { watch: IndexWatch::at(0), scale, counts: 0 }
         }
 
-        /// Turns on by so many counts, at most 50 between two looks, without a pulse.
+        /// Turns by so many counts, at most 50 between two checks, without a pulse.
         fn turn(&mut self, counts: i32) -> bool {
             let end = self.counts + counts;
             let mut lost = false;
@@ -135,7 +137,7 @@ mod tests {
             lost
         }
 
-        /// A pulse at a place, in a period of so many counts.
+        /// One pulse at a position, in a period of so many counts.
         fn pulse(&mut self, place: i32, step: i32) -> bool {
             self.watch.came(place, step);
             self.look()
@@ -170,7 +172,7 @@ mod tests {
                 let mut rotor = Turning::new();
                 assert!(!rotor.turn(300) && !rotor.pulse(300, 0) && !rotor.turn(turn));
                 assert_eq!(rotor.pulse(second, 0), lost, "{second}");
-                // Lost counts stay lost; the suspect of another place is the new one.
+                // Lost counts stay lost; a pulse at another position becomes the new suspect.
                 assert!(!rotor.turn(turn) || lost);
                 assert!(rotor.pulse(second, 0), "{second}");
             }
@@ -204,7 +206,7 @@ mod tests {
             assert!(!rotor.look());
         }
         assert!(!rotor.pulse(300, 0) && !rotor.is_suspicious());
-        // Neither is one believed that comes where a suspect was. The pulse's own look is the last of 16, or of 15.
+        // A pulse at the suspect's position is ignored as well. Its own check is the last of 16, or of 15.
         let mut rotor = Turning::new();
         for (looks, lost) in [(REST_SAMPLES - 1, false), (REST_SAMPLES - 2, true)] {
             rotor = Turning::new();
@@ -213,7 +215,7 @@ mod tests {
             assert_eq!(rotor.pulse(300, 0), lost, "{looks}");
         }
         assert!((0..REST_SAMPLES).all(|_| !rotor.look()) && !rotor.pulse(300, 0));
-        // Two counts on it turns again.
+        // Two counts further the rotor turns again.
         rotor.counts += 2;
         assert!(rotor.pulse(300, 0));
     }

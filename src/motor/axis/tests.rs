@@ -27,7 +27,7 @@ impl Bench {
         let sample = motor.sample();
         let axis = Axis::new(configuration, &calibration, &sample).expect("usual");
         let mut bench = Self { motor, axis, sample };
-        // The speed is tracked before anything switches.
+        // Track the speed before anything switches.
         bench.run(AxisRequest::RELEASED, 480);
         bench
     }
@@ -38,7 +38,7 @@ impl Bench {
         command
     }
 
-    /// With the joint's sample after every sixth, as a board takes it.
+    /// Runs ticks and takes the joint's sample after every sixth, as a board does.
     fn run_sampled(&mut self, request: AxisRequest, ticks: usize, spoil: impl Fn(&mut AxisSample)) {
         for tick in 0..ticks {
             spoil(&mut self.sample);
@@ -53,7 +53,7 @@ impl Bench {
         (0..ticks).fold(AxisCommand::RELEASED, |_, _| self.tick(request))
     }
 
-    /// Mean and spread (peak to peak) of both true currents over one electrical turn and more.
+    /// Mean and spread (peak to peak) of both true currents over at least one electrical turn.
     fn watch(&mut self, request: AxisRequest, ticks: usize) -> [(f64, f64); 2] {
         let (mut sum, mut least, mut most) = ([0.0; 2], [f64::MAX; 2], [f64::MIN; 2]);
         for _ in 0..ticks {
@@ -76,7 +76,7 @@ fn the_torque_current_follows_and_the_field_stays_zero_at_every_speed_and_sign()
         for current in [15.0, -15.0] {
             bench.run(ask(current), 1200);
             let [(d, _), (q, _)] = bench.watch(ask(current), 2400);
-            // Shunt zeros to 0.3 codes, a degree of offset error.
+            // Tolerance: current-sensor offsets to 0.3 codes, a degree of angle error.
             assert!((q - f64::from(current)).abs() < 0.1 && d.abs() < 0.3, "{speed} rad/s: {d} {q} A");
         }
         assert_eq!(bench.axis.fault(), None);
@@ -88,8 +88,8 @@ fn the_torque_current_follows_and_the_field_stays_zero_at_every_speed_and_sign()
 
 #[test]
 fn the_voltage_is_turned_to_where_the_rotor_will_be_in_the_middle_of_its_period() {
-    // A loop that has just been enabled, without feedforward, at no measured current: its voltage is a quadrature voltage of
-    // kp times the target, so the duties lie a quarter turn ahead of the angle in which it acts.
+    // A loop just enabled, without feedforward and at zero measured current, returns a quadrature voltage of
+    // kp times the target. So the duties lie a quarter turn ahead of the angle in which they act.
     for counts_per_tick in [5_i32, -5, 12, -12] {
         let configuration =
             AxisConfiguration { feedforward: false, dead_time: DeadTime::Uncompensated, ..CONFIGURATION };
@@ -109,7 +109,8 @@ fn the_voltage_is_turned_to_where_the_rotor_will_be_in_the_middle_of_its_period(
         let duty_turns = crate::real::atan2(beta, alpha) / core::f64::consts::TAU;
         let ahead = duty_turns - 0.25 - f64::from(angle.turns());
         let expected = 1.5 * f64::from(counts_per_tick) * 7.0 / 8192.0;
-        // Half a code of current against ten ampere is a tenth of a degree; one period more or less is 1.5 degrees and more.
+        // Tolerance: half a code of current against ten ampere is a tenth of a degree. One period more or
+        // less is at least 1.5 degrees.
         let error = (ahead - expected - (ahead - expected).round()) * 360.0;
         assert!(error.abs() < 0.3, "{counts_per_tick} counts per tick: {error} degrees");
     }
@@ -126,7 +127,7 @@ fn the_fast_sine_costs_less_than_two_thousandths_of_ripple() {
         spread
     };
     let (fast, exact) = (ripple(Sine::Fast), ripple(Sine::Exact));
-    // Peak to peak of 30 A; quantisation of angle and current is in both.
+    // Spreads are peak to peak of 30 A; both contain the quantisation of angle and current.
     assert!(fast - exact < 0.004 * 30.0, "{fast} A against {exact} A");
 }
 
@@ -154,9 +155,9 @@ fn the_joint_sample_belongs_to_the_middle_of_its_ticks_and_starts_over() {
     let second = bench.axis.joint_sample();
     bench.run(ask(5.0), 6);
     let third = bench.axis.joint_sample();
-    // 200 rad/s are 10.865 counts per tick, six of them 65.2.
+    // 200 rad/s are 10.865 counts per tick, 65.2 in six ticks.
     assert!((64..=67).contains(&(third.encoder_counts - second.encoder_counts)), "{second:?} {third:?}");
-    // Without a tick in between the newest count: two and a half ticks later.
+    // Without a tick in between, the newest count is returned: two and a half ticks later.
     let newest = bench.axis.joint_sample();
     assert!((25..=30).contains(&(newest.encoder_counts - third.encoder_counts)), "{newest:?}");
     bench.axis.set_counts(-1_000_000);
@@ -170,7 +171,7 @@ fn counts_stay_exact_through_many_wraps_of_the_counter() {
     bench.axis.set_counts(0);
     let begin = bench.motor.angle;
     bench.run(AxisRequest::RELEASED, 24_000);
-    // The newest sample is not yet ticked.
+    // The newest sample has not been ticked yet.
     bench.tick(AxisRequest::RELEASED);
     bench.tick(AxisRequest::RELEASED);
     let turned = -(bench.motor.angle - begin) / core::f64::consts::TAU * 8192.0;
@@ -216,7 +217,7 @@ fn who_is_about_to_switch_is_patient_with_no_bad_sample() {
         let mut bench = Bench::at(0.0, &CONFIGURATION);
         spoil(&mut bench.sample);
         assert_eq!((bench.tick(ask(5.0)), bench.axis.fault()), (AxisCommand::RELEASED, Some(fault)));
-        // In between it is survived.
+        // While switching, the same sample is tolerated.
         let mut bench = Bench::at(0.0, &CONFIGURATION);
         bench.run(ask(5.0), 10);
         spoil(&mut bench.sample);
@@ -239,7 +240,7 @@ fn one_bad_sample_alone_is_survived_and_a_lost_place_is_not_cleared() {
         bench.tick(ask(5.0));
     }
     assert_eq!(bench.axis.fault(), Some(AxisFault::Encoder));
-    // Without the rotor's angle there is nothing left but to brake.
+    // Without the rotor's angle only braking is left.
     assert_eq!(bench.run(ask(5.0), 10), AxisCommand::BRAKE);
     assert_eq!(bench.run(AxisRequest::RELEASED, 1), AxisCommand::RELEASED);
     assert!(!bench.axis.clear_fault());
@@ -275,9 +276,9 @@ fn an_axis_of_absurd_numbers_is_refused_by_part() {
     assert_eq!(refused(|c| c.current_limit.0 = 56.0), AxisError::Current);
     assert_eq!(refused(|c| c.overcurrent.0 = 70.0), AxisError::Current);
     assert_eq!(refused(|c| c.bus = [Volt(30.0), Volt(20.0)]), AxisError::Bus);
-    // The divider ends at 62.7 V.
+    // The converter's range ends at 62.7 V.
     assert_eq!(refused(|c| c.bus[1] = Volt(60.0)), AxisError::Bus);
-    // 7 pole pairs, 2.9 mV s: 58 V between two phases at 1650 rad/s.
+    // 7 pole pairs and 2.9 mV s make 58 V between two phases at 1650 rad/s.
     assert_eq!(refused(|c| c.greatest_speed.0 = 1700.0), AxisError::BackEmf);
     assert_eq!(CONFIGURATION.check(), Ok(()));
 }
@@ -287,7 +288,7 @@ fn every_one_of_the_65536_offsets_of_the_counter_gives_the_same_bits() {
     for speed in [180.0, -180.0] {
         let mut bench = Bench::at(speed, &CONFIGURATION);
         bench.run(ask(12.0), 240);
-        // 48 ticks are 470 counts: each offset from which the counter wraps on the way is among all of them.
+        // 48 ticks are 470 counts, so all offsets include each one from which the counter wraps on the way.
         let begin = bench.axis;
         let samples: [AxisSample; 48] = core::array::from_fn(|_| {
             let sample = bench.sample;
@@ -325,7 +326,7 @@ fn a_reading_that_was_not_believed_is_told_once() {
     assert_eq!(bench.axis.fault(), None);
 }
 
-/// Believed or not, one wrong reading of any size stops nobody, and leaves the place where it was.
+/// Accepted or not, one wrong reading of any size stops nothing and leaves the rotor position unchanged.
 #[test]
 fn the_way_back_from_a_wrong_reading_is_no_second_one() {
     for speed in [-60.0, 0.0, 60.0] {

@@ -1,4 +1,4 @@
-//! What an axis tells of itself, and forgets when it is told to.
+//! Accessors of `Axis`, clearing a fault, and resuming after a pause.
 
 use super::{Axis, AxisFault, IndexWatch, Rotating, SpeedTracker, Window};
 use crate::hal::AxisSample;
@@ -17,19 +17,19 @@ impl Axis {
         RadianPerSecond(self.speed.rad_per_s())
     }
 
-    /// Why the bridge is released, if the axis did it.
+    /// The fault that stopped the axis, if any.
     #[must_use]
     pub fn fault(&self) -> Option<AxisFault> {
         self.fault
     }
 
-    /// Place or parameters are lost: only a new calibration helps.
+    /// Rotor position or parameters are lost and require a new calibration.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.lost
     }
 
-    /// Forgets a fault, so that a request may enable again; `false` where the place was lost.
+    /// Clears a fault, so that a request may enable again. Returns `false` where the axis is lost.
     pub fn clear_fault(&mut self) -> bool {
         if !self.lost {
             self.fault = None;
@@ -37,10 +37,12 @@ impl Axis {
         !self.lost
     }
 
-    /// After a time without ticks, in which the bridge was released and the counter went on by itself: it is followed from here, and no step
-    /// is held against it. `long` where it may have gone round: the place within a turn is then known only of an encoder whose turns
-    /// its range is a multiple of, as 65,536 of 8,192; of any other it is lost. Counts are off by multiples of the range, and for
-    /// whoever knows better.
+    /// Resumes after a time without ticks, in which the outputs were off while the counter ran on. The
+    /// present count is accepted with any step.
+    ///
+    /// Set `long` where the counter may have wrapped. The position within a turn then stays valid only where
+    /// the counter's range is a multiple of the turn, as 65,536 of 8,192; otherwise it is lost. Counts may be
+    /// off by multiples of the range; the caller has to correct them.
     pub fn resume(&mut self, sample: &AxisSample, long: bool) {
         let constants = &self.constants;
         let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());

@@ -1,13 +1,14 @@
-//! A bit that flips in memory, on the host alone: what the checksum is tried against (row M2 of docs/safety.md). No image has it.
+//! Fault injection into an axis, host only: bit flips that the checksum must find (row M2 of docs/safety.md).
 
 use super::Axis;
 
 impl Axis {
-    /// Numbers of an axis that can be upset.
+    /// Number of values in which a bit can be flipped.
     pub const NUMBERS: u8 = 6;
 
-    /// Flips one bit (of 32, from the lowest) of a number that never changes: current limit, overcurrent bound squared, zeros of both
-    /// shunts, the sign of the current, proportional gain of the current loop.
+    /// Flips one bit (of 32, from the lowest) of a constant. In order: current limit, square of the
+    /// overcurrent bound, both current-sensor offsets, sign of the current, proportional gain of
+    /// the current loop.
     pub fn upset(&mut self, number: u8, bit: u8) {
         let constants = &mut self.constants;
         let [zero_b, zero_c] = &mut constants.zeros;
@@ -22,7 +23,7 @@ impl Axis {
         *upset = f32::from_bits(upset.to_bits() ^ 1 << (bit % 32));
     }
 
-    /// The modulator's numbers are none: what no port reaches (row N1).
+    /// Makes the modulator's constants NaN, which no input can do (row N1).
     pub const fn spoil_modulation(&mut self) {
         self.constants.modulator.spoil();
     }

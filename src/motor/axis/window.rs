@@ -1,4 +1,4 @@
-//! Means of count and current between two joint samples, both of the same ticks, so that they belong to one instant.
+//! Means of count and current between two joint samples, over the same ticks and so for one instant.
 
 use crate::hal::JointSample;
 use crate::units::Ampere;
@@ -7,7 +7,7 @@ use crate::units::Ampere;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
     first: i32,
-    /// Of counts minus `first`.
+    /// Sum of counts minus `first`.
     counts: i32,
     current_a: f32,
     pub(super) ticks: i32,
@@ -15,7 +15,7 @@ pub(super) struct Window {
 
 impl Window {
     pub(super) const EMPTY: Self = Self { first: 0, counts: 0, current_a: 0.0, ticks: 0 };
-    /// Of a joint sample that nobody fetches the window starts over.
+    /// Longest window, ticks. If no one reads the sample, averaging restarts.
     const MOST: i32 = 48;
 
     pub(super) fn push(&mut self, counts: i32, current_a: f32) {

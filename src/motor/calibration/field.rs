@@ -1,17 +1,18 @@
-//! How the field of a scan moves: evenly, and gradually into motion and out of it.
+//! Motion of a scan's field: constant speed, with gradual run-in and run-out.
 //!
-//! Field and rotor are a spring and a mass with hardly a damper: sqrt(pole pairs * holding torque / inertia), some 20 Hz. A field
-//! that jumps to its speed leaves the rotor swinging by a tenth of an electrical turn and more, for as long as the way lasts; so
-//! it takes and loses its speed evenly within one electrical turn at either end, in which nothing is measured.
+//! Field and rotor form a spring and a mass with hardly any damping, at sqrt(pole pairs * holding torque /
+//! inertia), some 20 Hz. A field that jumps to its speed leaves the rotor swinging by a tenth of an
+//! electrical turn or more during the whole scan. So the speed rises and falls linearly within one electrical
+//! turn at either end, in which nothing is measured.
 //!
 //! ```text
 //! t_a = 2 run-in / v;     field = v t^2 / (2 t_a),  v (t - t_a / 2),  way - v (t_end - t)^2 / (2 t_a)
 //! ```
 
-/// The field takes its speed at the beginning of each way and loses it at the end, electrical turns.
+/// Length of run-in and run-out of each pass, electrical turns.
 const RUN_IN_TURNS: f32 = 1.0;
 
-/// One way of the field; electrical turns.
+/// One pass of the field in one direction; electrical turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FieldWay {
     length: f32,
@@ -19,12 +20,12 @@ pub(super) struct FieldWay {
 }
 
 impl FieldWay {
-    /// Over so many turns at constant speed, and what it takes to reach and to leave it.
+    /// A pass of so many turns at constant speed, plus run-in and run-out.
     pub(super) fn over(turns: f32, turns_per_s: f32) -> Self {
         Self { length: turns + 2.0 * RUN_IN_TURNS, turns_per_s }
     }
 
-    /// How far the field has come after so many s.
+    /// Travel of the field after a time in seconds.
     pub(super) fn travelled(&self, seconds: f32) -> f32 {
         let half_rise_s = RUN_IN_TURNS / self.turns_per_s;
         let end_s = self.length / self.turns_per_s + 2.0 * half_rise_s;
@@ -40,13 +41,13 @@ impl FieldWay {
         }
     }
 
-    /// Turns at constant speed so far; `None` where it is not constant.
+    /// Travel at constant speed so far; `None` during run-in and run-out.
     pub(super) fn steady(&self, travelled: f32) -> Option<f32> {
         let steadily = travelled > RUN_IN_TURNS && travelled <= self.length - RUN_IN_TURNS;
         steadily.then_some(travelled - RUN_IN_TURNS)
     }
 
-    /// The end is reached.
+    /// Whether the pass is complete.
     pub(super) fn ended(&self, travelled: f32) -> bool {
         travelled >= self.length
     }
@@ -63,8 +64,8 @@ mod tests {
         for tick in 1..=36_000 {
             let travelled = way.travelled(tick as f32 / 24_000.0);
             let step = travelled - place;
-            // 8 turns per second are 3.3e-4 of a turn per tick, reached in a quarter of a second: 5.6e-8 more each; half a
-            // millionth is what nine turns are rounded to.
+            // 8 turns per second are 3.3e-4 of a turn per tick, reached in a quarter of a second: 5.6e-8 more
+            // in each. Nine turns are rounded to half a millionth.
             assert!(
                 (0.0..3.4e-4).contains(&step) && (step - speed).abs() < 2e-6,
                 "{tick}: {step} after {speed}"

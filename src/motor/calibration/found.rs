@@ -1,22 +1,22 @@
-//! What a passed calibration found, and what of it outlives the power.
+//! Results of a passed calibration, and their persistent part.
 
 use super::inductance::Inductances;
 use crate::motor::{AxisConfiguration, CountScale, Direction, ElectricalAngle};
 use crate::units::{Henry, Ohm};
 
-/// The part of a configuration on which an offset depends: with another one it is wrong.
+/// Part of a configuration on which the angle offset depends; with another setting the offset is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderSetting {
-    /// How the counter runs while the field turns from A over B to C.
+    /// Direction of the counter while the field turns from A over B to C.
     pub counter: Direction,
-    /// Of the motor.
+    /// Pole pairs of the motor.
     pub pole_pairs: u8,
-    /// Of the encoder.
+    /// Counts per turn of the encoder.
     pub counts_per_turn: u32,
 }
 
 impl EncoderSetting {
-    /// Of an axis.
+    /// Encoder setting of an axis.
     #[must_use]
     pub const fn of(configuration: &AxisConfiguration) -> Self {
         Self {
@@ -27,7 +27,7 @@ impl EncoderSetting {
     }
 }
 
-/// What a passed calibration found. There is no other way to one.
+/// Results of a passed calibration. Only a [`super::Calibrator`] can create it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
     pub(super) encoder: EncoderSetting,
@@ -35,77 +35,78 @@ pub struct Calibration {
     pub(super) resistance: Ohm,
     pub(super) inductances: Inductances,
     pub(super) offset: ElectricalAngle,
-    /// The counter at the end, and the place within a turn it stands for.
+    /// Counter at the end of the calibration, and the rotor position at that reading.
     pub(super) counter: u16,
     pub(super) place: i32,
     pub(super) indexed: bool,
 }
 
-/// What is worth keeping of a calibration while the power is off: places relative to the index.
+/// Part of a calibration stored while the power is off: positions relative to the index.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StoredCalibration {
-    /// Of one phase.
+    /// Resistance of one phase.
     pub resistance: Ohm,
-    /// Along the flux.
+    /// Inductance along the flux.
     pub direct_inductance: Henry,
-    /// Across the flux.
+    /// Inductance across the flux.
     pub quadrature_inductance: Henry,
     /// Electrical angle at the index.
     pub offset: ElectricalAngle,
-    /// With which configuration it was found.
+    /// Encoder setting of the calibrated configuration.
     pub encoder: EncoderSetting,
 }
 
 impl Calibration {
-    /// With which configuration it was found.
+    /// Encoder setting of the calibrated configuration.
     #[must_use]
     pub fn encoder(&self) -> EncoderSetting {
         self.encoder
     }
 
-    /// Whether places count from the index.
+    /// Whether rotor positions count from the index.
     #[must_use]
     pub fn indexed(&self) -> bool {
         self.indexed
     }
 
-    /// Codes of the shunts without current.
+    /// Current-sensor offsets: shunt codes without current.
     #[must_use]
     pub fn zeros(&self) -> [f32; 2] {
         self.zeros
     }
 
-    /// Of one phase.
+    /// Resistance of one phase.
     #[must_use]
     pub fn resistance(&self) -> Ohm {
         self.resistance
     }
 
-    /// Along the flux.
+    /// Inductance along the flux.
     #[must_use]
     pub fn direct_inductance(&self) -> Henry {
         self.inductances.direct
     }
 
-    /// Across the flux.
+    /// Inductance across the flux.
     #[must_use]
     pub fn quadrature_inductance(&self) -> Henry {
         self.inductances.quadrature
     }
 
-    /// Electrical angle at the place from which counts within a turn are counted: the index, if there is one.
+    /// Electrical angle at rotor position zero, which is the index, if there is one.
     #[must_use]
     pub fn offset(&self) -> ElectricalAngle {
         self.offset
     }
 
-    /// Electrical angle at a counter reading; the counter may have moved by half of its range since the calibration.
+    /// Electrical angle at a counter reading; since the calibration the counter may have moved by half
+    /// of its range.
     #[must_use]
     pub fn angle_at(&self, scale: &CountScale, direction: Direction, counter: u16) -> ElectricalAngle {
         scale.angle(self.place_of(scale, direction, counter)).plus(self.offset)
     }
 
-    /// What can be kept; nothing without an index, because the counter forgets.
+    /// Returns the part to store; `None` without an index, because the counter resets with the power.
     #[must_use]
     pub fn stored(&self) -> Option<StoredCalibration> {
         self.indexed.then_some(StoredCalibration {
@@ -117,7 +118,8 @@ impl Calibration {
         })
     }
 
-    /// The same, had the counter begun so many counts further: for tests of where it wraps, on the host alone.
+    /// This calibration for a counter that began so many counts further. For tests of its
+    /// wrapping, host only.
     #[cfg(not(target_os = "none"))]
     #[must_use]
     pub fn with_counter_moved(&self, offset: u16) -> Self {

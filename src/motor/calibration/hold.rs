@@ -1,11 +1,11 @@
-//! A current held along a fixed angle, of a motor nothing is known about.
+//! Current control along a fixed angle, for a motor with unknown constants.
 //!
 //! ```text
 //! v += k (i_target - i . n),   v n the voltage,   k = 10 V/(A s)
 //! ```
 //!
-//! An integral alone is slow and needs neither R nor L: with them its damping is R / (2 sqrt(k L)), 1.6 of 50 mOhm and
-//! 25 uH, above 0.3 down to 10 mOhm. The target rises in 50 ms.
+//! Integral control alone is slow and needs neither R nor L. With them its damping is R / (2 sqrt(k L)): 1.6
+//! for 50 mOhm and 25 uH, above 0.3 down to 10 mOhm. The target rises in 50 ms.
 
 use super::{ElectricalAngle, Reading, Refusal, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
@@ -27,10 +27,10 @@ impl Hold {
         Self { axis: angle.rotation(Sine::Exact), target_a: 0.0, volts: 0.0 }
     }
 
-    /// Brings the target nearer to `target`, `full` being the largest there is, and the current nearer to the target.
+    /// Runs one tick: moves the target towards `target` and adapts the voltage. The target's slope follows
+    /// from the settings' holding current.
     ///
-    /// # Errors
-    /// [`Refusal::MotorConstants`] where the voltage allowed is not enough.
+    /// # Errors [`Refusal::MotorConstants`] where the allowed voltage is insufficient.
     pub(super) fn tick(&mut self, reading: &Reading<'_>, target: Ampere) -> Result<(), Refusal> {
         let rise = reading.bench.settings.current.0 * RISE_PER_TICK;
         self.target_a += (target.0 - self.target_a).max(-rise).min(rise);
@@ -41,12 +41,12 @@ impl Hold {
         Ok(())
     }
 
-    /// The component of a current along the angle.
+    /// Component of a current along the angle.
     pub(super) fn along_axis(&self, current: Stationary<Ampere>) -> Ampere {
         current.to_rotating(self.axis).d
     }
 
-    /// The component of a current a quarter turn ahead.
+    /// Component of a current a quarter turn ahead.
     pub(super) fn across_axis(&self, current: Stationary<Ampere>) -> Ampere {
         current.to_rotating(self.axis).q
     }
@@ -59,7 +59,7 @@ impl Hold {
         self.voltage_with(Volt::ZERO, Volt::ZERO)
     }
 
-    /// The voltage with something more along and across.
+    /// The holding voltage plus components along and across the angle.
     pub(super) fn voltage_with(&self, along: Volt, across: Volt) -> Stationary<Volt> {
         super::Rotating { d: self.volts() + along, q: across }.to_stationary(self.axis)
     }

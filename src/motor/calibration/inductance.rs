@@ -1,17 +1,20 @@
 //! Inductances along and across the flux, by a square wave on top of the current that holds the rotor.
 //!
-//! The voltage is moved by +u for two periods and by -u for two, along the flux first, then across it:
+//! The voltage is offset by +u for two periods and by -u for two, first along the flux, then across it:
 //!
 //! ```text
 //! di = 2 u / R tanh(R t / (2 L)),   t = two periods      exact for a resistance and an inductance
 //! L  = u t / di (1 - x^2 / 3),   x = R di / (2 u)        to x^4 / 5: 1e-4 at x = 0.15
 //! ```
 //!
-//! Why on top of a current: as long as no phase's current changes its sign, dead time adds a constant and nothing else. So `di`
-//! is brought to 0.3 of the holding current by raising u (or to what the voltage allowed can do, 0.03 at least), and the swing across bends the smallest phase current (half the
-//! holding one) by 0.26 of the full. Across the flux the rotor feels an alternating torque at 6 kHz and stands still.
-//! What is commanded after sample k acts between the samples k+1 and k+2: the maximum is read three samples after the
-//! wave's beginning, the minimum two later. 512 waves each (85 ms): noise of 0.1 A leaves 6 mA of some amperes.
+//! Why on top of a current: as long as no phase current changes its sign, dead time adds only a constant. So
+//! u is raised until `di` is 0.3 of the holding current, or until the allowed voltage is reached with at
+//! least 0.03. The swing across then bends the smallest phase current (half the holding one) by 0.26 of the
+//! holding current. Across the flux the rotor feels an alternating torque at 6 kHz and stands still.
+//!
+//! The command after sample k acts between the samples k+1 and k+2. So the maximum is read three samples
+//! after the wave's beginning, the minimum two later. The mean of 512 waves each (85 ms) reduces noise of 0.1
+//! A to 6 mA of some amperes.
 
 use super::hold::Hold;
 use super::{Outcome, Reading, Refusal};
@@ -21,16 +24,16 @@ use crate::units::{Henry, Ohm, Volt};
 const HALF_WAVE_TICKS: u32 = 2;
 const WAVE_TICKS: u32 = 2 * HALF_WAVE_TICKS;
 const MEAN_WAVES: u32 = 512;
-/// After the amplitude was found, until the mean begins.
+/// Waves between the end of the amplitude search and the start of the mean.
 const SETTLE_WAVES: u32 = 64;
-/// What di is raised to, of the holding current.
+/// Target of di as share of the holding current.
 const SWING_SHARE: f32 = 0.3;
-/// Less, at the voltage allowed, is too little to be measured.
+/// Smallest share that is measurable at the allowed voltage.
 const LEAST_SWING_SHARE: f32 = 0.03;
-/// Steps of the amplitude, of the voltage allowed: one per wave.
+/// Increase of the amplitude per wave, as share of the allowed voltage.
 const RISE_SHARE: f32 = 1.0 / 1024.0;
 
-/// Along and across the flux.
+/// Inductances along and across the flux.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Inductances {
     pub direct: Henry,
@@ -102,7 +105,7 @@ impl InductanceStage {
         }))
     }
 
-    /// One wave's swing is known.
+    /// Evaluates one wave's swing.
     fn wave(&mut self, swing: f32, reading: &Reading<'_>) -> Result<(), Refusal> {
         let settings = &reading.bench.settings;
         if self.rising {
@@ -144,7 +147,7 @@ mod tests {
     use super::*;
     use crate::motor::ElectricalAngle;
 
-    /// What is found of a swing that a resistance and an inductance make at an amplitude.
+    /// Inductance found for the swing of a known resistance and inductance at an amplitude.
     fn found(resistance: f64, inductance: f64, amplitude: f64) -> Result<Henry, Refusal> {
         let seconds = 2.0 / 24_000.0;
         let tangent = |y: f64| 1.0 - 2.0 / (crate::real::exp(2.0 * y) + 1.0);
@@ -164,7 +167,7 @@ mod tests {
         {
             let found = f64::from(found(resistance, inductance, amplitude).expect("usual").0);
             let x: f64 = resistance * 2.0 / 24_000.0 / (2.0 * inductance);
-            // What the series leaves out, and single precision.
+            // Tolerance: truncation of the series, and single precision.
             let error = x * x * x * x / 5.0 + 1e-5;
             assert!((found / inductance - 1.0).abs() < error, "{found} for {inductance}, x {x}");
         }
@@ -172,7 +175,7 @@ mod tests {
 
     #[test]
     fn a_swing_that_is_mostly_resistance_is_refused() {
-        // x is 0.5 where the exponential has come to three quarters of its way.
+        // At x = 0.5 the exponential has come to three quarters of its final value.
         assert!(found(1.0, 100e-6, 1.0).is_ok());
         assert_eq!(found(1.0, 50e-6, 1.0), Err(Refusal::MotorConstants));
         assert_eq!(found(1e-6, 20e-3, 1.0), Err(Refusal::MotorConstants), "beyond the range of a motor");

@@ -1,40 +1,51 @@
-//! From an unknown motor on an unknown wiring to a [`Calibration`], or to the reason why there is none.
+//! Calibrates an unknown motor on unknown wiring: yields a [`Calibration`], or the reason for refusing one.
 //!
 //! ```text
-//! zeros (bridge off) -> resistance at C, B, A: wiring of phases and shunts -> inductances at A
-//!    -> scan: the field turns forwards and back, slowly: counts, direction, pole pairs, offset, index -> Calibration
+//! current-sensor offsets (bridge off) -> resistance at C, B, A: wiring of phases and shunts
+//!    -> inductances at A
+//!    -> scan, the field turns slowly forwards and back: counts, direction, pole pairs, offset, index
+//!    -> Calibration
 //! ```
 //!
-//! Why here and nowhere else: an [`super::Axis`] cannot be made without a [`Calibration`], and a [`Calibration`] has
-//! no constructor but the end of a [`Calibrator`]. Until then the motor sees voltages along angles that the machine chooses,
-//! never a quadrature current: a free rotor follows the field and stops with it, whatever the encoder says.
-//! Limits hold in every tick: current vector, voltage, bus, rails, time of every stage.
+//! Why here and nowhere else: an [`super::Axis`] cannot be made without a [`Calibration`], and a
+//! [`Calibration`] has no constructor but the end of a [`Calibrator`]. Until then the motor receives voltages
+//! along angles that the state machine chooses, never a quadrature current. A free rotor follows the field
+//! and stops with it, whatever the encoder reads. Limits apply in every tick: current vector, voltage, bus,
+//! rails, time of every stage.
 //!
-//! | wrong | seen as | reason |
+//! | defect | symptom | reason |
 //! | --- | --- | --- |
 //! | a phase open, or its shunt silent | no current along its axis, or none in it | [`Refusal::PhaseOpen`] |
-//! | a shunt inverted, both, the two exchanged | signs of the phase currents | [`Refusal::ShuntInverted`], [`Refusal::ShuntsInverted`], [`Refusal::ShuntsSwapped`] |
-//! | two motor leads exchanged, or A and B of the encoder | counter runs against the field | [`Refusal::Direction`] |
+//! | one shunt inverted | signs of the phase currents | [`Refusal::ShuntInverted`] |
+//! | both shunts inverted | signs of the phase currents | [`Refusal::ShuntsInverted`] |
+//! | shunts exchanged | signs of the phase currents | [`Refusal::ShuntsSwapped`] |
+//! | two motor leads or A and B of the encoder exchanged | runs against field | [`Refusal::Direction`] |
 //! | encoder without counts, rotor blocked | travel | [`Refusal::NoCounts`] |
-//! | pole pairs, counts per turn | counts per electrical turn | [`Refusal::PolePairs`], [`Refusal::CountsPerTurn`] |
-//! | index missing, or not at one place per turn | index | [`Refusal::NoIndex`], [`Refusal::IndexMoved`] |
-//! | load, friction or cogging too large | way and deviation, both ways | [`Refusal::Slipped`] |
-//! | encoder turned on its shaft since it was stored | offset at the index | [`Refusal::StoredOffset`] |
-//! | another motor than the stored one | resistance, inductances | [`Refusal::OtherMotor`] |
+//! | pole pairs | counts per electrical turn | [`Refusal::PolePairs`] |
+//! | counts per turn | counts per electrical turn | [`Refusal::CountsPerTurn`] |
+//! | no index, or at several positions | index | [`Refusal::NoIndex`], [`Refusal::IndexMoved`] |
+//! | load, friction or cogging too large | travel and deviation, both ways | [`Refusal::Slipped`] |
+//! | encoder moved on its shaft since it was stored | offset at the index | [`Refusal::StoredOffset`] |
+//! | not the stored motor | resistance, inductances | [`Refusal::OtherMotor`] |
 //!
-//! Nothing is corrected in silence. Exchanged motor leads and an exchanged encoder look the same from here (the counter runs
-//! against the field), but the second also reverses the joint's angle: so the direction is part of the commissioned
-//! configuration, and the other one is refused. All three leads moved on by one are the same motor with another offset, which
-//! is found. Counts per electrical turn tell pole pairs and counts per turn apart only where the first come out whole.
+//! Nothing is corrected silently. Exchanged motor leads and an exchanged encoder look alike here: the counter
+//! runs against the field. But the second also reverses the joint's angle. So the direction is part of the
+//! commissioned configuration, and the other one is refused. All three leads moved on by one are the same
+//! motor with another offset, which is found. Counts per electrical turn distinguish wrong pole pairs from
+//! wrong counts per turn only where whole pole pairs result.
 //!
-//! **What cannot be seen.** Two motor leads *and* the encoder's A and B exchanged together are an electrically sound drive that
-//! turns the other way: field, counter and torque agree, the joint's sense is reversed. Nothing within the drive knows which way
-//! the joint flexes. So commissioning ends with a step by hand: bridge released, flex the joint, and its angle must grow; the
-//! same after every work on leads or encoder. What was found is of use to the same configuration only: [`super::Axis::new`]
-//! refuses another direction, other pole pairs and other counts than those it was found with.
+//! **What cannot be detected.** Two motor leads *and* the encoder's A and B exchanged together are an
+//! electrically sound drive that turns the other way. Field, counter and torque agree, but the joint's sense
+//! is reversed. Inside the drive the flexion direction of the joint is unknown. So commissioning ends with a
+//! manual step, to be repeated after every work on leads or encoder: with the outputs off, flex the joint;
+//! its angle must grow.
 //!
-//! Known limits: gain errors of shunts and of the bus divider scale R and L; a constant torque (gravity)
-//! shifts the offset by asin(torque / holding torque), friction does not; calibrate with the leg hanging or unloaded.
+//! Results are valid for the calibrated configuration only: [`super::Axis::new`] refuses another direction,
+//! other pole pairs and other counts.
+//!
+//! Known limits: gain errors of shunts and of the bus divider scale R and L. A constant torque
+//! (gravity) shifts the offset by asin(torque / holding torque), friction does not. Calibrate with the
+//! leg hanging or unloaded.
 
 mod field;
 mod found;
@@ -62,29 +73,29 @@ use scan::{Scan, ScanResult};
 pub(super) use track::INDEX_WIDTH;
 use zeros::Zeros;
 
-/// What a calibration may do to a motor.
+/// Limits of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrationSettings {
-    /// Current that holds and turns the rotor; has to overcome friction and cogging several times.
+    /// Current that holds and turns the rotor; must overcome friction and cogging several times.
     pub current: Ampere,
     /// Longest voltage vector while the motor's constants are unknown.
     pub voltage: Volt,
-    /// Electrical turns per second of the scan, 0.5..=20.
+    /// Speed of the scan's field, electrical turns per second, 0.5..=20.
     pub turns_per_s: f32,
 }
 
-/// What a tick of a calibration answers.
+/// Result of one calibration tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CalibrationStep {
-    /// Goes on; what the bridge does next.
+    /// Still running; the bridge's next command.
     Running(AxisCommand),
-    /// Passed; the bridge is to be released.
+    /// Passed; turn the outputs off.
     Done(Calibration),
-    /// Refused; the bridge is to be released.
+    /// Refused; turn the outputs off.
     Refused(Refusal),
 }
 
-/// What all stages read.
+/// Constants that all stages read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bench {
     settings: CalibrationSettings,
@@ -100,7 +111,7 @@ struct Bench {
     sine: Sine,
 }
 
-/// What a stage sees of one tick.
+/// Input of a stage in one tick.
 #[derive(Clone, Copy)]
 struct Reading<'a> {
     bench: &'a Bench,
@@ -116,7 +127,7 @@ impl Reading<'_> {
     }
 }
 
-/// What a stage answers.
+/// Result of one tick of a stage.
 enum Outcome<R> {
     Running(Stationary<Volt>),
     Passed(R),
@@ -131,7 +142,7 @@ enum Stage {
     Finished(Result<Calibration, Refusal>),
 }
 
-/// The machine; one tick per PWM period, and every tick is answered.
+/// State machine of a calibration; one tick per PWM period, and every tick returns a result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibrator {
     bench: Bench,
@@ -143,10 +154,9 @@ pub struct Calibrator {
 }
 
 impl Calibrator {
-    /// Measures everything.
+    /// Starts a calibration that measures everything.
     ///
-    /// # Errors
-    /// The part of the configuration or of the settings (as [`AxisError::Current`]) that makes no sense.
+    /// # Errors Names the invalid part of the configuration; invalid settings give [`AxisError::Current`].
     pub fn new(configuration: &AxisConfiguration, settings: CalibrationSettings) -> Result<Self, AxisError> {
         configuration.check()?;
         let sensible = settings.current.0 > 0.0
@@ -181,11 +191,11 @@ impl Calibrator {
         })
     }
 
-    /// After a power-up: everything is measured again as by [`Self::new`] and has to agree with what is stored; of that only the offset is used.
+    /// Starts a calibration after a power-up. Everything is measured as by [`Self::new`] and must agree with
+    /// the stored values; of these only the offset is used.
     ///
-    /// # Errors
-    /// As [`Self::new`]; also [`AxisError::Encoder`] where there is no index, and [`AxisError::Calibration`] where the stored
-    /// values are those of another configuration.
+    /// # Errors As [`Self::new`]. Also [`AxisError::Encoder`] without an index, and
+    /// [`AxisError::Calibration`] where the stored values belong to another configuration.
     pub fn from_stored(
         configuration: &AxisConfiguration,
         settings: CalibrationSettings,
@@ -200,7 +210,7 @@ impl Calibrator {
         Ok(Self { stored: Some(stored), ..Self::new(configuration, settings)? })
     }
 
-    /// One PWM period.
+    /// Runs one PWM period.
     pub fn tick(&mut self, sample: &AxisSample) -> CalibrationStep {
         match self.advance(sample) {
             Ok(command) => CalibrationStep::Running(command),
@@ -211,7 +221,7 @@ impl Calibrator {
         }
     }
 
-    /// The command, or how it ended.
+    /// Returns the command, or the end of the calibration.
     fn advance(&mut self, sample: &AxisSample) -> Result<AxisCommand, Result<Calibration, Refusal>> {
         let [low, high] = self.bench.bus_codes;
         if !(low..=high).contains(&sample.bus_code) {
@@ -278,7 +288,8 @@ impl Calibrator {
         }
     }
 
-    /// Ends with [`Refusal::OtherMotor`] where what is stored and what was found differ by more than this share of the first.
+    /// Ends with [`Refusal::OtherMotor`] where stored and measured value differ by more than this share of
+    /// the stored one.
     fn agrees(
         &self,
         values: impl Fn(&StoredCalibration) -> (f32, f32),
@@ -317,12 +328,14 @@ impl Calibrator {
     }
 }
 
-/// Copper that is 100 K warmer or colder has 39 % more or less of it.
+/// Copper 100 K warmer or colder has 39 % more or less resistance.
 const RESISTANCE_SHARE: f32 = 0.4;
-/// Each of the two measurements is within 2 % (100 motors of `hal-sim/tests/calibration`), 4 % together; magnets that are 100 K warmer have 12 %
-/// less flux, and iron that it saturates no more than as much inductance: 16 %, and some room.
+/// Both measurements are within 2 % each (100 motors of `hal-sim/tests/calibration`), so 4 % together.
+/// Magnets 100 K warmer have 12 % less flux, and so saturate the iron less: at most 12 % of inductance.
+/// Together 16 %, and a margin.
 const INDUCTANCE_SHARE: f32 = 0.2;
-/// The field turns slowly: a loop this fast holds the current and forgives an inductance that is half of what was found.
+/// The field turns slowly. A loop this fast holds the current and tolerates an inductance of half the
+/// measured one.
 const SCAN_BANDWIDTH: Hertz = Hertz(300.0);
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The closed list of reasons for which there is no calibration.
+//! The closed list of reasons for refusing a calibration.
 
 /// One of the motor's phases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,7 +11,7 @@ pub enum Phase {
     C,
 }
 
-/// Why there is no calibration. The bridge is released.
+/// Reason for refusing a calibration. The outputs are off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// Current vector beyond the configuration's bound.
@@ -20,9 +20,9 @@ pub enum Refusal {
     CurrentSense,
     /// Bus voltage out of range.
     BusVoltage,
-    /// The zero of this phase's shunt is too far from the middle, or too noisy.
+    /// The current-sensor offset of this phase is too far from the middle, or too noisy.
     ShuntZero(Phase),
-    /// The rotor turns although the bridge is off.
+    /// The rotor turns although the outputs are off.
     Turning,
     /// No current in this phase.
     PhaseOpen(Phase),
@@ -36,9 +36,9 @@ pub enum Refusal {
     CurrentDirection,
     /// The phases' resistances differ by more than 15 %.
     PhaseImbalance,
-    /// Resistance or inductance out of range, or too large for the voltage allowed.
+    /// Resistance or inductance out of range, or too large for the allowed voltage.
     MotorConstants,
-    /// Resistance more than 40 %, or an inductance more than 20 % from the stored one: another motor.
+    /// Resistance more than 40 %, or an inductance more than 20 % from the stored one: not the stored motor.
     OtherMotor,
     /// The current does not settle in time.
     TimeOut,
@@ -46,16 +46,16 @@ pub enum Refusal {
     NoCounts,
     /// The counter runs against the field: two motor leads or the encoder's A and B are exchanged.
     Direction,
-    /// The counts fit this number of pole pairs.
+    /// The counts fit this number of pole pairs instead.
     PolePairs(u8),
-    /// The counts fit this number of counts per turn.
+    /// The counts fit this number of counts per turn instead.
     CountsPerTurn(u32),
     /// The rotor did not follow the field evenly: load, friction or a blocked joint.
     Slipped,
     /// No index pulse in a whole turn.
     NoIndex,
-    /// Index pulses at different places of the turn.
+    /// Index pulses at different positions of the turn.
     IndexMoved,
-    /// The rotor does not stand where the stored offset says.
+    /// The measured offset differs from the stored one.
     StoredOffset,
 }

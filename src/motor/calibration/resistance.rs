@@ -6,17 +6,20 @@
 //! R = (v_2 - v_1) / (i_2 - i_1)
 //! ```
 //!
-//! The difference removes what dead time and diodes take, which does not change with the current's size. The voltage is the
-//! modulator's, so the bridge's own resistance counts as the motor's, as it should.
-//! A current that flows must lie within 15 degrees of the voltage; each wrong wiring bends it by 30 or more on one of the
-//! axes, with its own pattern of signs. Where a wrong sign turns the hold's feedback around, a quarter of the current is enough.
+//! The difference removes what dead time and diodes take, which does not change with the current's size. The
+//! voltage is the modulator's, so the bridge's own resistance correctly counts as the motor's.
 //!
-//! **Dither.** A timer's step of 48 V / 3500 is 14 mV where 10 A through 50 mOhm are 500: a duty that stands still is rounded
-//! the same way for as long as it stands, and R would be 1 to 3 % off. So the voltage along the axis moves up a saw tooth of 16
-//! ticks by 4/3 of a step, of which the centred modulation makes one step in every phase, up in one and down in two.
+//! The measured current must lie within 15 degrees of the voltage; each wrong wiring bends it by 30 or more
+//! on one of the axes, with its own pattern of signs. Where a wrong sign reverses the hold's feedback, a
+//! quarter of the current is enough to decide.
 //!
-//! The rotor swings towards the field, and while it does its flux takes or gives voltage along it; so means of 0.1 s are
-//! taken until two in a row agree to 0.2 % (at least 0.3 s, at most 4 s), twice per axis.
+//! **Dither.** A timer's step of 48 V / 3500 is 14 mV, against 500 mV of 10 A through 50 mOhm. A constant
+//! duty is always rounded the same way, and R would be 1 to 3 % off. So the voltage along the axis follows a
+//! saw tooth of 16 ticks and 4/3 of a step. Centred modulation turns that into one step in every phase, up in
+//! one and down in two.
+//!
+//! While the rotor swings towards the field, its back-EMF adds to the voltage along it. So means of 0.1 s are
+//! taken until two in a row agree to 0.2 %. That takes 0.3 to 4 s, twice per axis.
 
 use super::hold::Hold;
 use super::{ElectricalAngle, Outcome, Phase, Reading, Refusal, Stationary};
@@ -25,32 +28,33 @@ use crate::units::{Ampere, Ohm, Volt};
 
 const RISE_TICKS: u32 = CURRENT_RATE_HZ / 10;
 const MEAN_TICKS: u32 = CURRENT_RATE_HZ / 10;
-/// Of the saw tooth.
+/// Period of the dither's saw tooth.
 const DITHER_TICKS: u32 = 16;
 const RELEASE_TICKS: u32 = CURRENT_RATE_HZ / 10;
 const LEVEL_TICKS: u32 = 4 * CURRENT_RATE_HZ;
-/// Share by which two means of a settled rotor may differ.
+/// Greatest relative difference of two means of a settled rotor.
 const SETTLED_SHARE: f32 = 0.002;
-/// Share of the held current that is refused at once where it flows backwards: the hold would drive it further.
+/// A backward current beyond this share of the holding current is refused at once: the hold would
+/// drive it further.
 const JUDGED_SHARE: f32 = 0.25;
-/// Tangent of 15 degrees.
+/// Tangent of 15 degrees, the greatest angle between voltage and current.
 const GREATEST_BEND: f32 = 0.268;
-/// Share of the largest phase current that counts as none.
+/// Share of the largest phase current below which a phase counts as open.
 const NO_CURRENT_SHARE: f32 = 0.15;
 const GREATEST_IMBALANCE: f32 = 0.15;
 
-/// The last one is where the rotor stands for what comes next.
+/// Order of the axes; the rotor stays at the last one for the next stage.
 const AXES: [Phase; 3] = [Phase::C, Phase::B, Phase::A];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ResistanceStage {
     axis: usize,
     level: Level,
-    /// Of this level.
+    /// Ticks since the start of this level.
     ticks: u32,
     hold: Hold,
     sums: Sums,
-    /// The sums before these.
+    /// Sums of the preceding mean.
     before: Option<Sums>,
     half: Sums,
     found: [f32; 3],
@@ -63,7 +67,7 @@ enum Level {
     Release,
 }
 
-/// Over the ticks of one mean.
+/// Sums over the ticks of one mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sums {
     volts: f32,
@@ -135,14 +139,14 @@ impl ResistanceStage {
         Ok(Outcome::Running(self.hold.voltage_with(self.dither(reading), Volt::ZERO)))
     }
 
-    /// From one half of a saw tooth's height below nothing to one above.
+    /// Saw tooth of the dither, symmetric about zero.
     fn dither(&self, reading: &Reading<'_>) -> Volt {
         let height = reading.bus * (4.0 / 3.0 * reading.bench.modulator.duty_step());
         let share = ((self.ticks % DITHER_TICKS) as f32 + 0.5) / DITHER_TICKS as f32 - 0.5;
         height * share
     }
 
-    /// The sums of a mean that agrees with the one before.
+    /// Returns the sums of a mean that agrees with the preceding one.
     fn settled(&mut self, reading: &Reading<'_>) -> Result<Option<Sums>, Refusal> {
         if self.ticks > LEVEL_TICKS {
             return Err(Refusal::TimeOut);
@@ -184,7 +188,7 @@ impl ResistanceStage {
         Ok(Ohm(mean))
     }
 
-    /// The voltage is at its bound: for want of a current, or because the resistance is that large.
+    /// The voltage reached its limit: either no current flows, or the resistance is too large.
     fn without_current(&self, reading: &Reading<'_>, phase: Phase, reason: Refusal) -> Refusal {
         let current = self.hold.along_axis(reading.current).abs();
         if current < reading.bench.settings.current * NO_CURRENT_SHARE {
@@ -194,14 +198,14 @@ impl ResistanceStage {
         }
     }
 
-    /// By the mean at half current: a rotor that swings towards the field bends the current as well.
+    /// Judges the mean at half current: a rotor that swings towards the field bends the current as well.
     fn judge_direction(&self, half: Sums, phase: Phase) -> Result<(), Refusal> {
         let (along, across) = (self.hold.along_axis(half.current), self.hold.across_axis(half.current));
         if across.abs() <= along * GREATEST_BEND { Ok(()) } else { Err(diagnosis(half.current, phase)) }
     }
 }
 
-/// What bends a current that ought to flow along `phase`'s axis: in through it, out through the other two.
+/// Cause of a bent current that should flow along `phase`'s axis: in through it, out through the other two.
 fn diagnosis(current: Stationary<Ampere>, phase: Phase) -> Refusal {
     let currents = current.to_phases();
     let phases = [(Phase::A, currents.a.0), (Phase::B, currents.b.0), (Phase::C, currents.c.0)];

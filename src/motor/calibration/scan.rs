@@ -1,27 +1,35 @@
-//! The encoder: the field turns slowly, a whole turn of the motor forwards and one back, and the rotor with it.
+//! Encoder scan: the field turns the rotor slowly, a whole turn of the motor forwards and one back.
 //!
 //! ```text
-//! deviation = field - angle(place)                         of every tick, turns
+//! deviation = field - angle(position)                      of every tick, turns
 //! offset = (mean deviation forwards + mean deviation backwards) / 2
 //! lag    = (mean deviation forwards - mean deviation backwards) / 2        asin(friction / holding torque)
 //! ```
 //!
-//! Whole turns, so that cogging and an encoder off its centre average out; both ways, so that friction and the loop's delay
-//! cancel. Current is held by the current loop of the axis in a frame that the field defines, not the encoder: its
-//! quadrature axis lies along the field, which moves as [`super::field`] says.
+//! Whole turns average out cogging and an eccentric encoder; both ways cancel friction and the loop's delay.
+//! The axis' current loop holds the current in a frame that the field defines, not the encoder. Its
+//! quadrature axis lies along the field, which moves as `field.rs` describes.
 //!
-//! Judged in this order, the way there: the counter moved at all; with the field; equally far in every electrical turn of the
-//! field (or the rotor slipped, and its counts say nothing); by one turn's counts to 0.4 of an electrical turn, which is what
-//! other pole pairs make; the deviation's drift, which is what slightly other counts make; deviations within 90 degrees of their
-//! first; by one turn's counts to an eighth of an electrical turn. The way back: as even and as long; the lag; the index at one place.
+//! Checks of the forward pass, in this order:
 //!
-//! **How much lag.** What cancels is friction that is equal both ways. Up to 30 degrees it takes half of the holding torque, so
-//! the rotor still has a margin of two before it slips, and friction that differs by an eighth between the ways
-//! shifts the offset by tan 30 / 16 rad: 2 degrees. At a lag of 60 degrees it would be 6, and hardly anything holds.
+//! 1. The counter moved at all, and in the field's direction.
+//! 2. Equal travel in every electrical turn of the field. Otherwise the rotor slipped, and its
+//!    counts mean nothing.
+//! 3. Travel of one turn's counts to 0.4 of an electrical turn: detects other pole pairs.
+//! 4. Drift of the deviation: detects slightly different counts per turn.
+//! 5. Deviations within 90 degrees of the first.
+//! 6. Travel of one turn's counts to an eighth of an electrical turn.
 //!
-//! **With a stored offset** the way is the same, and the offset found must agree with the stored one to 5 degrees (0.4 % of the
-//! torque); the stored one, of the commissioning, is then used. Reversed wiring, other pole pairs or counts and an index that
-//! moved are so found at every power-up.
+//! The backward pass must be as even and as long; then lag and index position are checked.
+//!
+//! **Limit of the lag.** Friction cancels where it is equal both ways. A lag of 30 degrees takes half of the
+//! holding torque: the rotor still has a margin of two before it slips. Friction that differs by an eighth
+//! between the ways then shifts the offset by tan 30 / 16 rad: 2 degrees. At a lag of 60 degrees it would be
+//! 6, with hardly any holding torque left.
+//!
+//! **With a stored offset** the scan is the same. The measured offset must agree with the stored one to 5
+//! degrees (0.4 % of the torque). The stored offset, from the commissioning, is then used. So reversed
+//! wiring, other pole pairs or counts and a moved index are detected at every power-up.
 
 use super::field::FieldWay;
 use super::track::{Followed, Track};
@@ -32,35 +40,35 @@ use crate::units::Volt;
 
 const REST_TICKS: u32 = CURRENT_RATE_HZ / 5;
 const FALL_TICKS: u32 = CURRENT_RATE_HZ / 20;
-/// Electrical turns.
+/// Greatest error of the forward travel, electrical turns.
 const GREATEST_TRAVEL_ERROR: f32 = 0.125;
-/// What other pole pairs make nearly at least: p and p + 1 differ by p / (p + 1). Electrical turns.
+/// Lower bound of the error by wrong pole pairs, electrical turns: p and p + 1 differ by p / (p + 1).
 const LEAST_MISTAKE: f32 = 0.4;
-/// Of the deviation, electrical turns per turn of the motor: 18 degrees. 100 simulated motors swing by up to 13; 4,000 counts
-/// told of 4,096 make 34 with 4 pole pairs.
+/// Greatest drift of the deviation, electrical turns per turn of the motor: 18 degrees. 100 simulated motors
+/// swing by up to 13. With 4 pole pairs, 4,000 counts configured for 4,096 make 34.
 const GREATEST_DRIFT: f32 = 0.05;
-/// Between both ways, electrical turns.
+/// Greatest difference between both passes, electrical turns.
 const GREATEST_DIFFERENCE: f32 = 0.125;
-/// Electrical turns: see the module.
+/// Greatest lag, electrical turns: see the module.
 const GREATEST_LAG: f32 = 1.0 / 12.0;
-/// Between the offset found and the stored one, electrical turns.
+/// Greatest difference of measured and stored offset, electrical turns.
 const GREATEST_STORED_ERROR: f32 = 5.0 / 360.0;
-/// Less is vibration, electrical turns.
+/// Less travel is vibration, electrical turns.
 const LEAST_TRAVEL: f32 = 0.1;
-/// How far pole pairs may be from a whole number to be named.
+/// Greatest distance from a whole number at which pole pairs are reported.
 const WHOLE: f32 = 0.1;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ScanResult {
-    /// At place zero.
+    /// Electrical angle at rotor position zero.
     pub offset: ElectricalAngle,
-    /// Of the last sample.
+    /// Rotor position of the last sample.
     pub place: i32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Leg {
-    /// At the beginning and before the way back.
+    /// At the beginning and before the backward pass.
     Rest,
     Forwards,
     Backwards,
@@ -74,9 +82,9 @@ pub(super) struct Scan {
     current_loop: CurrentLoop,
     stored: Option<ElectricalAngle>,
     leg: Leg,
-    /// Of this leg.
+    /// Ticks of this leg.
     ticks: u32,
-    /// Field at the beginning of the leg and now, electrical turns, not reduced.
+    /// Angle of the field at the beginning of the leg and now, electrical turns, not reduced.
     begin_turns: f32,
     field_turns: f32,
     track: Track,
@@ -86,7 +94,7 @@ pub(super) struct Scan {
 }
 
 impl Scan {
-    /// `begin` is the voltage that holds the current along phase A so far.
+    /// `begin` is the present voltage that holds the current along phase A.
     pub(super) fn new(gains: CurrentGains, begin: Volt, stored: Option<ElectricalAngle>) -> Self {
         Self {
             gains,
@@ -168,7 +176,7 @@ impl Scan {
         }
     }
 
-    /// Electrical turns of a travel, as the counts were told.
+    /// Converts counts to electrical turns by the configured scale.
     fn electrical(reading: &Reading<'_>, counts: i32) -> f32 {
         let turn = reading.bench.scale.counts_per_turn() as f32;
         counts as f32 * f32::from(reading.bench.pole_pairs) / turn
@@ -236,7 +244,7 @@ impl Scan {
         }
     }
 
-    /// What the offset grows by because places count from the index on, if there is one.
+    /// Angle to add to the offset because rotor positions count from the index; zero without an index.
     fn index_angle(&self, reading: &Reading<'_>) -> ElectricalAngle {
         let scale = &reading.bench.scale;
         let index = self.track.index.unwrap_or(0);

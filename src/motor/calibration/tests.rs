@@ -7,15 +7,15 @@ use crate::motor::{Axis, AxisRequest};
 pub(crate) const SETTINGS: CalibrationSettings =
     CalibrationSettings { current: Ampere(20.0), voltage: Volt(4.0), turns_per_s: 8.0 };
 
-/// Runs a calibration to its end; no quadrature torque is ever allowed to run the rotor away. `spoil` sees every sample with
-/// its number.
+/// Runs a calibration to its end and checks that quadrature torque never runs the rotor away. `spoil` can
+/// change every sample, by its number.
 fn run_with(
     motor: &mut TestMotor,
     mut calibrator: Calibrator,
     mut spoil: impl FnMut(&mut AxisSample, u32),
 ) -> Result<Calibration, Refusal> {
     let mut sample = motor.sample();
-    // Ten seconds.
+    // At most ten seconds.
     for tick in 0..240_000 {
         spoil(&mut sample, tick);
         let command = match calibrator.tick(&sample) {
@@ -39,7 +39,7 @@ pub(crate) fn calibrate(
     run(motor, Calibrator::new(configuration, SETTINGS).expect("usual"))
 }
 
-/// What is found against what is true, electrical degrees.
+/// Error of the offset found, electrical degrees.
 fn offset_error_deg(motor: &mut TestMotor, configuration: &AxisConfiguration, found: &Calibration) -> f64 {
     let scale = configuration.scale().expect("usual");
     let angle = found.angle_at(&scale, configuration.counter, motor.sample().encoder_count);
@@ -91,11 +91,11 @@ const WRONG: [(Change, Refusal); 18] = [
     (|motor| motor.pole_pairs = 11.0, Refusal::PolePairs(11)),
     (|motor| motor.zeros[1] = 400.0, Refusal::ShuntZero(Phase::C)),
     (|motor| motor.bus = 12.0, Refusal::BusVoltage),
-    // 0.61 N m hold: friction of 0.4 is a lag of 41 degrees, although the rotor follows.
+    // The holding torque is 0.61 N m: friction of 0.4 is a lag of 41 degrees, although the rotor follows.
     (|motor| motor.coulomb = 0.54, Refusal::Slipped),
     (|motor| motor.coulomb = 0.40, Refusal::Slipped),
-    // A gain 40 % off makes one phase's resistance 18 % larger than the mean and bends no current by more than 13 degrees; 60 %
-    // bend the first by 19.
+    // A gain 40 % off makes one phase's resistance 18 % larger than the mean and bends no current by more
+    // than 13 degrees. With 60 % the first current is bent by 19.
     (|motor| motor.shunts = |[b, c]| [1.4 * b, c], Refusal::PhaseImbalance),
     (|motor| motor.shunts = |[b, c]| [1.6 * b, c], Refusal::CurrentDirection),
     (|motor| motor.index_width = 30, Refusal::IndexMoved),
@@ -115,8 +115,8 @@ fn the_index_tells_counts_per_turn_from_pole_pairs() {
     let configuration = AxisConfiguration { counts_per_turn: 4096, ..CONFIGURATION };
     let refusals: std::vec::Vec<Refusal> = (0..7)
         .map(|turn| {
-            // The way forwards is nine sevenths of a turn: from two of the seven places where the rotor may align it passes the
-            // index twice.
+            // The forward pass is nine sevenths of a turn. So it passes the index twice from two of the seven
+            // positions where the rotor may align.
             let encoder_zero = f64::from(turn) / 7.0 - 0.1;
             let mut motor = TestMotor { counts_per_turn: 2048.0, encoder_zero, ..TestMotor::default() };
             calibrate(&mut motor, &configuration).expect_err("half of the counts")
@@ -132,7 +132,7 @@ fn what_is_stored_is_found_again_by_the_index() {
     let mut motor = TestMotor::default();
     let first = calibrate(&mut motor, &CONFIGURATION).expect("sound");
     let stored = first.stored().expect("an index");
-    // Power off: the counter forgets, the joint is moved.
+    // Power off: the counter resets, the joint is moved.
     motor.angle += 11.0;
     motor.speed = 0.0;
     motor.encoder_zero += 3.0;
@@ -168,7 +168,7 @@ fn constants_that_are_not_the_stored_ones_are_another_motors_and_what_is_used_is
     for (agrees, differs, place) in changes {
         for (share, end) in [(agrees, true), (-agrees, true), (differs, false), (-differs, false)] {
             let mut changed = stored;
-            // What is found is this share of what is stored beyond it.
+            // The measured value exceeds the stored one by this share.
             *place(&mut changed) /= 1.0 + share;
             let calibrator = Calibrator::from_stored(&CONFIGURATION, SETTINGS, changed).expect("usual");
             let found = run(&mut TestMotor { seed: 9, ..TestMotor::default() }, calibrator);
@@ -194,7 +194,7 @@ fn what_is_stored_excuses_no_wrong_wiring() {
     }
 }
 
-/// A change of what a calibration was made for.
+/// Changes of the encoder setting that make a calibration invalid.
 const OTHERS: [fn(&mut AxisConfiguration); 3] = [
     |configuration| configuration.counter = Direction::Down,
     |configuration| configuration.pole_pairs = 14,
@@ -228,7 +228,7 @@ fn a_border_that_is_crossed_on_the_way_ends_the_calibration() {
         (|sample| sample.bus_code = 0, Refusal::BusVoltage),
     ];
     for (spoil, reason) in spoils {
-        // In the resistance's stage and in the scan.
+        // During the resistance stage and during the scan.
         for moment in [12_000, 80_000] {
             let calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual");
             let end = run_with(&mut TestMotor::default(), calibrator, |sample, tick| {
@@ -256,7 +256,7 @@ fn an_axis_controls_the_motor_it_was_calibrated_on() {
             }
             assert_eq!(axis.fault(), None);
             let joint = axis.joint_sample();
-            // Positive current flexes: the counts grow with it, whatever the wiring; 0.1 s at some 340 rad/s^2.
+            // Positive current flexes: counts grow for every wiring; 0.1 s at some 340 rad/s^2.
             assert!((joint.current.0 - 3.0).abs() < 0.3, "{joint:?}");
             assert!(joint.encoder_counts > 500, "{joint:?}");
         }

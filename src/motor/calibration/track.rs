@@ -1,31 +1,32 @@
-//! What the rotor does while the field of a scan turns: counts along the way, the index on it, deviation from the field.
+//! Motion of the rotor during a scan: travel in counts, position of the index, deviation from the field.
 
 use super::{Reading, Refusal};
 use crate::motor::{CountScale, ElectricalAngle};
 
-/// Deviation that a rotor which follows keeps to, from where it began, electrical turns: beyond 90 degrees the field no longer
-/// holds it. Lightly damped rotors swing by up to 39 (100 simulated motors), salient ones that hardly hold by 65.
+/// Greatest change of the deviation of a rotor that follows, electrical turns: beyond 90 degrees the field no
+/// longer holds it. Lightly damped rotors swing by up to 39 degrees (100 simulated motors), salient ones that
+/// hardly hold by 65.
 const GREATEST_UNEVENNESS: f32 = 0.25;
-/// Counts between index pulses read from either side.
+/// Counts between index pulses captured from either side.
 pub(in crate::motor) const INDEX_WIDTH: i32 = 4;
-/// A rotor that followed goes equally far in every electrical turn of the field, to one part in so many: swinging makes up to
-/// 0.16 (100 simulated motors), a turn missed 0.67 at least.
+/// Travel of a rotor that followed is equal in every electrical turn of the field, to one part in so many.
+/// Swinging makes up to 0.16 (100 simulated motors), a missed turn at least 0.67.
 const EVEN_SHARE: i32 = 2;
 
-/// The counter unwrapped, growing with the field where all is well, and the index on the way.
+/// Unwrapped counter, growing with the field where all is well, and the index on the way.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Track {
     counter: Option<u16>,
-    /// Counts from the beginning.
+    /// Counts travelled since the beginning.
     pub way: i32,
-    /// Where on the way the index came first.
+    /// Travel at the first index pulse.
     pub index: Option<i32>,
-    /// A distance of two index pulses that is no whole number of turns.
+    /// A distance of two index pulses that is not a whole number of turns.
     pub index_distance: Option<i32>,
 }
 
 impl Track {
-    /// Moves the way on by what the counter did, and notes the index.
+    /// Adds the counter's step to the travel, and records the index.
     pub(super) fn follow(&mut self, reading: &Reading<'_>) {
         let sign = reading.bench.direction.sign();
         let now = reading.sample.encoder_count;
@@ -43,13 +44,14 @@ impl Track {
     }
 }
 
-/// Field less rotor over one way: mean, and the straight line through it.
+/// Deviation of field from rotor over one pass: mean, and slope of a straight line.
 ///
 /// ```text
 /// drift per turn = sum(x deviation) / sum(x^2)           x field turns from the middle of the way
 /// ```
 ///
-/// Summed up as integers, 2^-32 turns for the mean, 2^-12 and 2^-16 for the line: exact for as long as any way takes.
+/// Sums are integers, in 2^-32 turns for the mean, in 2^-12 and 2^-16 for the line: exact for
+/// the longest pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Deviation {
     first: ElectricalAngle,
@@ -74,23 +76,23 @@ impl Deviation {
         self.ticks += 1;
     }
 
-    /// Mean of the way.
+    /// Mean deviation of the pass.
     pub(super) fn mean(&self) -> ElectricalAngle {
         let mean = self.sum / i64::from(self.ticks.max(1));
         self.first.plus(ElectricalAngle::from_units(mean as i32))
     }
 
-    /// What the rotor stays behind more with every turn of the field, turns.
+    /// Growth of the rotor's lag per turn of the field, turns.
     pub(super) fn drift_per_turn(&self) -> f32 {
         self.moment as f32 / self.squares.max(1) as f32 * (4096.0 / 65_536.0)
     }
 }
 
-/// Counts of one way while the field turned steadily, in all and in each electrical turn of the field.
+/// Counts of one pass while the field turned steadily, in total and in each electrical turn of the field.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Travel {
     begin: Option<i32>,
-    /// Of the way, where this turn of the field began, and which it is.
+    /// Travel at which this turn of the field began, and its number.
     turn_begin: i32,
     turn: u8,
     now: i32,
@@ -113,20 +115,20 @@ impl Travel {
         }
     }
 
-    /// In all.
+    /// Total counts of the pass.
     pub(super) fn counts(&self) -> i32 {
         self.now.wrapping_sub(self.begin.unwrap_or(self.now))
     }
 
-    /// The rotor went equally far in every turn of the field: it may be another rotor than was told, but it followed. One
-    /// turn alone has nothing to be compared with.
+    /// Whether the rotor moved equally far in every turn of the field. Then it followed, even where the
+    /// configured scale is wrong. A single turn has nothing to be compared with.
     fn is_even(&self) -> bool {
         let mean = self.least / 2 + self.most / 2;
         self.least > self.most || self.most.wrapping_sub(self.least) <= mean.wrapping_abs() / EVEN_SHARE
     }
 }
 
-/// One way: how far, how evenly, with which deviation.
+/// One pass: distance, evenness, deviation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Followed {
     pub travel: Travel,
@@ -134,14 +136,14 @@ pub(super) struct Followed {
 }
 
 impl Followed {
-    /// One tick of steady motion: `field`, how far it has come of how far it will go steadily, electrical turns.
+    /// Adds one tick of steady motion: `field`, and `turns` travelled of the total steady turns, electrical.
     pub(super) fn push(&mut self, scale: &CountScale, way: i32, field: ElectricalAngle, turns: [f32; 2]) {
         let [now, all] = turns;
         self.travel.push(way, now);
         self.deviation.push(field.minus(scale.angle(scale.within_turn(way))), now - 0.5 * all);
     }
 
-    /// Whether rotor and field kept together at all, whatever the scale of the counts.
+    /// Checks that rotor and field stayed together, for any scale of the counts.
     ///
     /// # Errors
     /// [`Refusal::Slipped`].
@@ -149,7 +151,7 @@ impl Followed {
         if self.travel.is_even() { Ok(()) } else { Err(Refusal::Slipped) }
     }
 
-    /// Whether the rotor kept to the field, with the scale that it was told.
+    /// Checks that the rotor stayed with the field, with the configured scale.
     ///
     /// # Errors
     /// [`Refusal::Slipped`].
@@ -184,7 +186,7 @@ mod tests {
                 let swing = 0.05 * crate::real::sin_cos(x * 9.7).0;
                 deviation.push(ElectricalAngle::from_turns(0.3 + drift * x + swing), x);
             }
-            // 6 A / (pi N) of the whole way is left of an amplitude A that swings N times, six here at least.
+            // Swinging N times (at least six here) with amplitude A leaves 6 A / (pi N) of the whole pass.
             assert!((deviation.drift_per_turn() - drift).abs() * turns < 0.02, "{drift}: {deviation:?}");
         }
     }

@@ -1,7 +1,8 @@
-//! The shunts' zeros: with the bridge off no current flows, and what the amplifiers say then is nothing.
+//! Current-sensor offsets: shunt codes with the bridge off, so without current.
 //!
-//! Mean of 4,096 samples after 256 to settle (0.18 s). A zero more than 150 codes (6 A) from the middle, a spread of
-//! more than 80 codes or a rotor that turns meanwhile is refused. Noise of one code leaves 0.016 codes: 0.6 mA.
+//! Mean of 4,096 samples after 256 to settle (0.18 s). Reasons to refuse: an offset more than 150 codes (6 A)
+//! from the middle, a spread of more than 80 codes, a rotor that turns. Noise of one code leaves 0.016 codes:
+//! 0.6 mA.
 
 use super::{Phase, Refusal};
 use crate::hal::AxisSample;
@@ -11,7 +12,7 @@ const SETTLE_TICKS: u32 = 256;
 const MEAN_TICKS: u32 = 4096;
 const MIDDLE: u32 = 2048;
 const GREATEST_SPREAD: u16 = 80;
-/// Counts of the encoder that vibration may make.
+/// Encoder counts that vibration may cause.
 const GREATEST_TRAVEL: u16 = 3;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -10,7 +10,7 @@ const MOTOR: MotorConstants = MotorConstants {
 
 const PERIOD_S: f64 = 1.0 / 24_000.0;
 
-/// The motor in the rotor's frame with the loop's delay: the voltage of one sample acts from the next on.
+/// A motor in the rotor's frame with the loop's delay: the voltage of one sample acts from the next on.
 struct Plant {
     current: [f64; 2],
     pending: [f64; 2],
@@ -20,7 +20,7 @@ struct Plant {
 
 impl Plant {
     fn at(speed: f64) -> Self {
-        // As at the end of a long time at no current.
+        // State after a long time at zero current.
         Self { current: [0.0; 2], pending: [0.0, speed * 2.9e-3], speed, flux: 2.9e-3 }
     }
 
@@ -75,7 +75,8 @@ fn a_step_arrives_without_error_with_the_overshoot_of_its_phase_margin() {
             plant.current
         );
         assert!(peak < 10.0 * (1.0 + most), "{bandwidth}: {peak}");
-        // A first-order lag of the bandwidth reaches 63 % after 1 / (2 pi f), and one period and a half come before.
+        // A first-order lag of the bandwidth reaches 63 % after 1 / (2 pi f); one and a half periods of delay
+        // come before.
         let expected = 1.0 / (core::f64::consts::TAU * f64::from(bandwidth)) / PERIOD_S + 1.5;
         let crossed = crossed.expect("reached") as f64 + 1.0;
         assert!((crossed - expected).abs() < 1.5, "{bandwidth}: {crossed} of {expected} ticks");
@@ -98,7 +99,7 @@ fn feedforward_keeps_a_step_of_one_axis_out_of_the_other() {
         worst
     };
     let (with, without) = (disturbed(true), disturbed(false));
-    // What is left is the delay's: 1.5 periods of a change that takes four.
+    // The remainder is due to the delay: 1.5 periods of a change that takes four.
     assert!(with < 0.45 * without && with < 1.5, "{with} A with, {without} A without");
 }
 
@@ -115,7 +116,7 @@ fn the_sign_of_each_feedforward_is_the_motors() {
 #[test]
 fn at_the_limit_the_field_stays_and_the_voltage_never_exceeds_it() {
     let gains = gains(1000.0, true);
-    // Back-EMF of 4.6 V, 40 A want 2.7 V across and 2 V more along: 5 V are not enough.
+    // The back-EMF is 4.6 V; 40 A need 2.7 V across and 2 V along: 5 V are too few.
     let mut plant = Plant::at(1600.0);
     let mut current_loop = CurrentLoop::default();
     for tick in 0..4000 {
@@ -145,7 +146,8 @@ fn nothing_winds_up_at_the_limit() {
         }
         last_outside
     };
-    // However long the limit lasted; 30 ticks are 1.25 ms, from 8 A to 0.5 A with L/R = 0.5 ms for what the limit left.
+    // Recovery is independent of the time at the limit. 30 ticks are 1.25 ms: from 8 A to 0.5 A with L/R =
+    // 0.5 ms.
     let (short, long) = (recovery(400), recovery(40_000));
     assert!(short == long && long < 30, "{short}, {long} ticks");
 }

@@ -11,13 +11,13 @@ const SETTINGS: EndStopSettings = EndStopSettings {
     tolerance: 100,
 };
 
-/// A joint with friction, gravity and a stop, counts and amperes.
+/// Simulated joint with friction, gravity and a stop, in counts and amperes.
 struct Joint {
     place: f64,
     speed: f64,
     stop: f64,
     friction: f64,
-    /// Something in the way, once.
+    /// An obstacle that stops the joint once.
     obstacle: Option<f64>,
 }
 
@@ -78,7 +78,7 @@ fn a_way_without_a_stop_a_joint_that_sticks_and_an_obstacle_are_refused() {
     assert_eq!(refused(&mut Joint::to(-300_000.0)), ReferenceStep::Refused(ReferenceRefusal::NoStop));
     let stuck = &mut Joint { friction: 8.0, ..Joint::to(-50_000.0) };
     assert_eq!(refused(stuck), ReferenceStep::Refused(ReferenceRefusal::Stuck));
-    // A knee in the way that goes as soon as the joint backs off.
+    // A knee in the way that withdraws as soon as the joint backs off.
     let obstacle = &mut Joint { obstacle: Some(-30_000.0), ..Joint::to(-50_000.0) };
     let mut touched = false;
     let found = search(obstacle, SETTINGS, |joint, _| {

@@ -1,12 +1,12 @@
-//! The design's table: what each regular piece of work costs, its bound, and which part of the processor it takes.
+//! The design's table: cost, bound and share of the processor of each periodic task.
 
 use cortex_m_semihosting::hprintln;
 
 use crate::counter::Tally;
 
-/// Of the board.
+/// Clock of the board's processor.
 pub const PROCESSOR_HZ: f32 = 168e6;
-/// Of this processor with its flash accelerator; the board has to confirm it.
+/// Assumed cycles per instruction with the flash accelerator; to be confirmed on the board.
 pub const CYCLES_PER_INSTRUCTION: f32 = 1.34;
 const MOST_LINES: usize = 6;
 
@@ -23,14 +23,14 @@ struct Line {
 pub struct Account([Option<Line>; MOST_LINES]);
 
 impl Account {
-    /// Takes in what is done so often per second.
+    /// Adds a task that runs so often per second.
     pub fn add(&mut self, name: &'static str, tally: Tally, goal: u32, per_second: u32) {
         if let Some(free) = self.0.iter_mut().find(|line| line.is_none()) {
             *free = Some(Line { name, tally, goal, per_second });
         }
     }
 
-    /// Prints the table; whether all bounds are kept.
+    /// Prints the table; returns whether all bounds are met.
     pub fn report(&self) -> bool {
         hprintln!("\nAgainst the design, shares of {:.0} MHz", PROCESSOR_HZ / 1e6);
         hprintln!(

@@ -1,7 +1,7 @@
-//! What of one axis' tick costs what: each part called by itself, over the angles of an electrical turn.
+//! Costs of the parts of one axis' tick: each part called by itself, over the angles of an electrical turn.
 //!
-//! A part called by itself hands its arguments and its result over through memory, which in the tick they need not; so the
-//! parts come out somewhat dearer than they are, and the rest somewhat cheaper.
+//! A part called by itself passes its arguments and its result through memory, which the tick avoids. So the
+//! parts look somewhat dearer than they are, and the remainder somewhat cheaper.
 
 use core::hint::black_box;
 
@@ -15,7 +15,7 @@ use scarab::units::{Ampere, Henry, Ohm, Volt};
 use crate::counter::{Tally, count, heading};
 use crate::motor::CONFIGURATION;
 
-/// A part, and how often it is in a tick.
+/// Parts of a tick, and their number in a tick.
 const PARTS: [(&str, u32); 11] = [
     ("encoder step to place and angle", 1),
     ("speed tracking", 1),
@@ -30,7 +30,7 @@ const PARTS: [(&str, u32); 11] = [
     ("  not in the sum: sine and cosine, micromath", 0),
 ];
 
-/// Prints the parts, and what they leave over of the whole.
+/// Prints the parts, and the remainder of the whole.
 pub fn report(whole: &Tally) {
     let Some(tallies) = parts() else { return };
     heading("what costs what");

@@ -1,4 +1,4 @@
-//! One axis' tick as the 24 kHz interrupt calls it: calibrated, with noise, at four speeds, up to the voltage limit.
+//! One axis' tick, calibrated, with noise, at four speeds up to the voltage limit.
 
 use core::hint::black_box;
 
@@ -13,13 +13,14 @@ use crate::axis_parts;
 use crate::counter::{Tally, count, heading};
 use crate::motor::{CONFIGURATION, Motor};
 
-/// Design: one axis' tick.
+/// Design bound of one axis' tick.
 const MOST_INSTRUCTIONS: u32 = 700;
 
-/// Mechanical speeds and target currents: nearly at rest (a rotor that a current of either sign does not move has an encoder that is
-/// frozen), a joint's greatest behind 50:1, and near the voltage limit.
+/// Mechanical speeds and target currents: nearly at rest, a joint's greatest speed behind 50:1, and near the
+/// voltage limit. Not quite at rest, because a rotor that a current of either sign does not move counts as a
+/// frozen encoder.
 pub const SPEEDS: [(f32, f32); 4] = [(1.0, 10.0), (225.0, 30.0), (-225.0, 30.0), (820.0, 40.0)];
-/// Ticks counted at each speed; an electrical turn at the slowest moving speed is 96.
+/// Ticks counted at each speed; an electrical turn at the slowest moving speed takes 96.
 const TICKS: u32 = 1200;
 
 #[inline(never)]
@@ -27,7 +28,7 @@ fn tick(axis: &mut Axis, sample: &AxisSample, request: AxisRequest) -> AxisComma
     axis.tick(sample, request)
 }
 
-/// Prints the tables; whether the bounds are kept.
+/// Prints the tables; returns whether the bounds are met.
 pub fn report() -> bool {
     let mut kept = true;
     for (name, sine) in [("exact sine", Sine::Exact), ("micromath's sine", Sine::Fast)] {
@@ -47,7 +48,7 @@ pub fn report() -> bool {
     kept
 }
 
-/// A calibration of a motor, and what its ticks take; `None` where it is refused.
+/// Calibrates a motor and counts the ticks' instructions; `None` where it is refused.
 pub fn calibrated(
     motor: &mut Motor,
     configuration: &AxisConfiguration,

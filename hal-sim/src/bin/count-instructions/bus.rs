@@ -1,4 +1,4 @@
-//! What one node of the bus costs per frame: what comes at each cycle, what comes seldom, and the dearest of random frames.
+//! Cost of one bus node per frame: cyclic frames, rare frames, and the dearest of random frames.
 
 use core::hint::black_box;
 
@@ -49,7 +49,7 @@ impl Bench {
         self.heard.push(instructions);
     }
 
-    /// Everything that the node has to say; the last poll says nothing.
+    /// Sends all waiting frames; the last poll returns none.
     fn poll(&mut self) {
         loop {
             let (instructions, frame) = count(|| black_box(&mut self.node).poll(self.now_us, &mut self.axis));

@@ -1,8 +1,10 @@
-//! What a board's round of the bus costs while the wire is full: the interrupt of level 5 with its queues, without the controller's registers.
+//! Cost of a board's bus rounds on a full wire.
 //!
-//! Each frame that comes raises a round, each that has left another one, and every second tick of the servo a third. A wire at 1 Mbit/s carries at most
-//! so many: frames without data have 47 bits, of eight bytes 111, stuffed bits not counted. A round that takes its time is followed by the frames of
-//! that time at once, since it stands below nobody who hears them.
+//! Counted is the interrupt of level 5 with its queues, without the controller's registers.
+//!
+//! Each received frame raises a round, each sent frame another, and every second servo tick a third. A wire
+//! at 1 Mbit/s limits the number: frames without data have 47 bits, those of eight bytes 111, stuff bits not
+//! counted. The frames that arrive during a long round follow it at once.
 
 use core::hint::black_box;
 
@@ -23,13 +25,13 @@ use crate::machine::{Machine, bits};
 
 /// Frames of each kind.
 const COUNT: usize = 2000;
-/// Late enough for the boot-up messages.
+/// Time after the boot-up messages.
 const START_US: u64 = 10_000;
-/// The servo tells in every second tick.
+/// Interval of the servo's reports: every second tick.
 const TOLD_US: u64 = 500;
-/// With it the rest of the firmware keeps a fifth of the processor for its housekeeping and the search.
+/// With this share a fifth of the processor remains for housekeeping and the search.
 const MOST_PERCENT: f32 = 43.0;
-/// A station with its queues; the servo at their other end takes what it is given, and reports when it is told to.
+/// A station with its queues. The servo at their other end takes its orders, and reports on request.
 struct Bench<'a> {
     station: Station<2, 16>,
     found: Found<2, 1>,
@@ -74,7 +76,7 @@ impl<'a> Bench<'a> {
         operational.then_some(bench)
     }
 
-    /// One round; whether something was sent.
+    /// Runs one round; returns whether a frame was sent.
     fn hear(&mut self, frame: Option<Frame>) -> bool {
         self.machine.sent = 0;
         if let Some(frame) = frame {
@@ -88,7 +90,7 @@ impl<'a> Bench<'a> {
         self.machine.sent > 0
     }
 
-    /// These frames, one after the other, on a wire on which nothing else has room; what is sent raises rounds of its own.
+    /// Runs these frames back to back on a full wire; frames that are sent raise further rounds.
     fn run(&mut self, name: &str, frames: &[Frame]) -> bool {
         (self.tally, self.machine.bits, self.lost) = (Tally::default(), 0, 0);
         let (begun_us, mut bits_heard, mut half_ms) = (self.now_us, 0, 0);
@@ -127,7 +129,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Prints the table; whether all bounds are kept, `None` where there is no station.
+/// Prints the table; returns whether all bounds are met, `None` where there is no station.
 #[inline(never)]
 pub fn report() -> Option<bool> {
     hprintln!(
@@ -155,7 +157,7 @@ pub fn report() -> Option<bool> {
     let mut queues = BusQueues::new();
     let mut bench = Bench::new(&mut queues)?;
     full(&mut bench);
-    // A millisecond and more without an ear: what finds no room is told (8110).
+    // Reception stops for over a millisecond; frames without space are reported as lost (8110).
     bench.may_lose = true;
     kept &= bench.run("reset, records of 400 bytes", &[all[7].1]);
 
@@ -168,13 +170,13 @@ pub fn report() -> Option<bool> {
     Some(kept & bench.storage.given().is_some())
 }
 
-/// Both nodes keep as much as a record has room for, of any values.
+/// Fills both nodes' stored objects up to a record's capacity, with any values.
 fn full(bench: &mut Bench<'_>) {
     let mut record = [0; LONGEST];
     let mut length = 0;
     for (object, row) in kept_objects() {
         let Some(room) = record.get_mut(length..) else { break };
-        // The numbers of the nodes stay.
+        // Node numbers stay unchanged.
         let Ok(size) = write_kept(object, row.default, room) else { break };
         length += if object.index == 0x2001 { 0 } else { size };
     }

@@ -1,4 +1,4 @@
-//! Copies of memory (`scarab::board::copy`): that every length at every alignment arrives whole and nothing beside it, and what they cost.
+//! Memory copies (`scarab::board::copy`): correctness at every length and alignment, and cost.
 
 use core::hint::black_box;
 
@@ -7,15 +7,15 @@ use cortex_m_semihosting::hprintln;
 use crate::counter::{Tally, count, heading};
 
 const WORDS: usize = 48;
-/// Every way through the copies: rounds of 32 and of 16 bytes, and all that is left of them.
+/// Covers every path through the copies: rounds of 32 and of 16 bytes, and all remainders.
 const LONGEST: usize = 100;
 const ALIGNMENTS: usize = 4;
-/// What lies around a copy.
+/// Fill around a copy.
 const UNTOUCHED: u8 = 0xEE;
-/// Instructions of a copy of 144 bytes, both places aligned and not.
+/// Greatest instructions of a copy of 144 bytes, aligned and unaligned.
 const MOST: [u32; 2] = [80, 140];
 
-/// Prints the table; whether every copy is right and cheap enough.
+/// Prints the table; returns whether every copy is right and cheap enough.
 pub fn report() -> bool {
     heading("copies of 144 bytes");
     let words: [u32; WORDS] = core::array::from_fn(|place| 0x0302_0100 + 0x0404_0404 * place as u32);

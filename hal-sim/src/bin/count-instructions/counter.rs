@@ -1,6 +1,9 @@
-//! TIM5's counter as QEMU has it: 1 GHz without being enabled, which at `-icount shift=0` is one per instruction.
+//! Instruction counter: TIM5 as QEMU models it.
 //!
-//! No documentation promises that: [`start`] counts a hundred `nop` first, and nothing is measured where they are not a hundred.
+//! The timer runs at 1 GHz without being enabled, which at `-icount shift=0` is one count per instruction.
+//!
+//! No documentation promises that, so [`start`] first counts a hundred `nop`, and nothing is measured where
+//! they are not a hundred.
 
 use core::hint::black_box;
 
@@ -10,11 +13,11 @@ const TIM5_CNT: *const u32 = 0x4000_0C24 as *const u32;
 const TIM5_ARR: *mut u32 = 0x4000_0C2C as *mut u32;
 const TIM5_EGR: *mut u32 = 0x4000_0C14 as *mut u32;
 
-/// Lets the counter run over all of its 32 bits; whether it counts instructions.
+/// Starts the counter over all of its 32 bits; returns whether it counts instructions.
 #[expect(unsafe_code, reason = "device registers")]
 pub fn start() -> bool {
-    // SAFETY: these addresses are registers of TIM5 on this machine, nothing else uses the timer, and writing its reload value
-    // and update event has no effect on memory.
+    // SAFETY: these addresses are registers of TIM5 on this machine. Nothing else uses the timer, and writing
+    // its reload value and update event has no effect on memory.
     unsafe {
         TIM5_ARR.write_volatile(u32::MAX);
         TIM5_EGR.write_volatile(1);
@@ -35,12 +38,12 @@ fn hundred_nops() {
 
 #[expect(unsafe_code, reason = "device register")]
 pub fn now() -> u32 {
-    // SAFETY: an aligned register of TIM5, always mapped on this machine; reading it changes nothing.
+    // SAFETY: an aligned register of TIM5, always mapped on this machine; reading it has no side effect.
     unsafe { TIM5_CNT.read_volatile() }
 }
 
-/// Instructions of `work` and what it returned; the counting itself is subtracted. Never inlined: what surrounds the call must
-/// not be moved in between the two readings.
+/// Counts the instructions of `work` and returns its result too; the counting itself is subtracted. Never
+/// inlined: the compiler must not move surrounding code between the two readings.
 #[inline(never)]
 pub fn count<R>(work: impl FnOnce() -> R) -> (u32, R) {
     let before = now();
@@ -56,7 +59,7 @@ fn empty() -> u32 {
     now().wrapping_sub(before)
 }
 
-/// Mean and largest of many counts.
+/// Mean and maximum of many counts.
 #[derive(Clone, Copy, Default)]
 pub struct Tally {
     sum: u64,
@@ -89,12 +92,12 @@ impl Tally {
         self.most
     }
 
-    /// One line of the table.
+    /// Prints one line of the table.
     pub fn print(&self, name: &str) {
         hprintln!("{:<48} {:>8} {:>8}", name, self.mean(), self.most);
     }
 
-    /// One line of the table with the design's bound; whether it is kept.
+    /// Prints one line of the table with the design's bound; returns whether it is met.
     pub fn print_against(&self, name: &str, goal: u32) -> bool {
         let kept = self.most <= goal;
         let word = if kept { "kept" } else { "MISSED" };
@@ -103,7 +106,7 @@ impl Tally {
     }
 }
 
-/// A heading of the table.
+/// Prints a heading of the table.
 pub fn heading(name: &str) {
     hprintln!("\n{:<48} {:>8} {:>8}", name, "mean", "worst");
 }

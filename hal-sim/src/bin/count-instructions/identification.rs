@@ -1,4 +1,4 @@
-//! What identification costs: each 500 Hz sample, closing a motion, and the search.
+//! Cost of identification: each 500 Hz sample, closing a motion, and the search.
 
 use core::hint::black_box;
 use core::mem::MaybeUninit;
@@ -13,21 +13,21 @@ use crate::account::{Account, CYCLES_PER_INSTRUCTION, PROCESSOR_HZ};
 use crate::counter::{Tally, count, heading};
 use crate::leg::{self, BASE, JOINTS, Model};
 
-/// Design: both joints, each sample.
+/// Design bound of both joints, per sample.
 const MOST_INSTRUCTIONS_PER_SAMPLE: u32 = 30_000;
-/// Design: from the end of the motion to the verdict, processor time.
+/// Design bound from the end of the motion to the verdict, processor time.
 const MOST_SEARCH_S: f32 = 0.5;
 const INSTRUCTIONS_PER_S: f32 = PROCESSOR_HZ / CYCLES_PER_INSTRUCTION;
 
-/// As on the host, for the default leg's bandwidth.
+/// Filter size as on the host, for the default leg's bandwidth.
 const TAPS: usize = 256;
 const PENDING: usize = 26;
-/// Of the logged torque: 7 % of the mean absolute torque.
+/// Noise of the logged torque: 7 % of the mean absolute torque.
 const NOISE_NM: [f32; JOINTS] = [2.0, 1.0];
-/// More than any search takes.
+/// More evaluations than any search takes.
 const MOST_EVALUATIONS: u32 = 100_000;
 
-/// Sum of twelve uniform numbers: close enough to a normal one.
+/// Nearly normal noise: the sum of twelve uniform numbers.
 fn noise(seed: &mut u32) -> f32 {
     let mut sum = -6.0;
     for _ in 0..12 {
@@ -37,7 +37,7 @@ fn noise(seed: &mut u32) -> f32 {
     sum
 }
 
-/// Prints the table; whether the bounds are kept. `None` where the motion cannot be made or recorded.
+/// Prints the table; returns whether the bounds are met. `None` where the motion cannot be made or recorded.
 #[inline(never)]
 pub fn report(model: &Model, account: &mut Account) -> Option<bool> {
     heading("identification of two joints, 500 Hz");
@@ -88,7 +88,7 @@ fn recorded(model: &Model, account: &mut Account) -> Option<Record<f32, JOINTS, 
     Some(record)
 }
 
-/// Runs the search to its end; whether it ended in the time it may take.
+/// Runs the search to its end; returns whether it met its time bound.
 #[inline(never)]
 fn searched(
     model: &Model,

@@ -1,8 +1,11 @@
-//! The whole current interrupt, from its vector to its return: converters, contacts and counters read, decisions, both axes' current
-//! loops, queues, counters of the levels, compare values and outputs written.
+//! The whole current interrupt, from its vector to its return.
 //!
-//! Why: one axis' tick by itself is little more than half of it. The handler is the flash image's own, on registers that are words of memory
-//! ([`crate::machine`]); it stands in an exception that the program raises, since this machine has no such converters.
+//! Counted work: read converters, contacts and counters, decide, run both axes' current loops, update queues
+//! and counters of the levels, write compare values and outputs.
+//!
+//! Why: one axis' tick alone is little more than half of it. The handler is the flash image's own, with
+//! memory words in place of registers ([`crate::machine`]). Since this machine has no such converters, the
+//! handler serves an exception that the program raises.
 
 use cortex_m::asm::isb;
 use cortex_m::peripheral::SCB;
@@ -24,16 +27,16 @@ use crate::counter::{Tally, count, heading};
 use crate::machine::{self, Machine, REGISTERS};
 use crate::motor::{CONFIGURATION, Motor};
 
-/// Goals: instructions of one interrupt, both axes on; both axes' share of the processor, per cent.
+/// Goals: instructions of one interrupt with both axes on; both axes' share of the processor, per cent.
 const MOST_MEAN: u32 = 850;
 const MOST_WORST: u32 = 1250;
 const MOST_PERCENT: f32 = 35.0;
 const AXES: usize = 2;
 /// Periods at each speed: more than two checksums of the axes' constants, one in 64 ms.
 const PERIODS: u32 = 3200;
-/// Periods with the bridges off, before: what the shunts say then is their zero.
+/// Periods with the bridges off before, which measure the current-sensor offsets.
 const REST: u32 = 240;
-/// Set above a count that was taken at an index pulse.
+/// Flag above a count that was captured at an index pulse.
 const SEEN: u32 = 1 << 16;
 
 const CYCLES: core::num::NonZeroU32 = core::num::NonZeroU32::new(2 * TOP as u32).expect("not zero");
@@ -46,7 +49,7 @@ struct Queues {
     samples: [Queue<JointSample, 4>; AXES],
 }
 
-/// What level 0 works on, as on the board.
+/// State of level 0, as on the board.
 struct Current {
     loops: CurrentLoops<AXES>,
     ends: CurrentEnds<'static, AXES>,
@@ -107,7 +110,7 @@ fn finished() -> [Option<bool>; AXES] {
     [JEOC, EOC].map(|flag| (status & flag != 0).then_some(other & flag != 0))
 }
 
-/// The converters' vector.
+/// Interrupt of the converters.
 #[exception]
 fn PendSV() {
     let finished = finished();
@@ -122,7 +125,7 @@ fn PendSV() {
     }
 }
 
-/// Instructions of the handler alone: raised, less the same instructions that raise nothing.
+/// Instructions of the handler alone: with the exception raised, less the same instructions without.
 fn interrupt() -> u32 {
     let (with, ()) = count(|| {
         SCB::set_pendsv();
@@ -135,13 +138,13 @@ fn interrupt() -> u32 {
     with.saturating_sub(without)
 }
 
-/// The other ends of level 0's queues.
+/// Opposite ends of level 0's queues.
 struct Ends {
     orders: [Producer<'static, Order>; AXES],
     samples: [Consumer<'static, JointSample>; AXES],
 }
 
-/// Level 0 between two motors; what is not counted of the levels around it.
+/// Level 0 between two motors; the surrounding levels are not counted.
 struct Bench {
     motors: [Motor; AXES],
     samples: [AxisSample; AXES],
@@ -150,7 +153,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Both axes off.
+    /// A bench with both axes off.
     fn new(motors: [Motor; AXES]) -> Self {
         static QUEUES: StaticCell<Queues> = StaticCell::new();
         static CURRENT: StaticCell<Current> = StaticCell::new();
@@ -169,7 +172,8 @@ impl Bench {
         Self { motors, samples: [AxisSample::default(); AXES], ends, tally: Tally::default() }
     }
 
-    /// Motors at a speed, axes that begin to run, bridges off; the dearest interrupt in which an order came.
+    /// Sets the motors' speed and starts the axes with bridges off. Returns the dearest interrupt
+    /// with an order.
     fn begin(&mut self, calibrations: &[Calibration; AXES], speed_rad_per_s: f32) -> Option<u32> {
         SIGNALS.set_targets(&DriveCommand::RELEASED);
         self.tally = Tally::default();
@@ -187,7 +191,7 @@ impl Bench {
         Some(most)
     }
 
-    /// One period: each axis has its conversion, its interrupt, and its bridge's next command; then the servo.
+    /// Runs one period: conversion, interrupt and new bridge command for each axis; then the servo.
     fn period(&mut self) {
         for axis in 0..AXES {
             self.show(axis);
@@ -204,7 +208,7 @@ impl Bench {
         }
     }
 
-    /// Puts what an axis' sensors say into the registers.
+    /// Writes an axis' sensor values into the registers.
     fn show(&self, axis: usize) {
         let Some(sample) = self.samples.get(axis) else { return };
         REGISTERS.cycles.set(REGISTERS.cycles.get().wrapping_add(u32::from(TOP)));
@@ -220,7 +224,7 @@ impl Bench {
         REGISTERS.indices[axis & 1].set(sample.index_count.map_or(0, |count| SEEN | u32::from(count)));
     }
 
-    /// Why something stopped meanwhile, if it did.
+    /// Whether an axis has stopped; prints the reason.
     fn stopped(&self) -> bool {
         let fault = LOOPS.lock().as_ref().is_none_or(|current| {
             (0..AXES).any(|axis| current.loops.stage(axis).is_none_or(|stage| stage.fault().is_some()))
@@ -234,7 +238,7 @@ impl Bench {
     }
 }
 
-/// Prints the table; whether the goals are met.
+/// Prints the table; returns whether the goals are met.
 #[inline(never)]
 pub fn report(account: &mut Account) -> bool {
     let mut motors = [Motor::at_rest(); AXES];

@@ -1,4 +1,4 @@
-//! The default leg (`hal-sim/legs/x2-wearer-75kg.toml`) in the device's precision, and the motion designed for it.
+//! The default leg (`hal-sim/legs/x2-wearer-75kg.toml`) in the device's precision, and its designed motion.
 
 use nalgebra::{Matrix3, Vector3};
 use scarab::ident::{
@@ -18,7 +18,7 @@ use scarab::units::{
 pub const JOINTS: usize = 2;
 /// Base parameters of a leg with parallel axes.
 pub const BASE: usize = 13;
-/// Of the leg file.
+/// Bandwidth stated in the leg file.
 pub const BANDWIDTH_HZ: f32 = 16.0;
 pub const GRAVITY: [f32; 3] = [9.81, 0.0, 0.0];
 const TORQUE_PER_AMPERE: f32 = 1.5;
@@ -46,7 +46,7 @@ pub fn excitation() -> Option<Periodic<JOINTS>> {
     EXCITATION.motion(SERVO_RATE_HZ).ok()
 }
 
-/// The rows of the default leg: rotor and offset estimated, Stribeck friction looked for.
+/// Row model of the default leg: rotor and offset estimated, Stribeck friction searched for.
 #[inline(never)]
 pub fn model() -> Option<Model> {
     let joint = |a| DenavitHartenberg { alpha: 0.0, a, d: 0.0 };
@@ -78,7 +78,7 @@ fn link(
     }
 }
 
-/// What the torques are made of.
+/// Parameters that generate the torques.
 pub fn truth() -> LegParameters<f32, JOINTS> {
     let hip = [0.02755, 0.0, 0.0, 0.182826, 0.0, 0.182826];
     let knee = [0.040218, -0.02938, 0.0, 0.149894, 0.0, 0.181229];
@@ -88,7 +88,7 @@ pub fn truth() -> LegParameters<f32, JOINTS> {
     ])
 }
 
-/// What is believed beforehand.
+/// Prior of the links.
 pub fn prior() -> [LinkPrior<f32>; JOINTS] {
     let hip = [0.02595, 0.0, 0.0, 0.17447, 0.0, 0.17447];
     let knee = [0.038266, -0.028262, 0.0, 0.143377, 0.0, 0.173169];
@@ -107,7 +107,7 @@ pub fn scales() -> [JointScale; JOINTS] {
     })
 }
 
-/// The whole configuration, with the exciting motion in the place of every motion.
+/// Complete configuration, with the exciting motion in place of every motion.
 #[inline(never)]
 pub fn configuration(model: Model, motion: Periodic<JOINTS>) -> LegConfiguration<JOINTS, BASE> {
     let ranges = [[2.17_f32, 50.18], [-95.53, -6.85]].map(|range| range.map(f32::to_radians));
@@ -123,7 +123,7 @@ pub fn configuration(model: Model, motion: Periodic<JOINTS>) -> LegConfiguration
         bandwidth: Hertz(6.0),
     };
     LegConfiguration {
-        // Inertia: of the stretched leg of the prior, rotors included.
+        // Inertia of the prior's stretched leg, rotors included.
         joints: [joint(hip, ranges[0], 5.2), joint(knee, ranges[1], 2.3)],
         acceleration: [RadianPerSecondSquared(2000.0_f32.to_radians()); JOINTS],
         model,

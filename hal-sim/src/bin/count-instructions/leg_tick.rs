@@ -1,6 +1,8 @@
-//! The 4 kHz tick of a leg that follows a motion with its model in the feedforward: motion, model, observers, controllers,
-//! monitor, log; and of one that follows a host. One function does all of it, as in the image: the same code called from elsewhere as well
-//! would be compiled otherwise.
+//! The 4 kHz tick of a leg, following a motion with its model in the feedforward, or following a host.
+//!
+//! The tick comprises motion, model, observers, controllers, monitor and log.
+//!
+//! One function does all of it, as in the image: code with a second caller would be compiled differently.
 
 use core::hint::black_box;
 
@@ -19,16 +21,17 @@ use crate::account::Account;
 use crate::counter::{Tally, count, heading};
 use crate::leg::{self, GRAVITY, JOINTS, Model};
 
-/// Design: both joints, feedforward and monitor included.
+/// Design bound of both joints, feedforward and monitor included.
 const MOST_INSTRUCTIONS: u32 = 4000;
-/// Of a tick that follows a host with the model in the feedforward: what it takes, above the design in its worst tick (docs/bus.md, Cost).
+/// Cost of a tick that follows a host with the model in the feedforward. In its worst tick this exceeds the
+/// design bound (docs/bus.md, Cost).
 const MOST_WITH_HOST_AND_MODEL: u32 = 4400;
-/// Ticks of the motion that are counted, after the way to its start: 2.5 s.
+/// Counted ticks of the motion, after the approach: 2.5 s.
 const TICKS: u32 = 10_000;
-/// Longest way to the start.
+/// Longest approach to the start.
 const MOST_APPROACH_TICKS: u32 = 40_000;
 
-/// A plant that stands where it was told to be, to a count, with the current it was told: no lag, no noise.
+/// An ideal plant: target position to a count and target current, without lag and noise.
 fn follow(motion: &MotionState<JOINTS>, currents: [Ampere; JOINTS]) -> Sample<JOINTS> {
     let scales = leg::scales();
     Sample {
@@ -40,7 +43,7 @@ fn follow(motion: &MotionState<JOINTS>, currents: [Ampere; JOINTS]) -> Sample<JO
     }
 }
 
-/// As the image has it: one function, with a host or without.
+/// As in the image: one function, with a host or without.
 #[inline(never)]
 fn tick(
     control: &mut Control<JOINTS>,
@@ -51,7 +54,7 @@ fn tick(
     control.tick_with(sample, request, GRAVITY, host)
 }
 
-/// Prints the table; whether the bound is kept. `None` where the leg cannot be built or does not follow.
+/// Prints the table; adds the bounds to the account. `None` where the leg cannot be built or does not follow.
 #[inline(never)]
 pub fn report(model: &Model, account: &mut Account) -> Option<()> {
     heading("a leg of two joints, 4 kHz");
@@ -112,7 +115,7 @@ pub fn report(model: &Model, account: &mut Account) -> Option<()> {
     Some(())
 }
 
-/// A host commands positions cyclically, another one every eighth tick.
+/// Counts ticks in which a host commands cyclic positions, a new one every eighth tick.
 #[inline(never)]
 fn follow_a_host(
     configuration: &LegConfiguration<JOINTS, { leg::BASE }>,
@@ -152,7 +155,7 @@ fn follow_a_host(
     let (mut tally, mut place) = (Tally::default(), [0.5, 1.0]);
     for number in 0..TICKS {
         if number > 100 && number % 8 == 0 {
-            // There and back within the range.
+            // Forth and back within the range.
             let step = if number / 1000 % 2 == 0 { 0.0005 } else { -0.0005 };
             place = place.map(|place| place + step);
             command.target = Target::CyclicPosition {
@@ -187,7 +190,7 @@ fn follow_a_host(
     let name =
         if feedforward { "  instead: follows a host, with model" } else { "  instead: follows a host" };
     tally.print(name);
-    // In the place of a motion's tick, not beside it: no share of its own.
+    // Replaces a motion's tick and has no share of its own.
     let most = if feedforward { MOST_WITH_HOST_AND_MODEL } else { MOST_INSTRUCTIONS };
     account.add(name, tally, most, 0);
     Some(())

@@ -1,7 +1,7 @@
-//! What lies beneath the levels in this image: a board whose registers are words of memory.
+//! The hardware of this image: a board with memory words as registers.
 //!
-//! Each method accesses as many words as the board's own accesses registers, so that the instructions of a level are those of the flash image.
-//! What a level decides from a register is what the program put there.
+//! Each method accesses as many words as the board's own accesses registers, so the instructions of a level
+//! are those of the flash image. The program sets the values that a level reads.
 
 use scarab::board::odrive_v3_6::settings::timers::{MOE, TOP, bridge, compare};
 use scarab::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
@@ -10,16 +10,16 @@ use scarab::operation::Word;
 use crate::account::{CYCLES_PER_INSTRUCTION, PROCESSOR_HZ};
 use crate::counter;
 
-/// While the levels above the bus take a third of the processor.
+/// Time per instruction while the levels above the bus take a third of the processor.
 const US_PER_INSTRUCTION: f32 = 1e6 / PROCESSOR_HZ * CYCLES_PER_INSTRUCTION / (1.0 - 0.33);
-/// Register with the main output off, and duties of no voltage.
+/// Register value with the main output off, and duties of no voltage.
 const RELEASED: u32 = bridge(0)[0].value;
 const NO_VOLTAGE: u32 = TOP as u32 / 2;
 
 /// Registers of one converter.
 #[derive(Debug)]
 pub struct Converter {
-    /// Ends of conversions.
+    /// End-of-conversion flags.
     pub status: Word,
     /// First injected result, and the regular one.
     pub results: [Word; 2],
@@ -32,25 +32,25 @@ struct Timer {
     output: Word,
 }
 
-/// Registers that the levels reach.
+/// Registers that the levels access.
 #[derive(Debug)]
 pub struct Registers {
     /// Bus voltage, shunts of B, shunts of C.
     pub converters: [Converter; 3],
-    /// Cycles of the processor.
+    /// Cycle counter of the processor.
     pub cycles: Word,
-    /// Levels of the contacts' port and of the gate drivers' fault line; all set is good.
+    /// Levels of the contacts' port and of the gate drivers' fault line; all ones is good.
     pub ports: [Word; 2],
     /// Encoder counters.
     pub counters: [Word; 2],
-    /// Counts at index pulses, with a bit above them; 0 without.
+    /// Counts at index pulses, flagged by a higher bit; 0 without a pulse.
     pub indices: [Word; 2],
     /// Requests of the servo and of the bus.
     pub requests: [Word; 2],
     timers: [Timer; 2],
 }
 
-/// The board of this image.
+/// Board of this image.
 pub static REGISTERS: Registers = Registers {
     converters: [const { Converter { status: Word::new(0), results: [const { Word::new(0) }; 2] } }; 3],
     cycles: Word::new(0),
@@ -61,27 +61,27 @@ pub static REGISTERS: Registers = Registers {
     timers: [const { Timer { duties: [const { Word::new(0) }; 3], output: Word::new(0) } }; 2],
 };
 
-/// What a bridge's registers say.
+/// Command in a bridge's registers.
 pub fn command(axis: usize) -> AxisCommand {
     let Some(timer) = REGISTERS.timers.get(axis) else { return AxisCommand::RELEASED };
     let duty = timer.duties.each_ref().map(|duty| 1.0 - duty.get() as f32 / f32::from(TOP));
     AxisCommand { enabled: timer.output.get() & MOE != 0, duty }
 }
 
-/// The board as a level sees it, and the wire of the bus.
+/// The board at the levels' interface, and the wire of the bus.
 #[derive(Debug, Default)]
 pub struct Machine {
-    /// Time at which a round of the bus began, and the counter then.
+    /// Time at which the present round of the bus began.
     pub now_us: u64,
     /// The counter at that time.
     pub begun: u32,
-    /// Frames that were sent, and their bits.
+    /// Frames that were sent.
     pub sent: u32,
     /// Bits of the frames that were sent.
     pub bits: u32,
 }
 
-/// Bits of a frame on the wire, and of the pause after it.
+/// Bits of a frame on the wire, with the following pause.
 pub fn bits(frame: &Frame) -> u32 {
     47 + 8 * frame.data().len() as u32
 }

@@ -1,9 +1,13 @@
-//! Counts instructions on the emulated microcontroller: one axis' tick, its parts, the same steps of the crate `foc`, the
-//! whole current interrupt, the 4 kHz tick of a leg, the steps of its identification, the iterations of the default swarm and the frames of the bus.
+//! Counts instructions on the emulated microcontroller.
 //!
-//! Why instructions: the emulator executes them exactly and in the same number every time, and models neither flash wait
-//! states nor pipeline. `scripts/count-instructions` builds and runs this image (`qemu-system-arm -M netduinoplus2 -icount
-//! shift=0`, where one count of TIM5 is one instruction) and fails where a bound of the design is not kept.
+//! Counted work: one axis' tick and its parts, the same steps of the crate `foc`, the whole current
+//! interrupt, a leg's 4 kHz tick. Further work: the steps of its identification, the iterations of the
+//! default swarm, the frames of the bus.
+//!
+//! Why instructions: the emulator executes exactly the same number every time, and models neither flash wait
+//! states nor pipeline. `scripts/count-instructions` builds and runs this image
+//! (`qemu-system-arm -M netduinoplus2 -icount shift=0`, where one count of TIM5 is one instruction). The
+//! script fails where a design bound is not met.
 #![no_std]
 #![no_main]
 

@@ -1,5 +1,7 @@
-//! A motor to count instructions on, in single precision: just enough of one for a calibration to pass and for
-//! currents, speeds and noise to look real. What proves the current loop is the simulated hardware, not this.
+//! Motor model for counting instructions, in single precision.
+//!
+//! The model is just good enough for a calibration to pass and for realistic currents, speeds and noise. The
+//! current loop is verified on the simulated hardware, not here.
 
 use scarab::hal::{AxisCommand, AxisSample};
 use scarab::motor::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale, Sine};
@@ -27,7 +29,7 @@ pub const CONFIGURATION: AxisConfiguration = AxisConfiguration {
 
 const PAIRS: f32 = 7.0;
 const COUNTS: f32 = 8192.0;
-/// After so many turns the 16-bit counter is where it was.
+/// Number of turns after which the 16-bit counter repeats.
 const TURNS: f32 = 65_536.0 / COUNTS;
 const FLUX_VS: f32 = 2.9e-3;
 const RESISTANCE_OHM: f32 = 0.05;
@@ -44,7 +46,7 @@ pub struct Motor {
     /// Mechanical turns, `0..TURNS`.
     turns: f32,
     pub speed_rad_per_s: f32,
-    /// Turned by something stronger.
+    /// An external machine holds the speed.
     pub driven: bool,
     pub bus: f32,
     pending: AxisCommand,
@@ -64,7 +66,7 @@ impl Motor {
         }
     }
 
-    /// Codes of noise, -2..=2.
+    /// Noise of a code, -2..=2.
     fn noise(&mut self) -> f32 {
         self.seed ^= self.seed << 13;
         self.seed ^= self.seed >> 17;
@@ -84,27 +86,27 @@ impl Motor {
         AxisSample { shunt_codes, bus_code, encoder_count, index_count }
     }
 
-    /// What the sensors say where the counter stands at `count` and the quadrature current is `current` (A).
+    /// Sensor values for a counter at `count` and a quadrature current `current` (A).
     #[cfg(feature = "emulated")]
     pub fn seen(&mut self, count: u16, current: f32) -> AxisSample {
         let before = (self.turns * COUNTS) as u32 as u16;
         self.turns = f32::from(count) / COUNTS;
         self.current = [0.0, current];
-        // Place zero of any turn, from either side.
+        // Index at position zero of any turn, from either side.
         let [from, to] = [before, count].map(|count| count / COUNTS as u16);
         let forwards = count.wrapping_sub(before).cast_signed() > 0;
         let index = (from != to).then_some(if forwards { to } else { from } * COUNTS as u16);
         self.sample(index)
     }
 
-    /// One PWM period; `command` acts in the next one.
+    /// Runs one PWM period; `command` acts in the next one.
     pub fn period(&mut self, command: AxisCommand) -> AxisSample {
         let acting = core::mem::replace(&mut self.pending, command);
         let before = self.turns;
         for _ in 0..STEPS {
             self.step(&acting);
         }
-        // Place zero of any turn.
+        // Index at position zero of any turn.
         let passed = self.turns.max(before) as u32;
         let index = (before as u32 != self.turns as u32).then_some((passed * COUNTS as u32) as u16);
         if self.turns >= TURNS {

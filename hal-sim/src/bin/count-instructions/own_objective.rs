@@ -1,4 +1,4 @@
-//! A user's own objective on the microcontroller: the file of the example `damped_oscillation`, searched for its minimum.
+//! A user's own objective on the microcontroller: the file of the example `damped_oscillation`, minimised.
 
 use core::hint::black_box;
 

@@ -1,10 +1,10 @@
-//! The published crate `foc` (16.16 fixed point) beside the same steps of this firmware in single precision.
+//! Compares the crate `foc` (16.16 fixed point) with the same steps of this firmware in single precision.
 //!
-//! Its update is sine and cosine (CORDIC), Clarke, Park, two PI controllers, Park back and space vectors. Made for processors
-//! without floating point; on this one it is compared nevertheless, because it is what a crate registry offers. It has no voltage
-//! limit, no anti-windup, no feedforward, no dead-time or delay compensation, no minimum zero vector, no borders; converting
-//! codes and angles is the caller's. Ours is compared without what it lacks, but with the limit and anti-windup,
-//! which are part of its PI.
+//! Its update is sine and cosine (CORDIC), Clarke, Park, two PI controllers, Park back and space vectors. The
+//! crate targets processors without floating point; the comparison uses it because it is what a crate
+//! registry offers. It lacks voltage limit, anti-windup, feedforward, dead-time and delay compensation,
+//! minimum zero vector and limits; the caller converts codes and angles. This firmware is measured without
+//! these features, except limit and anti-windup, which are part of its PI.
 
 use core::hint::black_box;
 

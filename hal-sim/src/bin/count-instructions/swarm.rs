@@ -1,7 +1,7 @@
-//! What the default beetle swarm costs by itself: an iteration, and a search for the sphere's minimum to 0.1.
+//! Cost of the default beetle swarm by itself: an iteration, and a search for the sphere's minimum to 0.1.
 //!
-//! The sphere costs 2 to 3 instructions per coordinate, so nearly all that is counted is the swarm's; on it the metric learns in
-//! every iteration, which is its dearest work.
+//! The sphere costs 2 to 3 instructions per coordinate, so nearly the whole count is the swarm's. On the
+//! sphere the metric learns in every iteration, which is the swarm's dearest work.
 
 use core::hint::black_box;
 
@@ -11,11 +11,11 @@ use scarab::swarm::{Bso, BsoSettings, TestFunction, TestProblem};
 use crate::counter::{Tally, count, heading};
 
 const BEETLES: usize = 20;
-/// f - f* of the search.
+/// Target of the search, f - f*.
 const GOAL: f32 = 0.1;
-/// Half as many again as the worst of 1,000 runs on the host.
+/// Bound of iterations: 1.5 times the worst of 1,000 runs on the host.
 const MOST_ITERATIONS: u32 = 40;
-/// Iterations that are counted at least: the first one has no gradient yet.
+/// Least number of counted iterations: the first one has no gradient yet.
 const LEAST_ITERATIONS: u32 = 10;
 
 /// Prints the table; `None` where a search does not end.
@@ -64,7 +64,7 @@ fn searched<const D: usize>() -> Option<()> {
     Some(())
 }
 
-/// Advances to the end of the iteration.
+/// Advances to the end of the present iteration.
 fn iterate<const D: usize>(swarm: &mut Bso<f32, BEETLES, D>, problem: &TestProblem) {
     let before = swarm.iterations();
     while swarm.iterations() == before {

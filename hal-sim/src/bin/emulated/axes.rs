@@ -1,7 +1,7 @@
-//! The current loops of both axes, ticked with what their sensors would say of a drive that follows its target.
+//! Current loops of both axes, ticked with sensor values of a drive that follows its target.
 //!
-//! Their answer goes nowhere: what they cost is real, what they do to a motor is shown elsewhere. The calibration that makes
-//! them is real as well, on a small motor in single precision.
+//! Their commands are discarded: their cost is real, their effect on a motor is tested elsewhere. Their
+//! calibration is real as well, on a small motor in single precision.
 
 use scarab::hal::AxisSample;
 use scarab::motor::{Axis, AxisRequest, CalibrationSettings, CalibrationStep, Calibrator};
@@ -12,19 +12,19 @@ use super::motor::{CONFIGURATION, Motor};
 
 const SETTINGS: CalibrationSettings =
     CalibrationSettings { current: Ampere(10.0), voltage: Volt(2.0), turns_per_s: 10.0 };
-/// PWM periods; a calibration takes some seconds.
+/// Limit in PWM periods; a calibration takes some seconds.
 const LONGEST: u32 = 24_000 * 20;
 
-/// Both axes with what they see.
+/// Both axes with their simulated sensors.
 pub struct Axes {
     axes: [(Axis, Motor); JOINTS],
-    /// The counter after the calibration, and where the leg's counts stood then.
+    /// Counter after the calibration, and the leg's counts at that time.
     counter: u16,
     begin: [i32; JOINTS],
 }
 
 impl Axes {
-    /// One motor is calibrated, and both axes take it for theirs.
+    /// Calibrates one motor and uses the result for both axes.
     pub fn calibrated(begin: [i32; JOINTS]) -> Option<Self> {
         let mut motor = Motor::at_rest();
         let mut calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).ok()?;
@@ -46,7 +46,7 @@ impl Axes {
         None
     }
 
-    /// What the sensors of the next tick say: counts since the beginning and current of each joint's drive.
+    /// Sensor values of the next tick, from counts since the beginning and current of each joint's drive.
     pub fn look(&mut self, counts: [i32; JOINTS], currents: [f32; JOINTS]) -> [AxisSample; JOINTS] {
         let mut samples = [AxisSample::default(); JOINTS];
         for (joint, ((_, motor), sample)) in self.axes.iter_mut().zip(&mut samples).enumerate() {
@@ -56,7 +56,7 @@ impl Axes {
         samples
     }
 
-    /// One tick of both.
+    /// Runs one tick of both axes.
     #[inline(always)]
     pub fn tick(&mut self, samples: &[AxisSample; JOINTS], requests: [AxisRequest; JOINTS]) {
         for (((axis, _), sample), request) in self.axes.iter_mut().zip(samples).zip(requests) {
@@ -64,7 +64,7 @@ impl Axes {
         }
     }
 
-    /// An axis released itself, which no sample here gives it a reason to.
+    /// Whether an axis has faulted, for which the samples here give no reason.
     pub fn has_fault(&self) -> bool {
         self.axes.iter().any(|(axis, _)| axis.fault().is_some())
     }

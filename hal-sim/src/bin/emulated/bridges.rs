@@ -1,22 +1,23 @@
-//! Both bridges, as far as the emulator has them: what is written to their timers' registers, it logs.
+//! Both bridges as far as the emulator models them: QEMU logs writes to their timers' registers.
 //!
-//! The current loops' answer goes nowhere here ([`super::axes`]), so nothing is ever switched on; what a crash switches off are
-//! the board's registers with the board's values, and QEMU (`-d unimp`) is the witness of when.
+//! The current loops' commands are discarded here ([`super::axes`]), so nothing is ever switched on. A crash
+//! writes the board's values to the board's registers, and QEMU's log (`-d unimp`) shows when.
 #![expect(unsafe_code, reason = "device registers, and a name that the crash handler finds at link time")]
 
 use scarab::board::odrive_v3_6::settings::timers::{BASES, BDTR, bridge};
 
 use super::clock;
 
-/// Register with the main output, output off.
+/// Register value with the main output off.
 const RELEASED: u32 = bridge(0)[0].value;
 
-/// Called by every crash, before anything else.
+/// First step of every crash.
 #[unsafe(no_mangle)]
 extern "C" fn scarab_release() -> u32 {
     for base in BASES {
         let register = (base + BDTR) as *mut u32;
-        // SAFETY: a register of a timer that the emulated machine maps without having it: nothing but its log hears of it.
+        // SAFETY: a register of a timer that the emulated machine maps without modelling it: the write only
+        // appears in the log.
         unsafe { register.write_volatile(RELEASED) }
     }
     clock::instructions()

@@ -1,4 +1,4 @@
-//! What the emulated machine has of a board: it can request the servo, and nothing else.
+//! Board functions of the emulated machine: it can only request the servo.
 
 use scarab::hal::{Contacts, Controller, Frame, Hardware};
 use scarab::task::leg::JOINTS;

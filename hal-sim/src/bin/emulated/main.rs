@@ -1,20 +1,21 @@
 //! The whole firmware over a simulated leg, for the emulated microcontroller (`cargo emulate`).
 //!
-//! Why: no board needs to be at hand to see the leg's code, its executors and priorities, its search and its records run on a
-//! Cortex-M4F. What is the board's is the same crate and the same tasks as in the flash image; what is not is a small board layer.
+//! Why: leg code, executors, priorities, search and records can run on a Cortex-M4F without a board. Crate
+//! and tasks are those of the flash image; only a small board layer differs.
 //!
-//! | module | instead of |
+//! | module | replaces |
 //! | --- | --- |
-//! | [`clock`] | the timers: SysTick at 24 kHz, the executors' time, a clock that counts instructions |
-//! | [`axes`] | converters and bridges: two axes that are ticked with what they would see, their answer goes nowhere |
+//! | [`clock`] | timers: SysTick at 24 kHz, the executors' time, a clock that counts instructions |
+//! | [`axes`] | converters and bridges: two axes on simulated sensors |
 //! | [`machine`] | registers: only the servo can be requested |
-//! | [`plant`] | the leg: `hal_sim::world` with ideal drives, one step per servo tick, in time that is not the firmware's |
+//! | [`plant`] | the leg: `hal_sim::world` with ideal drives, a step per servo tick, outside firmware time |
 //! | [`vectors`] | interrupts and their levels |
 //! | [`bridges`] | the bridges' main outputs, which only a crash writes |
-//! | [`rehearsal`] | whatever crashes a board |
+//! | [`rehearsal`] | causes of crashes |
 //!
-//! QEMU models neither PWM timers nor converters of this part, so the current loops cannot close here: they run and are counted,
-//! and the leg's torque comes from drives that follow their target. `cargo sim identify --drive full` closes them on the host.
+//! QEMU models neither PWM timers nor converters of this part, so the current loops cannot close here. The
+//! loops run and are counted, and ideal drives that follow their targets produce the leg's torque.
+//! `cargo sim identify --drive full` closes the loops on the host.
 #![no_std]
 #![no_main]
 
@@ -65,8 +66,8 @@ fn main() -> ! {
     refuse("the task of the identification runs already")
 }
 
-/// The thread's executor, turned without end. `embassy_executor::Executor::run` sleeps in between, and the emulator takes six
-/// times as long for a processor that sleeps and is woken 24,000 times per second.
+/// Polls the thread's executor without end. `embassy_executor::Executor::run` sleeps in between; the emulator
+/// is six times slower for a processor that sleeps and is woken 24,000 times per second.
 #[expect(unsafe_code, reason = "an executor is polled")]
 fn spin<S>(task: SpawnToken<S>) -> ! {
     static EXECUTOR: StaticCell<raw::Executor> = StaticCell::new();
@@ -79,12 +80,12 @@ fn spin<S>(task: SpawnToken<S>) -> ! {
     }
 }
 
-/// How `embassy_executor` knows the thread's executor: it is woken by an event.
+/// Identifier of the thread's executor in `embassy_executor`: woken by an event.
 const THREAD: usize = usize::MAX;
 
-/// Of the bus voltage, as on a board of 56 V.
+/// Divider of the bus voltage, as on a board of 56 V.
 const DIVIDER: f32 = 19.0;
-/// The bus.
+/// Bus voltage.
 const BUS_V: f32 = 48.0;
 
 const SURROUNDINGS: Surroundings = Surroundings {
@@ -98,7 +99,7 @@ const SURROUNDINGS: Surroundings = Surroundings {
     told: || end(true),
 };
 
-/// Both halves of the leg in their places. Apart, as the next, so that what it takes of the stack is free again.
+/// Builds both halves of the leg in place. A separate function like [`hand_out`], so that its stack is freed.
 #[inline(never)]
 fn halves() -> (Control<{ leg::JOINTS }>, &'static mut leg::LegIdentification) {
     let Ok(configuration) = leg::LEG.configuration() else { refuse("the leg's constants make no sense") };
@@ -113,7 +114,7 @@ fn halves() -> (Control<{ leg::JOINTS }>, &'static mut leg::LegIdentification) {
     (control, identification)
 }
 
-/// Everything to its level.
+/// Hands every value to its level.
 #[inline(never)]
 fn hand_out(start: Start) -> identify::Thread {
     let (control, identification) = halves();
@@ -125,7 +126,7 @@ fn hand_out(start: Start) -> identify::Thread {
     let level = ServoLevel::new(&control, drives::derating(DIVIDER), volt_per_code, None);
     static SERVO: StaticCell<servo::ServoLoop> = StaticCell::new();
     let servo = SERVO.init(servo::ServoLoop { control, level, ends, clock: SURROUNDINGS.clock });
-    // The ideal drives need no supply; the leg is shown one that neither derates nor fails.
+    // The ideal drives need no supply; the leg reads a bus voltage that neither derates nor faults.
     SIGNALS.statistics.see_bus((BUS_V / volt_per_code.0) as u16);
     if let Some(mut home) = servo::SERVO.try_lock() {
         *home = Some(servo);

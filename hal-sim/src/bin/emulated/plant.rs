@@ -1,7 +1,8 @@
-//! Level 0: both axes' current ticks, and once per servo tick the leg's 250 us, which cost the firmware nothing.
+//! Level 0: both axes' current ticks, and once per servo tick the leg's 250 us, which cost no firmware time.
 //!
-//! The order is that of the simulation on the host: the servo's command of this tick acts until the next, then the sensors are read
-//! and the servo is pended. What an operator would do is done here, on the same ticks as there: enable, then identify.
+//! The order is that of the simulation on the host. The servo's command of this tick acts until the next;
+//! then the sensors are read and the servo is pended. The operator's actions are simulated here, on the same
+//! ticks as there: enable, then identify.
 
 use heapless::spsc::{Consumer, Producer};
 use scarab::hal::{AxisSample, CURRENT_RATE_HZ, DriveCommand, JointSample, LegDrives, Sample};
@@ -16,17 +17,17 @@ use super::rehearsal::Start;
 use super::{clock, end, refuse, vectors};
 use hal_sim::world::World;
 
-/// The leg, as `cargo emulate` writes it from a leg file.
+/// Leg description that `cargo emulate` writes from a leg file.
 mod described {
     include!(env!("SCARAB_PLANT_SOURCE"));
 }
 
 const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
-/// No identification takes longer.
+/// Limit of a run; no identification takes longer.
 const LONGEST_TICKS: u32 = 300 * SERVO_RATE_HZ;
-/// After a fault, for its records.
+/// Ticks after a fault, for its records.
 const LAST_TICKS: u32 = SERVO_RATE_HZ / 2;
-/// What the operator asks for, servo tick by servo tick; nothing in the first.
+/// Operator's requests, one per servo tick; the first tick has none.
 const ASKED: [ControlRequest<JOINTS>; 4] = [
     ControlRequest::Power(PowerRequest::Shutdown),
     ControlRequest::Power(PowerRequest::SwitchOn),
@@ -34,32 +35,32 @@ const ASKED: [ControlRequest<JOINTS>; 4] = [
     ControlRequest::Identify,
 ];
 
-/// What level 0 works on.
+/// State of level 0.
 pub struct Plant {
     world: World<JOINTS>,
     axes: Axes,
     samples: [Producer<'static, JointSample>; JOINTS],
     requests: Producer<'static, ControlRequest<JOINTS>>,
     drive: Consumer<'static, DriveState>,
-    /// The sensors now.
+    /// Present sensor values.
     seen: Sample<JOINTS>,
-    /// What converters and counters say in the six PWM periods until the next servo tick.
+    /// Values of converters and counters in the six PWM periods until the next servo tick.
     ahead: [[AxisSample; JOINTS]; TICKS_PER_SERVO as usize],
     servo_ticks: u32,
     answered: u32,
-    /// After which servo tick nothing more is expected.
+    /// Servo tick after which the run ends.
     last: u32,
-    /// What the operator does depends on it.
+    /// Kind of start, which decides the operator's actions.
     start: Start,
     /// Servo tick at which the operator began.
     began: u32,
 }
 
-/// What level 0 works on, once it is there.
+/// State of level 0, once it is built.
 pub static PLANT: spin::Mutex<Option<Plant>> = spin::Mutex::new(None);
 
 impl Plant {
-    /// The described leg where it begins; `None` where the axes cannot be calibrated.
+    /// The described leg in its start position; `None` where the axes cannot be calibrated.
     pub fn new(
         samples: [Producer<'static, JointSample>; JOINTS],
         requests: Producer<'static, ControlRequest<JOINTS>>,
@@ -104,9 +105,9 @@ impl Plant {
         }
     }
 
-    /// Between two servo ticks the rotors turn evenly.
+    /// Prepares the next periods; between two servo ticks the rotors turn evenly.
     fn look_ahead(&mut self, before: &Sample<JOINTS>) {
-        // Without the noise that a leg file adds to what is logged: it is not the shunts'.
+        // The leg file's noise belongs to the log, not to the shunts.
         let currents = core::array::from_fn(|joint| SIGNALS.target(joint).current.0);
         for (samples, way) in self.ahead.iter_mut().zip(1..) {
             let counts = core::array::from_fn(|joint| {
@@ -118,7 +119,7 @@ impl Plant {
         }
     }
 
-    /// To the next servo tick.
+    /// Advances to the next servo tick.
     fn advance(&mut self) {
         if self.servo_ticks > 0 {
             let requests = [SIGNALS.target(0), SIGNALS.target(1)];
@@ -148,7 +149,7 @@ impl Plant {
         }
     }
 
-    /// What the operator does in this tick.
+    /// Performs the operator's actions of this tick.
     fn operate(&mut self) {
         if self.start.resets(self.servo_ticks) {
             SIGNALS.inhibit.reset();
@@ -172,7 +173,7 @@ impl Plant {
     }
 }
 
-/// The described leg in its place, where it begins.
+/// Builds the plant in its place.
 #[inline(never)]
 pub fn prepare(
     samples: [Producer<'static, JointSample>; JOINTS],
@@ -188,7 +189,7 @@ pub fn prepare(
     }
 }
 
-/// SysTick.
+/// Interrupt of SysTick.
 #[inline(always)]
 pub fn interrupt() {
     if let Some(mut plant) = PLANT.try_lock()

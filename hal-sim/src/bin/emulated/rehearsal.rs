@@ -1,17 +1,17 @@
-//! Crashes on request: one, in the middle of a run, as the emulator's command line asks (`cargo emulate --crash`).
+//! One crash per run, selected on the emulator's command line (`cargo emulate --crash`).
 //!
-//! Why in this image: current loops, servo, executors and identification run as they always do, and it is their levels that the crash
-//! handler has to get past. Once it happened the image starts again, as on the board; what kind of start it is, and what the operator
-//! then does, is known here.
+//! Why in this image: current loops, servo, executors and identification run as usual, and the crash handler
+//! must work at their levels. After the crash the image starts again, as on the board. This module determines
+//! the kind of start, and the operator's actions that follow.
 //!
-//! | start | how it is known | what the operator does |
+//! | start | detected by | operator's actions |
 //! | --- | --- | --- |
-//! | first | neither of the others | enables and asks to identify; the crash comes in the tick that was asked for |
-//! | after the crash | its record | the same, which has to be refused; resets the fault, the same again; then starts the image again |
-//! | after that | a word kept over the reset | the same; ends the emulator |
+//! | first | none of the below | enables and requests identification; the crash comes in the given tick |
+//! | after the crash | crash record | as first, must be refused; resets the fault, as first; restarts |
+//! | after that | a word preserved over the reset | as first; ends the emulator |
 //!
-//! **The worst instant** is chosen: a crash at thread level comes so that a tick falls due while it is handled; a stack overflow
-//! right after a tick, so that none comes while the stack runs out.
+//! **The worst instant** is chosen. A crash at thread level comes such that a tick falls due during its
+//! handling. A stack overflow comes right after a tick, so that no tick interrupts it.
 #![expect(unsafe_code, reason = "memory that outlives a reset, semihosting, an address where nothing is")]
 
 use core::hint::black_box;
@@ -28,69 +28,70 @@ use stm32_metapac::Interrupt;
 
 use super::{clock, end};
 
-/// Longer command lines ask for nothing: without arguments it is the path of the image.
+/// Longest command line that is parsed. Without arguments the command line is the path of the image.
 const COMMAND_LINE: usize = 64;
 /// Memory that the board has and this machine does not.
 const NOWHERE: *const u32 = 0x1000_0000 as *const u32;
-/// Nobody handles it.
+/// Interrupt without a handler.
 const UNHANDLED: Interrupt = Interrupt::SDIO;
-/// Of SysTick, 7,000 a period: the crash is begun with 220 to 370 instructions to go.
+/// SysTick counts left, of 7,000 a period: the crash begins 220 to 370 instructions before a tick.
 const TICK_COMES: core::ops::Range<u32> = 300..500;
-/// More than 3,300 instructions to go: enough to fill the stack.
+/// More than 3,300 instructions before the next tick: enough to fill the stack.
 const TICK_WENT: u32 = 4_500;
-/// Servo ticks: the operator resets the fault; the image is started again; the last start ends.
+/// Servo ticks: the operator resets the fault; the image is restarted; the last start ends.
 const RESET: u32 = SERVO_RATE_HZ / 10;
 const RESTART: u32 = 2 * RESET;
 const LAST: u32 = RESET;
 /// Bytes of one call while the stack is filled.
 const FRAME: usize = 1024;
 
-/// What is kept over a reset. The emulated memory is all zero when the machine is switched on.
+/// State preserved over a reset. The emulated memory is all zero at power-on.
 #[derive(Clone, Copy)]
 struct Kept {
-    /// Instructions at which the crash was begun.
+    /// Instruction count at which the crash was begun.
     begun: u32,
-    /// Starts that found a crash, one after the other.
+    /// Consecutive starts that found a crash.
     crashes: u32,
-    /// The image was started again on purpose.
+    /// The image was restarted on purpose.
     restarted: bool,
 }
 
 #[unsafe(link_section = ".uninit.rehearsal")]
 static mut KEPT: MaybeUninit<Kept> = MaybeUninit::uninit();
 
-/// Servo tick from which on it happens, at thread level or in the servo's interrupt; none: the largest.
+/// Servo tick from which on the crash is due, at thread level or in the servo's interrupt; without
+/// one the largest.
 static DUE_IN_THREAD: AtomicU32 = AtomicU32::new(u32::MAX);
 static DUE_IN_SERVO: AtomicU32 = AtomicU32::new(u32::MAX);
-/// Which of those at thread level.
+/// Kind of the crash at thread level.
 static KIND: AtomicU32 = AtomicU32::new(0);
 
-/// How the image was started.
+/// Kind of start of the image.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// Switched on.
+    /// Power-on.
     First,
-    /// By a crash.
+    /// After a crash.
     Crashed,
-    /// On purpose, after that.
+    /// Deliberate restart after that.
     Again,
 }
 
 impl Start {
-    /// The word in records.
+    /// Name used in records.
     pub fn name(self) -> &'static str {
         if self == Self::First { "emulator" } else { "software" }
     }
 
-    /// In this servo tick the operator resets the fault, and begins anew.
+    /// Whether the operator resets the fault in this servo tick, and begins again.
     pub fn resets(self, servo_ticks: u32) -> bool {
         self == Self::Crashed && servo_ticks == RESET
     }
 
-    /// After so many servo ticks nothing more is to be seen.
+    /// Restarts the image or ends the run at the end of each kind of start.
     pub fn act(self, servo_ticks: u32) {
         match self {
-            // It was not asked for: it is told by now, and there is nothing to go on with.
+            // This crash was not requested. Its records have been sent, and the run cannot continue.
             Self::Crashed if servo_ticks == RESET / 2 && kept().begun == 0 => end(false),
             Self::Crashed if servo_ticks == RESTART => {
                 keep(Kept { begun: 0, crashes: 0, restarted: true });
@@ -103,24 +104,25 @@ impl Start {
 }
 
 fn kept() -> Kept {
-    // SAFETY: the static is there and aligned, zero when the machine is switched on and written as a whole ever after; its flag is
-    // therefore 0 or 1. Every access is volatile, and none interrupts another: starts come before interrupts, a crash is one.
+    // SAFETY: the static exists and is aligned, zero at power-on and always written as a whole afterwards. So
+    // its flag is 0 or 1. Every access is volatile, and none interrupts another: starts come before
+    // interrupts, and a crash ends the run.
     unsafe { ptr::read_volatile((&raw const KEPT).cast::<Kept>()) }
 }
 
 fn keep(now: Kept) {
-    // SAFETY: as above.
+    // SAFETY: as for `kept`.
     unsafe { ptr::write_volatile((&raw mut KEPT).cast::<Kept>(), now) }
 }
 
-/// How this start came about; where it is the first, what is asked for is made ready.
+/// Determines the kind of start; a first start arms the requested crash.
 pub fn start(crashed: bool) -> Start {
     let before = kept();
     keep(Kept { crashes: before.crashes + u32::from(crashed), restarted: false, ..before });
     if crashed {
         heprintln!("emulated: crash {} was begun at instruction {}", before.crashes + 1, before.begun);
         if before.crashes > 0 {
-            // Where nothing works any more, nothing is gained by starting for ever.
+            // A second crash in a row would repeat for ever.
             end(false);
         }
         return Start::Crashed;
@@ -132,10 +134,10 @@ pub fn start(crashed: bool) -> Start {
     Start::First
 }
 
-/// `crash=KIND@TICK` on the command line.
+/// Parses `crash=KIND@TICK` on the command line.
 fn ask() {
     let mut line = [0_u8; COMMAND_LINE];
-    // SAFETY: the debugger's call writes at most as many bytes as it is told there are.
+    // SAFETY: the debugger's call writes at most the given number of bytes.
     let failed = unsafe { syscall!(GET_CMDLINE, line.as_mut_ptr(), line.len()) };
     let words = line.split(|byte| matches!(byte, b' ' | 0)).filter_map(|word| str::from_utf8(word).ok());
     let asked = words.filter_map(|word| word.strip_prefix("crash=")?.split_once('@')).next();
@@ -156,7 +158,7 @@ fn begin() {
     keep(Kept { begun: clock::instructions(), ..kept() });
 }
 
-/// At thread level, between two steps of the identification.
+/// Crashes at thread level when due, between two steps of the identification.
 pub fn in_thread() {
     if SIGNALS.statistics.servo_ticks.get() < DUE_IN_THREAD.load(Ordering::Relaxed) {
         return;
@@ -171,7 +173,7 @@ pub fn in_thread() {
     }
 }
 
-/// In the servo's interrupt.
+/// Crashes in the servo's interrupt when due.
 #[inline(always)]
 pub fn in_servo() {
     if SIGNALS.statistics.servo_ticks.get() >= DUE_IN_SERVO.load(Ordering::Relaxed) {
@@ -189,7 +191,7 @@ fn reach_beyond() {
 #[inline(never)]
 fn read_nowhere() {
     begin();
-    // SAFETY: there is none; that is what this is for.
+    // SAFETY: not valid on purpose: the read must fault.
     black_box(unsafe { NOWHERE.read_volatile() });
 }
 
@@ -208,7 +210,7 @@ fn fill_the_stack(depth: u32) -> u32 {
 fn call_nobody() {
     begin();
     NVIC::pend(UNHANDLED);
-    // SAFETY: outside any critical section; that nobody handles it is what this is for.
+    // SAFETY: outside any critical section; the missing handler is intended.
     unsafe { NVIC::unmask(UNHANDLED) };
     black_box(UNHANDLED.number());
 }

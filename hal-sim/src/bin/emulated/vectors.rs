@@ -1,6 +1,6 @@
-//! Interrupts: the same levels as on the board.
+//! Interrupts, at the same levels as on the board.
 //!
-//! | level | vector | what |
+//! | level | vector | task |
 //! | --- | --- | --- |
 //! | 0 | SysTick | current loops of both axes, and with SysTick stopped the plant; never masked |
 //! | 1 | OTG_HS | servo; never masked |
@@ -23,10 +23,10 @@ const VECTORS: usize = 82;
 const LEVEL_1: u8 = 0x10;
 const LEVEL_6: u8 = 0x60;
 
-/// Levels, then the vectors; SysTick is started last.
+/// Sets the levels and enables the vectors; SysTick is started last.
 pub fn enable() {
-    // SAFETY: the registers of the interrupt controller, written once before any interrupt is enabled; called from `main`,
-    // outside any critical section.
+    // SAFETY: the registers of the interrupt controller, written once before any interrupt is enabled. Called
+    // from `main`, outside any critical section.
     unsafe {
         for vector in 0..VECTORS {
             PRIORITIES.add(vector).write_volatile(LEVEL_6);
@@ -40,7 +40,7 @@ pub fn enable() {
     }
 }
 
-/// Runs the servo as soon as level 0 is done.
+/// Requests a run of the servo after level 0.
 pub fn pend_servo() {
     NVIC::pend(Interrupt::OTG_HS);
 }

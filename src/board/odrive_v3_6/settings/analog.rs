@@ -1,26 +1,26 @@
-//! From converter codes to currents, volts and degrees.
+//! Conversion of ADC codes to currents, volts and degrees.
 //!
 //! ```text
 //! V_bus = code * 3.3 / 4096 * ratio           ratio 19 on 56 V boards, 11 on 24 V boards (board.h:120-126)
-//! T = ((a x + b) x + c) x + d, x = code / 4096         thermistor and divider, 0..120 degrees Celsius (board.cpp:53-54)
+//! T = ((a x + b) x + c) x + d, x = code / 4096    thermistor and divider, 0..120 degrees C (board.cpp:53-54)
 //! ```
 
 use crate::motor::SenseScale;
 use crate::units::Volt;
 
-/// Where the factory's version stands in one-time programmable memory: major, minor, voltage (board.cpp:266-290).
+/// Address of the factory version in one-time programmable memory: major, minor, voltage (board.cpp:266-290).
 pub const VERSION_ADDRESS: u32 = 0x1FFF_7803;
-/// Of memory that was never written.
+/// Value of memory that was never written.
 pub const BLANK: u8 = 0xFF;
 
-/// Coefficients a, b, c, d.
+/// Coefficients a, b, c, d of the thermistor's polynomial.
 pub const THERMISTOR: [f32; 4] = [363.939_1, -462.153_7, 307.551_3, -27.725_695];
-/// A bridge hotter than this is switched off, degrees Celsius: where ODrive begins to give less current.
+/// Bridge temperature above which outputs go off, degrees Celsius; ODrive begins to reduce the current here.
 pub const HOTTEST_C: f32 = 100.0;
-/// Codes of a thermistor that is neither open nor shorted: some -20 to 150 degrees.
+/// Code range of a thermistor that is neither open nor shorted: some -20 to 150 degrees.
 pub const THERMISTOR_CODES: [u16; 2] = [100, 3700];
 
-/// Ratio of the bus voltage's divider on a board of this version; `None` where the version is not one of this board.
+/// Divider ratio of the bus voltage on a board of this version; `None` for versions of other boards.
 #[must_use]
 pub const fn divider(version: [u8; 3]) -> Option<f32> {
     match version {
@@ -30,7 +30,7 @@ pub const fn divider(version: [u8; 3]) -> Option<f32> {
     }
 }
 
-/// The version of a board on which the factory has written nothing, for which it was said that it is one of 24 or 56 V.
+/// Version of a board without a factory entry that the user states to be one of 24 or 56 V.
 #[must_use]
 pub const fn stated(volts: Option<&str>) -> [u8; 3] {
     match volts {
@@ -43,13 +43,13 @@ pub const fn stated(volts: Option<&str>) -> [u8; 3] {
     }
 }
 
-/// Amplifiers, converter and divider as the current loop wants them.
+/// Scales of amplifiers, converter and divider for the current loop.
 #[must_use]
 pub const fn sense(divider: f32) -> SenseScale {
     SenseScale { volt_per_code: Volt(3.3 / 4096.0 * divider), ..SenseScale::ODRIVE_3_6 }
 }
 
-/// Temperature of a thermistor's code, degrees Celsius; `None` of one that is open or shorted.
+/// Temperature of a thermistor's code, degrees Celsius; `None` where it is open or shorted.
 #[must_use]
 pub fn temperature_c(code: u16) -> Option<f32> {
     let [low, high] = THERMISTOR_CODES;

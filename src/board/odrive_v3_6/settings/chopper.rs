@@ -6,20 +6,22 @@
 //! 84 MHz / (2 * 4096) = 10.25 kHz
 //! ```
 //!
-//! No hardware keeps the two apart, only the values do. Source: `Board/v3/Inc/main.h:72-74`, `Src/tim.c:158-186`,
-//! `MotorControl/low_level.cpp:97-136`; registers RM0090 18.4. Without a brake resistor the off state stays.
+//! No hardware separates both sides, only the compare values do.
+//! Source: `Board/v3/Inc/main.h:72-74`, `Src/tim.c:158-186`, `MotorControl/low_level.cpp:97-136`; registers
+//! RM0090 18.4. Without a brake resistor the off state remains.
 
 use super::Write;
 
-/// TIM2.
+/// First register of TIM2.
 pub const BASE: u32 = 0x4000_0000;
 /// Top of the counter.
 pub const TOP: u32 = 4096;
-/// Counts of the timer that lie between the two sides at least: 0.48 us.
+/// Least distance of both sides, counts of the timer: 0.48 us.
 pub const GAP: u32 = 40;
 
-/// Running in its off state; pins come afterwards. The buffered compare values are taken over before an output is let
-/// through: the zeros of a reset would keep the high side on until the counter's first end, 49 us later.
+/// Starts the timer in its off state; pins are connected afterwards. The buffered compare values are loaded
+/// before an output is enabled. Otherwise the reset's zeros would keep the high side on until the counter's
+/// first end, 49 us later.
 pub const CHOPPER: [Write; 7] = [
     // PWM mode 2, compare values buffered.
     Write::whole("TIM2_CCMR2", BASE + 0x1C, 0x7878),
@@ -32,8 +34,8 @@ pub const CHOPPER: [Write; 7] = [
     Write::whole("TIM2_CR1", BASE, 0b11 << 5 | 1),
 ];
 
-/// Compare values of the low and the high side for a duty of the resistor, 0..=0.95; anything else, also what is no
-/// number, counts as the nearest (0 of NaN). Never less than [`GAP`] apart.
+/// Compare values of the low and the high side for a duty of the resistor. Duties outside 0..=0.95 are
+/// clamped, NaN counts as 0. The values are never less than [`GAP`] apart.
 #[must_use]
 pub fn compare(duty: f32) -> [u16; 2] {
     let on = (duty * TOP as f32) as u32;

@@ -1,22 +1,22 @@
-//! ADC1 to ADC3: currents of both axes at the middle of their zero vectors, supply and temperatures beside them.
+//! ADC1 to ADC3: currents of both axes at the middle of their zero vectors, supply and temperatures.
 //!
 //! ```text
-//! TIM1 trigger -> injected: ADC2 B, ADC3 C of axis 0; ADC1 bus voltage, thermistors     interrupt at the end, from ADC3
-//! TIM8 trigger -> regular:  ADC2 B, ADC3 C of axis 1                                    interrupt at the end, from ADC3
+//! TIM1 trigger -> injected: ADC2 B, ADC3 C of axis 0; ADC1 bus voltage, thermistors   interrupt from ADC3
+//! TIM8 trigger -> regular:  ADC2 B, ADC3 C of axis 1                                  interrupt from ADC3
 //! clock 84 MHz / 4 = 21 MHz; 3 + 12 cycles = 0.71 us
 //! ```
 //!
 //! Both shunts of an axis are sampled in the same cycle. Axis 1 uses the bus voltage of half a period ago.
-//! Source: `Board/v3/Src/adc.c:81-218`, `board.cpp:431-440`, `Inc/main.h:83-90` (of axis 1 PC3 is B and PC2 is C);
-//! registers RM0090 13.13, triggers tables 68 and 69.
+//! Source: `Board/v3/Src/adc.c:81-218`, `board.cpp:431-440`, `Inc/main.h:83-90` (on axis 1 PC3 is B and PC2
+//! is C); registers RM0090 13.13, triggers tables 68 and 69.
 
 use super::Write;
 
-/// ADC1, ADC2, ADC3.
+/// First registers of ADC1, ADC2, ADC3.
 pub const BASES: [u32; 3] = [0x4001_2000, 0x4001_2100, 0x4001_2200];
-/// Prescaler of all three, register ADC_CCR.
+/// Common control register ADC_CCR with the prescaler of all three.
 const COMMON: u32 = 0x4001_2304;
-/// Of the converters, Hz.
+/// Clock of the converters, Hz.
 pub const CLOCK_HZ: u32 = 21_000_000;
 
 /// Offset of the status register.
@@ -30,15 +30,15 @@ pub const EOC: u32 = 1 << 1;
 /// End of the injected conversions.
 pub const JEOC: u32 = 1 << 2;
 
-/// Channels of the shunts of B and C of each axis.
+/// Channels of the shunts of B and C, by axis.
 pub const SHUNTS: [[u32; 2]; 2] = [[10, 11], [13, 12]];
-/// Bus voltage; bridge of axis 0, bridge of axis 1, chopper.
+/// Channels of bus voltage, bridge of axis 0, bridge of axis 1, chopper.
 pub const SLOW: [u32; 4] = [6, 15, 4, 5];
 
 const ON: u32 = 1;
-/// Injected by TIM1's trigger (number 1), rising edge.
+/// Injected conversions by TIM1's trigger (number 1), rising edge.
 const INJECTED: u32 = 0b0001 << 16 | 0b01 << 20;
-/// Regular by TIM8's trigger (number 14), rising edge.
+/// Regular conversions by TIM8's trigger (number 14), rising edge.
 const REGULAR: u32 = 0b1110 << 24 | 0b01 << 28;
 /// Fifteen cycles of sampling for the thermistors' dividers, channels 4 and 5 (SMPR2), 15 (SMPR1).
 const SLOW_SAMPLING: [u32; 2] = [0b001 << 15, 0b001 << 12 | 0b001 << 15];
@@ -49,10 +49,10 @@ macro_rules! adc {
     };
 }
 
-/// All converters on, channels and sequences; nothing triggers them yet. They need 3 us to settle.
+/// Turns all converters on and sets channels and sequences; nothing triggers them yet. Settling takes 3 us.
 pub const CONVERTERS: [Write; 19] = [
     Write::whole("ADC_CCR", COMMON, 0b01 << 16),
-    // Scan: four injected conversions at one trigger.
+    // Scan mode: four injected conversions per trigger.
     adc!(1, "CR1", 0x04, 1 << 8),
     adc!(1, "SMPR1", 0x0C, SLOW_SAMPLING[0]),
     adc!(1, "SMPR2", 0x10, SLOW_SAMPLING[1]),
@@ -64,7 +64,7 @@ pub const CONVERTERS: [Write; 19] = [
     adc!(2, "SQR1", 0x2C, 0),
     adc!(2, "SQR3", 0x34, SHUNTS[1][0]),
     adc!(2, "CR2", 0x08, ON),
-    // Interrupts at the end of either kind.
+    // Interrupts at the end of regular and injected conversions.
     adc!(3, "CR1", 0x04, 1 << 5 | 1 << 7),
     adc!(3, "SMPR1", 0x0C, 0),
     adc!(3, "JSQR", 0x38, SHUNTS[0][1] << 15),
@@ -74,14 +74,15 @@ pub const CONVERTERS: [Write; 19] = [
     adc!(3, "SR", SR, 0),
 ];
 
-/// From now on the timers trigger; written once they run in phase.
+/// Enables the timers' triggers; written once the timers run in phase.
 pub const TRIGGERED: [Write; 3] = [
     adc!(1, "CR2", 0x08, ON | INJECTED),
     adc!(2, "CR2", 0x08, ON | INJECTED | REGULAR),
     adc!(3, "CR2", 0x08, ON | INJECTED | REGULAR),
 ];
 
-/// Clears flags of a status register: zeros clear, ones do nothing (rc_w0), so none that comes meanwhile is lost.
+/// Value that clears flags of a status register: zeros clear, ones do nothing (rc_w0), so a flag raised
+/// meanwhile is not lost.
 #[must_use]
 pub const fn cleared(flags: u32) -> u32 {
     !flags

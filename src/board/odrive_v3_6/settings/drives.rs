@@ -1,46 +1,49 @@
-//! The axes of a leg on this board, and what may be done to their motors: the numbers to check before the first power-on of
-//! another machine (docs/board.md). What can be measured is measured by the calibration, and refused where it contradicts.
+//! Axis configurations of a leg on this board, and limits for their motors.
+//!
+//! Check these numbers before the first power-on of another machine (docs/board.md). The calibration measures
+//! what it can, and refuses contradictions.
 
 use super::analog;
 use crate::leg::{DeratingRamps, LegDescription, MotorDescription};
 use crate::motor::{AxisConfiguration, BridgeTiming, CalibrationSettings, DeadTime, Direction, Sine};
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt};
 
-/// Of the current loops.
+/// Bandwidth of the current loops.
 pub const BANDWIDTH: Hertz = Hertz(1000.0);
-/// Current within which the dead time is given back smoothly.
+/// Half width of the band in which the dead-time compensation changes its sign.
 pub const DEAD_TIME_BAND: Ampere = Ampere(2.0);
-/// Length of the current vector at which the bridges are released: what the shunts can tell, less their zeros.
+/// Length of the current vector above which the bridges turn off: the shunts' range less their offsets.
 pub const OVERCURRENT: Ampere = Ampere(61.0);
-/// Within which the bridges may switch, on a board of 56 V and on one of 24 V.
+/// Bus-voltage range in which the bridges may switch, on boards of 56 V and of 24 V.
 pub const BUS: [[Volt; 2]; 2] = [[Volt(20.0), Volt(58.0)], [Volt(12.0), Volt(25.7)]];
-/// Where a brake resistor begins to conduct, and where it does all the time it may; the same boards.
+/// Bus voltages at which a brake resistor begins to conduct and reaches its greatest duty; boards as above.
 pub const CHOPPER: [[Volt; 2]; 2] = [[Volt(50.0), Volt(54.0)], [Volt(25.0), Volt(25.5)]];
-/// Faster than the joint's limit by this a counter is not believed.
+/// Greatest plausible speed of a counter, relative to the joint's limit.
 pub const SPEED_MARGIN: f32 = 2.0;
-/// What a calibration may do to a motor.
+/// Current, voltage and speed of a calibration.
 pub const CALIBRATION: CalibrationSettings =
     CalibrationSettings { current: Ampere(15.0), voltage: Volt(3.0), turns_per_s: 10.0 };
 
-/// Which of two voltages a board with this divider is for.
+/// Index of the board's variant in the tables above, by its divider.
 const fn is_low(divider: f32) -> usize {
     if divider < 15.0 { 1 } else { 0 }
 }
 
-/// Where the brake resistor conducts on a board with this divider of the bus voltage.
+/// Voltage range of the brake resistor on a board with this bus-voltage divider.
 #[must_use]
 pub const fn chopper(divider: f32) -> [Volt; 2] {
     CHOPPER[is_low(divider)]
 }
 
-/// Within which the bridges may switch on a board with this divider of the bus voltage.
+/// Bus-voltage range of the bridges on a board with this divider.
 #[must_use]
 pub const fn bus(divider: f32) -> [Volt; 2] {
     BUS[is_low(divider)]
 }
 
-/// Where torque is given less and less of, on a board with this divider of the bus voltage: over the last 20 degrees of a bridge, from
-/// a fifth above the lowest bus on, and between the chopper's end and the highest bus.
+/// Ramps that reduce torque on a board with this bus-voltage divider. They cover the last 20 degrees of a
+/// bridge, and the bus voltage below 1.2 of its lower limit. A third one lies between the chopper's end and
+/// the upper limit.
 #[must_use]
 pub const fn derating(divider: f32) -> DeratingRamps {
     let ([low, high], [_, full]) = (bus(divider), chopper(divider));
@@ -52,8 +55,8 @@ pub const fn derating(divider: f32) -> DeratingRamps {
     )
 }
 
-/// The configuration of an axis that drives this motor, up to a joint's current and speed, on a board with this divider of the bus
-/// voltage. A mirrored drive is the servo's affair (`servo::JointScale`).
+/// Configuration of an axis that drives this motor, up to a joint's current and speed, on a board with this
+/// bus-voltage divider. A mirrored drive is handled in the servo (`servo::JointScale`).
 #[must_use]
 pub fn axis(
     motor: &MotorDescription,
@@ -81,7 +84,7 @@ pub fn axis(
     }
 }
 
-/// The configuration of every axis of a leg.
+/// Configurations of all axes of a leg.
 #[must_use]
 pub fn axes<const N: usize>(leg: &LegDescription<N>, divider: f32) -> [AxisConfiguration; N] {
     leg.joints.map(|joint| axis(&joint.motor, joint.current, joint.speed, divider))

@@ -1,6 +1,6 @@
-//! External interrupts: index pulses of both encoders, and the emergency stop's contact as it opens.
+//! External interrupts: index pulses of both encoders, and the opening of the emergency stop's contact.
 //!
-//! Source: registers RM0090 9.2 and 12.3; lines are pins' numbers.
+//! Source: registers RM0090 9.2 and 12.3; line numbers equal pin numbers.
 
 use super::Write;
 
@@ -12,10 +12,10 @@ pub const STOP_LINE: u32 = 4;
 /// External interrupt controller.
 const EXTI: u32 = 0x4001_3C00;
 const SYSCFG: u32 = 0x4001_3800;
-/// Pending lines; a one clears.
+/// Register of pending lines; a one clears.
 pub const PENDING: u32 = EXTI + 0x14;
 
-/// Port C for all of them: index pulses as they rise, the contact as it falls.
+/// All lines on port C: rising edges of the index pulses, falling edge of the contact.
 pub const EXTERNAL: [Write; 7] = [
     Write::bits("SYSCFG_EXTICR2", SYSCFG + 0x0C, 0xF, 2),
     Write::bits("SYSCFG_EXTICR3", SYSCFG + 0x10, 0xF << 4, 2 << 4),

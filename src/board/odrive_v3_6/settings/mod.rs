@@ -1,7 +1,7 @@
-//! What is written into the microcontroller's registers, as plain values.
+//! Register values of the microcontroller, as plain data.
 //!
-//! A test on the host (`cargo test --test board_registers -- --nocapture`) applies these lists to empty registers, derives
-//! from the result what the board does (frequency, phase, dead time, channels, pins) and prints the table.
+//! A test on the host (`cargo test --test board_registers -- --nocapture`) applies these lists to empty
+//! registers. The test derives frequency, phase, dead time, channels and pins, and prints the table.
 
 pub mod analog;
 pub mod can;
@@ -15,28 +15,28 @@ pub mod gate_driver;
 pub mod pins;
 pub mod timers;
 
-/// One register and the bits of it that are set to a value.
+/// Write of a register, or of some of its bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Write {
     /// Name as in RM0090; the device has no use for it.
     #[cfg(not(target_os = "none"))]
     pub register: &'static str,
-    /// Where.
+    /// Address of the register.
     pub address: u32,
-    /// Bits that are meant; with all of them the register is not read before.
+    /// Bits to write; with all bits the register is not read first.
     pub mask: u32,
-    /// Their value.
+    /// Value of those bits.
     pub value: u32,
 }
 
 impl Write {
-    /// A whole register.
+    /// Writes a whole register.
     #[must_use]
     pub const fn whole(register: &'static str, address: u32, value: u32) -> Self {
         Self::bits(register, address, u32::MAX, value)
     }
 
-    /// Some bits of a register.
+    /// Writes some bits of a register.
     #[must_use]
     pub const fn bits(register: &'static str, address: u32, mask: u32, value: u32) -> Self {
         #[cfg(target_os = "none")]
@@ -50,7 +50,7 @@ impl Write {
         }
     }
 
-    /// What a register that held `before` holds afterwards.
+    /// Value of a register after this write, for its value `before`.
     #[must_use]
     pub const fn applied_to(&self, before: u32) -> u32 {
         (before & !self.mask) | (self.value & self.mask)
@@ -61,17 +61,19 @@ impl Write {
 pub const CLOCK_HZ: u32 = 168_000_000;
 /// Clock of the timers on APB2 (TIM1, TIM8), Hz.
 pub const FAST_TIMER_HZ: u32 = crate::hal::BRIDGE_CLOCK_HZ;
-/// Of the timers on APB1 (TIM2 to TIM5), Hz.
+/// Clock of the timers on APB1 (TIM2 to TIM5), Hz.
 pub const SLOW_TIMER_HZ: u32 = 84_000_000;
 
 const RCC: u32 = 0x4002_3800;
 const FLASH: u32 = 0x4002_3C00;
 const DEBUG: u32 = 0xE004_2000;
 
-/// Flash: prefetch and both caches, which reset and `embassy-stm32` leave off (RM0090 3.9.1: PRFTEN, ICEN, DCEN).
+/// Flash prefetch and both caches, which reset and `embassy-stm32` leave off (RM0090 3.9.1:
+/// PRFTEN, ICEN, DCEN).
 pub const CACHES: [Write; 1] = [Write::bits("FLASH_ACR", FLASH, 7 << 8, 7 << 8)];
 
-/// Clocks of what is used (RM0090 7.3): ports A to D; TIM2, TIM3, TIM4; TIM1, TIM8, ADC1 to ADC3, SYSCFG.
+/// Clock enables of the used peripherals (RM0090 7.3): ports A to D; TIM2, TIM3, TIM4; TIM1, TIM8, ADC1 to
+/// ADC3, SYSCFG.
 pub const CLOCKS: [Write; 3] = [
     Write::bits("RCC_AHB1ENR", RCC + 0x30, 0b1111, 0b1111),
     Write::bits("RCC_APB1ENR", RCC + 0x40, 0b111, 0b111),
@@ -86,17 +88,19 @@ pub const DEBUG_FREEZE: [Write; 2] = [
     Write::bits("DBGMCU_APB2_FZ", DEBUG + 0x0C, 0b11, 0b11),
 ];
 
-/// Clock security: a crystal that fails raises the non-maskable interrupt (RCC_CR CSSON), which releases the bridges; the timers run
-/// on, 10.5 times slower. Their break circuit, which would do it in hardware, needs BKE, and its pins are taken.
+/// Clock security: failure of the crystal raises the non-maskable interrupt (RCC_CR CSSON), which turns the
+/// bridges off. Until then the timers run on, 10.5 times slower. Their break input, which would act in
+/// hardware, needs BKE, and its pins are in use.
 pub const CLOCK_SECURITY: [Write; 1] = [Write::bits("RCC_CR", RCC, 1 << 19, 1 << 19)];
 
 /// Clears the interrupt of clock security (RCC_CIR CSSC).
 pub const CLOCK_FAILURE_SEEN: Write = Write::bits("RCC_CIR", RCC + 0x0C, 1 << 23, 1 << 23);
 
-/// RCC_CSR, in which the reasons of the last reset stand from bit 25 on, and the bit that clears them (RMVF).
+/// RCC_CSR, with the reasons of the last reset from bit 25 on, and the bit that clears them (RMVF).
 pub const RESET_REASONS: Write = Write::bits("RCC_CSR", RCC + 0x74, 1 << 24, 1 << 24);
 
-/// Writes timers, pins and converters in the order of the start: a pin is connected only to a timer that holds it off.
+/// Writes timers, pins and converters in the order of the start: a pin is connected only to a timer that
+/// holds it off.
 pub fn prepare(mut write: impl FnMut(&[Write])) {
     (0..2).for_each(|axis| write(&timers::bridge(axis)));
     write(&chopper::CHOPPER);

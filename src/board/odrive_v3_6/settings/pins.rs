@@ -1,43 +1,46 @@
-//! What every used pin is. Source: `Board/v3/Inc/main.h:77-156`, `board.cpp:35-254`; registers RM0090 8.4.
+//! Function of every used pin.
 //!
-//! The bus' pins: [`super::can`]. Left as reset has them, since nothing uses them yet: UART_A (PA0, PA1), USB (PA11, PA12), GPIO6 to 8 (PB2,
-//! PA15, PB3).
+//! Source: `Board/v3/Inc/main.h:77-156`, `board.cpp:35-254`; registers RM0090 8.4.
+//!
+//! Pins of the bus: [`super::can`]. Unused and left in their reset state: UART_A (PA0, PA1), USB (PA11,
+//! PA12), GPIO6 to 8 (PB2, PA15, PB3).
 
 use super::Write;
 
-/// What a pin is to be.
+/// Function of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// A converter's input.
+    /// Analog input of a converter.
     Analog,
-    /// A level that is read.
+    /// Digital input.
     Input(Pull),
-    /// A level that is driven: high or low.
+    /// Digital output, initially high or low.
     Output(bool),
-    /// A peripheral's, by its number; pulled where it is an input, and until the peripheral drives it.
+    /// Alternate function, by number; the pull acts on inputs, and on outputs until the
+    /// peripheral drives them.
     Alternate(u32, Pull),
 }
 
-/// What a pin is pulled to.
+/// Pull resistor of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Pull {
-    /// Nothing.
+    /// No pull.
     None,
-    /// Supply.
+    /// Pull to the supply.
     Up,
-    /// Ground.
+    /// Pull to ground.
     Down,
 }
 
-/// A port and a number, and what it is to be.
+/// Port, number and function of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pin {
-    /// `A` to `D`.
+    /// Port `A` to `D`.
     pub port: u8,
-    /// 0..=15.
+    /// Number, 0..=15.
     pub number: u32,
-    /// What it is to be.
+    /// Function.
     pub mode: Mode,
 }
 
@@ -45,22 +48,22 @@ const fn pin(port: u8, number: u32, mode: Mode) -> Pin {
     Pin { port, number, mode }
 }
 
-/// What a released output looks like until the timer drives it: low.
+/// Pulled low until the timer drives it: outputs off.
 const BRIDGE_0: Mode = Mode::Alternate(1, Pull::Down);
 const BRIDGE_1: Mode = Mode::Alternate(3, Pull::Down);
 const CHOPPER: Mode = Mode::Alternate(1, Pull::Down);
 const ENCODER: Mode = Mode::Alternate(2, Pull::None);
-/// An open contact, or a wire that broke, is low.
+/// An open contact or a broken wire reads low.
 const CONTACT: Mode = Mode::Input(Pull::Down);
 
-/// Gate drivers off and deselected: the first that is set.
+/// Gate drivers off and deselected; these pins are set first.
 pub const GATES_OFF: [Pin; 3] = [
     pin(b'B', 12, Mode::Output(false)),
     pin(b'C', 13, Mode::Output(true)),
     pin(b'C', 14, Mode::Output(true)),
 ];
 
-/// All others; bridges and chopper last, when their timers hold them low.
+/// All other pins; bridges and chopper last, when their timers hold them low.
 pub const PINS: [Pin; 32] = [
     // Shunts of axis 0 (B, C) and axis 1 (C, B); bus voltage; thermistors of bridge 0, bridge 1 and chopper.
     pin(b'C', 0, Mode::Analog),
@@ -78,7 +81,7 @@ pub const PINS: [Pin; 32] = [
     pin(b'B', 7, ENCODER),
     pin(b'C', 9, Mode::Input(Pull::None)),
     pin(b'C', 15, Mode::Input(Pull::None)),
-    // Fault of either gate driver, low when there is one.
+    // Common fault line of both gate drivers, active low.
     pin(b'D', 2, Mode::Input(Pull::Up)),
     // GPIO5: emergency stop, GPIO3: enabling switch, GPIO4: start button.
     pin(b'C', 4, CONTACT),
@@ -112,7 +115,7 @@ pub const IDR: u32 = 0x10;
 pub const BSRR: u32 = 0x18;
 
 impl Pin {
-    /// What makes the pin so: level, pull, slowest edges, function, and the mode last.
+    /// Writes that configure the pin: level, pull, slowest edges, function, and the mode last.
     #[must_use]
     pub const fn writes(&self) -> [Write; 5] {
         let Self { port: letter, number, mode } = *self;

@@ -1,4 +1,4 @@
-//! What an axis makes of index pulses: noise, lost counts, and none.
+//! An axis' reaction to index pulses: noise, lost counts, and missing pulses.
 
 use super::*;
 use crate::real::sin_cos;
@@ -11,7 +11,7 @@ fn an_index_away_from_its_place_is_a_lost_place() {
                 let mut bench = Bench::at(speed, &CONFIGURATION);
                 bench.run(request, 100);
                 bench.motor.encoder_zero += f64::from(missed) / 8192.0;
-                // The index stays where it is on the shaft: three turns.
+                // The index keeps its position on the shaft; three turns.
                 bench.run_sampled(request, 9048, |sample| {
                     sample.index_count = sample.index_count.map(|at| at.wrapping_add(missed as u16));
                 });
@@ -33,7 +33,7 @@ fn two_turns_without_an_index_are_a_lost_place_where_there_was_one() {
             assert_eq!(bench.axis.clear_fault(), !lost);
         }
     }
-    // Moved to and fro within a turn there is nothing to miss.
+    // Moved to and fro within a turn, no pulse is missing.
     let mut bench = Bench::at(50.0, &CONFIGURATION);
     for way in 0..40 {
         bench.motor.speed = if way % 2 == 0 { 50.0 } else { -50.0 };
@@ -42,14 +42,14 @@ fn two_turns_without_an_index_are_a_lost_place_where_there_was_one() {
     assert_eq!(bench.axis.fault(), None);
 }
 
-/// Ticks of a turn at 50 rad/s.
+/// Ticks per turn at 50 rad/s.
 const TURN: usize = 3016;
 
 #[test]
 fn one_wrong_index_pulse_changes_no_command_and_takes_nothing() {
     for request in [ask(5.0), AxisRequest::RELEASED] {
         for speed in [0.0, 50.0, -50.0] {
-            // Bursts as long as a servo tick, and a pulse in each of them.
+            // Single pulses, and bursts as long as a servo tick with a pulse in each tick.
             for burst in [1, 6] {
                 let mut bench = Bench::at(speed, &CONFIGURATION);
                 bench.run_sampled(request, 96, |_| {});
@@ -72,7 +72,7 @@ fn one_wrong_index_pulse_changes_no_command_and_takes_nothing() {
 fn glitches_of_a_rotor_at_rest_are_no_index_however_often() {
     let mut bench = Bench::at(0.0, &CONFIGURATION);
     for speed in [50.0, -50.0].into_iter().cycle().take(6) {
-        // At the same place each time, and half a turn away in between.
+        // A glitch at the same position each time, half a turn of travel in between.
         bench.motor.speed = 0.0;
         bench.run_sampled(ask(0.0), 240, |_| {});
         bench.run_sampled(ask(0.0), 6, |sample| sample.index_count = Some(sample.encoder_count));
@@ -86,7 +86,7 @@ fn glitches_of_a_rotor_at_rest_are_no_index_however_often() {
 fn counts_that_were_lost_are_seen_at_the_second_index() {
     for (missed, speed) in [(6, 50.0), (-6, 50.0), (30, -50.0)] {
         let mut bench = Bench::at(speed, &CONFIGURATION);
-        // From shortly behind an index on.
+        // Start shortly behind an index.
         while bench.sample.index_count.is_none() {
             bench.tick(ask(5.0));
         }
@@ -103,7 +103,8 @@ fn counts_that_were_lost_are_seen_at_the_second_index() {
     }
 }
 
-/// What docs/motor.md states: `i cos(e)` makes torque and `i sin(e)` flows along the flux, e the electrical angle lost.
+/// Claim of docs/motor.md: `i cos(e)` makes torque and `i sin(e)` flows along the flux, e the electrical
+/// angle lost.
 #[test]
 fn until_the_second_index_the_torque_falls_with_the_cosine_of_what_was_lost() {
     for (losses, counts) in [(1, 5), (1, 26), (5, 29)] {
@@ -117,7 +118,7 @@ fn until_the_second_index_the_torque_falls_with_the_cosine_of_what_was_lost() {
         let [(d, _), (q, _)] = bench.watch(ask(10.0), 864);
         let lost = f64::from(losses * counts) * 7.0 / 8192.0 * core::f64::consts::TAU;
         let (sine, cosine) = sin_cos(lost);
-        // A degree of the calibration's offset, and the zeros of the shunts.
+        // Tolerance: a degree of the calibration's offset, and the current-sensor offsets.
         assert!((q - 10.0 * cosine).abs() < 0.2, "{losses} times {counts}: {q} A, {cosine}");
         assert!((d.abs() - 10.0 * sine).abs() < 0.3, "{losses} times {counts}: {d} A, {sine}");
         assert_eq!(bench.axis.fault(), None, "{losses} times {counts}");

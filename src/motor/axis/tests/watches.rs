@@ -1,4 +1,4 @@
-//! What an axis notices by holding voltages, currents, counts and codes against each other.
+//! Faults that an axis detects by comparing voltages, currents, counts and codes.
 
 use super::*;
 
@@ -7,7 +7,7 @@ const TWENTY_MS: usize = 80;
 const FIFTY_MS: usize = 200;
 
 impl Bench {
-    /// Servo periods until a fault acts, each sample spoilt before its tick; `None` without one.
+    /// Servo periods until a fault acts, with each sample faulted before its tick; `None` without a fault.
     fn until_fault(
         &mut self,
         request: AxisRequest,
@@ -27,7 +27,7 @@ impl Bench {
         None
     }
 
-    /// The same with a counter that stands still from now on.
+    /// As [`Self::until_fault`], with a counter that is frozen from now on.
     fn frozen(&mut self, request: AxisRequest, periods: usize) -> Option<(usize, AxisFault)> {
         let count = self.sample.encoder_count;
         self.until_fault(request, periods, |sample| {
@@ -54,7 +54,7 @@ fn a_counter_that_freezes_above_the_derived_speed_is_seen_within_20_ms_and_brake
             assert!(periods <= TWENTY_MS, "{current} A: {periods} periods");
             assert_eq!(bench.tick(ask(current)), AxisCommand::BRAKE);
             assert!(!bench.axis.clear_fault(), "the place is lost");
-            // Half of it is not seen, as it is said.
+            // A lower speed than the derived one is not detected, as documented.
             assert_eq!(Bench::settled(0.4 * sign * speed, current).frozen(ask(current), FIFTY_MS), None);
         }
     }
@@ -76,12 +76,12 @@ fn a_counter_that_stands_still_while_the_current_swings_is_frozen_at_any_speed()
                 assert_eq!(bench.tick(ask(4.0)), AxisCommand::BRAKE);
             }
         }
-        // A joint that is brought to rest gives back what braked it.
+        // A joint that comes to rest loses its braking current; that is no fault.
         let mut bench = Bench::settled(if speed == 0.0 { 2.0 } else { speed }, -30.0);
         let count = bench.sample.encoder_count;
         let freeze = |sample: &mut AxisSample| (sample.encoder_count, sample.index_count) = (count, None);
         assert_eq!(bench.until_fault(ask(6.0), FIFTY_MS, freeze), None, "{speed} rad/s");
-        // A rotor that turns however little is none.
+        // A rotor that turns, however slowly, has no frozen counter.
         let mut bench = Bench::settled(if speed == 0.0 { 0.3 } else { speed }, 4.0);
         for current in [-30.0, 30.0, -38.0] {
             assert_eq!(bench.until_fault(ask(current), FIFTY_MS, |_| {}), None, "{speed} rad/s, {current} A");
@@ -107,7 +107,7 @@ fn a_sound_axis_brakes_for_as_long_as_the_other_one_needs_it() {
 
 #[test]
 fn a_motor_too_fast_to_brake_below_the_current_bound_is_released() {
-    // 150 to 180 rad/s carry 55 A; a counter that froze says nothing of it, the back-EMF does.
+    // Braking at 150 to 180 rad/s already carries 55 A.
     for speed in [200.0, -260.0] {
         let mut bench = Bench::settled(speed, 0.0);
         assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::RELEASED, "{speed} rad/s");
@@ -129,7 +129,7 @@ fn a_motor_that_brakes_is_released_when_it_is_told_or_when_its_current_passes_th
         assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::BRAKE);
         bench.sample = bench.motor.period(AxisCommand::BRAKE);
     }
-    // 60 rad/s make 1.2 V at 0.05 ohm: the motor brakes, whatever is measured.
+    // 60 rad/s make 1.2 V at 0.05 ohm: the motor brakes, whatever the sensors measure.
     let torque = bench.motor.current[1];
     assert!(torque < -15.0, "{torque} A");
     assert_eq!(bench.tick(AxisRequest::RELEASED), AxisCommand::RELEASED);
@@ -142,13 +142,13 @@ fn a_motor_that_brakes_is_released_when_it_is_told_or_when_its_current_passes_th
 
 #[test]
 fn an_open_phase_is_seen_within_50_ms() {
-    // Joint speeds of 0.4 rad/s and more, and a motor that stands where the phase has to carry current.
+    // Joint speeds of at least 0.4 rad/s, and a motor at rest with current in the open phase.
     for (speed, current) in [(20.0, 10.0), (60.0, -5.0), (-200.0, 30.0), (0.0, 10.0)] {
         let mut bench = Bench::settled(speed, current);
         bench.motor.open = true;
         let found = bench.until_fault(ask(current), FIFTY_MS, |_| {});
         let Some((_, fault)) = found else { panic!("{speed} rad/s, {current} A") };
-        // Of a rotor at rest the counter may be held for frozen: then the motor brakes, with two phases.
+        // At rest the fault may show as a frozen counter; then the motor brakes with two phases.
         use AxisFault::{CurrentZero, EncoderFrozen, OpenPhase, Overcurrent};
         assert!(matches!(fault, OpenPhase | CurrentZero | Overcurrent | EncoderFrozen));
         let brakes = fault == EncoderFrozen;
@@ -168,7 +168,7 @@ fn a_zero_that_drifts_by_six_amperes_is_seen_within_50_ms_of_motion() {
                 matches!(found, Some((_, AxisFault::CurrentZero))),
                 "{speed} rad/s, {current} A: {found:?}"
             );
-            // 1 A is none.
+            // A drift of 1 A is tolerated.
             let mut bench = Bench::settled(speed, current);
             bench.motor.zeros[shunt] += codes / 6.0;
             assert_eq!(bench.until_fault(ask(current), 400, |_| {}), None, "{speed} rad/s, {current} A");
@@ -181,7 +181,7 @@ fn zeros_that_drifted_while_released_are_refused_at_enabling() {
     for (codes, refused) in [(25.0, false), (-60.0, true), (100.0, true)] {
         let mut bench = Bench::at(50.0, &CONFIGURATION);
         bench.motor.zeros[1] += codes;
-        // 10 ms.
+        // 240 ticks are 10 ms.
         bench.run(AxisRequest::RELEASED, 240);
         assert_eq!(bench.tick(ask(0.0)).enabled, !refused, "{codes} codes");
         assert_eq!(bench.axis.fault(), refused.then_some(AxisFault::CurrentZero), "{codes} codes");
@@ -196,7 +196,7 @@ fn a_warm_motor_that_is_reversed_again_and_again_raises_nothing() {
         bench.motor.flux *= flux;
         bench.motor.inductance = bench.motor.inductance.map(|henry| henry * inductance);
         for step in 0..24_000 {
-            // Up to the joint's greatest speed, at 3 Hz; currents at 7 Hz, and a step in each of them.
+            // Speeds up to the joint's greatest, at 3 Hz; currents at 7 Hz, with a step in each cycle.
             let time = f64::from(step) / 24_000.0;
             bench.motor.speed = 220.0 * crate::real::sin_cos(time * 18.8).0;
             let current = 38.0 * crate::real::sin_cos(time * 44.0).0 as f32;
@@ -222,7 +222,7 @@ fn a_code_that_stays_while_its_phase_is_asked_for_more_is_seen_in_the_fourth_tic
             assert!(ticks <= 54, "a quarter of an electrical turn");
         }
         assert_eq!(bench.axis.fault(), Some(AxisFault::StuckConversion));
-        // A step: the fourth tick after it.
+        // After a step, the fourth tick shows the fault.
         let mut bench = Bench::settled(0.0, 0.0);
         let stuck = bench.sample.shunt_codes[shunt];
         for tick in 0..100 {
@@ -260,7 +260,7 @@ fn codes_without_noise_that_stay_are_no_fault_while_nothing_is_asked_to_change()
     bench.motor.noise_codes = 0.0;
     bench.motor.zeros = [12.0, -21.0];
     assert_eq!(bench.until_fault(ask(0.0), 200, |_| {}), None);
-    // Half of the limit, 20 A, moves any rotor but this one.
+    // Half of the limit, 20 A, moves any rotor except this simulated one.
     for current in [0.9, 5.0, -5.0, 7.0, 0.0] {
         assert_eq!(bench.until_fault(ask(current), 200, |_| {}), None, "{current} A");
     }
@@ -273,7 +273,7 @@ fn a_code_that_is_wrong_every_other_tick_is_not_survived_for_long() {
         (|sample| sample.shunt_codes[1] = 4000, AxisFault::CurrentSense),
         (|sample| sample.bus_code = 3950, AxisFault::BusVoltage),
     ];
-    // One wrong reading of so many, and the wrong readings until it is told.
+    // One wrong reading in every `of`, and the number of wrong readings until the fault.
     for (of, told) in [(2, Some(3)), (3, Some(4)), (4, Some(6)), (5, None)] {
         for (spoil, fault) in spoils {
             let mut bench = Bench::at(50.0, &CONFIGURATION);
