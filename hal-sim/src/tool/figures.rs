@@ -69,13 +69,13 @@ pub struct Figure {
     pub file: String,
     /// Where it belongs.
     pub group: Group,
-    /// What it is read out as.
+    /// Title, read aloud by a screen reader.
     pub title: String,
     /// The drawing.
     pub svg: String,
 }
 
-/// All figures of a run; `joints` are their names.
+/// Draws all figures of a run; `joints` are the names of the joints.
 pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figure>, ToolError> {
     let mut figures = Vec::new();
     let mut add = |group, file: String, title: String, height, draw: Draw<'_>| {
@@ -110,7 +110,7 @@ pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figu
             })?;
         }
     }
-    // A board may have sent no log, and never tells its cost above the optimum of its box.
+    // A board may have sent no log, and never sends its cost above the optimum of its box.
     let is_told = run.trace.is_some();
     if !is_told || !series.motions.is_empty() {
         let (file, title) =
@@ -145,7 +145,7 @@ pub fn spread(leg: &str, spreads: &[Spread]) -> Result<Figure, ToolError> {
 
 type Draw<'d> = &'d dyn Fn(&Area<'_>) -> Result<(), DrawingError>;
 
-/// Writes figures into a directory, which is made if need be.
+/// Writes the figures into a directory, creating it if necessary.
 pub fn write(directory: &Path, figures: &[Figure]) -> Result<(), ToolError> {
     for figure in figures {
         files::write(&directory.join(&figure.file), &figure.svg)?;
@@ -162,7 +162,8 @@ fn name(stem: &str, part: usize) -> String {
     }
 }
 
-/// The motion of `identify.svg`: gait at 3 s, where inertia, gravity and friction all matter; else the last unused one.
+/// Motion of `identify.svg`: gait at 3 s, where inertia, gravity and friction all matter; else the
+/// last unused one.
 fn shown_motion(series: &Series) -> Option<&super::series::MotionSeries> {
     let unused = || series.motions.iter().filter(|motion| motion.role == Role::Validation);
     unused()
