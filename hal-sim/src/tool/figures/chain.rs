@@ -26,7 +26,7 @@ const TIME: i32 = 570;
 pub struct Curve {
     /// Sequential method, else the one-time method.
     pub sequential: bool,
-    /// Predicted minus noise-free torque [N m].
+    /// Predicted minus noise-free torque, N m.
     pub nm: Vec<f64>,
 }
 
@@ -35,15 +35,15 @@ pub struct Curve {
 pub struct JointTorque<'n> {
     /// Name of the joint.
     pub name: &'n str,
-    /// Time [s].
+    /// Time, s.
     pub time_s: Vec<f64>,
     /// Samples excluded because the joint stands still.
     pub still: Vec<bool>,
-    /// Measured torque [N m].
+    /// Measured torque, N m.
     pub measured: Vec<f64>,
-    /// Noise-free torque [N m].
+    /// Noise-free torque, N m.
     pub real: Vec<f64>,
-    /// Torque predicted by the one-time method [N m].
+    /// Torque predicted by the one-time method, N m.
     pub predicted: Vec<f64>,
     /// Errors of both methods.
     pub errors: [Curve; 2],

@@ -19,7 +19,7 @@ const HEAD: i32 = 56;
 const WIDEST: f64 = 4.5;
 /// Width of one bar, sigma.
 const BAR: f64 = 0.5;
-/// Time from one row to the next [s].
+/// Time from one row to the next, s.
 const ROW_S: f64 = scarab::ident::DECIMATION as f64 / scarab::ident::SAMPLE_RATE_HZ;
 
 pub fn height(joints: usize) -> u32 {

@@ -102,7 +102,7 @@ pub struct Verification {
     pub noise_free: Vec<FilteredRows<f32, JOINTS, ROOM>>,
     /// Rows with the measured torque, as a factor.
     measured: Record<f32, JOINTS, ROOM>,
-    /// Measured torque of these rows [N m].
+    /// Measured torque of these rows, N m.
     pub filtered_nm: Vec<[f32; JOINTS]>,
     /// All samples with their unfiltered measured torque.
     samples: Samples,
@@ -114,9 +114,9 @@ type Samples = Vec<Smoothed<f32, JOINTS>>;
 /// Prediction error of one joint's torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fit {
-    /// Mean absolute noise-free torque [N m]; all percentages refer to it.
+    /// Mean absolute noise-free torque, N m; all percentages refer to it.
     pub mean_absolute_nm: f64,
-    /// Equation (33) against the noise-free torque [N m].
+    /// Equation (33) against the noise-free torque, N m.
     pub rms_nm: f64,
     /// Equation (33) against the noise-free torque, percent.
     pub percent_of_truth: f64,
@@ -171,7 +171,7 @@ impl Verification {
     }
 }
 
-/// Torque of a regressor row with these base parameters [N m].
+/// Torque of a regressor row with these base parameters, N m.
 #[must_use]
 pub fn predicted(row: &[f32; ROOM], values: &[f32; ROOM]) -> f64 {
     row.iter().zip(values).map(|(&element, &value)| f64::from(element) * f64::from(value)).sum()

@@ -57,7 +57,7 @@ const MOTIONS: u64 = 5;
 const CANDIDATES: u64 = 40;
 const MOTION_SEED: u64 = 3_000_000;
 const PERIOD: Second = Second(10.0);
-/// Duration of the longest exciting motion including its approach [s].
+/// Duration of the longest exciting motion including its approach, s.
 const LONGEST_RUN_S: f64 = 120.0;
 
 /// Iterations and evaluations over all runs.

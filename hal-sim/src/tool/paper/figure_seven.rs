@@ -82,7 +82,7 @@ pub struct FitLine {
 /// Torque error of a joint as printed in the paper.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct PaperFit {
-    /// Root mean square error [N m].
+    /// Root mean square error, N m.
     pub rms_nm: f64,
     /// Error in percent of mean absolute torque.
     pub percent: f64,

@@ -76,9 +76,9 @@ pub struct LoadedTorque {
 /// Report of the experiment.
 #[derive(Clone, Debug, Serialize)]
 pub struct LoadReport {
-    /// Mass of the load [kg].
+    /// Mass of the load, kg.
     pub load_kg: f64,
-    /// Position in the third link's frame [m].
+    /// Position in the third link's frame, m.
     pub load_place_m: [f64; 3],
     /// Pairs of runs.
     pub runs: u64,
@@ -88,7 +88,7 @@ pub struct LoadReport {
     pub changed_of_table_v: Vec<&'static str>,
     /// Every base parameter.
     pub lines: Vec<ChangeLine>,
-    /// Mass from the difference of HX2R [kg]: median and sigma.
+    /// Mass from the difference of HX2R, kg: median and sigma.
     pub mass_found_kg: [Number; 2],
     /// Torque errors with three sets of parameters.
     pub torque: Vec<LoadedTorque>,

@@ -47,7 +47,7 @@ fn curve(leg: &LegFile) -> Result<Fourier<JOINTS>, MotionError> {
 }
 
 /// Mean absolute torque of the links alone, without rotors and friction, on the gait cycle with
-/// joint 1 held still [N m].
+/// joint 1 held still, N m.
 pub fn links_alone(leg: &LegFile) -> Result<[f64; JOINTS], ToolError> {
     const INSTANTS: u32 = 1000;
     let model = setup::row_model::<JOINTS, ROOM>(leg)?;

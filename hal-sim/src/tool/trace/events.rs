@@ -21,7 +21,7 @@ pub enum Weight {
 /// One event of the timeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
-    /// Time since the start [s]; unknown for records without a tick.
+    /// Time since the start, s; unknown for records without a tick.
     pub time_s: Option<f64>,
     /// Severity.
     pub weight: Weight,

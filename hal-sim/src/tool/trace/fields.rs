@@ -100,7 +100,7 @@ told! {
         version_minor: u8 = value,
         /// Voltage variant of the hardware.
         version_volt: u8 = value,
-        /// Clock of the processor [Hz].
+        /// Clock of the processor, Hz.
         clock_hz: u32 = value,
     }
 }

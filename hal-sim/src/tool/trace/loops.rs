@@ -30,9 +30,9 @@ pub struct LoopReport {
 /// Range of the supply, and highest temperatures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SupplySeen {
-    /// Lowest bus voltage [V].
+    /// Lowest bus voltage, V.
     pub low_v: f32,
-    /// Highest bus voltage [V].
+    /// Highest bus voltage, V.
     pub high_v: f32,
     /// Hottest bridge, degrees Celsius.
     pub bridge_c: f32,

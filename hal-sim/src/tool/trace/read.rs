@@ -15,7 +15,7 @@ use super::loops::Statistics;
 use super::text;
 use super::told::{KINDS, Told};
 
-/// Servo rate [Hz], unless the board reports another.
+/// Servo rate, Hz, unless the board reports another.
 const SERVO_HZ: f64 = scarab::servo::SERVO_RATE_HZ as f64;
 /// Limit of stored complaints about lines; further ones are only counted.
 const MOST_PROBLEMS: usize = 20;
