@@ -75,7 +75,7 @@ enum Command {
     FlashLeg(image::FlashArguments),
 }
 
-/// What a run without any arguments is.
+/// Arguments of a run without any.
 const MAIN_JOB: [&str; 5] = ["identify", "--figures", "target/sim", "--report", "target/sim/report.html"];
 
 /// Runs the tool on the process's arguments.
@@ -83,7 +83,7 @@ const MAIN_JOB: [&str; 5] = ["identify", "--figures", "target/sim", "--report", 
 pub fn main() -> ExitCode {
     let mut words: Vec<_> = std::env::args_os().collect();
     match words.get(1).and_then(|word| word.to_str()) {
-        // Without a subcommand the main job is meant.
+        // Without a subcommand, run the main job.
         None => words.extend(MAIN_JOB.map(Into::into)),
         Some(option) if option.starts_with("--") && !["--help", "--version"].contains(&option) => {
             words.insert(1, "identify".into());
@@ -104,7 +104,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Runs one command; its exit code.
+/// Runs one command and returns its exit code.
 fn run(command: &Command) -> Result<u8, ToolError> {
     match command {
         Command::Excite(arguments) => excite::run(arguments),
@@ -133,7 +133,7 @@ mod tests {
 
     use super::{Cli, files};
 
-    /// An argument that names a file has a type that says what is done with it, or the check would not see it.
+    /// Every path argument needs a type that states its use; otherwise the check would miss it.
     #[test]
     fn every_path_on_the_command_line_has_a_role() {
         let mut paths = 0;
