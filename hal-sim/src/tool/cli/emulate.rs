@@ -15,15 +15,15 @@ use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
 use crate::tool::trace::{log, run as told, run_report};
 
-/// Exit code of a run in which a tick was missed, and of a crash that was not handled as it has to be.
+/// Exit code of a run with a missed tick, or of a crash that was not handled correctly.
 const EXIT_MISSED: u8 = 1;
 
-/// A leg, and what to keep of its run.
+/// Leg, and outputs of its run.
 #[derive(Args, Debug)]
 pub struct EmulateArguments {
     #[command(flatten)]
     leg: LegOptions,
-    /// Of noise and swarm.
+    /// Seed of noise and swarm.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
     /// Keep the records here as the image sent them, for `cargo sim trace`.

@@ -1,4 +1,4 @@
-//! Which states of motion, and how their angles are counted.
+//! States of motion and the convention of their angles.
 
 use clap::Args;
 
@@ -18,7 +18,7 @@ pub struct StatesOptions {
 }
 
 impl StatesOptions {
-    /// How angles and torques are counted.
+    /// Convention of angles and torques.
     pub fn angles(&self) -> Angles {
         if self.dh { Angles::DenavitHartenberg } else { Angles::Anatomical }
     }
