@@ -7,11 +7,11 @@
 //!   (lengths there after Drillis and Contini): thigh 0.245, shank 0.246, foot 0.152 of the height.
 //! - The ankle is held at a right angle, so shank and foot are one body. The foot's centre of mass lies at
 //!   0.307 of its length in front of the ankle (ours: 0.083 m of 0.27 m).
-//! - Only sagittal inertias are given, so each segment is completed as a solid of revolution: about its long
-//!   axis it has mass * radius^2 / 2 with the radii stated below (ours).
+//! - Only sagittal inertias are given. Each segment is completed as a solid of revolution with
+//!   mass * radius^2 / 2 about its long axis; the radii are stated below (ours).
 //!
-//! Frames: x down the segment, y forward, z along the joint's axis; everything lies in the plane z = 0. Limits: adults;
-//! a single person differs from the fractions by some 10 %.
+//! Frames: x down the segment, y forward, z along the joint's axis; everything lies in the plane z
+//! = 0. Limits: adults; a single person differs from the fractions by about 10 %.
 
 /// Thigh, shank and foot of a standing height.
 const THIGH_OF_HEIGHT: f64 = 0.245;

@@ -41,29 +41,30 @@ struct Cli {
 enum Command {
     /// Identify a simulated leg: drive it, log it, solve, validate, track.
     Identify(identify::IdentifyArguments),
-    /// Design an exciting motion and say what it will tell, before anything moves.
+    /// Design an exciting motion and predict its result before anything moves.
     Excite(excite::ExciteArguments),
     /// Identify a leg from recordings.
     Replay(replay::ReplayArguments),
-    /// Report what a board told: a trace, decoded.
+    /// Decode and report the trace of a board.
     Trace(trace::TraceArguments),
-    /// Predict the torque of given states with a model that was kept: CSV.
+    /// Predict the torque of given states from a stored model: CSV.
     Predict(predict::PredictArguments),
-    /// Write a model that was kept as a robot description.
+    /// Write a stored model as a robot description.
     Export(export::ExportArguments),
     /// Write the electronic data sheets of the bus' nodes, one per joint.
     Eds(eds::EdsArguments),
-    /// Put legs on a CANopen bus that host software reaches over TCP (slcan).
+    /// Serve legs on a CANopen bus, reached by host software over TCP (slcan).
     Serve(serve::ServeArguments),
-    /// What a board remembers over the power: its flash as TOML, and TOML into a flash.
+    /// Export and import the stored data of a board: its flash as TOML, and TOML into a flash.
     Kept(kept::KeptArguments),
-    /// Change the load or the friction of a leg that walks: time to notice, what was found, false alarms.
+    /// Change load or friction while a leg walks: detection time, identified cause, false alarms.
     Monitor(monitor::MonitorArguments),
     /// Measure the current loop on a motor's test stand: steps, torque ripple, voltage limit, regeneration.
     Motor(motor::MotorArguments),
-    /// Inject the fault catalogue into the whole firmware while it identifies a leg: what is seen, when, and what follows.
+    /// Inject the fault catalogue into the whole firmware during an identification: detection,
+    /// time, and reaction.
     Faults(faults::FaultsArguments),
-    /// Run the paper's tables and figures again and set them beside what it prints.
+    /// Reproduce the paper's tables and figures and compare them with its printed results.
     Paper(paper::PaperArguments),
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     Regressor(regressor::RegressorArguments),

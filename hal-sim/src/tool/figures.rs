@@ -1,22 +1,23 @@
 //! Figures of a run as SVG, 900 pixels wide: one set for the files and for the report.
 //!
-//! | file | shows |
+//! | file | contents |
 //! | --- | --- |
 //! | `identify.svg` | at a glance: torque on one motion and the base parameters |
-//! | `motions.svg` | commanded and measured angles, and what lies between them |
-//! | `torque-1.svg`, ... | a joint's measured, predicted and noise-free torque on every motion, residuals below |
-//! | `residuals.svg` | how the residuals are distributed and correlated, against noise through the filter |
+//! | `motions.svg` | commanded and measured angles, and their deviation |
+//! | `torque-1.svg`, ... | a joint's measured, predicted and noise-free torque on every motion, residuals |
+//! | `residuals.svg` | distribution and correlation of the residuals, against noise through the filter |
 //! | `search.svg` | the swarm's cost above the optimum in its box over its iterations |
-//! | `base-parameters.svg` | errors of the base parameters in reported standard deviations, or those of the value |
+//! | `base-parameters.svg` | errors of the base parameters in reported sigma, or sigma in percent |
 //!
 //! Many runs (`--seeds`) have `spread.svg`: every base parameter about its truth.
 //!
 //! More than four motions are continued in `motions-b.svg`, `torque-1-b.svg` and so on.
 //! `scripts/figures` draws those in `docs/figures`.
 //!
-//! Colours are those of Okabe and Ito (2008) or tints of them, which the colour-blind can tell apart; curves differ in
-//! lightness and width as well, so that they can be told apart in grey. Drawn at four times the size with a `viewBox`
-//! of that size, since the backend rounds to whole pixels.
+//! Colours are those of Okabe and Ito (2008) or tints of them, which the colour-blind can
+//! distinguish. Curves also differ in lightness and width, so they can be distinguished in grey.
+//! Drawings have four times the shown size with a `viewBox` of that size, since the backend rounds
+//! to whole pixels.
 
 mod canvas;
 pub mod chain;
@@ -45,20 +46,20 @@ const WIDTH: u32 = 900;
 /// Motions in one figure.
 const MOTIONS_PER_FIGURE: usize = 4;
 
-/// Where a figure belongs in a report.
+/// Section of a report for a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
-    /// At a glance.
+    /// Summary at a glance.
     Summary,
     /// Angles.
     Trajectories,
     /// Torques.
     Torque,
-    /// Statistics of what is left.
+    /// Statistics of the residuals.
     Residuals,
-    /// The swarm's way.
+    /// Descent of the swarm.
     Search,
-    /// What torque determines.
+    /// Errors of the base parameters.
     BaseParameters,
 }
 

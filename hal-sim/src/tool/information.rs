@@ -2,7 +2,7 @@
 //! friction included.
 //!
 //! ```text
-//! bound^2 = diagonal of (sum of y' y / noise^2)^-1,   y = base columns | for each joint with Stribeck friction:
+//! bound^2 = diagonal of (sum of y' y / noise^2)^-1,   y = base columns | per joint with Stribeck friction:
 //!           sign(v) g(v / vs),   d/d ln vs = S sign(v) g(v / vs) 2 (v / vs)^2
 //! ```
 //!

@@ -6,9 +6,12 @@
 //! model against the leg's fingerprint.
 //!
 //! ```text
-//! flash image --Store::load, checks--> KeptFile --to_toml--> text    damaged or invalid parts: omitted, reported
-//! flash image <--Store::save (drive off)-- KeptFile <--parse, checks-- text    all or nothing; the rest stays
+//! flash image --Store::load, checks--> KeptFile --to_toml--> text   damaged or invalid parts: omitted
+//! flash image <--Store::save (drive off)-- KeptFile <--parse, checks-- text   all or nothing
 //! ```
+//!
+//! An export reports the parts that it omits. An import leaves the parts unchanged that its file
+//! does not name.
 //!
 //! Both directions have the same checks, so every export can be imported. Floats are written with
 //! the digits that restore the f32 exactly, angles in radians with those that restore the unit of

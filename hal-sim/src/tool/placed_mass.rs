@@ -2,8 +2,8 @@
 //! `KG@JOINT:X_M:Y_M`.
 //!
 //! JOINT is a joint's name or its number from 1; X and Y are in that joint's D-H frame, X along the
-//! link. A wrong mass is worse than none, so implausible values are rejected: a mass of 0 or below
-//! or above [`LARGEST_KG`], and a position beyond the link.
+//! link. A wrong mass is worse than none, so implausible values are rejected. These are a mass of
+//! 0, below, or above [`LARGEST_KG`], and a position beyond the link.
 
 use core::str::FromStr;
 

@@ -10,7 +10,7 @@
 //! axis the motion itself would have to be mirrored.
 //!
 //! **Trunk.** The base frame is the trunk's. A trunk that leans forward by p turns gravity in that
-//! frame about the hip's axis of flexion, in the direction in which flexion turns the thigh:
+//! frame about the hip's axis of flexion. The direction is that in which flexion turns the thigh:
 //!
 //! ```text
 //! g -> Rot(flexion axis of the hip, p) g          for the default leg (9.81, 0, 0) -> 9.81 (cos p, sin p, 0)

@@ -23,7 +23,7 @@
 //! | Catmull-Rom, 500 Hz, +-0.8 ms of jitter | -4e-5 at 3 Hz, with f^2; single points 5e-4 | about as above |
 //!
 //! Here sinc(x) = sin(pi x) / (pi x). Slopes over two steps keep the cubic smooth where stamps
-//! arrive in bursts: a slope over a very short step would amplify its noise across the next long
+//! arrive in bursts. A slope over a very short step would amplify its noise across the next long
 //! one. Outliers are best replaced before resampling: each affects the points of four samples (the
 //! cubic) or of two bins.
 //!
@@ -37,7 +37,8 @@ use super::recording::{JointSeries, Recording};
 
 /// Rate of the grid, Hz: that of the firmware's filter chain.
 pub const GRID_RATE_HZ: f64 = 500.0;
-/// Recordings with a shorter median step than this share of the grid's period are averaged, others interpolated.
+/// Share of the grid's period below which the median step leads to averaging, above it to
+/// interpolation.
 pub const DENSE_STEP: f64 = 0.9;
 /// Share of a recording's own rate up to which its resampled motion can be trusted.
 pub const TRUSTED_BANDWIDTH: f64 = 0.2;
@@ -88,9 +89,9 @@ impl fmt::Display for BandwidthWarning {
 impl Resampled {
     /// Puts a recording on the grid.
     ///
-    /// The first grid point is the first sample (its time plus half a period for bin means), the
-    /// last one is the last that the recording covers. A recording already on the grid is returned
-    /// unchanged, except for rounding of its stamps.
+    /// The first grid point is the first sample, for bin means half a period later. The last one is
+    /// the last that the recording covers. A recording already on the grid is returned unchanged,
+    /// except for rounding of its stamps.
     pub fn of(recording: &Recording) -> Self {
         let time = &recording.time_s;
         let (step, period) = (recording.median_step_s(), 1.0 / GRID_RATE_HZ);

@@ -4,7 +4,7 @@
 //! are therefore anatomical unless `--dh` is given.
 //!
 //! ```text
-//! D-H angle = direction * anatomical angle + zero offset        speed, acceleration and torque: the factor alone
+//! D-H angle = direction * anatomical angle + zero offset     speed, acceleration, torque: direction only
 //! ```
 //!
 //! Columns are found by name, others are ignored: `q1..` (or `q1_rad`) rad, `qd1..` (`qd1_radps`)

@@ -6,8 +6,8 @@
 //! Inconsistent bodies are rejected, not repaired.
 //!
 //! ```text
-//! parent to joint: xyz = (a, -d sin alpha, d cos alpha), R = Rx(alpha) Rz(zero offset)      modified D-H at flexion 0
-//! axis = (0, 0, direction)                                                                 angles are anatomical
+//! parent to joint: xyz = (a, -d sin alpha, d cos alpha), R = Rx(alpha) Rz(zero offset)   D-H at flexion 0
+//! axis = (0, 0, direction)                                                 angles are anatomical
 //! link frame = D-H frame of the joint;  inertial origin = h / m, axes along the link's
 //! ixx ixy ixz iyy iyz izz = elements of the tensor about the centre of mass, ixy = - integral of x y dm
 //! ```

@@ -9,8 +9,8 @@
 //!   constants below.
 //! - Wearer: anthropometry after Winter ([`super::anthropometry`]), segments as long as the exoskeleton's.
 //! - Motors: [`MotorFile::D5065_CLASS`], whose 0.03 N m/A times the gear's 50 are the leg's 1.5 N m/A.
-//! - Only sagittal inertias are given, so each segment is completed as a solid of revolution: about its long
-//!   axis it has mass * radius^2 / 2 with the radii stated below (ours).
+//! - Only sagittal inertias are given. Each segment is completed as a solid of revolution with
+//!   mass * radius^2 / 2 about its long axis; the radii are stated below (ours).
 //!
 //! Frames: x down the segment, y forward, z along the joint's axis; everything lies in the plane z = 0. For
 //! 75 kg: M1 10.34 kg, HX1 2.039 kg m, ZZ1 0.585 kg m^2 about the hip; M2 6.94, HX2 1.759, HY2 0.201, ZZ2
@@ -96,8 +96,8 @@ fn shank(wearer: &Wearer, drive: Drive) -> LinkParameters {
 
 /// Hip and knee worn by a person of `body_mass` kg. The prior is a designer's: the same exoskeleton
 /// on a standard wearer of 70 kg, round figures for rotor inertia and friction. Torque is limited
-/// to 85 N m: the 100 N m of the exoskeleton would be 66.7 A, beyond the 60.75 A that the board
-/// measures at its finer gain.
+/// to 85 N m. The 100 N m of the exoskeleton would be 66.7 A, and the board measures up to 60.75 A
+/// at its finer gain.
 #[must_use]
 pub fn leg_file(body_mass: f64) -> LegFile {
     let wearer = Wearer { mass: body_mass, thigh: THIGH_M, shank: SHANK_M, foot: WEARER_FOOT_M };

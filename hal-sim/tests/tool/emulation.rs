@@ -1,6 +1,7 @@
 //! Whole firmware on the emulated microcontroller, compared with the host.
 //!
-//! Needs QEMU and a compiler for the microcontroller, and takes minutes: `cargo test -p hal-sim --test tool emulated -- --ignored`.
+//! Needs QEMU and a compiler for the microcontroller, and takes minutes:
+//! `cargo test -p hal-sim --test tool emulated -- --ignored`.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};

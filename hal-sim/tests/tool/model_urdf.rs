@@ -92,7 +92,8 @@ fn described<const N: usize>(robot: &urdf_rs::Robot, leg: &LegFile) -> LegDescri
     for (target, joint) in described.joints.iter_mut().zip(&robot.joints[1..]) {
         let link = robot.links.iter().find(|link| link.name == joint.child.link).expect("the child");
         let [x, y, z] = joint.origin.xyz.0;
-        // R = Rx(alpha) Rz(zero): its third column is (0, -sin alpha, cos alpha), its first row (cos zero, -sin zero, 0).
+        // R = Rx(alpha) Rz(zero): its third column is (0, -sin alpha, cos alpha), its first row
+        // (cos zero, -sin zero, 0).
         let turn = turn(&joint.origin.rpy.0);
         let (sine, cosine) = (-turn[(1, 2)], turn[(2, 2)]);
         target.frame = DenavitHartenberg { alpha: sine.atan2(cosine), a: x, d: cosine * z - sine * y };

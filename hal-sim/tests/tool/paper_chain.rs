@@ -111,8 +111,8 @@ fn the_swarm_arrives_on_single_base_and_consistent_parameters_of_the_leg() {
     assert_eq!(rows, expected);
     for row in &report.rows {
         assert!(!row.problem.ends_with("base") || row.rows.success_rate == 1.0, "{}", row.problem);
-        // No search is better than its reference optimum, except for rounding of numbers near a
-        // thousand and the effect of barriers and of the pull on flat directions.
+        // No search is better than its reference optimum, except for two effects: rounding of
+        // numbers near a thousand, and barriers and the pull on flat directions.
         let lowest = row.lowest_chi2.known().expect("searched");
         assert!(lowest > -1e-4, "{}: {lowest} chi-square units below the optimum", row.problem);
     }

@@ -34,8 +34,8 @@ fn folder_with(more: &str, recordings: &[(&str, Motion)]) -> Folder {
 
 /// Fails unless every base parameter is right; returns the largest error in sigma.
 ///
-/// Tolerance: noise of one recording, 3.5 sigma in the worst of six parameters, plus the effect of
-/// the filter's passband (flat to 1.6e-4) and of resampling.
+/// Tolerance: noise of one recording, 3.5 sigma in the worst of six parameters. The effects of the
+/// filter's passband (flat to 1.6e-4) and of resampling are added.
 fn finds_the_truth(report: &Value) -> f64 {
     let errors = TRUTH.map(|(name, truth)| {
         let (error, sigma) = (base(report, name, "value") - truth, base(report, name, "sigma"));

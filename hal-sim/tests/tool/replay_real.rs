@@ -2,7 +2,7 @@
 //!
 //! `SCARAB_RECORDINGS` names the folder (`dp_A0`: planar double pendulum, BSD-3-Clause, DFKI RIC
 //! 2022; `sp`: single pendulum, BSD-3-Clause, DFKI RIC 2021). "To beat" is weighted least squares
-//! over all rows, on angle and torque after a second-order Butterworth filter forward and backward,
+//! over all rows. Its angle and torque pass a second-order Butterworth filter forward and backward,
 //! cut-off 5 Hz (-3 dB at 4 Hz).
 
 use crate::command::{Folder, Table, fit, reasons, scarab};
@@ -73,10 +73,10 @@ fn held_out_torque_of_real_machines_is_predicted_as_well_as_stated() {
     let double =
         "@dp_A0/00.csv @dp_A0/01.csv @dp_A0/03.csv @dp_A0/05.csv @dp_A0/13.csv --leg dp-a0 --bandwidth 5";
     let excitation = "--validate @dp_A0/02.csv @dp_A0/04.csv @dp_A0/12.csv";
-    // Limits in N m, 3 % above the measured values: as printed (-3 dB at 5 Hz, rows in which the
-    // joint moves), and from the table through the reference filter, over all rows. To beat: 0.100;
-    // 0.148, 0.098; 0.202, 0.135. The pendulum's file has 6 s; its three seconds of training hardly
-    // determine the estimated offset.
+    // Limits in N m, 3 % above the measured values. First as printed: -3 dB at 5 Hz, rows in which
+    // the joint moves. Then from the table through the reference filter, over all rows. To beat:
+    // 0.100; 0.148, 0.098; 0.202, 0.135. The pendulum's file has 6 s; its three seconds of training
+    // hardly determine the estimated offset.
     let table: [(&str, String, &[f64], &[f64]); 3] = [
         (
             "sp/ddp, first half -> second",

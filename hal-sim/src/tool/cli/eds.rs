@@ -13,7 +13,7 @@ const JOINTS: [&str; 2] = ["hip", "knee"];
 /// Destination of the data sheets.
 #[derive(Args, Debug)]
 pub struct EdsArguments {
-    /// Folder for the sheets, one per joint; it is made where there is none.
+    /// Folder for the sheets, one per joint; created if missing.
     #[arg(long)]
     out: OutputFolder,
 }

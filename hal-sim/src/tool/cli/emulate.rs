@@ -32,11 +32,12 @@ pub struct EmulateArguments {
     /// Write the report here, for exit codes 0 and 3.
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
-    /// Write the 500 Hz log of the motion identified from here, in the format that replay reads; the image then tells every sample.
+    /// Write the 500 Hz log of the motion identified from here, in the format that replay reads;
+    /// the image then sends every sample.
     #[arg(long, value_name = "FILE")]
     csv: Option<Output>,
-    /// Crash while the leg identifies, and show what comes of it: exit code 0 if the bridges were released first, the record
-    /// survived and the next start refused to enable, else 1.
+    /// Crash while the leg identifies, and evaluate it. Exit code 0 if the bridges were off first,
+    /// the record survived and the next start refused to enable; else 1.
     #[arg(long, value_name = "KIND", conflicts_with_all = ["json", "csv"])]
     crash: Option<CrashKind>,
     /// Servo tick (of 4,000 per second) in which it crashes.
@@ -82,7 +83,7 @@ pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
     })
 }
 
-/// Crashes the image and says what came of it.
+/// Crashes the image and prints the evaluation.
 fn show(kind: CrashKind, tick: u32, image: &Path, trace: &Path) -> Result<u8, ToolError> {
     let [log, lines] = ["log", "txt"].map(|kind| image.with_extension(kind));
     let begun = crash(image, trace, &log, kind, tick)?;

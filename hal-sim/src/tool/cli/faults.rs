@@ -36,7 +36,8 @@ pub struct FaultsArguments {
     /// Runs of each fault.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     seeds: Option<u64>,
-    /// The emergency stop also at every servo tick of a whole identification, and at every current tick of one second of it.
+    /// The emergency stop also at every servo tick of a whole identification, and at every current
+    /// tick of one second of it.
     #[arg(long)]
     every_tick: bool,
     /// Runs of the sweep: each channel of a sensor faulted in each way; no invariant may be

@@ -8,8 +8,8 @@ use crate::tool::leg_file::LegFile;
 /// Noise of the logged torque, instead of the leg file's.
 #[derive(Args, Debug)]
 pub struct NoiseOptions {
-    /// Noise of the logged torque in percent of each joint's mean absolute torque on the default motion; the leg file's
-    /// unless given.
+    /// Noise of the logged torque in percent of each joint's mean absolute torque on the default
+    /// motion; the leg file's unless given.
     #[arg(long, allow_negative_numbers = true)]
     torque_noise: Option<f64>,
     /// Noise in N m, one number or one for each joint: the standard deviation of the logged torque

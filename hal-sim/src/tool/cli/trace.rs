@@ -14,7 +14,8 @@ use crate::tool::trace::{Trace, log, run as told, run_report};
 /// Trace and outputs.
 #[derive(Args, Debug)]
 pub struct TraceArguments {
-    /// A recorded trace, or - for standard input: text as a debug probe prints it, or with --image a defmt stream.
+    /// A recorded trace, or - for standard input: text as a debug probe prints it, or with --image
+    /// a defmt stream.
     file: Input,
     /// The image (ELF) that sent the stream; it holds the texts of the records.
     #[arg(long, value_name = "ELF")]

@@ -2,7 +2,7 @@
 //!
 //! Angle, speed and acceleration are proved from the coefficients (`scarab::motion`). Torque
 //! depends on a leg that is not yet measured. It is computed for the assumed leg at **every** servo
-//! tick of the commanded motion, with all base parameters off by the margin in the worst sense at
+//! tick of the commanded motion. All base parameters are off by the margin in the worst sense at
 //! once. The approach may begin anywhere: it is computed from every corner of the range and from
 //! its middle, along the firmware's path.
 //!

@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! for each number of cycles that fits the duration:
-//!     swarm over (amplitudes, share of the range, place)  ->  least  -ln det A + penalty on torque        (score)
-//!     rounded to a microradian, shrunk until the torque of every tick keeps its limit                     (demand)
-//!     run on the assumed leg through the firmware's filters                                              (expectation)
+//!     swarm over (amplitudes, share of the range, position)  ->  least  -ln det A + torque penalty   (score)
+//!     rounded to a microradian, shrunk until the torque of every tick keeps its limit               (demand)
+//!     run on the assumed leg through the firmware's filters                                    (expectation)
 //! the most informative of them is the design
 //! ```
 //!

@@ -1,7 +1,7 @@
 //! Information and torque of a curve, cheap enough for ten thousand evaluations.
 //!
 //! ```text
-//! A       = sum_i (cycles / s_i^2) sum over the rows of joint i  y_i' y_i   information of the base parameters
+//! A       = sum_i (cycles / s_i^2) sum over the rows of joint i  y_i' y_i   information matrix
 //! s_i^2   = noise_i^2 / 10                                            variance of one 50 Hz row
 //! merit   = ln det A
 //! torque  = max over t  |y_i b| + margin sum_k |y_ik b_k|             each b_k off by the margin
@@ -9,9 +9,9 @@
 //! ```
 //!
 //! `y_i` is the base row of joint i (N m per unit), at 50 Hz along one cycle of the commanded
-//! curve; `b` are the base parameters of the assumed leg. noise_i is that of the logged torque [N
-//! m], equal for every curve. Noise in percent of a curve's own torque would favour a leg that
-//! hangs where it needs none (tried: the hip between 5 and 29 degrees).
+//! curve; `b` are the base parameters of the assumed leg. `noise_i` is the noise of the logged
+//! torque in N m, equal for every curve. Noise in percent of a curve's own torque would favour a
+//! leg that hangs where it needs none. This was tried: the hip stayed between 5 and 29 degrees.
 //!
 //! A row counts unless the joint stands still in too much of its window, the rule of
 //! `ident::record`. Shares of stillness come from speeds at 100 Hz, linear in between, and the

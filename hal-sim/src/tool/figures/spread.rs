@@ -1,4 +1,5 @@
-//! Base parameters over many runs: a dot for each run, a bar from one standard deviation below their mean to one above.
+//! Base parameters over many runs: a dot per run, and a bar of one standard deviation to both sides
+//! of their mean.
 
 use plotters::element::{Circle, PathElement};
 use plotters::style::Color;

@@ -200,7 +200,7 @@ mod tests {
         assert!(
             nearness(&finding("condition", 900.0, 1000.0)) > nearness(&finding("condition", 9.0, 1000.0))
         );
-        // Limits of zero that are kept, and offsets of either sign.
+        // Limits of zero without a violation, and offsets of either sign.
         assert_eq!(nearness(&finding("not_finite", 0.0, 0.0)), 0.0);
         assert_eq!(nearness(&finding("encoder_zero", -0.5, 1.0)), 0.5);
     }

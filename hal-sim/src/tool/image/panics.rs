@@ -5,10 +5,10 @@
 //! functions is a location. Functions that the vectors reach by branches belong to the interrupts.
 //!
 //! ```text
-//! BL      11110 S imm10 | 11 J1 1 J2 imm11      target = pc + 4 + imm25, I = not(J xor S)       call
-//! B.W     11110 S imm10 | 10 J1 1 J2 imm11      as BL                                           tail call
-//! Bc.W    11110 S c imm6 | 10 J1 0 J2 imm11     target = pc + 4 + imm21                         to a cold end
-//! B, Bc   11100 imm11, 1101 c imm8              target = pc + 4 + imm12, imm9                   to a neighbour
+//! BL      11110 S imm10 | 11 J1 1 J2 imm11     target = pc + 4 + imm25, I = not(J xor S)   call
+//! B.W     11110 S imm10 | 10 J1 1 J2 imm11     as BL                                       tail call
+//! Bc.W    11110 S c imm6 | 10 J1 0 J2 imm11    target = pc + 4 + imm21                     to a cold end
+//! B, Bc   11100 imm11, 1101 c imm8             target = pc + 4 + imm12, imm9               to a neighbour
 //! ```
 //!
 //! Source: Armv7-M Architecture Reference Manual (DDI 0403), A7.7.12, A7.7.18. Mapping symbols `$t`
@@ -19,7 +19,7 @@
 //! source location, loaded by the two instructions before the branch:
 //!
 //! ```text
-//! MOVW r0, MOVT r0   11110 i 10 s100 imm4 | 0 imm3 0000 imm8   r0 = address of file name, its length, line, column
+//! MOVW r0, MOVT r0   11110 i 10 s100 imm4 | 0 imm3 0000 imm8   r0 = address of name, length, line, column
 //! ```
 //!
 //! Known limits: calls by a pointer are counted but not followed; remainders by the capacity of a

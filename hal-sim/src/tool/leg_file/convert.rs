@@ -62,8 +62,8 @@ impl JointFile {
                 coulomb: truth.coulomb,
                 viscous: truth.viscous,
                 // Friction of coulomb + asymmetry one way and coulomb - asymmetry the other is
-                // equivalent to friction of coulomb both ways and a constant torque, moving and at
-                // rest.
+                // equivalent to symmetric friction of coulomb and a constant torque. This holds
+                // moving and at rest.
                 offset: truth.offset + truth.asymmetry,
                 stribeck: self.stribeck.map(|stribeck| Stribeck {
                     static_level: stribeck.static_nm,

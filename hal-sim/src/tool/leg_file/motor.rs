@@ -1,8 +1,8 @@
 //! Keys `[joint.motor]` and `supply` of a complete drive.
 //!
-//! The magnets' flux is not a key. It follows from the torque constant,
-//! `torque_per_ampere = 1.5 pole_pairs flux ratio`, so that both drives of a leg make the same
-//! torque from the same current. Bridge, shunts and converter are those of the board
+//! The magnets' flux is not a key. It follows from the torque constant:
+//! `torque_per_ampere = 1.5 pole_pairs flux ratio`. Both drives of a leg thus make the same torque
+//! from the same current. Bridge, shunts and converter are those of the board
 //! ([`crate::drive::description`]).
 
 use super::check::{Fault, Place};

@@ -146,8 +146,8 @@ impl MonitorRun {
         Self { refused: reasons, ..Self::new(seed) }
     }
 
-    /// Whether all went as required: a model, no false alarm, the change detected and correctly
-    /// explained, and no alarm after the update unless the change went on.
+    /// Whether all went as required: a model, no false alarm, and a change that was detected and
+    /// correctly explained. After the update there is no alarm unless the change went on.
     #[must_use]
     pub fn is_as_it_should_be(&self) -> bool {
         let quiet = self.still_changing || !self.alarm_after_update;

@@ -3,14 +3,18 @@
 //! | name | search | constants | iterations | evaluations at most |
 //! | --- | --- | --- | --- | --- |
 //! | `pso` | particle swarm, 20 particles | the paper's: w 0.8, c 1.4 | one move of all | E |
-//! | `pso-constriction` | the same | w 0.7298, c 1.496 (Clerc, Kennedy, 2002) | one move of all | E |
+//! | `pso-constriction` | as `pso` | w 0.7298, c 1.496 (Clerc, Kennedy, 2002) | one move of all | E |
 //! | `bas` | beetle antennae search | the paper's | one step | 3,001: the paper's 1,000 iterations |
-//! | `bso-paper` | beetle swarm as printed, (29) corrected, 20 beetles | the paper's | one move of all | 60,020: 1,000 iterations |
-//! | `bso` | the default beetle swarm, 20 beetles | its own | rounds of its best, 20 evaluations and more | 1,000 iterations |
+//! | `bso-paper` | beetle swarm as printed, 20 beetles | the paper's | one move of all | 60,020 |
+//! | `bso` | the default beetle swarm, 20 beetles | its own | rounds of its best | 1,000 iterations |
 //! | `cma-es` | crate `cmaes`, population 4 + 3 ln D, active | its own | one generation | E |
-//! | `cma-es-20` | the same with a population of 20 | its own | one generation | E |
-//! | `cma-es-restarts` | `cma-es`, begun anew with twice the population where it ends (Auger, Hansen, 2005) | its own | one generation | E |
+//! | `cma-es-20` | as `cma-es`, population 20 | its own | one generation | E |
+//! | `cma-es-restarts` | `cma-es` with restarts | its own | one generation | E |
 //! | `pso-argmin` | crate `argmin`, 20 particles | its own: those of SPSO 2011 | one move of all | E |
+//!
+//! Equation (29) of `bso-paper` is corrected; its 60,020 evaluations are 1,000 iterations. A round
+//! of `bso` takes at least 20 evaluations. `cma-es-restarts` restarts with twice the population
+//! where `cma-es` ends (Auger, Hansen, 2005).
 //!
 //! E = 20 + 1,000 (20 + 2 min(20, D)) is the number of evaluations of 1,000 usual iterations of the
 //! default swarm. In the dimensions of Table IV these are 24,020 (D = 2) and 60,020 (D = 10 and

@@ -16,9 +16,9 @@
 //!
 //! | row | unknowns | box | J_opt, in double precision |
 //! | --- | --- | --- | --- |
-//! | raw | every parameter with an effect on torque | prior's range of each | active set over single parameters |
+//! | raw | every parameter with an effect on torque | prior's range | active set over single parameters |
 //! | base | base parameters | sums of those ranges | active set |
-//! | log-Cholesky | 10 per link, logarithms of IA, FC, FV, and OFF | identification, section 7 | barriers of 1e-8 |
+//! | log-Cholesky | 10 per link, logs of IA, FC, FV, and OFF | identification, section 7 | barriers of 1e-8 |
 //! | seen | without the nine of a link along gravity, see [`super::seen_links`] | as above | as above |
 //!
 //! `chain` and `leg` have links and friction, as the paper's Equation (6); `whole` adds a rotor and

@@ -59,7 +59,8 @@ impl Case {
 pub struct FitLine {
     /// Noise of the torque in the identification and on the verification motion.
     pub noise_percent: f64,
-    /// `one-time` or `sequential`, by the swarm; at 7 % also `least squares, unweighted` and `sequential, 60 s`.
+    /// Plan `one-time` or `sequential`, by the swarm; at 7 % also `least squares, unweighted` and
+    /// `sequential, 60 s`.
     pub method: &'static str,
     /// Joint, from 1.
     pub joint: usize,

@@ -72,7 +72,8 @@ pub const TABLE_SIX: [Printed; 15] = [
     line("HY3", 11.447, 12.358, 7.96),
 ];
 
-/// Root mean square torque error of each joint on the verification motion, N m, and percent of mean absolute torque.
+/// Root mean square torque error of each joint on the verification motion, N m, and percent of mean
+/// absolute torque.
 pub const FIGURE_SEVEN: [(f64, f64); 3] = [(23.85, 7.42), (20.39, 6.5), (9.26, 4.91)];
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! torque determines.
 //!
 //! ```text
-//! J(p) - J_LS = |R K p - z|^2        K: terms of the base parameters, R and z: the factor of all weighted rows
+//! J(p) - J_LS = |R K p - z|^2     K: terms of the base parameters, R and z: factor of all weighted rows
 //! ```
 //!
 //! The cost is flat along the null space of K, for example 15 of 36 directions of the chain's

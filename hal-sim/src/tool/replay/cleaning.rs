@@ -4,10 +4,10 @@
 //! The filter is the board's ([`scarab::ident::hampel`]). Two cases occur in recordings only:
 //!
 //! - Recordings slower than [`SPARSEST_HZ`]: vibrations of the machine are as fast as its samples, and
-//!   neighbours do not predict them (2 to 3 % of a correct recording at 200 Hz would count as outliers). Only
+//!   neighbours do not predict them. Of a correct recording at 200 Hz 2 to 3 % would count as outliers. Only
 //!   the filter after resampling is used there.
-//! - Coarse sensors: a last bit that flickers at rest is not an outlier. Deviations within [`QUANTA`] steps of
-//!   the sensor stay.
+//! - Coarse sensors: a last bit that flickers at rest is not an outlier. Deviations within [`QUANTA`] steps
+//!   of the sensor stay.
 
 use scarab::ident::hampel::{Cleaned, Hampel, Quantity};
 

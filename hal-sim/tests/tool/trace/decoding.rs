@@ -1,4 +1,5 @@
-//! Frames of a `defmt` stream, made by defmt's own encoder, decoded with an image that holds the records' formats.
+//! Frames of a `defmt` stream from defmt's own encoder, decoded with an image that holds the
+//! records' formats.
 //!
 //! The image is made here: an ELF with symbols only, as a linker would write them for the formats
 //! of this version. The emulator tests cover a real image.
