@@ -152,8 +152,7 @@ fn an_image_takes_no_default_for_what_moves_a_person() {
     let (_, after) = rest.split_once("[[joint]]").expect("another joint");
     let (_, reason) = refused(&format!("{before}[[joint]]{after}"));
     assert!(reason.starts_with("joint `hip`: `motor` is missing"), "{reason}");
-    // Without these keys the flux would be another motor's: the reader has no other default for a
-    // motor.
+    // Without these keys the flux would be another motor's: the reader has no other default for a motor.
     let unmotored =
         |text: String| format!("{}[[joint]]{after}", text.split_once("[joint.motor]").expect("a motor").0);
     for key in ["torque_per_ampere", "encoder"] {

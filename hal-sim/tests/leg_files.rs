@@ -251,8 +251,7 @@ fn legs_hang_straight_down_at_their_anatomical_zero() {
     let at_zero = chain.joints.map(|joint| joint.zero_offset);
     let mechanism = Mechanism::new(&chain);
     let energy = |knee: f64| mechanism.potential_energy(&[at_zero[0], at_zero[1], at_zero[2] + knee]);
-    // The knee's lowest position is off only by its centre of mass: atan(1.532 / 10.636) = 8.2
-    // degrees.
+    // The knee's lowest position is off only by its centre of mass: atan(1.532 / 10.636) = 8.2 degrees.
     assert!(energy(0.0) < energy(0.3) && energy(0.0) < energy(-0.3));
     // Axis 1 lies along gravity: turning it does not change the potential energy.
     let turned = mechanism.potential_energy(&[0.5, at_zero[1], at_zero[2]]);

@@ -1,7 +1,6 @@
 //! Reading of recordings: accepted data, and the message for every rejection.
 //!
-//! `SCARAB_RECORDINGS` names the folder with recordings of real machines; without it they are
-//! skipped.
+//! `SCARAB_RECORDINGS` names the folder with recordings of real machines; without it they are skipped.
 #![cfg(feature = "tool")]
 
 use std::env;

@@ -71,9 +71,8 @@ fn a_fifty_hertz_sine_is_interpolated_within_the_stated_error() {
     let resampled = Resampled::of(&sine(uniform_stamps(50.0)));
     let (worst, amplitude, phase) = compare(&resampled);
     assert_eq!(resampled.method, Method::CatmullRom);
-    // Half way: 3/8 (0.06 pi)^4 = 4.7e-4. At a quarter the odd cubic term is added: (0.06 pi)^3 8 /
-    // 6 * 0.1 = 9e-4. First and last interval have a one-sided slope and are left to the filter
-    // chain's own ends.
+    // Half way: 3/8 (0.06 pi)^4 = 4.7e-4. At a quarter the odd cubic term is added: (0.06 pi)^3 8 / 6 * 0.1
+    // = 9e-4. First and last interval have a one-sided slope and are left to the filter chain's own ends.
     let interior = worst_between(&resampled, 0.05);
     assert!(interior < 9.0e-4, "error {interior:e}");
     assert!(worst < 0.03, "error at the ends {worst:e}");
@@ -121,12 +120,10 @@ fn noise_of_a_one_kilohertz_recording_drops_by_what_two_samples_allow() {
     let resampled = Resampled::of(&recording(time_s, JointSeries { position_rad, torque_nm }));
     let noise = &resampled.joints[0].torque_nm;
     let deviation = sqrt(noise.iter().map(|value| value * value).sum::<f64>() / noise.len() as f64);
-    // Weights 1/4, 1/2, 1/4: sqrt(3/8) = 0.612, below the 1/sqrt(2) of a mean of two samples. 5,000
-    // values.
+    // Weights 1/4, 1/2, 1/4: sqrt(3/8) = 0.612, below the 1/sqrt(2) of a mean of two samples. 5,000 values.
     assert!((deviation - 0.612).abs() < 0.02, "deviation {deviation}");
-    // After the low-pass only the density at low frequency matters. The mean of 100 grid points
-    // (0.2 s, 200 samples) must have the deviation 1/sqrt(200). 50 blocks: +-10 %, three deviations
-    // of it.
+    // After the low-pass only the density at low frequency matters. The mean of 100 grid points (0.2 s, 200
+    // samples) must have the deviation 1/sqrt(200). 50 blocks: +-10 %, three deviations of it.
     let blocks: Vec<f64> = noise.chunks_exact(100).map(|block| block.iter().sum::<f64>() / 100.0).collect();
     let slow = sqrt(blocks.iter().map(|mean| mean * mean).sum::<f64>() / blocks.len() as f64 * 200.0);
     assert!((slow - 1.0).abs() < 0.3, "density at low frequency {slow}");
@@ -147,8 +144,7 @@ fn angle_and_torque_go_through_the_same_operator() {
 #[test]
 fn stamps_in_bursts_do_not_throw_noise_across_the_next_step() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(4);
-    // Two samples 10 us apart every 10 ms: a parabola's slope would amplify the noise of the short
-    // step.
+    // Two samples 10 us apart every 10 ms: a parabola's slope would amplify the noise of the short step.
     let stamp = |k: u32| f64::from(k / 3) * 0.010 + [0.0, 1e-5, 5e-3][(k % 3) as usize];
     let time_s: Vec<f64> = (0..900).map(stamp).collect();
     let position_rad: Vec<f64> = time_s.iter().map(|_| StandardNormal.sample(&mut random)).collect();

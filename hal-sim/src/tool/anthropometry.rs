@@ -98,8 +98,7 @@ fn limb(mass: f64, length: f64, gyration: f64, radius: f64) -> Segment {
     Segment { mass, x: 0.433 * length, y: 0.0, sagittal: mass * gyration * gyration, radius, along: Along::X }
 }
 
-/// Joins segments to a rigid body: mass, centre of mass, and tensor elements XX XY XZ YY YZ ZZ
-/// about it.
+/// Joins segments to a rigid body: mass, centre of mass, and tensor elements XX XY XZ YY YZ ZZ about it.
 #[must_use]
 pub fn joined(segments: &[Segment]) -> (f64, [f64; 3], [f64; 6]) {
     let mass: f64 = segments.iter().map(|segment| segment.mass).sum();

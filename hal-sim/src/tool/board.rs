@@ -45,8 +45,7 @@ const CALIBRATION_CURRENT_A: f64 = drives::CALIBRATION.current.0 as f64;
 /// of the lowest bus voltage.
 const CALIBRATION_VOLTAGE_V: [f64; 2] = [3.0, 9.5];
 const CALIBRATION_TURNS_PER_S: f32 = drives::CALIBRATION.turns_per_s;
-/// Half-wave with which the firmware measures inductances, s, and its share of the calibration
-/// current.
+/// Half-wave with which the firmware measures inductances, s, and its share of the calibration current.
 const HALF_WAVE_S: f64 = 2.0 / 24_000.0;
 const WAVE_SHARE: f64 = 0.3;
 /// Load on the stand: the rotor alone, kg m^2; bearings, N m; slight drag, N m s/rad.
@@ -85,8 +84,7 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
     }
 }
 
-/// Motor on its stand, free of its gear, at rest with outputs off; the rotor started at `angle`,
-/// rad.
+/// Motor on its stand, free of its gear, at rest with outputs off; the rotor started at `angle`, rad.
 #[must_use]
 pub fn rested(axis: &AxisDescription, supply: &SupplyDescription, angle: f64, seed: u64) -> Stand {
     let mut stand = Stand::new(axis, supply, ROTOR, angle, seed);
@@ -97,8 +95,7 @@ pub fn rested(axis: &AxisDescription, supply: &SupplyDescription, angle: f64, se
     stand
 }
 
-/// Calibrates a motor on its stand with the rotor at `angle` (rad); `name` is used in error
-/// messages.
+/// Calibrates a motor on its stand with the rotor at `angle` (rad); `name` is used in error messages.
 pub fn commission(
     name: &str,
     configuration: &AxisConfiguration,
@@ -125,8 +122,7 @@ pub fn commission(
     Err(refused("the calibration did not end".into()))
 }
 
-/// Axes and chopper of a ready board: motors calibrated, counters at the initial pose of the
-/// simulated leg.
+/// Axes and chopper of a ready board: motors calibrated, counters at the initial pose of the simulated leg.
 fn ready<const N: usize>(
     believed: &LegFile,
     description: &CompleteDescription<N>,

@@ -1,5 +1,4 @@
-//! Physically consistent legs: result of the board, result of a swarm over whole legs, and the
-//! optimum.
+//! Physically consistent legs: result of the board, result of a swarm over whole legs, and the optimum.
 //!
 //! The board searches base values and completes them. The host also runs the beetle swarm over
 //! log-Cholesky coordinates of every link, in the board's precision. In double precision it finds

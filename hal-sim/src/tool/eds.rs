@@ -1,8 +1,7 @@
 //! Electronic data sheet of a joint's node, generated from the node's own object table.
 //!
-//! Why generated: host software trusts the sheet, not the node, and a manual sheet is wrong after
-//! the next change. Values that only a live node has (measurements, serial number, versions) have
-//! no default.
+//! Why generated: host software trusts the sheet, not the node, and a manual sheet is wrong after the next
+//! change. Values that only a live node has (measurements, serial number, versions) have no default.
 //!
 //! Source: CiA 306-1 (CAN electronic data sheet). Checked by `hal-sim/tests/tool/eds.rs` against a live node.
 

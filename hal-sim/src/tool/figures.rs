@@ -14,10 +14,9 @@
 //! More than four motions are continued in `motions-b.svg`, `torque-1-b.svg` and so on.
 //! `scripts/figures` draws those in `docs/figures`.
 //!
-//! Colours are those of Okabe and Ito (2008) or tints of them, which the colour-blind can
-//! distinguish. Curves also differ in lightness and width, so they can be distinguished in grey.
-//! Drawings have four times the shown size with a `viewBox` of that size, since the backend rounds
-//! to whole pixels.
+//! Colours are those of Okabe and Ito (2008) or tints of them, which the colour-blind can distinguish.
+//! Curves also differ in lightness and width, so they can be distinguished in grey. Drawings have four
+//! times the shown size with a `viewBox` of that size, since the backend rounds to whole pixels.
 
 mod canvas;
 pub mod chain;

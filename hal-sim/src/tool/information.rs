@@ -6,8 +6,7 @@
 //!           sign(v) g(v / vs),   d/d ln vs = S sign(v) g(v / vs) 2 (v / vs)^2
 //! ```
 //!
-//! No unbiased estimator of these parameters has a smaller variance. Rows of a sticking joint are
-//! excluded.
+//! No unbiased estimator of these parameters has a smaller variance. Rows of a sticking joint are excluded.
 
 use scarab::ident::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE, Row};
 use scarab::real::{exp, sign, sqrt};

@@ -1,5 +1,4 @@
-//! Persistent data of a board as a readable file: objects of its nodes, calibrations, and the
-//! model.
+//! Persistent data of a board as a readable file: objects of its nodes, calibrations, and the model.
 //!
 //! Why: the data can be moved to a replacement board, and calibrations can be viewed or compared
 //! without a bus. A board does not trust the file: it still checks a calibration at the motor and a

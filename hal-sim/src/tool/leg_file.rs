@@ -1,8 +1,7 @@
 //! Leg files: a leg in TOML, as users write it.
 //!
-//! Why a file: simulation and identification must state their leg in one place that can be read,
-//! compared and shared. Keys are an interface; unknown ones are errors. Every error names file,
-//! line and reason.
+//! Why a file: simulation and identification must state their leg in one place that can be read, compared
+//! and shared. Keys are an interface; unknown ones are errors. Every error names file, line and reason.
 //!
 //! | key | unit, meaning | default |
 //! | --- | --- | --- |
@@ -32,10 +31,9 @@
 //! | `truth`, `prior` | see below | none |
 //! | `[joint.motor]`, `supply` | complete drive ([`MotorFile`], [`SupplyFile`]) | none, 48 V |
 //!
-//! `torque_noise_percent` refers to each joint's mean absolute torque, per logged 500 Hz sample.
-//! The noise is added to the logged current only; `current_noise_a` comes on top. `outliers` refers
-//! to logged 500 Hz samples of the current. `segments` describes the last two links as the thigh
-//! and shank of a wearer.
+//! `torque_noise_percent` refers to each joint's mean absolute torque, per logged 500 Hz sample. The noise
+//! is added to the logged current only; `current_noise_a` comes on top. `outliers` refers to logged 500 Hz
+//! samples of the current. `segments` describes the last two links as the thigh and shank of a wearer.
 //!
 //! Keys of `truth` and `prior` are
 //! `{ mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset, asymmetry }`; the last five

@@ -323,8 +323,7 @@ impl StoredLeg {
     }
 }
 
-/// Symmetric matrix of `count` rows, padded with ones on the diagonal: linear algebra without a
-/// heap.
+/// Symmetric matrix of `count` rows, padded with ones on the diagonal: linear algebra without a heap.
 fn padded(
     count: usize,
     element: impl Fn(usize, usize) -> f64,

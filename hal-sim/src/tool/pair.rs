@@ -201,8 +201,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         })
     }
 
-    /// Exchanges the connectors of two joints, motor and encoder together, before the drive is
-    /// enabled.
+    /// Exchanges the connectors of two joints, motor and encoder together, before the drive is enabled.
     pub fn exchange(&mut self, one: usize, other: usize) {
         self.wiring.swap(one, other);
         self.sample.joints.swap(one, other);

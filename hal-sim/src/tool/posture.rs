@@ -4,10 +4,9 @@
 //! encoder the other way. Angles and torques stay anatomical. The frames keep their axes'
 //! directions in space: a turn about z is unchanged by a mirror along z.
 //!
-//! Everything odd in z changes its sign: offsets along the axes, z of the centres of mass, the
-//! products XZ and YZ. So do the drives' counts and currents
-//! (`scarab::servo::JointScale::mirrored`). Only legs with parallel axes are mirrored; with another
-//! axis the motion itself would have to be mirrored.
+//! Everything odd in z changes its sign: offsets along the axes, z of the centres of mass, the products XZ
+//! and YZ. So do the drives' counts and currents (`scarab::servo::JointScale::mirrored`). Only legs with
+//! parallel axes are mirrored; with another axis the motion itself would have to be mirrored.
 //!
 //! **Trunk.** The base frame is the trunk's. A trunk that leans forward by p turns gravity in that
 //! frame about the hip's axis of flexion. The direction is that in which flexion turns the thigh:

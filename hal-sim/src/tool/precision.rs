@@ -1,8 +1,7 @@
 //! Digits of reported numbers: as many as the standard deviation supports, three without one.
 //!
-//! Two significant digits of the standard deviation, and the value to the same decimal place.
-//! Source: "Guide to the Expression of Uncertainty in Measurement", JCGM 100:2008, 7.2.6. JSON has
-//! all digits.
+//! Two significant digits of the standard deviation, and the value to the same decimal place. Source:
+//! "Guide to the Expression of Uncertainty in Measurement", JCGM 100:2008, 7.2.6. JSON has all digits.
 
 use super::report::Number;
 
@@ -50,8 +49,7 @@ pub fn plain(value: Number) -> String {
     }
 }
 
-/// Formats an exact number, for example a limit: at most four significant digits, no trailing
-/// zeros.
+/// Formats an exact number, for example a limit: at most four significant digits, no trailing zeros.
 #[must_use]
 pub fn exact(value: Number) -> String {
     let Some(value) = value.known() else { return "-".into() };

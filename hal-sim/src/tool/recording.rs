@@ -4,8 +4,7 @@
 //! repaired silently. Invalid data are rejected with file, line and reason; plausible data pass
 //! unchanged ([`resample`](super::resample) makes them uniform).
 //!
-//! Format: a header, then one row per sample. Columns are found by name, in any order; others are
-//! ignored.
+//! Format: a header, then one row per sample. Columns are found by name, in any order; others are ignored.
 //!
 //! | column | unit | range |
 //! | --- | --- | --- |
@@ -42,8 +41,7 @@ const RATE_TOLERANCE: f64 = 1.001;
 pub const LARGEST_STEP_S: f64 = 0.1;
 /// Median steps up to which there is no gap either.
 pub const LARGEST_STEP_IN_MEDIANS: f64 = 20.0;
-/// Largest plausible time stamp, s: seconds since 1970 are 2e9, and a microsecond is still resolved
-/// there.
+/// Largest plausible time stamp, s: seconds since 1970 are 2e9, and a microsecond is still resolved there.
 pub const LARGEST_TIME_S: f64 = 1.0e10;
 /// Largest plausible angle, rad; larger ones are in another unit.
 pub const LARGEST_POSITION_RAD: f64 = 1.0e3;
@@ -175,8 +173,7 @@ impl Recording {
         Ok(())
     }
 
-    /// Rejects stamps in another unit before they are put on a grid of seconds, which would take
-    /// gigabytes.
+    /// Rejects stamps in another unit before they are put on a grid of seconds, which would take gigabytes.
     fn check_rate(&self) -> Result<(), RecordingError> {
         let step_s = self.median_step_s();
         if step_s * MINIMUM_RATE_HZ <= RATE_TOLERANCE {

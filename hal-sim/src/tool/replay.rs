@@ -97,8 +97,7 @@ struct Samples<const N: usize> {
     replaced: [u32; N],
     rate_hz: f64,
     start_s: f64,
-    /// Whether the recording has the firmware's sampling instants, so that its scatter is the
-    /// sensor's own.
+    /// Whether the recording has the firmware's sampling instants, so that its scatter is the sensor's own.
     native: bool,
     position: Vec<[f32; N]>,
     torque: Vec<[f32; N]>,
@@ -290,8 +289,7 @@ fn series<const N: usize, const B: usize>(
     Ok(reader.series(solver, motions))
 }
 
-/// Above this bandwidth, 50 Hz rows alias the noise that the low-pass passes, and sigma becomes too
-/// small.
+/// Above this bandwidth, 50 Hz rows alias the noise that the low-pass passes, and sigma becomes too small.
 const LARGEST_BANDWIDTH_HZ: f64 = 25.0;
 
 fn new_recorder<const N: usize, const B: usize>(bandwidth_hz: f64) -> Result<HostRecorder<N, B>, ToolError> {

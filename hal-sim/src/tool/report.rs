@@ -207,9 +207,8 @@ pub struct ConsistentSearchReport {
     pub evaluations: u32,
     /// Newton steps of the completion; none if the closed form is physically consistent.
     pub steps: u32,
-    /// Whether the completion ended at its minimum, not at the limit of steps or of single
-    /// precision; unknown for the search over whole legs. The verdict judges the cost
-    /// (`prior_box`), not this.
+    /// Whether the completion ended at its minimum, not at the limit of steps or of single precision;
+    /// unknown for the search over whole legs. The verdict judges the cost (`prior_box`), not this.
     pub settled: Option<bool>,
     /// Cost of the data above the least that any allowed leg has, found in double precision.
     pub excess_chi2: Number,
@@ -227,8 +226,7 @@ pub struct ConsistentSearchReport {
 pub struct ConsistentReport {
     /// Search whose result is the run's result.
     pub chosen: &'static str,
-    /// J_C - J_LS: cost of physical consistency within the prior's limits, found in double
-    /// precision.
+    /// J_C - J_LS: cost of physical consistency within the prior's limits, found in double precision.
     pub optimum_over_least_squares: Number,
     /// J - J_LS of the run's result, as the verdict sees it.
     pub result_over_least_squares: Number,
@@ -268,8 +266,7 @@ pub struct RunReport {
     pub plan: &'static str,
     /// `accepted` or `refused`.
     pub verdict: &'static str,
-    /// Whether unused motions were predicted; if not, `accepted` refers to the motion identified
-    /// from.
+    /// Whether unused motions were predicted; if not, `accepted` refers to the motion identified from.
     pub validated: bool,
     /// Reasons for rejection, from the closed list.
     pub reasons: Vec<&'static str>,

@@ -22,10 +22,9 @@
 //! | | -0.05 % at 3 Hz for h = 20 ms | unchanged at a sample |
 //! | Catmull-Rom, 500 Hz, +-0.8 ms of jitter | -4e-5 at 3 Hz, with f^2; single points 5e-4 | about as above |
 //!
-//! Here sinc(x) = sin(pi x) / (pi x). Slopes over two steps keep the cubic smooth where stamps
-//! arrive in bursts. A slope over a very short step would amplify its noise across the next long
-//! one. Outliers are best replaced before resampling: each affects the points of four samples (the
-//! cubic) or of two bins.
+//! Here sinc(x) = sin(pi x) / (pi x). Slopes over two steps keep the cubic smooth where stamps arrive in
+//! bursts. A slope over a very short step would amplify its noise across the next long one. Outliers are
+//! best replaced before resampling: each affects the points of four samples (the cubic) or of two bins.
 //!
 //! Limits: beyond 0.2 of the recording's own rate the interpolation loses 6 % and more, see
 //! [`Resampled::bandwidth_warning`]. Source of the cubic: Catmull and Rom, A class of local
@@ -37,8 +36,7 @@ use super::recording::{JointSeries, Recording};
 
 /// Rate of the grid, Hz: that of the firmware's filter chain.
 pub const GRID_RATE_HZ: f64 = 500.0;
-/// Share of the grid's period below which the median step leads to averaging, above it to
-/// interpolation.
+/// Share of the grid's period below which the median step leads to averaging, above it to interpolation.
 pub const DENSE_STEP: f64 = 0.9;
 /// Share of a recording's own rate up to which its resampled motion can be trusted.
 pub const TRUSTED_BANDWIDTH: f64 = 0.2;

@@ -70,8 +70,7 @@ struct SeenAgain<const N: usize> {
 }
 
 impl<const N: usize, const B: usize> Scale<N, B> {
-    /// Evaluates the load, and runs a second identification with the mass on the already identified
-    /// `pair`.
+    /// Evaluates the load, and runs a second identification with the mass on the already identified `pair`.
     pub fn find(
         context: &Context<N, B>,
         pair: &Pair<N, B>,

@@ -95,8 +95,7 @@ macro_rules! with_leg_size {
     };
 }
 
-/// Number of base parameters of a leg of two joints; zero for another number, or if they cannot be
-/// found.
+/// Number of base parameters of a leg of two joints; zero for another number, or if they cannot be found.
 #[must_use]
 pub fn base_rank(leg: &LegFile) -> usize {
     row_model::<2, 18>(leg).map_or(0, |model| model.base.rank())
@@ -369,8 +368,7 @@ pub fn configuration<const N: usize, const B: usize>(
     Ok((configuration, motions))
 }
 
-/// Largest inertia of each joint from the leg file's prior, else its truth; determines the servo's
-/// gains.
+/// Largest inertia of each joint from the leg file's prior, else its truth; determines the servo's gains.
 fn servo_inertia<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,

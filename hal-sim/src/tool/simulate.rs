@@ -1,5 +1,4 @@
-//! Complete simulated run: the firmware's leg against the plant, with data that only a simulation
-//! has.
+//! Complete simulated run: the firmware's leg against the plant, with data that only a simulation has.
 
 use std::time::Instant;
 

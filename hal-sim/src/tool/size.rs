@@ -16,9 +16,8 @@
 //! moves its lower part as a whole differs little from even stretching:
 //! `stretching_is_close_to_a_telescope` measures it. Rotor inertia, friction and limits stay.
 //!
-//! Ranges: the lengths that the paper gives for its exoskeleton, thigh 0.402-0.505 m, shank
-//! 0.397-0.506 m. The default leg's own 0.39 and 0.40 m come from its source and stay unless other
-//! lengths are requested.
+//! Ranges: the lengths that the paper gives for its exoskeleton, thigh 0.402-0.505 m, shank 0.397-0.506 m.
+//! The default leg's own 0.39 and 0.40 m come from its source and stay unless other lengths are requested.
 
 use core::str::FromStr;
 

@@ -61,8 +61,7 @@ impl Spread {
         self.errors.iter().sum::<f64>() / self.errors.len().max(1) as f64
     }
 
-    /// Standard deviation of the errors about their mean, in sigma; 1 if the reported sigma is
-    /// right.
+    /// Standard deviation of the errors about their mean, in sigma; 1 if the reported sigma is right.
     #[must_use]
     pub fn deviation(&self) -> f64 {
         let mean = self.mean();

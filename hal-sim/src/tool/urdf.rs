@@ -12,11 +12,10 @@
 //! ixx ixy ixz iyy iyz izz = elements of the tensor about the centre of mass, ixy = - integral of x y dm
 //! ```
 //!
-//! The root is `world` with gravity along -z, as usual in these programs; a fixed joint rotates it
-//! to the leg's base. Values without a place in the format are written as comments: rotor inertia
-//! at the joint (MuJoCo: the joint's `armature`; Pinocchio: `model.armature`; Drake: its reflected
-//! inertia) and the torque offset. A friction coefficient identified below zero, within its sigma,
-//! is written as 0.
+//! The root is `world` with gravity along -z, as usual in these programs; a fixed joint rotates it to the
+//! leg's base. Values without a place in the format are written as comments: rotor inertia at the joint
+//! (MuJoCo: the joint's `armature`; Pinocchio: `model.armature`; Drake: its reflected inertia) and the
+//! torque offset. A friction coefficient identified below zero, within its sigma, is written as 0.
 //!
 //! Limits: no geometry, transmission or contact; the program's own meaning of `friction` applies to
 //! Coulomb friction.

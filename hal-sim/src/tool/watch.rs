@@ -231,9 +231,8 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         self.excess.push((iterations, excess));
     }
 
-    /// Curves of the run, with noise-free torque and commands from the simulation. `values` are
-    /// those of the leg with its load; torque is corrected if a known mass determined the
-    /// constants.
+    /// Curves of the run, with noise-free torque and commands from the simulation. `values` are those of
+    /// the leg with its load; torque is corrected if a known mass determined the constants.
     fn series(
         &self,
         model: &RowModel<f32, N, B>,

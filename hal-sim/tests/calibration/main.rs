@@ -120,8 +120,7 @@ fn spoil(trial: &mut Trial, seed: u64) -> Refusal {
             trial.axis.motor.pole_pairs = u32::from(pairs);
             Refusal::PolePairs(pairs)
         }
-        // One phase reads 40 % too much: resistances differ by 18 %, currents are rotated by 13
-        // degrees.
+        // One phase reads 40 % too much: resistances differ by 18 %, currents are rotated by 13 degrees.
         12 => {
             trial.axis.shunts.gain_error[0] = 0.4;
             Refusal::PhaseImbalance

@@ -160,8 +160,7 @@ fn duties(voltage: f64, angle: f64) -> AxisCommand {
     AxisCommand { enabled: true, duty }
 }
 
-/// Rotor at constant speed under a rotating voltage vector; energies of each period, with the last
-/// samples.
+/// Rotor at constant speed under a rotating voltage vector; energies of each period, with the last samples.
 fn turning(
     description: &AxisDescription,
     speed: f64,
@@ -252,8 +251,7 @@ fn codes_are_the_currents_at_the_middle_of_the_lower_zero_vector() {
     let step = description.shunts.ampere_per_code();
     for (channel, code) in sample.shunt_codes.iter().enumerate() {
         let read = (f64::from(*code) - 2048.0) * step;
-        // Half a step: the converter waits for the amplifier's lag, to 2 ns of a slope of up to 0.4
-        // A/us.
+        // Half a step: the converter waits for the amplifier's lag, to 2 ns of a slope of up to 0.4 A/us.
         assert!((read - expected[channel + 1]).abs() < 0.5 * step + 0.001, "{read} {expected:?}");
         assert!(expected[channel + 1].abs() > 5.0, "{expected:?}");
     }

@@ -11,8 +11,7 @@ use scarab::units::Ampere;
 const START: LegState<2> = LegState { angles: [1.2, -0.8], rates: [0.0, 1.0] };
 const NO_TORQUE: [f64; 2] = [0.0; 2];
 
-/// Largest deviation of the energy over 10 s of free swinging, and the mean one of the last second,
-/// J.
+/// Largest deviation of the energy over 10 s of free swinging, and the mean one of the last second, J.
 fn energy_deviation(step: f64) -> (f64, f64) {
     let leg = Leg::new(&planar_leg());
     let energy = |state: &LegState<2>| {

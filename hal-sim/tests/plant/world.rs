@@ -131,9 +131,8 @@ fn drive_follows_its_target_with_the_exact_lag_and_never_beyond_its_limit() {
 #[test]
 fn a_mirrored_and_turned_joint_behaves_alike_at_its_ports() {
     let plain = worn_leg();
-    // Equivalent description of the leg. The knee's axis is reversed (its frame turned by half a
-    // turn about x). The hip's angle is counted from another zero (the base turned about the hip's
-    // axis).
+    // Equivalent description of the leg. The knee's axis is reversed (its frame turned by half a turn about
+    // x). The hip's angle is counted from another zero (the base turned about the hip's axis).
     let mut described = plain;
     let (sine, cosine) = 0.3_f64.sin_cos();
     described.gravity = [9.81 * cosine, 9.81 * sine, 0.0];

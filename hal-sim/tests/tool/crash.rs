@@ -13,8 +13,7 @@ use crate::emulation::{changed_leg, the_image};
 
 const REHEARSAL: &str = include_str!("../../src/bin/emulated/rehearsal.rs");
 
-/// Crash in the middle of the excitation, while a current tick is due; fails if a requirement is
-/// violated.
+/// Crash in the middle of the excitation, while a current tick is due; fails if a requirement is violated.
 fn crashed(kind: &str) -> Run {
     let _image = the_image();
     let folder = Folder::new();

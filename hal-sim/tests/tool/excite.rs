@@ -60,11 +60,9 @@ fn a_design_keeps_every_limit_in_simulation_and_on_paper() {
         assert!(value(joint, "acceleration_deg_s2") <= value(joint, "acceleration_limit_deg_s2"));
         let bound = value(joint, "torque_with_margin_nm");
         assert!(bound <= torque, "{joint}");
-        // Near the ends the monitor reduces the torque of a joint that could not stop; here it must
-        // not.
+        // Near the ends the monitor reduces the torque of a joint that could not stop; here it must not.
         assert_eq!(joint["simulated"]["limited_ticks"], 0, "{joint}");
-        // The plant's own torque, with friction and position loop, stays below the bound with the
-        // margin.
+        // The plant's own torque, with friction and position loop, stays below the bound with the margin.
         assert!(value(&joint["simulated"], "torque_nm") <= bound, "{joint}");
         // The limits are used: a design that hardly moves would also respect them.
         assert!(bound > 0.5 * torque, "{joint}");
@@ -77,8 +75,7 @@ fn a_design_tells_far_more_than_the_best_of_300_random_motions() {
     let own = value(report, "log_determinant");
     let random = value(&report["random"], "log_determinant");
     println!("ln det {own:.2} against {random:.2}");
-    // Measured 18.3 with the default effort; 13 corresponds to every sigma at 0.6 of the random
-    // motion's.
+    // Measured 18.3 with the default effort; 13 corresponds to every sigma at 0.6 of the random motion's.
     assert!(own > random + 13.0, "{own} {random}");
 }
 
@@ -214,8 +211,7 @@ fn every_parameter_has_a_status_before_anything_moves() {
     ] {
         assert_eq!(status(name), expected, "{name}");
     }
-    // A hip that cannot hang straight hardly separates an offset from a mass in front; the status
-    // says so.
+    // A hip that cannot hang straight hardly separates an offset from a mass in front; the status says so.
     assert_eq!(status("OFF1"), "weak");
     let warnings = list(report, "warnings");
     assert!(warnings.iter().any(|line| line.as_str().is_some_and(|line| line.starts_with("OFF1: weak"))));

@@ -243,8 +243,7 @@ fn a_folder_that_the_command_makes_may_hold_its_other_files() {
     let sheets = folder.path("new/sheets");
     scarab("eds --out", &[&sheets]).ends_with(0);
     assert_eq!(fs::read_dir(&sheets).expect("made").count(), 2);
-    // The drawings' folder does not exist yet, and the report lies in it: only the recording is
-    // missing.
+    // The drawings' folder does not exist yet, and the report lies in it: only the recording is missing.
     let (drawn, page) = (folder.path("drawn"), folder.path("drawn/report.html"));
     let line = [Path::new("--figures"), &drawn, Path::new("--report"), &page];
     let message = scarab("replay none.csv --leg sp", &line).refusal();

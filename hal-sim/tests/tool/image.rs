@@ -1,5 +1,4 @@
-//! `scarab-sim fw` and `flash-leg`: legs for which no image is built. A step of `.ci/run` builds
-//! images.
+//! `scarab-sim fw` and `flash-leg`: legs for which no image is built. A step of `.ci/run` builds images.
 
 use crate::command::{Folder, scarab};
 

@@ -14,9 +14,8 @@ fn runs(leg: &LegFile, seeds: std::ops::RangeInclusive<u64>) -> Vec<RunReport> {
     identify_many::<2, 13>(leg, &options).expect("it runs").runs
 }
 
-/// Default leg with this switch for rotor and offset of both joints, this offset in both, and
-/// optionally no rotor in the knee. Prior and servo match: a loop that expects a rotor shakes a
-/// joint without one.
+/// Default leg with this switch for rotor and offset of both joints, this offset in both, and optionally no
+/// rotor in the knee. Prior and servo match: a loop that expects a rotor shakes a joint without one.
 fn leg(switch: Switch, without_rotor: bool, offset: f64) -> LegFile {
     let mut leg = LegFile::load(DEFAULT_LEG).expect("shipped");
     for joint in &mut leg.joints {
@@ -78,8 +77,7 @@ fn rotor_and_offset_that_are_there_are_kept_and_give_the_numbers_of_on() {
         for (joint, option) in [(2, "rotor"), (1, "offset"), (2, "offset")] {
             assert_eq!(choice(&auto, joint, option).used, "on", "{option} of joint {joint}");
         }
-        // The choice takes a tick: the held-out motions begin one tick later and have another
-        // noise.
+        // The choice takes a tick: the held-out motions begin one tick later and have another noise.
         let found = |run: &RunReport| {
             (run.base_parameters.clone(), run.parameters.clone(), run.least_squares.clone(), run.bso.clone())
         };
@@ -88,8 +86,7 @@ fn rotor_and_offset_that_are_there_are_kept_and_give_the_numbers_of_on() {
     }
 }
 
-/// Default leg with knee friction that differs by 1.6 N m between the directions, without an
-/// offset.
+/// Default leg with knee friction that differs by 1.6 N m between the directions, without an offset.
 fn uneven(asked: Switch, half: f64) -> LegFile {
     let mut leg = LegFile::load(DEFAULT_LEG).expect("shipped");
     let knee = &mut leg.joints[1];

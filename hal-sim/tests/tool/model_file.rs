@@ -268,8 +268,7 @@ fn a_known_mass_makes_the_model_absolute_and_its_constants_the_identified_ones()
         // Identified within 2 %, and not equal to the assumed number.
         assert!((joint.torque_per_ampere / 1.5 - 1.0).abs() < 0.02 && joint.torque_per_ampere != 1.5);
     }
-    // A leg that assumes 1.5 does not match these parameters until its file states the identified
-    // constant.
+    // A leg that assumes 1.5 does not match these parameters until its file states the identified constant.
     let states = folder.write("states.csv", STATES);
     let arguments = |leg: &str| format!("predict --states {} --leg {leg} --model", states.display());
     let run = scarab(&arguments(DEFAULT_LEG), &[&path]).ends_with(3);

@@ -92,8 +92,7 @@ fn the_table_has_total_band_and_parts_and_knows_both_signs_of_an_angle() {
         assert_eq!(hip.rigid + hip.friction + hip.offset, hip.total());
         assert!(hip.sigma > 0.0 && knee.sigma > 0.0 && knee.friction != 0.0 && knee.offset != 0.0);
     }
-    // The knee's anatomical angle is minus its D-H angle; units in column names and the time are
-    // optional.
+    // The knee's anatomical angle is minus its D-H angle; units in column names and the time are optional.
     let flexed = "q1_rad,q2_rad,qd1_radps,qd2_radps,qdd1_radps2,qdd2_radps2\n0.3,0.9,0.7,1.1,4.0,6.0\n0.8,0.2,-1.3,-0.4,-2.0,-9.0\n";
     let flexed = folder.write("flexed.csv", flexed);
     let printed = scarab("predict --model", &[&kept().model, "--states".as_ref(), &flexed]);

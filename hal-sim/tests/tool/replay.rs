@@ -1,5 +1,4 @@
-//! `scarab-sim replay` as an interface: valid recordings, contents of the report and the torque
-//! table.
+//! `scarab-sim replay` as an interface: valid recordings, contents of the report and the torque table.
 
 use crate::command::{Folder, MUJOCO, base, fit, reasons, scarab};
 use crate::pendulum::{Motion, TRUTH, leg};
@@ -10,8 +9,7 @@ use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Replays the named recordings of the folder with its `leg.toml`; writes `report.json` and
-/// `torque.csv`.
+/// Replays the named recordings of the folder with its `leg.toml`; writes `report.json` and `torque.csv`.
 fn replay(folder: &Folder, files: &[&str], arguments: &str) -> (Value, crate::command::Run) {
     let files: Vec<_> = files.iter().map(|name| folder.path(name)).collect();
     let (leg, json, csv) = (folder.path("leg.toml"), folder.path("report.json"), folder.path("torque.csv"));

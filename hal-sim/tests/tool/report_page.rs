@@ -1,5 +1,4 @@
-//! Report page: complete, well-formed, explicit about unknowns, and safe against the contents of
-//! files.
+//! Report page: complete, well-formed, explicit about unknowns, and safe against the contents of files.
 
 use std::fs;
 

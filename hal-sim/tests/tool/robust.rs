@@ -86,9 +86,8 @@ impl Dice {
     }
 }
 
-/// Recording with 3 % of its torques off by one to two times their maximum, and 3 % of its angles
-/// by 0.05 to 0.3 rad. Pushes of 0.3 of the largest torque last 0.3 s, at the given rate per minute
-/// on each joint.
+/// Recording with 3 % of its torques off by one to two times their maximum, and 3 % of its angles by 0.05
+/// to 0.3 rad. Pushes of 0.3 of the largest torque last 0.3 s, at the given rate per minute on each joint.
 fn corrupted(recording: &Path, pushes_per_minute: f64) -> String {
     let mut table = Table::read(recording.to_str().expect("a path"));
     let mut dice = Dice(1);
@@ -172,8 +171,7 @@ fn wild_samples_are_replaced_at_the_rate_of_the_recording_not_after_resampling_s
         writeln!(std::io::stderr(), "{notice}").expect("standard error");
         return;
     };
-    // The stamps are jittered, so the recording is interpolated. No pushes: 6 s are too short to
-    // find them.
+    // The stamps are jittered, so the recording is interpolated. No pushes: 6 s are too short to find them.
     let [robust, plain] =
         distances(&recordings.join("sp/ddp.csv"), "--leg sp --bandwidth 5", 0.0, |report| {
             assert_eq!(reasons(report), Vec::<&str>::new());

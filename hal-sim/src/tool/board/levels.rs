@@ -1,8 +1,7 @@
 //! The firmware's levels composed as on the board, over simulated registers.
 //!
-//! Fault campaign, `serve` and complete drives all run this composition. It makes no decisions:
-//! each method runs one level of `scarab::operation`, and the owner of the plant calls them in the
-//! board's order:
+//! Fault campaign, `serve` and complete drives all run this composition. It makes no decisions: each method
+//! runs one level of `scarab::operation`, and the owner of the plant calls them in the board's order:
 //!
 //! ```text
 //! every 48th period   housekeeping
@@ -223,8 +222,7 @@ impl<const N: usize> Levels<N> {
         self.loops.tick(axis, &tick, &mut ends, &self.signals, &mut self.registers);
     }
 
-    /// Watch, level 6, at the end of each period: guard of the current ticks, and the watchdog's
-    /// check.
+    /// Watch, level 6, at the end of each period: guard of the current ticks, and the watchdog's check.
     pub fn watch(&mut self, period: u64) {
         if period.is_multiple_of(PERIODS_PER_LOOK) {
             self.watch.look(&self.signals, &mut self.registers);

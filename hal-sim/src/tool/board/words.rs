@@ -1,5 +1,4 @@
-//! Describes rejections and faults of the firmware's axes, with the key of the leg file that
-//! corrects them.
+//! Describes rejections and faults of the firmware's axes, with the key of the leg file that corrects them.
 
 use scarab::motor::{AxisError, AxisFault, Phase, Refusal};
 

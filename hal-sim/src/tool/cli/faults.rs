@@ -40,8 +40,7 @@ pub struct FaultsArguments {
     /// tick of one second of it.
     #[arg(long)]
     every_tick: bool,
-    /// Runs of the sweep: each channel of a sensor faulted in each way; no invariant may be
-    /// violated.
+    /// Runs of the sweep: each channel of a sensor faulted in each way; no invariant may be violated.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=MOST_SEEDS))]
     sweep: Option<u64>,
     /// Runs of two random faults within 50 ms; no invariant may be violated.
@@ -58,9 +57,8 @@ pub struct FaultsArguments {
     /// code 0 if it does.
     #[arg(long, conflicts_with = "every_tick")]
     blind: bool,
-    /// Only the run of this seed of each fault, reported in full; `--fault sweep` and
-    /// `--fault pairs` name runs of those. The run repeats bit for bit for equal --seconds, leg and
-    /// program.
+    /// Only the run of this seed of each fault, reported in full; `--fault sweep` and `--fault pairs` name
+    /// runs of those. The run repeats bit for bit for equal --seconds, leg and program.
     #[arg(long, value_name = "SEED", conflicts_with_all = ["seeds", "every_tick", "sweep", "pairs"], value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     replay: Option<u64>,
     /// Inject only in the first seconds of each identification.

@@ -36,8 +36,7 @@ enum Way {
         #[arg(long, value_name = "FILE.toml")]
         out: Option<Output>,
     },
-    /// Write the contents of a TOML file into a board's flash, all or nothing; parts not named
-    /// stay.
+    /// Write the contents of a TOML file into a board's flash, all or nothing; parts not named stay.
     Import {
         /// File written by `export`.
         file: Input,

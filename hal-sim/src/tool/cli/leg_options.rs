@@ -20,8 +20,7 @@ pub enum SideArgument {
 /// Leg and its settings.
 #[derive(Args, Clone, Debug)]
 pub struct LegOptions {
-    /// Name of a shipped leg, or a leg file; x2-wearer-75kg unless given. Replay and flash-leg
-    /// require it.
+    /// Name of a shipped leg, or a leg file; x2-wearer-75kg unless given. Replay and flash-leg require it.
     #[arg(long)]
     leg: Option<LegName>,
     /// Set the thigh to this length, m (0.402 to 0.505).

@@ -12,8 +12,7 @@ use crate::tool::tables;
 /// Model to be compared with, and destination of the result.
 #[derive(Args, Debug)]
 pub struct ModelArguments {
-    /// Store an accepted result here, for predict, export and comparison; a rejected one is not
-    /// written.
+    /// Store an accepted result here, for predict, export and comparison; a rejected one is not written.
     #[arg(long)]
     save_model: Option<Output>,
     /// Compare the result with this model, which must be one of the same leg.
@@ -22,8 +21,7 @@ pub struct ModelArguments {
 }
 
 impl ModelArguments {
-    /// Reads the model to compare with, if named; a model of another leg is rejected before
-    /// anything runs.
+    /// Reads the model to compare with, if named; a model of another leg is rejected before anything runs.
     pub fn kept(&self, leg: &LegFile) -> Result<Option<ModelFile>, ToolError> {
         let Some(path) = &self.compare_model else { return Ok(None) };
         let model = ModelFile::load(path)?;

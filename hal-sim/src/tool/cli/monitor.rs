@@ -1,5 +1,4 @@
-//! `monitor`: a leg is identified and walks, something changes, and the firmware's reaction is
-//! reported.
+//! `monitor`: a leg is identified and walks, something changes, and the firmware's reaction is reported.
 
 use clap::Args;
 use rayon::prelude::*;

@@ -12,8 +12,7 @@ pub struct NoiseOptions {
     /// motion; the leg file's unless given.
     #[arg(long, allow_negative_numbers = true)]
     torque_noise: Option<f64>,
-    /// Noise in N m, one number or one for each joint: the standard deviation of the logged torque
-    /// at rest.
+    /// Noise in N m, one number or one for each joint: the standard deviation of the logged torque at rest.
     #[arg(
         long,
         value_name = "NM[,NM..]",

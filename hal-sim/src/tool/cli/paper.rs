@@ -29,8 +29,7 @@ enum TableArgument {
     /// The combinations of the chain's parameters that torque determines; always with V.
     #[value(name = "VI")]
     Six,
-    /// The chain identified before and after its load changes; no table of the paper, but its
-    /// argument.
+    /// The chain identified before and after its load changes; no table of the paper, but its argument.
     LoadChange,
     /// Iterations of the default swarm on identification problems; no table of the paper.
     Convergence,

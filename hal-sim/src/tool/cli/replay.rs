@@ -29,8 +29,7 @@ pub struct ReplayArguments {
     /// The first fraction of each file trains, the rest validates.
     #[arg(long, allow_negative_numbers = true)]
     split: Option<f64>,
-    /// -3 dB frequency of the filter chain's low-pass, Hz; the leg file's (8 by default) unless
-    /// given.
+    /// -3 dB frequency of the filter chain's low-pass, Hz; the leg file's (8 by default) unless given.
     #[arg(long, allow_negative_numbers = true)]
     bandwidth: Option<f64>,
     /// Write measured and predicted torque of the validation part here.

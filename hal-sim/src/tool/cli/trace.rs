@@ -29,8 +29,7 @@ pub struct TraceArguments {
     /// Write the 500 Hz log of one motion here, in the format that replay reads.
     #[arg(long)]
     csv: Option<Output>,
-    /// Motion for --csv: 0 is the motion identified from, 1 and more are those that were only
-    /// predicted.
+    /// Motion for --csv: 0 is the motion identified from, 1 and more are those that were only predicted.
     #[arg(long, value_name = "NUMBER", requires = "csv", default_value_t = log::TRAINING)]
     csv_motion: u8,
     /// Write the run as one HTML page here.

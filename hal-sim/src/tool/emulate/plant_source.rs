@@ -1,5 +1,4 @@
-//! Simulated leg as a constant of the emulated image: the initial state of a simulation on the
-//! host.
+//! Simulated leg as a constant of the emulated image: the initial state of a simulation on the host.
 
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;

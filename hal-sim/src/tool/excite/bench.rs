@@ -42,8 +42,7 @@ pub struct ExciteOptions {
 /// Reference of the torque noise.
 #[derive(Clone, Copy, Debug)]
 pub struct NoiseOrigin {
-    /// Percent of each joint's mean absolute torque on the default motion; zero if only N m are
-    /// stated.
+    /// Percent of each joint's mean absolute torque on the default motion; zero if only N m are stated.
     pub percent: f64,
     /// Leg whose torque is meant: `truth` or `prior`.
     pub of: &'static str,

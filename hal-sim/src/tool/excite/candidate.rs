@@ -6,17 +6,15 @@
 //! g is lowered until speed and acceleration, blends included, keep their limits
 //! ```
 //!
-//! Every point of the box is thus a curve that the firmware accepts; only torque remains a
-//! condition. The inner range leaves the share [`RANGE_MARGIN`] free at both ends for errors of the
-//! position loop.
+//! Every point of the box is thus a curve that the firmware accepts; only torque remains a condition. The
+//! inner range leaves the share [`RANGE_MARGIN`] free at both ends for errors of the position loop.
 
 use scarab::motion::{Fourier, HARMONICS, JointEnvelope};
 use scarab::units::{Radian, Second};
 
 /// Share of the range left free at both ends.
 pub const RANGE_MARGIN: f32 = 0.06;
-/// Largest used share of the speed and acceleration limits; the rest is for overshoot of the
-/// position loop.
+/// Largest used share of the speed and acceleration limits; the rest is for overshoot of the position loop.
 pub const RATE_SHARE: f32 = 0.9;
 /// Smallest share of the inner range.
 const LEAST_SHARE: f64 = 0.3;

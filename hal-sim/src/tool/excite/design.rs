@@ -9,9 +9,8 @@
 //! ```
 //!
 //! Why several paces: the best speed is a trade-off of inertia, friction, limits and rows lost at
-//! reversals. A slow and a fast motion are different landscapes, and the swarm need not jump
-//! between them. Cost: [`DesignOptions::evaluations`] curves of about 0.2 ms in all; one run on the
-//! assumed leg per pace.
+//! reversals. A slow and a fast motion are different landscapes, and the swarm need not jump between them.
+//! Cost: [`DesignOptions::evaluations`] curves of about 0.2 ms in all; one run on the assumed leg per pace.
 //!
 //! Known limits: the search ends by count, not at a proved optimum; another seed gives a similar
 //! motion, not an identical one.

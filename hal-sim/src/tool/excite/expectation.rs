@@ -6,20 +6,18 @@
 //! record --> the firmware's weights, covariance, status
 //! ```
 //!
-//! Why a whole run and not a formula: the rows that count depend on where friction holds a joint,
-//! and that on the position loop. One noise-free run with the real filter chain shows them in a
-//! tenth of a second. The mean residual from noise is known ((I5) read backwards) and is added. All
-//! later steps are the firmware's own code: this sigma is the one that an identification reports,
-//! without its scatter.
+//! Why a whole run and not a formula: the rows that count depend on where friction holds a joint, and that
+//! on the position loop. One noise-free run with the real filter chain shows them in a tenth of a second.
+//! The mean residual from noise is known ((I5) read backwards) and is added. All later steps are the
+//! firmware's own code: this sigma is the one that an identification reports, without its scatter.
 //!
 //! The run is undisturbed, so every row has the same weight (`Estimator::Plain`). Without noise the
 //! robust estimator would take each reversal for a disturbance. On data with noise only it costs
 //! less than a hundredth of sigma.
 //!
-//! The run also shows the error without noise (`systematic`): its parameters minus the assumed
-//! ones. Encoder steps, sticking and the drive's lag cause it. The value is one sample of an error
-//! that depends on the motion; it is not a standard deviation, and averaging over runs does not
-//! remove it.
+//! The run also shows the error without noise (`systematic`): its parameters minus the assumed ones.
+//! Encoder steps, sticking and the drive's lag cause it. The value is one sample of an error that depends
+//! on the motion; it is not a standard deviation, and averaging over runs does not remove it.
 
 use scarab::ident::{DECIMATION, Estimate, Estimator, Plan, Problem, Record, RowModel, Selection};
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase};

@@ -89,9 +89,8 @@ pub struct Expected {
     pub base_parameter: Vec<ExpectedBase>,
 }
 
-/// Fingerprint of the meaning of a motion's angles (FNV-1a, 64 bits). It covers names,
-/// Denavit-Hartenberg numbers and anatomical convention of every joint. Gravity, limits and masses
-/// are checked separately.
+/// Fingerprint of the meaning of a motion's angles (FNV-1a, 64 bits). It covers names, Denavit-Hartenberg
+/// numbers and anatomical convention of every joint. Gravity, limits and masses are checked separately.
 #[must_use]
 pub fn geometry(leg: &LegFile) -> String {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;

@@ -19,8 +19,7 @@ pub struct ExpectedBase {
     pub unit: String,
     /// Value of the assumed leg.
     pub assumed: f64,
-    /// Standard deviation that an identification reports; absent if the motion does not determine
-    /// it.
+    /// Standard deviation that an identification reports; absent if the motion does not determine it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
     /// Error without noise: encoder, friction at reversals, lag.
@@ -34,8 +33,7 @@ pub struct ComparedBase {
     /// Entry of the file.
     #[serde(flatten)]
     pub expected: ExpectedBase,
-    /// Ratio to the sigma of the best of 300 random motions: two cycles, equal duration and noise
-    /// in N m.
+    /// Ratio to the sigma of the best of 300 random motions: two cycles, equal duration and noise in N m.
     pub ratio_to_random: Number,
 }
 

@@ -185,8 +185,7 @@ pub fn axes<'a, 'b>(area: &'a Area<'b>, axes: &Axes<'_>) -> Result<Chart<'a, 'b>
 /// With fewer labels the scale of an axis cannot be read.
 const LEAST_LABELS: usize = 3;
 
-/// Labels to request for an axis: `most`, or more where plotters would draw fewer than
-/// [`LEAST_LABELS`].
+/// Labels to request for an axis: `most`, or more where plotters would draw fewer than [`LEAST_LABELS`].
 fn labels(range: &Range<f64>, most: usize) -> usize {
     let axis = RangedCoordf64::from(range.clone());
     let drawn = |count: &usize| axis.key_points(BoldPoints(*count)).len();

@@ -159,8 +159,7 @@ fn rows_of<X: Ranged<ValueType = f64>>(
     Ok(())
 }
 
-/// Writes a name to the left and text to the right of a row at `y`, relative to the figure's
-/// corner.
+/// Writes a name to the left and text to the right of a row at `y`, relative to the figure's corner.
 pub fn labels(
     area: &Area<'_>,
     y: i32,

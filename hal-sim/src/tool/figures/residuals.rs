@@ -52,8 +52,7 @@ pub fn whole(area: &Area<'_>, joints: &[&str], series: &Series) -> Result<(), Dr
     Ok(())
 }
 
-/// Share of residuals per sigma in each bar from -WIDEST on; wider residuals count in the outermost
-/// bars.
+/// Share of residuals per sigma in each bar from -WIDEST on; wider residuals count in the outermost bars.
 fn density(residuals: &[Vec<Option<f64>>], sigma: f64) -> Vec<f64> {
     let bars = (2.0 * WIDEST / BAR) as usize;
     let mut counts = vec![0_u32; bars];

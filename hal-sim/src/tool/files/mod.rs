@@ -1,8 +1,7 @@
 //! Files of a command: inputs, outputs, and how they are written.
 //!
-//! Why one place: a command that overwrites its own recording destroys data for good. The files of
-//! every command are therefore checked before any computation, and no other module of the tool
-//! writes a file.
+//! Why one place: a command that overwrites its own recording destroys data for good. The files of every
+//! command are therefore checked before any computation, and no other module of the tool writes a file.
 //!
 //! | part | contents |
 //! | --- | --- |
@@ -58,8 +57,7 @@ fn folder_of(path: &Path) -> PathBuf {
     }
 }
 
-/// Whether the path is a terminal, pipe or other device: these are written directly and may be
-/// shared.
+/// Whether the path is a terminal, pipe or other device: these are written directly and may be shared.
 fn is_device(path: &Path) -> bool {
     OPEN_STREAMS.iter().any(|stream| path.starts_with(stream))
         || path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())

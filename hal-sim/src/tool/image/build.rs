@@ -77,8 +77,7 @@ pub fn write_if_changed(path: &Path, text: &str) -> Result<PathBuf, ToolError> {
     path.canonicalize().map_err(|error| ToolError::cannot_write(path, &error))
 }
 
-/// Build command for the microcontroller; with `log` the image sends every sample of the 500 Hz
-/// log.
+/// Build command for the microcontroller; with `log` the image sends every sample of the 500 Hz log.
 #[must_use]
 pub fn firmware_build(log: bool) -> Command {
     let mut command = Command::new(workspace().join("scripts/firmware-build"));

@@ -45,9 +45,8 @@ const PANICS: [&str; 8] = [
     "_defmt_panic",
     "__defmt_default_panic",
 ];
-/// File with tolerated panics in interrupts. A queue of `heapless` stores its capacity as a value
-/// and takes the remainder of an index by it. The compiler does not see that every capacity is a
-/// constant above zero.
+/// File with tolerated panics in interrupts. A queue of `heapless` stores its capacity as a value and takes
+/// the remainder of an index by it. The compiler does not see that every capacity is a constant above zero.
 const QUEUE: [&str; 2] = ["heapless-", "/src/spsc.rs"];
 
 /// A branch to a panic.
@@ -187,8 +186,7 @@ impl Panics {
     }
 }
 
-/// Targets of a function's branches except itself, with the first argument of each; one entry per
-/// branch.
+/// Targets of a function's branches except itself, with the first argument of each; one entry per branch.
 fn callees(functions: &BTreeMap<u32, Function>, begin: u32) -> impl Iterator<Item = (u32, Option<u32>)> {
     let function = functions.get(&begin);
     let branches = function.map_or(&[][..], |function| &function.branches);

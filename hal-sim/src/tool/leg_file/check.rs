@@ -1,9 +1,8 @@
 //! Checks a leg beyond its types.
 //!
-//! Bounds are wide: they reject impossible values (a slipped decimal point, a wrong unit), not
-//! unusual ones. A body is physically consistent if its mass is positive and its inertia about the
-//! centre of mass positive definite. In addition, no principal moment may reach the sum of the two
-//! others.
+//! Bounds are wide: they reject impossible values (a slipped decimal point, a wrong unit), not unusual
+//! ones. A body is physically consistent if its mass is positive and its inertia about the centre of mass
+//! positive definite. In addition, no principal moment may reach the sum of the two others.
 
 use super::{JointFile, LegFile, LinkParameters, Switch};
 use nalgebra::Matrix3;

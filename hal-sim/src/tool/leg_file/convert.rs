@@ -8,10 +8,9 @@ use crate::description::{
 };
 
 impl LegFile {
-    /// Description of the simulated leg. Its sensors have `current_noise_a` only:
-    /// `torque_noise_percent` refers to a motion, for which the caller adds it with
-    /// `World::set_current_noise`. Fails if the leg does not have `N` joints or a joint has no
-    /// `truth`.
+    /// Description of the simulated leg. Its sensors have `current_noise_a` only: `torque_noise_percent`
+    /// refers to a motion, for which the caller adds it with `World::set_current_noise`. Fails if the leg
+    /// does not have `N` joints or a joint has no `truth`.
     pub fn description<const N: usize>(&self) -> Result<LegDescription<N>, LegFileError> {
         let refused = |reason: String| LegFileError::of_file(&self.name, reason);
         let mut joints = Vec::with_capacity(N);
@@ -61,9 +60,8 @@ impl JointFile {
             friction: FrictionDescription {
                 coulomb: truth.coulomb,
                 viscous: truth.viscous,
-                // Friction of coulomb + asymmetry one way and coulomb - asymmetry the other is
-                // equivalent to symmetric friction of coulomb and a constant torque. This holds
-                // moving and at rest.
+                // Friction of coulomb + asymmetry one way and coulomb - asymmetry the other is equivalent
+                // to symmetric friction of coulomb and a constant torque. This holds moving and at rest.
                 offset: truth.offset + truth.asymmetry,
                 stribeck: self.stribeck.map(|stribeck| Stribeck {
                     static_level: stribeck.static_nm,

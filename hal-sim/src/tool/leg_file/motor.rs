@@ -128,10 +128,9 @@ impl SupplyFile {
 }
 
 impl MotorFile {
-    /// Motor of the class of ODrive's D5065 with 270 rpm/V: 8.27/270 = 0.0306 N m/A, 7 pole pairs
-    /// and 12 slots, at most 65 A. Resistance and inductance are typical of such outrunners (15..40
-    /// mohm, 9..35 uH). Cogging (1 % of the greatest torque), saliency and thermal values are our
-    /// assumptions.
+    /// Motor of the class of ODrive's D5065 with 270 rpm/V: 8.27/270 = 0.0306 N m/A, 7 pole pairs and 12
+    /// slots, at most 65 A. Resistance and inductance are typical of such outrunners (15..40 mohm, 9..35
+    /// uH). Cogging (1 % of the greatest torque), saliency and thermal values are our assumptions.
     pub const D5065_CLASS: Self = Self {
         pole_pairs: 7,
         resistance_ohm: 0.039,

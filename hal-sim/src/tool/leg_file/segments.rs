@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::LegFile;
 use crate::tool::anthropometry::Wearer;
 
-/// Segments of the last two links: a thigh and a shank with its foot, as an exoskeleton on a
-/// wearer.
+/// Segments of the last two links: a thigh and a shank with its foot, as an exoskeleton on a wearer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SegmentsFile {

@@ -21,8 +21,7 @@ use crate::tool::temperature;
 
 /// Quantile of the normal distribution at 0.999, standard deviations.
 const NORMAL_QUANTILE: f64 = 3.090_232;
-/// Added to the diagonal of the correlations: rounding of the smallest eigenvalue in single
-/// precision.
+/// Added to the diagonal of the correlations: rounding of the smallest eigenvalue in single precision.
 const ROUNDING: f64 = 1e-6;
 /// Number of parameters named in the line.
 const NAMED: usize = 3;

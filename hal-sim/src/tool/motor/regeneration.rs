@@ -1,8 +1,7 @@
 //! Braking of a spinning inertia into a supply that absorbs no energy.
 //!
-//! The inertia is a leg joint's 2.5 kg m^2, reduced to the motor by the joint's gear, at the
-//! joint's top speed. A current of 50 A brakes it to a tenth of that speed, with and without the
-//! brake chopper.
+//! The inertia is a leg joint's 2.5 kg m^2, reduced to the motor by the joint's gear, at the joint's top
+//! speed. A current of 50 A brakes it to a tenth of that speed, with and without the brake chopper.
 
 use scarab::motor::AxisFault;
 use serde::Serialize;

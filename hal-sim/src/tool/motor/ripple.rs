@@ -1,9 +1,8 @@
 //! Torque ripple at constant speed and current.
 //!
-//! Uses the torque of each PWM period over whole turns of the rotor, without cogging. Reported are
-//! its rms about the mean, and its sixth harmonic per electrical turn, which dead time causes. The
-//! measurement is made with the board's noise and with noise-free sensors, which shows the effect
-//! of the sine.
+//! Uses the torque of each PWM period over whole turns of the rotor, without cogging. Reported are its rms
+//! about the mean, and its sixth harmonic per electrical turn, which dead time causes. The measurement is
+//! made with the board's noise and with noise-free sensors, which shows the effect of the sine.
 
 use core::f64::consts::TAU;
 

@@ -1,10 +1,9 @@
 //! Runs the whole firmware on the paper's three-joint chain: one identification, then the paper's
 //! verification motion.
 //!
-//! Why a separate runner: `identify` validates on its own motions, the paper verifies on Equations
-//! (31) and (32). Here these replace the first validation motion. Everything else is as in
-//! `identify`: the plant of this crate under the firmware's servo, its logging, identification and
-//! verdict.
+//! Why a separate runner: `identify` validates on its own motions, the paper verifies on Equations (31) and
+//! (32). Here these replace the first validation motion. Everything else is as in `identify`: the plant of
+//! this crate under the firmware's servo, its logging, identification and verdict.
 //!
 //! Every sample has the same weight (`identify --estimator plain`), as in the paper. The data have
 //! no outliers; the robust estimator would reject the servo motion of the slow first joint.
@@ -83,8 +82,7 @@ pub struct ChainRun {
     pub report: RunReport,
     /// Identified base parameters.
     pub values: [f32; ROOM],
-    /// Least squares over all rows at once, with the same weight for every joint whatever its
-    /// noise.
+    /// Least squares over all rows at once, with the same weight for every joint whatever its noise.
     pub unweighted: [f32; ROOM],
     /// Sign of the joints' anatomical angles and torques relative to the model's, 1 or -1.
     pub direction: [i64; JOINTS],

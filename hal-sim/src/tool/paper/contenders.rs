@@ -20,11 +20,10 @@
 //! default swarm. In the dimensions of Table IV these are 24,020 (D = 2) and 60,020 (D = 10 and
 //! 30). Leaps and scattering cost more, up to 6 % at D = 2 where the swarm stagnates.
 //!
-//! All searches start in the same box. Swarms scatter uniformly; CMA-ES draws its centre uniformly
-//! and begins with a sigma of 0.3 of the box's width. Outside the box CMA-ES receives the value at
-//! the nearest point of it, plus the squared distance to it in the coordinates' unit. Swarms stay
-//! inside by themselves. A first scattered swarm is iteration 0; CMA-ES has none, its first
-//! generation is iteration 1.
+//! All searches start in the same box. Swarms scatter uniformly; CMA-ES draws its centre uniformly and
+//! begins with a sigma of 0.3 of the box's width. Outside the box CMA-ES receives the value at the nearest
+//! point of it, plus the squared distance to it in the coordinates' unit. Swarms stay inside by themselves.
+//! A first scattered swarm is iteration 0; CMA-ES has none, its first generation is iteration 1.
 
 use argmin::core::{CostFunction, Error, Executor, PopulationState};
 use argmin::solver::particleswarm::{Particle, ParticleSwarm};

@@ -1,10 +1,9 @@
 //! Figure 7 and Equation (33): predicted and real torque of the chain on the verification motion,
 //! for noise of 0 to 15 %.
 //!
-//! The base parameters of both methods, multiplied by the rows of the verification motion, are
-//! compared with the torque of the plant's motors. The error against the noise-free torque is that
-//! of the parameters. The error against the measured torque includes noise, which cannot be
-//! predicted.
+//! The base parameters of both methods, multiplied by the rows of the verification motion, are compared
+//! with the torque of the plant's motors. The error against the noise-free torque is that of the
+//! parameters. The error against the measured torque includes noise, which cannot be predicted.
 //!
 //! Limits: the plant differs from the paper's, whose geometry, motion of joint 1, noise and samples
 //! are not printed. The paper's percentages are therefore listed for information only.

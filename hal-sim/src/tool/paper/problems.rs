@@ -1,13 +1,11 @@
 //! Test functions by their names in the report, in their readings and dimensions.
 //!
-//! Why beside `scarab::swarm::TestProblem`: the functions are the firmware's, so the device
-//! evaluates the same ones. Names, readings, and a new shift and rotation for every run belong to
-//! the report.
+//! Why beside `scarab::swarm::TestProblem`: the functions are the firmware's, so the device evaluates the
+//! same ones. Names, readings, and a new shift and rotation for every run belong to the report.
 //!
-//! `f4-shifted-rotated` is f(x) = Ackley(R (x - c)). The shift c is uniform within half of the
-//! half-box, the rotation R uniform over the orthogonal matrices (Haar). Both are drawn from the
-//! run's seed. Source of R: Gram-Schmidt on rows of normal numbers (Stewart, 1980). Cost: D^2
-//! operations per evaluation.
+//! `f4-shifted-rotated` is f(x) = Ackley(R (x - c)). The shift c is uniform within half of the half-box,
+//! the rotation R uniform over the orthogonal matrices (Haar). Both are drawn from the run's seed. Source
+//! of R: Gram-Schmidt on rows of normal numbers (Stewart, 1980). Cost: D^2 operations per evaluation.
 
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -57,8 +55,7 @@ const fn moved(id: &'static str, function: TestFunction, dimension: usize) -> Ca
     Case { id, reading: Reading::Intended, dimension, function, is_moved: true }
 }
 
-/// All cases of Table IV: the paper's in the plane, the paper's in thirty dimensions, and further
-/// ones.
+/// All cases of Table IV: the paper's in the plane, the paper's in thirty dimensions, and further ones.
 pub const CASES: [Case; 20] = [
     case("f1", TestFunction::Sphere, 2),
     case("f2", TestFunction::SixHumpCamel, 2),

@@ -13,8 +13,7 @@ use scarab::ident::FullObjective;
 use scarab::model::{BaseParameters, INERTIAL_PARAMETERS, LegParameters, Parameter, Standing};
 use scarab::swarm::Objective;
 
-/// Ratio of a link's largest extent to a ball's, both in the prior's radius of gyration: 1.58
-/// sqrt(3).
+/// Ratio of a link's largest extent to a ball's, both in the prior's radius of gyration: 1.58 sqrt(3).
 const LARGEST_OVER_BALL: f64 = 2.736_64;
 
 /// Cost of a leg over the coordinates with an effect on torque.

@@ -1,7 +1,6 @@
 //! Rows of Table IV: many runs of one search on one function, as medians and percentiles.
 //!
-//! A failed run counts as infinite: a median or percentile that falls on a failed run is unknown
-//! (`null`).
+//! A failed run counts as infinite: a median or percentile that falls on a failed run is unknown (`null`).
 
 use serde::Serialize;
 

@@ -172,8 +172,7 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         self.exact.excess(&base.project(&parameters))
     }
 
-    /// Searches log-Cholesky coordinates: all, and without those of links that affect torque by one
-    /// number.
+    /// Searches log-Cholesky coordinates: all, and without those of links that affect torque by one number.
     pub fn whole_legs(&self) -> (Trial, Option<Trial>) {
         let background = &self.context.background;
         let (above, _) = consistent::optimum(background, &self.solver);

@@ -207,8 +207,7 @@ fn grid(problem: &TestProblem, points: u32) -> Vec<Point> {
         .collect()
 }
 
-/// Compass search: steps along the axes while the value falls, halves the step otherwise, down to
-/// rounding.
+/// Compass search: steps along the axes while the value falls, halves the step otherwise, down to rounding.
 fn compass(problem: &TestProblem, start: Point, mut step: f64) -> Point {
     let half = problem.half_width();
     let mut best = start;

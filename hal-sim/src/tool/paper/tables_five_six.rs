@@ -139,8 +139,7 @@ pub struct BaseLine {
 pub struct TablesReport {
     /// Name of the leg file.
     pub leg: &'static str,
-    /// Noise per logged 500 Hz sample, percent of each joint's mean absolute torque on the exciting
-    /// motion.
+    /// Noise per logged 500 Hz sample, percent of each joint's mean absolute torque on the exciting motion.
     pub noise_percent: f64,
     /// Runs of each method.
     pub runs: u64,

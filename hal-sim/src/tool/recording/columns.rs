@@ -13,8 +13,7 @@ pub(in crate::tool) fn read_text(file: &Path) -> Result<String, RecordingError> 
     String::from_utf8(bytes).map_err(|_| refuse(file, None, Fault::NotText))
 }
 
-/// Passes the header to `find` and every row after it to `take`; returns the byte offset of each
-/// row.
+/// Passes the header to `find` and every row after it to `take`; returns the byte offset of each row.
 pub(in crate::tool) fn for_each_row<C>(
     file: &Path,
     text: &str,

@@ -1,5 +1,4 @@
-//! Replaces outliers of a recording at its own rate: resampling would smear each over its
-//! neighbours.
+//! Replaces outliers of a recording at its own rate: resampling would smear each over its neighbours.
 //!
 //! The filter is the board's ([`scarab::ident::hampel`]). Two cases occur in recordings only:
 //!

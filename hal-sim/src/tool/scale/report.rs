@@ -34,8 +34,7 @@ pub struct TorqueConstantReport {
     pub identified: Number,
     /// Standard deviation of the identified constant.
     pub sigma: Number,
-    /// Whether the two runs differ by the stated mass at the stated position, as far as this joint
-    /// shows.
+    /// Whether the two runs differ by the stated mass at the stated position, as far as this joint shows.
     pub consistent: Option<bool>,
     /// Whether the mass is heavy enough to determine this constant.
     #[serde(skip)]

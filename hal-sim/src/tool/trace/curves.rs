@@ -1,8 +1,7 @@
 //! The log of a trace as curves, for figures: measured and predicted torque, residuals.
 //!
-//! The reported identification's samples pass the filter chain once more, as those of a simulated
-//! run do. A motion with a missing sample is not drawn: the filter would join samples that do not
-//! belong together.
+//! The reported identification's samples pass the filter chain once more, as those of a simulated run do. A
+//! motion with a missing sample is not drawn: the filter would join samples that do not belong together.
 
 use scarab::ident::no_stribeck;
 use scarab::model::Parameter;

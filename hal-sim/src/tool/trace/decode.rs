@@ -5,10 +5,9 @@
 //! finds the next frame. Frames that do not decode are counted and skipped. Single-precision values
 //! return with the same bits, since `defmt-decoder` writes the shortest digits that do so.
 //!
-//! Cost: memory for one frame, however long the stream is.
-//! Limits: an image that sends frames without an encoding is rejected, since decoding could not
-//! resume after a gap. A damaged frame that still decodes is reported as it reads; its record
-//! number then rarely continues the sequence.
+//! Cost: memory for one frame, however long the stream is. Limits: an image that sends frames without an
+//! encoding is rejected, since decoding could not resume after a gap. A damaged frame that still decodes is
+//! reported as it reads; its record number then rarely continues the sequence.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -47,8 +46,7 @@ impl Decoder {
     /// A decoder with the texts of an image (ELF).
     ///
     /// # Errors
-    /// The file is no image, belongs to another program, or has no `defmt` or another version of
-    /// it.
+    /// The file is no image, belongs to another program, or has no `defmt` or another version of it.
     pub fn new(image: &[u8]) -> Result<Self, ToolError> {
         let table = Table::parse(image)
             .map_err(|error| ToolError::input(format!("cannot be used as an image: {error}")))?

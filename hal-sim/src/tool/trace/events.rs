@@ -147,8 +147,7 @@ pub fn board(board: &Board) -> String {
     )
 }
 
-/// Returns whether the board is emulated; then its plant is that of the leg file and the truth is
-/// known.
+/// Returns whether the board is emulated; then its plant is that of the leg file and the truth is known.
 #[must_use]
 pub fn is_emulated(board: &Board) -> bool {
     (board.uid0, board.uid1, board.uid2) == (0, 0, 0)

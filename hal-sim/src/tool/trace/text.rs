@@ -45,8 +45,7 @@ fn place(line: &str) -> Option<(usize, usize)> {
     None
 }
 
-/// End of the record without the source location that a logger appends,
-/// ` (scarab src/leg/control.rs:12)`.
+/// End of the record without the source location that a logger appends, ` (scarab src/leg/control.rs:12)`.
 fn end(line: &str, start: usize) -> usize {
     let without = line.ends_with(')').then(|| line.rfind(" (")).flatten();
     match without {

@@ -212,8 +212,7 @@ fn the_curves_of_a_trace_are_those_of_the_run() {
             assert_eq!((&told.measured_deg, &told.still), (&own.measured_deg, &own.still));
         }
     }
-    // The noise is the residual; the identification subtracts its parameters, thirteen of a
-    // thousand rows.
+    // The noise is the residual; the identification subtracts its parameters, thirteen of a thousand rows.
     for (told, own) in told.noise_nm.iter().zip(&own.noise_nm) {
         assert!((told / own - 1.0).abs() < 0.02, "{told} {own}");
     }
