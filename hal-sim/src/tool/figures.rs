@@ -67,7 +67,7 @@ pub enum Group {
 pub struct Figure {
     /// Name of its file.
     pub file: String,
-    /// Where it belongs.
+    /// Section of the report.
     pub group: Group,
     /// Title, read aloud by a screen reader.
     pub title: String,

@@ -67,7 +67,7 @@ impl core::str::FromStr for PriorChoice {
 pub struct SetupError {
     /// Name in the leg file.
     pub leg: String,
-    /// In words.
+    /// Reason.
     pub reason: String,
 }
 

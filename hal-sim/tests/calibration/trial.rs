@@ -46,7 +46,8 @@ impl Trial {
         let mut dice = Dice(Xoshiro256PlusPlus::seed_from_u64(seed));
         let pole_pairs = dice.one_of([4, 5, 7, 10, 14, 21]);
         let counts = dice.one_of([2400.0, 4000.0, 8192.0, 10_000.0, 16_384.0]);
-        // Ranges: 30 mOhm to 0.3 Ohm, log-uniform; L/R of 0.3 ms to 1.5 ms; 20 to 100 mN m/A.
+        // Ranges: 30 mOhm to 0.3 Ohm, small and large ones equally often; L/R of 0.3 ms to 1.5 ms; 20 to
+        // 100 mN m/A.
         let resistance = dice.one_of([0.03, 0.05, 0.08, 0.13, 0.2]) * dice.between(1.0, 1.5);
         let inductance_d = resistance * dice.between(0.3e-3, 1.5e-3);
         let torque_per_ampere = dice.between(0.02, 0.1);

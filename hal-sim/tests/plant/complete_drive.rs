@@ -160,7 +160,7 @@ fn duties(voltage: f64, angle: f64) -> AxisCommand {
     AxisCommand { enabled: true, duty }
 }
 
-/// Rotor at constant speed under a rotating voltage vector; energies of each period, with the last samples.
+/// Rotor at constant speed under a rotating voltage vector; impulse, charge and heat of each period.
 fn turning(
     description: &AxisDescription,
     speed: f64,

@@ -1,4 +1,4 @@
-//! Joints stick, break away, slide and drag each other as friction says.
+//! Friction: joints stick, break away, slide and drag each other.
 
 use crate::common::{joint, leg, planar_leg, spatial_chain, worn_leg};
 use hal_sim::description::{FrictionDescription, LegDescription, Stribeck};

@@ -45,7 +45,7 @@ pub struct EmulateArguments {
     crash_tick: u32,
 }
 
-/// Builds, runs, decodes; the exit code.
+/// Builds, runs and decodes; returns the exit code.
 pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load_for_image()?;
     let image = build(&leg, arguments.seed, arguments.csv.is_some())?;
@@ -94,7 +94,7 @@ fn show(kind: CrashKind, tick: u32, image: &Path, trace: &Path) -> Result<u8, To
         Ok::<_, ToolError>(String::from_utf8_lossy(&bytes).into_owned())
     };
     let report = CrashReport::new(kind, &text(&lines)?, &text(&log)?, begun, image)?;
-    // Megabytes.
+    // Logs of some megabytes.
     for file in [log, lines] {
         let _ = std::fs::remove_file(file);
     }

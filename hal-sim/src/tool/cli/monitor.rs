@@ -26,7 +26,7 @@ pub struct MonitorArguments {
     /// Factor on Coulomb and viscous friction of all joints.
     #[arg(long, allow_hyphen_values = true)]
     friction: Option<f64>,
-    /// The friction changes in the course of this many seconds.
+    /// Duration of the change of friction, seconds.
     #[arg(long, requires = "friction", default_value_t = 0.0)]
     over: f64,
     /// Seconds of walking before the change.
@@ -35,7 +35,7 @@ pub struct MonitorArguments {
     /// Hours of walking without a change, for false alarms.
     #[arg(long, default_value_t = 0.0)]
     hours: f64,
-    /// PER_MINUTE:PEAK_NM: the wearer pushes while walking, half a second on average.
+    /// Pushes of the wearer while walking, PER_MINUTE:PEAK_NM; half a second each on average.
     #[arg(long)]
     pushes: Option<String>,
     /// Seed of noise and pushes.

@@ -27,7 +27,7 @@ pub struct ServeArguments {
     /// Simulated seconds per second.
     #[arg(long, value_name = "K", default_value_t = 1.0)]
     speed: f64,
-    /// Bit rate of the wire, kbit/s.
+    /// Bit rate of the bus, kbit/s.
     #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates())]
     bit_rate: u64,
     /// File of the boards' flash; created if missing.

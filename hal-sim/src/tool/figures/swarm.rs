@@ -60,7 +60,7 @@ impl Band {
         Self::of(curves, 1)
     }
 
-    /// Quartiles over evaluations, one value per [`STRIDE`].
+    /// Quartiles over evaluations, one value per `STRIDE`.
     #[must_use]
     pub fn over_evaluations(curves: &[&[f64]]) -> Self {
         Self::of(curves, STRIDE)

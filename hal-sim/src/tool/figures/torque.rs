@@ -147,7 +147,7 @@ fn torques(curves: &JointCurves) -> impl Iterator<Item = &f64> {
     curves.measured_nm.iter().chain(&curves.predicted_nm).chain(&curves.noise_free_nm)
 }
 
-/// Residuals within the range of the axis: measured ones while the joint moves.
+/// Residuals that the axis must show: measured ones while the joint moves.
 fn errors_seen(curves: &JointCurves) -> impl Iterator<Item = f64> + '_ {
     curves.residual_nm().flatten()
 }

@@ -99,7 +99,7 @@ impl Bench {
         current.min(f64::from(self.configuration.current_limit.0))
     }
 
-    /// Returns an error if the axis has faulted during the measurement.
+    /// Rejects a measurement of an axis that has switched itself off.
     pub fn must_hold(&self, rig: &Rig, what: &str, speed: f64) -> Result<(), ToolError> {
         let Some(fault) = rig.axis.fault() else { return Ok(()) };
         Err(ToolError::Refused(format!(
