@@ -1,4 +1,4 @@
-//! The foot on the floor and the blocked joint of the plant.
+//! Contact of the foot with the floor, and the blocked joint of the plant.
 #![cfg(feature = "tool")]
 use hal_sim::tool::leg_file::{DEFAULT_LEG, LegFile};
 use hal_sim::world::{TICK_S, World};
@@ -24,7 +24,7 @@ fn foot_height(world: &World<2>) -> f64 {
     -0.39 * scarab::real::sin_cos(hip).1 - FOOT[0] * scarab::real::sin_cos(hip - knee).1
 }
 
-/// Lets the released leg fall for so many seconds; the lowest the foot comes.
+/// Lets the leg fall with outputs off for a time; returns the lowest height of the foot.
 fn lowest(world: &mut World<2>, seconds: f64) -> f64 {
     let mut lowest = f64::INFINITY;
     for _ in 0..(seconds / TICK_S) as u32 {
@@ -36,7 +36,7 @@ fn lowest(world: &mut World<2>, seconds: f64) -> f64 {
 
 #[test]
 fn the_floor_holds_a_falling_leg_and_lets_go_after_its_time() {
-    // Heavy enough to fall against the drives' friction.
+    // Heavy enough to fall against the friction of the drives.
     let heavy = || {
         let mut world = world();
         world.attach(1, 10.0, [0.3, 0.0, 0.0]);
@@ -48,7 +48,7 @@ fn the_floor_holds_a_falling_leg_and_lets_go_after_its_time() {
     let mut standing = heavy();
     standing.touch(FOOT, 0.0, 1.0);
     let held = lowest(&mut standing, 1.0);
-    // It sinks in until stiffness, 10 kN/m, has taken it up.
+    // The foot sinks in until a stiffness of 10 kN/m carries it.
     assert!(held > start - 0.02, "{} m below", start - held);
     assert!(lowest(&mut standing, 1.0) < start - 0.05, "the floor is gone");
 }

@@ -1,4 +1,4 @@
-//! The constant that an image holds of a leg, and the size of an image.
+//! Leg constant of an image, and the size of an image.
 
 use hal_sim::tool::board::{BRAKE, axis_configuration, calibration_settings};
 use hal_sim::tool::image::leg_source::{describe, source};
@@ -41,7 +41,7 @@ fn the_board_makes_of_the_constant_the_configuration_the_simulation_runs_with() 
         assert_eq!(made.joints, configuration.joints, "{name}");
         assert_eq!(made.model, configuration.model, "{name}");
         assert_eq!(made.prior, configuration.prior, "{name}");
-        // Every motion tick by tick, to the last bit of the numbers that are stored and then one rounding.
+        // Every motion is compared tick by tick: equal stored bits, then one rounding.
         for (one, other) in [(made.excitation, configuration.excitation)]
             .into_iter()
             .chain(made.validation.into_iter().zip(configuration.validation))
@@ -58,7 +58,7 @@ fn the_board_makes_of_the_constant_the_configuration_the_simulation_runs_with() 
     }
 }
 
-/// What the board is told of its axes is what the simulation of the complete drive runs with.
+/// The axis settings of the board equal those of the simulated complete drive.
 #[test]
 fn the_board_s_axes_are_those_of_the_simulated_drive() {
     let file = leg(DEFAULT_LEG);
@@ -75,7 +75,7 @@ fn the_board_s_axes_are_those_of_the_simulated_drive() {
         assert_eq!(drives::CALIBRATION, calibration_settings(&axis, motor));
     }
     assert_eq!(drives::chopper(19.0), BRAKE);
-    // On a board of 24 V too.
+    // Also on a 24 V board.
     drives::axes(&description, 11.0).iter().for_each(|axis| axis.check().expect("sensible"));
     assert!(scarab::motor::Chopper::new(drives::chopper(11.0)[0], drives::chopper(11.0)[1]).is_some());
 }
@@ -107,7 +107,7 @@ fn a_motor_that_is_not_described_is_not_built_for() {
     assert!(refused(&coarse).contains("joint `hip`: its encoder is at the joint"), "{}", refused(&coarse));
 }
 
-/// The default leg's text without the lines (of a joint: the first one's) that begin with a key.
+/// Text of the default leg without the lines (of the first joint) that begin with a key.
 fn without(key: &str) -> String {
     let mut left = false;
     let lines = include_str!("../legs/x2-wearer-75kg.toml").lines();
@@ -152,7 +152,7 @@ fn an_image_takes_no_default_for_what_moves_a_person() {
     let (_, after) = rest.split_once("[[joint]]").expect("another joint");
     let (_, reason) = refused(&format!("{before}[[joint]]{after}"));
     assert!(reason.starts_with("joint `hip`: `motor` is missing"), "{reason}");
-    // Without these the flux would be another motor's: the reader knows no other default of theirs with a motor.
+    // Without these keys the flux would be another motor's: the reader has no other default for a motor.
     let unmotored =
         |text: String| format!("{}[[joint]]{after}", text.split_once("[joint.motor]").expect("a motor").0);
     for key in ["torque_per_ampere", "encoder"] {
@@ -170,7 +170,7 @@ fn an_image_takes_no_default_for_what_moves_a_person() {
         let (_, reason) = refused(&format!("{before}\nprior{first}{}", rest.trim_start()));
         assert!(reason.starts_with(&format!("joint `hip`: `prior.{key}` is missing")), "{reason}");
     }
-    // The shipped legs of exoskeletons state everything; one of them with an encoder at the joint does not.
+    // The shipped exoskeleton legs state everything; the one with an encoder at the joint does not.
     for name in [DEFAULT_LEG, "x2-rough"] {
         LegFile::load_for_image(name, false).expect("states everything");
     }

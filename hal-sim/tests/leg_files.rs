@@ -1,4 +1,4 @@
-//! Leg files: the shipped ones, what they mean, and every fault with its line and its words.
+//! Leg files: the shipped ones, their meaning, and every fault with its line and message.
 #![cfg(feature = "tool")]
 
 use hal_sim::mechanism::Mechanism;
@@ -225,7 +225,7 @@ fn a_leg_without_truth_or_with_another_number_of_joints_cannot_be_simulated() {
 
 #[test]
 fn the_mujoco_leg_has_the_torques_of_its_simulation() {
-    // Rows 0 and 1 of the noise-free record: joint angles, rates, accelerations and torques of MuJoCo.
+    // Rows 0 and 1 of MuJoCo's noise-free record: joint angles, rates, accelerations and torques.
     let rows = [
         [0.099828014, -0.85715392, -0.05294382, 0.26802728, 0.11948001, 1.4387463, -3.6427595, -3.5831597],
         [0.099304697, -0.85439826, -0.051797402, 0.28239112, 0.10702225, 1.4421343, -3.6719179, -3.5637578],
@@ -233,7 +233,7 @@ fn the_mujoco_leg_has_the_torques_of_its_simulation() {
     let description = LegFile::load("mujoco-leg").expect("shipped").description::<2>().expect("truth");
     let world = World::new(&description, 1);
     for [q1, q2, v1, v2, a1, a2, tau1, tau2] in rows {
-        // At the ports the knee's flexion is positive.
+        // Knee flexion is positive at the ports.
         let torque = world.inverse_dynamics(&[q1, -q2], &[v1, -v2], &[a1, -a2]);
         // The record has eight digits.
         assert!(
@@ -251,9 +251,9 @@ fn legs_hang_straight_down_at_their_anatomical_zero() {
     let at_zero = chain.joints.map(|joint| joint.zero_offset);
     let mechanism = Mechanism::new(&chain);
     let energy = |knee: f64| mechanism.potential_energy(&[at_zero[0], at_zero[1], at_zero[2] + knee]);
-    // The knee's lowest position is off by its centre of mass only: atan(1.532 / 10.636) = 8.2 degrees.
+    // The knee's lowest position is off only by its centre of mass: atan(1.532 / 10.636) = 8.2 degrees.
     assert!(energy(0.0) < energy(0.3) && energy(0.0) < energy(-0.3));
-    // Axis 1 is along gravity: turning it lifts nothing.
+    // Axis 1 lies along gravity: turning it does not change the potential energy.
     let turned = mechanism.potential_energy(&[0.5, at_zero[1], at_zero[2]]);
     assert!((turned - energy(0.0)).abs() < 1e-9);
 }

@@ -1,6 +1,6 @@
-//! Reading recordings: what is accepted, and the message for everything that is not.
+//! Reading of recordings: accepted data, and the message for every rejection.
 //!
-//! Recordings of real machines are read where `SCARAB_RECORDINGS` names their folder.
+//! `SCARAB_RECORDINGS` names the folder with recordings of real machines; without it they are skipped.
 #![cfg(feature = "tool")]
 
 use std::env;
@@ -23,7 +23,7 @@ fn text(header: &str, rows: &[String]) -> String {
     format!("{header}\n{}\n", rows.join("\n"))
 }
 
-/// The message for two joints of a text.
+/// Message for a text read with two joints.
 fn refusal(text: &str) -> String {
     match Recording::parse(Path::new("walk.csv"), text, 2) {
         Ok(_) => panic!("this was accepted:\n{text}"),
@@ -31,7 +31,7 @@ fn refusal(text: &str) -> String {
     }
 }
 
-/// The message for a recording whose line 102 (sample 100, 1 s) is replaced.
+/// Message for a recording with line 102 (sample 100, 1 s) replaced.
 fn refusal_with(line: &str) -> String {
     let mut rows = rows();
     line.clone_into(&mut rows[100]);
@@ -83,7 +83,7 @@ fn a_header_without_a_needed_column_is_refused() {
     assert!(refusal(&text(&header, &rows())).starts_with("walk.csv:1: the header has no column `q2_rad`;"));
     let header = HEADER.replace("tau1_Nm", "i1_A");
     assert!(refusal(&text(&header, &rows())).starts_with("walk.csv:1: the header has no column `tau1_Nm`;"));
-    // No header at all: the first row of numbers is taken for one and shown.
+    // Without a header the first row of numbers counts as one and is shown.
     assert!(
         refusal(&rows().join("\n"))
             .ends_with("no column `t_s`; its columns are: 0.000, 0.1000, -0.2000, 3.000, -4.000")
@@ -173,7 +173,7 @@ fn half_of_the_steps_may_not_be_longer_than_a_tenth_of_a_second() {
     assert!(sampled(10.0).is_ok());
     let message = sampled(9.9).expect_err("too slow");
     assert!(message.contains("which is 9.9 Hz; at least 10 Hz are needed"), "{message}");
-    // A gap takes no median's place.
+    // A gap does not change the median.
     assert!(sampled(1.0).expect_err("too slow").contains("1 Hz"));
 }
 
@@ -185,7 +185,7 @@ fn a_gap_is_refused_where_it_ends() {
         refusal(&text(HEADER, &rows)),
         "walk.csv:102: 0.260 s without a sample before this line; at most 0.200 s are bridged"
     );
-    // 20 median steps of 10 ms are bridged.
+    // A gap of 20 median steps of 10 ms is accepted.
     rows.insert(100, "1.1,0.1,-0.2,3,-4".to_owned());
     assert!(Recording::parse(Path::new("walk.csv"), &text(HEADER, &rows), 2).is_ok());
 }
@@ -214,7 +214,7 @@ fn numbers_in_another_unit_are_refused() {
         refusal_with("1.0,1e300,-0.2,3,-4"),
         "walk.csv:102: 1e300 in column `q1_rad` is beyond 1000: is it in another unit?"
     );
-    // Milliseconds since 1970.
+    // Unix time in milliseconds.
     assert_eq!(
         refusal_with("1.79e12,0.1,-0.2,3,-4"),
         "walk.csv:102: 1.79e12 in column `t_s` is beyond 1e10: is it in another unit?"
@@ -264,7 +264,7 @@ fn a_split_shares_no_sample_and_refuses_a_part_that_is_too_short() {
     assert_eq!(second.joints[1].torque_nm[0], 200.0);
 }
 
-/// Recordings of real machines: samples, duration (s) and how they come onto the grid.
+/// Recordings of real machines: samples, duration (s) and resampling method.
 const REAL: [(&str, usize, usize, f64, Method); 12] = [
     ("dp_A0/00.csv", 2, 4997, 9.999_871, Method::CatmullRom),
     ("dp_A0/01.csv", 2, 4997, 9.998_365, Method::CatmullRom),
@@ -283,7 +283,7 @@ const REAL: [(&str, usize, usize, f64, Method); 12] = [
 #[test]
 fn recordings_of_real_machines_are_read_and_resampled() {
     let Some(folder) = env::var_os("SCARAB_RECORDINGS").map(PathBuf::from) else {
-        // Past the harness, which keeps back what a passing test prints.
+        // Bypasses the test harness, which suppresses the output of passing tests.
         let notice = "SKIPPED recordings of real machines: SCARAB_RECORDINGS names no folder";
         writeln!(std::io::stderr(), "{notice}").expect("standard error");
         return;
@@ -300,7 +300,8 @@ fn recordings_of_real_machines_are_read_and_resampled() {
             "{name}: {} points",
             resampled.len()
         );
-        // Averaging and cubic move a point by a few encoder counts of 3.8e-4 rad: 0.2 to 3.7 of them measured.
+        // Averaging and the cubic move a point by a few encoder counts of 3.8e-4 rad: 0.2 to 3.7
+        // counts measured.
         let worst = largest_distance(&recording, &resampled);
         println!("{name}: {} points, at most {worst:.1e} rad from the straight lines", resampled.len());
         assert!(worst < 2e-3, "{name}: {worst:e} rad");

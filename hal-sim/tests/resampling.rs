@@ -1,4 +1,4 @@
-//! Putting recordings on the uniform grid: what passes, what is lost, and that angle and torque are treated alike.
+//! Resampling on the uniform grid: pass band, losses, and equal treatment of angle and torque.
 #![cfg(feature = "tool")]
 
 use std::f64::consts::TAU;
@@ -14,7 +14,7 @@ use scarab::real::{atan2, sin_cos, sqrt};
 const FREQUENCY_HZ: f64 = 3.0;
 const OFFSET_S: f64 = 17.3;
 
-/// Angle: a sine of amplitude 1 at 3 Hz; torque: three times that.
+/// Angle: sine of amplitude 1 at 3 Hz; torque: three times that.
 fn sine(time_s: Vec<f64>) -> Recording {
     let position_rad: Vec<f64> = time_s.iter().map(|time| sin_cos(TAU * FREQUENCY_HZ * time).0).collect();
     let torque_nm = position_rad.iter().map(|angle| 3.0 * angle).collect();
@@ -30,7 +30,7 @@ fn uniform_stamps(rate_hz: f64) -> Vec<f64> {
     (0..=(10.0 * rate_hz) as usize).map(|sample| OFFSET_S + sample as f64 / rate_hz).collect()
 }
 
-/// 500 Hz stamps that are each up to 0.8 ms early or late: steps of 0.4 to 3.6 ms.
+/// Stamps at 500 Hz, each up to 0.8 ms early or late: steps of 0.4 to 3.6 ms.
 fn jittered_stamps(seed: u64) -> Vec<f64> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let jitter = Uniform::new(-0.8e-3, 0.8e-3).expect("a range");
@@ -41,7 +41,7 @@ fn jittered_stamps(seed: u64) -> Vec<f64> {
 fn compare(resampled: &Resampled) -> (f64, f64, f64) {
     let joint = &resampled.joints[0];
     let (mut worst, mut in_phase, mut quadrature) = (0.0_f64, 0.0, 0.0);
-    // Whole periods only, so that the projection leaks nothing.
+    // Whole periods only, so that the projection has no leakage.
     let points = (9.0 * GRID_RATE_HZ) as usize;
     for (point, angle) in joint.position_rad.iter().enumerate() {
         let (sine, cosine) = sin_cos(TAU * FREQUENCY_HZ * resampled.time_s(point));
@@ -60,7 +60,7 @@ fn a_one_kilohertz_sine_is_attenuated_as_stated_and_not_delayed() {
     let resampled = Resampled::of(&sine(uniform_stamps(1000.0)));
     let (worst, amplitude, phase) = compare(&resampled);
     assert_eq!(resampled.method, Method::BinMean);
-    // sinc(0.006) sinc(0.003)^2 = 1 - 8.9e-5, the table's -0.01 %.
+    // sinc(0.006) sinc(0.003)^2 = 1 - 8.9e-5, the -0.01 % of the table.
     assert!((amplitude - (1.0 - 8.9e-5)).abs() < 1e-6, "amplitude {amplitude}");
     assert!(worst < 9.5e-5, "error {worst:e}");
     assert!(phase.abs() < 1e-9, "phase {phase:e} rad");
@@ -71,13 +71,13 @@ fn a_fifty_hertz_sine_is_interpolated_within_the_stated_error() {
     let resampled = Resampled::of(&sine(uniform_stamps(50.0)));
     let (worst, amplitude, phase) = compare(&resampled);
     assert_eq!(resampled.method, Method::CatmullRom);
-    // Half way 3/8 (0.06 pi)^4 = 4.7e-4; at a quarter also the odd cubic term, (0.06 pi)^3 8 / 6 * 0.1 = 9e-4.
-    // The first and last interval have a one-sided slope and are left to the filter chain's own ends.
+    // Half way: 3/8 (0.06 pi)^4 = 4.7e-4. At a quarter the odd cubic term is added: (0.06 pi)^3 8 / 6 * 0.1
+    // = 9e-4. First and last interval have a one-sided slope and are left to the filter chain's own ends.
     let interior = worst_between(&resampled, 0.05);
     assert!(interior < 9.0e-4, "error {interior:e}");
     assert!(worst < 0.03, "error at the ends {worst:e}");
     assert!((amplitude - 1.0).abs() < 3.0e-4, "amplitude {amplitude}");
-    // The intervals' odd terms cancel: 1e-4 rad at 3 Hz would be 5 us.
+    // Odd terms of the intervals cancel: 1e-4 rad at 3 Hz would be 5 us.
     assert!(phase.abs() < 1e-4, "phase {phase:e} rad");
 }
 
@@ -86,11 +86,12 @@ fn a_jittered_sine_is_put_right() {
     let resampled = Resampled::of(&sine(jittered_stamps(1)));
     let (_, amplitude, phase) = compare(&resampled);
     let interior = worst_between(&resampled, 0.01);
-    // Untreated, 0.8 ms of jitter are an error of up to 2 pi 3 Hz 0.8 ms = 1.5e-2.
-    // A slope over uneven steps is off by y''/2 * (their difference), and the middle by 1/8 of the step times both
-    // ends' slopes: 3.6 ms / 8 * 2 * 178 * 3.2 ms = 5.1e-4 at worst.
+    // Untreated, 0.8 ms of jitter are an error of up to 2 pi 3 Hz 0.8 ms = 1.5e-2. A slope over
+    // uneven steps is off by y''/2 times their difference. The error in the middle is 1/8 of the
+    // step times both ends' slope errors: 3.6 ms / 8 * 2 * 178 * 3.2 ms = 5.1e-4 at worst.
     assert!(interior < 5.1e-4, "error {interior:e}");
-    // A share of that error follows the curvature: on average -4e-5 at 3 Hz, growing with the frequency's square.
+    // A share of that error follows the curvature: on average -4e-5 at 3 Hz, proportional to the
+    // frequency squared.
     assert!((amplitude - 1.0).abs() < 6.0e-5, "amplitude {amplitude}");
     assert!(phase.abs() < 2.0e-5, "phase {phase:e} rad");
 }
@@ -119,9 +120,9 @@ fn noise_of_a_one_kilohertz_recording_drops_by_what_two_samples_allow() {
     let resampled = Resampled::of(&recording(time_s, JointSeries { position_rad, torque_nm }));
     let noise = &resampled.joints[0].torque_nm;
     let deviation = sqrt(noise.iter().map(|value| value * value).sum::<f64>() / noise.len() as f64);
-    // Weights 1/4, 1/2, 1/4: sqrt(3/8) = 0.612, below the 1/sqrt(2) of taking two samples' mean. 5,000 values.
+    // Weights 1/4, 1/2, 1/4: sqrt(3/8) = 0.612, below the 1/sqrt(2) of a mean of two samples. 5,000 values.
     assert!((deviation - 0.612).abs() < 0.02, "deviation {deviation}");
-    // What counts after the low-pass is the density at low frequency: the mean of 100 grid points (0.2 s, 200
+    // After the low-pass only the density at low frequency matters. The mean of 100 grid points (0.2 s, 200
     // samples) must have the deviation 1/sqrt(200). 50 blocks: +-10 %, three deviations of it.
     let blocks: Vec<f64> = noise.chunks_exact(100).map(|block| block.iter().sum::<f64>() / 100.0).collect();
     let slow = sqrt(blocks.iter().map(|mean| mean * mean).sum::<f64>() / blocks.len() as f64 * 200.0);
@@ -143,12 +144,12 @@ fn angle_and_torque_go_through_the_same_operator() {
 #[test]
 fn stamps_in_bursts_do_not_throw_noise_across_the_next_step() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(4);
-    // Every 10 ms two samples 10 us apart: a parabola's slope would take over the noise of the short step.
+    // Two samples 10 us apart every 10 ms: a parabola's slope would amplify the noise of the short step.
     let stamp = |k: u32| f64::from(k / 3) * 0.010 + [0.0, 1e-5, 5e-3][(k % 3) as usize];
     let time_s: Vec<f64> = (0..900).map(stamp).collect();
     let position_rad: Vec<f64> = time_s.iter().map(|_| StandardNormal.sample(&mut random)).collect();
     let mut sparse = recording(time_s, JointSeries { torque_nm: position_rad.clone(), position_rad });
-    // Which method a burst falls under is decided by the median step; both must stay calm.
+    // The median step selects the method for a burst; both methods must stay smooth.
     for expected in [Method::CatmullRom, Method::BinMean] {
         if expected == Method::BinMean {
             sparse.time_s.iter_mut().for_each(|time| *time /= 4.0);
@@ -181,7 +182,7 @@ fn asking_beyond_the_last_point_or_joint_gives_nothing() {
     assert!(Resampled::of(&sine(vec![1.0])).is_empty());
 }
 
-/// Largest difference from the sine, leaving out `margin_s` at both ends.
+/// Largest difference from the sine, without `margin_s` at both ends.
 fn worst_between(resampled: &Resampled, margin_s: f64) -> f64 {
     let margin = (margin_s * GRID_RATE_HZ) as usize;
     (margin..resampled.len() - margin)

@@ -1,4 +1,4 @@
-//! From a solver and its records to the report of a run.
+//! Builds the report of a run from a solver and its records.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -20,7 +20,7 @@ use super::report::{
 };
 use super::scale::ScaleReport;
 
-/// What is known of a leg beside the data.
+/// Knowledge of a leg besides the data.
 #[derive(Clone, Debug)]
 pub struct Background<const N: usize, const B: usize> {
     /// Name in the leg file.
@@ -29,75 +29,76 @@ pub struct Background<const N: usize, const B: usize> {
     pub model: RowModel<f64, N, B>,
     /// Row model of the device.
     pub device: RowModel<f32, N, B>,
-    /// Which columns are estimated.
+    /// Number of estimated columns.
     pub columns: usize,
-    /// What was believed before.
+    /// Prior of the links.
     pub prior: Option<[LinkPrior<f64>; N]>,
     /// `none`, `file` or `wrong:P`.
     pub prior_name: String,
-    /// What the simulated leg has.
+    /// Parameters of the simulated leg.
     pub truth: Option<LegParameters<f64, N>>,
-    /// What the leg file asks of each joint's model.
+    /// Model requested by the leg file, by joint.
     pub asked: Vec<Asked>,
-    /// Of the drives, degrees Celsius, if it is known.
+    /// Temperature of the drives, degrees Celsius, if known.
     pub temperature_c: Option<f64>,
-    /// Its friction curves.
+    /// Stribeck curves of the simulated joints.
     pub stribeck_truth: [Option<StribeckTruth>; N],
 }
 
-/// A motion that was recorded, and how its noise-free torque compares, where that is known.
+/// Recorded motion and, in simulation, its comparison with the noise-free torque.
 #[derive(Clone, Debug)]
 pub struct Motion<const N: usize, const B: usize> {
     /// `fourier`, `gait-6.5`, ...
     pub name: String,
-    /// Rows of it.
+    /// Filtered rows of the motion.
     pub record: Record<f32, N, B>,
-    /// Only of simulated motions.
+    /// Comparison with the noise-free torque; simulated motions only.
     pub truth: Option<[TruthFit; N]>,
 }
 
 /// Comparison with the noise-free torque of one joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TruthFit {
-    /// Root mean square error over mean absolute torque, rows left out in which the joint sticks, percent.
+    /// Root mean square error over mean absolute torque, percent; rows in which the joint sticks
+    /// are excluded.
     pub percent_of_mean_abs: f64,
-    /// Share of rows left out.
+    /// Share of excluded rows.
     pub sticking_share: f64,
 }
 
-/// What surrounds the numbers of a run.
+/// Further data for the report of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Circumstances<const B: usize> {
-    /// Of the simulated noise.
+    /// Seed of the simulated noise.
     pub seed: Option<u64>,
     /// Cramer-Rao bound of the base parameters.
     pub cramer_rao: Option<[f64; B]>,
-    /// The same of each joint's Stribeck surplus.
+    /// Cramer-Rao bound of each joint's Stribeck surplus.
     pub surplus_cramer_rao: Vec<Option<f64>>,
     /// Robust or plain.
     pub estimator: Estimator,
-    /// First iteration with an excess of at most a half.
+    /// First iteration with an excess of at most 0.5.
     pub iterations_to_half_chi2: Option<u32>,
     /// Every test of the verdict.
     pub findings: Vec<FindingReport>,
-    /// What the model is worth to the servo.
+    /// Effect of the model on the servo.
     pub tracking: Vec<TrackingReport>,
-    /// Which drives were simulated.
+    /// Kind of simulated drives.
     pub drive: Option<&'static str>,
     /// Simulated or recorded time, s.
     pub simulated_s: f64,
-    /// Time it took.
+    /// Computing time.
     pub wall: Duration,
 }
 
-/// Name of a parameter as reports write it.
+/// Name of a parameter in reports.
 #[must_use]
 pub fn parameter_name(joint: usize, parameter: Parameter) -> String {
     format!("{}{}", parameter.symbol(), joint + 1)
 }
 
 impl<const N: usize, const B: usize> Background<N, B> {
-    /// Name of a base parameter: its carrier, with an `R` where others are regrouped into it.
+    /// Name of a base parameter: its carrier, with an `R` if others are regrouped into it.
     #[must_use]
     pub fn base_name(&self, base: usize) -> String {
         let Some((joint, parameter)) = self.model.base.independent(base) else { return String::new() };
@@ -105,7 +106,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
         format!("{}{}", self.name(joint, parameter), if others { "R" } else { "" })
     }
 
-    /// Plain least squares looks for nothing that was not asked for.
+    /// Sets the estimator. Plain least squares disables every choice left to the data.
     pub fn use_estimator(&mut self, estimator: Estimator) {
         let unasked = |choice: &mut Choice| {
             if *choice == Choice::Auto && estimator == Estimator::Plain {
@@ -126,7 +127,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
         })
     }
 
-    /// Not estimated, and so zero in the model; `dropped` are the base parameters held at zero.
+    /// Whether the parameter is not estimated and thus zero in the model; `dropped` are base
+    /// parameters held at zero.
     pub fn is_zero(&self, dropped: &[bool; B], joint: usize, parameter: Parameter) -> bool {
         self.model.base.standing(joint, parameter) == Standing::Off
             || self.device.drive(joint, parameter).is_some_and(|base| dropped[base])
@@ -136,7 +138,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
         self.model.base.independent(base).map_or("", |(_, parameter)| parameter.unit())
     }
 
-    /// The swarm's constrained optimum and both costs, in double precision and chi-square units.
+    /// Constrained optimum of the swarm and both costs, in double precision and chi-square units.
     #[must_use]
     pub fn costs(&self, solver: &Solver<f32, N, B>) -> Costs<B> {
         let record = solver.record().convert::<f64>();
@@ -150,7 +152,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
         Costs { least_squares: all.residual(), above: all.excess(&optimum), factor: all }
     }
 
-    /// The report of a run.
+    /// Builds the report of a run.
     #[must_use]
     pub fn report(
         &self,
@@ -236,7 +238,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
         found.filter_map(|(joint, fit)| Some(StribeckReport::of(joint, fit.as_ref()?, values))).collect()
     }
 
-    /// Surplus of static over Coulomb friction, of joints that have one or for which one was found.
+    /// Static friction above Coulomb friction, for joints with a true or identified surplus.
     pub fn surpluses(&self, found: &[StribeckReport], cramer_rao: &[Option<f64>]) -> Vec<BaseReport> {
         let of = |joint: usize| {
             let found = found.iter().find(|found| found.joint == joint + 1);
@@ -262,7 +264,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
         (0..self.model.base.rank()).filter(|&base| !dropped[base])
     }
 
-    /// What torque determines.
+    /// Reports of the base parameters.
     pub fn base_parameters(
         &self,
         dropped: &[bool; B],
@@ -286,7 +288,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             .collect()
     }
 
-    /// The others of a parameter's base parameters.
+    /// Other parameters of the same base parameters.
     #[must_use]
     pub fn grouped_with(&self, joint: usize, parameter: Parameter) -> Vec<String> {
         let carriers = self.model.base.carriers(joint, parameter);
@@ -302,7 +304,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
     fn parameters(&self, solver: &Solver<f32, N, B>, estimate: &Estimate<f32, B>) -> Vec<ParameterReport> {
         let record = solver.record();
         let prior = self.prior.as_ref().map(prior_parameters);
-        // Without a prior the values that torque does not tell would be made up.
+        // Without a prior, values that torque does not determine would be arbitrary.
         let completed = prior.and_then(|_| solver.parameters());
         let mut reports = Vec::with_capacity(N * PARAMETERS_PER_JOINT);
         for joint in 0..N {
@@ -345,13 +347,13 @@ pub struct Costs<const B: usize> {
     pub factor: Factor<f64, B>,
 }
 
-/// Name of static friction.
+/// Name of the static friction of a joint.
 #[must_use]
 pub fn surplus_name(joint: usize) -> String {
     format!("FS{}", joint + 1)
 }
 
-/// The word for an estimator.
+/// Name of an estimator.
 #[must_use]
 pub const fn estimator_name(estimator: Estimator) -> &'static str {
     match estimator {
@@ -360,7 +362,7 @@ pub const fn estimator_name(estimator: Estimator) -> &'static str {
     }
 }
 
-/// The word for a plan.
+/// Name of a plan.
 #[must_use]
 pub const fn plan_name(plan: Plan) -> &'static str {
     match plan {

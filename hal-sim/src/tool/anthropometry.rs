@@ -1,24 +1,24 @@
 //! A wearer's thigh, shank and foot from body mass and lengths.
 //!
-//! Why: a prior for a person nobody has measured, and simulated persons of any size.
+//! Why: a prior for a person without measurements, and simulated persons of any size.
 //!
-//! - Mass, centre of mass and radius of gyration of a segment as fractions of body mass and segment length, and lengths as
-//!   fractions of height, after Winter, Biomechanics and Motor Control of Human Movement (lengths there after Drillis and
-//!   Contini): thigh 0.245, shank 0.246, foot 0.152 of the height.
-//! - Ankle held at a right angle, so shank and foot are one body; the foot's centre of mass lies at 0.307 of its length in
-//!   front of the ankle (ours: 0.083 m of 0.27 m).
-//! - Only sagittal inertias are given, so each segment is completed as a solid of revolution: about its long axis it has
-//!   mass * radius^2 / 2 with the radii stated below (ours).
+//! - Mass, centre of mass and radius of gyration of a segment are fractions of body mass and segment length,
+//!   lengths are fractions of height. Source: Winter, Biomechanics and Motor Control of Human Movement
+//!   (lengths there after Drillis and Contini): thigh 0.245, shank 0.246, foot 0.152 of the height.
+//! - The ankle is held at a right angle, so shank and foot are one body. The foot's centre of mass lies at
+//!   0.307 of its length in front of the ankle (ours: 0.083 m of 0.27 m).
+//! - Only sagittal inertias are given. Each segment is completed as a solid of revolution with
+//!   mass * radius^2 / 2 about its long axis; the radii are stated below (ours).
 //!
-//! Frames: x down the segment, y forward, z along the joint's axis; everything lies in the plane z = 0. Limits: adults;
-//! a single person differs from the fractions by some 10 %.
+//! Frames: x down the segment, y forward, z along the joint's axis; everything lies in the plane z
+//! = 0. Limits: adults; a single person differs from the fractions by about 10 %.
 
 /// Thigh, shank and foot of a standing height.
 const THIGH_OF_HEIGHT: f64 = 0.245;
 const SHANK_OF_HEIGHT: f64 = 0.246;
 const FOOT_OF_HEIGHT: f64 = 0.152;
 
-/// A person as far as a leg is concerned.
+/// Body mass and leg lengths of a person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wearer {
     /// Body mass, kg.
@@ -32,7 +32,7 @@ pub struct Wearer {
 }
 
 impl Wearer {
-    /// Somebody of this mass (kg) and height (m).
+    /// Person of this mass (kg) and height (m).
     #[must_use]
     pub fn of_height(mass: f64, height: f64) -> Self {
         Self {
@@ -69,7 +69,7 @@ impl Wearer {
 /// Long axis of a solid of revolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Along {
-    /// Down the segment.
+    /// Along the segment.
     X,
     /// Forward.
     Y,
@@ -78,17 +78,17 @@ pub enum Along {
 /// A solid of revolution in the plane of motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
-    /// kg.
+    /// Mass, kg.
     pub mass: f64,
-    /// Centre of mass, m.
+    /// Centre of mass along x, m.
     pub x: f64,
-    /// Centre of mass, m.
+    /// Centre of mass along y, m.
     pub y: f64,
-    /// About the joint's axis through the centre of mass, kg m^2.
+    /// Inertia about the joint's axis through the centre of mass, kg m^2.
     pub sagittal: f64,
-    /// m.
+    /// Radius, m.
     pub radius: f64,
-    /// Its long axis.
+    /// Direction of the long axis.
     pub along: Along,
 }
 
@@ -98,7 +98,7 @@ fn limb(mass: f64, length: f64, gyration: f64, radius: f64) -> Segment {
     Segment { mass, x: 0.433 * length, y: 0.0, sagittal: mass * gyration * gyration, radius, along: Along::X }
 }
 
-/// One rigid body of several segments: mass, centre of mass, and tensor elements XX XY XZ YY YZ ZZ about that.
+/// Joins segments to a rigid body: mass, centre of mass, and tensor elements XX XY XZ YY YZ ZZ about it.
 #[must_use]
 pub fn joined(segments: &[Segment]) -> (f64, [f64; 3], [f64; 6]) {
     let mass: f64 = segments.iter().map(|segment| segment.mass).sum();

@@ -1,11 +1,12 @@
-//! The firmware's side of a complete drive: all levels of the board ([`levels`]) over simulated registers ([`registers`]).
+//! Firmware side of a complete drive: all levels of the board ([`levels`]) over simulated registers
+//! ([`registers`]).
 //!
-//! What the plant says in a PWM period is answered in the same period and acts in the next; the servo's sample is the mean of the six
-//! periods since its last tick.
+//! The firmware answers the plant's readings of a PWM period in the same period; the answer acts in
+//! the next. The servo's sample is the mean of the six periods since its last tick.
 //!
-//! A run begins with a drive that is ready: every motor was calibrated on a stand, free of its gear and at rest, with the rotor
-//! and the counter where they are in the leg, and the pose in which the leg stands is taken for the reference (a released leg
-//! would swing for the half second that `StatedPose` waits).
+//! A run begins with a ready drive. Every motor was calibrated on a stand, free of its gear and at
+//! rest, with rotor and counter at the leg's positions. The leg's initial pose is taken for the
+//! reference: with outputs off, the leg would swing for the half second that `StatedPose` waits.
 
 pub mod levels;
 mod locked;
@@ -31,29 +32,30 @@ use crate::drive::stand::{Load, Stand};
 use crate::world::World;
 use crate::world::periods::PERIODS_PER_TICK;
 
-/// Of the bus voltage, on the board of 56 V.
+/// Divider of the bus voltage on the 56 V board.
 const DIVIDER: f32 = 19.0;
-/// Within which its bridges may switch.
+/// Bus voltages at which the bridges may switch.
 pub const BUS: [Volt; 2] = drives::bus(DIVIDER);
-/// Where its brake resistor conducts.
+/// Bus voltages at which the brake resistor conducts.
 pub const BRAKE: [Volt; 2] = drives::chopper(DIVIDER);
 
-/// Most that a motor is calibrated with on its stand.
+/// Largest current for the calibration of a motor on its stand.
 const CALIBRATION_CURRENT_A: f64 = drives::CALIBRATION.current.0 as f64;
-/// Voltage vectors of a calibration: what is enough for motors of the default leg, and less than half of the lowest bus.
+/// Voltage vectors of a calibration: sufficient for motors of the default leg, and less than half
+/// of the lowest bus voltage.
 const CALIBRATION_VOLTAGE_V: [f64; 2] = [3.0, 9.5];
 const CALIBRATION_TURNS_PER_S: f32 = drives::CALIBRATION.turns_per_s;
-/// Half of a wave with which the firmware measures inductances, s, and the share of the current that it aims at.
+/// Half-wave with which the firmware measures inductances, s, and its share of the calibration current.
 const HALF_WAVE_S: f64 = 2.0 / 24_000.0;
 const WAVE_SHARE: f64 = 0.3;
-/// What turns on the stand: the rotor alone, kg m^2; bearings, N m; a little of drag, N m s/rad.
+/// Load on the stand: the rotor alone, kg m^2; bearings, N m; slight drag, N m s/rad.
 const ROTOR: Load = Load::Free { inertia: 1e-4, coulomb: 0.01, viscous: 1e-4, torque: 0.0 };
-/// Before a calibration: half a second.
+/// Rest before a calibration: half a second.
 const REST_PERIODS: u32 = 12_000;
-/// A calibration takes some seconds.
+/// Limit of a calibration, periods; it takes some seconds.
 const LONGEST_CALIBRATION: u32 = 24_000 * 60;
 
-/// The configuration of a joint's axis, as the board's settings make it of what a leg file states.
+/// Configuration of a joint's axis, derived from the leg file by the board's settings.
 pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfiguration {
     let motor = MotorDescription {
         pole_pairs: motor.pole_pairs as u8,
@@ -65,8 +67,8 @@ pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfigura
     drives::axis(&motor, Ampere(joint.current_limit() as f32), speed, DIVIDER)
 }
 
-/// How a motor is calibrated on its stand: no more than its axis' current and what its resistance lets through at the voltage
-/// allowed; that by resistance and inductance.
+/// Calibration settings of a motor on its stand. The current is limited by the axis and by what the
+/// resistance allows at the permitted voltage; the voltage follows from resistance and inductance.
 #[must_use]
 pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile) -> CalibrationSettings {
     let [usual, most] = CALIBRATION_VOLTAGE_V;
@@ -82,18 +84,18 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
     }
 }
 
-/// A motor on its stand, free of its gear, that came to rest with its bridge released: the rotor began at `angle`, rad.
+/// Motor on its stand, free of its gear, at rest with outputs off; the rotor started at `angle`, rad.
 #[must_use]
 pub fn rested(axis: &AxisDescription, supply: &SupplyDescription, angle: f64, seed: u64) -> Stand {
     let mut stand = Stand::new(axis, supply, ROTOR, angle, seed);
-    // Cogging takes the rotor to a place where it rests.
+    // Cogging moves the rotor to a rest position.
     for _ in 0..REST_PERIODS {
         stand.period(&AxisCommand::RELEASED, 0.0);
     }
     stand
 }
 
-/// Calibrates a motor on its stand, the rotor at `angle` (rad); `name` is for the message where that fails.
+/// Calibrates a motor on its stand with the rotor at `angle` (rad); `name` is used in error messages.
 pub fn commission(
     name: &str,
     configuration: &AxisConfiguration,
@@ -120,7 +122,7 @@ pub fn commission(
     Err(refused("the calibration did not end".into()))
 }
 
-/// Axes of a board that is ready, and its chopper: motors calibrated, counts as those of the pose in which the world's leg stands.
+/// Axes and chopper of a ready board: motors calibrated, counters at the initial pose of the simulated leg.
 fn ready<const N: usize>(
     believed: &LegFile,
     description: &CompleteDescription<N>,
@@ -139,7 +141,8 @@ fn ready<const N: usize>(
         let (name, simulated) = (&joint.name, &description.axes[index]);
         let settings = calibration_settings(&configuration, motor);
         let counts = pose.joints[index].encoder_counts;
-        // The counter wraps at 16 bits, which are no whole turns of every encoder: it has to begin where the leg's does.
+        // The counter wraps at 16 bits, not at whole turns of every encoder: it must start at the
+        // leg's count.
         let angle = TAU * f64::from(counts) / simulated.counter.counts;
         let supply = &description.supply;
         let calibration = commission(name, &configuration, settings, simulated, supply, angle, seed)?;
@@ -151,14 +154,14 @@ fn ready<const N: usize>(
     let chopper = Chopper::new(BRAKE[0], BRAKE[1])
         .ok_or_else(|| ToolError::input("the firmware refuses the chopper's voltages"))?;
     let axes = axes.try_into().map_err(|_| ToolError::input("a motor for every joint is needed"))?;
-    // The first period was that of the reference; the rest of its servo tick passes released.
+    // The first period took the reference; outputs stay off for the rest of its servo tick.
     for _ in 1..PERIODS_PER_TICK {
         world.period(&[AxisCommand::RELEASED; N], 0.0);
     }
     Ok((axes, chopper))
 }
 
-/// What the housekeeping of this leg is built from.
+/// Settings of the housekeeping for this leg.
 fn housekeeping_settings<const N: usize>(leg: &LegFile) -> Result<HousekeepingSettings<N>, ToolError> {
     let unfit = || ToolError::input("a motor for every joint is needed");
     let mut parts = Vec::with_capacity(N);

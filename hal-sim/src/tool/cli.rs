@@ -41,29 +41,30 @@ struct Cli {
 enum Command {
     /// Identify a simulated leg: drive it, log it, solve, validate, track.
     Identify(identify::IdentifyArguments),
-    /// Design an exciting motion and say what it will tell, before anything moves.
+    /// Design an exciting motion and predict its result before anything moves.
     Excite(excite::ExciteArguments),
     /// Identify a leg from recordings.
     Replay(replay::ReplayArguments),
-    /// Report what a board told: a trace, decoded.
+    /// Decode and report the trace of a board.
     Trace(trace::TraceArguments),
-    /// Predict the torque of given states with a model that was kept: CSV.
+    /// Predict the torque of given states from a stored model: CSV.
     Predict(predict::PredictArguments),
-    /// Write a model that was kept as a robot description.
+    /// Write a stored model as a robot description.
     Export(export::ExportArguments),
     /// Write the electronic data sheets of the bus' nodes, one per joint.
     Eds(eds::EdsArguments),
-    /// Put legs on a CANopen bus that host software reaches over TCP (slcan).
+    /// Serve legs on a CANopen bus, reached by host software over TCP (slcan).
     Serve(serve::ServeArguments),
-    /// What a board remembers over the power: its flash as TOML, and TOML into a flash.
+    /// Export and import the stored data of a board: its flash as TOML, and TOML into a flash.
     Kept(kept::KeptArguments),
-    /// Change the load or the friction of a leg that walks: time to notice, what was found, false alarms.
+    /// Change load or friction while a leg walks: detection time, identified cause, false alarms.
     Monitor(monitor::MonitorArguments),
     /// Measure the current loop on a motor's test stand: steps, torque ripple, voltage limit, regeneration.
     Motor(motor::MotorArguments),
-    /// Inject the fault catalogue into the whole firmware while it identifies a leg: what is seen, when, and what follows.
+    /// Inject the fault catalogue into the whole firmware during an identification: detection,
+    /// time, and reaction.
     Faults(faults::FaultsArguments),
-    /// Run the paper's tables and figures again and set them beside what it prints.
+    /// Reproduce the paper's tables and figures and compare them with its printed results.
     Paper(paper::PaperArguments),
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     Regressor(regressor::RegressorArguments),
@@ -75,7 +76,7 @@ enum Command {
     FlashLeg(image::FlashArguments),
 }
 
-/// What a run without any arguments is.
+/// Arguments of a run without any.
 const MAIN_JOB: [&str; 5] = ["identify", "--figures", "target/sim", "--report", "target/sim/report.html"];
 
 /// Runs the tool on the process's arguments.
@@ -83,7 +84,7 @@ const MAIN_JOB: [&str; 5] = ["identify", "--figures", "target/sim", "--report", 
 pub fn main() -> ExitCode {
     let mut words: Vec<_> = std::env::args_os().collect();
     match words.get(1).and_then(|word| word.to_str()) {
-        // Without a subcommand the main job is meant.
+        // Without a subcommand, run the main job.
         None => words.extend(MAIN_JOB.map(Into::into)),
         Some(option) if option.starts_with("--") && !["--help", "--version"].contains(&option) => {
             words.insert(1, "identify".into());
@@ -104,7 +105,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Runs one command; its exit code.
+/// Runs one command and returns its exit code.
 fn run(command: &Command) -> Result<u8, ToolError> {
     match command {
         Command::Excite(arguments) => excite::run(arguments),
@@ -133,7 +134,7 @@ mod tests {
 
     use super::{Cli, files};
 
-    /// An argument that names a file has a type that says what is done with it, or the check would not see it.
+    /// Every path argument needs a type that states its use; otherwise the check would miss it.
     #[test]
     fn every_path_on_the_command_line_has_a_role() {
         let mut paths = 0;

@@ -1,8 +1,9 @@
-//! Legs that can exist: what the board found, what a swarm over whole legs finds, and the optimum of both.
+//! Physically consistent legs: result of the board, result of a swarm over whole legs, and the optimum.
 //!
-//! The board searches base values and completes them. Beside it the host runs the beetle swarm over log-Cholesky
-//! coordinates of every link, in the board's precision, and finds in double precision the least cost any allowed leg
-//! has. That problem is convex, so its optimum is the global one, up to the barriers' 21 N times 1e-8.
+//! The board searches base values and completes them. The host also runs the beetle swarm over
+//! log-Cholesky coordinates of every link, in the board's precision. In double precision it finds
+//! the least cost of any allowed leg. That problem is convex, so its optimum is the global one, up
+//! to the barriers' 21 N times 1e-8.
 
 use std::collections::BTreeMap;
 
@@ -15,12 +16,12 @@ use scarab::swarm::BsoSettings;
 use super::analysis::Background;
 use super::report::{ConsistentReport, ConsistentSearchReport, Number};
 
-/// Room for the coordinates of three joints.
+/// Capacity for the coordinates of three joints.
 const DIMENSIONS: usize = 42;
-/// Excess at which a search has arrived, chi-square units.
+/// Excess at which a search counts as finished, chi-square units.
 const ARRIVED: f64 = 0.5;
 
-/// The least cost of an allowed leg above that of least squares, chi-square units.
+/// Least cost of an allowed leg above that of least squares, chi-square units.
 #[must_use]
 pub fn optimum<const N: usize, const B: usize>(
     background: &Background<N, B>,
@@ -37,7 +38,7 @@ pub fn optimum<const N: usize, const B: usize>(
     (weighted.excess(&background.model.base.project(&completion.parameters())), weighted)
 }
 
-/// Both searches against the optimum.
+/// Compares both searches with the optimum.
 #[must_use]
 pub fn compare<const N: usize, const B: usize>(
     background: &Background<N, B>,
@@ -70,7 +71,7 @@ pub fn compare<const N: usize, const B: usize>(
     }
 }
 
-/// The swarm over whole legs.
+/// Runs the swarm over whole legs.
 fn full<const N: usize, const B: usize>(
     background: &Background<N, B>,
     solver: &Solver<f32, N, B>,
@@ -120,7 +121,8 @@ fn full<const N: usize, const B: usize>(
     report
 }
 
-/// Values by name; none without a prior, because what torque does not see would be made up.
+/// Values by name; empty without a prior, because parameters without an effect on torque would be
+/// arbitrary.
 fn named<const N: usize, const B: usize>(
     background: &Background<N, B>,
     parameters: Option<&LegParameters<f32, N>>,

@@ -1,4 +1,5 @@
-//! Legs that can exist over many runs: how both searches fare, and how far apart what torque cannot know comes out.
+//! Statistics of physically consistent legs over many runs: both searches, and the spread of
+//! parameters that torque does not determine.
 
 use super::error::ToolError;
 use super::report::{ConsistentSearchReport, RunReport};
@@ -8,7 +9,7 @@ use super::tables::{self, say};
 const ITERATIONS: u32 = 125;
 const EXCESS: f64 = 0.5;
 
-/// Picks one of a run's two searches.
+/// Selects one of a run's two searches.
 type Search = fn(&RunReport) -> Option<&ConsistentSearchReport>;
 
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
@@ -21,7 +22,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// Both searches, then the parameters that torque alone does not tell.
+/// Prints both searches, then the parameters that torque alone does not determine.
 pub fn print(runs: &[RunReport]) -> Result<(), ToolError> {
     let mut table = tables::headed(&[
         "search for a leg that can exist",
@@ -69,7 +70,7 @@ pub fn print(runs: &[RunReport]) -> Result<(), ToolError> {
     hidden(runs)
 }
 
-/// Parameters that are the prior's or share a group: how far from the truth they and the prior are.
+/// Parameters from the prior or in a group: their distance and the prior's distance from the truth.
 fn hidden(runs: &[RunReport]) -> Result<(), ToolError> {
     let Some(first) = runs.first() else { return Ok(()) };
     let mut table = tables::headed(&[

@@ -1,4 +1,4 @@
-//! What was set aside of a motion and what was found of Stribeck friction, as reports say it.
+//! Reports of excluded data and of Stribeck friction.
 
 use scarab::ident::{Record, StribeckFit};
 use serde::Serialize;
@@ -6,16 +6,16 @@ use serde::Serialize;
 use super::precision::{plain, sigma, value};
 use super::report::Number;
 
-/// What was set aside of the motion identified from.
+/// Data excluded from the motion identified from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OutliersReport {
     /// `robust` or `plain`.
     pub estimator: &'static str,
-    /// 500 Hz samples taken in.
+    /// 500 Hz samples accepted.
     pub samples: u32,
-    /// Isolated wild angles and torques of each joint, replaced before the filter.
+    /// Isolated outliers among angles and torques of each joint, replaced before the filter.
     pub replaced: Vec<u32>,
-    /// Share of each joint's rows that counted for less than half, 0..1.
+    /// Share of each joint's rows with less than half of their weight, 0..1.
     pub disturbed_share: Vec<Number>,
     /// Longest stretch of such rows of each joint, s.
     pub longest_s: Vec<Number>,
@@ -24,7 +24,7 @@ pub struct OutliersReport {
 }
 
 impl OutliersReport {
-    /// Of the record of a training motion.
+    /// Report of a training motion's record.
     #[must_use]
     pub fn of<const N: usize, const B: usize>(record: &Record<f32, N, B>, estimator: &'static str) -> Self {
         let outliers = &record.outliers;
@@ -38,7 +38,7 @@ impl OutliersReport {
         }
     }
 
-    /// One line; nothing to say of plain least squares.
+    /// One line; `None` for plain least squares.
     #[must_use]
     pub fn line(&self) -> Option<String> {
         if self.estimator == "plain" {
@@ -66,22 +66,22 @@ impl OutliersReport {
 /// Stribeck friction of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StribeckReport {
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
-    /// Static friction less Coulomb's, N m.
+    /// Static friction above Coulomb friction, N m.
     pub surplus_nm: Number,
-    /// Standard deviation.
+    /// Standard deviation of the surplus.
     pub surplus_sigma_nm: Number,
-    /// Speed at which it has fallen to 1/e, rad/s.
+    /// Speed at which the surplus has fallen to 1/e, rad/s.
     pub speed_rad_s: Number,
-    /// Standard deviation.
+    /// Standard deviation of the speed.
     pub speed_sigma_rad_s: Number,
-    /// Chi-square that it explains.
+    /// Chi-square explained by the Stribeck term.
     pub gain_chi2: Number,
 }
 
 impl StribeckReport {
-    /// Of a joint whose Stribeck friction was found, with these base parameters.
+    /// Report of an identified Stribeck curve with these base parameters.
     #[must_use]
     pub fn of<const B: usize>(joint: usize, fit: &StribeckFit<f32, B>, values: &[f32; B]) -> Self {
         Self {
@@ -94,7 +94,7 @@ impl StribeckReport {
         }
     }
 
-    /// One line.
+    /// One line of text.
     #[must_use]
     pub fn line(&self) -> String {
         format!(

@@ -1,7 +1,7 @@
-//! The electronic data sheet of a joint's node, written from the same table that the node is.
+//! Electronic data sheet of a joint's node, generated from the node's own object table.
 //!
-//! Why generated: host software believes the sheet, not the node; a sheet that was written by hand is wrong after the next
-//! change. Values that only a live node has (what is measured, serial number, versions) have no default in it.
+//! Why generated: host software trusts the sheet, not the node, and a manual sheet is wrong after the next
+//! change. Values that only a live node has (measurements, serial number, versions) have no default.
 //!
 //! Source: CiA 306-1 (CAN electronic data sheet). Checked by `hal-sim/tests/tool/eds.rs` against a live node.
 
@@ -12,13 +12,13 @@ use scarab::bus::Identity;
 use scarab::bus::dictionary::{Access, Mapping, Row, Type};
 use scarab::bus::table::{GROUPS, NAMES, ROWS};
 
-/// One part of an object.
+/// One subindex of an object.
 struct Part {
     row: &'static Row,
     name: &'static str,
 }
 
-/// The sheet of a joint's node.
+/// Data sheet of a joint's node.
 #[must_use]
 pub fn text(joint: &str) -> String {
     let mut out = String::new();
@@ -27,7 +27,7 @@ pub fn text(joint: &str) -> String {
     out
 }
 
-/// Every object: its parts by subindex.
+/// Objects with their parts by subindex.
 fn objects() -> BTreeMap<u16, BTreeMap<u8, Part>> {
     let mut objects: BTreeMap<u16, BTreeMap<u8, Part>> = BTreeMap::new();
     for (row, name) in ROWS.iter().zip(NAMES) {
@@ -54,7 +54,7 @@ fn write_all(out: &mut String, joint: &str) -> fmt::Result {
          LSS_Supported=0\n",
         identity.vendor, identity.product, identity.revision
     )?;
-    // Place holders in received PDOs: INTEGER8 to UNSIGNED32.
+    // Dummy entries for received PDOs: INTEGER8 to UNSIGNED32.
     writeln!(out, "[DummyUsage]")?;
     for kind in 1..=7 {
         writeln!(out, "Dummy{kind:04}={}", u8::from(kind > 1))?;

@@ -1,4 +1,4 @@
-//! Errors of the tool and the exit codes they become.
+//! Errors of the tool and their exit codes.
 
 use std::path::Path;
 
@@ -7,50 +7,50 @@ use super::model_file::ModelFileError;
 use super::recording::RecordingError;
 use super::setup::SetupError;
 
-/// Done, and the result was accepted.
+/// Exit code of an accepted result.
 pub const EXIT_ACCEPTED: u8 = 0;
-/// Done, and the result was refused.
+/// Exit code of a rejected result.
 pub const EXIT_REFUSED: u8 = 3;
-/// Bad input.
+/// Exit code of bad input.
 pub const EXIT_INPUT: u8 = 2;
 
-/// Why there is no result, in words that name file, line and reason.
+/// Reason for a missing result; names file, line and cause.
 #[derive(Debug, thiserror::Error)]
 pub enum ToolError {
-    /// A leg file.
+    /// Error of a leg file.
     #[error(transparent)]
     LegFile(#[from] LegFileError),
-    /// A model file.
+    /// Error of a model file.
     #[error(transparent)]
     ModelFile(#[from] ModelFileError),
-    /// Readable and well-formed, but not to be used: exit code [`EXIT_REFUSED`], not [`EXIT_INPUT`].
+    /// Well-formed input that must not be used: exit code [`EXIT_REFUSED`], not [`EXIT_INPUT`].
     #[error("{0}")]
     Refused(String),
-    /// A recording.
+    /// Error of a recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// A leg that cannot be worked with.
+    /// Error of a leg's configuration.
     #[error(transparent)]
     Setup(#[from] SetupError),
-    /// Anything else a user can mend.
+    /// Any other error that a user can correct.
     #[error("{0}")]
     Input(String),
 }
 
 impl ToolError {
-    /// Bad input, in words.
+    /// Bad input with a reason.
     #[must_use]
     pub fn input(reason: impl Into<String>) -> Self {
         Self::Input(reason.into())
     }
 
-    /// What it becomes of the process.
+    /// Exit code of the process.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         if matches!(self, Self::Refused(_)) { EXIT_REFUSED } else { EXIT_INPUT }
     }
 
-    /// A file that cannot be written.
+    /// Error of a file that cannot be written.
     #[must_use]
     pub fn cannot_write(path: &Path, error: &dyn std::fmt::Display) -> Self {
         Self::Input(format!("{}: cannot be written: {error}", path.display()))

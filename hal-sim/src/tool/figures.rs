@@ -1,22 +1,22 @@
 //! Figures of a run as SVG, 900 pixels wide: one set for the files and for the report.
 //!
-//! | file | shows |
+//! | file | contents |
 //! | --- | --- |
 //! | `identify.svg` | at a glance: torque on one motion and the base parameters |
-//! | `motions.svg` | commanded and measured angles, and what lies between them |
-//! | `torque-1.svg`, ... | a joint's measured, predicted and noise-free torque on every motion, residuals below |
-//! | `residuals.svg` | how the residuals are distributed and correlated, against noise through the filter |
+//! | `motions.svg` | commanded and measured angles, and their deviation |
+//! | `torque-1.svg`, ... | a joint's measured, predicted and noise-free torque on every motion, residuals |
+//! | `residuals.svg` | distribution and correlation of the residuals, against noise through the filter |
 //! | `search.svg` | the swarm's cost above the optimum in its box over its iterations |
-//! | `base-parameters.svg` | errors of the base parameters in reported standard deviations, or those of the value |
+//! | `base-parameters.svg` | errors of the base parameters in reported sigma, or sigma in percent |
 //!
 //! Many runs (`--seeds`) have `spread.svg`: every base parameter about its truth.
 //!
 //! More than four motions are continued in `motions-b.svg`, `torque-1-b.svg` and so on.
 //! `scripts/figures` draws those in `docs/figures`.
 //!
-//! Colours are those of Okabe and Ito (2008) or tints of them, which the colour-blind can tell apart; curves differ in
-//! lightness and width as well, so that they can be told apart in grey. Drawn at four times the size with a `viewBox`
-//! of that size, since the backend rounds to whole pixels.
+//! Colours are those of Okabe and Ito (2008) or tints of them, which the colour-blind can distinguish.
+//! Curves also differ in lightness and width, so they can be distinguished in grey. Drawings have four
+//! times the shown size with a `viewBox` of that size, since the backend rounds to whole pixels.
 
 mod canvas;
 pub mod chain;
@@ -45,20 +45,20 @@ const WIDTH: u32 = 900;
 /// Motions in one figure.
 const MOTIONS_PER_FIGURE: usize = 4;
 
-/// Where a figure belongs in a report.
+/// Section of a report for a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
-    /// At a glance.
+    /// Summary at a glance.
     Summary,
     /// Angles.
     Trajectories,
     /// Torques.
     Torque,
-    /// Statistics of what is left.
+    /// Statistics of the residuals.
     Residuals,
-    /// The swarm's way.
+    /// Descent of the swarm.
     Search,
-    /// What torque determines.
+    /// Errors of the base parameters.
     BaseParameters,
 }
 
@@ -67,15 +67,15 @@ pub enum Group {
 pub struct Figure {
     /// Name of its file.
     pub file: String,
-    /// Where it belongs.
+    /// Section of the report.
     pub group: Group,
-    /// What it is read out as.
+    /// Title, read aloud by a screen reader.
     pub title: String,
     /// The drawing.
     pub svg: String,
 }
 
-/// All figures of a run; `joints` are their names.
+/// Draws all figures of a run; `joints` are the names of the joints.
 pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figure>, ToolError> {
     let mut figures = Vec::new();
     let mut add = |group, file: String, title: String, height, draw: Draw<'_>| {
@@ -110,7 +110,7 @@ pub fn all(joints: &[&str], run: &RunReport, series: &Series) -> Result<Vec<Figu
             })?;
         }
     }
-    // A board may have sent no log, and never tells its cost above the optimum of its box.
+    // A board may have sent no log, and never sends its cost above the optimum of its box.
     let is_told = run.trace.is_some();
     if !is_told || !series.motions.is_empty() {
         let (file, title) =
@@ -145,7 +145,7 @@ pub fn spread(leg: &str, spreads: &[Spread]) -> Result<Figure, ToolError> {
 
 type Draw<'d> = &'d dyn Fn(&Area<'_>) -> Result<(), DrawingError>;
 
-/// Writes figures into a directory, which is made if need be.
+/// Writes the figures into a directory, creating it if necessary.
 pub fn write(directory: &Path, figures: &[Figure]) -> Result<(), ToolError> {
     for figure in figures {
         files::write(&directory.join(&figure.file), &figure.svg)?;
@@ -162,7 +162,8 @@ fn name(stem: &str, part: usize) -> String {
     }
 }
 
-/// The motion of `identify.svg`: gait at 3 s, where inertia, gravity and friction all matter; else the last unused one.
+/// Motion of `identify.svg`: gait at 3 s, where inertia, gravity and friction all matter; else the
+/// last unused one.
 fn shown_motion(series: &Series) -> Option<&super::series::MotionSeries> {
     let unused = || series.motions.iter().filter(|motion| motion.role == Role::Validation);
     unused()

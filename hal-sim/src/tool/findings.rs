@@ -1,4 +1,4 @@
-//! What the verdict saw: every test with its number and limit, and each refusal as a sentence.
+//! Evidence of the verdict: every test with its value and limit, and a sentence for each failure.
 
 use scarab::ident::{Evidence, Reason, Test};
 use serde::Serialize;
@@ -8,26 +8,26 @@ use super::report::Number;
 /// One test of the verdict, passed or not.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FindingReport {
-    /// Why the result is refused if it failed: a word of the closed list.
+    /// Reason for rejection if the test failed: a word of the closed list.
     pub reason: &'static str,
-    /// Which test.
+    /// Name of the test.
     pub test: &'static str,
-    /// Counted from 1; `null` where the test is not about one joint.
+    /// Joint, from 1; `null` if the test does not concern one joint.
     pub joint: Option<usize>,
     /// Name of the unused motion; `null` for the motion identified from, or for all.
     pub motion: Option<String>,
-    /// What was seen.
+    /// Tested value.
     pub value: Number,
-    /// What is allowed.
+    /// Limit of the value.
     pub limit: Number,
-    /// Within it.
+    /// Whether the value is within the limit.
     pub passed: bool,
-    /// What a failed test means, in a sentence with its numbers; empty where it passed.
+    /// Meaning of a failed test in a sentence with its numbers; empty if it passed.
     pub words: String,
 }
 
 impl FindingReport {
-    /// The report of one piece of evidence; `motions` are the names of the unused ones.
+    /// Report of one piece of evidence; `motions` are the names of the unused motions.
     #[must_use]
     pub fn new(evidence: &Evidence<f32>, motions: &[&str]) -> Self {
         let motion = evidence.motion.map(|index| {
@@ -47,7 +47,7 @@ impl FindingReport {
         }
     }
 
-    /// A drive that stopped before the identification was done, told by `words`.
+    /// Report of a drive that stopped before the end of the identification; `words` say why.
     #[must_use]
     pub fn stopped(words: String) -> Self {
         Self {
@@ -63,7 +63,7 @@ impl FindingReport {
     }
 }
 
-/// What a failed test means.
+/// Sentence for a failed test.
 fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
     let joint = evidence.joint.map_or(0, |joint| joint + 1);
     let (value, limit) = (f64::from(evidence.value), f64::from(evidence.limit));

@@ -1,12 +1,12 @@
-//! A run as one HTML page: what is known, how well, and what is not.
+//! Report of a run as one HTML page: results, their uncertainty, and their limits.
 //!
-//! Why one page: a result must be something that can be looked at, printed, sent along and kept. The page needs no
-//! network, no font, no script; its figures are the SVG drawings of [`super::figures`] themselves. Everything that
-//! comes from a file, a leg's name for one, passes through maud's escaping; only the drawings go in as they are, and
-//! their texts were escaped by the backend.
+//! Why one page: a result must be easy to view, print, share and archive. The page needs no
+//! network, font or script; its figures are the SVG drawings of [`super::figures`]. All text from
+//! files, for example a leg's name, is escaped by maud. Only the drawings are inserted unescaped;
+//! the backend has escaped their texts.
 //!
-//! What the page does not know by name, a key that a later report has, it shows as a table all the same
-//! (`html/generic.rs`).
+//! Keys without a section of their own, for example from a later report, are shown in a generic
+//! table (`html/generic.rs`).
 
 mod choices;
 pub mod faults;
@@ -30,24 +30,24 @@ use super::report::{Number, RunReport};
 
 /// Colours, print rules, narrow screens.
 const STYLE: &str = include_str!("html/style.css");
-/// Nothing may be fetched and nothing may run, whatever a file's text contains.
+/// Content policy: nothing is fetched or executed, whatever a file's text contains.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
 
-/// What surrounds a run.
+/// Circumstances of a run.
 #[derive(Clone, Debug)]
 pub struct Circumstances {
-    /// When, UTC.
+    /// Time, UTC.
     pub time_utc: String,
-    /// How it was called.
+    /// Command line.
     pub command: String,
-    /// What was identified.
+    /// Identified leg.
     pub leg: LegFile,
 }
 
 impl Circumstances {
-    /// This process's arguments and the time.
+    /// Command line of this process and the current time.
     ///
-    /// `SOURCE_DATE_EPOCH` [s since 1970] replaces the time, for a page that is to be reproduced.
+    /// `SOURCE_DATE_EPOCH` (s since 1970) replaces the time, for reproducible pages.
     #[must_use]
     pub fn now(leg: &LegFile) -> Self {
         let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
@@ -62,7 +62,7 @@ impl Circumstances {
     }
 }
 
-/// As a shell takes it as one word.
+/// Quotes a word for a shell.
 fn quoted(word: String) -> String {
     let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./:=,+".contains(letter);
     if !word.is_empty() && word.chars().all(plain) {
@@ -71,7 +71,7 @@ fn quoted(word: String) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// The whole page.
+/// Creates the page.
 pub fn page(
     circumstances: &Circumstances,
     run: &RunReport,
@@ -121,7 +121,7 @@ pub fn page(
     Ok(page.into_string())
 }
 
-/// A drawing, to be read out by its title.
+/// Drawing with a title for screen readers.
 fn drawing(figure: &Figure) -> Markup {
     let svg = figure.svg.replacen("<svg ", "<svg role=\"img\" aria-labelledby=\"", 1);
     let identity = figure.file.replace('.', "-");
@@ -134,7 +134,7 @@ fn drawing(figure: &Figure) -> Markup {
     }
 }
 
-/// A number as the page writes it: a true minus, a dash where nothing is known.
+/// Formats digits with a true minus sign; a dash if unknown.
 fn typeset(digits: &str) -> String {
     match digits {
         "-" => "\u{2013}".into(),
@@ -142,38 +142,38 @@ fn typeset(digits: &str) -> String {
     }
 }
 
-/// Three significant digits.
+/// Formats three significant digits.
 fn number(value: Number) -> String {
     typeset(&precision::plain(value))
 }
 
-/// Limit, or another number that is exact.
+/// Formats an exact number, for example a limit.
 fn exact(value: Number) -> String {
     typeset(&precision::exact(value))
 }
 
-/// Value of a parameter, rounded by its standard deviation.
+/// Formats a value, rounded by its standard deviation.
 fn measured(value: Number, sigma: Number) -> String {
     typeset(&precision::value(value, sigma))
 }
 
-/// Standard deviation.
+/// Formats a standard deviation.
 fn sigma(value: Number) -> String {
     typeset(&precision::sigma(value))
 }
 
-/// Name of a joint that is counted from 1.
+/// Name of a joint, from 1.
 fn joint_name(leg: &LegFile, joint: usize) -> String {
     let file = joint.checked_sub(1).and_then(|index| leg.joints.get(index));
     file.map_or_else(|| format!("joint {joint}"), |file| file.name.clone())
 }
 
-/// A number with its sign.
+/// Formats a number with its sign.
 fn signed(value: f64) -> String {
     format!("{value:+.1}").replace('-', "\u{2212}")
 }
 
-/// Exponents of a unit raised, factors apart: `kg m2` becomes `kg m²`.
+/// Typesets a unit with raised exponents: `kg m2` becomes `kg m²`.
 fn unit(plain: &str) -> String {
     plain.replace("m2", "m\u{b2}").replace(' ', "\u{a0}")
 }
@@ -183,7 +183,7 @@ fn count(number: usize, thing: &str) -> String {
     format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
 }
 
-/// What every page has before its body: no network, no script.
+/// Head of every page: no network, no script.
 fn page_head(title: &str) -> Markup {
     html! {
         head {

@@ -1,4 +1,4 @@
-//! `identify`: one simulated run or many, their log and their statistics.
+//! `identify`: one or many simulated runs, their logs and statistics.
 
 use std::path::Path;
 
@@ -19,16 +19,16 @@ use super::tables::{self, say};
 use scarab::leg::{LoggedSample, Segment};
 use scarab::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
 
-/// Many runs.
+/// Report of many runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunsReport {
     /// [`SCHEMA`].
     pub schema: u32,
-    /// In the order of their seeds.
+    /// Runs in the order of their seeds.
     pub runs: Vec<RunReport>,
 }
 
-/// One run with its curves, if options ask for them; writes its log where a path is given.
+/// Runs one identification, with curves on request; writes its log if a path is given.
 pub fn identify_one<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &SimulationOptions,
@@ -43,7 +43,7 @@ pub fn identify_one<const N: usize, const B: usize>(
     Ok((run.report, run.series))
 }
 
-/// One run for each seed, in parallel.
+/// Runs one identification per seed, in parallel.
 pub fn identify_many<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &[SimulationOptions],
@@ -64,7 +64,7 @@ pub fn identify_many<const N: usize, const B: usize>(
     Ok(RunsReport { schema: SCHEMA, runs })
 }
 
-/// The training motion in the format that `replay` reads: anatomical angles and torques.
+/// Writes the training motion in the format of `replay`: anatomical angles and torques.
 pub fn write_log<const N: usize>(
     path: &Path,
     leg: &LegFile,
@@ -101,14 +101,14 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / f64::from(count.max(1))).sqrt()
 }
 
-/// Value at a share of the sorted list.
+/// Quantile of a list.
 fn quantile(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let index = (share * values.len().saturating_sub(1) as f64).round() as usize;
     values.get(index).copied().unwrap_or(f64::NAN)
 }
 
-/// Errors about truth over what is possible, for each base parameter.
+/// Table of the errors relative to the bound, for each base parameter.
 fn spread_table(report: &RunsReport) -> Table {
     let mut table = tables::headed(&[
         "base parameter",
@@ -151,7 +151,7 @@ fn spread_table(report: &RunsReport) -> Table {
     table
 }
 
-/// Share of errors within so many reported sigma, pooled.
+/// Share of errors within a number of reported sigma, pooled.
 fn coverage(report: &RunsReport, sigmas: f64) -> f64 {
     let (mut within, mut all) = (0_u32, 0_u32);
     for base in report.runs.iter().flat_map(|run| &run.base_parameters) {
@@ -165,7 +165,7 @@ fn coverage(report: &RunsReport, sigmas: f64) -> f64 {
     100.0 * f64::from(within) / f64::from(all.max(1))
 }
 
-/// Statistics of many runs on standard output.
+/// Prints statistics of many runs.
 pub fn print_runs(report: &RunsReport) -> Result<(), ToolError> {
     let runs = &report.runs;
     let Some(first) = runs.first() else { return Ok(()) };

@@ -1,21 +1,22 @@
-//! The Cramer-Rao bound of a simulated motion: the noise-free rows of every logged sample, Stribeck friction included.
+//! Cramer-Rao bound of a simulated motion: the noise-free rows of every logged sample, Stribeck
+//! friction included.
 //!
 //! ```text
-//! bound^2 = diagonal of (sum of y' y / noise^2)^-1,   y = base columns | for each joint with Stribeck friction:
+//! bound^2 = diagonal of (sum of y' y / noise^2)^-1,   y = base columns | per joint with Stribeck friction:
 //!           sign(v) g(v / vs),   d/d ln vs = S sign(v) g(v / vs) 2 (v / vs)^2
 //! ```
 //!
-//! No unbiased estimator of the same parameters has a smaller variance. Rows of a joint that sticks are left out.
+//! No unbiased estimator of these parameters has a smaller variance. Rows of a sticking joint are excluded.
 
 use scarab::ident::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE, Row};
 use scarab::real::{exp, sign, sqrt};
 
-/// Friction curve of a simulated joint.
+/// Stribeck curve of a simulated joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StribeckTruth {
-    /// Static friction less Coulomb's, N m.
+    /// Static friction above Coulomb friction, N m.
     pub surplus: f64,
-    /// rad/s.
+    /// Speed of the decay, rad/s.
     pub speed: f64,
 }
 
@@ -29,7 +30,8 @@ pub struct Information<const N: usize> {
 }
 
 impl<const N: usize> Information<N> {
-    /// Of `rank` base parameters and the joints' curves; curves for which there is no room are left out.
+    /// Information of `rank` base parameters and the joints' curves; curves beyond the capacity are
+    /// omitted.
     #[must_use]
     pub fn new(rank: usize, curves: [Option<StribeckTruth>; N]) -> Self {
         let columns = rank + 2 * curves.iter().flatten().count();
@@ -46,7 +48,7 @@ impl<const N: usize> Information<N> {
         self.curves[joint].map(|_| self.rank + 2 * self.curves[..joint].iter().flatten().count())
     }
 
-    /// Takes one sample of a joint's torque with this noise, N m; `velocity` is the joint's.
+    /// Adds one sample of a joint's torque with this noise, N m; `velocity` is the joint's.
     pub fn insert(&mut self, joint: usize, regressor: &[f64], velocity: f64, noise: f64) {
         let mut row: Row<f64> = [0.0; LARGEST_COLUMNS + 1];
         let weight = 1.0 / noise.max(1e-12);
@@ -62,7 +64,7 @@ impl<const N: usize> Information<N> {
         packed::rotate(&mut self.factor, self.columns, &mut row);
     }
 
-    /// Of the same motion with these base parameters known to be zero.
+    /// Information with these base parameters known to be zero.
     #[must_use]
     pub fn without(&self, dropped: &[bool]) -> Self {
         let mut factor = [0.0; LARGEST_SIZE];
@@ -76,12 +78,12 @@ impl<const N: usize> Information<N> {
         Self { factor, ..self.clone() }
     }
 
-    /// Bounds of the base parameters, and of each joint's surplus.
+    /// Bounds of the base parameters and of each joint's surplus.
     #[must_use]
     pub fn bounds<const B: usize>(&self) -> ([f64; B], [Option<f64>; N]) {
         let mut variance = [0.0; LARGEST_COLUMNS];
         for unit in 0..self.columns {
-            // R x = unit: one column of the inverse.
+            // R x = unit vector: one column of the inverse.
             let mut factor = self.factor;
             let mut end = 0;
             for column in 0..self.columns {

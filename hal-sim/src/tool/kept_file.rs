@@ -1,16 +1,20 @@
-//! What a board remembers over the power, as a file that people read: objects of its nodes, calibrations, the model.
+//! Persistent data of a board as a readable file: objects of its nodes, calibrations, and the model.
 //!
-//! Why: a board is replaced, and what it was taught goes with it; a calibration is looked at, or compared, without a bus. The file is
-//! nothing a board believes: a calibration is checked at the motor and a model against the leg's fingerprint, as ever.
+//! Why: the data can be moved to a replacement board, and calibrations can be viewed or compared
+//! without a bus. A board does not trust the file: it still checks a calibration at the motor and a
+//! model against the leg's fingerprint.
 //!
 //! ```text
-//! flash image --Store::load, checks--> KeptFile --to_toml--> text           what is damaged or fails a check is told and left out
-//! flash image <--Store::save (drive off)-- KeptFile <--parse, checks-- text  all of it or nothing; what is not named stays
+//! flash image --Store::load, checks--> KeptFile --to_toml--> text   damaged or invalid parts: omitted
+//! flash image <--Store::save (drive off)-- KeptFile <--parse, checks-- text   all or nothing
 //! ```
 //!
-//! The same checks stand both ways, so that what is exported can be imported. Floats are written with the digits that restore the f32
-//! exactly, angles in radians with those that restore the unit of 2^-32 turns. Keys are an interface (`docs/store.md`): unknown ones are
-//! errors.
+//! An export reports the parts that it omits. An import leaves the parts unchanged that its file
+//! does not name.
+//!
+//! Both directions have the same checks, so every export can be imported. Floats are written with
+//! the digits that restore the f32 exactly, angles in radians with those that restore the unit of
+//! 2^-32 turns. Keys are an interface (`docs/store.md`): unknown ones are errors.
 
 mod convert;
 mod flash;
@@ -26,39 +30,39 @@ use super::error::ToolError;
 /// Version of the keys.
 pub const KEPT_SCHEMA: i64 = 1;
 
-/// What a file holds; what it does not name is not touched.
+/// Contents of a file; parts not named stay unchanged.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeptFile {
     /// [`KEPT_SCHEMA`].
     pub schema: i64,
-    /// One of each node.
+    /// Objects of the nodes.
     #[serde(default)]
     pub node: Vec<NodeObjects>,
-    /// One of each axis.
+    /// Calibrations of the axes.
     #[serde(default)]
     pub calibration: Vec<AxisCalibration>,
     /// The accepted model.
     pub model: Option<ModelPart>,
 }
 
-/// A joint of the leg, and the node and the axis that are its.
+/// Joint of the leg with its node and axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Joint {
-    /// The first.
+    /// First joint.
     Hip,
-    /// The second.
+    /// Second joint.
     Knee,
-    /// The third, of a model only.
+    /// Third joint, in models only.
     Ankle,
 }
 
 impl Joint {
-    /// From the base.
+    /// All joints, from the base.
     pub const ALL: [Self; 3] = [Self::Hip, Self::Knee, Self::Ankle];
 
-    /// As files call it.
+    /// Name in files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -69,87 +73,87 @@ impl Joint {
     }
 }
 
-/// What a host changed of a node's objects.
+/// Objects of a node that a host has changed.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NodeObjects {
-    /// Whose node.
+    /// Joint of the node.
     pub joint: Joint,
-    /// All that are kept; the others are as after the start.
+    /// All stored objects; the others have their initial values.
     pub objects: Vec<ObjectValue>,
 }
 
-/// One object.
+/// Value of one object.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectValue {
-    /// In the dictionary.
+    /// Index in the dictionary.
     pub index: u16,
-    /// In the dictionary.
+    /// Subindex in the dictionary.
     pub subindex: u8,
-    /// As the dictionary has it; for people, and checked where it stands.
+    /// Name in the dictionary; for people, and checked if present.
     pub name: Option<String>,
-    /// In the object's own unit.
+    /// Value in the object's own unit.
     pub value: i64,
 }
 
-/// What an axis was found to be.
+/// Calibration of an axis.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AxisCalibration {
-    /// Whose axis.
+    /// Joint of the axis.
     pub joint: Joint,
-    /// Of one phase.
+    /// Resistance of one phase, ohm.
     pub resistance_ohm: f64,
-    /// Along the flux, H.
+    /// Inductance along the flux, H.
     pub direct_inductance_h: f64,
-    /// Across the flux, H.
+    /// Inductance across the flux, H.
     pub quadrature_inductance_h: f64,
     /// Electrical angle at the index, from -pi to pi.
     pub offset_rad: f64,
-    /// With which it was found.
+    /// Encoder settings of the calibration.
     pub encoder: Encoder,
 }
 
-/// The setting a calibration holds for.
+/// Settings for which a calibration is valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Encoder {
-    /// How the counter runs while the field turns from A over B to C.
+    /// Direction of the counter while the field turns from A over B to C.
     pub counter: Counter,
-    /// Of the motor.
+    /// Pole pairs of the motor.
     pub pole_pairs: u8,
-    /// Of the encoder.
+    /// Encoder counts per turn.
     pub counts_per_turn: u32,
 }
 
-/// Which way a counter runs.
+/// Direction of a counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Counter {
-    /// With the field.
+    /// Counter runs with the field.
     Up,
-    /// Against it.
+    /// Counter runs against the field.
     Down,
 }
 
-/// An accepted model and where it comes from.
+/// Accepted model with its origin.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelPart {
-    /// Of the leg it was found on: 16 hexadecimal digits, as in model files.
+    /// Fingerprint of the leg: 16 hexadecimal digits, as in model files.
     pub fingerprint: String,
-    /// Version of the firmware that found it.
+    /// Version of the firmware that identified the model.
     pub firmware: String,
-    /// Counts the models that were accepted on the board.
+    /// Number of models accepted on the board so far.
     pub generation: u32,
-    /// Text, since it may need all 64 bits.
+    /// Seed of the swarm; text, since it may need all 64 bits.
     pub swarm_seed: String,
-    /// Of the warmer bridge, degrees Celsius; absent where it was not known.
+    /// Temperature of the warmer bridge, degrees Celsius; absent if unknown.
     pub bridge_temperature_c: Option<f64>,
-    /// A person wore the leg; absent where it was not known.
+    /// Whether a person wore the leg; absent if unknown.
     pub worn: Option<bool>,
-    /// From the base.
+    /// Joints, from the base.
     pub joint: Vec<ModelJoint>,
 }
 
@@ -157,25 +161,25 @@ pub struct ModelPart {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelJoint {
-    /// Which.
+    /// Joint.
     pub joint: Joint,
-    /// All fourteen, SI.
+    /// Fourteen parameters, SI units.
     pub parameters: Parameters,
-    /// Friction that falls with the speed.
+    /// Friction that decreases with speed.
     pub stribeck: StribeckPart,
-    /// What the constant column is.
+    /// Meaning of the constant column.
     pub constant: ConstantPart,
-    /// Distance to the joint before it, m.
+    /// Distance to the previous joint, m.
     pub length_m: f64,
-    /// N m/A at the joint.
+    /// Torque constant at the joint, N m/A.
     pub torque_per_ampere: f64,
-    /// Of measured minus predicted, on a motion that was not identified from, N m; absent where it was not known.
+    /// RMS of measured minus predicted torque on an unused motion, N m; absent if unknown.
     pub rms_nm: Option<f64>,
-    /// Of the torque on it, N m; absent likewise.
+    /// Mean absolute torque on that motion, N m; absent if unknown.
     pub mean_absolute_nm: Option<f64>,
 }
 
-/// The fourteen parameters of a joint, each under its symbol.
+/// Fourteen parameters of a joint, by symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[serde(rename_all = "UPPERCASE")]
@@ -197,31 +201,31 @@ pub struct Parameters {
     pub off: f64,
 }
 
-/// Coulomb friction * (1 + excess exp(-(speed / velocity)^2)).
+/// Stribeck curve: Coulomb friction * (1 + excess exp(-(speed / velocity)^2)).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StribeckPart {
-    /// 0 or more.
+    /// Excess, at least 0.
     pub excess: f64,
-    /// rad/s.
+    /// Speed of the decay, rad/s.
     pub velocity_rad_s: f64,
 }
 
-/// What the constant column of a joint is.
+/// Meaning of a joint's constant column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ConstantPart {
-    /// An offset of the torque.
+    /// Torque offset.
     Offset,
-    /// A difference of friction between the directions.
+    /// Difference of friction between the directions.
     Asymmetry,
 }
 
 impl KeptFile {
-    /// The checked content of a text; `file` is what faults are reported under.
+    /// Parses and checks a text; `file` is its name in error messages.
     ///
     /// # Errors
-    /// What is no such file, with the line where one is to blame, or the part.
+    /// The file is invalid; the error names the line or the part at fault.
     pub fn parse(text: &str, file: &str) -> Result<Self, ToolError> {
         let of_text = |fault: toml::de::Error| {
             let reason = fault.message().replace('\n', ", ");
@@ -260,7 +264,7 @@ fn of_node(joint: Joint, why: &str) -> String {
     format!("objects of the {}: {why}", joint.name())
 }
 
-/// Each joint once, and only those a board has a place for.
+/// Rejects repeated joints and joints that a board does not have.
 fn once(what: &str, joints: impl Iterator<Item = Joint>) -> Result<(), String> {
     let mut seen = Vec::new();
     for joint in joints {

@@ -1,38 +1,44 @@
 //! Leg files: a leg in TOML, as users write it.
 //!
-//! Why a file: what the tool simulates and what it identifies must be stated in one place that can be read,
-//! compared and sent along. Keys are an interface; unknown ones are errors. Every fault names file, line and
-//! reason.
+//! Why a file: simulation and identification must state their leg in one place that can be read, compared
+//! and shared. Keys are an interface; unknown ones are errors. Every error names file, line and reason.
 //!
 //! | key | unit, meaning | default |
 //! | --- | --- | --- |
 //! | `name` | | required |
 //! | `gravity` | m/s^2, base frame | required |
-//! | `torque_noise_percent` | white, per logged 500 Hz sample, of each joint's mean absolute torque, on the logged current only | 0 |
-//! | `bandwidth_hz` | where the low-pass of the identification is 3 dB down | 8 |
-//! | `pushes` | `{ per_minute, torque_nm, duration_s }`: the wearer pushes at random | none |
-//! | `temperature_c` | of the drives, degrees Celsius, if it is known | none |
+//! | `torque_noise_percent` | white noise in percent of mean absolute torque, see below | 0 |
+//! | `bandwidth_hz` | -3 dB frequency of the identification's low-pass | 8 |
+//! | `pushes` | `{ per_minute, torque_nm, duration_s }`: random pushes by the wearer | none |
+//! | `temperature_c` | temperature of the drives, degrees Celsius, if known | none |
 //! | `side` | `"right"` or `"left"`: on the left the drives are mounted mirrored | right |
-//! | `segments` | `{ shank_m, foot_m, wearer_kg, prior_wearer_kg }`: the last two links are a thigh and a shank, and whose | none |
+//! | `segments` | `{ shank_m, foot_m, wearer_kg, prior_wearer_kg }`, see below | none |
 //! | `joint.name`, `joint.dh` | `dh = { alpha, a, d }`, modified D-H, rad and m | required |
 //! | `direction`, `zero_offset_deg` | joint angle = direction * anatomical angle + zero offset | 1, 0 |
 //! | `range_deg` | anatomical, lower and upper | -90, 90 |
 //! | `speed_limit_deg_s`, `acceleration_limit_deg_s2`, `torque_limit_nm` | | 180, 2000, 100 |
 //! | `torque_per_ampere` | N m/A at the joint | 1.5 |
-//! | `current_limit_a` | the drive's | torque limit / torque per ampere |
+//! | `current_limit_a` | limit of the drive | torque limit / torque per ampere |
 //! | `drive_lag_s` | time constant of the current | 0.0005 |
 //! | `encoder` | `{ side = "motor" or "joint", counts, ratio }` | motor, 8192, 50 |
-//! | `current_noise_a` | standard deviation per logged 500 Hz sample, besides `torque_noise_percent` | 0 |
+//! | `current_noise_a` | standard deviation per logged 500 Hz sample | 0 |
 //! | `current_offset_a`, `current_step_a` | error and conversion step of the current sensor | 0, 0 (none) |
-//! | `outliers` | `{ percent, torque_nm }`: share of logged 500 Hz samples with a wild current, its largest error | none |
-//! | `offset`, `rotor` | `"auto"`, `"on"`, `"off"`: whether a torque offset, a rotor inertia is estimated | on, on |
-//! | `stribeck_model`, `asymmetric_coulomb` | the same of Stribeck friction, of Coulomb friction with a level for each direction | auto, off |
-//! | `stribeck` | `{ static_nm, speed_rad_s }`: simulated friction at rest and where it has fallen | none |
-//! | `truth`, `prior` | `{ mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset, asymmetry }`, the last five 0 unless given | none |
-//! | `[joint.motor]`, `supply` | motor and supply of a complete drive ([`MotorFile`], [`SupplyFile`]) | none, 48 V |
+//! | `outliers` | `{ percent, torque_nm }`: share of samples with an outlier, its largest error | none |
+//! | `offset`, `rotor` | `"auto"`, `"on"`, `"off"`: estimate torque offset, rotor inertia | on, on |
+//! | `stribeck_model` | `"auto"`, `"on"`, `"off"`: estimate Stribeck friction | auto |
+//! | `asymmetric_coulomb` | `"auto"`, `"on"`, `"off"`: one Coulomb level per direction | off |
+//! | `stribeck` | `{ static_nm, speed_rad_s }`: simulated static friction, speed of its decay | none |
+//! | `truth`, `prior` | see below | none |
+//! | `[joint.motor]`, `supply` | complete drive ([`MotorFile`], [`SupplyFile`]) | none, 48 V |
 //!
-//! `inertia_com` holds the tensor elements XX XY XZ YY YZ ZZ about the centre of mass. Everything in `truth`
-//! and `prior` is in the joint's D-H frame with the D-H sign. `truth` is only needed to simulate.
+//! `torque_noise_percent` refers to each joint's mean absolute torque, per logged 500 Hz sample. The noise
+//! is added to the logged current only; `current_noise_a` comes on top. `outliers` refers to logged 500 Hz
+//! samples of the current. `segments` describes the last two links as the thigh and shank of a wearer.
+//!
+//! Keys of `truth` and `prior` are
+//! `{ mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset, asymmetry }`; the last five
+//! default to 0. `inertia_com` holds the tensor elements XX XY XZ YY YZ ZZ about the centre of
+//! mass. All are in the joint's D-H frame with the D-H sign. Only a simulation needs `truth`.
 
 mod check;
 mod convert;
@@ -49,7 +55,7 @@ pub use switch::Switch;
 
 use serde::{Deserialize, Serialize};
 
-/// The leg that is meant when none is named.
+/// Default leg.
 pub const DEFAULT_LEG: &str = "x2-wearer-75kg";
 
 /// Shipped legs by name, with their text.
@@ -62,36 +68,36 @@ pub const SHIPPED_LEGS: [(&str, &str); 6] = [
     ("paper-chain", include_str!("../../legs/paper-chain.toml")),
 ];
 
-/// A checked leg: 1 to 3 joints, physically possible, limits in order.
+/// Checked leg: 1 to 3 joints, physically consistent, limits in order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LegFile {
-    /// What the leg is called.
+    /// Name of the leg.
     pub name: String,
     /// Gravity's acceleration in the base frame, m/s^2.
     pub gravity: [f64; 3],
     /// Noise of the logged torque in percent of each joint's mean absolute torque.
     #[serde(default)]
     pub torque_noise_percent: f64,
-    /// Where the low-pass of the identification is 3 dB down, Hz.
+    /// Frequency at which the low-pass of the identification is 3 dB down, Hz.
     #[serde(default = "default_bandwidth")]
     pub bandwidth_hz: f64,
     /// The wearer's pushes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pushes: Option<PushesFile>,
-    /// Of the drives, degrees Celsius, if it is known.
+    /// Temperature of the drives, degrees Celsius, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
     /// Side of the body.
     #[serde(default, skip_serializing_if = "BodySide::is_default")]
     pub side: BodySide,
-    /// What thigh and shank are made of.
+    /// Segments of thigh and shank.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub segments: Option<SegmentsFile>,
-    /// What feeds complete drives.
+    /// Supply of complete drives.
     #[serde(default, skip_serializing_if = "SupplyFile::is_default")]
     pub supply: SupplyFile,
-    /// Proximal first.
+    /// Joints, proximal first.
     #[serde(rename = "joint")]
     pub joints: Vec<JointFile>,
 }
@@ -112,9 +118,9 @@ pub struct PushesFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointFile {
-    /// What the joint is called.
+    /// Name of the joint.
     pub name: String,
-    /// Where its frame lies in the previous one.
+    /// Position of its frame in the previous one.
     pub dh: DhFile,
     /// 1 or -1: joint angle = direction * anatomical angle + zero offset.
     #[serde(default = "one")]
@@ -125,16 +131,16 @@ pub struct JointFile {
     /// Anatomical range, degrees.
     #[serde(default = "default_range")]
     pub range_deg: [f64; 2],
-    /// Degrees per second.
+    /// Speed limit, degrees per second.
     #[serde(default = "default_speed_limit")]
     pub speed_limit_deg_s: f64,
-    /// Degrees per second squared.
+    /// Acceleration limit, degrees per second squared.
     #[serde(default = "default_acceleration_limit")]
     pub acceleration_limit_deg_s2: f64,
-    /// N m at the joint.
+    /// Torque limit at the joint, N m.
     #[serde(default = "default_torque_limit")]
     pub torque_limit_nm: f64,
-    /// N m/A at the joint.
+    /// Torque constant at the joint, N m/A.
     #[serde(default = "default_torque_per_ampere")]
     pub torque_per_ampere: f64,
     /// Limit of the drive, A; torque limit / torque per ampere unless given.
@@ -155,7 +161,7 @@ pub struct JointFile {
     /// Conversion step of the current sensor, A; 0 for none.
     #[serde(default)]
     pub current_step_a: f64,
-    /// Wild readings of the current, simulated only.
+    /// Outliers of the measured current, simulated only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outliers: Option<OutliersFile>,
     /// Whether a torque offset is estimated.
@@ -170,13 +176,13 @@ pub struct JointFile {
     /// Whether Coulomb friction has a level for each direction.
     #[serde(default = "Switch::off", skip_serializing_if = "Switch::is_off")]
     pub asymmetric_coulomb: Switch,
-    /// Friction at rest above Coulomb's, simulated only.
+    /// Static friction above Coulomb friction, simulated only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stribeck: Option<StribeckFile>,
-    /// What the simulated leg is made of.
+    /// Parameters of the simulated leg.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<LinkParameters>,
-    /// What is believed before measuring.
+    /// Parameters assumed before identification.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<LinkParameters>,
     /// Motor of a complete drive.
@@ -200,9 +206,9 @@ pub struct DhFile {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EncoderFile {
-    /// Motor or joint.
+    /// Motor or joint side of the gear.
     pub side: Side,
-    /// Per encoder turn.
+    /// Counts per encoder turn.
     pub counts: u32,
     /// Encoder turns per joint turn.
     pub ratio: f64,
@@ -212,9 +218,9 @@ pub struct EncoderFile {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
-    /// On the motor.
+    /// Encoder on the motor.
     Motor,
-    /// On the joint.
+    /// Encoder on the joint.
     Joint,
 }
 
@@ -228,11 +234,11 @@ pub struct StribeckFile {
     pub speed_rad_s: f64,
 }
 
-/// Isolated wild readings.
+/// Isolated outliers of the current.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutliersFile {
-    /// Of the logged 500 Hz samples.
+    /// Share of the logged 500 Hz samples, percent.
     pub percent: f64,
     /// Largest error, either sign, N m at the joint.
     pub torque_nm: f64,
@@ -242,25 +248,25 @@ pub struct OutliersFile {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LinkParameters {
-    /// kg.
+    /// Mass, kg.
     pub mass: f64,
     /// Centre of mass, m.
     pub com: [f64; 3],
     /// Tensor elements XX XY XZ YY YZ ZZ about the centre of mass, kg m^2.
     pub inertia_com: [f64; 6],
-    /// At the joint, kg m^2.
+    /// Rotor inertia at the joint, kg m^2.
     #[serde(default)]
     pub rotor_inertia: f64,
-    /// N m.
+    /// Coulomb friction, N m.
     #[serde(default)]
     pub coulomb: f64,
-    /// N m s/rad.
+    /// Viscous friction, N m s/rad.
     #[serde(default)]
     pub viscous: f64,
-    /// N m.
+    /// Torque offset, N m.
     #[serde(default)]
     pub offset: f64,
-    /// Half of what Coulomb friction is larger by with a growing D-H angle than against it, N m.
+    /// Half the difference of Coulomb friction between growing and falling D-H angle, N m.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub asymmetry: f64,
 }
@@ -306,7 +312,7 @@ fn default_encoder() -> EncoderFile {
 }
 
 impl JointFile {
-    /// A joint with the defaults of every key but these.
+    /// Joint with defaults for every other key.
     #[must_use]
     pub fn new(name: &str, dh: DhFile) -> Self {
         Self {
@@ -339,7 +345,7 @@ impl JointFile {
 }
 
 impl LegFile {
-    /// A leg of these joints with the defaults of every other key.
+    /// Leg of these joints with defaults for every other key.
     #[must_use]
     pub fn plain(name: &str, gravity: [f64; 3], joints: Vec<JointFile>) -> Self {
         Self {
@@ -356,13 +362,13 @@ impl LegFile {
         }
     }
 
-    /// A shipped leg by name, or the file at a path.
+    /// Loads a shipped leg by name, or the file at a path.
     pub fn load(name_or_path: &str) -> Result<Self, LegFileError> {
         let (text, file) = Self::text(name_or_path)?;
         Self::parse(&text, &file)
     }
 
-    /// The text of a shipped leg or of a file, and the name that faults are reported under.
+    /// Text of a shipped leg or of a file, and its name in error messages.
     fn text(name_or_path: &str) -> Result<(String, String), LegFileError> {
         if let Some((name, text)) = SHIPPED_LEGS.iter().find(|(name, _)| *name == name_or_path) {
             return Ok(((*text).to_owned(), format!("{name} (shipped)")));
@@ -375,14 +381,14 @@ impl LegFile {
         Ok((text, name_or_path.to_owned()))
     }
 
-    /// A leg from TOML text; `file` is what faults are reported under.
+    /// Parses TOML text; `file` is its name in error messages.
     pub fn parse(text: &str, file: &str) -> Result<Self, LegFileError> {
         let leg: Self = toml::from_str(text).map_err(|fault| LegFileError::of_text(file, text, &fault))?;
         check::leg(&leg).map_err(|fault| LegFileError::of_value(file, text, &fault))?;
         Ok(leg)
     }
 
-    /// The leg as TOML text that [`LegFile::parse`] reads back unchanged.
+    /// TOML text that [`LegFile::parse`] reads back unchanged.
     #[must_use]
     pub fn to_toml(&self) -> String {
         toml::to_string(self)

@@ -1,34 +1,34 @@
-//! The host tool: everything that needs `std`.
+//! Host tool: everything that needs `std`.
 //!
-//! | module | what lives there |
+//! | module | contents |
 //! | --- | --- |
 //! | [`cli`] | the command line |
 //! | [`leg_file`], [`x2`] | leg files and the derivation of the default leg |
-//! | [`size`], [`anthropometry`], [`posture`] | a leg file for other lengths, another wearer, side or trunk |
-//! | [`setup`] | from a leg file to what the firmware is built from |
-//! | [`recording`], [`resample`], [`replay`] | identification on recordings |
-//! | [`trace`] | what a board told, read back and reported |
+//! | [`size`], [`anthropometry`], [`posture`] | leg files for other lengths, wearer, side or trunk |
+//! | [`setup`] | leg file to the firmware's configuration |
+//! | [`recording`], [`resample`], [`replay`] | identification from recordings |
+//! | [`trace`] | records of a board, read back and reported |
 //! | [`board`] | the firmware's current loops against complete drives |
-//! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg and its plant run together, and what is seen of them |
-//! | [`excite`] | an exciting motion designed, and what it will tell |
+//! | [`pair`], [`simulate`], [`watch`], [`identify`] | a leg run with its plant, and observed |
+//! | [`excite`] | design of an exciting motion, and its expected result |
 //! | [`faults`] | the fault catalogue injected into the whole firmware |
 //! | [`motor`] | the current loop measured on a test stand |
-//! | [`paper`] | the paper's experiments, run again |
-//! | [`monitor`] | an accepted model watched while the leg walks and something changes |
-//! | [`series`], [`figures`], [`html`] | a run as curves, drawn, and on one page |
-//! | [`model_choice`], [`temperature`] | what of the model was left to the data; when a model is another day's |
-//! | [`findings`] | what the verdict saw, in words |
-//! | [`perturb`] | what can be made wrong on purpose |
+//! | [`paper`] | the paper's experiments, reproduced |
+//! | [`monitor`] | an accepted model monitored while the leg walks and something changes |
+//! | [`series`], [`figures`], [`html`] | a run as curves, as figures, and as a page |
+//! | [`model_choice`], [`temperature`] | model terms left to the data; models of another day |
+//! | [`findings`] | evidence of the verdict in words |
+//! | [`perturb`] | deliberate errors |
 //! | [`placed_mass`], [`scale`] | known masses: torque constants and loads |
-//! | [`eds`] | the electronic data sheet of a node of the bus |
-//! | [`model_file`], [`predict`], [`urdf`] | what was found, kept; its torque; the same for other programs |
+//! | [`eds`] | electronic data sheet of a bus node |
+//! | [`model_file`], [`predict`], [`urdf`] | stored models, their torque, and their export |
 //! | [`states`], [`regressor`] | given states of motion; their torques and regressor |
-//! | [`consistent`], [`consistent_runs`] | legs that can exist: both searches and their optimum |
-//! | [`analysis`], [`report`], [`tables`] | what a run found: as data, JSON and tables |
-//! | [`bus`] | legs on a CANopen bus, for host software that exists |
-//! | [`kept_file`] | what a board remembers over the power, as TOML and back |
+//! | [`consistent`], [`consistent_runs`] | physically consistent legs: both searches and their optimum |
+//! | [`analysis`], [`report`], [`tables`] | results of a run: as data, JSON and tables |
+//! | [`bus`] | legs on a CANopen bus, for existing host software |
+//! | [`kept_file`] | persistent data of a board, as TOML and back |
 //! | [`image`] | the flash image: its leg, its build, its size |
-//! | [`files`] | files of a command: checked before it computes, written whole |
+//! | [`files`] | files of a command: checked before the computation, written atomically |
 //! | [`precision`] | digits of reported numbers |
 //! | [`error`], [`words`] | bad input, exit codes, and the firmware's codes in words |
 

@@ -1,15 +1,15 @@
-//! What of each joint's model was asked for, what was used, and why.
+//! Model terms of each joint: requested, used, and why.
 //!
-//! The firmware decides (`scarab::ident::selection`, `scarab::ident::stribeck`); here leg files become its choices and
-//! its decisions become words.
+//! The firmware decides (`scarab::ident::selection`, `scarab::ident::stribeck`). This module
+//! converts leg files to its choices and its decisions to words.
 //!
-//! | `offset` | `asymmetric_coulomb` | the constant column is |
+//! | `offset` | `asymmetric_coulomb` | constant column |
 //! | --- | --- | --- |
-//! | on, auto | off, auto | the offset, kept or as the data tell; a difference of the directions is not told apart from it |
-//! | off, auto | on | the difference of the directions, kept |
-//! | off | auto | the same as the data tell |
-//! | off | off | not there |
-//! | on | on | refused: they are one column |
+//! | on, auto | off, auto | the offset, always or by the data; includes any difference of the directions |
+//! | off, auto | on | the difference of the directions, always |
+//! | off | auto | the difference of the directions, by the data |
+//! | off | off | absent |
+//! | on | on | rejected: both are one column |
 
 use scarab::ident::{Choice, Constant, DriveChoice, Estimate, Selection, selection, stribeck};
 use scarab::model::{Parameter, Standing};
@@ -20,7 +20,7 @@ use super::leg_file::{JointFile, Switch};
 use super::precision::{plain, sigma, value};
 use super::report::Number;
 
-/// What a leg file asks of one joint.
+/// Model requested for one joint by the leg file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Asked {
     rotor: Switch,
@@ -30,7 +30,7 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// Of a joint.
+    /// Reads the request of a joint.
     #[must_use]
     pub fn of(joint: &JointFile) -> Self {
         Self {
@@ -50,7 +50,7 @@ fn choice(switch: Switch) -> Choice {
     }
 }
 
-/// What the firmware is to do about a joint's rotor and constant column.
+/// Choice for a joint's rotor and constant column.
 #[must_use]
 pub fn drive_choice(joint: &JointFile) -> DriveChoice {
     let (constant, meaning) = match (joint.offset, joint.asymmetric_coulomb) {
@@ -61,16 +61,16 @@ pub fn drive_choice(joint: &JointFile) -> DriveChoice {
     DriveChoice { rotor: choice(joint.rotor), constant, meaning }
 }
 
-/// Whether a joint's Stribeck friction is looked for.
+/// Choice for a joint's Stribeck friction.
 #[must_use]
 pub fn stribeck_choice(joint: &JointFile) -> Choice {
     choice(joint.stribeck_model)
 }
 
-/// One part of one joint's model.
+/// Decision about one term of one joint's model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModelChoiceReport {
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
     /// `rotor`, `offset`, `stribeck` or `asymmetric_coulomb`, as in leg files.
     pub option: &'static str,
@@ -78,30 +78,30 @@ pub struct ModelChoiceReport {
     pub asked: &'static str,
     /// `on` or `off`.
     pub used: &'static str,
-    /// Chi-square that it explains; unknown where nothing was asked of the data.
+    /// Chi-square explained by the term; unknown if the data were not asked.
     pub gain_chi2: Number,
-    /// Less is dropped.
+    /// Limit below which the term is dropped.
     pub limit_chi2: Number,
-    /// In words.
+    /// Reason in words.
     pub why: String,
 }
 
 /// Coulomb friction of one joint in both directions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DirectionsReport {
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
-    /// While the D-H angle grows, N m.
+    /// Friction while the D-H angle grows, N m.
     pub forward_nm: Number,
-    /// Standard deviation.
+    /// Standard deviation of `forward_nm`.
     pub forward_sigma_nm: Number,
-    /// While it falls, N m, not negative for friction.
+    /// Friction while the D-H angle falls, N m; not negative for friction.
     pub backward_nm: Number,
-    /// Standard deviation.
+    /// Standard deviation of `backward_nm`.
     pub backward_sigma_nm: Number,
 }
 
-/// What was decided, and the words for it.
+/// Decision with its reason.
 struct Decision {
     used: bool,
     gain: Option<f64>,
@@ -114,7 +114,8 @@ fn decided(used: bool, why: &str) -> Decision {
 }
 
 impl<const N: usize, const B: usize> Background<N, B> {
-    /// Name of a parameter in this leg's reports: `FCA1` where the constant column is a difference of the directions.
+    /// Name of a parameter in this leg's reports: `FCA1` if the constant column is a difference of
+    /// the directions.
     #[must_use]
     pub fn name(&self, joint: usize, parameter: Parameter) -> String {
         if parameter == Parameter::OFF && self.meaning(joint) == Constant::Asymmetry {
@@ -127,8 +128,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
         self.device.drive_choice.get(joint).map_or(Constant::Offset, |choice| choice.meaning)
     }
 
-    /// All options of all joints, with what the data told and of each joint whether its Stribeck friction is used and the root
-    /// mean square of its torque. A gain that is not a number was not told.
+    /// All terms of all joints. `stribeck` holds for each joint whether its Stribeck friction is
+    /// used, and the root mean square of its torque. A gain of NaN was not reported.
     #[must_use]
     pub fn model_choice(
         &self,
@@ -252,7 +253,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
         Decision { used, gain: Some(gain), limit: Some(limit), why }
     }
 
-    /// Coulomb friction of both directions, of joints where they differ by what was measured.
+    /// Coulomb friction of both directions, for joints in which they differ according to the data.
     #[must_use]
     pub fn directions(&self, dropped: &[bool; B], estimate: &Estimate<f32, B>) -> Vec<DirectionsReport> {
         let of = |joint: usize| {
@@ -287,7 +288,7 @@ pub fn asymmetry_name(joint: usize) -> String {
     format!("FCA{}", joint + 1)
 }
 
-/// What was left to the data, a line each.
+/// Decisions that were left to the data, a line each.
 #[must_use]
 pub fn lines(choices: &[ModelChoiceReport], directions: &[DirectionsReport]) -> Vec<String> {
     let open = choices.iter().filter(|choice| choice.asked == "auto");

@@ -1,16 +1,16 @@
-//! Model files: what an accepted identification found, kept for later use.
+//! Model files: results of an accepted identification, stored for later use.
 //!
-//! Why a file of its own: a result is worth keeping only together with what it was found on (leg, lengths, torque
-//! constants, gravity) and how sure it is (covariance). With both, torque can be predicted with a band, two
-//! identifications can be compared, and a model of another leg can be refused. Keys are an interface, see
-//! `docs/model-file.md`; unknown ones are errors.
+//! Why a separate file: a result is useful only together with its basis (leg, lengths, torque
+//! constants, gravity) and its covariance. With both, torque can be predicted with a band, two
+//! identifications can be compared, and a model of another leg can be rejected. Keys are an
+//! interface, see `docs/model-file.md`; unknown ones are errors.
 //!
 //! ```text
 //! identify, replay --save-model--> file --predict, export, --compare-model-->
 //! ```
 //!
-//! Numbers are written with the digits that restore the f64 exactly. The checksum covers every key and value but
-//! itself, so that an edited file is noticed: the numbers belong together.
+//! Numbers are written with the digits that restore the f64 exactly. The checksum covers every key
+//! and value except itself and detects an edited file: the numbers belong together.
 
 mod check;
 mod checksum;
@@ -36,11 +36,11 @@ use error::Step;
 
 /// Version of the keys.
 pub const MODEL_SCHEMA: i64 = 1;
-/// Base parameters there is room for: those of three joints.
+/// Capacity of the base set: that of three joints.
 pub(super) const LARGEST_BASE_SET: usize = 28;
-/// The constant column of a joint whose Coulomb friction differs between the directions.
+/// Constant column of a joint whose Coulomb friction differs between the directions.
 const ASYMMETRY: &str = "FCA";
-/// Larger files are something else.
+/// Size limit of a model file, bytes.
 const LARGEST_FILE_BYTES: u64 = 1 << 20;
 
 /// A checked model.
@@ -49,35 +49,35 @@ const LARGEST_FILE_BYTES: u64 = 1 << 20;
 pub struct ModelFile {
     /// [`MODEL_SCHEMA`].
     pub schema: i64,
-    /// Of everything else.
+    /// Checksum of everything else.
     pub checksum: String,
-    /// Of geometry, anatomy and torque constants, as the board computes it.
+    /// Fingerprint of geometry, anatomy and torque constants, as the board computes it.
     pub fingerprint: String,
-    /// RFC 3339, UTC.
+    /// Time of the identification, RFC 3339, UTC.
     pub created: String,
     /// Version of the program that wrote it.
     pub scarab: String,
-    /// What it was found on.
+    /// Identified leg.
     pub leg: StoredLeg,
-    /// How it was found.
+    /// Conditions of the identification.
     pub conditions: Conditions,
-    /// What torque determined.
+    /// Base parameters.
     pub base_set: BaseSet,
-    /// All fourteen parameters of every joint.
+    /// Fourteen parameters of every joint.
     pub full_set: FullSet,
 }
 
-/// The leg, as far as the parameters' meaning depends on it.
+/// Data of the leg that define the parameters' meaning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredLeg {
-    /// In the leg file.
+    /// Name in the leg file.
     pub name: String,
-    /// Of the body.
+    /// Side of the body.
     pub side: BodySide,
-    /// Base frame, m/s^2; of a trunk that leaned, as it was.
+    /// Gravity in the base frame, m/s^2, including a lean of the trunk.
     pub gravity: [f64; 3],
-    /// Proximal first.
+    /// Joints, proximal first.
     pub joints: Vec<StoredJoint>,
 }
 
@@ -85,7 +85,7 @@ pub struct StoredLeg {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredJoint {
-    /// What the joint is called.
+    /// Name of the joint.
     pub name: String,
     /// Modified Denavit-Hartenberg, rad and m.
     pub dh: DhFile,
@@ -95,15 +95,16 @@ pub struct StoredJoint {
     pub zero_offset_deg: f64,
     /// Anatomical range, degrees.
     pub range_deg: [f64; 2],
-    /// Degrees per second.
+    /// Speed limit, degrees per second.
     pub speed_limit_deg_s: f64,
-    /// N m at the joint.
+    /// Torque limit at the joint, N m.
     pub torque_limit_nm: f64,
-    /// In whose units the parameters are, N m/A at the joint: the one that was used, or the one a known mass told.
+    /// Torque constant at the joint in whose units the parameters are, N m/A: the assumed one, or
+    /// the one identified from a known mass.
     pub torque_per_ampere: f64,
 }
 
-/// How a model was found.
+/// Conditions of an identification.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Conditions {
@@ -111,28 +112,28 @@ pub struct Conditions {
     pub source: String,
     /// Always `accepted`.
     pub verdict: String,
-    /// `relative` to the torque constants that were used, or `absolute`: a known mass told them.
+    /// `relative` to the assumed torque constants, or `absolute`: identified from a known mass.
     pub scale: String,
     /// `none`, `file` or `wrong:P`.
     pub prior: String,
     /// `one-time` or `sequential`.
     pub plan: String,
-    /// Where the low-pass was 3 dB down, Hz.
+    /// Frequency at which the low-pass was 3 dB down, Hz.
     pub bandwidth_hz: f64,
-    /// Of all motions, used and held out, s.
+    /// Duration of all motions, used and held out, s.
     pub motion_s: f64,
-    /// Of simulated noise; text, since a seed may need all 64 bits.
+    /// Seed of the simulated noise; text, since a seed may need all 64 bits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<String>,
-    /// Of the swarm.
+    /// Seed of the swarm.
     pub swarm_seed: String,
-    /// Of the scaled weighted problem.
+    /// Condition number of the scaled weighted problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition: Option<f64>,
-    /// Of the drives, degrees Celsius; absent where it was not known.
+    /// Temperature of the drives, degrees Celsius; absent if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
-    /// Parameters left out of the estimate, as if they were zero.
+    /// Parameters excluded from the estimate, as if they were zero.
     pub not_estimated: Vec<String>,
     /// Torque errors on the motion identified from and on those held out.
     pub fits: Vec<StoredFit>,
@@ -142,29 +143,29 @@ pub struct Conditions {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredFit {
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
-    /// Its name.
+    /// Name of the motion.
     pub motion: String,
     /// `training` or `validation`.
     pub role: String,
-    /// N m.
+    /// Root mean square error, N m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rms_nm: Option<f64>,
-    /// Of the mean absolute torque.
+    /// Error in percent of the mean absolute torque.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub percent_of_mean_abs: Option<f64>,
 }
 
-/// What torque determined.
+/// Set of base parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BaseSet {
-    /// In the order of the covariance.
+    /// Base parameters, in the order of the covariance.
     pub parameters: Vec<StoredBase>,
-    /// Row by row.
+    /// Covariance, row by row.
     pub covariance: Vec<Vec<f64>>,
-    /// Stribeck friction, of joints that show it.
+    /// Stribeck friction of the joints that show it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stribeck: Vec<StoredStribeck>,
 }
@@ -173,16 +174,16 @@ pub struct BaseSet {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredStribeck {
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
-    /// N m.
+    /// Static friction above Coulomb friction, N m.
     pub surplus_nm: f64,
-    /// Standard deviation; files from before it was kept have none.
+    /// Standard deviation of the surplus; absent in older files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surplus_sigma_nm: Option<f64>,
-    /// rad/s.
+    /// Speed of the decay, rad/s.
     pub speed_rad_s: f64,
-    /// Standard deviation, likewise.
+    /// Standard deviation of the speed; absent in older files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed_sigma_rad_s: Option<f64>,
 }
@@ -191,25 +192,25 @@ pub struct StoredStribeck {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredBase {
-    /// As reports name it.
+    /// Name as in reports.
     pub name: String,
-    /// The parameter in whose column the value gives the torque.
+    /// Parameter in whose column the value gives the torque.
     pub carrier: String,
-    /// SI.
+    /// Value, SI units.
     pub value: f64,
     /// Standard deviation, the root of the covariance's diagonal.
     pub sigma: f64,
-    /// SI.
+    /// SI unit.
     pub unit: String,
-    /// Whose weighted sum it is.
+    /// Parameters and factors of the weighted sum.
     pub terms: BTreeMap<String, f64>,
 }
 
-/// All fourteen parameters of every joint.
+/// Fourteen parameters of every joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FullSet {
-    /// In the order that never changes, proximal joint first.
+    /// Parameters in a fixed order, proximal joint first.
     pub parameters: Vec<StoredParameter>,
 }
 
@@ -219,23 +220,24 @@ pub struct FullSet {
 pub struct StoredParameter {
     /// Symbol and joint.
     pub name: String,
-    /// Absent where neither torque nor a prior tells.
+    /// Value; absent if neither torque nor a prior determines it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// Standard deviation; absent unless measured alone.
+    /// Standard deviation; absent unless the parameter is identified alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
-    /// SI.
+    /// SI unit.
     pub unit: String,
     /// `identified`, `grouped`, `weak` or `prior`.
     pub status: String,
 }
 
 impl ModelFile {
-    /// The checked model in a file.
+    /// Loads and checks a model.
     ///
     /// # Errors
-    /// [`ModelFileError`] for what is no model; [`ToolError::Refused`] for one that was edited or was never accepted.
+    /// [`ModelFileError`] for an invalid file; [`ToolError::Refused`] for one that was edited or
+    /// never accepted.
     pub fn load(path: &Path) -> Result<Self, ToolError> {
         let file = path.display().to_string();
         let unreadable =
@@ -248,10 +250,10 @@ impl ModelFile {
         Self::parse(&text, &file)
     }
 
-    /// The checked model in a text; `file` is what faults are reported under.
+    /// Parses and checks a model; `file` is its name in error messages.
     ///
     /// # Errors
-    /// As [`ModelFile::load`].
+    /// Errors of [`ModelFile::load`].
     pub fn parse(text: &str, file: &str) -> Result<Self, ToolError> {
         let of_text = |fault| ModelFileError::of_text(file, text, &fault);
         let of_value = |steps: &[Step], reason| ModelFileError::of_value(file, text, steps, reason);
@@ -280,19 +282,20 @@ impl ModelFile {
         Ok(model)
     }
 
-    /// Joint and parameter of a name like `ZZ1`.
+    /// Joint and parameter of a name, for example `ZZ1`.
     #[must_use]
     pub fn parameter(&self, name: &str) -> Option<(usize, Parameter)> {
         parameter_of(name, self.leg.joints.len())
     }
 
-    /// Whether a parameter of this name acts only while its joint moves: a difference of friction between the directions.
+    /// Whether the name is that of a friction difference between the directions, which acts only
+    /// while its joint moves.
     #[must_use]
     pub fn is_asymmetry(name: &str) -> bool {
         name.starts_with(ASYMMETRY)
     }
 
-    /// Values of the fourteen parameters of a joint; `None` where one is unknown.
+    /// Fourteen parameters of a joint; `None` if one is unknown.
     #[must_use]
     pub fn joint_parameters(&self, joint: usize) -> Option<[f64; scarab::model::PARAMETERS_PER_JOINT]> {
         const COUNT: usize = scarab::model::PARAMETERS_PER_JOINT;
@@ -303,7 +306,7 @@ impl ModelFile {
 }
 
 impl StoredLeg {
-    /// As a leg file without truth, prior and drive.
+    /// Leg file without truth, prior and drive.
     #[must_use]
     pub fn to_leg_file(&self) -> LegFile {
         let joints = self.joints.iter().map(|stored| {
@@ -320,7 +323,7 @@ impl StoredLeg {
     }
 }
 
-/// A symmetric matrix of `count` rows with ones on the rest of the diagonal: linear algebra without a heap.
+/// Symmetric matrix of `count` rows, padded with ones on the diagonal: linear algebra without a heap.
 fn padded(
     count: usize,
     element: impl Fn(usize, usize) -> f64,
@@ -334,7 +337,7 @@ fn padded(
     matrix
 }
 
-/// Joint and parameter of a name like `ZZ1` in a leg of so many joints.
+/// Joint and parameter of a name, for example `ZZ1`, in a leg with `joints` joints.
 fn parameter_of(name: &str, joints: usize) -> Option<(usize, Parameter)> {
     let split = name.find(|letter: char| letter.is_ascii_digit())?;
     let (symbol, joint) = name.split_at(split);

@@ -1,7 +1,8 @@
-//! `monitor`: a leg is identified and walks; load or friction change meanwhile; what the firmware notices and makes of it.
+//! `monitor`: a leg is identified and walks while load or friction change; reports the firmware's
+//! detection and update.
 //!
-//! The leg walks the paper's gait with a 3 s cycle, which hardly excites it: what can be told is what a wearer's own day
-//! shows. The operator of this simulation takes every update that is offered.
+//! The leg walks the paper's gait with a 3 s cycle, which hardly excites it: the information is
+//! that of a wearer's normal day. The simulated operator accepts every offered update.
 
 mod print;
 mod report;
@@ -25,45 +26,45 @@ use crate::description::PushDescription;
 use crate::world::TICK_S;
 use report::update_report;
 
-/// A change that is not noticed within so long is not noticed.
+/// Limit after which a change counts as not detected.
 const LONGEST_WAIT_S: f64 = 600.0;
-/// The quick pass is tried again for so long.
+/// Limit for repeated attempts of the quick update.
 const LONGEST_UPDATE_S: f64 = 120.0;
-/// Walked with the update in use.
+/// Walking time with the update in use.
 const AFTER_S: f64 = 60.0;
-/// Identification takes 53 s.
+/// Limit of an identification, which takes 53 s.
 const LONGEST_IDENTIFICATION_S: f64 = 300.0;
-/// After a false alarm: damping and coming to rest.
+/// Rest after a false alarm: damping until standstill.
 const REST_S: f64 = 4.0;
-/// Friction that changes slowly does so in steps of a second.
+/// Step in which a slow change of friction is simulated.
 const FRICTION_STEP_S: f64 = 1.0;
 
-/// What happens to a leg while it walks.
+/// Change to a leg while it walks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Disturbance {
-    /// A point mass fixed to a link, or taken off.
+    /// Point mass fixed to a link, or removed.
     Payload(Payload<f64>),
-    /// Coulomb and viscous friction of all joints.
+    /// Change of Coulomb and viscous friction of all joints.
     Friction {
-        /// Times what it was.
+        /// Factor on the original friction.
         factor: f64,
-        /// In the course of so many seconds.
+        /// Duration of the change, s.
         over_s: f64,
     },
 }
 
-/// What to simulate.
+/// Options of the simulation.
 #[derive(Clone, Debug)]
 pub struct MonitorOptions {
-    /// Of noise and pushes.
+    /// Seed of noise and pushes.
     pub seed: u64,
-    /// What changes.
+    /// Changes to simulate.
     pub disturbances: Vec<Disturbance>,
-    /// Seconds of walking before that.
+    /// Walking time before the change, s.
     pub at_s: f64,
-    /// Hours of walking in which nothing changes.
+    /// Walking time without a change, hours.
     pub hours: f64,
-    /// The wearer's pushes while walking.
+    /// Pushes by the wearer while walking.
     pub pushes: Option<PushesFile>,
 }
 
@@ -71,7 +72,7 @@ fn ticks(seconds: f64) -> u64 {
     (seconds / TICK_S) as u64
 }
 
-/// The 3 s gait for so long.
+/// Gait with a 3 s cycle for a duration.
 fn gait<const N: usize, const B: usize>(
     leg: &LegFile,
     context: &Context<N, B>,
@@ -84,7 +85,7 @@ fn gait<const N: usize, const B: usize>(
     Ok(context.configuration.prove(motion).map_err(|_| unfit())?)
 }
 
-/// Identified, at rest; `Err` holds the words of the refusal.
+/// Identified pair at rest; `Err` holds the reason for rejection.
 fn identified<const N: usize, const B: usize>(
     leg: &LegFile,
     context: &Context<N, B>,
@@ -109,19 +110,19 @@ fn identified<const N: usize, const B: usize>(
     Ok(if pair.leg.control().model().is_some() { Ok(pair) } else { Err(reasons) })
 }
 
-/// A pair that walks, and how well.
+/// Walking pair with its tracking error.
 struct Walk<'a, const N: usize, const B: usize> {
     leg: &'a LegFile,
     context: &'a Context<N, B>,
     pair: Pair<N, B>,
-    /// What changes, and since which tick.
+    /// Active changes and the tick of their start.
     changing: Option<(&'a [Disturbance], u64)>,
     squared: f64,
     count: u64,
 }
 
 impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
-    /// From rest into the gait.
+    /// Starts the gait from rest.
     fn begin(
         leg: &'a LegFile,
         context: &'a Context<N, B>,
@@ -170,7 +171,7 @@ impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
         mean.sqrt().to_degrees()
     }
 
-    /// Walks on until there is an alarm, at most so long. Seconds it took.
+    /// Walks until an alarm, or up to a limit; returns the elapsed seconds.
     fn until_alarm(&mut self, longest_s: f64) -> Result<Option<f64>, ToolError> {
         for tick in 0..ticks(longest_s) {
             self.tick(None)?;
@@ -188,7 +189,7 @@ impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
         Ok(())
     }
 
-    /// Stands still, damped, and is enabled again.
+    /// Damps the leg to a standstill and enables it again.
     fn rest(mut self) -> Result<Pair<N, B>, ToolError> {
         self.pair.tick(Some(ControlRequest::Power(PowerRequest::QuickStop)), self.context.gravity);
         for _ in 0..ticks(REST_S) {
@@ -201,7 +202,7 @@ impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
     }
 }
 
-/// One seed: identification, false alarms, change.
+/// Runs one seed: identification, false alarms, change.
 pub fn watch<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &MonitorOptions,
@@ -296,7 +297,7 @@ fn change<const N: usize, const B: usize>(
         .disturbances
         .iter()
         .any(|disturbance| matches!(disturbance, Disturbance::Friction { over_s, .. } if *over_s > after_s));
-    // A truth that moves is none.
+    // A truth that still changes is no reference.
     let known: &[_] = if run.still_changing { &[] } else { &options.disturbances };
     let thresholds = &context.configuration.thresholds;
     let waited_s = waited as f64 * TICK_S;
@@ -312,7 +313,7 @@ fn change<const N: usize, const B: usize>(
     Ok(())
 }
 
-/// What happens at this tick after the change began.
+/// Applies the changes at this tick after their start.
 fn disturb<const N: usize, const B: usize>(pair: &mut Pair<N, B>, disturbances: &[Disturbance], tick: u64) {
     for disturbance in disturbances {
         match *disturbance {

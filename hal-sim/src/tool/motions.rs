@@ -1,7 +1,7 @@
-//! The motions of a run: an exciting one to identify from, and three to predict.
+//! Motions of a run: an exciting one to identify from, and three to predict.
 //!
-//! The exciting motion is the most informative of some hundred random Fourier series that are proved to stay within the
-//! leg's limits: the largest determinant of the information matrix of the base parameters.
+//! The exciting motion is the most informative of some hundred random Fourier series within the
+//! leg's proved limits. Its information matrix of the base parameters has the largest determinant.
 
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -15,7 +15,7 @@ use scarab::units::{Radian, Second};
 use super::leg_file::LegFile;
 use super::setup::SetupError;
 
-/// Names of the motions that are predicted, in the order of the leg's validation.
+/// Names of the predicted motions, in the order of the leg's validation.
 pub const VALIDATION_NAMES: [&str; VALIDATION_MOTIONS] = ["gait-6.5", "gait-3", "fourier"];
 
 const EXCITATION_PERIOD: Second = Second(10.0);
@@ -23,26 +23,26 @@ const EXCITATION_PERIOD: Second = Second(10.0);
 pub const EXCITATION_CYCLES: u32 = 2;
 const UNUSED_PERIOD: Second = Second(8.0);
 const BLEND: Second = Second(1.0);
-/// Harmonics of the exciting motion; the curve has room for one more.
+/// Harmonics of the exciting motion; the curve has capacity for one more.
 const EXCITED_HARMONICS: usize = 5;
 const CANDIDATES: u64 = 300;
 const INSTANTS: u32 = 100;
-/// Share of the range that is kept free at both ends.
+/// Share of the range left free at both ends.
 const RANGE_MARGIN: f32 = 0.06;
-/// First seed of the candidates to identify from and of the one that is predicted.
+/// First seed of the candidates for excitation, and of the predicted motion.
 const EXCITATION_SEED: u64 = 1_000;
 const UNUSED_SEED: u64 = 900_000;
 
-/// All motions of a run, model's angles.
+/// All motions of a run in the model's angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motions<const N: usize> {
-    /// Identified from.
+    /// Motion identified from.
     pub excitation: Periodic<N>,
-    /// Predicted; see [`VALIDATION_NAMES`].
+    /// Predicted motions; see [`VALIDATION_NAMES`].
     pub validation: [Periodic<N>; VALIDATION_MOTIONS],
 }
 
-/// Motions for a leg within `limits`; `gait` tells which joints walk as hip and knee.
+/// Motions for a leg within `limits`; `gait` selects the joints that walk as hip and knee.
 pub fn motions<const N: usize, const B: usize>(
     leg: &LegFile,
     model: &RowModel<f64, N, B>,
@@ -58,7 +58,7 @@ pub fn motions<const N: usize, const B: usize>(
     Ok(Motions { excitation, validation: [slow, fast, unused] })
 }
 
-/// The default way to an exciting motion: the most informative of 300 random ones.
+/// Default exciting motion: the most informative of 300 random ones.
 #[must_use]
 pub fn random_excitation<const N: usize, const B: usize>(
     model: &RowModel<f64, N, B>,
@@ -69,7 +69,7 @@ pub fn random_excitation<const N: usize, const B: usize>(
     most_informative(model, limits, period, cycles, EXCITATION_SEED, CANDIDATES)
 }
 
-/// The most informative of `candidates` random motions, drawn with seeds from `seed` on.
+/// Most informative of `candidates` random motions with seeds from `seed` on.
 #[must_use]
 pub fn most_informative<const N: usize, const B: usize>(
     model: &RowModel<f64, N, B>,
@@ -91,7 +91,7 @@ pub fn most_informative<const N: usize, const B: usize>(
     best.map(|(_, motion)| motion)
 }
 
-/// Random amplitudes that fall with the harmonic, stretched into the range less its margins.
+/// Random amplitudes that decrease with the harmonic, stretched into the range minus its margins.
 fn random_curve<const N: usize>(
     limits: &[JointEnvelope; N],
     period: Second,
@@ -117,7 +117,7 @@ fn inner_ranges<const N: usize>(limits: &[JointEnvelope; N]) -> [(Radian, Radian
     })
 }
 
-/// The curve as a motion at rest at both ends, its period stretched until the limits are proved.
+/// Motion with rest at both ends; its period is stretched until the limits are proved.
 fn slowed_into<const N: usize>(
     curve: Fourier<N>,
     limits: &[JointEnvelope; N],
@@ -153,8 +153,8 @@ fn log_determinant<const N: usize, const B: usize>(model: &RowModel<f64, N, B>, 
     (0..model.base.rank()).map(|base| factor.triangle()[base][base].abs().max(1e-30).ln()).sum()
 }
 
-/// The paper's gait, hip then knee (a third joint before them goes with the hip), in the leg's own range where that is not
-/// the paper's.
+/// Gait of the paper, hip then knee; a third joint before them moves with the hip. The leg's own
+/// range replaces the paper's where they differ.
 fn walk<const N: usize>(
     leg: &LegFile,
     limits: &[JointEnvelope; N],

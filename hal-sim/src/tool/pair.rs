@@ -1,7 +1,7 @@
-//! Leg and plant ticked together, and what both are made from.
+//! Leg and plant ticked together, and the data both are built from.
 //!
-//! One value that can be cloned at any tick and run on: the copies go the same way bit for bit until they are given
-//! different requests.
+//! One value that can be cloned at any tick and continued. The copies evolve bit for bit alike
+//! until they receive different requests.
 
 use scarab::hal::{LegDrives, Sample};
 use scarab::ident::{Kernel, LowPass, Record, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
@@ -25,21 +25,21 @@ use crate::world::{TICK_S, World};
 
 /// Taps of the device's filter.
 pub const TAPS: usize = 256;
-/// Open outputs that go with them.
+/// Open outputs of that filter.
 pub const PENDING: usize = 26;
-/// The leg as the device holds it.
+/// Firmware leg with the device's filter lengths.
 pub type DeviceLeg<const N: usize, const B: usize> = Leg<N, B, TAPS, PENDING>;
 
-/// Evaluations of the search per servo tick: 8,000 per second. One costs some 7,900 instructions of the device at 13 base
-/// parameters, so the search takes half of the processor while it runs.
+/// Evaluations of the search per servo tick: 8,000 per second. One costs about 7,900 instructions
+/// of the device at 13 base parameters, so a running search takes half of the processor.
 pub const EVALUATIONS_PER_TICK: u32 = 2;
 
-/// What a run is made from, before it starts.
+/// Data from which a run is built.
 #[derive(Clone, Debug)]
 pub struct Context<const N: usize, const B: usize> {
-    /// What is known beside the data.
+    /// Knowledge besides the data.
     pub background: Background<N, B>,
-    /// What the firmware is built from.
+    /// Configuration of the firmware.
     pub configuration: LegConfiguration<N, B>,
     /// The motions of the run.
     pub motions: Motions<N>,
@@ -47,18 +47,18 @@ pub struct Context<const N: usize, const B: usize> {
     pub smoothing: Kernel<f32, TAPS>,
     /// Second stage.
     pub low_pass: LowPass<f32, TAPS>,
-    /// In the base frame, m/s^2.
+    /// Gravity in the base frame, m/s^2.
     pub gravity: [f32; 3],
     /// Standard deviation of each joint's logged torque, N m.
     pub noise: [f64; N],
-    /// Where drives are complete: the leg that the current loops are configured for.
+    /// Leg for which the current loops are configured; complete drives only.
     pub complete: Option<Box<LegFile>>,
-    /// What is made wrong on purpose.
+    /// Deliberate errors.
     pub perturbations: Vec<Perturbation>,
 }
 
 impl<const N: usize, const B: usize> Context<N, B> {
-    /// What a run of this leg, as the firmware believes it to be, is made from.
+    /// Prepares a run of this leg as the firmware assumes it.
     pub fn new(leg: &LegFile, options: &SimulationOptions) -> Result<Self, ToolError> {
         perturb::check_drives(options)?;
         let mut background = background::<N, B>(leg, options.prior, options.seed)?;
@@ -68,7 +68,8 @@ impl<const N: usize, const B: usize> Context<N, B> {
         configuration.estimator = options.estimator;
         let world = World::<N>::new(&leg.description()?, options.seed);
         let percent = options.torque_noise_percent.unwrap_or(leg.torque_noise_percent);
-        // Of the default motion whichever is asked for: a sensor does not know what it will be used for.
+        // The percentage always refers to the default motion: noise of a sensor does not depend on
+        // its later use.
         let mean = mean_absolute_torque(leg, &world, &motions.excitation);
         if let Some(excitation) = &options.excitation {
             motions.excitation = excitation.motion()?;
@@ -100,15 +101,15 @@ impl<const N: usize, const B: usize> Context<N, B> {
 }
 
 impl<const N: usize, const B: usize> Context<N, B> {
-    /// The noise as one of each joint's current, A.
+    /// Noise of each joint's current, A.
     #[must_use]
     pub fn current_noise(&self, leg: &LegFile) -> [f64; N] {
         core::array::from_fn(|joint| self.noise[joint] / leg.joints[joint].torque_per_ampere)
     }
 }
 
-/// Where a leg hangs before anything moves, rad: a tenth into the range, inside it, and near to hanging for a leg that hangs at
-/// its lower end.
+/// Initial angles of the resting leg, rad: a tenth into the range. A leg whose lower end is the
+/// hanging position thus starts near it.
 #[must_use]
 pub fn start_position<const N: usize>(leg: &LegFile) -> [f64; N] {
     core::array::from_fn(|joint| {
@@ -117,7 +118,7 @@ pub fn start_position<const N: usize>(leg: &LegFile) -> [f64; N] {
     })
 }
 
-/// Of the motor torque along a motion, anatomical.
+/// Mean absolute motor torque along a motion, anatomical.
 fn mean_absolute_torque<const N: usize>(leg: &LegFile, world: &World<N>, motion: &Periodic<N>) -> [f64; N] {
     let mut sum = [0.0; N];
     let ticks = (motion.blend_ticks()..motion.duration_ticks() - motion.blend_ticks()).step_by(8);
@@ -145,22 +146,22 @@ pub struct Pair<const N: usize, const B: usize> {
     pub leg: Box<DeviceLeg<N, B>>,
     /// The plant.
     pub world: World<N>,
-    /// All levels of the board, where the plant's drives are complete.
+    /// All levels of the board, if the plant's drives are complete.
     pub board: Option<Box<Levels<N>>>,
-    /// What the sensors said last.
+    /// Last sensor readings.
     pub sample: Sample<N>,
-    /// So far.
+    /// Elapsed servo ticks.
     pub ticks: u64,
-    /// Evaluations of the search at each tick.
+    /// Evaluations of the search per tick.
     pub evaluations: u32,
-    /// What the last tick of complete drives gave.
+    /// Last output of complete drives.
     output: Option<ControlOutput<N>>,
-    /// Which joint of the plant hangs on each joint's connectors.
+    /// Joint of the plant at each joint's connectors.
     wiring: [usize; N],
 }
 
 impl<const N: usize, const B: usize> Pair<N, B> {
-    /// A leg at rest a tenth into its range, drive off.
+    /// Leg at rest a tenth into its range, drive off.
     pub fn new(leg: &LegFile, context: &Context<N, B>, seed: u64) -> Result<Self, ToolError> {
         let (description, believed) = (leg.description()?, context.complete.as_deref());
         let mut drives = believed.map(|_| leg.complete_description::<N>()).transpose()?;
@@ -181,7 +182,8 @@ impl<const N: usize, const B: usize> Pair<N, B> {
             Some((believed, drives)) => {
                 let mut board = Levels::ready(believed, drives, &device, &mut world, seed)?;
                 board.queues().set_samples(&sample.joints);
-                // Requests come from the run: a switch that was never open asks for nothing, and one that opens would stop the leg.
+                // Requests come from the run. A switch that never opens requests nothing; an open
+                // one would stop the leg.
                 board.registers.contacts.enabling = true;
                 Some(Box::new(board))
             }
@@ -209,7 +211,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         }
     }
 
-    /// One servo tick of both.
+    /// Runs one servo tick of leg and plant.
     pub fn tick(&mut self, request: Option<ControlRequest<N>>, gravity: [f32; 3]) -> ControlOutput<N> {
         let output = if self.board.is_some() {
             self.tick_board(request, gravity)
@@ -227,7 +229,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         output
     }
 
-    /// One servo tick of all levels of the board, and six periods of the plant.
+    /// Runs one servo tick of all levels of the board, and six periods of the plant.
     fn tick_board(&mut self, request: Option<ControlRequest<N>>, gravity: [f32; 3]) -> ControlOutput<N> {
         let Some(board) = &mut self.board else { unreachable!("called with a board") };
         if let Some(request) = request {
@@ -259,7 +261,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         self.output.expect("a board that is ready ticks its leg at once")
     }
 
-    /// Goes along the exciting motion, and no further than the record of it; `None` where the drive does not complete it.
+    /// Runs the exciting motion up to its record; `None` if the drive does not complete it.
     pub fn recorded(&mut self, gravity: [f32; 3], longest_s: f64) -> Option<Record<f32, N, B>> {
         let mut request = Some(ControlRequest::Identify);
         for _ in 0..(longest_s / TICK_S) as u32 {
@@ -275,7 +277,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         None
     }
 
-    /// Why the drive is no longer enabled, in words.
+    /// Reason why the drive is no longer enabled.
     #[must_use]
     pub fn stop_words(&self, leg: &LegFile) -> String {
         let Some((joint, fault)) = self.board.as_ref().and_then(|board| board.fault()) else {
@@ -285,7 +287,7 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         format!("axis `{name}` released its bridge, and with it all others: {}", axis_fault(fault))
     }
 
-    /// From off to enabled; tells whether the drive is.
+    /// Enables the drive and returns whether it is enabled.
     pub fn enable(&mut self, gravity: [f32; 3]) -> bool {
         self.tick(None, gravity);
         for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {

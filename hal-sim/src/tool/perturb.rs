@@ -1,23 +1,28 @@
-//! Things done to a simulated identification on purpose, to see that the verdict notices.
+//! Deliberate errors in a simulated identification, which the verdict must detect.
 //!
-//! Why: a verdict that has only seen honest runs has shown nothing. Every perturbation goes through the whole firmware;
-//! none of them needs a door in it that a board would not have.
+//! Why: a verdict tested only on correct runs has proved nothing. Every perturbation acts through
+//! the whole firmware; none needs an interface that a board would not have.
 //!
-//! | `--perturb` | what is wrong | where |
+//! | `--perturb` | error | place |
 //! | --- | --- | --- |
-//! | `inertia=0.7`, `com=0.8` | the result, before it is validated: base parameters carried by an inertia (rotors included), by a first moment | values to be validated |
-//! | `length=1.1` | the firmware believes all link lengths this much longer | firmware |
-//! | `sign=JOINT` | the firmware believes the other direction of one joint | firmware |
-//! | `zero=5`, `zero=5@JOINT` | the firmware believes an encoder's zero so many degrees off; the first joint's unless named | firmware |
+//! | `inertia=0.7` | factor on base parameters carried by an inertia, rotors included | result, see below |
+//! | `com=0.8` | factor on base parameters carried by a first moment | result, see below |
+//! | `length=1.1` | factor on all link lengths assumed by the firmware | firmware |
+//! | `sign=JOINT` | the firmware assumes the other direction of one joint | firmware |
+//! | `zero=5`, `zero=5@JOINT` | the firmware assumes an encoder zero off by these degrees | firmware |
 //! | `swap` | connectors of the first two joints exchanged, motor and encoder together | wiring |
-//! | `torque-constant=1.2` | all motors make so much more torque per ampere than the firmware believes | plant |
-//! | `added-mass=2` | kg at the last link's centre of mass, after the excitation, before the validation | plant |
-//! | `contact=2` | the foot stands on the floor for so many seconds in the middle of the excitation | plant |
-//! | `stuck=JOINT` | a joint is blocked where the leg stands at the start | plant |
-//! | `small-motion`, `small-motion=0.05` | the excitation with so small a share of its amplitude | firmware |
-//! | `trigger=-40` | converters triggered so many timer clocks after the middle of the zero vector (the board: 20) | complete drives |
-//! | `quarter-shift` | the bridges switch a quarter of a period apart (the board: half) | complete drives |
-//! | `coupling=0.5` | A by which each edge of the other bridge in the 1.2 us before the hold disturbs a sample | complete drives |
+//! | `torque-constant=1.2` | factor of all motors' true torque per ampere over the assumed one | plant |
+//! | `added-mass=2` | kg at the last link's centre of mass, added after the excitation | plant |
+//! | `contact=2` | the foot stands on the floor for these seconds in mid-excitation | plant |
+//! | `stuck=JOINT` | a joint is blocked at its initial position | plant |
+//! | `small-motion`, `small-motion=0.05` | excitation with this share of its amplitude | firmware |
+//! | `trigger=-40` | converter trigger, timer clocks after mid zero vector (board: 20) | complete drives |
+//! | `quarter-shift` | the bridges switch a quarter of a period apart (board: half) | complete drives |
+//! | `coupling=0.5` | A of disturbance per edge of the other bridge, see below | complete drives |
+//!
+//! `inertia` and `com` change the result before its validation. `zero` applies to the first joint
+//! unless one is named. `added-mass` is in place before the validation. `coupling` disturbs a
+//! sample for each edge of the other bridge in the 1.2 us before the hold.
 
 use core::str::FromStr;
 
@@ -32,28 +37,28 @@ use super::pair::{Context, Pair};
 use super::simulate::{DriveModel, SimulationOptions};
 use crate::drive::description::{CompleteDescription, ShuntDescription};
 
-/// One thing that is wrong; see the module's table.
+/// One deliberate error; see the module's table.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Perturbation {
-    /// Factor on what an inertia carries.
+    /// Factor on base parameters carried by an inertia.
     Inertia(f64),
-    /// Factor on what a first moment carries.
+    /// Factor on base parameters carried by a first moment.
     CentreOfMass(f64),
-    /// Factor on the link lengths believed.
+    /// Factor on the assumed link lengths.
     Length(f64),
-    /// The first two joints exchanged.
+    /// First two joints exchanged.
     Swap,
-    /// A joint whose direction is believed wrong.
+    /// Joint whose assumed direction is wrong.
     Sign(String),
-    /// Degrees, and the joint.
+    /// Error of the encoder zero in degrees, and its joint.
     Zero(f64, Option<String>),
-    /// kg.
+    /// Mass, kg.
     AddedMass(f64),
-    /// s.
+    /// Duration, s.
     Contact(f64),
-    /// A joint that does not move.
+    /// Blocked joint.
     Stuck(String),
-    /// True over believed torque per ampere.
+    /// True over assumed torque per ampere.
     TorqueConstant(f64),
     /// Share of the excitation's amplitude.
     SmallMotion(f64),
@@ -61,11 +66,11 @@ pub enum Perturbation {
     Trigger(f64),
     /// Bridges a quarter of a period apart.
     QuarterShift,
-    /// A for each edge of the other bridge.
+    /// Disturbance in A per edge of the other bridge.
     Coupling(f64),
 }
 
-/// A number from the text, within the range that makes sense.
+/// Parses a number within a plausible range.
 fn number(name: &str, text: Option<&str>, default: f64, low: f64, high: f64) -> Result<f64, String> {
     let Some(text) = text else { return Ok(default) };
     match text.parse::<f64>() {
@@ -118,19 +123,19 @@ impl FromStr for Perturbation {
 }
 
 impl Perturbation {
-    /// Whether it changes the values found, before they are validated.
+    /// Whether it changes the identified values before their validation.
     #[must_use]
     pub fn tampers(&self) -> bool {
         matches!(self, Self::Inertia(_) | Self::CentreOfMass(_))
     }
 
-    /// Whether it changes something that only complete drives have.
+    /// Whether it needs complete drives.
     fn needs_complete_drives(&self) -> bool {
         matches!(self, Self::Trigger(_) | Self::QuarterShift | Self::Coupling(_))
     }
 }
 
-/// Refuses what the simulated drives cannot have.
+/// Rejects perturbations that the simulated drives cannot have.
 pub fn check_drives(options: &SimulationOptions) -> Result<(), ToolError> {
     let ideal = options.drive == DriveModel::Ideal;
     if ideal && options.perturbations.iter().any(Perturbation::needs_complete_drives) {
@@ -141,7 +146,7 @@ pub fn check_drives(options: &SimulationOptions) -> Result<(), ToolError> {
     Ok(())
 }
 
-/// Changes the complete drives that are simulated.
+/// Applies the perturbations to complete drives.
 pub fn drives<const N: usize>(drives: &mut CompleteDescription<N>, perturbations: &[Perturbation]) {
     for perturbation in perturbations {
         match perturbation {
@@ -158,7 +163,7 @@ pub fn drives<const N: usize>(drives: &mut CompleteDescription<N>, perturbations
     }
 }
 
-/// The place of a joint given by its name or its number from 1.
+/// Index of a joint from its name or its number from 1.
 fn joint_index(leg: &LegFile, joint: &str) -> Result<usize, ToolError> {
     let by_number = joint.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
     leg.joints
@@ -176,7 +181,7 @@ fn joint_index(leg: &LegFile, joint: &str) -> Result<usize, ToolError> {
         })
 }
 
-/// The leg that the firmware believes in.
+/// Leg as assumed by the firmware.
 pub fn believed(leg: &LegFile, perturbations: &[Perturbation]) -> Result<LegFile, ToolError> {
     let mut believed = leg.clone();
     for perturbation in perturbations {
@@ -196,14 +201,14 @@ pub fn believed(leg: &LegFile, perturbations: &[Perturbation]) -> Result<LegFile
     Ok(believed)
 }
 
-/// The leg that is simulated.
+/// Leg as simulated.
 pub fn simulated(leg: &LegFile, perturbations: &[Perturbation]) -> Result<LegFile, ToolError> {
     let mut simulated = leg.clone();
     for perturbation in perturbations {
         match perturbation {
             Perturbation::TorqueConstant(factor) => {
                 for joint in &mut simulated.joints {
-                    // The drive's limit is one of current.
+                    // The limit of the drive is one of current.
                     joint.current_limit_a = Some(joint.current_limit());
                     joint.torque_per_ampere *= factor;
                 }
@@ -217,7 +222,7 @@ pub fn simulated(leg: &LegFile, perturbations: &[Perturbation]) -> Result<LegFil
     Ok(simulated)
 }
 
-/// The same motion, its amplitude about its centre multiplied by `share`.
+/// Motion with its amplitude about its centre multiplied by `share`.
 fn shrunk<const N: usize>(motion: &Periodic<N>, share: f32) -> Result<Periodic<N>, MotionError> {
     let centre = motion.curve().centre_rad();
     let curve = motion.curve().mapped([share; N], centre.map(|angle| Radian((1.0 - share) * angle)))?;
@@ -226,7 +231,7 @@ fn shrunk<const N: usize>(motion: &Periodic<N>, share: f32) -> Result<Periodic<N
     Periodic::new(curve, blend, cycles, SERVO_RATE_HZ)
 }
 
-/// What is wrong with the configuration, before the firmware is built from it.
+/// Applies the perturbations of the configuration before the firmware is built.
 pub fn configure<const N: usize, const B: usize>(
     context: &mut Context<N, B>,
     perturbations: &[Perturbation],
@@ -242,7 +247,7 @@ pub fn configure<const N: usize, const B: usize>(
     Ok(())
 }
 
-/// What is wrong from the start of the run.
+/// Applies the perturbations present from the start of the run.
 pub fn at_start<const N: usize, const B: usize>(
     leg: &LegFile,
     pair: &mut Pair<N, B>,
@@ -258,7 +263,7 @@ pub fn at_start<const N: usize, const B: usize>(
     Ok(())
 }
 
-/// What happens when the exciting motion begins.
+/// Applies the perturbations that begin with the exciting motion.
 pub fn at_excitation<const N: usize, const B: usize>(
     leg: &LegFile,
     context: &Context<N, B>,
@@ -275,7 +280,7 @@ pub fn at_excitation<const N: usize, const B: usize>(
     }
 }
 
-/// What happens between the exciting motion and the search.
+/// Applies the perturbations between the exciting motion and the search.
 pub fn after_excitation<const N: usize, const B: usize>(
     leg: &LegFile,
     pair: &mut Pair<N, B>,
@@ -288,7 +293,7 @@ pub fn after_excitation<const N: usize, const B: usize>(
     }
 }
 
-/// What happens to the result before it is validated.
+/// Applies the perturbations of the result before its validation.
 pub fn before_validation<const N: usize, const B: usize>(
     context: &Context<N, B>,
     pair: &mut Pair<N, B>,

@@ -1,8 +1,9 @@
-//! A known mass at a known place of a leg, as the command line states it: `KG@JOINT:X_M` or `KG@JOINT:X_M:Y_M`.
+//! Known mass at a known position of a leg, as stated on the command line: `KG@JOINT:X_M` or
+//! `KG@JOINT:X_M:Y_M`.
 //!
-//! JOINT is a joint's name or its number from 1; X and Y are in that joint's D-H frame, X along the link. A mass that is
-//! stated wrongly is worse than none, so what cannot be meant is refused: a mass of 0 or below or above
-//! [`LARGEST_KG`], and a place beyond the link.
+//! JOINT is a joint's name or its number from 1; X and Y are in that joint's D-H frame, X along the
+//! link. A wrong mass is worse than none, so implausible values are rejected. These are a mass of
+//! 0, below, or above [`LARGEST_KG`], and a position beyond the link.
 
 use core::str::FromStr;
 
@@ -12,10 +13,10 @@ use scarab::model::Payload;
 use super::error::ToolError;
 use super::leg_file::LegFile;
 
-/// More than this hangs on no leg that a drive of this class moves, kg.
+/// Largest mass that a drive of this class moves, kg.
 pub const LARGEST_KG: f64 = 50.0;
 
-/// A mass as it was stated; not yet held against a leg.
+/// Mass as stated, not yet checked against a leg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedMass {
     mass: f64,
@@ -47,7 +48,7 @@ impl FromStr for PlacedMass {
 }
 
 impl PlacedMass {
-    /// The mass on this leg; `option` is what a refusal is reported under.
+    /// Places the mass on this leg; `option` is named in error messages.
     pub fn on(&self, leg: &LegFile, option: &str) -> Result<Payload<f64>, ToolError> {
         let refused = |reason: String| ToolError::input(format!("{option}: {reason}"));
         let number = self.joint.parse::<usize>().ok().and_then(|number| number.checked_sub(1));

@@ -1,29 +1,31 @@
-//! A leg file for the other side of the body, or for a trunk that leans.
+//! Leg file for the other side of the body, or for a leaning trunk.
 //!
-//! **Side.** The drives of a left leg are mounted mirrored: the same flexion turns motor and encoder the other way. Angles
-//! and torques stay anatomical, and the frames keep their axes' directions in space: a turn about z is the same turn in a
-//! mirror along z. What changes sign is everything odd in z: offsets along the axes, z of the centres of mass, the products
-//! XZ and YZ; and the drives' counts and currents (`scarab::servo::JointScale::mirrored`). Only legs whose axes are all parallel are mirrored: with another axis the
-//! motion itself would have to be.
+//! **Side.** The drives of a left leg are mounted mirrored: the same flexion turns motor and
+//! encoder the other way. Angles and torques stay anatomical. The frames keep their axes'
+//! directions in space: a turn about z is unchanged by a mirror along z.
 //!
-//! **Trunk.** The base frame is the trunk's. A trunk that leans forward by p turns gravity in it about the hip's axis of
-//! flexion, the same way as flexion turns the thigh:
+//! Everything odd in z changes its sign: offsets along the axes, z of the centres of mass, the products XZ
+//! and YZ. So do the drives' counts and currents (`scarab::servo::JointScale::mirrored`). Only legs with
+//! parallel axes are mirrored; with another axis the motion itself would have to be mirrored.
+//!
+//! **Trunk.** The base frame is the trunk's. A trunk that leans forward by p turns gravity in that
+//! frame about the hip's axis of flexion. The direction is that in which flexion turns the thigh:
 //!
 //! ```text
 //! g -> Rot(flexion axis of the hip, p) g          for the default leg (9.81, 0, 0) -> 9.81 (cos p, sin p, 0)
 //! ```
 //!
-//! Limits: one angle for a whole run.
+//! Limits: one constant angle per run.
 
 use nalgebra::{Rotation3, Unit, Vector3};
 
 use super::error::ToolError;
 use super::leg_file::{BodySide, LegFile};
 
-/// A trunk leans no further, degrees.
+/// Largest lean of a trunk, degrees.
 pub const LARGEST_PITCH_DEG: f64 = 90.0;
 
-/// The leg on this side of the body.
+/// Leg for this side of the body.
 pub fn on_side(leg: &LegFile, side: BodySide) -> Result<LegFile, ToolError> {
     let mut turned = leg.clone();
     if side == leg.side {
@@ -39,7 +41,7 @@ pub fn on_side(leg: &LegFile, side: BodySide) -> Result<LegFile, ToolError> {
     for joint in &mut turned.joints {
         joint.dh.d = 0.0 - joint.dh.d;
         for link in [&mut joint.truth, &mut joint.prior].into_iter().flatten() {
-            // 0 - x, so that a zero stays one without a sign.
+            // 0 - x keeps a zero without a sign.
             link.com[2] = 0.0 - link.com[2];
             link.inertia_com[2] = 0.0 - link.inertia_com[2];
             link.inertia_com[4] = 0.0 - link.inertia_com[4];
@@ -48,7 +50,7 @@ pub fn on_side(leg: &LegFile, side: BodySide) -> Result<LegFile, ToolError> {
     Ok(turned)
 }
 
-/// The leg below a trunk that leans forward by `degrees`.
+/// Leg below a trunk that leans forward by `degrees`.
 pub fn pitched(leg: &LegFile, degrees: f64) -> Result<LegFile, ToolError> {
     if !(-LARGEST_PITCH_DEG..=LARGEST_PITCH_DEG).contains(&degrees) {
         return Err(ToolError::input(format!(
@@ -62,8 +64,8 @@ pub fn pitched(leg: &LegFile, degrees: f64) -> Result<LegFile, ToolError> {
     Ok(leaning)
 }
 
-/// The hip's axis of flexion in the base frame, all joints at their anatomical zero; of a leg without a joint called hip
-/// the first joint's.
+/// Flexion axis of the hip in the base frame, all joints at their anatomical zero. A leg without a
+/// joint named hip uses its first joint.
 fn flexion_axis(leg: &LegFile) -> Unit<Vector3<f64>> {
     let hip = leg.joints.iter().position(|joint| joint.name == "hip").unwrap_or(0);
     let mut frame = Rotation3::identity();

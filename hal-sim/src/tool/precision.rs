@@ -1,19 +1,19 @@
-//! Digits of reported numbers: as many as their standard deviation supports, three where none is known.
+//! Digits of reported numbers: as many as the standard deviation supports, three without one.
 //!
-//! Two significant digits of the standard deviation, and the value to the same decimal place. Source: "Guide to the
-//! Expression of Uncertainty in Measurement", JCGM 100:2008, 7.2.6. JSON keeps all digits.
+//! Two significant digits of the standard deviation, and the value to the same decimal place. Source:
+//! "Guide to the Expression of Uncertainty in Measurement", JCGM 100:2008, 7.2.6. JSON has all digits.
 
 use super::report::Number;
 
-/// Smaller numbers are the rounding of a computation in double precision.
+/// Smaller numbers are rounding errors of double precision.
 const ROUNDING: f64 = 1e-12;
-/// Smaller parameters without standard deviation are the rounding of a prior's zero [SI].
-/// Shipped legs have rounding up to 7e-11, other values from 1e-5 on.
+/// Smaller parameters without standard deviation are the rounding of a prior's zero, SI. Shipped
+/// legs have rounding up to 7e-11, other values from 1e-5 on.
 const ROUNDING_OF_PARAMETERS: f64 = 1e-9;
-/// Decimal places beyond which a number is written with an exponent.
+/// Decimal places beyond which an exponent is used.
 const MOST_PLACES: i32 = 7;
 
-/// Value of a parameter, rounded by its standard deviation.
+/// Formats the value of a parameter, rounded by its standard deviation.
 #[must_use]
 pub fn value(value: Number, sigma: Number) -> String {
     match (value.known(), places(sigma)) {
@@ -25,7 +25,7 @@ pub fn value(value: Number, sigma: Number) -> String {
     }
 }
 
-/// Standard deviation with two significant digits.
+/// Formats a standard deviation with two significant digits.
 #[must_use]
 pub fn sigma(sigma: Number) -> String {
     match (sigma.known(), places(sigma)) {
@@ -35,7 +35,7 @@ pub fn sigma(sigma: Number) -> String {
     }
 }
 
-/// Number with three significant digits.
+/// Formats a number with three significant digits.
 #[must_use]
 pub fn plain(value: Number) -> String {
     match value.known() {
@@ -49,7 +49,7 @@ pub fn plain(value: Number) -> String {
     }
 }
 
-/// Number that is exact, a limit for instance: four significant digits at most, no zeros at the end.
+/// Formats an exact number, for example a limit: at most four significant digits, no trailing zeros.
 #[must_use]
 pub fn exact(value: Number) -> String {
     let Some(value) = value.known() else { return "-".into() };
@@ -69,12 +69,12 @@ fn places(sigma: Number) -> Option<i32> {
     sigma.known().filter(|sigma| *sigma > 0.0).map(|sigma| 1 - magnitude(sigma, 1))
 }
 
-/// Power of ten of the first digit, after rounding to so many digits behind it.
+/// Power of ten of the first digit, after rounding to `digits` digits behind it.
 fn magnitude(value: f64, digits: usize) -> i32 {
     format!("{value:.digits$e}").split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0)
 }
 
-/// Value at a decimal place; negative ones lie before the point.
+/// Rounds a value at a decimal place; negative places lie before the point.
 fn rounded(value: f64, places: i32) -> String {
     let unit = 10_f64.powi(-places);
     let text = if places > MOST_PLACES {
@@ -85,7 +85,7 @@ fn rounded(value: f64, places: i32) -> String {
     } else {
         format!("{value:.*}", places as usize)
     };
-    // What rounds to zero has no sign.
+    // A number that rounds to zero has no sign.
     if value.abs() < unit / 2.0 { text.trim_start_matches('-').into() } else { text }
 }
 
@@ -130,7 +130,7 @@ mod tests {
             assert_eq!(shown(found), text);
         }
         assert_eq!((shown(f64::NAN), sigma(Number::UNKNOWN)), ("-".into(), "-".into()));
-        // A search that ends this far above its optimum is no rounding.
+        // A search that ends this far above its optimum is not a rounding error.
         assert_eq!(plain(2.31e-7.into()), "2.31e-7");
         assert_eq!(plain(6.94e-17.into()), "0");
     }

@@ -1,21 +1,24 @@
-//! `predict`: torque of given states after a kept model, with its band.
+//! `predict`: torque of given states from a stored model, with its uncertainty band.
 //!
 //! ```text
 //! torque_i = y_i . values            y_i: columns of the base parameters' carriers in row i of the regressor
 //! sigma_i  = sqrt(y_i' C y_i)        C: covariance of the base parameters
 //! ```
 //!
-//! Only what was measured goes in: the base set, not its split among grouped parameters, so that the prior has no part
-//! in the torque. The band is that of the parameters; noise, stiction and what the model leaves out come on top.
+//! Only identified values are used: the base set, not its split among grouped parameters. The prior
+//! therefore has no influence on the torque. The band is that of the parameters; noise, stiction
+//! and unmodelled effects come on top.
 //!
 //! | | columns |
 //! | --- | --- |
-//! | in | states of motion ([`super::states`]); `t_s` if there |
-//! | out | `t_s` if there, else `k` from 0; per joint `tau1_Nm`, `tau1_sigma_Nm`, and the parts whose sum it is: `tau1_rigid_Nm` (bodies, gravity, rotor), `tau1_friction_Nm`, `tau1_offset_Nm` |
+//! | in | states of motion ([`super::states`]); `t_s` if present |
+//! | out | `t_s` if present, else `k` from 0; per joint the columns below |
+//! | torque and its sigma | `tau1_Nm`, `tau1_sigma_Nm` |
+//! | parts of the torque | `tau1_rigid_Nm` (bodies, gravity, rotor), `tau1_friction_Nm`, `tau1_offset_Nm` |
 //!
-//! A difference of Coulomb friction between the directions (`FCA1`) is friction, an offset is not.
-//! Torques have the sign of the angles that were given. At a speed of exactly 0 Coulomb friction is undetermined and
-//! counts as 0. All states are read and computed before anything is written.
+//! A difference of Coulomb friction between the directions (`FCA1`) counts as friction, an offset
+//! does not. Torques have the sign of the given angles. At a speed of exactly 0 Coulomb friction is
+//! undetermined and counts as 0. All states are read and computed before anything is written.
 
 use std::path::Path;
 
@@ -31,37 +34,37 @@ use super::states::{Angles, States};
 /// Torque of one joint, N m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Prediction {
-    /// Bodies, gravity and rotor.
+    /// Torque of bodies, gravity and rotor.
     pub rigid: f64,
-    /// Coulomb, viscous and Stribeck.
+    /// Coulomb, viscous and Stribeck friction.
     pub friction: f64,
-    /// Constant.
+    /// Constant torque.
     pub offset: f64,
-    /// One standard deviation of their sum.
+    /// Standard deviation of the sum.
     pub sigma: f64,
 }
 
 impl Prediction {
-    /// The whole torque, N m.
+    /// Sum of the parts, N m.
     #[must_use]
     pub fn total(&self) -> f64 {
         self.rigid + self.friction + self.offset
     }
 }
 
-/// A model ready to be asked.
+/// Model prepared for predictions.
 #[derive(Clone, Debug)]
 pub struct Predictor<'a, const N: usize> {
     model: &'a ModelFile,
     chain: Chain<f64, N>,
     gravity: Vector3<f64>,
     carriers: Vec<(usize, Parameter)>,
-    /// Of each carrier: it acts only while its joint moves.
+    /// Whether a carrier acts only while its joint moves.
     moving_only: Vec<bool>,
 }
 
 impl<'a, const N: usize> Predictor<'a, N> {
-    /// A checked model of a leg of `N` joints.
+    /// Prepares a checked model of a leg of `N` joints.
     pub fn new(model: &'a ModelFile) -> Result<Self, ToolError> {
         let leg = model.leg.to_leg_file();
         let carriers = model.base_set.parameters.iter().filter_map(|base| model.parameter(&base.carrier));
@@ -76,7 +79,7 @@ impl<'a, const N: usize> Predictor<'a, N> {
         })
     }
 
-    /// Torques of a state, D-H.
+    /// Torques of a state in D-H angles.
     #[must_use]
     pub fn torques(&self, state: &JointState<f64, N>) -> [Prediction; N] {
         let set = &self.model.base_set;
@@ -117,8 +120,8 @@ impl<'a, const N: usize> Predictor<'a, N> {
             let ratio = state.qd[joint] / found.speed_rad_s;
             let fallen = (-ratio * ratio).exp();
             torques[joint].friction += found.surplus_nm * sign(state.qd[joint]) * fallen;
-            // As if independent of the base parameters, which is on the safe side: surplus and Coulomb friction make up for
-            // each other.
+            // Treated as independent of the base parameters. This overestimates the sigma, since
+            // surplus and Coulomb friction compensate each other.
             let surplus =
                 if state.qd[joint] == 0.0 { 0.0 } else { found.surplus_sigma_nm.unwrap_or(0.0) * fallen };
             let speed = found.surplus_nm * fallen * 2.0 * ratio * ratio / found.speed_rad_s
@@ -129,7 +132,7 @@ impl<'a, const N: usize> Predictor<'a, N> {
     }
 }
 
-/// The table of a model of any size, as CSV text.
+/// Table for a model of any size, as CSV text.
 pub fn table(model: &ModelFile, states: &Path, angles: Angles) -> Result<String, ToolError> {
     match model.leg.joints.len() {
         1 => table_of::<1>(model, states, angles),

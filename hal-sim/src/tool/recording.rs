@@ -1,19 +1,22 @@
-//! Recordings of a leg's motion: time, angle and torque of each joint, read from CSV or refused with a reason.
+//! Recordings of a leg's motion: time, angle and torque of each joint, read from CSV and checked.
 //!
-//! A recording comes from a machine nobody here has seen, and an identification is only as good as its input. So
-//! nothing is repaired silently: whatever cannot be a measurement of a leg is refused, naming file, line and
-//! reason, and what may be one is passed on untouched ([`resample`](super::resample) makes it uniform).
+//! An identification is only as good as its input, and the recording machine is unknown. Nothing is
+//! repaired silently. Invalid data are rejected with file, line and reason; plausible data pass
+//! unchanged ([`resample`](super::resample) makes them uniform).
 //!
 //! Format: a header, then one row per sample. Columns are found by name, in any order; others are ignored.
 //!
 //! | column | unit | range |
 //! | --- | --- | --- |
-//! | `t_s` | s, strictly increasing, within +-1e10 s | at least 10 Hz by the median step; a step of at most 0.1 s or 20 median steps, whichever is longer |
+//! | `t_s` | s, strictly increasing, within +-1e10 s | see below |
 //! | `q1_rad`, `q2_rad`, .. | rad, proximal joint first | within +-1000 rad |
 //! | `tau1_Nm`, `tau2_Nm`, .. | N m at the joint | within +-100 kN m |
 //!
-//! Limits: columns that were swapped, or a command recorded as if it were measured, look like any other numbers
-//! here; only the fit can tell. Cost: 16 bytes per joint and sample and 16 per sample.
+//! The median time step corresponds to at least 10 Hz. No step exceeds 0.1 s or 20 median steps,
+//! whichever is longer.
+//!
+//! Limits: swapped columns, or a command recorded as a measurement, look like any other numbers
+//! here; only the fit can detect them. Cost: 16 bytes per joint and sample and 16 per sample.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -26,26 +29,26 @@ mod fault;
 use columns::{Column, for_each_row, line_at, read_text, refuse};
 pub use fault::{Fault, RecordingError};
 
-/// A recording has at least this many samples...
+/// Least number of samples of a recording.
 pub const MINIMUM_SAMPLES: usize = 50;
-/// ...over at least this time, s.
+/// Least duration of a recording, s.
 pub const MINIMUM_DURATION_S: f64 = 1.0;
-/// Half of the steps in time are at most one over this long, Hz.
+/// Least median rate, Hz.
 pub const MINIMUM_RATE_HZ: f64 = 10.0;
-/// Rounded stamps may make a recording that much slower than it is.
+/// Tolerance on the rate for rounded time stamps.
 const RATE_TOLERANCE: f64 = 1.001;
-/// A step in time up to this long is never a gap, s.
+/// Time step up to which there is no gap, s.
 pub const LARGEST_STEP_S: f64 = 0.1;
-/// A step in time of up to this many median steps is never a gap either.
+/// Median steps up to which there is no gap either.
 pub const LARGEST_STEP_IN_MEDIANS: f64 = 20.0;
-/// A stamp beyond this is in another unit, s: seconds since 1970 are 2e9, and a microsecond can still be told there.
+/// Largest plausible time stamp, s: seconds since 1970 are 2e9, and a microsecond is still resolved there.
 pub const LARGEST_TIME_S: f64 = 1.0e10;
-/// An angle beyond this is in another unit, rad.
+/// Largest plausible angle, rad; larger ones are in another unit.
 pub const LARGEST_POSITION_RAD: f64 = 1.0e3;
-/// A torque beyond this is in another unit, N m.
+/// Largest plausible torque, N m; larger ones are in another unit.
 pub const LARGEST_TORQUE_NM: f64 = 1.0e5;
 
-/// What one joint did: one entry per sample.
+/// Recorded signals of one joint: one entry per sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointSeries {
     /// Angle, rad.
@@ -54,16 +57,16 @@ pub struct JointSeries {
     pub torque_nm: Vec<f64>,
 }
 
-/// A motion as it was recorded: every list is as long as `time_s`.
+/// Recorded motion: every list is as long as `time_s`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// Where it came from.
+    /// Source file.
     pub file: PathBuf,
-    /// Time stamps, s, strictly increasing, with whatever jitter and offset the recorder had.
+    /// Time stamps, s, strictly increasing, with the recorder's jitter and offset.
     pub time_s: Vec<f64>,
-    /// Proximal first.
+    /// Joints, proximal first.
     pub joints: Vec<JointSeries>,
-    /// How many joints the file holds; more than `joints` when fewer were asked for.
+    /// Number of joints in the file; more than `joints` if fewer were requested.
     pub joints_in_file: usize,
 }
 
@@ -73,7 +76,7 @@ impl Recording {
         Self::parse(file, &read_text(file)?, joints)
     }
 
-    /// Reads the first `joints` joints of a CSV text; `file` is only named in errors.
+    /// Reads the first `joints` joints of a CSV text; `file` is used only in error messages.
     pub fn parse(file: &Path, text: &str, joints: usize) -> Result<Self, RecordingError> {
         let mut recording = Self {
             file: file.to_owned(),
@@ -102,7 +105,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// From the first sample to the last, s.
+    /// Time from the first sample to the last, s.
     pub fn duration_s(&self) -> f64 {
         match (self.time_s.first(), self.time_s.last()) {
             (Some(first), Some(last)) => last - first,
@@ -110,14 +113,14 @@ impl Recording {
         }
     }
 
-    /// The median distance of two samples, s; zero for fewer than two samples.
+    /// Median time between two samples, s; zero for fewer than two samples.
     pub fn median_step_s(&self) -> f64 {
         let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
         steps.get(steps.len() / 2).copied().unwrap_or(0.0)
     }
 
-    /// Splits at a fraction (0 to 1) of the duration; refused where a part is too short to be a recording.
+    /// Splits at a fraction (0 to 1) of the duration; fails if a part is too short for a recording.
     pub fn split(&self, fraction: f64) -> Result<(Self, Self), RecordingError> {
         let border = self.time_s.first().copied().unwrap_or(0.0) + fraction * self.duration_s();
         let at = self.time_s.partition_point(|&time| time < border);
@@ -140,7 +143,7 @@ impl Recording {
         Ok((first, second))
     }
 
-    /// Writes the format that [`Recording::parse`] reads, every number with the digits that restore it exactly.
+    /// Writes the format of [`Recording::parse`] with the digits that restore every number exactly.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         write!(out, "t_s")?;
         (1..=self.joints.len()).try_for_each(|joint| write!(out, ",q{joint}_rad"))?;
@@ -170,7 +173,7 @@ impl Recording {
         Ok(())
     }
 
-    /// Refuses stamps that are in another unit before they are put on a grid of seconds, which would take gigabytes.
+    /// Rejects stamps in another unit before they are put on a grid of seconds, which would take gigabytes.
     fn check_rate(&self) -> Result<(), RecordingError> {
         let step_s = self.median_step_s();
         if step_s * MINIMUM_RATE_HZ <= RATE_TOLERANCE {
@@ -180,7 +183,7 @@ impl Recording {
         Err(refuse(&self.file, None, Fault::TooSlow { step_s, counts }))
     }
 
-    /// The first gap, with the number of the sample after it.
+    /// First gap, with the number of the sample after it.
     fn check_gaps(&self) -> Result<(), (usize, Fault)> {
         let limit = LARGEST_STEP_S.max(LARGEST_STEP_IN_MEDIANS * self.median_step_s());
         let step = |sample: usize| self.time_s[sample] - self.time_s[sample - 1];
@@ -199,10 +202,10 @@ impl Recording {
     }
 }
 
-/// Where everything that is read stands in a row.
+/// Column positions of all signals.
 struct Columns {
     time: Column,
-    /// Angle and torque of each joint.
+    /// Columns of angle and torque of each joint.
     joints: Vec<(Column, Column)>,
     joints_in_file: usize,
 }

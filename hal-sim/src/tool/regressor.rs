@@ -1,17 +1,18 @@
 //! `regressor`: torques and regressor of given states, for comparison with other rigid-body software.
 //!
-//! Only the rigid bodies: ten inertial parameters of each link, no rotor inertia, friction or offset. The torques
-//! come from Newton-Euler and the regressor from its own equations, so that whoever reads the table can check one
-//! against the other as well as both against theirs.
+//! Only rigid bodies: ten inertial parameters of each link, without rotor inertia, friction or
+//! offset. Torques come from Newton-Euler and the regressor from its own equations. A reader can
+//! therefore check one against the other, and both against other software.
 //!
 //! | | columns |
 //! | --- | --- |
 //! | in | states of motion ([`super::states`]) |
 //! | out | `k` from 0; `tau1..tauN` N m; `y1_XX1..y1_M1, y1_XX2..`: row of torque 1, then of torque 2 |
 //!
-//! Torques and rows have the sign of the angles that were given; the parameters stay those of the D-H frames, so that
-//! torque = row times parameters either way. Numbers are written with the digits that restore the f64 exactly; in the device's arithmetic, the f64 that
-//! equals the f32. All states are read and computed before anything is written.
+//! Torques and rows have the sign of the given angles. The parameters stay those of the D-H frames,
+//! so torque = row times parameters in either convention. Numbers are written with the digits that
+//! restore the f64 exactly; in the device's arithmetic, the f64 that equals the f32. All states are
+//! read and computed before anything is written.
 
 use std::path::Path;
 
@@ -27,19 +28,19 @@ use super::leg_file::LegFile;
 use super::setup::{chain, links};
 use super::states::{Angles, States};
 
-/// Parameters of a rigid body; the first of a joint's fourteen.
+/// Parameters of a rigid body: the first of a joint's fourteen.
 const INERTIAL: usize = 10;
 
-/// What to compute.
+/// Options of the computation.
 #[derive(Clone, Copy, Debug)]
 pub struct RegressorOptions {
-    /// How angles in and torques out are counted.
+    /// Convention of angles and torques.
     pub angles: Angles,
-    /// In the device's arithmetic.
+    /// Whether the device's arithmetic is used.
     pub single_precision: bool,
 }
 
-/// The table for a leg of any size, as CSV text.
+/// Table for a leg of any size, as CSV text.
 pub fn table(leg: &LegFile, states: &Path, options: &RegressorOptions) -> Result<String, ToolError> {
     match leg.joints.len() {
         1 => table_of::<1>(leg, states, options),
@@ -82,7 +83,7 @@ fn header<const N: usize>() -> String {
     text
 }
 
-/// Geometry, gravity and, where the leg file has them for every joint, parameters.
+/// Geometry, gravity and, if the leg file has them for every joint, parameters.
 struct Bodies<const N: usize> {
     chain: Chain<f64, N>,
     gravity: Vector3<f64>,
@@ -100,7 +101,7 @@ impl<const N: usize> Bodies<N> {
         })
     }
 
-    /// One line of the table, computed in precision `T`.
+    /// Computes one line of the table in precision `T`.
     fn row<T: Real>(&self, state: &JointState<f64, N>) -> Row<N> {
         let chain = self.chain.convert::<T>();
         let gravity = self.gravity.map(T::of);
@@ -116,14 +117,14 @@ impl<const N: usize> Bodies<N> {
 }
 
 struct Row<const N: usize> {
-    /// N m.
+    /// Torques, N m.
     torques: Option<[f64; N]>,
-    /// By torque, link and inertial parameter.
+    /// Elements by torque, link and inertial parameter.
     elements: [[[f64; INERTIAL]; N]; N],
 }
 
 impl<const N: usize> Row<N> {
-    /// Torques, and what they are made of, in the sign of the angles that were given.
+    /// Converts torques and elements to the sign of the given angles.
     fn turned(mut self, to_chain: &[AnatomicalJoint<f64>; N]) -> Self {
         for (joint, anatomy) in to_chain.iter().enumerate() {
             let turn = |number: &mut f64| *number = anatomy.from_chain(*number);

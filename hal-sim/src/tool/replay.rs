@@ -24,80 +24,80 @@ use super::resample::Resampled;
 use super::series::{Anatomy, Reader, Role, Series};
 use super::setup::{PriorChoice, anatomy, background};
 
-/// Taps the host sets aside: bandwidths from 1 Hz.
+/// Reserved filter taps: bandwidths from 1 Hz.
 const TAPS: usize = 2048;
-/// Open outputs that go with them.
+/// Open outputs of that filter.
 const PENDING: usize = 205;
-/// From one sample of the firmware to the next.
+/// Sample time of the firmware.
 const GRID_S: f64 = 0.002;
-/// Evaluations between two looks at the search.
+/// Evaluations between two updates of the search.
 const SLICE: u32 = 20;
-/// A recording may go this far beyond the leg's range before that is worth a warning.
+/// Excess over the leg's range from which a warning is printed.
 const RANGE_MARGIN_DEG: f64 = 5.0;
 
-/// What to replay.
+/// Options of a replay.
 #[derive(Clone, Debug)]
 pub struct ReplayOptions {
-    /// One training set.
+    /// Recordings of the training set.
     pub files: Vec<PathBuf>,
-    /// Held out.
+    /// Recordings held out for validation.
     pub validate: Vec<PathBuf>,
-    /// The first part of each file trains, the rest validates.
+    /// Share of each file that trains; the rest validates.
     pub split: Option<f64>,
-    /// Where the low-pass is 3 dB down, Hz.
+    /// Frequency at which the low-pass is 3 dB down, Hz.
     pub bandwidth_hz: f64,
     /// One-time or sequential.
     pub plan: Plan,
     /// Prior for the search box.
     pub prior: PriorChoice,
-    /// Whether disturbances are met, and Stribeck friction looked for unasked.
+    /// Estimator; the robust one excludes disturbances and searches Stribeck friction by itself.
     pub estimator: Estimator,
-    /// Of the swarm.
+    /// Seed of the swarm.
     pub swarm_seed: u64,
-    /// Predicted torque of the validation part.
+    /// Output file for the predicted torque of the validation part.
     pub csv: Option<PathBuf>,
 }
 
 type HostRecorder<const N: usize, const B: usize> = Recorder<f32, N, B, TAPS, PENDING>;
 
-/// What a replay found and from which files.
+/// Result of a replay with its files.
 #[derive(Clone, Debug)]
 pub struct Replayed {
     /// Report of the identification.
     pub run: RunReport,
-    /// Training first.
+    /// Files, training first.
     pub sources: Vec<Source>,
     /// Curves of every file.
     pub series: Series,
 }
 
-/// One file, or a part of one, and what became of it.
+/// One file, or a part of one, and its use.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Source {
-    /// As it was named.
+    /// Name as given.
     pub file: PathBuf,
     /// `training` or `validation`.
     pub role: &'static str,
-    /// On the recording's clock, s.
+    /// Start on the recording's clock, s.
     pub start_s: f64,
-    /// Length, s.
+    /// Duration, s.
     pub duration_s: f64,
-    /// The recording's own rate, Hz.
+    /// Rate of the recording, Hz.
     pub rate_hz: f64,
-    /// Filtered rows at 50 Hz, each joint's alike.
+    /// Filtered rows at 50 Hz, equal for all joints.
     pub rows: u32,
-    /// Those of each joint that were used; it stood still in the others.
+    /// Rows used for each joint; it stood still in the others.
     pub used: Vec<u32>,
 }
 
-/// One file on the firmware's grid, D-H angles and torques.
+/// One file on the firmware's grid, as D-H angles and torques.
 struct Samples<const N: usize> {
     file: PathBuf,
-    /// Wild samples replaced before resampling, as many samples of the grid.
+    /// Outliers replaced before resampling, converted to samples of the grid.
     replaced: [u32; N],
     rate_hz: f64,
     start_s: f64,
-    /// Sampled at the firmware's instants, so that its scatter is the sensor's own.
+    /// Whether the recording has the firmware's sampling instants, so that its scatter is the sensor's own.
     native: bool,
     position: Vec<[f32; N]>,
     torque: Vec<[f32; N]>,
@@ -111,7 +111,7 @@ impl<const N: usize> Samples<N> {
             Estimator::Plain => (recording, [0; N]),
         };
         let grid = Resampled::of(recording);
-        // In samples of the grid, as the recorder counts.
+        // Unit: samples of the grid, as in the recorder.
         let share = grid.len() as f64 / recording.time_s.len() as f64;
         let replaced = replaced.map(|count| (f64::from(count) * share).round() as u32);
         if let Some(warning) = grid.bandwidth_warning(options.bandwidth_hz) {
@@ -140,7 +140,7 @@ impl<const N: usize> Samples<N> {
     }
 }
 
-/// Identifies from recordings and validates on what was held out.
+/// Identifies from recordings and validates on the held-out ones.
 pub fn replay<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ReplayOptions,
@@ -262,7 +262,7 @@ pub fn replay<const N: usize, const B: usize>(
     Ok(Replayed { run, sources, series })
 }
 
-/// Every file as curves.
+/// Curves of every file.
 fn series<const N: usize, const B: usize>(
     background: &Background<N, B>,
     anatomy: &[AnatomicalJoint<f64>; N],
@@ -289,7 +289,7 @@ fn series<const N: usize, const B: usize>(
     Ok(reader.series(solver, motions))
 }
 
-/// Above this bandwidth rows at 50 Hz alias the noise that the low-pass lets through, and sigma comes out too small.
+/// Above this bandwidth, 50 Hz rows alias the noise that the low-pass passes, and sigma becomes too small.
 const LARGEST_BANDWIDTH_HZ: f64 = 25.0;
 
 fn new_recorder<const N: usize, const B: usize>(bandwidth_hz: f64) -> Result<HostRecorder<N, B>, ToolError> {
@@ -330,7 +330,7 @@ fn read_all(options: &ReplayOptions, leg: &LegFile) -> Result<(Vec<Recording>, V
     Ok((training, held_out))
 }
 
-/// What can be another machine's recording but need not be.
+/// Warns of signs that the recording is from another machine.
 fn warn_of_another_leg(recording: &Recording, leg: &LegFile) {
     let (in_file, in_leg) = (recording.joints_in_file, leg.joints.len());
     if in_file > in_leg {
@@ -357,7 +357,7 @@ fn warn_of_another_leg(recording: &Recording, leg: &LegFile) {
     }
 }
 
-/// Every file is a motion of its own: windows never reach across.
+/// Every file is a separate motion: windows never span two files.
 fn feed<const N: usize, const B: usize>(
     recorder: &mut HostRecorder<N, B>,
     background: &Background<N, B>,

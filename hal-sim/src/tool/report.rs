@@ -1,6 +1,6 @@
-//! What a run found, as plain data: written as JSON, printed as tables.
+//! Results of a run as plain data: written as JSON, printed as tables.
 //!
-//! The names of the fields are an interface. A number that is not known is `null`, never NaN.
+//! The names of the fields are an interface. An unknown number is `null`, never NaN.
 
 use super::findings::FindingReport;
 use super::scale::ScaleReport;
@@ -14,12 +14,12 @@ use super::model_choice::{DirectionsReport, ModelChoiceReport};
 /// Version of the JSON.
 pub const SCHEMA: u32 = 1;
 
-/// A number that JSON can hold: what is not finite is unknown.
+/// Number for JSON: values that are not finite are unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Number(pub Option<f64>);
 
 impl Number {
-    /// Not known.
+    /// Unknown number.
     pub const UNKNOWN: Self = Self(None);
 
     /// The number, if it is finite.
@@ -61,65 +61,66 @@ impl Serialize for Number {
 pub struct ParameterReport {
     /// `XX1`, `IA2`: symbol and joint.
     pub name: String,
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
-    /// Unknown where neither torque nor a prior tells.
+    /// Value; unknown if neither torque nor a prior determines it.
     pub value: Number,
-    /// SI.
+    /// SI unit.
     pub unit: &'static str,
-    /// Standard deviation; unknown unless measured alone.
+    /// Standard deviation; unknown unless the parameter is identified alone.
     pub sigma: Number,
     /// `identified`, `grouped`, `weak` or `prior`.
     pub status: &'static str,
-    /// The others of its base parameters.
+    /// Other parameters of its base parameters.
     pub grouped_with: Vec<String>,
-    /// What the simulated leg has.
+    /// True value of the simulated leg.
     pub truth: Number,
-    /// What was believed before.
+    /// Value of the prior.
     pub prior: Number,
 }
 
 /// One combination of parameters that torque determines.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BaseReport {
-    /// The carrying parameter; with an `R` where others are regrouped into it.
+    /// Carrying parameter, with an `R` if others are regrouped into it.
     pub name: String,
     /// Parameters and factors of the weighted sum.
     pub terms: BTreeMap<String, f64>,
-    /// Of the swarm's result, which is the run's result.
+    /// Result of the swarm, which is the run's result.
     pub value: Number,
-    /// SI.
+    /// SI unit.
     pub unit: &'static str,
     /// Standard deviation.
     pub sigma: Number,
-    /// What the simulated leg has.
+    /// True value of the simulated leg.
     pub truth: Number,
-    /// Least standard deviation any unbiased estimator can reach from the logged samples (Cramer-Rao).
+    /// Least standard deviation of an unbiased estimator from the logged samples (Cramer-Rao).
     pub cramer_rao: Number,
 }
 
-/// How well one joint's torque on one motion is predicted.
+/// Prediction error of one joint's torque on one motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FitReport {
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
     /// `fourier`, `gait-6.5`, `gait-3`, `recording`.
     pub motion: String,
-    /// Root mean square of measured minus predicted, both through the same filter; without what was set aside.
+    /// Root mean square of measured minus predicted torque, both behind the same filter; excluded
+    /// rows do not count.
     pub rms_nm: Number,
-    /// Of the mean absolute filtered torque.
+    /// Error in percent of the mean absolute filtered torque.
     pub percent_of_mean_abs: Number,
-    /// Of the root mean square filtered torque.
+    /// Error in percent of the root mean square filtered torque.
     pub percent_of_rms: Number,
-    /// Against the noise-free torque, rows left out in which the joint sticks.
+    /// Error against the noise-free torque, percent; rows in which the joint sticks are excluded.
     pub percent_of_mean_abs_vs_truth: Number,
-    /// Share of rows left out there.
+    /// Share of those excluded rows.
     pub sticking_share: Number,
-    /// Share of the motion's rows that was set aside as disturbed (less than half of their weight), 0..1.
+    /// Share of the motion's rows excluded as disturbed (less than half of their weight), 0..1.
     pub disturbed_share: Number,
     /// Longest stretch of such rows, s.
     pub disturbed_longest_s: Number,
-    /// Wild angles and torques that were replaced before the filter.
+    /// Outliers among angles and torques that were replaced before the filter.
     pub replaced: u32,
 }
 
@@ -135,40 +136,40 @@ pub struct LeastSquaresReport {
 /// The beetle swarm on the same data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SwarmReport {
-    /// Of the swarm's random numbers.
+    /// Seed of the swarm's random numbers.
     pub seed: u64,
-    /// All stages.
+    /// Iterations of all stages.
     pub iterations: u32,
-    /// All stages.
+    /// Evaluations of all stages.
     pub evaluations: u32,
     /// J / J_LS - 1.
     pub cost_over_least_squares: Number,
     /// J - J_C, with J_C the optimum in the search box, found in double precision.
     pub excess_chi2: Number,
-    /// Iterations until the excess was at most a half; unknown where it never was.
+    /// Iterations until the excess was at most 0.5; unknown if it never was.
     pub iterations_to_half_chi2: Option<u32>,
 }
 
-/// A result against a model that was kept.
+/// Comparison of a result with a stored model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ComparisonReport {
-    /// The kept model's file.
+    /// File of the stored model.
     pub model: String,
-    /// When it was found, RFC 3339.
+    /// Time of its identification, RFC 3339.
     pub created: String,
     /// `same` or `changed`.
     pub verdict: &'static str,
-    /// In words.
+    /// Result in words.
     pub line: String,
     /// Squared distance of the two base sets under both covariances.
     pub chi2: f64,
-    /// What two identifications of one leg stay below in 999 of 1000 cases.
+    /// Limit that two identifications of one leg exceed in 1 of 1000 cases.
     pub chi2_limit: f64,
-    /// Base parameters compared, the furthest apart first.
+    /// Compared base parameters, largest difference first.
     pub differences: Vec<DifferenceReport>,
-    /// Base parameters of one of the two only.
+    /// Base parameters present in one of the two only.
     pub not_compared: Vec<String>,
-    /// Both temperatures are known, and they differ by more than hardly.
+    /// Warning of a relevant difference between two known temperatures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub warning: Option<String>,
 }
@@ -176,75 +177,75 @@ pub struct ComparisonReport {
 /// One base parameter in two identifications.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DifferenceReport {
-    /// As reports name it.
+    /// Name as in reports.
     pub name: String,
-    /// Kept.
+    /// Stored value.
     pub stored: f64,
-    /// Found now.
+    /// Value identified now.
     pub found: f64,
-    /// Found less kept, in standard deviations of the difference.
+    /// Identified minus stored value, in standard deviations of the difference.
     pub sigmas: f64,
 }
 
-/// What a model file keeps beyond the report.
+/// Further data for a model file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModelDetail {
-    /// Of the base parameters, in their order.
+    /// Covariance of the base parameters, in their order.
     pub covariance: Vec<Vec<f64>>,
-    /// The parameter in whose column each base parameter's value stands.
+    /// Parameter whose column carries each base parameter's value.
     pub carriers: Vec<String>,
-    /// Parameters that were left out of the estimate, as if they were zero.
+    /// Parameters excluded from the estimate, as if they were zero.
     pub not_estimated: Vec<String>,
 }
 
-/// One search for a leg that can exist.
+/// Search for a physically consistent leg.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConsistentSearchReport {
-    /// Of the swarm.
+    /// Iterations of the swarm.
     pub iterations: u32,
-    /// Of the swarm.
+    /// Evaluations of the swarm.
     pub evaluations: u32,
-    /// Newton steps of the completion; none where the closed form is a possible leg.
+    /// Newton steps of the completion; none if the closed form is physically consistent.
     pub steps: u32,
-    /// The completion ended at its minimum, not because steps ran out or single precision did; unknown of the search over
-    /// whole legs. The verdict judges what it costs (`prior_box`), not this.
+    /// Whether the completion ended at its minimum, not at the limit of steps or of single precision;
+    /// unknown for the search over whole legs. The verdict judges the cost (`prior_box`), not this.
     pub settled: Option<bool>,
-    /// Cost of the data above the least that any allowed leg has, that found in double precision.
+    /// Cost of the data above the least that any allowed leg has, found in double precision.
     pub excess_chi2: Number,
-    /// Iterations until the excess was at most a half; unknown where it never was.
+    /// Iterations until the excess was at most 0.5; unknown if it never was.
     pub iterations_to_half_chi2: Option<u32>,
-    /// The leg that was found (of the search over whole legs: the best of every iteration) is a possible one; unknown where
-    /// it was not told.
+    /// Whether the result is physically consistent (search over whole legs: the best of every
+    /// iteration); unknown if not reported.
     pub consistent: Option<bool>,
-    /// Its parameters by name; empty without a prior.
+    /// Parameters of the result by name; empty without a prior.
     pub parameters: BTreeMap<String, Number>,
 }
 
-/// Both searches for a leg that can exist.
+/// Both searches for a physically consistent leg.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConsistentReport {
-    /// Which of the two is the run's result.
+    /// Search whose result is the run's result.
     pub chosen: &'static str,
-    /// J_C - J_LS: what physical consistency within the prior's limits costs, found in double precision.
+    /// J_C - J_LS: cost of physical consistency within the prior's limits, found in double precision.
     pub optimum_over_least_squares: Number,
-    /// The same of the run's result, as the verdict sees it.
+    /// J - J_LS of the run's result, as the verdict sees it.
     pub result_over_least_squares: Number,
-    /// Most degrees of freedom of that chi-square.
+    /// Upper bound on the degrees of freedom of that chi-square.
     pub degrees_of_freedom: Option<usize>,
-    /// Log-Cholesky coordinates of every link; only the host searches there.
+    /// Search over log-Cholesky coordinates of every link; on the host only.
     pub full: Option<ConsistentSearchReport>,
-    /// Base values, completed.
+    /// Search over base values, with completion.
     pub base: ConsistentSearchReport,
 }
 
-/// Position error on gait.
+/// Position error on the gait motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackingReport {
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
-    /// Feedback alone.
+    /// Error with feedback alone.
     pub rms_deg_without_model: Number,
-    /// The same gains, the identified model in the feedforward.
+    /// Error with the same gains and the identified model in the feedforward.
     pub rms_deg_with_model: Number,
 }
 
@@ -253,11 +254,11 @@ pub struct TrackingReport {
 pub struct RunReport {
     /// [`SCHEMA`].
     pub schema: u32,
-    /// Name in the leg file.
+    /// Name of the leg in the leg file.
     pub leg: String,
-    /// Of the simulated noise; unknown in a replay.
+    /// Seed of the simulated noise; unknown in a replay.
     pub seed: Option<u64>,
-    /// Of the swarm.
+    /// Seed of the swarm.
     pub swarm_seed: u64,
     /// `none`, `file` or `wrong:P`.
     pub prior: String,
@@ -265,67 +266,67 @@ pub struct RunReport {
     pub plan: &'static str,
     /// `accepted` or `refused`.
     pub verdict: &'static str,
-    /// Whether motions that were not used were predicted; where none was, `accepted` speaks of the motion identified from.
+    /// Whether unused motions were predicted; if not, `accepted` refers to the motion identified from.
     pub validated: bool,
-    /// From the closed list.
+    /// Reasons for rejection, from the closed list.
     pub reasons: Vec<&'static str>,
     /// Every test of the verdict.
     pub findings: Vec<FindingReport>,
     /// Base parameters that the data determine.
     pub rank: usize,
-    /// Parameters estimated.
+    /// Number of estimated parameters.
     pub columns: usize,
-    /// Of the scaled weighted problem.
+    /// Condition number of the scaled weighted problem.
     pub condition: Number,
-    /// All fourteen of every joint.
+    /// Fourteen parameters of every joint.
     pub parameters: Vec<ParameterReport>,
-    /// What torque determines.
+    /// Base parameters.
     pub base_parameters: Vec<BaseReport>,
-    /// Of joints that show it.
+    /// Stribeck friction of the joints that show it.
     pub stribeck: Vec<StribeckReport>,
-    /// What was asked of each joint's model, used, and why.
+    /// Requested and used model of each joint, and why.
     pub model_choice: Vec<ModelChoiceReport>,
-    /// Of joints whose Coulomb friction was found to differ between the directions.
+    /// Joints whose Coulomb friction differs between the directions.
     pub asymmetric_coulomb: Vec<DirectionsReport>,
-    /// Of the drives, degrees Celsius; unknown unless stated.
+    /// Temperature of the drives, degrees Celsius; unknown unless stated.
     pub temperature_c: Number,
-    /// What was set aside of the motion identified from.
+    /// Rows and samples excluded from the motion identified from.
     pub outliers: OutliersReport,
-    /// The motion identified from.
+    /// Residuals on the motion identified from.
     pub training: Vec<FitReport>,
-    /// Motions not used.
+    /// Residuals on unused motions.
     pub validation: Vec<FitReport>,
-    /// The closed form.
+    /// Solution in closed form.
     pub least_squares: LeastSquaresReport,
-    /// The search.
+    /// Search by the swarm.
     pub bso: SwarmReport,
-    /// Searches for a leg that can exist.
+    /// Searches for a physically consistent leg.
     pub consistent: ConsistentReport,
-    /// What the model is worth to the servo; empty in a replay.
+    /// Effect of the model on the servo; empty in a replay.
     pub tracking: Vec<TrackingReport>,
-    /// What the parameters are measured in, and what the leg carried.
+    /// Units of the parameters, and masses carried by the leg.
     #[serde(flatten)]
     pub scale: ScaleReport,
-    /// Which drives were simulated; none in a replay.
+    /// Kind of simulated drives; absent in a replay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drive: Option<&'static str>,
     /// Simulated or recorded time, s.
     pub simulated_s: f64,
-    /// Time it took, s.
+    /// Computing time, s.
     pub wall_s: f64,
-    /// Against a model that was kept, where one was given.
+    /// Comparison with a stored model, if one was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub compared: Option<ComparisonReport>,
-    /// What else a board told, where the run is one of a board.
+    /// Further data of a board's trace.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trace: Option<TraceReport>,
-    /// For the model file; not in the JSON.
+    /// Data for the model file; not in the JSON.
     #[serde(skip)]
     pub detail: ModelDetail,
 }
 
 impl RunReport {
-    /// Exit code 0.
+    /// Whether the result was accepted: exit code 0.
     #[must_use]
     pub fn accepted(&self) -> bool {
         self.reasons.is_empty()

@@ -1,9 +1,9 @@
-//! Recordings with jittered stamps or another rate, put on the uniform 500 Hz grid of the filter chain.
+//! Puts recordings with jitter or another rate on the uniform 500 Hz grid of the filter chain.
 //!
-//! Why here: the firmware samples on a clock and its differentiating kernels are exact on a uniform grid only, so
-//! what a recorder's clock did is undone once, on the host. Angle and torque go through the same linear operator,
-//! whose weights depend on the time stamps alone; so both are delayed (by nothing) and attenuated alike, and the
-//! relation between them that is to be identified stays as it was.
+//! Why here: the firmware samples on a clock, and its differentiating kernels are exact on a
+//! uniform grid only. The effect of a recorder's clock is therefore removed once, on the host.
+//! Angle and torque pass the same linear operator, whose weights depend on the time stamps alone.
+//! Both are attenuated alike without delay, so the relation to be identified is unchanged.
 //!
 //! With the grid period T = 2 ms and the recording's step h:
 //!
@@ -16,17 +16,19 @@
 //!
 //! | method | response at frequency f, uniform stamps | white noise |
 //! | --- | --- | --- |
-//! | mean over a bin | sinc(f T) sinc(f h)^2, -0.01 % at 3 Hz and -0.1 % at 10 Hz for h = 1 ms | density kept, so no sample is wasted; deviation / 1.6 at 1 kHz |
-//! | Catmull-Rom | 1 - 3/8 (pi f h)^4 at worst, half way between two samples; -0.05 % at 3 Hz for h = 20 ms | deviation * 0.8 half way, unchanged at a sample |
-//! | Catmull-Rom, 500 Hz with +-0.8 ms of jitter | -4e-5 at 3 Hz, with the square of f; single points 5e-4 | about as above |
+//! | mean over a bin | sinc(f T) sinc(f h)^2 | density unchanged; deviation / 1.6 at 1 kHz |
+//! | | -0.01 % at 3 Hz, -0.1 % at 10 Hz for h = 1 ms | no sample is wasted |
+//! | Catmull-Rom | 1 - 3/8 (pi f h)^4 at worst, half way between samples | deviation * 0.8 half way |
+//! | | -0.05 % at 3 Hz for h = 20 ms | unchanged at a sample |
+//! | Catmull-Rom, 500 Hz, +-0.8 ms of jitter | -4e-5 at 3 Hz, with f^2; single points 5e-4 | about as above |
 //!
-//! where sinc(x) = sin(pi x) / (pi x). The slopes over two steps keep the cubic calm where stamps arrive in
-//! bursts: a slope over a very short step would throw its noise across the next long one. Wild samples are best
-//! replaced before: each touches the points of four samples (the cubic) or of two bins.
+//! Here sinc(x) = sin(pi x) / (pi x). Slopes over two steps keep the cubic smooth where stamps arrive in
+//! bursts. A slope over a very short step would amplify its noise across the next long one. Outliers are
+//! best replaced before resampling: each affects the points of four samples (the cubic) or of two bins.
 //!
 //! Limits: beyond 0.2 of the recording's own rate the interpolation loses 6 % and more, see
-//! [`Resampled::bandwidth_warning`]. Source of the cubic: Catmull and Rom, A class of local interpolating splines,
-//! 1974. Cost: linear in the number of samples.
+//! [`Resampled::bandwidth_warning`]. Source of the cubic: Catmull and Rom, A class of local
+//! interpolating splines, 1974. Cost: linear in the number of samples.
 
 use std::fmt;
 
@@ -34,12 +36,12 @@ use super::recording::{JointSeries, Recording};
 
 /// Rate of the grid, Hz: that of the firmware's filter chain.
 pub const GRID_RATE_HZ: f64 = 500.0;
-/// Recordings with a shorter median step than this share of the grid's period are averaged, others interpolated.
+/// Share of the grid's period below which the median step leads to averaging, above it to interpolation.
 pub const DENSE_STEP: f64 = 0.9;
 /// Share of a recording's own rate up to which its resampled motion can be trusted.
 pub const TRUSTED_BANDWIDTH: f64 = 0.2;
 
-/// How the grid's values were made from the recording's.
+/// Resampling method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// The recording is denser than the grid: mean over each period.
@@ -53,20 +55,20 @@ pub enum Method {
 pub struct Resampled {
     /// Time of the first grid point on the recording's clock, s.
     pub start_s: f64,
-    /// The recording's own rate, Hz: one over its median step.
+    /// Rate of the recording, Hz: one over its median step.
     pub native_rate_hz: f64,
-    /// Chosen by the median step.
+    /// Method chosen by the median step.
     pub method: Method,
-    /// Proximal first.
+    /// Joints, proximal first.
     pub joints: Vec<JointSeries>,
 }
 
-/// The asked-for bandwidth is more than the recording can carry.
+/// Warning that the requested bandwidth exceeds the recording's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BandwidthWarning {
-    /// Asked for, Hz.
+    /// Requested bandwidth, Hz.
     pub bandwidth_hz: f64,
-    /// The recording's own rate, Hz.
+    /// Rate of the recording, Hz.
     pub native_rate_hz: f64,
 }
 
@@ -85,15 +87,17 @@ impl fmt::Display for BandwidthWarning {
 impl Resampled {
     /// Puts a recording on the grid.
     ///
-    /// The first grid point is the first sample (its time plus half a period where bins are averaged), the last one
-    /// is the last that the recording covers. A recording that is on the grid already comes back unchanged, but for rounding of its stamps.
+    /// The first grid point is the first sample, for bin means half a period later. The last one is
+    /// the last that the recording covers. A recording already on the grid is returned unchanged,
+    /// except for rounding of its stamps.
     pub fn of(recording: &Recording) -> Self {
         let time = &recording.time_s;
         let (step, period) = (recording.median_step_s(), 1.0 / GRID_RATE_HZ);
         let method = if step < DENSE_STEP * period { Method::BinMean } else { Method::CatmullRom };
         let margin = if method == Method::BinMean { period / 2.0 } else { 0.0 };
         let start_s = time.first().copied().unwrap_or(0.0) + margin;
-        // Stamps are rounded, to a microsecond at best: a grid point that late belongs to the last sample.
+        // Stamps are rounded, to a microsecond at best: a grid point later by that still belongs to
+        // the last sample.
         let covered = recording.duration_s() - 2.0 * margin + 1.0e-6;
         let points = if time.len() < 2 || covered < 0.0 { 0 } else { (covered * GRID_RATE_HZ) as usize + 1 };
         let grid = Grid { time, start_s, points };
@@ -128,17 +132,19 @@ impl Resampled {
         self.start_s + point as f64 / GRID_RATE_HZ
     }
 
-    /// Angle of the first `N` joints at a grid point, rad; none beyond the last point or with fewer joints.
+    /// Angle of the first `N` joints at a grid point, rad; `None` beyond the last point or with
+    /// fewer joints.
     pub fn position_rad<const N: usize>(&self, point: usize) -> Option<[f64; N]> {
         self.row(point, |joint| &joint.position_rad)
     }
 
-    /// Torque of the first `N` joints at a grid point, N m; none beyond the last point or with fewer joints.
+    /// Torque of the first `N` joints at a grid point, N m; `None` beyond the last point or with
+    /// fewer joints.
     pub fn torque_nm<const N: usize>(&self, point: usize) -> Option<[f64; N]> {
         self.row(point, |joint| &joint.torque_nm)
     }
 
-    /// What to tell the user where the recording is too slow for the bandwidth of the filter chain.
+    /// Warning if the recording is too slow for the bandwidth of the filter chain.
     pub fn bandwidth_warning(&self, bandwidth_hz: f64) -> Option<BandwidthWarning> {
         let native_rate_hz = self.native_rate_hz;
         (bandwidth_hz > TRUSTED_BANDWIDTH * native_rate_hz)
@@ -158,7 +164,7 @@ impl Resampled {
     }
 }
 
-/// The recording's stamps and the grid laid over them.
+/// Time stamps of the recording and the grid over them.
 struct Grid<'a> {
     time: &'a [f64],
     start_s: f64,
@@ -171,10 +177,10 @@ impl Grid<'_> {
         self.start_s + point / GRID_RATE_HZ
     }
 
-    /// Means of the straight lines through the samples, from the differences of their integral.
+    /// Means of the linear interpolation over bins, from the differences of its integral.
     fn bin_means(&self, values: &[f64]) -> Vec<f64> {
         let (mut interval, mut total) = (0, 0.0);
-        // The integral from the first sample; the borders only move forward, and so does the interval.
+        // Integral from the first sample; the bounds only move forward, and so does the interval.
         let mut integral = |until: f64| {
             while interval + 2 < self.time.len() && self.time[interval + 1] <= until {
                 let width = self.time[interval + 1] - self.time[interval];

@@ -1,12 +1,12 @@
-//! Scale and load of a simulated run: the same leg once more with a known mass, and a load that is known anyway.
+//! Scale and load of a simulated run: a second run with a known mass, and a known load.
 //!
-//! Why here: the board identifies one leg as it hangs. What a second run with a known mass says about the torque constants
-//! (`scarab::ident::scale`) is worked out from the records of two identifications, each through the whole firmware on the
-//! same simulated leg; attaching the mass between them is the operator's part. Then the first run is solved again with
-//! every torque put right, by the same solver, and judged again by the same verdict. A load that the leg is known to
-//! carry is taken off the records in the same way.
+//! Why here: the board identifies one leg as it hangs. A second run with a known mass determines
+//! the torque constants (`scarab::ident::scale`). It compares the records of two identifications,
+//! each through the whole firmware on the same simulated leg; attaching the mass between them is
+//! the operator's part. The first run is then solved again with corrected torques, by the same
+//! solver and verdict. A known load is subtracted from the records in the same way.
 //!
-//! Without a mass everything stays relative to the torque constants that were used, and the report says so.
+//! Without a mass, results stay relative to the assumed torque constants, and the report says so.
 
 mod report;
 
@@ -25,52 +25,52 @@ use super::motions::VALIDATION_NAMES;
 use super::pair::{Context, PENDING, Pair, TAPS};
 use crate::world::TICK_S;
 
-/// The leg hangs so long with the mass before it is moved again, s.
+/// Time for which the leg hangs with the mass before it moves again, s.
 const ATTACHING_S: f64 = 2.0;
-/// The second run takes no longer, s.
+/// Limit of the second run, s.
 const LONGEST_RUN_S: f64 = 120.0;
-/// Evaluations between two looks at the search.
+/// Evaluations between two updates of the search.
 const SLICE: u32 = 20;
 
-/// Records of the motions that were predicted.
+/// Records of the predicted motions.
 pub type Unused<const N: usize, const B: usize> = [Option<Record<f32, N, B>>; VALIDATION_MOTIONS];
 
-/// What a known mass and a known load say about a run.
+/// Results of a known mass and a known load.
 #[derive(Clone, Debug)]
 pub struct Scale<const N: usize, const B: usize> {
-    /// The mass of the second run.
+    /// Mass of the second run.
     pub payload: Option<Payload<f64>>,
-    /// Believed over true torque constant, where the mass told.
+    /// Assumed over true torque constant, if the mass determines it.
     pub ratios: [Option<ConstantRatio<f32>>; N],
-    /// What the leg was known to carry in both runs.
+    /// Known load in both runs.
     pub load: Option<Payload<f64>>,
-    /// Base parameters of that; zero without.
+    /// Base parameters of that load; zero without one.
     pub load_base: [f32; B],
 }
 
-/// A run solved again with every torque put right.
+/// Run solved again with corrected torques.
 #[derive(Clone, Debug)]
 pub struct Corrected<const N: usize, const B: usize> {
-    /// Done.
+    /// Finished solver.
     pub solver: Box<Solver<f32, N, B>>,
-    /// Of the corrected result on the corrected records.
+    /// Verdict on the corrected result with the corrected records.
     pub verdict: Verdict,
-    /// What it saw.
+    /// Evidence of that verdict.
     pub findings: Vec<FindingReport>,
-    /// Corrected.
+    /// Corrected records of the unused motions.
     pub unused: Unused<N, B>,
-    /// First iteration with an excess of at most a half.
+    /// First iteration with an excess of at most 0.5.
     pub iterations_to_half_chi2: Option<u32>,
 }
 
-/// What unused motions look like with every torque put right.
+/// Unused motions with corrected torques.
 struct SeenAgain<const N: usize> {
     residuals: [Residual<f32, N>; VALIDATION_MOTIONS],
     asked: Misalignments<f32>,
 }
 
 impl<const N: usize, const B: usize> Scale<N, B> {
-    /// What a load says, and a mass for which `pair`, which has identified, is carried through a second run.
+    /// Evaluates the load, and runs a second identification with the mass on the already identified `pair`.
     pub fn find(
         context: &Context<N, B>,
         pair: &Pair<N, B>,
@@ -85,7 +85,7 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         Ok(Self { payload: payload.copied(), ratios, load: load.copied(), load_base })
     }
 
-    /// The same without a load, with a mass on the leg that need not be the one that is stated.
+    /// Runs without a load; the attached mass may differ from the stated one.
     pub fn find_with(
         context: &Context<N, B>,
         pair: &Pair<N, B>,
@@ -102,7 +102,8 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         Ok(Self { payload: Some(*stated), ratios, load: None, load_base: [0.0; B] })
     }
 
-    /// Believed over true constant of all joints; `None` unless the mass told every one of them well and nothing contradicts.
+    /// Ratios of assumed over true constants; `None` unless the mass determined all of them well
+    /// and without contradiction.
     #[must_use]
     pub fn trusted(&self) -> Option<[ConstantRatio<f32>; N]> {
         let all: Option<Vec<_>> = self
@@ -113,7 +114,7 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         all?.try_into().ok()
     }
 
-    /// The run with every torque put right; `None` where there is nothing to correct.
+    /// Solves the run again with corrected torques; `None` if no correction applies.
     #[must_use]
     pub fn corrected(
         &self,
@@ -155,8 +156,9 @@ impl<const N: usize, const B: usize> Scale<N, B> {
         Some(Corrected { solver: again, verdict, findings, unused, iterations_to_half_chi2 })
     }
 
-    /// The unused motions once more through the firmware's own recorder, every torque put right, held against the corrected
-    /// leg with what it carries: their order in time, and what they ask for.
+    /// Passes the unused motions through the firmware's own recorder again with corrected
+    /// torques. They are compared with the corrected leg including its load: residuals in their order, and
+    /// apparent misalignments.
     fn look_again(
         &self,
         context: &Context<N, B>,
@@ -204,14 +206,14 @@ fn base_of<const N: usize, const B: usize>(context: &Context<N, B>, mass: &Paylo
     context.background.model.base.project(&mass.parameters::<N>()).map(|value| value as f32)
 }
 
-/// Base values of the leg with what it carries, from those of the leg alone.
+/// Base values of the leg with its load, from those of the leg alone.
 #[must_use]
 pub fn loaded<const N: usize, const B: usize>(scale: Option<&Scale<N, B>>, values: &[f32; B]) -> [f32; B] {
     let load = scale.map_or([0.0; B], |scale| scale.load_base);
     core::array::from_fn(|base| values[base] + load[base])
 }
 
-/// Runs the search to its end; the first iteration with an excess of at most a half.
+/// Runs the search to its end; returns the first iteration with an excess of at most 0.5.
 fn search<const N: usize, const B: usize>(
     context: &Context<N, B>,
     solver: &mut Solver<f32, N, B>,
@@ -230,7 +232,7 @@ fn search<const N: usize, const B: usize>(
     }
 }
 
-/// The excitation once more, with a mass on the leg: the record of it.
+/// Repeats the excitation with a mass on the leg and returns its record.
 fn second_run<const N: usize, const B: usize>(
     pair: &Pair<N, B>,
     payload: &Payload<f64>,

@@ -1,7 +1,7 @@
-//! A run as curves over time, for figures: anatomical angles and torques.
+//! Curves of a run over time, for figures: anatomical angles and torques.
 //!
-//! Every motion goes once more through the filter chain of the identification, whole windows only, and its rows are
-//! multiplied by the result: what is drawn is what least squares saw.
+//! Every motion passes the filter chain of the identification once more, whole windows only, and
+//! its rows are multiplied by the result. The figures thus show what least squares saw.
 
 use scarab::ident::{
     DECIMATION, Ends, KernelError, LARGEST_STILL_SHARE, LowPass, Recorder, RowModel, SAMPLE_RATE_HZ, Solver,
@@ -14,29 +14,29 @@ const LONGEST_LAG_S: f64 = 0.6;
 /// Curves of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
-    /// The motions identified from first.
+    /// Motions, those identified from first.
     pub motions: Vec<MotionSeries>,
     /// Cost of the swarm's best above the optimum in its box, chi-square units, after each iteration.
     pub excess: Vec<(u32, f64)>,
-    /// J_C - J_LS: that optimum above least squares, chi-square units.
+    /// J_C - J_LS: optimum in the box above least squares, chi-square units.
     pub floor_chi2: Option<f64>,
     /// Noise of each joint's filtered torque as the identification estimates it: standard deviation, N m.
     pub noise_nm: Vec<f64>,
-    /// Autocorrelation, lag by lag of a row, that white noise of the logged torque has after the filter.
+    /// Autocorrelation of filtered white torque noise, by lag in rows.
     pub white_correlation: Vec<f64>,
 }
 
-/// What a motion was good for.
+/// Use of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Identified from.
+    /// Used for the estimate.
     Training,
     /// Predicted only.
     Validation,
 }
 
 impl Role {
-    /// As reports write it.
+    /// Name in reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -49,30 +49,30 @@ impl Role {
 /// One motion, a point for each filtered row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionSeries {
-    /// As the tables name it.
+    /// Name in the tables.
     pub name: String,
-    /// What it was good for.
+    /// Use of the motion.
     pub role: Role,
-    /// Since the motion began, or the recording's clock, s.
+    /// Time since the start of the motion, or on the recording's clock, s.
     pub time_s: Vec<f64>,
-    /// Proximal first.
+    /// Joints, proximal first.
     pub joints: Vec<JointCurves>,
 }
 
-/// One joint on one motion: all of the same length as the times, empty where nothing is known.
+/// Curves of one joint on one motion: as long as the times, or empty if unknown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointCurves {
     /// Logged angle, degrees.
     pub measured_deg: Vec<f64>,
-    /// Where it was told to be, degrees.
+    /// Commanded angle, degrees.
     pub commanded_deg: Vec<f64>,
-    /// From the noisy current, filtered, N m.
+    /// Torque from the noisy current, filtered, N m.
     pub measured_nm: Vec<f64>,
-    /// By the result of the identification, filtered, N m.
+    /// Torque predicted by the result, filtered, N m.
     pub predicted_nm: Vec<f64>,
-    /// Of the plant's motor, filtered, N m.
+    /// Torque of the plant's motor, filtered, N m.
     pub noise_free_nm: Vec<f64>,
-    /// Whether the joint stands still, so that the row is left out.
+    /// Whether the joint stands still; such rows are excluded.
     pub still: Vec<bool>,
 }
 
@@ -84,10 +84,10 @@ impl JointCurves {
     }
 }
 
-/// From model angles and torques to anatomical ones.
+/// Conversion from model angles and torques to anatomical ones.
 #[derive(Clone, Copy, Debug)]
 pub struct Anatomy<const N: usize> {
-    /// Of each joint, 1 or -1.
+    /// Direction of each joint, 1 or -1.
     pub direction: [f64; N],
     /// Model angle at the anatomical zero, rad.
     pub zero_rad: [f64; N],
@@ -101,7 +101,7 @@ impl<const N: usize> Anatomy<N> {
     }
 }
 
-/// Sends motions through the filter chain and multiplies their rows by a result.
+/// Passes motions through the filter chain and multiplies their rows by a result.
 pub struct Reader<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> {
     recorder: Box<Recorder<f32, N, B, TAPS, PENDING>>,
     model: &'a RowModel<f32, N, B>,
@@ -115,7 +115,7 @@ pub struct Reader<'a, const N: usize, const B: usize, const TAPS: usize, const P
 impl<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     Reader<'a, N, B, TAPS, PENDING>
 {
-    /// A reader with the filter chain of a bandwidth.
+    /// Creates a reader with the filter chain of a bandwidth.
     pub fn new(
         model: &'a RowModel<f32, N, B>,
         anatomy: Anatomy<N>,
@@ -135,7 +135,8 @@ impl<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize
         })
     }
 
-    /// One motion: `samples` are model angles, rad, and torques, N m, at 500 Hz from `start_s` on.
+    /// Curves of one motion: `samples` are model angles, rad, and torques, N m, at 500 Hz from
+    /// `start_s` on.
     pub fn motion(
         &mut self,
         name: impl Into<String>,
@@ -182,14 +183,14 @@ impl<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize
         Series { noise_nm, ..self.of_motions(motions) }
     }
 
-    /// The same where there is no solver to ask.
+    /// Curves of a run without a solver.
     #[must_use]
     pub fn of_motions(self, motions: Vec<MotionSeries>) -> Series {
         Series { motions, white_correlation: self.white_correlation, ..Series::default() }
     }
 }
 
-/// Sum of h_k h_(k + lag) over that without lag, at the rate of the rows.
+/// Sum of h_k h_(k + lag), normalised to lag 0, at the rate of the rows.
 fn white_correlation(weights: &[f32]) -> Vec<f64> {
     let sum = |lag: usize| -> f64 {
         let later = weights.iter().skip(lag);
@@ -199,7 +200,8 @@ fn white_correlation(weights: &[f32]) -> Vec<f64> {
     (0..=lags).map(|lag| sum(lag * DECIMATION) / sum(0)).collect()
 }
 
-/// Autocorrelation of a joint's residuals over its motions, pairs with a joint at rest left out; lag by lag of a row.
+/// Autocorrelation of a joint's residuals over its motions, by lag in rows; pairs with a joint at
+/// rest are excluded.
 #[must_use]
 pub fn autocorrelation(residuals: &[Vec<Option<f64>>], lags: usize) -> Vec<f64> {
     let mean_product = |lag: usize| -> f64 {
@@ -222,7 +224,7 @@ mod tests {
 
     #[test]
     fn rows_at_rest_break_the_autocorrelation_and_nothing_else() {
-        // Alternating signs: -1 at odd lags, 1 at even ones, whatever is left out.
+        // Alternating signs: -1 at odd lags, 1 at even ones, whatever is excluded.
         let mut alternating: Vec<Option<f64>> =
             (0..40).map(|index| Some(if index % 2 == 0 { 2.0 } else { -2.0 })).collect();
         alternating[7] = None;

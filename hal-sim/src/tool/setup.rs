@@ -1,4 +1,4 @@
-//! From a leg file to what the firmware is built from.
+//! Converts a leg file to the firmware's configuration.
 
 use nalgebra::{Matrix3, Vector3};
 use rand_core::{Rng, SeedableRng};
@@ -28,20 +28,20 @@ use super::motions::{Motions, motions};
 
 /// Bandwidth of the position loop.
 const POSITION_BANDWIDTH: Hertz = Hertz(6.0);
-/// Seed unless another is asked for.
+/// Default seed.
 pub const DEFAULT_SEED: u64 = 1;
 
-/// Which prior an identification starts from.
+/// Prior of an identification.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PriorChoice {
-    /// The leg file's where it has one, else none.
+    /// Prior of the leg file if present, else none.
     #[default]
     Default,
-    /// None.
+    /// No prior.
     None,
-    /// The leg file's.
+    /// Prior of the leg file.
     File,
-    /// The truth, off by so many percent.
+    /// Truth with an error of this percentage.
     Wrong(f64),
 }
 
@@ -61,27 +61,28 @@ impl core::str::FromStr for PriorChoice {
     }
 }
 
-/// A leg that cannot be worked with, in words.
+/// Leg that cannot be used, with the reason.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("{leg}: {reason}")]
 pub struct SetupError {
     /// Name in the leg file.
     pub leg: String,
-    /// In words.
+    /// Reason.
     pub reason: String,
 }
 
 impl SetupError {
-    /// What is wrong with a leg.
+    /// Creates an error about a leg.
     #[must_use]
     pub fn new(leg: &LegFile, reason: impl Into<String>) -> Self {
         Self { leg: leg.name.clone(), reason: reason.into() }
     }
 }
 
-/// Base parameters a leg of `joints` joints may have: room for two parallel axes, or for any axes.
+/// Selects the capacity for base parameters of a leg of `joints` joints: for two parallel axes, or
+/// for any axes.
 ///
-/// Runs `$body` with the constants `N` (joints) and `B` (room for base parameters).
+/// Runs `$body` with the constants `N` (joints) and `B` (capacity for base parameters).
 #[macro_export]
 macro_rules! with_leg_size {
     ($leg:expr, $body:ident ( $($argument:expr),* )) => {
@@ -94,13 +95,13 @@ macro_rules! with_leg_size {
     };
 }
 
-/// Base parameters of a leg of two joints; zero where the leg has another number or none can be found.
+/// Number of base parameters of a leg of two joints; zero for another number, or if they cannot be found.
 #[must_use]
 pub fn base_rank(leg: &LegFile) -> usize {
     row_model::<2, 18>(leg).map_or(0, |model| model.base.rank())
 }
 
-/// Geometry of a leg.
+/// Kinematic chain of a leg.
 pub fn chain<const N: usize>(leg: &LegFile) -> Result<Chain<f64, N>, SetupError> {
     let geometry: Vec<_> = leg
         .joints
@@ -114,7 +115,7 @@ pub fn chain<const N: usize>(leg: &LegFile) -> Result<Chain<f64, N>, SetupError>
     Chain::new(&geometry).map_err(|_| SetupError::new(leg, "a D-H number is not finite"))
 }
 
-/// The columns a leg file asks to estimate.
+/// Columns to be estimated according to a leg file.
 #[must_use]
 pub fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
     core::array::from_fn(|joint| {
@@ -127,7 +128,7 @@ pub fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
     })
 }
 
-/// With what a leg file leaves to the data.
+/// Adds the choices that a leg file leaves to the data.
 fn chosen<T: Real, const N: usize, const B: usize>(
     leg: &LegFile,
     model: RowModel<T, N, B>,
@@ -155,7 +156,7 @@ pub fn row_model<const N: usize, const B: usize>(leg: &LegFile) -> Result<RowMod
     Ok(chosen(leg, RowModel::new(chain, gravity, base)))
 }
 
-/// The same in the device's precision, analysed there.
+/// Row model in the device's precision, analysed in that precision.
 pub fn device_model<const N: usize, const B: usize>(
     leg: &LegFile,
     reference: &RowModel<f64, N, B>,
@@ -195,7 +196,7 @@ fn link_prior(link: &LinkParameters) -> LinkPrior<f64> {
     }
 }
 
-/// `truth` or `prior` of every joint; `None` unless all have it.
+/// `truth` or `prior` of every joint; `None` if one lacks it.
 pub fn links<const N: usize>(
     leg: &LegFile,
     of: impl Fn(&JointFile) -> Option<&LinkParameters>,
@@ -204,10 +205,11 @@ pub fn links<const N: usize>(
     links?.try_into().ok()
 }
 
-/// Keeps the signs of a wrong prior apart from the noise of the same seed.
+/// Separates the random signs of a wrong prior from the noise of the same seed.
 const PRIOR_STREAM: u64 = 0x0070_7269_6f72;
 
-/// A prior that is off by `percent` in every number, signs from the seed, kept physically possible; offset zero.
+/// Prior with an error of `percent` in every number, signs from the seed; physically consistent,
+/// offset zero.
 #[must_use]
 pub fn wrong_prior<const N: usize>(
     truth: &[LinkPrior<f64>; N],
@@ -227,8 +229,8 @@ pub fn wrong_prior<const N: usize>(
                 |row, column| if row <= column { off(link.body.inertia[(row, column)]) } else { 0.0 },
             );
         let mut inertia = inertia + inertia.transpose() - Matrix3::from_diagonal(&inertia.diagonal());
-        // Independent signs may break the triangle inequality of the principal moments: move towards the truth's
-        // shape, which keeps it.
+        // Independent signs may violate the triangle inequality of the principal moments: move
+        // towards the truth's shape, which satisfies it.
         for _ in 0..60 {
             let body = RigidBody { mass, centre_of_mass, inertia };
             if is_physically_consistent(&body.to_parameters()) {
@@ -246,7 +248,7 @@ pub fn wrong_prior<const N: usize>(
     })
 }
 
-/// What is known of a leg beside its data.
+/// Knowledge of a leg besides its data.
 pub fn background<const N: usize, const B: usize>(
     leg: &LegFile,
     prior: PriorChoice,
@@ -284,13 +286,13 @@ pub fn background<const N: usize, const B: usize>(
     })
 }
 
-/// Friction curve of a simulated joint.
+/// Stribeck curve of a simulated joint.
 fn stribeck_truth(joint: &JointFile) -> Option<StribeckTruth> {
     let (truth, curve) = (joint.truth?, joint.stribeck?);
     Some(StribeckTruth { surplus: curve.static_nm - truth.coulomb, speed: curve.speed_rad_s })
 }
 
-/// Largest inertia each joint moves, kg m2, over postures of the whole circle.
+/// Largest inertia moved by each joint, kg m2, over postures of the whole circle.
 #[must_use]
 pub fn largest_inertia<const N: usize>(
     chain: &Chain<f64, N>,
@@ -309,7 +311,7 @@ pub fn largest_inertia<const N: usize>(
     largest
 }
 
-/// The firmware's configuration of a leg, and its motions.
+/// Configuration of the firmware for a leg, and its motions.
 pub fn configuration<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,
@@ -366,7 +368,7 @@ pub fn configuration<const N: usize, const B: usize>(
     Ok((configuration, motions))
 }
 
-/// Largest inertia of each joint after the leg file's prior, else its truth: the servo's gains follow it.
+/// Largest inertia of each joint from the leg file's prior, else its truth; determines the servo's gains.
 fn servo_inertia<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,

@@ -1,4 +1,4 @@
-//! A whole run in simulation: the firmware's leg against the plant, and what only a simulation knows.
+//! Complete simulated run: the firmware's leg against the plant, with data that only a simulation has.
 
 use std::time::Instant;
 
@@ -20,13 +20,13 @@ use super::setup::{PriorChoice, SetupError};
 use super::watch::Watch;
 use crate::world::TICK_S;
 
-/// No run takes longer, s.
+/// Limit of a run, s.
 const LONGEST_RUN_S: f64 = 300.0;
 
-/// Which drives are simulated.
+/// Kind of simulated drives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DriveModel {
-    /// A current with a lag.
+    /// Ideal current with a lag.
     #[default]
     Ideal,
     /// Motor, bridge, shunts, counter and supply, under the board's current loops.
@@ -34,7 +34,7 @@ pub enum DriveModel {
 }
 
 impl DriveModel {
-    /// As reports and options write it.
+    /// Name in reports and options.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -44,14 +44,14 @@ impl DriveModel {
     }
 }
 
-/// What to simulate.
+/// Options of a simulated run.
 #[derive(Clone, Debug)]
 pub struct SimulationOptions {
-    /// Of noise, pushes and a wrong prior.
+    /// Seed of noise, pushes and a wrong prior.
     pub seed: u64,
-    /// Of the swarm.
+    /// Seed of the swarm.
     pub swarm_seed: u64,
-    /// Instead of the leg file's.
+    /// Replaces the noise of the leg file, percent.
     pub torque_noise_percent: Option<f64>,
     /// Ideal or complete drives.
     pub drive: DriveModel,
@@ -59,22 +59,22 @@ pub struct SimulationOptions {
     pub plan: Plan,
     /// Prior for the search box.
     pub prior: PriorChoice,
-    /// A known mass for a second run that tells the torque constants.
+    /// Known mass for a second run, which determines the torque constants.
     pub payload: Option<Payload<f64>>,
-    /// A known mass that the leg carries all the time.
+    /// Known mass that the leg carries all the time.
     pub load: Option<Payload<f64>>,
-    /// What is made wrong on purpose.
+    /// Deliberate errors.
     pub perturbations: Vec<Perturbation>,
-    /// Whether disturbances are met, and Stribeck friction looked for unasked.
+    /// Estimator; the robust one excludes disturbances and searches Stribeck friction by itself.
     pub estimator: Estimator,
-    /// Whether to keep the run's curves.
+    /// Whether curves are recorded.
     pub with_series: bool,
-    /// Identified from instead of the default motion; see [`super::excite::run::check`].
+    /// Replaces the default motion; see [`super::excite::run::check`].
     pub excitation: Option<Excitation>,
 }
 
 impl SimulationOptions {
-    /// The leg as its file says, with both seeds the same, and nothing asked for beside.
+    /// Options for the unchanged leg file, with both seeds equal.
     #[must_use]
     pub fn of_seed(seed: u64) -> Self {
         Self {
@@ -94,14 +94,14 @@ impl SimulationOptions {
     }
 }
 
-/// A run with what it left behind.
+/// Result of a simulated run.
 #[derive(Clone, Debug)]
 pub struct SimulatedRun<const N: usize> {
     /// The report.
     pub report: RunReport,
     /// Samples of the motions identified from and predicted.
     pub log: Vec<LoggedSample<N>>,
-    /// Curves; empty unless asked for.
+    /// Curves; empty unless requested.
     pub series: Series,
 }
 
@@ -124,17 +124,18 @@ pub fn simulate<const N: usize, const B: usize>(
     watch.report(&pair, options, tracking, None, started)
 }
 
-/// A leg that has been through one identification, and what was seen of it.
+/// Leg after one identification, with its observation.
 pub struct Driven<'a, const N: usize, const B: usize> {
-    /// Leg and plant as the verdict left them.
+    /// Leg and plant after the verdict.
     pub pair: Pair<N, B>,
-    /// What the firmware does not know.
+    /// Data unknown to the firmware.
     pub watch: Watch<'a, N, B>,
-    /// Why there is no verdict, in words.
+    /// Reason for a missing verdict.
     pub stopped: Option<String>,
 }
 
-/// From off to the verdict: the firmware of `context` against the plant `simulated`; `leg` is how its user calls it.
+/// Runs from drive off to the verdict: the firmware of `context` against the plant `simulated`;
+/// `leg` is the user's leg.
 pub fn drive<'a, const N: usize, const B: usize>(
     leg: &LegFile,
     simulated: &LegFile,
@@ -156,7 +157,7 @@ pub fn drive<'a, const N: usize, const B: usize>(
     let largest = (LONGEST_RUN_S / TICK_S) as u64;
     let mut before = Activity::Idle;
     loop {
-        // What the sensors of this tick saw, without noise.
+        // State behind this tick's sensor readings, without noise.
         let (torque, sticking) = (pair.world.motor_torque(), pair.world.sticking());
         let output = pair.tick(request.take(), context.gravity);
         watch.see(&pair, &torque, &sticking, output.logged.as_ref());
@@ -190,7 +191,7 @@ pub fn drive<'a, const N: usize, const B: usize>(
     }
 }
 
-/// Position error on the 3 s gait, feedback alone and with the model, from the same instant.
+/// Position error on the 3 s gait, with feedback alone and with the model, from the same instant.
 fn track<const N: usize, const B: usize>(context: &Context<N, B>, pair: &Pair<N, B>) -> Vec<TrackingReport> {
     let motion = context.motions.validation[1];
     let error = |with_model: bool| -> Option<[f64; N]> {

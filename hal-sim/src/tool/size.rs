@@ -1,22 +1,23 @@
 //! A leg file for other lengths and another wearer.
 //!
-//! Why: an exoskeleton is set to its wearer's lengths, and the prior should know who that is. The rule, for truth and
-//! prior alike (`[segments]` of the leg file says what the link was made of):
+//! Why: an exoskeleton is adjusted to its wearer's lengths, and the prior should match. One rule
+//! applies to truth and prior alike; `[segments]` of the leg file describes the original link:
 //!
 //! ```text
 //! link     = exoskeleton's part + wearer's segment (anthropometry)
-//! wearer   : segment of the new mass and length; the prior's mass scales as the truth's does, so a prior that was 7 % off
-//!            stays so
-//! exoskeleton, and a wearer of whom only lengths are told : the mass stays, its places along the link stretch with it,
+//! wearer   : segment of the new mass and length; the prior's mass scales as the truth's does, so a prior
+//!            that was 7 % off stays so
+//! exoskeleton, and a wearer with new lengths only : the mass stays, its positions along the link stretch,
 //!            x -> s x:  c -> S c,   C -> S C S,   I = tr(C) E - C,   S = diag(s, 1, 1)
 //! ```
 //!
-//! s is the new over the old length, c the centre of mass, C the second moment of mass about it, I the inertia tensor: a
-//! stretched body is a possible body whatever s. A telescope that moves its lower part as a whole differs from even
-//! stretching by little: `stretching_is_close_to_a_telescope` says how much. Rotor inertia, friction and limits stay.
+//! s is the new over the old length, c the centre of mass, C the second moment of mass about it, I
+//! the inertia tensor. A stretched body is physically consistent for every s. A telescope that
+//! moves its lower part as a whole differs little from even stretching:
+//! `stretching_is_close_to_a_telescope` measures it. Rotor inertia, friction and limits stay.
 //!
-//! Ranges: the lengths that the paper gives for its exoskeleton, thigh 0.402-0.505 m, shank 0.397-0.506 m. The default
-//! leg's own 0.39 and 0.40 m are what its source says and stay where nothing else is asked for.
+//! Ranges: the lengths that the paper gives for its exoskeleton, thigh 0.402-0.505 m, shank 0.397-0.506 m.
+//! The default leg's own 0.39 and 0.40 m come from its source and stay unless other lengths are requested.
 
 use core::str::FromStr;
 
@@ -32,12 +33,12 @@ pub const THIGH_RANGE_M: [f64; 2] = [0.402, 0.505];
 /// Shortest and longest shank, m.
 pub const SHANK_RANGE_M: [f64; 2] = [0.397, 0.506];
 
-/// `KG,M` on the command line.
+/// Wearer as `KG,M` on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Person {
-    /// kg.
+    /// Body mass, kg.
     pub mass: f64,
-    /// m.
+    /// Height, m.
     pub height: f64,
 }
 
@@ -61,14 +62,14 @@ impl FromStr for Person {
     }
 }
 
-/// What is asked for.
+/// Requested size.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Size {
     /// Hip to knee, m.
     pub thigh: Option<f64>,
     /// Knee to ankle, m.
     pub shank: Option<f64>,
-    /// Lengths from the height where they are not given themselves.
+    /// Wearer whose height determines the lengths not given.
     pub wearer: Option<Person>,
 }
 
@@ -76,13 +77,13 @@ pub struct Size {
 struct Change<'a> {
     name: &'a str,
     stretch: f64,
-    /// Of somebody of a mass: before, and after where another wearer is told.
+    /// Segments of a person of a given mass: before, and after for another wearer.
     before: &'a dyn Fn(f64) -> Vec<Segment>,
     after: Option<&'a dyn Fn(f64) -> Vec<Segment>>,
 }
 
 impl Size {
-    /// The leg of this size.
+    /// Leg of this size.
     pub fn of(&self, leg: &LegFile) -> Result<LegFile, ToolError> {
         if *self == Self::default() {
             return Ok(leg.clone());
@@ -93,7 +94,7 @@ impl Size {
                 leg.name
             ))
         })?;
-        // The reader of leg files has seen that there are two joints.
+        // The reader of leg files has verified that there are two joints.
         let knee = leg.joints.len().saturating_sub(1);
         let before = old.wearer(leg.link_length(knee.saturating_sub(1)), old.wearer_kg);
         let tall = self.wearer.map(|person| Wearer::of_height(person.mass, person.height));
@@ -195,7 +196,7 @@ fn body(mass: f64, com: [f64; 3], [xx, xy, xz, yy, yz, zz]: [f64; 6]) -> RigidBo
     }
 }
 
-/// The body that is left when a part is taken off.
+/// Body that remains without a part.
 fn difference(whole: &RigidBody<f64>, part: &RigidBody<f64>) -> Option<RigidBody<f64>> {
     let (mut left, part) = (whole.to_parameters(), part.to_parameters());
     left.iter_mut().zip(part).for_each(|(left, part)| *left -= part);
@@ -213,7 +214,7 @@ fn stretched(body: &RigidBody<f64>, stretch: f64) -> RigidBody<f64> {
     }
 }
 
-/// The old link's rotor and friction with a new body.
+/// Rotor and friction of the old link with a new body.
 fn linked(link: &LinkParameters, body: &RigidBody<f64>) -> LinkParameters {
     let tensor = &body.inertia;
     LinkParameters {

@@ -1,4 +1,4 @@
-//! Many runs of one leg: how every base parameter lies about its truth.
+//! Distribution of every base parameter about its truth over many runs of one leg.
 
 use scarab::real::sqrt;
 
@@ -7,22 +7,22 @@ use super::report::RunReport;
 /// One base parameter over all runs that determine it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spread {
-    /// As reports name it.
+    /// Name in reports.
     pub name: String,
-    /// SI.
+    /// SI unit.
     pub unit: &'static str,
-    /// The simulated leg's.
+    /// True value of the simulated leg.
     pub truth: f64,
-    /// Value less truth, over the sigma of its run.
+    /// Value minus truth, over the sigma of its run.
     pub errors: Vec<f64>,
-    /// Reported, root mean square.
+    /// Root mean square of the reported sigma.
     pub sigma: f64,
-    /// Root mean square error over the Cramér-Rao bound; none where no run has one.
+    /// Root mean square error over the Cramér-Rao bound; `None` if no run has one.
     pub over_bound: Option<f64>,
 }
 
 impl Spread {
-    /// Of every base parameter with a truth, in the order in which they first appear.
+    /// Spread of every base parameter with a truth, in the order of first appearance.
     #[must_use]
     pub fn of(runs: &[RunReport]) -> Vec<Self> {
         let mut names: Vec<&str> = Vec::new();
@@ -61,14 +61,14 @@ impl Spread {
         self.errors.iter().sum::<f64>() / self.errors.len().max(1) as f64
     }
 
-    /// Standard deviation of the errors in sigma about their mean: 1 where sigma is what it claims to be.
+    /// Standard deviation of the errors about their mean, in sigma; 1 if the reported sigma is right.
     #[must_use]
     pub fn deviation(&self) -> f64 {
         let mean = self.mean();
         rms(&self.errors.iter().map(|error| error - mean).collect::<Vec<_>>())
     }
 
-    /// Share of the errors within so many sigma.
+    /// Share of the errors within a number of sigma.
     #[must_use]
     pub fn within(&self, sigmas: f64) -> f64 {
         let inside = self.errors.iter().filter(|error| error.abs() <= sigmas).count();

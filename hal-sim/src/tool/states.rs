@@ -1,14 +1,14 @@
-//! States of motion in a CSV file, for `predict` and `regressor`: read, and turned into the model's angles.
+//! Reads states of motion from a CSV file, for `predict` and `regressor`, in the model's angles.
 //!
-//! Why one place: `replay` reads anatomical angles from columns of the same names, so everything that a user hands over is
-//! anatomical unless `--dh` says otherwise.
+//! Why one place: `replay` reads anatomical angles from columns of the same names. All user data
+//! are therefore anatomical unless `--dh` is given.
 //!
 //! ```text
-//! D-H angle = direction * anatomical angle + zero offset        speed, acceleration and torque: the factor alone
+//! D-H angle = direction * anatomical angle + zero offset     speed, acceleration, torque: direction only
 //! ```
 //!
-//! Columns are found by name, others are ignored: `q1..` (or `q1_rad`) rad, `qd1..` (`qd1_radps`) rad/s, `qdd1..`
-//! (`qdd1_radps2`) rad/s2; `t_s` if there is one.
+//! Columns are found by name, others are ignored: `q1..` (or `q1_rad`) rad, `qd1..` (`qd1_radps`)
+//! rad/s, `qdd1..` (`qdd1_radps2`) rad/s2; `t_s` is optional.
 
 use std::path::{Path, PathBuf};
 
@@ -20,20 +20,20 @@ use super::recording::columns::{Column, for_each_row, line_at, read_text, refuse
 use super::recording::{Fault, RecordingError};
 use super::setup::{SetupError, anatomy};
 
-/// How the angles of a file are counted.
+/// Convention of the angles in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Angles {
-    /// As in recordings: flexion positive, zero where the leg file has it.
+    /// Convention of recordings: flexion positive, zero as in the leg file.
     Anatomical,
-    /// As in the D-H frames of the leg file.
+    /// D-H frames of the leg file.
     DenavitHartenberg,
 }
 
 impl Angles {
-    /// From these angles to the D-H angles of every joint.
+    /// Conversion from these angles to the D-H angles of every joint.
     ///
     /// # Errors
-    /// Where direction or zero offset of a joint make no sense.
+    /// Direction or zero offset of a joint is invalid.
     pub fn to_chain<const N: usize>(self, leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N], SetupError> {
         match self {
             Self::Anatomical => anatomy(leg),
@@ -46,17 +46,17 @@ impl Angles {
 pub struct States<const N: usize> {
     file: PathBuf,
     text: String,
-    /// In the order of the file.
+    /// States in the order of the file.
     pub rows: Vec<State<N>>,
-    /// Where each row stands in the text.
+    /// Byte offset of each row in the text.
     offsets: Vec<usize>,
 }
 
 /// One row of the file.
 pub struct State<const N: usize> {
-    /// As it stands in the file.
+    /// Time as written in the file.
     pub time: Option<String>,
-    /// D-H.
+    /// State in D-H angles.
     pub motion: JointState<f64, N>,
 }
 
@@ -64,7 +64,7 @@ pub struct State<const N: usize> {
 type Columns = ([Vec<Column>; 3], Option<Column>);
 
 impl<const N: usize> States<N> {
-    /// Reads a file whose angles `to_chain` turns into D-H angles.
+    /// Reads a file; `to_chain` converts its angles to D-H angles.
     ///
     /// # Errors
     /// Names file, line and reason.
@@ -91,7 +91,7 @@ impl<const N: usize> States<N> {
         Ok(Self { file: file.to_owned(), text, rows, offsets })
     }
 
-    /// A row whose torque is beyond the range of the numbers computed with.
+    /// Error of a row whose torque exceeds the range of the number format.
     #[must_use]
     pub fn out_of_range(&self, row: usize) -> RecordingError {
         let line = self.offsets.get(row).map(|&offset| line_at(&self.text, offset));
@@ -108,7 +108,7 @@ fn find_columns<const N: usize>(header: &StringRecord) -> Result<Columns, Fault>
     Ok((columns, is_timed.then(|| Column::find(header, "t_s".into())).transpose()?))
 }
 
-/// The column of this name, with the unit behind it or without.
+/// Column of this name, with or without the unit appended.
 fn find(header: &StringRecord, name: &str, unit: &str) -> Result<Column, Fault> {
     let with_unit = format!("{name}_{unit}");
     let is_with_unit = header.iter().any(|present| present == with_unit);

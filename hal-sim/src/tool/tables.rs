@@ -1,4 +1,4 @@
-//! The report of a run as plain tables.
+//! Formats the report of a run as plain tables.
 
 use std::io::{ErrorKind, Write};
 
@@ -10,7 +10,7 @@ use super::precision::{plain, sigma, value};
 use super::replay::Source;
 use super::report::{ConsistentSearchReport, FitReport, Number, RunReport};
 
-/// Writes to standard output; a reader that has seen enough and closed the pipe is no fault.
+/// Writes to standard output; a pipe closed by its reader is not an error.
 pub fn print(text: &str) -> Result<(), ToolError> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -21,13 +21,13 @@ pub fn print(text: &str) -> Result<(), ToolError> {
     }
 }
 
-/// `println!` by way of [`print`]: leaves the function where standard output cannot be written.
+/// `println!` through [`print`]: returns from the function if standard output cannot be written.
 macro_rules! say {
     ($($text:tt)*) => { $crate::tool::tables::print(&format!("{}\n", format_args!($($text)*)))? };
 }
 pub(crate) use say;
 
-/// An empty table without frames.
+/// Empty table without frames.
 #[must_use]
 pub fn headed(header: &[&str]) -> Table {
     let mut table = Table::new();
@@ -35,7 +35,7 @@ pub fn headed(header: &[&str]) -> Table {
     table
 }
 
-/// A table without the columns that nothing is known for, one line each.
+/// Formats a table without the columns that are unknown, one line per row.
 fn text(mut table: Table, unknown: &[usize]) -> String {
     for &index in unknown {
         if let Some(column) = table.column_mut(index) {
@@ -53,7 +53,7 @@ fn align_numbers(table: &mut Table, columns: impl IntoIterator<Item = usize>) {
     }
 }
 
-/// A number with four significant digits, or a dash.
+/// Formats a number with four significant digits, or a dash.
 #[must_use]
 pub fn number(value: Number) -> String {
     match value.known() {
@@ -67,7 +67,7 @@ pub fn number(value: Number) -> String {
     }
 }
 
-/// What torque determines: value, sigma, truth and how many sigma lie between.
+/// Table of the base parameters: value, sigma, truth and error in sigma.
 #[must_use]
 pub fn base_parameters(run: &RunReport) -> String {
     let mut rows = headed(&["base parameter", "value", "sigma", "unit", "truth", "error/sigma", "= sum of"]);
@@ -100,7 +100,7 @@ pub fn base_parameters(run: &RunReport) -> String {
     text(rows, if known { &[] } else { &[4, 5] })
 }
 
-/// Which of all parameters were measured.
+/// Table of all parameters with their status.
 #[must_use]
 pub fn parameters(run: &RunReport) -> String {
     let mut rows = headed(&["parameter", "value", "sigma", "unit", "status", "grouped with", "truth"]);
@@ -122,7 +122,7 @@ pub fn parameters(run: &RunReport) -> String {
            splits them.\nweak: measured with little certainty. prior: does not show in the torque.\n"
 }
 
-/// Torque errors on all motions.
+/// Table of the torque errors on all motions.
 #[must_use]
 pub fn fits(run: &RunReport) -> String {
     let mut rows = headed(&[
@@ -157,7 +157,7 @@ pub fn fits(run: &RunReport) -> String {
     text(rows, if known { &[] } else { &[7, 8] })
 }
 
-/// Which files trained and validated, and how many of their rows each joint could use.
+/// Table of the training and validation files, with the rows used for each joint.
 #[must_use]
 pub fn sources(sources: &[Source]) -> String {
     let joints = sources.first().map_or(0, |source| source.used.len());
@@ -183,7 +183,7 @@ pub fn sources(sources: &[Source]) -> String {
            is undetermined.\n\n"
 }
 
-/// One run on standard output.
+/// Prints one run.
 pub fn print_run(run: &RunReport) -> Result<(), ToolError> {
     print(&run_text(run))
 }
@@ -245,7 +245,7 @@ fn run_text(run: &RunReport) -> String {
     lines.join("\n") + "\n"
 }
 
-/// What the search took and how far it came; a board tells the first only.
+/// Effort and result of the search; a board sends the effort only.
 fn search_line(run: &RunReport) -> String {
     let swarm =
         format!("beetle swarm: {} iterations, {} evaluations", run.bso.iterations, run.bso.evaluations);
@@ -259,7 +259,7 @@ fn search_line(run: &RunReport) -> String {
     )
 }
 
-/// What physical consistency costs, and both searches for it.
+/// Cost of physical consistency, and both searches for it.
 fn consistent_line(run: &RunReport) -> String {
     let found = &run.consistent;
     let search = |search: &ConsistentSearchReport| {
@@ -287,7 +287,7 @@ fn consistent_line(run: &RunReport) -> String {
     )
 }
 
-/// A reason of the closed list in words.
+/// Explanation of a reason from the closed list.
 #[must_use]
 pub fn explanation(reason: &str) -> &'static str {
     match reason {
@@ -307,7 +307,7 @@ pub fn explanation(reason: &str) -> &'static str {
     }
 }
 
-/// The verdict in words.
+/// Verdict in words.
 #[must_use]
 pub fn verdict_line(run: &RunReport) -> String {
     let seconds = if run.simulated_s > 0.0 && run.wall_s > 0.0 {

@@ -1,25 +1,26 @@
-//! The drives' temperature: kept with a model, and what a difference does to it.
+//! Temperature of the drives: stored with a model, and the effect of a difference.
 //!
 //! ```text
 //! k_t(T) = k_t(T0) (1 - 0.0011 (T - T0))                       remanence of neodymium magnets, per kelvin
 //! ```
 //!
-//! A warm motor makes less torque of the same current, so every parameter, believed in the cold motor's units, comes out
-//! larger; grease thins, and viscous friction falls by an amount that nobody knows beforehand. Nothing is corrected: what
-//! the leg's magnets and gears do is not known, and a thermometer on the housing is not one on the magnet.
+//! A warm motor makes less torque from the same current, so every parameter, in the cold motor's
+//! units, becomes larger. Grease becomes thinner, and viscous friction falls by an unknown amount.
+//! Nothing is corrected: the behaviour of the leg's magnets and gears is unknown, and the housing
+//! does not have the magnets' temperature.
 
-/// Temperatures that a drive can have, degrees Celsius.
+/// Range of a drive's temperature, degrees Celsius.
 pub const RANGE_C: (f64, f64) = (-40.0, 125.0);
-/// A larger difference is worth a warning, kelvin: the constants then differ by 1.1 %, several sigma of the first moments
-/// that 22 s of motion tell.
+/// Difference above which a warning is printed, kelvin. The constants then differ by 1.1 %, several
+/// sigma of the first moments from 22 s of motion.
 pub const LARGEST_DIFFERENCE_K: f64 = 10.0;
-/// Of neodymium's remanence, per kelvin.
+/// Temperature coefficient of neodymium's remanence, per kelvin.
 pub const MAGNET_SHARE_PER_KELVIN: f64 = -0.0011;
 
-/// A temperature given on the command line.
+/// Parses a temperature from the command line.
 ///
 /// # Errors
-/// What is no number, or no drive's temperature.
+/// The text is not a number, or outside the range of a drive.
 pub fn parse(text: &str) -> Result<f64, String> {
     let (low, high) = RANGE_C;
     match text.parse::<f64>() {
@@ -28,8 +29,8 @@ pub fn parse(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What to think of a model found at `model` degrees Celsius on a leg at `leg`; nothing where either is unknown or they
-/// hardly differ.
+/// Warning about a model identified at `model` degrees Celsius on a leg at `leg`; `None` if one is
+/// unknown or the difference is small.
 #[must_use]
 pub fn warning(model: Option<f64>, leg: Option<f64>) -> Option<String> {
     let (model, leg) = (model?, leg?);

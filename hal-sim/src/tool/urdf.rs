@@ -1,22 +1,24 @@
-//! A kept model as a robot description (URDF), for MuJoCo, Gazebo, Pinocchio and their like.
+//! Exports a stored model as a robot description (URDF) for MuJoCo, Gazebo, Pinocchio and others.
 //!
-//! Why: a leg that was identified is to be simulated and planned for elsewhere. A robot description wants whole bodies,
-//! though torque tells only sums of their numbers; so each link says in a comment which of its numbers were measured,
-//! which only in sums and which are the prior's, and bodies that cannot exist are refused, not mended.
+//! Why: an identified leg is simulated and planned for in other software. A robot description needs
+//! complete bodies, but torque determines only sums of their parameters. Each link therefore states
+//! in a comment which numbers were identified, which only in sums, and which come from the prior.
+//! Inconsistent bodies are rejected, not repaired.
 //!
 //! ```text
-//! parent to joint: xyz = (a, -d sin alpha, d cos alpha), R = Rx(alpha) Rz(zero offset)      modified D-H at flexion 0
-//! axis = (0, 0, direction)                                                                 angles are anatomical
+//! parent to joint: xyz = (a, -d sin alpha, d cos alpha), R = Rx(alpha) Rz(zero offset)   D-H at flexion 0
+//! axis = (0, 0, direction)                                                 angles are anatomical
 //! link frame = D-H frame of the joint;  inertial origin = h / m, axes along the link's
 //! ixx ixy ixz iyy iyz izz = elements of the tensor about the centre of mass, ixy = - integral of x y dm
 //! ```
 //!
-//! The root is `world` with gravity along -z, as those programs have it; a fixed joint turns it to the leg's base. What
-//! the format has no place for stands in comments: rotor inertia at the joint (MuJoCo: the joint's `armature`;
-//! Pinocchio: `model.armature`; Drake: its reflected inertia) and the torque offset. A friction coefficient that was
-//! measured below zero, within its sigma, is written as 0.
+//! The root is `world` with gravity along -z, as usual in these programs; a fixed joint rotates it to the
+//! leg's base. Values without a place in the format are written as comments: rotor inertia at the joint
+//! (MuJoCo: the joint's `armature`; Pinocchio: `model.armature`; Drake: its reflected inertia) and the
+//! torque offset. A friction coefficient identified below zero, within its sigma, is written as 0.
 //!
-//! Limits: no geometry, no transmission, no contact; Coulomb friction is what the programs make of `friction`.
+//! Limits: no geometry, transmission or contact; the program's own meaning of `friction` applies to
+//! Coulomb friction.
 
 use std::borrow::Cow;
 use std::io;
@@ -30,17 +32,18 @@ use scarab::model::{JointParameters, Parameter, RigidBody, is_physically_consist
 use super::error::ToolError;
 use super::model_file::{ModelFile, StoredJoint};
 
-/// How far, in its sigma, the full parameters may be from a measured sum.
+/// Largest distance between the full parameters and an identified sum, in sigma.
 const LARGEST_DEVIATION: f64 = 1.0;
-/// Gravity is -z here.
+/// Name of the root link, in which gravity is along -z.
 const ROOT: &str = "world";
-/// The leg's base frame.
+/// Name of the leg's base frame.
 const BASE: &str = "base";
 
-/// The robot description of a model; `file` is what refusals are reported under.
+/// Robot description of a model; `file` is its name in error messages.
 ///
 /// # Errors
-/// [`ToolError::Refused`] where a link's parameters are unknown, no body's, or not those that torque told.
+/// [`ToolError::Refused`] if a link's parameters are unknown, inconsistent, or contradict the
+/// identified sums.
 pub fn text(model: &ModelFile, file: &str) -> Result<String, ToolError> {
     let refused = |reason: String| ToolError::Refused(format!("{file}: not exported: {reason}"));
     let mut links = Vec::new();
@@ -57,9 +60,9 @@ struct Link<'a> {
     joint: &'a StoredJoint,
     parameters: JointParameters<f64>,
     body: RigidBody<f64>,
-    /// The constant column is a difference of friction between the directions.
+    /// Whether the constant column is a difference of friction between the directions.
     is_asymmetric: bool,
-    /// Names of parameters by what is known of them.
+    /// Names of parameters by their status.
     standing: String,
 }
 
@@ -106,7 +109,7 @@ impl<'a> Link<'a> {
         Ok(Self { joint, parameters, body, is_asymmetric, standing })
     }
 
-    /// What the constant column says, in words.
+    /// Describes the constant column.
     fn constant(&self) -> String {
         let (level, half) = (self.parameter(Parameter::FC), self.parameter(Parameter::OFF));
         if self.is_asymmetric {
@@ -125,7 +128,7 @@ impl<'a> Link<'a> {
     }
 }
 
-/// The bodies must move as torque told, or they are another leg's.
+/// Checks that the bodies reproduce the identified base set; otherwise they belong to another leg.
 fn full_set_gives_the_base_set(model: &ModelFile) -> Result<(), String> {
     for base in &model.base_set.parameters {
         let known = |name: &str| {
@@ -175,10 +178,10 @@ fn write(model: &ModelFile, links: &[Link<'_>]) -> io::Result<String> {
     String::from_utf8(bytes).map_err(io::Error::other)
 }
 
-/// The root, and the leg's base turned so that gravity points along -z of the root.
+/// Writes the root, and the leg's base rotated so that gravity points along -z of the root.
 fn base(xml: &mut Xml, gravity: &Vector3<f64>) -> io::Result<()> {
     let turn = Rotation3::rotation_between(gravity, &-Vector3::z())
-        // Against each other: any half turn about a level axis.
+        // Opposite directions: any half turn about a level axis.
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI));
     empty(xml, "link", &[("name", ROOT.into())])?;
     inside(xml, "joint", &[("name", "scarab_mount".into()), ("type", "fixed".into())], |xml| {
@@ -256,7 +259,7 @@ fn origin(xml: &mut Xml, place: &Vector3<f64>, turn: &Rotation3<f64>) -> io::Res
 
 type Attribute<'a> = (&'a str, Cow<'a, str>);
 
-/// With the digits that restore the f64 exactly; adding 0 turns -0 into 0.
+/// Formats with the digits that restore the f64 exactly; adding 0 turns -0 into 0.
 fn number(number: f64) -> Cow<'static, str> {
     (number + 0.0).to_string().into()
 }
@@ -284,7 +287,8 @@ fn inside(
     xml.write_event(Event::End(BytesEnd::new(name)))
 }
 
-/// Only words, numbers and parameters' names: no user's text, which might end the comment.
+/// Writes a comment of words, numbers and parameter names; user text, which might end the comment,
+/// must not occur.
 fn comment(xml: &mut Xml, text: &str) -> io::Result<()> {
     xml.write_event(Event::Comment(BytesText::from_escaped(format!(" {text} "))))
 }

@@ -1,4 +1,4 @@
-//! Everything that is looked at during a run and that the firmware does not know.
+//! Observes a run, including data that the firmware does not have.
 
 use std::time::Instant;
 
@@ -62,14 +62,14 @@ impl<const N: usize, const B: usize> TruthChain<N, B> {
     }
 }
 
-/// Comparison of base values with the noise-free torque of one motion.
+/// Compares base values with the noise-free torque of one motion.
 fn truth_fit<const N: usize, const B: usize>(
     rows: &[FilteredRows<f32, N, B>],
     model: &RowModel<f32, N, B>,
     values: &[f32; B],
 ) -> [TruthFit; N] {
     core::array::from_fn(|joint| {
-        // The rows were made before the friction curve was known: its part is made of other columns.
+        // The rows predate the friction curve: its part is built from other columns.
         let curve = model.stribeck[joint];
         let places = [Parameter::FC, Parameter::FV].map(|parameter| model.drive(joint, parameter));
         let surplus = curve.excess * places[0].map_or(0.0, |base| values[base]);
@@ -99,7 +99,7 @@ fn truth_fit<const N: usize, const B: usize>(
     })
 }
 
-/// Everything that is looked at during a run and that the firmware does not know.
+/// Observer of a run, including data that the firmware does not have.
 pub struct Watch<'a, const N: usize, const B: usize> {
     context: &'a Context<N, B>,
     chain: TruthChain<N, B>,
@@ -112,12 +112,12 @@ pub struct Watch<'a, const N: usize, const B: usize> {
     information: Information<N>,
     costs: Option<Costs<B>>,
     excess: Vec<(u32, f64)>,
-    /// What a known mass and a known load said, once they were asked.
+    /// Results of a known mass and a known load, after their evaluation.
     pub scale: Option<Scale<N, B>>,
 }
 
 impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
-    /// Nothing seen yet.
+    /// Creates an empty observer.
     pub fn new(context: &'a Context<N, B>) -> Self {
         Self {
             context,
@@ -138,18 +138,19 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         }
     }
 
-    /// Rows of a motion that was predicted, with the noise-free torque; the last motion's are there once it is reported.
+    /// Rows of a predicted motion with the noise-free torque; the last motion's are available once
+    /// it is reported.
     #[must_use]
     pub fn noise_free(&self, motion: usize) -> &[FilteredRows<f32, N, B>] {
         self.validation_rows.get(motion).map_or(&[], Vec::as_slice)
     }
 
-    /// What was logged of a motion.
+    /// Logged samples of a motion.
     pub fn logged(&self, segment: Segment) -> impl Iterator<Item = &LoggedSample<N>> {
         self.log.iter().filter(move |logged| logged.segment == Some(segment))
     }
 
-    /// Looks at the tick that was just run, `torque` and `sticking` from before it.
+    /// Observes the tick just run; `torque` and `sticking` are from before it.
     pub fn see(
         &mut self,
         pair: &Pair<N, B>,
@@ -184,7 +185,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         (self.torque_sum, self.sticking_sum) = ([0.0; N], [0.0; N]);
     }
 
-    /// Adds what the noise-free motion of this sample tells of the base parameters.
+    /// Adds the information of this sample's noise-free motion about the base parameters.
     fn inform(&mut self, pair: &Pair<N, B>) {
         let truth = pair.world.truth();
         let scales = self.context.configuration.joints.map(|joint| joint.scale);
@@ -218,7 +219,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
     }
 
     fn watch_search(&mut self, pair: &Pair<N, B>) {
-        // Until it is decided which columns are there, costs are those of another problem.
+        // Before the selection of columns, costs belong to another problem.
         let solver = pair.leg.identification().solver().filter(|solver| solver.is_selected());
         let Some(solver) = solver else { return };
         let iterations = solver.search().iterations();
@@ -230,8 +231,8 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         self.excess.push((iterations, excess));
     }
 
-    /// The run as curves, with what only a simulation knows: noise-free torque and commands. `values` are those of the leg
-    /// with what it carries, the torque is put right where a known mass told the constants.
+    /// Curves of the run, with noise-free torque and commands from the simulation. `values` are those of
+    /// the leg with its load; torque is corrected if a known mass determined the constants.
     fn series(
         &self,
         model: &RowModel<f32, N, B>,
@@ -290,7 +291,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         })
     }
 
-    /// What stands in the report of a run in which nothing was recorded.
+    /// Empty solver for the report of a run in which nothing was recorded.
     fn nothing_found(&self, options: &SimulationOptions) -> Result<Solver<f32, N, B>, ToolError> {
         let configuration = &self.context.configuration;
         let mut recorder = Box::new(
@@ -301,7 +302,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         Ok(Solver::new(&configuration.model, recorder.finish(), options.plan, prior, options.swarm_seed))
     }
 
-    /// What was seen, once the verdict is there, or the drive `stopped` before: then the result is refused as input.
+    /// Report after the verdict. If the drive `stopped` before, the result is rejected as input.
     pub fn report(
         mut self,
         pair: &Pair<N, B>,
@@ -335,7 +336,7 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
             None => (solver, verdict, identification.validation()),
         };
         let model = identification.model();
-        // The plant's torque is that of the leg with what it carries.
+        // The plant's torque includes the load of the leg.
         let carrying = loaded(scale.as_ref(), &found.estimate().values);
         let training = RecordedMotion {
             name: "fourier".into(),

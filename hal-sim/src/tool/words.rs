@@ -1,4 +1,4 @@
-//! What the firmware says in codes, in words a user can act on.
+//! Describes the firmware's error codes in words that a user can act on.
 
 use scarab::ident::KernelError;
 use scarab::leg::LegError;
@@ -12,7 +12,7 @@ fn joint_name(leg: &LegFile, joint: usize) -> &str {
     leg.joints.get(joint).map_or("?", |joint| &joint.name)
 }
 
-/// Why the firmware does not take a leg.
+/// Reason why the firmware rejects a leg.
 #[must_use]
 pub fn leg_error(leg: &LegFile, error: LegError) -> String {
     match error {
@@ -59,7 +59,7 @@ pub fn leg_error(leg: &LegFile, error: LegError) -> String {
     }
 }
 
-/// Why a drive is no longer enabled.
+/// Reason why a drive is no longer enabled.
 #[must_use]
 pub fn drive_stop(leg: &LegFile, state: DriveState) -> String {
     let Some(fault) = state.fault() else {

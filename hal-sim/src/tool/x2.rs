@@ -1,16 +1,16 @@
 //! The default leg, derived: a Fourier X2 exoskeleton leg with a wearer of a given mass.
 //!
-//! Why derived: the leg file's numbers are sums over seven bodies; here they can be checked against their
-//! sources and made for another wearer.
+//! Why derived: the leg file's numbers are sums over seven bodies. Here they can be checked against
+//! their sources and computed for another wearer.
 //!
 //! - Exoskeleton: masses, sagittal inertias, centres of mass, friction and rotor inertia after the parameter
-//!   file of CANOpenRobotController (University of Melbourne, Apache-2.0, `config/x2_params.yaml`); some are marked
-//!   there as not yet investigated. "From hip" and "from knee" of the lower parts are read as in the constants
-//!   below.
+//!   file of CANOpenRobotController (University of Melbourne, Apache-2.0, `config/x2_params.yaml`); some are
+//!   marked there as not yet investigated. "From hip" and "from knee" of the lower parts are read as in the
+//!   constants below.
 //! - Wearer: anthropometry after Winter ([`super::anthropometry`]), segments as long as the exoskeleton's.
 //! - Motors: [`MotorFile::D5065_CLASS`], whose 0.03 N m/A times the gear's 50 are the leg's 1.5 N m/A.
-//! - Only sagittal inertias are given, so each segment is completed as a solid of revolution: about its long axis
-//!   it has mass * radius^2 / 2 with the radii stated below (ours).
+//! - Only sagittal inertias are given. Each segment is completed as a solid of revolution with
+//!   mass * radius^2 / 2 about its long axis; the radii are stated below (ours).
 //!
 //! Frames: x down the segment, y forward, z along the joint's axis; everything lies in the plane z = 0. For
 //! 75 kg: M1 10.34 kg, HX1 2.039 kg m, ZZ1 0.585 kg m^2 about the hip; M2 6.94, HX2 1.759, HY2 0.201, ZZ2
@@ -28,11 +28,11 @@ const WEARER_FOOT_M: f64 = 0.27;
 
 /// Body mass of the default wearer, kg.
 pub const DEFAULT_WEARER_KG: f64 = 75.0;
-/// Body mass of the standard wearer a designer would have assumed, kg.
+/// Body mass of a standard wearer, which a designer would have assumed, kg.
 const STANDARD_WEARER_KG: f64 = 70.0;
 
-/// Exoskeleton: upper and lower thigh of this length, m. It is a telescope: the upper part keeps its place below the hip,
-/// the lower one above the knee.
+/// Upper and lower thigh of the exoskeleton for a length, m. It is a telescope: the upper part
+/// keeps its position below the hip, the lower one above the knee.
 fn exoskeleton_thigh(length: f64) -> [Segment; 2] {
     [
         Segment { mass: 0.70, x: 0.0811, y: 0.0, sagittal: 0.002_197, radius: 0.05, along: Along::X },
@@ -47,7 +47,7 @@ fn exoskeleton_thigh(length: f64) -> [Segment; 2] {
     ]
 }
 
-/// Exoskeleton: upper and lower shank, foot; a telescope likewise.
+/// Upper and lower shank and foot of the exoskeleton, also a telescope.
 fn exoskeleton_shank(length: f64) -> [Segment; 3] {
     [
         Segment { mass: 0.64, x: 0.0908, y: 0.0, sagittal: 0.002_346, radius: 0.05, along: Along::X },
@@ -66,7 +66,7 @@ fn exoskeleton_shank(length: f64) -> [Segment; 3] {
 /// Rotor inertia, Coulomb and viscous friction of a joint.
 type Drive = [f64; 3];
 
-/// A link of several segments, rounded to six decimals, as it is printed.
+/// Link of several segments, rounded to six decimals as in the file.
 fn link(segments: &[Segment], [rotor_inertia, coulomb, viscous]: Drive) -> LinkParameters {
     let (mass, com, inertia_com) = joined(segments);
     let rounded = |value: f64| (value * 1e6).round() / 1e6;
@@ -94,17 +94,16 @@ fn shank(wearer: &Wearer, drive: Drive) -> LinkParameters {
     link(&[upper, lower, foot, calf, wearer_foot], drive)
 }
 
-/// Hip and knee worn by somebody of `body_mass` kg. The prior is what a designer would write down: the same
-/// exoskeleton on a standard wearer of 70 kg, round figures for rotor inertia and friction. Torque is capped
-/// at 85 N m: the 100 N m of the exoskeleton would be 66.7 A, beyond the 60.75 A that the board measures at
-/// its finer gain.
+/// Hip and knee worn by a person of `body_mass` kg. The prior is a designer's: the same exoskeleton on a
+/// standard wearer of 70 kg, round figures for rotor inertia and friction. Torque is limited to 85 N m. The
+/// 100 N m of the exoskeleton would be 66.7 A, and the board measures up to 60.75 A at its finer gain.
 #[must_use]
 pub fn leg_file(body_mass: f64) -> LegFile {
     let wearer = Wearer { mass: body_mass, thigh: THIGH_M, shank: SHANK_M, foot: WEARER_FOOT_M };
     leg_file_of(&wearer, STANDARD_WEARER_KG)
 }
 
-/// The same set to a wearer's lengths, with a prior that assumes another body mass.
+/// Default leg with a wearer's lengths, and a prior that assumes another body mass.
 #[must_use]
 pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
     let standard = Wearer { mass: prior_mass, ..*wearer };
@@ -149,7 +148,7 @@ pub fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
 mod tests {
     use super::*;
 
-    /// M, HX, HY, ZZ about the joint.
+    /// Sums M, HX, HY, ZZ about the joint.
     fn sums(link: &LinkParameters) -> [f64; 4] {
         let [x, y, _] = link.com;
         let about_joint = link.inertia_com[5] + link.mass * (x * x + y * y);
@@ -163,7 +162,7 @@ mod tests {
         for (joint, expected) in leg.joints.iter().zip(expected) {
             let truth = joint.truth.expect("derived");
             for (sum, expected) in sums(&truth).iter().zip(expected) {
-                // The check sums are given with three decimals, masses with two.
+                // The reference sums have three decimals, masses two.
                 assert!(
                     (sum - expected).abs() < if expected > 5.0 { 6e-3 } else { 6e-4 },
                     "{sum} {expected}"

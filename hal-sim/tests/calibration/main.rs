@@ -1,6 +1,7 @@
-//! Calibration of many motors and wirings: the firmware's machine against the simulated hardware.
+//! Calibration of many motors and wirings: the firmware's procedure against the simulated hardware.
 //!
-//! Everything differs from seed to seed: motor, encoder, shunts, friction, cogging, which leads are moved on in a circle.
+//! Everything varies with the seed: motor, encoder, shunts, friction, cogging, and rotated motor
+//! leads.
 //! Figures: `cargo test -p hal-sim --test calibration -- --nocapture`.
 
 mod trial;
@@ -20,11 +21,11 @@ fn errors(seed: u64) -> [f64; 4] {
     let (mut stand, result, _) = trial.run(seed);
     let found = result.unwrap_or_else(|reason| panic!("seed {seed}: {reason:?}\n{trial:?}"));
     let motor = &trial.axis.motor;
-    // A switch that conducts is part of what the modulator's voltage sees.
+    // The on-resistance of a switch is part of what the modulator's voltage sees.
     let resistance = motor.resistance + trial.axis.bridge.on_resistance;
 
-    // A quadrature current on a rotor that is turned slowly over many counts (2,400 of them and 21 pole pairs are 3 degrees
-    // each): what of it lies along the true flux is the offset's error.
+    // The rotor turns slowly over many counts (2,400 counts and 21 pole pairs are 3 degrees each)
+    // with a quadrature current. Its component along the true flux is the offset's error.
     stand.set_load(Load::Turned(2.0));
     let mut sample = stand.period(&AxisCommand::RELEASED, 0.0);
     let mut axis = Axis::new(&trial.configuration, &found, &sample).expect("sensible");
@@ -48,7 +49,7 @@ fn errors(seed: u64) -> [f64; 4] {
         f64::from(found.resistance().0) / resistance - 1.0,
         f64::from(found.direct_inductance().0) / motor.inductance_d - 1.0,
         f64::from(found.quadrature_inductance().0) / motor.inductance_q - 1.0,
-        // Small enough to be its own tangent.
+        // The angle is small enough to replace the arc tangent.
         d / q.abs() / TAU * 360.0,
     ]
 }
@@ -70,10 +71,11 @@ fn sound(seeds: core::ops::RangeInclusive<u64>) {
     assert!(worst[..3].iter().all(|error| *error < 0.02) && worst[3] < 1.0, "{worst:?}");
 }
 
-/// Kinds of [`spoil`].
+/// Number of kinds of [`spoil`].
 const KINDS: u64 = 18;
 
-/// Each wrong wiring in turn and what it has to be called. What the axis was told stays; what it meets changes.
+/// Applies each wiring fault in turn and returns the expected refusal. The axis keeps its settings;
+/// the hardware changes.
 fn spoil(trial: &mut Trial, seed: u64) -> Refusal {
     let holding = trial.holding();
     let wiring = &mut trial.axis.wiring;
@@ -118,32 +120,32 @@ fn spoil(trial: &mut Trial, seed: u64) -> Refusal {
             trial.axis.motor.pole_pairs = u32::from(pairs);
             Refusal::PolePairs(pairs)
         }
-        // One phase reads 40 % too much: resistances 18 % apart, currents bent by 13 degrees.
+        // One phase reads 40 % too much: resistances differ by 18 %, currents are rotated by 13 degrees.
         12 => {
             trial.axis.shunts.gain_error[0] = 0.4;
             Refusal::PhaseImbalance
         }
-        // Bent by 19.
+        // Currents rotated by 19 degrees.
         13 => {
             trial.axis.shunts.gain_error[0] = 0.6;
             Refusal::CurrentDirection
         }
-        // A lag of 37 degrees, although the rotor follows all the way.
+        // A lag of 37 degrees, although the rotor follows throughout.
         14 => {
             trial.load = Load::Free { inertia: 2e-4, coulomb: 0.6 * holding, viscous: 2e-4, torque: 0.0 };
             Refusal::Slipped
         }
-        // Cogging that holds the rotor where the field lets go.
+        // Cogging holds the rotor where the field releases it.
         15 => {
             trial.axis.motor.cogging = 0.5 * holding;
             Refusal::Slipped
         }
-        // A weight turns the rotor while the bridge is off.
+        // A weight turns the rotor while the outputs are off.
         16 => {
             trial.load = Load::Free { inertia: 2e-4, coulomb: 0.0, viscous: 2e-4, torque: 0.2 * holding };
             Refusal::Turning
         }
-        // A zero 180 codes off.
+        // A current-sensor offset of 180 codes.
         _ => {
             trial.axis.shunts.offset_codes[1] = 180.0;
             Refusal::ShuntZero(Phase::C)
@@ -157,14 +159,15 @@ fn wrong(seeds: core::ops::RangeInclusive<u64>) {
         let expected = spoil(&mut trial, seed);
         let (stand, result, furthest) = trial.run(seed);
         assert_eq!(result.err(), Some(expected), "seed {seed}\n{trial:?}");
-        // Nothing ran away: the rotor went no further than the field took it, and half an electrical turn to align.
+        // No runaway: the rotor moved no further than the field's path plus half an electrical turn
+        // for the alignment.
         let pairs = f64::from(trial.axis.motor.pole_pairs);
         let field = (f64::from(trial.configuration.pole_pairs) + 2.6) / pairs;
         assert!(furthest < field, "seed {seed}: {furthest} turns, {:?}", stand.rotor());
     }
 }
 
-/// What a sound trial found, as it is kept while the power is off.
+/// Calibration of a faultless trial, as stored while the power is off.
 fn stored(trial: &Trial, seed: u64) -> StoredCalibration {
     let (_, found, _) = trial.run(seed);
     found.unwrap_or_else(|reason| panic!("seed {seed}: {reason:?}\n{trial:?}")).stored().expect("an index")
@@ -175,18 +178,18 @@ fn what_was_stored_is_accepted_by_the_same_motor_and_by_no_wrong_wiring() {
     for seed in 101..=100 + 2 * KINDS {
         let mut trial = Trial::sound(seed);
         let stored = stored(&trial, seed);
-        // The counter forgets, the joint was moved.
+        // The counter has lost its position, and the joint was moved.
         trial.axis.counter.start = trial.axis.counter.start.wrapping_add(12_345);
         trial.angle += 7.0 * TAU / f64::from(trial.axis.motor.cogging_periods);
-        // Other noise, as of another day.
+        // Another noise seed, as on another day.
         let (_, found, _) = trial.run_stored(seed + 1000, stored);
         assert_eq!(found.map(|found| found.offset()), Ok(stored.offset), "seed {seed}");
         let found = found.expect("accepted");
         let (d, q) = (found.direct_inductance().0, found.quadrature_inductance().0);
         let shares = [d / stored.direct_inductance.0, q / stored.quadrature_inductance.0];
-        // Each is within 2 % of the motor's.
+        // Both values are within 2 % of the motor's.
         assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.04), "seed {seed}: {shares:?}");
-        // Measured, and not taken from the store.
+        // The value is measured, not taken from the store.
         assert!(shares.iter().any(|share| *share != 1.0), "seed {seed}");
 
         let expected = spoil(&mut trial, seed);
@@ -234,7 +237,7 @@ fn every_wrong_wiring_is_refused_by_name_and_no_rotor_runs_away() {
 fn counts_per_turn_that_are_not_the_encoders_are_refused() {
     for seed in 1..=12 {
         let mut trial = Trial::sound(seed);
-        // Far from it, and 2.4 % from it.
+        // Far from the true value, and 2.4 % from it.
         let near = seed % 2 == 0;
         if near {
             trial.axis.counter.counts = 4096.0;
@@ -246,11 +249,13 @@ fn counts_per_turn_that_are_not_the_encoders_are_refused() {
         let true_counts = trial.axis.counter.counts;
         let found = match result {
             Err(Refusal::CountsPerTurn(found)) => found,
-            // The same counts per electrical turn, and one index seen only: nothing tells it from other pole pairs.
+            // Equal counts per electrical turn and only one index pulse: other pole pairs cannot be
+            // distinguished.
             Err(Refusal::PolePairs(pairs)) if !near => 6000 * trial.axis.motor.pole_pairs / u32::from(pairs),
             other => panic!("seed {seed}: {other:?}"),
         };
-        // An eighth of an electrical turn of friction's lag; what the line through many swings leaves of it is less.
+        // Friction causes a lag of an eighth of an electrical turn; the line through many swings
+        // reduces it.
         let error = f64::from(found) / true_counts - 1.0;
         let most = if near { 0.05 } else { 0.125 };
         assert!(

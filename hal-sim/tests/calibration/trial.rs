@@ -1,4 +1,4 @@
-//! A motor on its stand with what its axis was told about it.
+//! Motor on its stand with the configuration of its axis.
 
 use core::f64::consts::TAU;
 
@@ -37,24 +37,26 @@ impl Dice {
     }
 }
 
-/// A, holding current.
+/// Holding current, A.
 const CURRENT: f64 = 20.0;
 
 impl Trial {
-    /// Wired as its axis was told.
+    /// Trial wired according to its configuration.
     pub fn sound(seed: u64) -> Self {
         let mut dice = Dice(Xoshiro256PlusPlus::seed_from_u64(seed));
         let pole_pairs = dice.one_of([4, 5, 7, 10, 14, 21]);
         let counts = dice.one_of([2400.0, 4000.0, 8192.0, 10_000.0, 16_384.0]);
-        // 30 mOhm to 0.3 Ohm, as many small as large; L/R of 0.3 ms to 1.5 ms; 20 to 100 mN m/A.
+        // Ranges: 30 mOhm to 0.3 Ohm, small and large ones equally often; L/R of 0.3 ms to 1.5 ms; 20 to
+        // 100 mN m/A.
         let resistance = dice.one_of([0.03, 0.05, 0.08, 0.13, 0.2]) * dice.between(1.0, 1.5);
         let inductance_d = resistance * dice.between(0.3e-3, 1.5e-3);
         let torque_per_ampere = dice.between(0.02, 0.1);
         let holding = torque_per_ampere * CURRENT;
         let flux = torque_per_ampere / (1.5 * f64::from(pole_pairs));
-        // A rotor whose saliency outweighs its magnets would not rest along them.
+        // If saliency outweighed the magnets, the rotor would not rest along them.
         let inductance_q = (inductance_d * dice.between(1.0, 1.4)).min(inductance_d + 0.8 * flux / CURRENT);
-        // A current along the flux of a salient rotor holds it with less: torque = 3/2 p i sin(x) (flux - (Lq - Ld) i cos(x)).
+        // Current along the flux of a salient rotor holds it with less torque: 3/2 p i sin(x)
+        // (flux - (Lq - Ld) i cos(x)).
         let held = holding * (1.0 - (inductance_q - inductance_d) * CURRENT / flux).max(0.2);
         let motor = MotorDescription {
             resistance,
@@ -110,7 +112,7 @@ impl Trial {
             bus: [Volt(20.0), Volt(58.0)],
             greatest_speed: RadianPerSecond(400.0),
         };
-        // Where cogging lets a rotor rest.
+        // Rest positions from cogging.
         let tooth = TAU / f64::from(motor.cogging_periods);
         let angle = (dice.between(0.0, 6.0) / tooth).round() * tooth;
         Self {
@@ -131,12 +133,13 @@ impl Trial {
         1.5 * f64::from(self.axis.motor.pole_pairs) * self.axis.motor.flux * CURRENT
     }
 
-    /// Runs the machine to its end; with the furthest that the rotor was from where it began, turns.
+    /// Runs the calibration to its end; also returns the largest distance of the rotor from its
+    /// start, turns.
     pub fn run(&self, seed: u64) -> (Stand, Result<Calibration, Refusal>, f64) {
         self.run_with(seed, Calibrator::new(&self.configuration, self.settings).expect("sensible"))
     }
 
-    /// As `run`, after a power-up.
+    /// Runs the calibration after a power-up.
     pub fn run_stored(
         &self,
         seed: u64,

@@ -1,4 +1,4 @@
-//! Legs the plant's tests share.
+//! Legs shared by the plant's tests.
 
 use core::f64::consts::FRAC_PI_2;
 use hal_sim::description::{
@@ -26,7 +26,7 @@ pub fn leg<const N: usize>(gravity: [f64; 3], joints: [JointDescription; N]) -> 
     LegDescription { gravity, joints, mirrored: false, pushes: None }
 }
 
-/// The two links of the reference torque vectors (about the centres of mass), without friction.
+/// Two links of the reference torque vectors (about the centres of mass), without friction.
 pub fn planar_leg() -> LegDescription<2> {
     leg(
         [9.81, 0.0, 0.0],
@@ -37,7 +37,7 @@ pub fn planar_leg() -> LegDescription<2> {
     )
 }
 
-/// Hip and knee with the friction and rotors of a worn exoskeleton.
+/// Hip and knee with the friction and rotors of an exoskeleton in use.
 pub fn worn_leg() -> LegDescription<2> {
     let mut worn = planar_leg();
     for (joint, (coulomb, viscous)) in worn.joints.iter_mut().zip([(4.58, 5.01), (4.67, 3.26)]) {

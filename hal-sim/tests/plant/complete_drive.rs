@@ -1,4 +1,4 @@
-//! The complete drive against closed formulas: what any motor, bridge and bus must do.
+//! Complete drive against closed formulas that hold for every motor, bridge and bus.
 #![expect(clippy::disallowed_methods, reason = "expected values by another library than the plant's")]
 
 use crate::common::worn_leg;
@@ -17,7 +17,7 @@ use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::{AxisCommand, AxisSample};
 
-/// With saliency, so that nothing cancels by chance.
+/// Motor with saliency, so that nothing cancels by chance.
 const MOTOR: MotorDescription = MotorDescription {
     resistance: 0.039,
     inductance_d: 15e-6,
@@ -48,7 +48,7 @@ fn cold(angle: f64) -> Motor {
     Motor::new(&MOTOR, 0.0, Direction::of(angle))
 }
 
-/// Phase quantities of an amplitude that leads a phase's axis by `angle`.
+/// Phase quantities of an amplitude at `angle` ahead of a phase's axis.
 fn phases(amplitude: f64, angle: f64) -> [f64; 3] {
     core::array::from_fn(|phase| amplitude * (angle - TAU / 3.0 * phase as f64).cos())
 }
@@ -89,7 +89,7 @@ fn torque_is_that_of_magnets_and_reluctance() {
     let angle = 2.1;
     let (along, across) = (-12.0, 40.0);
     let mut motor = cold(angle);
-    // Voltages that charge both axes in one instant.
+    // Voltage impulses that charge both axes at once.
     let impulse = [along * MOTOR.inductance_d, across * MOTOR.inductance_q];
     let volts: [f64; 3] = core::array::from_fn(|phase| {
         phases(impulse[0], angle)[phase] + phases(impulse[1], angle + PI / 2.0)[phase]
@@ -103,7 +103,7 @@ fn torque_is_that_of_magnets_and_reluctance() {
     assert!((flow.impulse / 1e-12 / expected - 1.0).abs() < 1e-6, "{} {expected}", flow.impulse / 1e-12);
 }
 
-/// The steady state of a motor whose terminals are connected, by the textbook's equations.
+/// Steady state of a motor with connected terminals, by the textbook's equations.
 #[test]
 fn a_short_circuit_brakes_with_the_current_and_the_torque_of_the_textbook() {
     for speed in [50.0, 600.0, 3000.0] {
@@ -139,7 +139,8 @@ fn open_terminals_show_the_magnets_voltage_and_make_no_torque() {
         assert!(flow.impulse.abs() < 1e-15);
     }
     assert!(motor.currents().iter().all(|current| current.abs() < 1e-9));
-    // One terminal held, another read: with the bus too low for the voltage between phases diodes conduct.
+    // One terminal is held, another is read. The bus is too low for the voltage between phases, so
+    // diodes conduct.
     let peak = 3.0_f64.sqrt() * MOTOR.flux * speed;
     for (bus, conducts) in [(0.98 * peak - 1.6, true), (1.02 * peak - 1.6, false)] {
         let diodes = [Terminal::Off(-0.8, bus + 0.8); 3];
@@ -153,13 +154,13 @@ fn open_terminals_show_the_magnets_voltage_and_make_no_torque() {
     }
 }
 
-/// Duties that hold a voltage (V) at an electrical angle.
+/// Duties that apply a voltage (V) at an electrical angle.
 fn duties(voltage: f64, angle: f64) -> AxisCommand {
     let duty = phases(voltage, angle).map(|volt| (0.5 + volt / BUS) as f32);
     AxisCommand { enabled: true, duty }
 }
 
-/// A rotor at constant speed under a turning voltage vector; what each period moved, with the last samples.
+/// Rotor at constant speed under a rotating voltage vector; impulse, charge and heat of each period.
 fn turning(
     description: &AxisDescription,
     speed: f64,
@@ -189,7 +190,7 @@ fn turning(
 
 #[test]
 fn what_the_bus_gives_is_heat_work_and_field() {
-    // Motoring and braking, at a speed where the magnets make 3.0 V.
+    // Motoring and braking at a speed with a back-EMF of 3.0 V.
     let speed = 150.0;
     for lead in [PI / 2.0, 2.3, -PI / 2.0] {
         for dead_time in [0.0, 20.0 / 168e6] {
@@ -202,8 +203,8 @@ fn what_the_bus_gives_is_heat_work_and_field() {
             let spent =
                 sum(&|flow| flow.heat) + speed * sum(&|flow| flow.impulse) + axis.motor().field_energy();
             let size = sum(&|flow| flow.heat) + speed * sum(&|flow| flow.impulse.abs());
-            // Midpoint steps of at most a quarter (10 us) keep energy to second order: (10 us / 0.4 ms)^2 are 6e-4.
-            // In a dead time the current's path is implicit of first order.
+            // Midpoint steps of at most a quarter (10 us) conserve energy to second order: (10 us /
+            // 0.4 ms)^2 is 6e-4. Within a dead time the current's path is implicit of first order.
             let tolerance = if dead_time == 0.0 { 1e-3 } else { 2e-3 };
             assert!((drawn - spent).abs() < tolerance * size, "{lead} {dead_time}: {drawn} {spent}");
         }
@@ -216,7 +217,7 @@ fn a_dead_time_costs_its_share_of_the_bus_against_the_current() {
     with.bridge.diode_drop = 0.0;
     let mut without = with;
     without.bridge.dead_time = 0.0;
-    // A large current in phase A, half of it back through B and C each, rotor at rest.
+    // A large current in phase A returns in equal parts through B and C, rotor at rest.
     let resistance = MOTOR.resistance;
     let settle = |description: &AxisDescription, voltage: f64| {
         let mut axis = Axis::new(description, 0.0, 0);
@@ -231,9 +232,10 @@ fn a_dead_time_costs_its_share_of_the_bus_against_the_current() {
     };
     for voltage in [1.5, -1.5] {
         let lost = (settle(&without, voltage) - settle(&with, voltage)) * resistance;
-        // Each output loses dead time / period of the bus in the direction of its current: 1 and 2 x 1/2 of it, 4/3 along A.
+        // Each output loses dead time / period of the bus voltage in the direction of its current:
+        // 1 and 2 x 1/2 of it, 4/3 along A.
         let expected = voltage.signum() * 4.0 / 3.0 * BUS * with.bridge.dead_time / PERIOD_S;
-        // The ripple at the sample and the timer's steps of 14 mV.
+        // Tolerance: ripple at the sample and the timer's steps of 14 mV.
         assert!((lost - expected).abs() < 0.05 * expected.abs(), "{lost} {expected}");
     }
 }
@@ -249,13 +251,13 @@ fn codes_are_the_currents_at_the_middle_of_the_lower_zero_vector() {
     let step = description.shunts.ampere_per_code();
     for (channel, code) in sample.shunt_codes.iter().enumerate() {
         let read = (f64::from(*code) - 2048.0) * step;
-        // Half a step: the converter waits for what the amplifier lags, to 2 ns of a slope of up to 0.4 A/us.
+        // Half a step: the converter waits for the amplifier's lag, to 2 ns of a slope of up to 0.4 A/us.
         assert!((read - expected[channel + 1]).abs() < 0.5 * step + 0.001, "{read} {expected:?}");
         assert!(expected[channel + 1].abs() > 5.0, "{expected:?}");
     }
 }
 
-/// The same axis with every step between edges cut into a hundred.
+/// Comparison with every step between edges divided by a hundred.
 #[test]
 fn edges_alone_are_steps_fine_enough() {
     let description = axis();
@@ -288,7 +290,7 @@ fn edges_alone_are_steps_fine_enough() {
         .fold(0.0_f64, |worst, (one, other)| worst.max((one - other).abs()));
     let size = motor.currents().iter().fold(0.0_f64, |most, current| most.max(current.abs()));
     assert!(size > 20.0, "{size}");
-    // A tenth of a converter's step of 40 mA; measured 3.8 mA and 4e-5.
+    // A tenth of a converter step of 40 mA; measured 3.8 mA and 4e-5.
     assert!(worst < 5e-3, "{worst:e} A");
     assert!((moved / impulse - 1.0).abs() < 1e-4, "{:e}", moved / impulse - 1.0);
 }
@@ -331,11 +333,13 @@ fn an_axis_answers_a_command_half_a_period_after_the_one_before() {
     let bus = |drives: &CompleteDrives<2>| drives.axes().map(|axis| axis.currents()[0]);
     drives.period(&[Rotor::default(); 2], &[command; 2], 0.0);
     let first = bus(&drives);
-    // The second axis has had half of its period, one of two equal pulses; the other's has decayed by no more than a tenth.
+    // The second axis has had half of its period, one of two equal pulses; the first axis' pulse
+    // has decayed by at most a tenth.
     assert!(first[0] > 0.5 && (0.5..0.56).contains(&(first[1] / first[0])), "{first:?}");
 }
 
-/// Codes of the shunts of both axes after some periods at this voltage along A in the second, none in the first.
+/// Codes of both axes' shunts after some periods with this voltage along A in the second axis and
+/// none in the first.
 fn codes_beside(volt: f64, shift_quarters: u32, ampere_per_edge: f64) -> [[u16; 2]; 2] {
     let mut description = board();
     description.shift_quarters = shift_quarters;
@@ -358,20 +362,21 @@ fn edges_of_the_other_bridge_disturb_a_sample_a_quarter_of_a_period_apart_and_no
             [0, 1].map(|shunt| (f64::from(with[axis][shunt]) - f64::from(without[axis][shunt])) * step)
         })
     };
-    // Without a voltage all three outputs of the second fall at three quarters of its period, where the first samples; those of
-    // the first rise at a quarter of its own, where the second samples.
+    // Without a voltage all three outputs of the second axis fall at three quarters of its period,
+    // the first axis' sampling instant. The outputs of the first rise at a quarter of its own
+    // period, the second axis' sampling instant.
     for (axis, sum) in errors(0.0, 1, 0.8).into_iter().zip([-2.4, 2.4]) {
         assert!(axis.iter().all(|error| (error - sum).abs() < 0.6 * step), "{axis:?} {sum}");
     }
-    // Output A of the second moves out of the window first: 12 V are a quarter of the bus.
+    // Output A of the second axis leaves the window first: 12 V are a quarter of the bus.
     let [first, _] = errors(12.0, 1, 0.8);
     assert!(first.iter().all(|error| error.abs() < 1.0), "{first:?}");
     for volt in [0.0, 3.0, 12.0, 20.0] {
         assert_eq!(errors(volt, SHIFT_QUARTERS, 0.8), [[0.0; 2]; 2], "{volt} V");
     }
-    // Off unless it is described.
+    // Disabled unless described.
     assert_eq!(board().coupling.ampere_per_edge, 0.0);
-    // A pulse of 2.5 % about the middle of the second's period: its rising edge comes 0.52 us before the middle.
+    // A pulse of 2.5 % about the middle of the second axis' period rises 0.52 us before the middle.
     let mut narrow = Axis::new(&axis(), 0.0, 0);
     let mut noise = Xoshiro256PlusPlus::seed_from_u64(1);
     narrow.begin(&AxisCommand { enabled: true, duty: [0.025, 0.5, 0.5] }, 0, &mut noise);
@@ -399,8 +404,8 @@ fn wires_lead_where_they_are_connected() {
         sample.shunt_codes.map(|code| (f64::from(code) - 2048.0) * description.shunts.ampere_per_code())
     };
     let plain = current(Wiring::default());
-    // 1 V along output B at rest: 25.6 A into it, half of it out of A and C; the rotor stands elsewhere, which at rest is
-    // a matter of inductance only.
+    // 1 V along output B at rest: 25.6 A into it, half of it out of A and C each. Another rotor
+    // angle changes only the inductance.
     assert!((plain[0] - 25.6).abs() < 0.5 && (plain[1] + 12.8).abs() < 0.5, "{plain:?}");
     let exchanged = current(Wiring { shunts_exchanged: true, ..Wiring::default() });
     assert!((exchanged[1] - plain[0]).abs() < 0.1 && (exchanged[0] - plain[1]).abs() < 0.1);
@@ -424,7 +429,7 @@ fn a_loaded_winding_warms_towards_its_resistance_times_its_power() {
         heat = (0..4).map(|_| axis.advance(BUS).heat).sum::<f64>();
     }
     let power = heat / PERIOD_S;
-    // 1 K/W, twenty time constants; power itself falls as the resistance rises.
+    // 1 K/W, twenty time constants; the power itself falls as the resistance rises.
     assert!((axis.motor().temperature() - 20.0 - power).abs() < 0.01 * power, "{power}");
     let resistance = MOTOR.resistance * (1.0 + 0.00393 * power);
     assert!((axis.motor().resistance() / resistance - 1.0).abs() < 0.01);
@@ -446,7 +451,7 @@ fn a_free_rotor_on_the_stand_gains_what_the_torque_gives_it_and_sticks_at_rest()
     assert!((stand.rotor().speed / expected - 1.0).abs() < 1e-9, "{:?}", stand.rotor());
 }
 
-/// Samples and states of a world under commands that shake both axes.
+/// Samples and states of a world under commands that excite both axes.
 fn shaken(world: &mut World<2>, periods: core::ops::Range<u32>) -> Vec<[AxisSample; 2]> {
     let command = |number: u32, turn: f64| duties(1.2, f64::from(number / 600) * 0.9 + turn);
     periods.map(|number| world.period(&[command(number, 0.0), command(number, 2.0)], 0.0)).collect()
@@ -479,7 +484,8 @@ fn a_world_with_complete_drives_repeats_to_the_bit_and_copies_go_on_alike() {
 
 #[test]
 fn a_coasting_leg_swings_as_with_ideal_drives_that_are_released() {
-    // Without current the electrical part is not there; only the step of the mechanics differs, 42 instead of 250 us.
+    // Without current the electrical part has no effect; only the step of the mechanics differs, 42
+    // instead of 250 us.
     let mut ideal = World::new(&worn_leg(), 1);
     let mut complete = World::with_complete_drives(&worn_leg(), &board(), 1);
     for world in [&mut ideal, &mut complete] {

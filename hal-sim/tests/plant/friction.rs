@@ -1,4 +1,4 @@
-//! Joints stick, break away, slide and drag each other as friction says.
+//! Friction: joints stick, break away, slide and drag each other.
 
 use crate::common::{joint, leg, planar_leg, spatial_chain, worn_leg};
 use hal_sim::description::{FrictionDescription, LegDescription, Stribeck};
@@ -11,7 +11,7 @@ fn dry(coulomb: f64) -> FrictionDescription {
     FrictionDescription { coulomb, ..FrictionDescription::default() }
 }
 
-/// A flywheel of 1 kg m^2 on a vertical axis: nothing but inertia and friction.
+/// Flywheel of 1 kg m^2 on a vertical axis: inertia and friction only.
 fn flywheel(friction: FrictionDescription) -> LegDescription<1> {
     let mut wheel = joint([0.0; 3], 2.0, [0.0; 3], [0.5, 0.0, 0.0, 0.5, 0.0, 1.0]);
     wheel.friction = friction;
@@ -26,7 +26,7 @@ fn a_leg_held_off_its_equilibrium_by_friction_does_not_move_by_one_bit() {
     let mut world = World::new(&held, 3);
     world.place(&[0.2, 0.1]);
     let before = world.truth();
-    // Gravity pulls with 9.7 and 1.9 N m here: below both levels.
+    // Gravity pulls with 9.7 and 1.9 N m here, below both levels.
     for _ in 0..20_000 {
         world.advance();
     }
@@ -58,8 +58,9 @@ fn a_sliding_joint_comes_to_rest_after_the_time_and_way_of_its_friction() {
         wheel.advance(&mut state, &[0.0], &[0.0], TICK_S);
         ticks += 1;
     }
-    // At 3 rad/s^2 it stops after 0.5001 s, within tick 2001, and v^2 / 6. The end is met to within a fine step of
-    // 31 us, in which the wheel creeps 3 rad/s^2 * (31 us)^2 / 2 = 1.5e-9 rad; a whole tick would leave 9e-8.
+    // At 3 rad/s^2 the wheel stops after 0.5001 s, within tick 2001, at v^2 / 6. The end is found
+    // to within a fine step of 31 us. Within it the wheel creeps 3 rad/s^2 * (31 us)^2 / 2 = 1.5e-9
+    // rad; a whole tick would leave 9e-8.
     assert_eq!(ticks, 2001);
     assert!((state.angles[0] - 1.5003 * 1.5003 / 6.0).abs() < 2e-9, "{}", state.angles[0]);
 }
@@ -103,12 +104,12 @@ fn stribeck_holds_to_its_static_level_and_falls_to_coulomb_with_speed() {
     wheel.advance(&mut resting, &[4.99], &[4.99], TICK_S);
     assert_eq!(resting.rates, [0.0]);
     let mut sliding = LegState { angles: [0.0], rates: [0.0] };
-    // It creeps first: 0.01 N m of surplus, 2 N m once the speed has passed 0.1 rad/s.
+    // The wheel creeps first: 0.01 N m of surplus, 2 N m once the speed has passed 0.1 rad/s.
     for _ in 0..8000 {
         wheel.advance(&mut sliding, &[5.01], &[5.01], TICK_S);
     }
     assert!(sliding.rates[0] > 1.0, "broken away, the wheel speeds up: {}", sliding.rates[0]);
-    // The same 4 N m that cannot start the wheel keep it going.
+    // 4 N m cannot start the wheel but keep it turning.
     let mut kept = LegState { angles: [0.0], rates: [0.5] };
     for _ in 0..400 {
         wheel.advance(&mut kept, &[4.0], &[4.0], TICK_S);
@@ -122,7 +123,7 @@ fn stribeck_holds_to_its_static_level_and_falls_to_coulomb_with_speed() {
 
 #[test]
 fn coupled_joints_stick_and_slide_as_inverse_dynamics_of_their_motion_demands() {
-    // A chain shaken hard enough that each joint starts, stops and turns many times.
+    // The chain is shaken hard enough that each joint starts, stops and turns many times.
     let mut chain = spatial_chain();
     for (joint, coulomb) in chain.joints.iter_mut().zip([12.0, 14.0, 5.0]) {
         joint.friction = FrictionDescription { coulomb, viscous: 0.5, offset: 0.2, stribeck: None };

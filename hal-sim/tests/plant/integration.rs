@@ -1,4 +1,4 @@
-//! Time steps: energy, reversibility, order, and what they would do to identified parameters.
+//! Time steps: energy, reversibility, order, and their effect on identified parameters.
 
 use crate::common::{planar_leg, worn_leg};
 use hal_sim::description::LegDescription;
@@ -39,7 +39,7 @@ fn energy_of_a_frictionless_leg_is_kept_to_second_order() {
     let (largest, late) = energy_deviation(TICK_S);
     let (largest_at_half, _) = energy_deviation(0.5 * TICK_S);
     println!("energy deviation: largest {largest:e} J, mean of the last second {late:e} J");
-    // Rates of change reach about 10/s and 30 J go back and forth: (10/s * 250 us)^2 * 30 J = 2e-4 J.
+    // Rates of change reach about 10/s and 30 J are exchanged: (10/s * 250 us)^2 * 30 J = 2e-4 J.
     assert!(largest < 2e-4 && late.abs() < 2e-5, "{largest:e} {late:e}");
     let ratio = largest / largest_at_half;
     assert!((3.8..4.2).contains(&ratio), "half the step must leave a quarter of the error, not 1/{ratio}");
@@ -66,7 +66,7 @@ fn a_frictionless_leg_runs_back_to_where_it_started() {
 /// Position, true rate and motor torque of each tick.
 type Record = Vec<([f64; 2], [f64; 2], [f64; 2])>;
 
-/// 20 s along three sines per joint, held there by feedforward and stiffness.
+/// Drives three sines per joint for 20 s, by feedforward and stiffness.
 fn driven_motion(description: &LegDescription<2>) -> Record {
     let mut world = World::new(description, 1);
     let reference = |time: f64| -> ([f64; 2], [f64; 2], [f64; 2]) {
@@ -124,10 +124,10 @@ fn fit(rows: impl Iterator<Item = ([f64; 3], f64)>) -> SVector<f64, 3> {
     normal.cholesky().expect("the motion excites all columns").solve(&right)
 }
 
-/// What a motion's torque lacks against inverse dynamics, explained by inertia, viscous and Coulomb friction
-/// of the joint itself. Rates and accelerations are eighth-order differences of the positions: what the leg
-/// really did. `smoothing` ticks of Hann window on both sides, so that turning points may stay in; without,
-/// rows near them go.
+/// Fits the torque error of a motion against inverse dynamics by inertia, viscous and Coulomb
+/// friction of the joint. Rates and accelerations are eighth-order differences of the positions:
+/// the leg's actual motion. `smoothing` is the half-width of a Hann window in ticks, with which
+/// turning points may stay. Without it, rows near them are excluded.
 fn bias(description: &LegDescription<2>, record: &Record, smoothing: usize) -> [SVector<f64, 3>; 2] {
     const FIRST: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
     const SECOND: [f64; 5] = [-205.0 / 72.0, 8.0 / 5.0, -1.0 / 5.0, 8.0 / 315.0, -1.0 / 560.0];
@@ -156,7 +156,7 @@ fn bias(description: &LegDescription<2>, record: &Record, smoothing: usize) -> [
             };
             let smooth = world.inverse_dynamics(&at(0), &rate, &acceleration);
             [0, 1].map(|joint| {
-                // Dry friction by the true direction, not by that of the differences.
+                // Dry friction uses the true direction, not that of the differences.
                 let dry = description.joints[joint].friction.coulomb * sign(joint, tick);
                 let lacking = record[tick].2[joint] - smooth[joint] - dry;
                 let clean = [0, 1].iter().all(|&any| {
@@ -195,9 +195,9 @@ fn bias(description: &LegDescription<2>, record: &Record, smoothing: usize) -> [
 fn integration_biases_inertia_and_friction_by_less_than_two_parts_in_ten_thousand() {
     let description = worn_leg();
     let record = driven_motion(&description);
-    // Of the joint with everything beyond it, rotor included, kg m^2: only a scale.
+    // Inertia of the joint with everything beyond it, rotor included, kg m^2; a scale only.
     let inertias = [4.1, 2.2];
-    // Away from turning points, and everywhere with 50 ms of window on both sides.
+    // Away from turning points, and everywhere with a window of 50 ms on both sides.
     for smoothing in [0, 200] {
         for (joint, lacking) in bias(&description, &record, smoothing).iter().enumerate() {
             let friction = description.joints[joint].friction;

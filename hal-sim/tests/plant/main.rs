@@ -1,4 +1,4 @@
-//! The simulated hardware against the textbook.
+//! Simulated hardware against the textbook.
 
 mod common;
 mod complete_drive;

@@ -1,4 +1,4 @@
-//! The rigid bodies against vectors of another library, energies and kinematics by hand.
+//! Rigid bodies against vectors of another library, and against energies and kinematics by hand.
 
 use crate::common::{planar_leg, spatial_chain};
 use hal_sim::description::LegDescription;
@@ -101,7 +101,7 @@ fn lagrange_torque_equals_the_reference_vectors() {
     }
 }
 
-/// Orientation and position of each link's frame by multiplying modified D-H transforms.
+/// Orientation and position of each link's frame from products of modified D-H transforms.
 fn frames<const N: usize>(description: &LegDescription<N>, angles: &[f64; N]) -> [Matrix4<f64>; N] {
     let mut frame = Matrix4::identity();
     core::array::from_fn(|i| {
@@ -131,7 +131,7 @@ fn kinetic_and_potential_energy_of_a_spatial_chain_equal_those_of_its_moving_fra
         let com = Vector3::from(body.com).push(1.0);
         let velocity = ((after[i] - before[i]) * com).xyz() / (2.0 * step);
         let change = (after[i] - before[i]).fixed_view::<3, 3>(0, 0) / (2.0 * step);
-        // Angular velocity in the link: R' dR/dt is skew.
+        // Angular velocity in the link frame: R' dR/dt is skew.
         let skew = now[i].fixed_view::<3, 3>(0, 0).transpose() * change;
         let spin = Vector3::new(skew[(2, 1)], skew[(0, 2)], skew[(1, 0)]);
         let [xx, xy, xz, yy, yz, zz] = body.inertia_com;
@@ -161,7 +161,7 @@ fn coriolis_and_gravity_torque_are_the_derivatives_of_the_energies() {
         let angles =
             core::array::from_fn(|i| ANGLES[i] + time * RATES[i] + 0.5 * time * time * acceleration[i]);
         let rates = core::array::from_fn(|i| RATES[i] + time * acceleration[i]);
-        // The kinetic energy is quadratic in the rates: a difference over 2 is exact.
+        // Kinetic energy is quadratic in the rates: a difference over 2 is exact.
         0.5 * (chain.kinetic_energy(&angles, &moved(&rates, joint, 1.0))
             - chain.kinetic_energy(&angles, &moved(&rates, joint, -1.0)))
     };

@@ -1,4 +1,4 @@
-//! A world as the firmware meets it: sensors, drives, seeds, copies and signs.
+//! Simulated world at its interface to the firmware: sensors, drives, seeds, copies and signs.
 #![expect(clippy::disallowed_methods, reason = "expected values by another library than the plant's")]
 
 use crate::common::{planar_leg, worn_leg};
@@ -92,7 +92,8 @@ fn current_noise_has_its_stated_size_in_the_mean_of_eight_samples() {
         squares += mean * mean / f64::from(rows);
         assert_eq!(world.sample().joints[1].current, Ampere(0.0), "the other joint's sensor is noiseless");
     }
-    // 10,000 rows determine a standard deviation to 0.7 %, a mean to 0.007 A: four of each are allowed.
+    // 10,000 rows determine a standard deviation to 0.7 %, a mean to 0.007 A; the tolerance is four
+    // times that.
     assert!((squares.sqrt() / 0.7 - 1.0).abs() < 0.028, "{}", squares.sqrt());
     assert!(sum.abs() < 0.028, "{sum}");
     assert!((single_squares.sqrt() / (0.7 * 8.0_f64.sqrt()) - 1.0).abs() < 0.01, "white: {single_squares}");
@@ -118,7 +119,7 @@ fn drive_follows_its_target_with_the_exact_lag_and_never_beyond_its_limit() {
     for tick in 1..=40 {
         let sample = world.tick(&command);
         let reached = 1.0 - (-f64::from(tick) * TICK_S / 5e-4).exp();
-        // Readings are single precision.
+        // Readings have single precision.
         assert!((f64::from(sample.joints[0].current.0) - 20.0 * reached).abs() < 2e-6);
         assert!((f64::from(sample.joints[1].current.0) + 30.0 * reached).abs() < 4e-6);
     }
@@ -130,8 +131,8 @@ fn drive_follows_its_target_with_the_exact_lag_and_never_beyond_its_limit() {
 #[test]
 fn a_mirrored_and_turned_joint_behaves_alike_at_its_ports() {
     let plain = worn_leg();
-    // The same leg, described with the knee's axis the other way round (its frame turned half about x) and
-    // with the hip's angle counted from elsewhere (the base turned about the hip's axis).
+    // Equivalent description of the leg. The knee's axis is reversed (its frame turned by half a turn about
+    // x). The hip's angle is counted from another zero (the base turned about the hip's axis).
     let mut described = plain;
     let (sine, cosine) = 0.3_f64.sin_cos();
     described.gravity = [9.81 * cosine, 9.81 * sine, 0.0];
@@ -186,7 +187,7 @@ fn a_mass_fixed_to_a_link_costs_its_own_weight_and_inertia() {
     let mut loaded = bare.clone();
     let (mass, along, across) = (3.0, 0.2, 0.05);
     loaded.attach(1, mass, [along, across, 0.0]);
-    // A body of its own, carried by the second link without mass: what is added is what it costs alone.
+    // Separate body on a massless second link: its own torque is the added one.
     let mut alone = description;
     for joint in &mut alone.joints {
         joint.body = hal_sim::description::BodyDescription { mass: 1e-9, ..Default::default() };

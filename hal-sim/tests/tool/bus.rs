@@ -1,4 +1,4 @@
-//! Two legs on one wire: what a cycle takes of it, how late it is, and what a bus that is full does to the legs.
+//! Two legs on one bus: load of a cycle, latencies, and the effect of a saturated bus on the legs.
 
 use hal_sim::tool::bus::network::Network;
 use hal_sim::tool::bus::serve::{ServeOptions, network};
@@ -44,7 +44,7 @@ impl Bus {
         }
     }
 
-    /// One SDO download, answered within 5 ms.
+    /// Writes an object by SDO download, which must be answered within 5 ms.
     fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) {
         let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
         self.network.send(Frame::new(0x600 + node, &[0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]));
@@ -122,7 +122,7 @@ fn mapped(mapping: Mapping) -> Bus {
     bus
 }
 
-/// Share of the wire, and of each cycle the latest feedback and the latest target, microseconds after its SYNC.
+/// Bus load, and the latest feedback and target of each cycle, microseconds after its SYNC.
 struct Cycles {
     load: f64,
     feedback_us: [f64; 2],
@@ -204,7 +204,7 @@ fn the_compact_mapping_fits_a_kilohertz_and_the_standard_one_hardly_half_of_it()
             (Mapping::Compact, _) => {
                 complete > 0.99 && load < 1.0 && feedback_us[1] < 600.0 && targets_us[1] < 850.0
             }
-            // 94 % without stuffed bits: whether a cycle is whole is a matter of what is sent.
+            // 94 % without stuffed bits: whether a cycle completes depends on the data sent.
             (Mapping::Standard, 500) => load > 0.94,
             (Mapping::Standard, _) => load > 0.99 && complete < 0.9,
         };
@@ -214,7 +214,7 @@ fn the_compact_mapping_fits_a_kilohertz_and_the_standard_one_hardly_half_of_it()
 
 #[test]
 fn a_bus_that_is_full_of_others_frames_stops_a_leg_by_its_timers_and_nothing_else() {
-    // Lowest priority: everybody else waits for one frame at most.
+    // Lowest priority: all other frames wait for one frame at most.
     let mut bus = Bus::new();
     bus.enable();
     let flood = |bus: &mut Bus, id: u16, count: u32| {
@@ -223,7 +223,7 @@ fn a_bus_that_is_full_of_others_frames_stops_a_leg_by_its_timers_and_nothing_els
             bus.network.send_at(Frame::new(id, &[0x55; 8]), now + u64::from(number));
         }
     };
-    // A host whose late PDO is not watched: the legs go on, whatever else is on the wire.
+    // Host without monitoring of late PDOs: the legs continue, whatever else is on the bus.
     for id in [0x7F0, 0x001] {
         flood(&mut bus, id, 4000);
         let load = bus.load(1600);
@@ -233,7 +233,7 @@ fn a_bus_that_is_full_of_others_frames_stops_a_leg_by_its_timers_and_nothing_els
             bus.run(4);
         }
     }
-    // One whose PDO is: the leg is stopped.
+    // Host with monitoring: the leg is stopped.
     bus.write(1, 0x1400, 5, 50, 2);
     bus.network.send(Frame::new(0x201, &[15, 0]));
     bus.run(40);
@@ -242,7 +242,7 @@ fn a_bus_that_is_full_of_others_frames_stops_a_leg_by_its_timers_and_nothing_els
     bus.run(4000);
     let states: Vec<_> = bus.network.boards().iter().map(|board| board.rig.state()).collect();
     assert_eq!(states, [DriveState::SwitchOnDisabled, DriveState::OperationEnabled]);
-    // What the node had to say about it comes once the wire is free.
+    // The node's message follows once the bus is free.
     while bus.network.waiting() > 0 {
         bus.run(4);
     }
@@ -270,7 +270,7 @@ fn what_is_stored_is_there_after_a_reset_of_the_node_and_its_number_is_the_new_o
         .map(|sent| sent.frame.id())
         .collect();
     assert_eq!(boots, [0x701, 0x703, 0x704, 0x714]);
-    // The heartbeat that was kept.
+    // Stored heartbeat.
     assert!(
         bus.sent.iter().filter(|sent| sent.frame.id() == 0x701 && sent.frame.data() == [0x7F]).count() >= 1
     );
@@ -283,10 +283,10 @@ fn what_is_stored_is_there_after_a_reset_of_the_node_and_its_number_is_the_new_o
         u32::from_le_bytes(answer.frame.data()[4..].try_into().expect("four bytes"))
     };
     assert_eq!((read(&mut bus, 1, 0x6065), read(&mut bus, 20, 0x6065)), (12_345, 87_266));
-    // Forgotten.
+    // Restores the default parameters (object 1011).
     bus.sent.clear();
     bus.write(1, 0x1011, 1, u32::from_le_bytes(*b"load"), 4);
-    // Two sectors, a second each. The other leg goes on, and what else is sent to the one that stands is lost.
+    // Two sectors take a second each. The other leg continues; frames to the stalled one are lost.
     bus.run(2000);
     for _ in 0..5 {
         bus.network.send(Frame::new(0x601, &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0]));
@@ -300,7 +300,8 @@ fn what_is_stored_is_there_after_a_reset_of_the_node_and_its_number_is_the_new_o
     assert_eq!(codes(&bus, 0x81), [0xFF0D, 0x8110, 0, 0]);
     assert!(codes(&bus, 0x83).is_empty());
     let answers = bus.sent.iter().filter(|sent| sent.frame.id() == 0x581).count();
-    // The request to forget, and the last of the three that waited: they come at once, and a server answers one.
+    // The request to restore, and the last of three waiting requests: they arrive at once, and a
+    // server answers one.
     assert_eq!(answers, 2);
     bus.network.send(Frame::new(0, &[129, 0]));
     bus.run(20);

@@ -1,4 +1,4 @@
-//! Runs the tool as its users do and reads what it leaves behind.
+//! Runs the tool as its users do and reads its outputs.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -7,17 +7,17 @@ use std::{env, fs};
 
 use serde_json::Value;
 
-/// Recording of the leg that MuJoCo simulated: 30 s at 500 Hz, period 10 s.
+/// Recording of the leg simulated by MuJoCo: 30 s at 500 Hz, period 10 s.
 pub const MUJOCO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/mujoco_leg/fourier.csv");
 
-/// What a run printed and how it ended.
+/// Output and exit code of a run.
 pub struct Run {
     pub code: Option<i32>,
     pub printed: String,
     pub errors: String,
 }
 
-/// Runs `scarab-sim` with arguments separated by blanks, and paths.
+/// Runs `scarab-sim` with arguments separated by spaces, and paths.
 pub fn scarab(arguments: &str, paths: &[&Path]) -> Run {
     let output: Output = Command::new(env!("CARGO_BIN_EXE_scarab-sim"))
         .args(arguments.split_whitespace())
@@ -32,13 +32,13 @@ pub fn scarab(arguments: &str, paths: &[&Path]) -> Run {
 }
 
 impl Run {
-    /// Fails unless it ended like this, and shows what it said.
+    /// Fails unless the run ended with this code, and shows its output.
     pub fn ends_with(self, code: i32) -> Self {
         assert_eq!(self.code, Some(code), "{}{}", self.printed, self.errors);
         self
     }
 
-    /// The message of a run that was refused as bad input.
+    /// Message of a run rejected as bad input.
     pub fn refusal(self) -> String {
         let run = self.ends_with(2);
         assert_eq!(run.printed, "", "bad input prints nothing but its message");
@@ -46,7 +46,7 @@ impl Run {
     }
 }
 
-/// A folder that is gone afterwards.
+/// Temporary folder.
 pub struct Folder(PathBuf);
 
 impl Folder {
@@ -84,7 +84,7 @@ impl Drop for Folder {
     }
 }
 
-/// Numbers with the names of their columns.
+/// Numbers with their column names.
 pub struct Table {
     pub header: Vec<String>,
     pub rows: Vec<Vec<f64>>,

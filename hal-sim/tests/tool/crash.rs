@@ -1,6 +1,7 @@
-//! Crashes of the whole firmware on the emulated microcontroller: bridges first, a record that survives one reset, a refusal.
+//! Crashes of the whole firmware on the emulated microcontroller: outputs off first, a record that
+//! survives one reset, a refusal.
 //!
-//! Those that need QEMU and a compiler for the microcontroller are left to a step of .ci/run:
+//! Tests that need QEMU and a compiler for the microcontroller run in a step of .ci/run:
 //! `cargo test -p hal-sim --test tool emulated -- --ignored`.
 
 use std::path::Path;
@@ -12,17 +13,17 @@ use crate::emulation::{changed_leg, the_image};
 
 const REHEARSAL: &str = include_str!("../../src/bin/emulated/rehearsal.rs");
 
-/// A crash in the middle of the excitation, while a current tick falls due; fails where anything is not as it has to be.
+/// Crash in the middle of the excitation, while a current tick is due; fails if a requirement is violated.
 fn crashed(kind: &str) -> Run {
     let _image = the_image();
     let folder = Folder::new();
-    // The leg of the other emulated test, so that nothing is built twice.
+    // Leg of the other emulated test, so that nothing is built twice.
     let leg = changed_leg(&folder);
     let kept = folder.path("trace");
     let run = scarab("emulate --crash", &[kind.as_ref(), "--leg".as_ref(), &leg, "--trace".as_ref(), &kept]);
     println!("{}{}", run.printed, run.errors);
     let run = run.ends_with(0);
-    // What the checks of the report rest on, once more in the words of the timeline.
+    // The basis of the report's checks, as shown by the timeline.
     let told = run.printed.matches("the image CRASHED before this start").count();
     assert_eq!((told, run.printed.matches("start (software)").count()), (1, 2));
     assert_eq!(run.printed.matches("identify, REFUSED").count(), 1);
@@ -50,8 +51,8 @@ fn an_emulated_hard_fault_in_the_servo_releases_the_bridges_first_and_tells_its_
 #[ignore = "needs an emulator and a compiler for the microcontroller: a step of .ci/run"]
 fn an_emulated_stack_overflow_faults_below_the_memory_and_releases_the_bridges_first() {
     let run = crashed("stack_overflow");
-    // The stack ends where the memory begins: the word that did not fit is within one call of it.
-    // Its caller may be a sequence that the compiler made a function of its own, so its name is not asked for.
+    // The stack ends at the start of the memory: the overflowing word is within one call of it. Its
+    // caller may be a function that the compiler has outlined, so its name is not checked.
     let told = run.printed.split_once("stack_overflow").map_or("", |(_, rest)| rest);
     let address = told.split_once("address 0x");
     let digits = address.and_then(|(_, rest)| rest.lines().next()).expect("its address is told");
@@ -63,7 +64,7 @@ fn an_emulated_stack_overflow_faults_below_the_memory_and_releases_the_bridges_f
 #[ignore = "needs an emulator and a compiler for the microcontroller: a step of .ci/run"]
 fn an_emulated_interrupt_that_nobody_handles_releases_the_bridges_first_and_tells_its_number() {
     let run = crashed("interrupt");
-    // SDIO, RM0090 table 62.
+    // Interrupt 49 is SDIO, RM0090 table 62.
     assert!(run.printed.contains("interrupt: number 49\n"), "{}", run.printed);
 }
 

@@ -1,4 +1,4 @@
-//! Electronic data sheets against a live node: object by object.
+//! Electronic data sheets compared with a live node, object by object.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::command::{Folder, scarab};
 
 const NODE: u8 = 2;
 
-/// A node behind which a joint stands that no leg has told anything.
+/// Node of a joint without a leg.
 struct Live {
     node: Node,
     axis: Axis,
@@ -26,7 +26,7 @@ impl Live {
         live
     }
 
-    /// An SDO upload: its command, and the four bytes behind the object.
+    /// Reads an object by SDO upload: its command, and the four bytes of data.
     fn read(&mut self, index: u16, sub: u8) -> (u8, u32) {
         let [low, high] = index.to_le_bytes();
         let request = Frame::new(0x602, &[0x40, low, high, sub, 0, 0, 0, 0]);
@@ -88,7 +88,7 @@ fn every_object_of_the_sheet_is_there_with_its_size_and_default_and_no_other() {
         }
         listed.sort_unstable();
         for index in 0x1000..=0x6FFF_u16 {
-            // What answers that there is no such object is not in the sheet, all else is.
+            // The sheet lists exactly the objects that the node has.
             let is_there = live.read(index, 0) != (0x80, 0x0602_0000);
             assert_eq!(listed.binary_search(&u32::from(index)).is_ok(), is_there, "{index:x}");
             assert_eq!(sheet.contains_key(&format!("{index:04X}")), is_there, "{index:x}");
@@ -109,7 +109,7 @@ fn every_object_of_the_sheet_is_there_with_its_size_and_default_and_no_other() {
                     4 | 7 | 8 => 4,
                     _ => continue,
                 };
-                // What only a leg tells is not asked of a joint alone.
+                // Objects that need a leg are not read from a joint alone.
                 if command == 0x80 && (0x2100..0x219A).contains(&index) {
                     assert_eq!(value, 0x0800_0024);
                     continue;

@@ -1,6 +1,7 @@
-//! The whole firmware on the emulated microcontroller against the same on the host.
+//! Whole firmware on the emulated microcontroller, compared with the host.
 //!
-//! Needs QEMU and a compiler for the microcontroller, and takes minutes: `cargo test -p hal-sim --test tool emulated -- --ignored`.
+//! Needs QEMU and a compiler for the microcontroller, and takes minutes:
+//! `cargo test -p hal-sim --test tool emulated -- --ignored`.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -21,13 +22,13 @@ fn base(report: &Value) -> Vec<(String, f64, f64, f64)> {
     entries.iter().map(entry).collect()
 }
 
-/// There is one image at a time; every test that builds and runs it holds this.
+/// Lock of the only image; every test that builds and runs it holds this.
 pub fn the_image() -> MutexGuard<'static, ()> {
     static IMAGE: Mutex<()> = Mutex::new(());
     IMAGE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A leg file that is not the shipped one: the knee's viscous friction half as large again.
+/// Leg file that differs from the shipped one: 1.5 times the knee's viscous friction.
 pub fn changed_leg(folder: &Folder) -> PathBuf {
     let text = include_str!("../../legs/x2-wearer-75kg.toml");
     let changed = text.replacen("coulomb = 4.67, viscous = 3.26", "coulomb = 4.67, viscous = 4.89", 1);
@@ -43,7 +44,7 @@ fn the_emulated_leg_finds_what_the_simulated_one_does_and_tells_the_same_bytes_e
     let leg = changed_leg(&folder);
     let [json, once, again, host] =
         ["emulated.json", "once", "again", "host.json"].map(|name| folder.path(name));
-    // Side by side: the second one to come finds the image built.
+    // Side by side: the second thread finds the image built.
     std::thread::scope(|scope| {
         scope.spawn(|| scarab("emulate --leg", &[&leg, Path::new("--trace"), &again]).ends_with(0));
         let run = scarab("emulate --leg", &[&leg, Path::new("--json"), &json, Path::new("--trace"), &once])
@@ -58,7 +59,7 @@ fn the_emulated_leg_finds_what_the_simulated_one_does_and_tells_the_same_bytes_e
     assert_eq!(emulated["trace_bytes"], bytes.len());
     let instructions = &emulated["instructions"];
     assert!(number(&instructions["servo_tick_worst"]) < number(&instructions["servo_period"]));
-    // The search ran below ticks that went on: all of the 500 Hz samples were taken.
+    // The search ran while ticks continued: every 500 Hz sample was taken.
     assert_eq!(emulated["trace"]["loops"]["samples_lost"], 0);
     assert_eq!(emulated["trace"]["lost_records"], 0);
 
@@ -66,7 +67,7 @@ fn the_emulated_leg_finds_what_the_simulated_one_does_and_tells_the_same_bytes_e
     let simulated = folder.json("host.json");
     for (one, other) in base(&emulated).iter().zip(base(&simulated)) {
         assert_eq!(one.0, other.0);
-        // The same samples in the same precision; sums may be taken in another order by another compiler.
+        // Equal samples and precision; another compiler may change the order of sums.
         assert!((one.1 - other.1).abs() < 1e-3 * other.2, "{one:?} {other:?}");
     }
     assert_eq!(emulated["bso"]["iterations"], simulated["bso"]["iterations"]);

@@ -1,4 +1,5 @@
-//! `scarab-sim excite`, and `identify --excitation`: what a designed motion keeps, tells beforehand, and refuses.
+//! `scarab-sim excite`, and `identify --excitation`: limits of a designed motion, its predictions,
+//! and rejections.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +13,7 @@ use scarab::real::sqrt;
 use scarab::servo::SERVO_RATE_HZ;
 use serde_json::Value;
 
-/// The constant that was written together with [`SHIPPED`].
+/// Constant written together with [`SHIPPED`].
 #[path = "../data/excitation/x2_wearer_75kg.rs"]
 mod shipped;
 
@@ -22,7 +23,7 @@ const SHIPPED_SOURCE: &str = include_str!("../data/excitation/x2_wearer_75kg.rs"
 /// An eighth of the default effort: within 1 of its ln det, and quick.
 const EFFORT: &str = "--evaluations 6000";
 
-/// One design for the default leg, as its truth would have it, and its report.
+/// Design for the default leg with its truth assumed, and its report.
 fn designed() -> &'static (Folder, Value) {
     static DESIGN: OnceLock<(Folder, Value)> = OnceLock::new();
     DESIGN.get_or_init(|| {
@@ -59,11 +60,11 @@ fn a_design_keeps_every_limit_in_simulation_and_on_paper() {
         assert!(value(joint, "acceleration_deg_s2") <= value(joint, "acceleration_limit_deg_s2"));
         let bound = value(joint, "torque_with_margin_nm");
         assert!(bound <= torque, "{joint}");
-        // Near the ends the monitor takes torque from a joint that could not stop: not from this one.
+        // Near the ends the monitor reduces the torque of a joint that could not stop; here it must not.
         assert_eq!(joint["simulated"]["limited_ticks"], 0, "{joint}");
-        // The plant's own torque, friction and position loop included, stays below the bound with the margin.
+        // The plant's own torque, with friction and position loop, stays below the bound with the margin.
         assert!(value(&joint["simulated"], "torque_nm") <= bound, "{joint}");
-        // And the limits are used: a design that hardly moves would keep them too.
+        // The limits are used: a design that hardly moves would also respect them.
         assert!(bound > 0.5 * torque, "{joint}");
     }
 }
@@ -74,7 +75,7 @@ fn a_design_tells_far_more_than_the_best_of_300_random_motions() {
     let own = value(report, "log_determinant");
     let random = value(&report["random"], "log_determinant");
     println!("ln det {own:.2} against {random:.2}");
-    // Measured 18.3 with the default effort; 13 is every sigma at 0.6 of the random motion's.
+    // Measured 18.3 with the default effort; 13 corresponds to every sigma at 0.6 of the random motion's.
     assert!(own > random + 13.0, "{own} {random}");
 }
 
@@ -100,14 +101,17 @@ fn the_sigma_that_is_expected_is_the_sigma_that_is_reported_and_the_spread_that_
         let ratio = sqrt(squares / f64::from(SEEDS - 1)) / sigma;
         let reported = mean(&reported) / sigma;
         println!("{}: spread {ratio:.3}, reported {reported:.3} of expected", base["name"]);
-        // A run's noise is found from 1000 rows within 3 %, the mean of 40 runs within 0.5 %; three times that.
+        // The noise of a run is estimated from 1000 rows within 3 %, the mean of 40 runs within 0.5
+        // %; the tolerance is three times that.
         assert!((reported - 1.0).abs() < 0.015, "{}: {reported}", base["name"]);
-        // The spread of 40 normal numbers has itself a spread of 1/sqrt(78) = 11 %; four times that.
+        // The spread of 40 normal numbers has itself a spread of 1/sqrt(78) = 11 %; the tolerance
+        // is four times that.
         assert!((ratio - 1.0).abs() < 0.45, "{}: {ratio}", base["name"]);
         pooled += ratio * ratio;
         count += 1.0;
     }
-    // Thirteen of them, some hardly independent: as good as six, 5 % (one standard deviation); three times that.
+    // Thirteen values, some strongly correlated, count as six: 5 % (one standard deviation); the
+    // tolerance is three times that.
     let pooled: f64 = sqrt(pooled / count);
     println!("pooled {pooled:.3}");
     assert!((pooled - 1.0).abs() < 0.15, "{pooled}");
@@ -118,7 +122,7 @@ fn noise_is_the_sensors_own_whichever_leg_is_assumed_and_whatever_it_is_to_be_us
     let folder = Folder::new();
     let json = folder.path("report.json");
     let report = |arguments: &str| {
-        // The motion was designed for the truth, so no doubt is added to what the prior makes of it.
+        // The motion was designed for the truth, so no margin is added for the prior.
         let arguments = format!("excite --torque-margin 0 {arguments} --excitation");
         scarab(&arguments, &[Path::new(SHIPPED), Path::new("--json"), &json]).ends_with(0);
         folder.json("report.json")
@@ -129,7 +133,8 @@ fn noise_is_the_sensors_own_whichever_leg_is_assumed_and_whatever_it_is_to_be_us
     let (prior, truth) = (report(""), report("--assume-truth"));
     assert_eq!(noise(&prior), noise(&truth));
     assert_eq!((&prior["torque_noise_of"], &prior["assumed"]), (&"truth".into(), &"prior".into()));
-    // Stillness differs a little with the friction that is believed; noise that is a share of the torque believed made 8 %.
+    // Stillness depends slightly on the assumed friction; noise as a share of the assumed torque
+    // changed it by 8 %.
     for (prior, truth) in list(&prior, "base_parameters").iter().zip(list(&truth, "base_parameters")) {
         let ratio = value(prior, "sigma") / value(truth, "sigma");
         println!("{}: sigma expected of the prior over that of the truth {ratio:.3}", prior["name"]);
@@ -137,20 +142,21 @@ fn noise_is_the_sensors_own_whichever_leg_is_assumed_and_whatever_it_is_to_be_us
     }
     let stated = report("--torque-noise-nm 2,1.5");
     let [hip, knee] = noise(&stated)[..] else { panic!("two joints") };
-    // Through amperes and back.
+    // Converted to amperes and back.
     assert!((hip - 2.0).abs() < 1e-12 && (knee - 1.5).abs() < 1e-12, "{hip} {knee}");
     let doubled = report("--torque-noise-nm 4,3");
     for (one, two) in list(&stated, "base_parameters").iter().zip(list(&doubled, "base_parameters")) {
-        // The noise-free residual is counted beside it.
+        // The noise-free residual is added to it.
         assert!((value(two, "sigma") / value(one, "sigma") - 2.0).abs() < 0.05, "{one} {two}");
     }
-    // The run meets what was stated: its sigma is the one expected.
+    // The run has the stated noise: its sigma is the expected one.
     let paths = [Path::new(SHIPPED), Path::new("--json"), &json];
     scarab("identify --torque-noise-nm 2,1.5 --excitation", &paths).ends_with(0);
     let run = folder.json("report.json");
     for (expected, found) in list(&stated, "base_parameters").iter().zip(list(&run, "base_parameters")) {
         let ratio = value(found, "sigma") / value(expected, "sigma");
-        // One run tells a noise within 3 %; three times that, and what the prior's friction changes of stillness.
+        // One run determines a noise within 3 %; the tolerance is three times that, plus the prior
+        // friction's effect on stillness.
         assert!((ratio - 1.0).abs() < 0.12, "{}: {ratio}", expected["name"]);
     }
 }
@@ -173,7 +179,7 @@ fn a_written_motion_is_read_back_unchanged() {
     let expected = motion.expected.expect("a design says what it expects");
     assert_eq!(expected.assumed, "truth");
     assert_eq!(expected.base_parameter.len(), list(report, "base_parameters").len());
-    // The same motion, looked at, is said the same of.
+    // Checking the same motion gives an identical report.
     let json = folder.path("again.json");
     let paths = [Path::new("--excitation"), &file, Path::new("--json"), &json];
     scarab("excite --assume-truth", &paths).ends_with(0);
@@ -205,7 +211,7 @@ fn every_parameter_has_a_status_before_anything_moves() {
     ] {
         assert_eq!(status(name), expected, "{name}");
     }
-    // A hip that cannot hang straight hardly tells an offset from a mass in front: that is said in words.
+    // A hip that cannot hang straight hardly separates an offset from a mass in front; the status says so.
     assert_eq!(status("OFF1"), "weak");
     let warnings = list(report, "warnings");
     assert!(warnings.iter().any(|line| line.as_str().is_some_and(|line| line.starts_with("OFF1: weak"))));
@@ -279,7 +285,7 @@ fn a_motion_that_takes_too_much_torque_is_refused_and_never_designed() {
     let arguments = ["identify --excitation", SHIPPED, "--leg"].join(" ");
     let message = scarab(&arguments, &[&frail]).refusal();
     assert!(message.contains("the motion takes") && message.contains("the limit is 55.0"), "{message}");
-    // Half the torque: the hip of the assumed leg alone takes 53 N m to be held at the end of its range.
+    // Half the torque limit: the hip of the assumed leg alone needs 53 N m at the end of its range.
     let json = folder.path("report.json");
     let arguments = format!("excite {EFFORT} --torque-margin 5 --leg");
     scarab(&arguments, &[&frail, Path::new("--json"), &json]).ends_with(0);
@@ -321,7 +327,7 @@ fn no_sigma_is_expected_where_no_noise_is_stated() {
         let folder = Folder::new();
         let json = folder.path("report.json");
         let mut line = vec![Path::new("--json"), &json];
-        // A leg with a motion of its own that states no noise.
+        // Leg with its own motion but without stated noise.
         let mut silent = LegFile::load("x2-wearer-75kg").expect("shipped");
         silent.torque_noise_percent = 0.0;
         let silent = folder.write("silent.toml", &silent.to_toml());

@@ -1,10 +1,10 @@
-//! `cargo sim faults` as its users run it.
+//! `cargo sim faults` from the command line.
 
 use serde_json::Value;
 
 use crate::command::{Folder, scarab};
 
-/// Within the first second: the approach to the exciting motion, so the tests stay short.
+/// Runs within the first second, the approach to the exciting motion, to keep the tests short.
 fn report(arguments: &str, code: i32) -> Value {
     let folder = Folder::new();
     let seconds = if arguments.contains("--seconds") { "" } else { "--seconds 1" };
@@ -26,7 +26,8 @@ fn the_json_is_that_of_the_interface_and_its_numbers_add_up() {
         assert_eq!(count("runs"), count("detected") + count("missed") + count("undetectable_by_design"));
         assert!(count("state_reached") <= count("runs") && count("false_alarms") == 0, "{row}");
         let (worst, deadline) = (&row["worst_ms"], &row["deadline_ms"]);
-        // One turn of a rotor, the end of an identification, what never has to happen: none is a time.
+        // One turn of a rotor, the end of an identification, and events that must never happen have
+        // no time limit.
         let timeless =
             ["E3", "E4", "E5", "V3", "B3", "B4", "X3", "F1", "F2", "F3", "J1", "H2", "H3", "H4", "I1"];
         assert_eq!(deadline.is_null(), timeless.iter().any(|fault| row["fault"] == *fault), "{row}");
@@ -61,7 +62,7 @@ fn the_same_seeds_leave_the_same_trace_and_one_of_them_is_repeated_alone() {
     assert!(all.printed.contains("trace hash"), "{}", all.printed);
 }
 
-/// The hash of all runs is made from those of the runs that are repeated alone: all of them the same to the bit.
+/// The hash of all runs is made from those of single repeated runs: all of them agree bit for bit.
 #[test]
 fn runs_of_the_sweep_and_of_two_faults_are_repeated_alone() {
     for kind in ["sweep", "pairs"] {
@@ -82,15 +83,15 @@ fn runs_of_the_sweep_and_of_two_faults_are_repeated_alone() {
         assert_eq!(all["trace_hash"], format!("{folded:016x}"));
         let page = std::fs::read_to_string(folder.path("run.html")).expect("written");
         assert!(page.contains("<svg") && page.contains(&format!("{kind}, seed 3")));
-        // Eleven columns are wider than a screen: their words may wrap, and the rest scrolls.
+        // Eleven columns are wider than a screen: words may wrap, and the table scrolls.
         assert!(page.contains("<div class=\"wide\"><table class=\"any\">"));
     }
 }
 
-/// Of every row, those with a bench of their own among them.
+/// Every row is included, also those with their own bench.
 #[test]
 fn every_detector_that_is_switched_off_is_noticed() {
-    // Faults that are only to be seen in motion take more of it than a second's: whole identifications.
+    // Faults that appear only in motion need more than its first second: whole identifications.
     let report = report("--seconds 300 --seeds 16 --blind", 0);
     let rows = report["rows"].as_array().expect("a list");
     assert!(rows.len() >= 36, "{}", rows.len());
@@ -109,15 +110,16 @@ fn every_detector_that_is_switched_off_is_noticed() {
     }
 }
 
-/// Its phase stands at zero current until the loop outweighs dead time: once in 500 times that was taken for a stuck conversion.
+/// The phase stays at zero current until the loop overcomes dead time; 1 in 500 runs took this for
+/// a stuck conversion.
 #[test]
 fn a_leg_that_its_host_holds_still_is_not_released() {
     let report = report("--fault F3 --replay 894", 0);
     assert_eq!(report["rows"][0]["detected"], 1);
 }
 
-/// A hang of each that checks in is answered by a reset, neither sooner nor later than the watchdog's oscillator allows, and what boots
-/// is refused for it.
+/// A hang of each monitored level is answered by a reset, within the tolerance of the watchdog's
+/// oscillator. The restarted firmware is inhibited for it.
 #[test]
 fn whoever_hangs_is_reset_and_refused() {
     let report = report("--fault K3 --seeds 24", 0);
@@ -139,7 +141,7 @@ fn normal_motion_with_a_pushing_wearer_raises_nothing() {
 #[test]
 fn the_emergency_stop_is_tried_at_every_tick() {
     let report = report("--fault X1 --seeds 1 --every-tick", 0);
-    // A second of servo ticks, the first and the last among them.
+    // One second of servo ticks, including the first and the last.
     assert_eq!((report["every_tick"].as_u64(), report["rows"][0]["missed"].as_u64()), (Some(4001), Some(0)));
 }
 

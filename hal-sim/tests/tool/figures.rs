@@ -1,4 +1,4 @@
-//! Figures of a run: all there, small, and about that run.
+//! Figures of a run: complete, small, and consistent with the run.
 
 use std::path::Path;
 
@@ -44,7 +44,7 @@ fn a_run_is_drawn_completely_and_small() {
         roxmltree::Document::parse(svg).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert!(svg.starts_with("<svg width=\"900\""), "{name}");
         assert!(!svg.contains("NaN") && !svg.contains("inf,"), "{name}");
-        // What a repository should hold.
+        // Suitable size for a repository.
         assert!(svg.len() < 200_000, "{name}: {} bytes", svg.len());
     }
     for base in &report.base_parameters {
@@ -55,15 +55,16 @@ fn a_run_is_drawn_completely_and_small() {
     for motion in ["excitation (identified from)", "gait-6.5 (unused", "gait-3 (unused", "fourier (unused"] {
         assert!(read("torque-2.svg").contains(motion) && read("motions.svg").contains(motion), "{motion}");
     }
-    // The knee deviates by 0.4 degrees: an axis with its zero alone has no scale.
+    // The knee deviates by 0.4 degrees: an axis with a zero label only has no scale.
     assert!(read("motions.svg").contains("\u{2212}0.2"), "the axis of the deviation has no labels");
     assert!(read("identify.svg").contains("kg m\u{b2}") && !read("identify.svg").contains("kg m2"));
     let curves = |svg: &str| svg.matches("<polyline").count();
-    // Three torques and two residuals on each of four motions; two angles and a deviation of two joints on each.
+    // Each of four motions has three torques and two residuals, and for two joints two angles and a
+    // deviation.
     assert!(curves(read("torque-1.svg")) >= 20 && curves(read("motions.svg")) >= 24);
 }
 
-/// What is drawn over one another belongs to the same instant: each curve is compared with the one it must follow.
+/// Overlaid curves refer to the same instant: each is compared with the one it must follow.
 #[test]
 fn curves_of_one_motion_are_of_the_same_instants() {
     let (report, series) = identified();
@@ -74,17 +75,20 @@ fn curves_of_one_motion_are_of_the_same_instants() {
             let lengths =
                 [&curves.measured_deg, &curves.commanded_deg, &curves.noise_free_nm, &curves.predicted_nm];
             assert!(lengths.iter().all(|values| values.len() == points) && points > 300, "{}", motion.name);
-            // The loop follows to 0.13 deg rms; the knee moves at 60 deg/s rms in places, so 20 ms would show.
+            // The loop follows to 0.13 deg rms; the knee moves at 60 deg/s rms in places, so 20 ms
+            // would be visible.
             let deviation =
                 curves.measured_deg.iter().zip(&curves.commanded_deg).map(|(one, other)| one - other);
             assert!(root_mean_square(deviation) < 0.2, "{} {joint}", motion.name);
-            // The table's error against the noise-free torque is below 1.3 %; a row's shift of 20 ms makes tens.
+            // The table's error against the noise-free torque is below 1.3 %; a shift of a row by
+            // 20 ms gives tens of percent.
             let moving = |still: &bool| !still;
             let error = curves.noise_free_nm.iter().zip(&curves.predicted_nm).zip(&curves.still);
             let error = error.filter(|(_, still)| moving(still)).map(|((one, other), _)| one - other);
             let size = root_mean_square(curves.noise_free_nm.iter().copied());
             assert!(root_mean_square(error) < 0.02 * size, "{} {joint}", motion.name);
-            // The residual that is drawn is the one in the table: whole windows there, cut ones in the training.
+            // The drawn residual equals the one in the table; training uses whole windows there,
+            // cut ones here.
             let residual = root_mean_square(curves.residual_nm().flatten());
             let fits = if motion.role == Role::Training { &report.training } else { &report.validation };
             let name = if motion.role == Role::Training { "fourier" } else { motion.name.as_str() };
@@ -94,7 +98,7 @@ fn curves_of_one_motion_are_of_the_same_instants() {
             assert!((residual / table - 1.0).abs() < 0.05, "{} {joint}: {residual}, {table}", motion.name);
         }
     }
-    // The noise of 7 % of the mean torque behind the filter, as the training's residual shows it.
+    // Noise of 7 % of the mean torque behind the filter, as in the training's residual.
     for (joint, sigma) in series.noise_nm.iter().enumerate() {
         let training = report.training[joint].rms_nm.known().expect("known");
         assert!((sigma / training - 1.0).abs() < 0.03, "{sigma}, {training}");
@@ -120,7 +124,8 @@ fn torques_that_a_known_mass_put_right_are_drawn_put_right() {
             let residual = root_mean_square(curves.residual_nm().flatten());
             let fit =
                 fits.iter().find(|fit| fit.motion == name && fit.joint == joint + 1).expect("in the table");
-            // As without a mass, above; a ratio on the wrong side makes 44 % of the torque, 30 times that.
+            // Tolerance as above without a mass; a ratio on the wrong side gives 44 % of the
+            // torque, 30 times that.
             let table = fit.rms_nm.known().expect("known");
             assert!((residual / table - 1.0).abs() < 0.05, "{} {joint}: {residual}, {table}", motion.name);
         }

@@ -1,15 +1,15 @@
-//! Files of every command: nothing that is read is overwritten, nothing is written twice, and what cannot be written is
-//! known before anything is computed.
+//! Files of every command: no input is overwritten, no file is written twice, and unwritable files
+//! are reported before any computation.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::command::{Folder, scarab};
 
-/// What stands in a file that a command may not touch.
+/// Content of a file that a command must not modify.
 const CONTENT: &str = "not to be touched";
 
-/// A command, options of the files it reads (empty: by position) and of the files it writes.
+/// Command with the options of its input files (empty: positional) and of its output files.
 const COMMANDS: [(&str, &[&str], &[&str]); 17] = [
     (
         "replay",
@@ -52,7 +52,7 @@ fn no_command_overwrites_what_it_reads() {
             inputs.iter().flat_map(|input| outputs.iter().map(move |output| (input, output)))
         {
             let mut line: Vec<&Path> = vec![Path::new(output), &file];
-            // `replay` and `export` ask for further files, which need not exist.
+            // `replay` and `export` need further files, which need not exist.
             let further: &[&str] = match (command, *input) {
                 ("replay", "") => &["--leg", "sp"],
                 ("replay", "--leg") => &["none.csv"],
@@ -76,7 +76,7 @@ fn no_command_overwrites_what_it_reads() {
         }
     }
     println!("{tried} pairs of an input and an output");
-    // Both files by position.
+    // Both files are positional.
     let message = scarab("kept import", &[&file, &file]).refusal();
     assert!(message.contains("that the command reads"), "{message}");
     assert_eq!(fs::read_to_string(&file).expect("there"), CONTENT);
@@ -172,13 +172,13 @@ fn an_output_that_cannot_be_written_is_found_before_the_input_is_read() {
         ("--figures", file.clone(), "it is a file, not a folder"),
         ("--figures", folder.path("file/drawn"), "is no folder"),
     ];
-    // Where nobody may make a file, not even the superuser.
+    // A place in which not even the superuser can create a file.
     if cfg!(target_os = "linux") {
         cases.push(("--json", PathBuf::from("/proc/run.json"), "no file can be made in the folder /proc"));
         cases.push(("--figures", PathBuf::from("/proc/drawn"), "no file can be made in the folder /proc"));
     }
     for (option, path, reason) in cases {
-        // The recording does not exist: the output is looked at first.
+        // The recording does not exist: the output is checked first.
         let message = scarab("replay none.csv --leg sp", &[Path::new(option), &path]).refusal();
         let expected = format!("error: {option} {}: cannot be written: ", path.display());
         assert!(message.starts_with(&expected) && message.contains(reason), "{message}");
@@ -189,7 +189,7 @@ fn an_output_that_cannot_be_written_is_found_before_the_input_is_read() {
     assert_eq!(fs::read_dir(folder.path("")).expect("a folder").count(), 2, "something is left behind");
 }
 
-/// The flash of a board on which nothing was stored.
+/// Flash of a board without stored data.
 fn erased_flash(folder: &Folder) -> PathBuf {
     let flash = folder.path("flash.bin");
     fs::write(&flash, vec![0xFF; 256 * 1024]).expect("a temporary file");
@@ -204,7 +204,7 @@ fn a_file_is_replaced_as_a_whole_and_a_link_to_it_stays_one() {
     let flash = erased_flash(&folder);
     let file = folder.write("kept.toml", CONTENT);
     fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).expect("own file");
-    // The old file lives on under its other name: it was replaced, not written into.
+    // The old file keeps its other name: it was replaced, not overwritten.
     fs::hard_link(&file, folder.path("old.toml")).expect("a link");
     symlink(&file, folder.path("link.toml")).expect("a link");
     scarab("kept export --out", &[&folder.path("link.toml"), &flash]).ends_with(0);
@@ -243,7 +243,7 @@ fn a_folder_that_the_command_makes_may_hold_its_other_files() {
     let sheets = folder.path("new/sheets");
     scarab("eds --out", &[&sheets]).ends_with(0);
     assert_eq!(fs::read_dir(&sheets).expect("made").count(), 2);
-    // The folder of the drawings does not exist yet, and the report lies in it: only the recording is missing.
+    // The drawings' folder does not exist yet, and the report lies in it: only the recording is missing.
     let (drawn, page) = (folder.path("drawn"), folder.path("drawn/report.html"));
     let line = [Path::new("--figures"), &drawn, Path::new("--report"), &page];
     let message = scarab("replay none.csv --leg sp", &line).refusal();

@@ -1,8 +1,9 @@
-//! Files as a bad disk, a bad editor or a bad mind leaves them: whatever is read, it ends in an error that names the file, or in
-//! something that makes sense, and never in a panic.
+//! Random corruption of files: reading one ends in an error that names the file, or in a valid
+//! result, never in a panic.
 //!
-//! Files that are good are spoilt at random: bytes, lines, numbers, the end. The seed is fixed; `SCARAB_FUZZ_CASES` asks for more
-//! than the few hundred of each kind that every test run tries. What fails is shrunk to the fewest changes that do.
+//! Valid files are corrupted at random: bytes, lines, numbers, the end. The seed is fixed;
+//! `SCARAB_FUZZ_CASES` requests more than the few hundred cases of each kind in every test run. A
+//! failure is reduced to the fewest changes that cause it.
 
 use std::path::Path;
 
@@ -22,7 +23,7 @@ use crate::trace::session;
 const CASES: u32 = 200;
 const NAME: &str = "spoilt-file";
 const EXCITATION: &str = include_str!("../data/excitation/x2_wearer_75kg.toml");
-/// What a number becomes.
+/// Replacements of a number.
 const NUMBERS: [&str; 16] = [
     "nan",
     "inf",
@@ -42,14 +43,14 @@ const NUMBERS: [&str; 16] = [
     "3.5",
 ];
 
-/// One change: what kind, where, and with what.
+/// One change: kind, position, and content.
 type Change = (u8, f64, u32);
 
 fn changes() -> impl Strategy<Value = Vec<Change>> {
     prop::collection::vec((0_u8..9, 0.0..1.0_f64, any::<u32>()), 1..6)
 }
 
-/// The byte ranges of the numbers in a text.
+/// Byte ranges of the numbers in a text.
 fn numbers(text: &[u8]) -> Vec<(usize, usize)> {
     let digit = |byte: u8| byte.is_ascii_digit() || b".eE+-".contains(&byte);
     let mut found = Vec::new();
@@ -108,7 +109,7 @@ fn spoilt(good: &str, changes: &[Change]) -> Vec<u8> {
     text
 }
 
-/// Spoils the files and hands each to the reader, which tells what it said where it refused.
+/// Corrupts the files and passes each to the reader, which returns the message of a rejection.
 fn fuzz(files: &[String], read: impl Fn(&[u8]) -> Result<(), String>) {
     let cases = std::env::var("SCARAB_FUZZ_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(CASES);
     let config = Config { cases, failure_persistence: None, ..Config::default() };
@@ -123,7 +124,7 @@ fn fuzz(files: &[String], read: impl Fn(&[u8]) -> Result<(), String>) {
     }
 }
 
-/// As a program that reads a file of text does; what is no text is refused there.
+/// Reads text as a program would; other bytes are rejected there.
 fn text(bytes: &[u8]) -> Option<&str> {
     std::str::from_utf8(bytes).ok()
 }
@@ -134,7 +135,7 @@ fn spoilt_leg_files_are_refused_by_name_or_make_sense() {
     fuzz(&legs, |bytes| {
         let Some(text) = text(bytes) else { return Ok(()) };
         let leg = LegFile::parse(text, NAME).map_err(|error| error.to_string())?;
-        // What was believed can be written, read and simulated.
+        // Accepted files can be written, read and simulated.
         LegFile::parse(&leg.to_toml(), NAME).map_err(|error| error.to_string())?;
         let _ = leg.description::<2>();
         let _ = leg.complete_description::<2>();
@@ -160,7 +161,7 @@ fn spoilt_models_are_refused_by_name_or_are_the_same() {
     fuzz(&[kept::text()], |bytes| {
         let Some(text) = text(bytes) else { return Ok(()) };
         let model = ModelFile::parse(text, NAME).map_err(|error| error.to_string())?;
-        // The checksum lets nothing through but comments and blanks.
+        // The checksum permits changes of comments and spaces only.
         if model == good { Ok(()) } else { Err("an edited model was believed".into()) }
     });
 }

@@ -1,4 +1,4 @@
-//! `scarab-sim fw` and `flash-leg`: legs that no image is built for. What builds one is a step of `.ci/run`.
+//! `scarab-sim fw` and `flash-leg`: legs for which no image is built. A step of `.ci/run` builds images.
 
 use crate::command::{Folder, scarab};
 

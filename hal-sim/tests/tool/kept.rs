@@ -1,4 +1,4 @@
-//! One identification of the default leg that the tests of kept models share.
+//! Identification of the default leg, shared by the tests of stored models.
 
 use std::sync::OnceLock;
 use std::{fs, path::PathBuf};
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::command::{Folder, Run, scarab};
 
-/// One identification of the default leg, its report and its model.
+/// Identification of the default leg: its report and its model.
 pub struct Kept {
     pub folder: Folder,
     pub report: Value,
@@ -39,7 +39,7 @@ pub fn text() -> String {
 pub const STATES: &str =
     "t_s,q1,q2,qd1,qd2,qdd1,qdd2\n0.0,0.3,-0.9,0.7,-1.1,4.0,-6.0\n0.5,0.8,-0.2,-1.3,0.4,-2.0,9.0\n";
 
-/// Predicts the torque of [`STATES`], which are D-H, after a model.
+/// Predicts the torque of [`STATES`], in D-H angles, from a model.
 pub fn predict(folder: &Folder, model: &str, more: &str) -> Run {
     let (model, states) = (folder.write("model.toml", model), folder.write("states.csv", STATES));
     scarab(&format!("predict --dh {more} --model"), &[&model, "--states".as_ref(), &states])

@@ -1,4 +1,5 @@
-//! What a board remembers, out of its flash and back: the same text, what is refused, and a board that starts with it.
+//! Stored data of a board, exported from its flash and imported: equal text, rejections, and a
+//! board that starts with it.
 
 use std::fs;
 use std::path::Path;
@@ -67,12 +68,12 @@ fn own_fingerprint() -> String {
     fingerprint(&LegFile::load(DEFAULT_LEG).expect("shipped")).expect("two joints")
 }
 
-/// Everything, as a person might write it.
+/// Complete file in a person's formatting.
 fn text() -> String {
     format!("schema = 1\n{NODES}{CALIBRATIONS}{}", model(&own_fingerprint()))
 }
 
-/// Without the comment before it.
+/// Text without the leading comment.
 fn content(exported: &str) -> &str {
     &exported[exported.find("schema").expect("a schema")..]
 }
@@ -99,7 +100,7 @@ fn what_was_exported_imported_and_exported_again_is_the_same_to_the_letter() {
     assert_eq!(fs::read_to_string(&out).expect("written"), exported.printed);
     assert_eq!(fs::read(&first).expect("written"), fs::read(&second).expect("written"));
 
-    // The second board of a file; the first stays, and what is imported a second time is not written again.
+    // Second board of a file; the first is unchanged, and a repeated import writes nothing.
     let before = fs::read(&second).expect("written");
     let file = folder.write("kept.toml", &exported.printed);
     scarab("kept import --board 2", &[&file, &second]).ends_with(0);
@@ -169,7 +170,8 @@ fn a_board_that_starts_with_an_imported_flash_uses_it_and_a_model_of_another_leg
 fn what_is_damaged_is_said_and_the_rest_is_exported() {
     let folder = Folder::new();
     let flash = folder.path("flash.bin");
-    // An entry cut off, a controlword, and a value that no node takes, under the hip's key; the calibrations are whole.
+    // The hip's key holds a truncated entry, a controlword, and a value that no node accepts; the
+    // calibrations are valid.
     let off = scarab::leg::DriveState::SwitchOnDisabled;
     for (bytes, why) in [
         (&[0x17, 0x10, 0, 2, 50, 0, 0x17][..], "bytes that are no entry"),
@@ -191,7 +193,7 @@ fn what_is_damaged_is_said_and_the_rest_is_exported() {
         assert!(said[1].contains("objects of the hip: ") && said[1].contains(why), "{said:?}");
     }
 
-    // Something else altogether: nothing is read, and nothing is written over it.
+    // Unrelated data: nothing is read, and nothing is overwritten.
     let noise: Vec<u8> =
         (0..BYTES as u32).map(|place| (place.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     fs::write(&flash, &noise).expect("a temporary file");
@@ -201,7 +203,8 @@ fn what_is_damaged_is_said_and_the_rest_is_exported() {
     assert!(run.errors.contains("no record of it can be read: nothing was written"), "{}", run.errors);
     assert_eq!(fs::read(&flash).expect("still there"), noise);
 
-    // A record that has rotted (behind it are zeros that fill the word) where no other is left: the log answers none, and the file is not erased.
+    // A damaged record (followed by zeros that fill the word) without a copy: the log has no
+    // answer, and the file is not erased.
     fs::remove_file(&flash).ok();
     import(&folder, "schema = 1\n[[node]]\njoint = \"hip\"\nobjects = []\n", &flash).ends_with(0);
     let mut bytes = fs::read(&flash).expect("written");
@@ -283,7 +286,7 @@ fn a_file_that_cannot_be_meant_is_refused_with_its_reason_and_the_flash_stays() 
         );
         assert_eq!(fs::read(&flash).expect("still there"), before, "{new}");
     }
-    // More than a board keeps of a node.
+    // More than a board stores for a node.
     let many: Vec<String> = (0x1A00..0x1A04)
         .flat_map(|index| {
             (1..9).map(move |sub| format!("{{ index = {index}, subindex = {sub}, value = 0x60410010 }}"))
@@ -295,7 +298,7 @@ fn a_file_that_cannot_be_meant_is_refused_with_its_reason_and_the_flash_stays() 
     let many = format!("schema = 1\n[[node]]\njoint = \"hip\"\nobjects = [{}]\n", many.join(", "));
     let said = import(&folder, &many, &flash).refusal();
     assert!(said.contains("more than the 400 bytes that a board keeps of a node"), "{said}");
-    // A file of another size is no flash, and is not made one.
+    // A file of another size is not a flash and is not turned into one.
     fs::write(&flash, [0xFF; 100]).expect("a temporary file");
     let said = import(&folder, &whole, &flash).refusal();
     assert!(said.contains("100 bytes; the flash of 1 to 4 boards has 262144 each"), "{said}");

@@ -1,9 +1,9 @@
-//! A leg set to a wearer, on either side, below a leaning trunk: what stays the same and what is refused.
+//! Leg with a wearer, on either side, below a leaning trunk: invariants and rejections.
 
 use crate::command::{Folder, scarab};
 use serde_json::Value;
 
-/// The report of a run with these options.
+/// Report of a run with these options.
 fn identified(options: &str) -> Value {
     let folder = Folder::new();
     scarab(&format!("identify {options} --json"), &[&folder.path("run.json")]).ends_with(0);
@@ -18,7 +18,7 @@ fn number(of: &Value, key: &str) -> f64 {
     of[key].as_f64().expect("known")
 }
 
-/// All base parameters lie within four sigma of the simulated leg's.
+/// Checks that all base parameters are within four sigma of the simulated leg's.
 fn assert_true(run: &Value) {
     for base in bases(run) {
         let off = (number(&base, "value") - number(&base, "truth")).abs();
@@ -32,14 +32,15 @@ fn left_and_right_leg_have_the_same_anatomical_parameters() {
     let run = |side: &str| {
         let files = [format!("{side}.json"), format!("{side}.csv")];
         let [json, log] = files.each_ref().map(|name| folder.path(name).display().to_string());
-        // Without noise: the same draws would stand against the motion on one side.
+        // Without noise: equal draws would have opposite signs relative to the motion on one side.
         scarab(&format!("identify --torque-noise 0 --side {side} --json {json} --log {log}"), &[])
             .ends_with(0);
         (folder.json(&files[0]), std::fs::read_to_string(folder.path(&files[1])).expect("written"))
     };
     let ((right, right_log), (left, left_log)) = (run("right"), run("left"));
     assert_eq!(left["leg"], "x2-wearer-75kg --side left");
-    // Counts and currents are exactly each other's negatives, so anatomically nothing differs to the last bit.
+    // Counts and currents are exact negatives of each other, so the anatomical results agree to the
+    // last bit.
     assert_eq!(bases(&right), bases(&left));
     assert!(right_log.lines().count() > 1000 && right_log == left_log);
 }
@@ -51,14 +52,14 @@ fn a_known_trunk_pitch_turns_gravity_and_leaves_the_base_set_as_it_is() {
         let leaning = identified(&format!("--trunk-pitch {pitch}"));
         for (one, other) in bases(&upright).iter().zip(&bases(&leaning)) {
             assert_eq!(one["name"], other["name"]);
-            // The analysis rounds differently; factors and values are near 1.
+            // Rounding of the analysis differs; factors and values are near 1.
             assert!((number(one, "truth") - number(other, "truth")).abs() < 1e-9);
             for (name, factor) in one["terms"].as_object().expect("terms") {
                 assert!((number(&other["terms"], name) - factor.as_f64().expect("known")).abs() < 1e-9);
             }
         }
         assert_true(&leaning);
-        // The same parameters under another gravity need another torque.
+        // Equal parameters under another gravity need another torque.
         let size = |run: &Value| {
             100.0 * number(&run["training"][0], "rms_nm") / number(&run["training"][0], "percent_of_rms")
         };

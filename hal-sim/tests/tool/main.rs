@@ -1,4 +1,5 @@
-//! The tool as its users run it: each command, what it prints, writes and refuses. One program, so that helpers stand once.
+//! Command-line tests of the tool: each command with its output, files and rejections. One program,
+//! so helpers are shared.
 #![cfg(feature = "tool")]
 
 mod bus;

@@ -1,4 +1,4 @@
-//! What of each joint's model is left to the data: found where it is there, dropped where it is not, told in words.
+//! Model terms left to the data: found if present, dropped if absent, and reported in words.
 
 use crate::command::{Folder, base, scarab};
 use hal_sim::tool::identify::identify_many;
@@ -14,8 +14,8 @@ fn runs(leg: &LegFile, seeds: std::ops::RangeInclusive<u64>) -> Vec<RunReport> {
     identify_many::<2, 13>(leg, &options).expect("it runs").runs
 }
 
-/// The default leg with this asked of rotor and offset of both joints; with this offset in both, and perhaps without a
-/// rotor in the knee. Prior and servo know of that: a loop that expects a rotor shakes a joint without one.
+/// Default leg with this switch for rotor and offset of both joints, this offset in both, and optionally no
+/// rotor in the knee. Prior and servo match: a loop that expects a rotor shakes a joint without one.
 fn leg(switch: Switch, without_rotor: bool, offset: f64) -> LegFile {
     let mut leg = LegFile::load(DEFAULT_LEG).expect("shipped");
     for joint in &mut leg.joints {
@@ -53,7 +53,7 @@ fn rotor_and_offset_that_are_not_there_are_dropped_and_the_rest_is_known_better(
             assert_eq!(found.used == "on", found.gain_chi2.known() >= Some(9.0), "{found:?}");
         }
     }
-    // 0.27 % of 60 is 0.16: three or more in one of 1,500 choices of seeds.
+    // 0.27 % of 60 is 0.16; three or more occur in one of 1,500 choices of seeds.
     assert!(kept <= 2, "{kept} of 60 kept");
     for (on, auto) in kept_on.iter().zip(&chosen) {
         if auto.rank == 10 {
@@ -64,20 +64,20 @@ fn rotor_and_offset_that_are_not_there_are_dropped_and_the_rest_is_known_better(
             assert_eq!((on.rank, auto.base_parameters.len(), auto.columns), (13, 10, on.columns - 3));
         }
     }
-    // The hip's rotor is measured in a sum only, whatever it is.
+    // The hip's rotor is only determined in a sum, whatever its value.
     let hip = choice(&chosen[0], 1, "rotor");
     assert!(hip.used == "on" && hip.why.contains("ZZ1R"), "{hip:?}");
 }
 
 #[test]
 fn rotor_and_offset_that_are_there_are_kept_and_give_the_numbers_of_on() {
-    // 6 N m are eight standard deviations of the hip's offset, the weakest of them.
+    // 6 N m are eight standard deviations of the hip's offset, the weakest of the terms.
     let of = |switch| runs(&leg(switch, false, 6.0), 1..=5);
     for (auto, on) in of(Switch::Auto).into_iter().zip(of(Switch::On)) {
         for (joint, option) in [(2, "rotor"), (1, "offset"), (2, "offset")] {
             assert_eq!(choice(&auto, joint, option).used, "on", "{option} of joint {joint}");
         }
-        // The choice takes a tick, so that the motions held out begin one later and have another noise.
+        // The choice takes a tick: the held-out motions begin one tick later and have another noise.
         let found = |run: &RunReport| {
             (run.base_parameters.clone(), run.parameters.clone(), run.least_squares.clone(), run.bso.clone())
         };
@@ -86,7 +86,7 @@ fn rotor_and_offset_that_are_there_are_kept_and_give_the_numbers_of_on() {
     }
 }
 
-/// The default leg with friction that differs between the knee's directions by 1.6 N m, no offset asked for.
+/// Default leg with knee friction that differs by 1.6 N m between the directions, without an offset.
 fn uneven(asked: Switch, half: f64) -> LegFile {
     let mut leg = LegFile::load(DEFAULT_LEG).expect("shipped");
     let knee = &mut leg.joints[1];
@@ -107,7 +107,7 @@ fn friction_that_differs_between_the_directions_is_found_in_both() {
             (found[0].backward_nm, found[0].backward_sigma_nm, 4.67 - 0.8),
         ] {
             let (value, sigma) = (value.known().expect("found"), sigma.known().expect("found"));
-            // Of ten normal errors one exceeds four sigma in 0.06 % of all choices of seeds.
+            // One of ten normal errors exceeds four sigma in 0.06 % of all choices of seeds.
             assert!((value - truth).abs() < 4.0 * sigma && sigma < 0.2, "{value} +- {sigma}, {truth}");
         }
     }
@@ -139,7 +139,7 @@ fn friction_of_two_directions_is_kept_exported_and_predicted_as_such() {
     scarab(&arguments, &[&model]).ends_with(0);
     let table = folder.table("torque.csv");
     let friction = table.column("tau2_friction_Nm");
-    // One rounding each of numbers below 10.
+    // One rounding per number below 10.
     assert!((friction[0] + friction[1] - 2.0 * half).abs() < 1e-6, "{friction:?} {half}");
     assert_eq!((friction[2], table.column("tau2_offset_Nm")), (0.0, vec![0.0; 3]), "nothing of it at rest");
 
@@ -202,7 +202,7 @@ fn one_column_cannot_be_asked_for_twice_and_who_yields_is_said() {
             &format!("name = \"hip\"\n{key} = \"{word}\""),
             1,
         );
-        // The file as written says the key already, so the word alone is exchanged where it does.
+        // The written file already has the key; if so, only its value is replaced.
         let text = if key == "rotor" { text.replacen("rotor = \"on\"\n", "", 1) } else { text };
         let refusal = scarab("identify --leg", &[&folder.write("leg.toml", &text)]).refusal();
         assert!(

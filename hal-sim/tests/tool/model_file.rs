@@ -1,4 +1,4 @@
-//! Models that are kept: what is in them, and what is refused.
+//! Stored models: their contents and rejections.
 #![expect(clippy::disallowed_methods, reason = "runs on the host only and may use std's mathematics")]
 
 use crate::command::{Folder, scarab};
@@ -12,7 +12,8 @@ use serde_json::Value;
 #[test]
 fn a_model_holds_the_report_number_by_number_and_reads_back_unchanged() {
     let (model, report) = (model(), &kept().report);
-    // The test's JSON reader may miss the last bit; what single precision found is the same number again.
+    // The test's JSON reader may miss the last bit; results of single precision must be equal after
+    // rounding to it.
     let number = |entry: &Value, key: &str| entry[key].as_f64().map(|value| value as f32);
     let base = report["base_parameters"].as_array().expect("a list");
     assert_eq!(model.base_set.parameters.len(), base.len());
@@ -20,7 +21,7 @@ fn a_model_holds_the_report_number_by_number_and_reads_back_unchanged() {
         assert_eq!(Some(stored.name.as_str()), reported["name"].as_str());
         assert_eq!(Some(stored.value as f32), number(reported, "value"));
         assert_eq!(Some(stored.sigma as f32), number(reported, "sigma"));
-        // The root was taken in single precision.
+        // The root was computed in single precision.
         let variance = model.base_set.covariance[index][index];
         assert!((variance.sqrt() / stored.sigma - 1.0).abs() < 1e-6, "{}", stored.name);
     }
@@ -58,7 +59,7 @@ fn the_fingerprint_is_the_one_the_board_computes() {
 fn a_refused_result_is_not_kept() {
     let folder = Folder::new();
     let path = folder.path("model.toml");
-    // Nothing is held out from 8 s of one joint standing still: refused for many reasons.
+    // With 8 s of one resting joint nothing can be held out: rejected for many reasons.
     let rows: String = (0..4000).map(|row| format!("{},0.1,1.0\n", f64::from(row) * 0.002)).collect();
     let still = folder.write("still.csv", &format!("t_s,q1_rad,tau1_Nm\n{rows}"));
     let run = scarab("replay --leg sp --save-model", &[&path, &still]).ends_with(3);
@@ -93,7 +94,7 @@ fn hostile_files_are_refused_with_file_line_and_reason() {
         changed("schema = 1", "schema = 2"),
         "error: model.toml:3: this schema is unknown; this program reads 1\n"
     );
-    // Anywhere cut off: never a panic, never accepted.
+    // Truncation anywhere: never a panic, never accepted.
     for cut in (1..good.len() - 2).step_by(997) {
         let cut = (cut..).find(|&cut| good.is_char_boundary(cut)).expect("an end");
         assert!(refusal(&good[..cut]).starts_with("error: model.toml"), "cut at {cut}");
@@ -246,7 +247,7 @@ fn a_model_of_another_leg_is_refused_in_words() {
         leg.joints[0].name = std::mem::replace(&mut leg.joints[1].name, name);
     });
     assert_eq!(swapped, "its joints are hip, knee, the leg's are knee, hip");
-    // What does not give the parameters their meaning is no reason.
+    // Keys without influence on the parameters' meaning cause no rejection.
     let mut same = leg.clone();
     same.joints[0].torque_limit_nm = 50.0;
     same.joints[0].encoder.counts = 4096;
@@ -264,10 +265,10 @@ fn a_known_mass_makes_the_model_absolute_and_its_constants_the_identified_ones()
     let model = ModelFile::load(&path).expect("just written");
     assert_eq!(model.conditions.scale, "absolute");
     for joint in &model.leg.joints {
-        // Found within 2 %, and not the number that was put in.
+        // Identified within 2 %, and not equal to the assumed number.
         assert!((joint.torque_per_ampere / 1.5 - 1.0).abs() < 0.02 && joint.torque_per_ampere != 1.5);
     }
-    // The leg that believes 1.5 is not the one these parameters are for, until its file says what was found.
+    // A leg that assumes 1.5 does not match these parameters until its file states the identified constant.
     let states = folder.write("states.csv", STATES);
     let arguments = |leg: &str| format!("predict --states {} --leg {leg} --model", states.display());
     let run = scarab(&arguments(DEFAULT_LEG), &[&path]).ends_with(3);
@@ -300,7 +301,7 @@ fn the_same_leg_is_recognised_and_a_heavier_shank_is_named() {
         assert_eq!(same["differences"].as_array().map(Vec::len), Some(13));
         assert_eq!(same["line"], format!("the same leg as on {}", model().created));
     }
-    // 0.1 kg at 0.3 m of the knee: 0.03 kg m beside a sigma of 0.0044 of the difference.
+    // 0.1 kg at 0.3 m of the knee: 0.03 kg m against a sigma of 0.0044 of the difference.
     let mut heavier = LegFile::load(DEFAULT_LEG).expect("shipped");
     let truth = heavier.joints[1].truth.as_mut().expect("simulated");
     let moment = truth.mass * truth.com[0] + 0.1 * 0.3;

@@ -1,4 +1,4 @@
-//! Models that are kept: the torque that they predict, and its band.
+//! Stored models: predicted torque and its band.
 #![expect(clippy::disallowed_methods, reason = "runs on the host only and may use std's mathematics")]
 
 use crate::command::{Folder, Table, scarab};
@@ -34,7 +34,7 @@ fn predicted_torque_is_that_of_the_plant_for_true_parameters() {
         let torque = plant.inverse_dynamics(&state.q, &state.qd, &state.qdd);
         let rigid = plant.mechanism().inverse_dynamics(&state.q, &state.qd, &state.qdd);
         for (joint, predicted) in predictor.torques(&state).iter().enumerate() {
-            // Roundings of torques up to 60 N m; the base set's factors carry 15 digits.
+            // Rounding of torques up to 60 N m; the base set's factors have 15 digits.
             assert!((predicted.total() - torque[joint]).abs() < 1e-12 * 60.0, "{predicted:?} {torque:?}");
             assert!((predicted.rigid - rigid[joint]).abs() < 1e-12 * 60.0, "{predicted:?} {rigid:?}");
         }
@@ -63,7 +63,8 @@ fn the_band_is_the_covariance_seen_through_the_torque() {
                 })
                 .map(|(element, left, right)| left[joint] * element * right[joint])
                 .sum();
-            // Differences of torques up to 60 N m keep 13 digits, the cancelling covariance takes four of them.
+            // Differences of torques up to 60 N m have 13 digits; the cancelling covariance costs
+            // four of them.
             assert!((before[joint].sigma / variance.sqrt() - 1.0).abs() < 1e-8, "{before:?} {variance}");
         }
     }
@@ -91,7 +92,7 @@ fn the_table_has_total_band_and_parts_and_knows_both_signs_of_an_angle() {
         assert_eq!(hip.rigid + hip.friction + hip.offset, hip.total());
         assert!(hip.sigma > 0.0 && knee.sigma > 0.0 && knee.friction != 0.0 && knee.offset != 0.0);
     }
-    // The knee's anatomical angle is minus its D-H angle; names may carry the unit; time may be left out.
+    // The knee's anatomical angle is minus its D-H angle; units in column names and the time are optional.
     let flexed = "q1_rad,q2_rad,qd1_radps,qd2_radps,qdd1_radps2,qdd2_radps2\n0.3,0.9,0.7,1.1,4.0,6.0\n0.8,0.2,-1.3,-0.4,-2.0,-9.0\n";
     let flexed = folder.write("flexed.csv", flexed);
     let printed = scarab("predict --model", &[&kept().model, "--states".as_ref(), &flexed]);
@@ -115,7 +116,7 @@ fn predict_reads_the_columns_of_a_recording_as_replay_does() {
     let (recording, model) = (folder.write("a.csv", &motion.csv()), folder.path("model.toml"));
     let line = [&recording, Path::new("--leg"), &leg, Path::new("--save-model"), &model];
     scarab("replay --split 0.5", &line).ends_with(0);
-    // The recording itself with speeds and accelerations: differences of angles without noise.
+    // Speeds and accelerations for the recording: differences of noise-free angles.
     let samples = motion.samples();
     let mut states = String::from("t_s,q1_rad,qd1_radps,qdd1_radps2\n");
     let mut recorded = Vec::new();
@@ -131,13 +132,13 @@ fn predict_reads_the_columns_of_a_recording_as_replay_does() {
     let run = scarab("predict --model", &[&model, "--states".as_ref(), &states]).ends_with(0);
     let predicted = Table::parse(&run.printed).column("tau1_Nm");
     let (mut squares, mut count) = (0.0, 0.0);
-    // Where the pendulum turns round, the sign of its speed is uncertain.
+    // Near the turning points of the pendulum the sign of its speed is uncertain.
     for ((_, torque), predicted) in recorded.iter().zip(predicted).filter(|((speed, _), _)| speed.abs() > 0.2)
     {
         squares += (torque - predicted) * (torque - predicted);
         count += 1.0;
     }
     let rms = (squares / count).sqrt();
-    // The recording's noise is uniform within 0.2 N m: 0.115 N m. Torques reach 30 N m.
+    // The recording's noise is uniform within 0.2 N m: 0.115 N m rms. Torques reach 30 N m.
     assert!((0.1..0.13).contains(&rms), "{rms} N m");
 }

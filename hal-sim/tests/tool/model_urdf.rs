@@ -1,4 +1,4 @@
-//! Robot descriptions written from models: read by others, moved by other equations.
+//! Robot descriptions from models: read by another library, moved by other equations.
 #![expect(clippy::disallowed_methods, reason = "runs on the host only and may use std's mathematics")]
 
 use crate::command::{Folder, scarab};
@@ -13,13 +13,13 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use scarab::ident::prior_parameters;
 use scarab::model::{JointState, Parameter};
 
-/// A leg of which one link lies outside the plane and one joint's zero is off.
+/// Leg with one link outside the plane and one joint zero offset.
 fn skewed(name: &str) -> LegFile {
     let mut leg = LegFile::load(name).expect("shipped");
     for joint in &mut leg.joints {
         joint.prior = joint.truth;
     }
-    // Off its reference pose, with a link that is not in the plane.
+    // Away from its reference pose, with a link outside the plane.
     let last = leg.joints.last_mut().expect("joints");
     last.zero_offset_deg = 10.0;
     if let Some(truth) = &mut last.truth {
@@ -31,7 +31,7 @@ fn skewed(name: &str) -> LegFile {
     leg
 }
 
-/// A model of that leg with its true bodies: what identification makes of them is not the point here.
+/// Model of that leg with its true bodies, independent of any identification.
 fn true_model<const N: usize, const B: usize>(folder: &Folder, name: &str) -> ModelFile {
     let leg = skewed(name);
     let (file, path) = (folder.write("leg.toml", &leg.to_toml()), folder.path("model.toml"));
@@ -48,7 +48,8 @@ fn true_model<const N: usize, const B: usize>(folder: &Folder, name: &str) -> Mo
     model
 }
 
-/// A leg identified with its truth for a prior, so that every body can exist; model and robot description.
+/// Leg identified with its truth as prior, so that every body is physically consistent; model and
+/// robot description.
 fn exported(folder: &Folder, name: &str) -> (ModelFile, String) {
     let file = folder.write("leg.toml", &skewed(name).to_toml());
     let model = folder.path("model.toml");
@@ -61,12 +62,12 @@ fn exported(folder: &Folder, name: &str) -> (ModelFile, String) {
 }
 
 fn turn(rpy: &[f64; 3]) -> Matrix3<f64> {
-    // The format's definition: about the fixed axes x, y, z in this order.
+    // Definition of the format: rotations about the fixed axes x, y, z in this order.
     let about = |axis, angle| Rotation3::from_axis_angle(&axis, angle).into_inner();
     about(Vector3::z_axis(), rpy[2]) * about(Vector3::y_axis(), rpy[1]) * about(Vector3::x_axis(), rpy[0])
 }
 
-/// Ten parameters about the joint's axis from a link's inertial element, by the definition of each.
+/// Ten parameters about the joint's axis from a link's inertial element, each by its definition.
 fn about_joint(inertial: &urdf_rs::Inertial) -> [f64; 10] {
     let (mass, c, inertia) = (inertial.mass.value, inertial.origin.xyz.0, &inertial.inertia);
     [
@@ -83,7 +84,7 @@ fn about_joint(inertial: &urdf_rs::Inertial) -> [f64; 10] {
     ]
 }
 
-/// What the plant's equations are made from, by the description's numbers; rotors and friction are no part of it.
+/// Bodies for the plant's equations with the description's numbers, without rotors and friction.
 fn described<const N: usize>(robot: &urdf_rs::Robot, leg: &LegFile) -> LegDescription<N> {
     let mount = turn(&robot.joints[0].origin.rpy.0);
     let mut described = leg.description::<N>().expect("simulated");
@@ -91,7 +92,8 @@ fn described<const N: usize>(robot: &urdf_rs::Robot, leg: &LegFile) -> LegDescri
     for (target, joint) in described.joints.iter_mut().zip(&robot.joints[1..]) {
         let link = robot.links.iter().find(|link| link.name == joint.child.link).expect("the child");
         let [x, y, z] = joint.origin.xyz.0;
-        // R = Rx(alpha) Rz(zero): its third column is (0, -sin alpha, cos alpha), its first row (cos zero, -sin zero, 0).
+        // R = Rx(alpha) Rz(zero): its third column is (0, -sin alpha, cos alpha), its first row
+        // (cos zero, -sin zero, 0).
         let turn = turn(&joint.origin.rpy.0);
         let (sine, cosine) = (-turn[(1, 2)], turn[(2, 2)]);
         target.frame = DenavitHartenberg { alpha: sine.atan2(cosine), a: x, d: cosine * z - sine * y };
@@ -120,7 +122,7 @@ fn checks<const N: usize, const B: usize>(name: &str) {
         let joint = &robot.joints[number + 1];
         let link = robot.links.iter().find(|link| link.name == joint.child.link).expect("the child");
         for (found, expected) in about_joint(&link.inertial).iter().zip(&parameters) {
-            // There and back by the parallel axis: roundings of numbers up to 10.
+            // Converted by the parallel-axis theorem and back: rounding of numbers up to 10.
             assert!((found - expected).abs() < 1e-13, "{name} joint {number}: {found} against {expected}");
         }
         let dynamics = joint.dynamics.as_ref().expect("friction");
@@ -133,11 +135,11 @@ fn checks<const N: usize, const B: usize>(name: &str) {
         assert_eq!(joint.limit.effort, stored.torque_limit_nm);
     }
 
-    // The plant's Lagrange equations, fed with the description's numbers, give the model's torque.
+    // The plant's Lagrange equations with the description's numbers give the model's torque.
     let description = described::<N>(&robot, &skewed(name));
     for (joint, stored) in description.joints.iter().zip(&model.leg.joints) {
         assert_eq!(joint.direction, stored.direction as f64);
-        // Ten degrees by way of three angles and back.
+        // Ten degrees, converted to three angles and back.
         assert!((joint.zero_offset.to_degrees() - stored.zero_offset_deg).abs() < 1e-12);
     }
     let mechanism = Mechanism::new(&description);
@@ -153,7 +155,7 @@ fn checks<const N: usize, const B: usize>(name: &str) {
         for (joint, predicted) in predictor.torques(&state).iter().enumerate() {
             let rotor = model.joint_parameters(joint).expect("with a prior")[Parameter::IA.index()];
             let whole = torque[joint] + rotor * state.qdd[joint];
-            // Roundings of torques up to 300 N m, and of the base set's factors.
+            // Rounding of torques up to 300 N m, and of the base set's factors.
             assert!(
                 (whole - predicted.rigid).abs() < 1e-9,
                 "{name} joint {joint}: {whole} against {predicted:?}"
@@ -188,7 +190,7 @@ fn the_default_leg_as_shipped_is_exported_and_moves_as_torque_told() {
     let torque = mechanism.inverse_dynamics(&state.q, &state.qd, &state.qdd);
     for (joint, predicted) in predictor.torques(&state).iter().enumerate() {
         let rotor = model.joint_parameters(joint).expect("with a prior")[Parameter::IA.index()];
-        // The completion meets the measured sums to the rounding of single precision.
+        // The completion reproduces the identified sums to the rounding of single precision.
         let whole = torque[joint] + rotor * state.qdd[joint];
         assert!((whole - predicted.rigid).abs() < 1e-4, "joint {joint}: {whole} against {predicted:?}");
     }
@@ -258,7 +260,7 @@ fn what_is_no_body_and_what_nobody_knows_is_not_exported() {
     });
     assert!(contradiction.contains("the bodies' HX2 is +"), "{contradiction}");
 
-    // The same from the command line: identified without a prior, no mass is known.
+    // From the command line: without a prior no mass is known.
     let path = folder.path("bare.toml");
     scarab("identify --prior none --save-model", &[&path]).ends_with(0);
     let run = scarab("export --urdf none.urdf --model", &[&path]).ends_with(3);

@@ -1,4 +1,4 @@
-//! `cargo sim monitor` as its users run it.
+//! `cargo sim monitor` from the command line.
 
 use crate::command::{Folder, scarab};
 

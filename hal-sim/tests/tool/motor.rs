@@ -1,11 +1,11 @@
-//! `motor`: the board's current loop against the simulated motor, by what the command reports.
+//! `motor`: the board's current loop with the simulated motor, as reported by the command.
 
 use std::sync::OnceLock;
 
 use crate::command::{Folder, scarab};
 use serde_json::Value;
 
-/// The report of the default leg's first motor.
+/// Report of the default leg's first motor.
 fn report() -> &'static Value {
     static REPORT: OnceLock<Value> = OnceLock::new();
     REPORT.get_or_init(|| {
@@ -30,7 +30,8 @@ fn steps_of_current_rise_as_designed_at_every_speed() {
     assert_eq!(entries("steps").len(), 8);
     for step in entries("steps") {
         let (rise, overshoot) = (number(step, "rise_ms"), number(step, "overshoot_percent"));
-        // Inductance is measured to 0.7 %; without feedforward the back-EMF of a rotor that turns on is met by the integral.
+        // Inductance is measured to 0.7 %. Without feedforward, the integral compensates the
+        // back-EMF of a rotor that keeps turning.
         let tolerance = if step["feedforward"] == true { 0.02 } else { 0.06 };
         assert!((rise / number(designed, "rise_ms") - 1.0).abs() < tolerance, "{rise} {designed}");
         assert!(overshoot < number(designed, "overshoot_percent") + 1.0, "{overshoot} {designed}");
@@ -85,9 +86,9 @@ fn a_voltage_limit_costs_no_more_than_a_step_to_come_back_from() {
             assert_eq!(entry["released"], false);
         }
         let (limited, free) = (number(weak, "recovery_ms"), number(strong, "recovery_ms"));
-        // A wound-up integral of 100 ms would take many milliseconds.
+        // Wind-up over 100 ms would take many milliseconds to recover.
         assert!(limited < free + 0.1 && limited < 0.35, "{limited} {free}");
-        // The field stays where it belongs while the quadrature current gives way.
+        // The direct current stays at its target while the quadrature current falls.
         assert!(number(weak, "direct_a").abs() < 0.1, "{weak}");
     }
 }
@@ -96,15 +97,15 @@ fn a_voltage_limit_costs_no_more_than_a_step_to_come_back_from() {
 fn the_chopper_keeps_the_bus_within_bounds_and_without_it_the_firmware_lets_go() {
     let [with, without] = entries("regeneration") else { panic!("two brakings") };
     assert!(number(with, "highest_bus_v") < 51.0 && with["fault"].is_null(), "{}", with["highest_bus_v"]);
-    // The rest raised the capacitor's voltage and is drawn from it again at the end.
+    // The rest charged the capacitor and is drawn from it again at the end.
     let burnt = number(with, "brake_j") / number(with, "returned_j");
     assert!((0.8..1.0).contains(&burnt), "what comes back is burnt, and only that: {burnt}");
     assert!(number(with, "returned_j") < number(with, "motion_j"));
     assert_eq!(without["fault"], "bus_voltage");
-    // The curve goes on to where it is released.
+    // The curve includes the time at which the bridge is switched off.
     let last = without["bus_v"].as_array().and_then(|curve| curve.last()).and_then(Value::as_f64);
     assert!(last.is_some_and(|volts| volts > 57.8), "{last:?}");
-    // Beyond 58 V the bridge is released within two ticks.
+    // Above 58 V the bridge is switched off within two ticks.
     assert!((58.0..58.6).contains(&number(without, "highest_bus_v")), "{}", without["highest_bus_v"]);
 }
 
@@ -138,7 +139,7 @@ fn curves_of_one_frame_differ_in_colour_or_dashes_and_the_legend_has_each() {
         for name in names {
             assert!(words.contains(name), "{file}: no {name} in the legend");
         }
-        // Solid curves; a dash has few points.
+        // Solid curves only; a dash has few points.
         let mut looks = std::collections::BTreeMap::new();
         for node in document.descendants().filter(|node| node.has_tag_name("polyline")) {
             let points = node.attribute("points").map_or(0, |points| points.split_whitespace().count());
@@ -150,7 +151,7 @@ fn curves_of_one_frame_differ_in_colour_or_dashes_and_the_legend_has_each() {
     }
 }
 
-/// The default leg with other words in it, in a folder of its own.
+/// Default leg with replaced words, in its own folder.
 fn changed(folder: &Folder, changes: &[(&str, &str)]) -> std::path::PathBuf {
     let mut text = include_str!("../../legs/x2-wearer-75kg.toml").to_owned();
     for (from, to) in changes {
@@ -163,7 +164,7 @@ fn changed(folder: &Folder, changes: &[(&str, &str)]) -> std::path::PathBuf {
 #[test]
 fn motors_that_are_weak_slow_or_slow_to_follow_are_measured_within_their_limits() {
     for changes in [
-        // 3.3 A.
+        // Limit of 3.3 A.
         &[("torque_limit_nm = 85.0", "torque_limit_nm = 5.0")][..],
         &[("speed_limit_deg_s = 257.8", "speed_limit_deg_s = 0.5")],
         &[
@@ -185,7 +186,8 @@ fn motors_that_are_weak_slow_or_slow_to_follow_are_measured_within_their_limits(
         let report = folder.json("motor.json");
         let limit = changes[0].1.ends_with("5.0").then_some(5.0 / 1.5);
         for step in report["steps"].as_array().expect("steps") {
-            // 1 mH takes 0.7 ms at the voltage limit; without feedforward the integral is not there after 2 ms.
+            // 1 mH takes 0.7 ms at the voltage limit; without feedforward the integral has not
+            // settled after 2 ms.
             assert!(number(step, "error_a").abs() < 0.3, "{changes:?}: {} A", step["error_a"]);
             assert!(number(step, "to_a") <= limit.unwrap_or(25.0) + 1e-5);
             assert!((0.0..2.5).contains(&number(step, "rise_ms")), "{changes:?} {}", step["rise_ms"]);
@@ -201,7 +203,7 @@ fn an_axis_that_releases_itself_and_a_supply_that_fails_are_named() {
     let run = scarab("motor --leg", &[&leg]).ends_with(3);
     assert!(run.errors.contains("axis `hip` released its bridge (steps"), "{}", run.errors);
     assert!(run.errors.contains("the bus voltage left 20 V..58 V (`supply`)"), "{}", run.errors);
-    // With a leg on it the servo sees the falling supply before an axis does.
+    // With a leg the servo detects the falling supply before an axis does.
     let run = scarab("identify --drive full --leg", &[&leg]).ends_with(3);
     let words = "fault 0x3220: joint hip, its supply went away";
     assert!(format!("{}{}", run.printed, run.errors).contains(words), "{}{}", run.printed, run.errors);

@@ -1,4 +1,4 @@
-//! `paper`: the report of Tables III and IV as an interface, and what must be true of any few runs.
+//! `paper`: the report of Tables III and IV as an interface, and properties of any few runs.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use crate::command::{Folder, scarab};
 use serde_json::Value;
 
-/// Table IV of two runs, once for all tests here.
+/// Table IV of two runs, shared by all tests here.
 fn rows() -> &'static [Value] {
     static REPORT: OnceLock<Value> = OnceLock::new();
     let report = REPORT.get_or_init(|| table_four("a.json").1);
@@ -81,7 +81,7 @@ fn a_count_is_null_where_too_few_runs_succeed_and_a_number_elsewhere() {
         assert_eq!(row["runs"], 2, "{row}");
         let success = row["success_rate"].as_f64().expect("a number");
         assert!([0.0, 0.5, 1.0].contains(&success), "{row}");
-        // Of two runs the median is the better, the 95th percentile the worse.
+        // With two runs the median is the better one, the 95th percentile the worse.
         assert_eq!(row["iterations_median"].is_u64(), success >= 0.5, "{row}");
         assert_eq!(row["evaluations_median"].is_u64(), success >= 0.5, "{row}");
         assert_eq!(row["iterations_p95"].is_u64(), success >= 1.0, "{row}");
@@ -95,7 +95,7 @@ fn printed_swarm_never_reaches_thirty_dimensions_and_the_default_always_does() {
         assert_eq!(find(function, 30, "bso-paper", 0.1, "f64")["success_rate"], 0.0);
         for precision in ["f64", "f32"] {
             let row = find(function, 30, "bso", 0.1, precision);
-            // Known medians are 16 to 25; 60 evaluations in each iteration, 20 before.
+            // Known medians are 16 to 25; 60 evaluations per iteration, 20 before.
             let (iterations, evaluations) =
                 (row["iterations_p95"].as_u64(), row["evaluations_median"].as_u64());
             assert!(iterations.is_some_and(|count| (5..=40).contains(&count)), "{row}");
@@ -107,7 +107,8 @@ fn printed_swarm_never_reaches_thirty_dimensions_and_the_default_always_does() {
 
 #[test]
 fn searches_of_other_crates_are_really_run() {
-    // Known medians of 100 runs to 0.1: about 2,400 and 3,000 evaluations in thirty dimensions, 430 for the particles in two.
+    // Known medians of 100 runs to 0.1: about 2,400 and 3,000 evaluations in thirty dimensions, 430
+    // for the particle swarm in two.
     for (function, dimension, search, least, most) in [
         ("f1", 30, "cma-es", 1_500, 4_000),
         ("f1", 30, "cma-es-20", 1_800, 4_500),
@@ -133,7 +134,7 @@ fn least_values_are_those_of_the_standard_functions_and_not_the_listed_ones() {
     scarab("paper --table III --json", &[&folder.path("three.json")]).ends_with(0);
     let report = folder.json("three.json");
     let minima = report["minima"].as_array().expect("a list");
-    // Grid, compass search and the value that is stated agree to 1e-9.
+    // Grid, compass search and stated value agree to 1e-9.
     for (function, reading, least) in [
         ("f1", "intended", 0.0),
         ("f2", "intended", -1.031_628_453),
@@ -158,7 +159,7 @@ fn figure_five_is_drawn_for_each_function_small_and_well_formed() {
         let svg = fs::read_to_string(&path).expect("it was drawn");
         roxmltree::Document::parse(&svg).unwrap_or_else(|error| panic!("{function}: {error}"));
         assert!(!svg.contains("NaN") && !svg.contains("inf,"), "{function}");
-        // What a repository should hold.
+        // Suitable size for a repository.
         assert!(svg.len() < 250_000, "{function}: {} bytes", svg.len());
         for word in ["bso-paper", "pso", "bas", "iterations", "evaluations"] {
             assert!(svg.contains(word), "{function}: no {word}");

@@ -1,6 +1,7 @@
-//! The paper's three-joint chain: Tables V and VI, Figure 7, the load that changes, and the swarm on such problems.
+//! Three-joint chain of the paper: Tables V and VI, Figure 7, the load change, and the swarm on
+//! such problems.
 //!
-//! Few runs each: what is asked here has to hold of every one.
+//! Few runs each: the claims must hold for every run.
 
 use hal_sim::tool::paper::printed::{TABLE_FIVE, TABLE_SIX};
 use hal_sim::tool::paper::{convergence, figure_seven, load_change, tables_five_six};
@@ -22,7 +23,7 @@ fn torque_tells_nine_of_twenty_parameters_and_fifteen_sums() {
     let unseen: Vec<_> = report.table_v.iter().filter(|line| line.status == "prior").collect();
     assert_eq!(unseen.iter().map(|line| line.name.as_str()).collect::<Vec<_>>(), ["HZ2"]);
     for line in &report.table_v {
-        // The leg file states bodies about their centres of mass, in eight digits.
+        // The leg file states bodies about their centres of mass with eight digits.
         let truth = line.truth.known().expect("simulated");
         assert!((truth - line.paper.real).abs() < 1e-6, "{}: {truth}", line.name);
         let measured = matches!(line.status, "identified" | "weak");
@@ -37,7 +38,7 @@ fn both_methods_find_the_fifteen_combinations_within_their_sigma() {
     assert_eq!(names, TABLE_SIX.map(|line| line.name));
     for line in &report.table_vi {
         for found in [&line.one_time, &line.sequential, &line.least_squares] {
-            // The root mean square of two errors: 4 sigma is beyond all chance of 45 of them.
+            // Root mean square of two errors: 4 sigma is beyond chance for 45 of them.
             let score = found.error_over_sigma.known().expect("measured");
             assert!(score < 4.0, "{}: {score}", line.name);
         }
@@ -56,9 +57,10 @@ fn the_verification_torque_is_predicted_within_two_percent_of_its_mean() {
     let one_time = of("one-time");
     assert_eq!(one_time.len(), 3);
     assert!(one_time.iter().all(|percent| *percent < figure_seven::GOAL_PERCENT), "{one_time:?}");
-    // Joint 1's small torque is built from what joints 2 and 3 say of their links: the sequential plan misses it.
+    // Joint 1's small torque follows from the link parameters of joints 2 and 3: the sequential
+    // plan misses it.
     assert!(of("sequential")[0] > one_time[0], "{:?}", of("sequential"));
-    // Along gravity: less than a thousandth of what the hip takes.
+    // Axis along gravity: less than a thousandth of the hip's torque.
     assert!(report.links_alone_nm[0] < 1e-3 * report.links_alone_nm[1], "{:?}", report.links_alone_nm);
 }
 
@@ -75,7 +77,7 @@ fn a_changed_load_is_found_where_it_is_and_nowhere_else() {
     }
     let told = |name: &str| report.lines.iter().any(|line| line.name == name && line.told_share == 1.0);
     assert!(["XX3R", "YZ3", "ZZ3", "HY3", "HX2R"].into_iter().all(told));
-    // A load that is known need not be identified: as good as a new identification.
+    // A known load needs no identification: as accurate as a new identification.
     let percent = |set: usize, joint: usize| report.torque[set].percent_of_truth[joint].known();
     for joint in 0..3 {
         assert!(
@@ -88,7 +90,8 @@ fn a_changed_load_is_found_where_it_is_and_nowhere_else() {
 fn the_swarm_arrives_on_single_base_and_consistent_parameters_of_the_leg() {
     let report = convergence::report(1).expect("both legs are recorded");
     let rows: Vec<_> = report.rows.iter().map(|row| (row.problem.as_str(), row.dimension)).collect();
-    // 21 and 10 combinations with friction, 25 and 13 with rotors and offsets. All of Table V but HZ2 and six of friction show.
+    // 21 and 10 combinations with friction, 25 and 13 with rotors and offsets. All of Table V but
+    // HZ2 and six of friction have an effect.
     let expected = [
         ("chain-raw", 25),
         ("chain-base", 21),
@@ -108,8 +111,8 @@ fn the_swarm_arrives_on_single_base_and_consistent_parameters_of_the_leg() {
     assert_eq!(rows, expected);
     for row in &report.rows {
         assert!(!row.problem.ends_with("base") || row.rows.success_rate == 1.0, "{}", row.problem);
-        // No search is better than the optimum it is measured by, but for rounding of numbers near a thousand and what
-        // barriers and the pull on flat directions leave.
+        // No search is better than its reference optimum, except for two effects: rounding of
+        // numbers near a thousand, and barriers and the pull on flat directions.
         let lowest = row.lowest_chi2.known().expect("searched");
         assert!(lowest > -1e-4, "{}: {lowest} chi-square units below the optimum", row.problem);
     }

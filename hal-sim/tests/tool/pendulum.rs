@@ -1,4 +1,4 @@
-//! A pendulum whose recording can be written down: torque in closed form, any stamps, a little noise.
+//! Pendulum with an analytic recording: torque in closed form, any stamps, a little noise.
 
 use scarab::real::sin_cos;
 use std::f64::consts::TAU;
@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 pub const TRUTH: [(&str, f64); 6] =
     [("ZZ1R", 0.8), ("HX1", 1.5), ("HY1", 0.1), ("FC1", 0.6), ("FV1", 0.3), ("OFF1", 0.2)];
 
-/// A leg file without truth and prior; `more` are further keys of its joint.
+/// Leg file without truth and prior; `more` holds further keys of its joint.
 pub fn leg(more: &str) -> String {
     format!(
         "name = \"pendulum\"\ngravity = [9.81, 0.0, 0.0]\n[[joint]]\nname = \"only\"\n\
@@ -16,19 +16,20 @@ pub fn leg(more: &str) -> String {
     )
 }
 
-/// How the pendulum is moved and recorded.
+/// Motion and recording of the pendulum.
 #[derive(Clone, Copy)]
 pub struct Motion {
-    /// Angle about which it swings, rad. It reverses with 20 rad/s2 at least, so hardly any time is spent near
-    /// standstill.
+    /// Centre of the swing, rad. The reversal has at least 20 rad/s2, so hardly any time is spent
+    /// near standstill.
     pub centre: f64,
-    /// Nominal, Hz.
+    /// Nominal rate, Hz.
     pub rate_hz: f64,
     /// Largest error of a stamp, s.
     pub jitter_s: f64,
     /// Half the range of the torque's noise, N m.
     pub noise_nm: f64,
-    /// Anatomical angle and torque are these of the joint times this, after the zero offset (rad) is taken off.
+    /// Sign of anatomical angle and torque relative to the joint's, after subtraction of the zero
+    /// offset (rad).
     pub direction: f64,
     pub zero_offset: f64,
     pub seed: u64,
@@ -49,7 +50,7 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// Lines `t,q,tau` of ten seconds.
+    /// Rows `t,q,tau` of ten seconds.
     pub fn samples(&self) -> Vec<[f64; 3]> {
         let mut random = self.seed;
         // Uniform in +-1 (constants of Knuth's MMIX generator; its high bits).
@@ -81,7 +82,7 @@ impl Motion {
             .collect()
     }
 
-    /// As a recording.
+    /// CSV text of the recording.
     pub fn csv(&self) -> String {
         csv(&self.samples())
     }

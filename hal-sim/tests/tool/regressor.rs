@@ -1,4 +1,4 @@
-//! `scarab-sim regressor` against torques and regressors of an independent rigid-body library.
+//! `scarab-sim regressor` compared with an independent rigid-body library.
 
 use crate::command::{Folder, Table, scarab};
 use scarab::real::sin_cos;
@@ -13,8 +13,8 @@ fn states() -> String {
     format!("{REFERENCE}/torque.csv")
 }
 
-/// A leg file of the reference: inertias about the centre of mass, with rotors, friction and offsets that must not
-/// show.
+/// Leg file of the reference: inertias about the centre of mass, with rotors, friction and offsets
+/// that must have no effect.
 fn leg(key: &str) -> String {
     let text = std::fs::read_to_string(format!("{REFERENCE}/truth.json")).expect("the reference");
     let truth: Value = serde_json::from_str(&text).expect("JSON");
@@ -23,7 +23,7 @@ fn leg(key: &str) -> String {
         let [xx, xy, xz, yy, yz, zz, hx, hy, hz, mass] =
             ELEMENTS.map(|symbol| link[symbol].as_f64().expect("a number"));
         let [x, y, z] = [hx, hy, hz].map(|moment| moment / mass);
-        // Parallel axis; the tensor's products are negative integrals.
+        // Parallel-axis theorem; the tensor's products are negative integrals.
         let inertia = [
             xx - mass * (y * y + z * z),
             xy + mass * x * y,
@@ -65,7 +65,7 @@ fn errors(table: &Table) -> (f64, f64) {
     }
     let torque_error = error / largest;
     (error, largest) = (0.0, 0.0);
-    // The reference has a row for each state and joint: k, joint, twenty elements.
+    // The reference has a row per state and joint: k, joint, twenty elements.
     let expected = Table::read(&format!("{REFERENCE}/regressor.csv"));
     for (number, theirs) in expected.rows.iter().enumerate() {
         let ours = &table.rows[number / 2][3 + 20 * (number % 2)..][..20];
@@ -87,11 +87,12 @@ fn torque_and_regressor_are_those_of_the_reference_without_rotor_friction_and_of
     let table = Table::parse(&run.printed);
     assert_eq!(table.header.join(","), header());
     assert_eq!(table.column("k"), (0..50).map(f64::from).collect::<Vec<_>>(), "counted, not copied");
-    // The reference's files carry 15 digits.
+    // The reference's files have 15 digits.
     let (torque, elements) = errors(&table);
     assert!(torque < 1e-12 && elements < 1e-12, "torque {torque:e}, regressor {elements:e}");
 
-    // The device's arithmetic rounds ten times or so, at 6e-8; that it is seen at all shows it is another one.
+    // The device's arithmetic rounds about ten times, at 6e-8; a visible difference proves that it
+    // was used.
     let run = scarab(&format!("regressor --dh --f32 --states {} --leg", states()), &[&file]).ends_with(0);
     let (torque, elements) = errors(&Table::parse(&run.printed));
     assert!((1e-9..1e-6).contains(&torque), "torque {torque:e}");
@@ -116,15 +117,16 @@ fn angles_are_anatomical_unless_they_are_said_to_be_dh() {
     };
     let short = "q1,q2,qd1,qd2,qdd1,qdd2";
     let dh = printed("--dh", short, chain);
-    // A moment of mass along the first link hangs straight down where its D-H angle is 0.
+    // A first moment along the first link hangs straight down at a D-H angle of 0.
     let gravity = 9.81 * sin_cos(zero - angles[0]).0;
     assert!((dh.column("y1_HX1")[0] - gravity).abs() < 1e-12, "{gravity}");
-    // The names of a recording's columns are known too.
+    // Column names of a recording are accepted too.
     for header in [short, "q1_rad,q2_rad,qd1_radps,qd2_radps,qdd1_radps2,qdd2_radps2"] {
         let own = printed("", header, anatomical);
         assert_eq!(own.header, dh.header);
         for (name, (own, dh)) in own.header.iter().zip(own.rows[0].iter().zip(&dh.rows[0])).skip(1) {
-            // Torque and regressor row turn with the angle; the angle is the same but for its last bit.
+            // Torque and regressor row change sign with the angle; the angle is equal except for
+            // its last bit.
             assert!((own + dh).abs() < 1e-12 * 60.0, "{name}: {own} {dh}");
         }
         assert!(own.column("tau1")[0].abs() > 1.0);
@@ -134,7 +136,7 @@ fn angles_are_anatomical_unless_they_are_said_to_be_dh() {
 #[test]
 fn single_precision_rounds_the_states_too() {
     let folder = Folder::new();
-    // 0.1 is not a number in either precision; the element is a plain copy of the acceleration.
+    // 0.1 is not exact in either precision; the element is a copy of the acceleration.
     let states = folder.write("states.csv", "q1,qd1,qdd1\n0,0,0.1\n");
     let element = |arguments: &str| {
         let run = scarab(&format!("regressor --leg sp {arguments} --states"), &[&states]).ends_with(0);
@@ -214,7 +216,7 @@ fn bad_states_are_refused_with_file_line_and_reason() {
         "error: states.csv:1: the header has the column `q1` twice\n"
     );
     assert_eq!(refusal(""), "error: states.csv: the file is empty\n");
-    // Nothing is written before everything is known to be good; blank lines count.
+    // Nothing is written before all states are valid; blank lines count.
     let states = folder.write("states.csv", "q1,qd1,qdd1\n0,0,1e30\n\n0,0,1e39\n");
     let message = scarab("regressor --leg sp --f32 --states", &[&states]).refusal();
     let reason = ":4: the torque of this state is beyond the range of the numbers computed with\n";
@@ -232,7 +234,7 @@ fn bad_states_are_refused_with_file_line_and_reason() {
 #[test]
 fn a_reader_that_closes_the_pipe_early_is_no_fault() {
     let folder = Folder::new();
-    // A megabyte: more than any pipe holds.
+    // A megabyte: more than the capacity of any pipe.
     let text = "q1,qd1,qdd1\n".to_owned() + &"0.1,0.2,0.3\n".repeat(20_000);
     let states = folder.write("states.csv", &text);
     let mut tool = Command::new(env!("CARGO_BIN_EXE_scarab-sim"))

@@ -1,4 +1,4 @@
-//! `scarab-sim replay` as an interface: what may be recorded, what the report and the table of torques hold.
+//! `scarab-sim replay` as an interface: valid recordings, contents of the report and the torque table.
 
 use crate::command::{Folder, MUJOCO, base, fit, reasons, scarab};
 use crate::pendulum::{Motion, TRUTH, leg};
@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Replays the named recordings of the folder with its `leg.toml`; leaves `report.json` and `torque.csv`.
+/// Replays the named recordings of the folder with its `leg.toml`; writes `report.json` and `torque.csv`.
 fn replay(folder: &Folder, files: &[&str], arguments: &str) -> (Value, crate::command::Run) {
     let files: Vec<_> = files.iter().map(|name| folder.path(name)).collect();
     let (leg, json, csv) = (folder.path("leg.toml"), folder.path("report.json"), folder.path("torque.csv"));
@@ -30,15 +30,15 @@ fn folder_with(more: &str, recordings: &[(&str, Motion)]) -> Folder {
     folder
 }
 
-/// Fails unless every base parameter is right; returns the largest error, in sigma.
+/// Fails unless every base parameter is right; returns the largest error in sigma.
 ///
-/// The noise of one recording, 3.5 sigma in the worst of six parameters, and beside it what the filter's passband
-/// (flat to 1.6e-4) and resampling change.
+/// Tolerance: noise of one recording, 3.5 sigma in the worst of six parameters. The effects of the
+/// filter's passband (flat to 1.6e-4) and of resampling are added.
 fn finds_the_truth(report: &Value) -> f64 {
     let errors = TRUTH.map(|(name, truth)| {
         let (error, sigma) = (base(report, name, "value") - truth, base(report, name, "sigma"));
         assert!(error.abs() < 3.5 * sigma + 3e-4 * truth, "{name}: off by {error}, sigma {sigma}");
-        // 0.2 N m of noise on 15 N m.
+        // Noise of 0.2 N m on 15 N m.
         assert!(sigma < 0.05 * truth, "{name}: sigma {sigma}");
         error.abs() / sigma
     });
@@ -66,10 +66,10 @@ fn direction_turns_angle_and_torque_and_the_zero_offset_only_the_angle() {
     let (report, _) = replay(&folder, &["a.csv"], "--split 0.5");
     for (name, _) in TRUTH {
         let difference = base(&report, name, "value") - base(&expected, name, "value");
-        // Nine digits in the file, single precision: far below the noise.
+        // Nine digits in the file and single precision: far below the noise.
         assert!(difference.abs() < 0.05 * base(&expected, name, "sigma"), "{name}: {difference}");
     }
-    // What comes out is anatomical again.
+    // The output is anatomical again.
     let (torques, expected) = (folder.table("torque.csv"), plain.table("torque.csv"));
     for column in ["tau1_measured_Nm", "tau1_predicted_Nm"] {
         for (ours, theirs) in torques.column(column).iter().zip(expected.column(column)) {
@@ -80,7 +80,7 @@ fn direction_turns_angle_and_torque_and_the_zero_offset_only_the_angle() {
 
 #[test]
 fn several_files_are_one_training_set_and_no_window_reaches_across() {
-    // The pendulum jumps by two radians from one file to the next.
+    // The pendulum jumps by two radians between the files.
     let (one, other) = (Motion::default(), Motion { centre: -1.6, seed: 2, ..Motion::default() });
     let folder = folder_with("", &[("a.csv", one), ("b.csv", other)]);
     let (alone, _) = replay(&folder, &["a.csv"], "");
@@ -94,14 +94,14 @@ fn several_files_are_one_training_set_and_no_window_reaches_across() {
         let difference = (base(&both, name, "value") - base(&reversed, name, "value")).abs();
         assert!(difference < 0.05 * sigma, "{name}: {difference} of {sigma}");
     }
-    // The samples less the window of the smoothing, every tenth; rows are cut short at the ends of a file.
+    // Samples minus the smoothing window, every tenth; rows are cut at the ends of a file.
     let smoothing = Kernel::<f64, 512>::new(8.0 * SMOOTHING_BANDWIDTHS, 500.0).expect("fits");
     let rows = (5000 - smoothing.taps() + 1).div_ceil(10);
     for name in ["a.csv", "b.csv"] {
         let line = run.printed.lines().find(|line| line.contains(name)).expect("a line for the file");
         let cells: Vec<&str> = line.split_whitespace().collect();
         assert_eq!(cells[1..5], ["training", "0.00", "10.00", "500"], "{line}");
-        // Rows used and rows of a joint that turned round slowly.
+        // Used rows, and rows of a joint that turned slowly.
         let counts: Vec<usize> = cells[5..].iter().filter_map(|cell| cell.parse().ok()).collect();
         assert_eq!(counts.iter().sum::<usize>(), rows, "{line}");
         assert!(counts[1] < rows / 20, "{line}");
@@ -202,7 +202,7 @@ fn what_was_not_validated_says_so() {
     assert_eq!(report["validated"], true);
 }
 
-/// Fails unless the object has these keys, each a number or, where it may be, null.
+/// Fails unless the object has these keys, each a number or, if allowed, null.
 fn has_numbers(object: &Value, numbers: &[&str], may_be_null: bool) {
     for key in numbers {
         let value = object.get(key).unwrap_or_else(|| panic!("no {key} in {object}"));
@@ -210,7 +210,7 @@ fn has_numbers(object: &Value, numbers: &[&str], may_be_null: bool) {
     }
 }
 
-/// Every field of the interface.
+/// Checks every field of the interface.
 fn is_complete(report: &Value, joints: usize) {
     has_numbers(report, &["schema", "swarm_seed", "rank", "columns", "simulated_s", "wall_s"], false);
     has_numbers(report, &["condition", "seed"], true);
@@ -263,10 +263,10 @@ fn reports_are_complete_and_free_of_nan_whatever_the_verdict() {
     is_complete(&report, 2);
     assert_eq!((&report["verdict"], reasons(&report).len()), (&"accepted".into(), 0));
     assert!(report["parameters"].as_array().expect("a list").iter().all(|entry| entry["value"].is_number()));
-    // A parameter in no sum of others is its own base parameter.
+    // A parameter that is in no sum is its own base parameter.
     assert_eq!(base(&report, "HX2", "value"), report["parameters"][14 + 6]["value"]);
 
-    // Motionless, no prior, no truth: nothing is known.
+    // No motion, prior or truth: nothing is known.
     folder.write("leg.toml", &leg(""));
     let still: Vec<[f64; 3]> = (0..2500).map(|k| [f64::from(k) * 0.002, 0.3, 1.5]).collect();
     let (leg, still) = (folder.path("leg.toml"), folder.write("still.csv", &crate::pendulum::csv(&still)));
@@ -280,7 +280,7 @@ fn reports_are_complete_and_free_of_nan_whatever_the_verdict() {
     assert_eq!(report["verdict"], "refused");
     assert!(reasons(&report).contains(&"unexcited"), "{:?}", reasons(&report));
     assert!(report["parameters"].as_array().expect("a list").iter().all(|entry| entry["value"].is_null()));
-    // The table of torques is written for a refused result too.
+    // The torque table is also written for a rejected result.
     assert!(!folder.table("torque.csv").rows.is_empty());
 }
 

@@ -1,9 +1,9 @@
-//! `scarab-sim replay` on the recording of a leg that another physics engine simulated, at 8 Hz.
+//! `scarab-sim replay` on a recording from another physics engine, at 8 Hz.
 //!
-//! Two periods train, the third is held out. Friction at rest is whatever keeps the joint at rest, so rows in whose
-//! window it stood still say nothing of a model and are left out, in the tool by the smoothed speed and here by the
-//! true one. The hip's mean absolute torque is 10.3 N m in the rows that are left and 7.7 N m over the whole motion,
-//! so it is stated which one an error is related to.
+//! Two periods train, the third is held out. Friction at rest is undetermined, so rows with a
+//! resting joint in their window are excluded. The tool decides by the smoothed speed, this test by
+//! the true one. The hip's mean absolute torque is 10.3 N m in the remaining rows and 7.7 N m over
+//! the whole motion; each error states its reference.
 
 use crate::command::{Folder, MUJOCO, Table, base, fit, scarab};
 use scarab::ident::LowPass;
@@ -12,7 +12,7 @@ use scarab::real::sqrt;
 use std::path::Path;
 
 const CLEAN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/mujoco_leg/clean_torque.csv");
-/// Of hip and knee over the whole motion, N m, from the simulation.
+/// Mean absolute torque of hip and knee over the whole motion, N m, from the simulation.
 const MEAN_ABSOLUTE: [f64; 2] = [7.6965, 4.8675];
 const BANDWIDTH_HZ: f64 = 8.0;
 const CLEAN_RATE_HZ: f64 = 100.0;
@@ -30,7 +30,8 @@ fn torque_held_out_is_predicted_to_the_noise_of_the_recording() {
     for plan in ["one-time", "sequential"] {
         replay(&folder, &format!("--plan {plan}"));
         let report = folder.json("report.json");
-        // Of the mean over the whole motion noise alone is 0.95 and 0.76 %; measured: 1.040 and 0.841 %.
+        // Relative to the mean over the whole motion, noise alone is 0.95 and 0.76 %; measured:
+        // 1.040 and 0.841 %.
         for (joint, limit, limit_of_whole) in [(1, 1.05, 1.05), (2, 0.9, 0.9)] {
             let percent = fit(&report, "validation", joint, "percent_of_mean_abs");
             let of_whole = 100.0 * fit(&report, "validation", joint, "rms_nm") / MEAN_ABSOLUTE[joint - 1];
@@ -49,7 +50,7 @@ fn parameters_of_the_simulated_leg_are_found_within_their_sigma() {
     replay(&folder, "");
     let report = folder.json("report.json");
     assert_eq!(report["rank"], 13);
-    // One draw of the noise: 13 errors of up to three sigma; heavy parameters within 4 % as well.
+    // One draw of the noise: 13 errors of up to three sigma; large parameters also within 4 %.
     for entry in report["base_parameters"].as_array().expect("a list") {
         let name = entry["name"].as_str().expect("a name");
         let [value, sigma, truth] = ["value", "sigma", "truth"].map(|field| base(&report, name, field));
@@ -69,7 +70,7 @@ fn noise_free_torque_held_out_is_predicted_within_half_a_percent() {
     let low_pass = LowPass::<f64, 64>::new(BANDWIDTH_HZ, CLEAN_RATE_HZ).expect("fits");
     for joint in [1, 2] {
         let (time, torque) = (predicted.column("t_s"), predicted.column(&format!("tau{joint}_predicted_Nm")));
-        // Clean stamps lie between two of the grid's: the mean of both, 2 ms apart.
+        // A noise-free stamp lies between two of the grid's: the mean of both, 2 ms apart.
         let at = |now: f64| {
             let right = time.partition_point(|&stamp| stamp < now);
             let share = (now - *time.get(right.checked_sub(1)?)?) / (time.get(right)? - time[right - 1]);
@@ -77,7 +78,7 @@ fn noise_free_torque_held_out_is_predicted_within_half_a_percent() {
         };
         let speed = clean.column(&format!("qd{joint}_radps"));
         let truth = clean.column(&format!("tau{joint}_Nm"));
-        // Error and speed wherever there is a prediction.
+        // Error and speed at every prediction.
         let (errors, speeds): (Vec<f64>, Vec<f64>) = clean
             .column("t_s")
             .iter()

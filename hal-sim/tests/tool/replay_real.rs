@@ -1,8 +1,9 @@
 //! `scarab-sim replay` on recordings of real machines, held out, at 5 Hz.
 //!
-//! Read where `SCARAB_RECORDINGS` names their folder (`dp_A0`: planar double pendulum, BSD-3-Clause, DFKI RIC 2022;
-//! `sp`: single pendulum, BSD-3-Clause, DFKI RIC 2021). "To beat" is weighted least squares on angle and torque that
-//! went through a second-order Butterworth filter forward and backward, cut-off 5 Hz (-3 dB at 4 Hz), over all rows.
+//! `SCARAB_RECORDINGS` names the folder (`dp_A0`: planar double pendulum, BSD-3-Clause, DFKI RIC
+//! 2022; `sp`: single pendulum, BSD-3-Clause, DFKI RIC 2021). "To beat" is weighted least squares
+//! over all rows. Its angle and torque pass a second-order Butterworth filter forward and backward,
+//! cut-off 5 Hz (-3 dB at 4 Hz).
 
 use crate::command::{Folder, Table, fit, reasons, scarab};
 use scarab::real::{sin_cos, sqrt};
@@ -12,14 +13,14 @@ use std::path::{Path, PathBuf};
 fn recordings() -> Option<PathBuf> {
     let folder = std::env::var_os("SCARAB_RECORDINGS").map(PathBuf::from);
     if folder.is_none() {
-        // Past the harness, which keeps back what a passing test prints.
+        // Bypasses the test harness, which suppresses the output of passing tests.
         let notice = "SKIPPED replay of recordings of real machines: SCARAB_RECORDINGS names no folder";
         writeln!(std::io::stderr(), "{notice}").expect("standard error");
     }
     folder
 }
 
-/// Runs `replay` with `@name` standing for a recording; returns the report and the table of torques.
+/// Runs `replay`; `@name` stands for a recording. Returns the report and the torque table.
 fn replay(recordings: &Path, arguments: &str, code: i32) -> (serde_json::Value, Table) {
     let folder = Folder::new();
     let arguments = format!("replay {}", arguments.replace('@', &format!("{}/", recordings.display())));
@@ -28,7 +29,8 @@ fn replay(recordings: &Path, arguments: &str, code: i32) -> (serde_json::Value, 
     (folder.json("report.json"), folder.table("torque.csv"))
 }
 
-/// The other filter: second-order Butterworth at 5 Hz of 500, forward and backward, at rest in its first value.
+/// Reference filter: second-order Butterworth at 5 Hz of 500, forward and backward, at rest at its
+/// first value.
 fn butterworth(values: &[f64]) -> Vec<f64> {
     let (sine, cosine) = sin_cos(std::f64::consts::PI * 5.0 / 500.0);
     let warped = sine / cosine;
@@ -48,7 +50,8 @@ fn butterworth(values: &[f64]) -> Vec<f64> {
     once(once(values.to_vec()))
 }
 
-/// Root mean square of measured minus predicted torque through the other filter, over all rows of the table, N m.
+/// Root mean square of measured minus predicted torque through the reference filter, over all rows
+/// of the table, N m.
 fn judged(table: &Table, joint: usize) -> f64 {
     let file = table.column("file");
     let measured = table.column(&format!("tau{joint}_measured_Nm"));
@@ -70,9 +73,10 @@ fn held_out_torque_of_real_machines_is_predicted_as_well_as_stated() {
     let double =
         "@dp_A0/00.csv @dp_A0/01.csv @dp_A0/03.csv @dp_A0/05.csv @dp_A0/13.csv --leg dp-a0 --bandwidth 5";
     let excitation = "--validate @dp_A0/02.csv @dp_A0/04.csv @dp_A0/12.csv";
-    // Limits in N m, 3 % above what was measured: as printed (-3 dB at 5 Hz, rows in which the joint moves), and from
-    // the table through the other filter, over all rows. To beat: 0.100; 0.148, 0.098; 0.202, 0.135. The pendulum's
-    // file has 6 s; its three seconds of training hardly show the offset that is estimated with the rest.
+    // Limits in N m, 3 % above the measured values. First as printed: -3 dB at 5 Hz, rows in which
+    // the joint moves. Then from the table through the reference filter, over all rows. To beat:
+    // 0.100; 0.148, 0.098; 0.202, 0.135. The pendulum's file has 6 s; its three seconds of training
+    // hardly determine the estimated offset.
     let table: [(&str, String, &[f64], &[f64]); 3] = [
         (
             "sp/ddp, first half -> second",
@@ -117,7 +121,7 @@ fn recordings_that_are_no_free_motion_are_refused() {
     // The torque column is the command m g l sin q: a perfect fit with a negative inertia, and no friction.
     let (report, _) = replay(&recordings, "@sp/gravcomp.csv --leg sp --split 0.5 --bandwidth 5", 3);
     assert_eq!(reasons(&report), ["unphysical", "not_a_measurement"]);
-    // Somebody pushed in the second half.
+    // Disturbed by a push in the second half.
     let (report, _) = replay(&recordings, "@sp/energy.csv --leg sp --split 0.5 --bandwidth 5", 3);
     assert_eq!(reasons(&report), ["validation"]);
 }

@@ -1,10 +1,11 @@
-//! Everything `scarab-sim replay` refuses: bad input with a message and exit code 2, bad results with a reason and 3.
+//! Rejections of `scarab-sim replay`: bad input with a message and exit code 2, bad results with a
+//! reason and 3.
 
 use crate::command::{Folder, MUJOCO, reasons, scarab};
 use crate::pendulum::{Motion, leg};
 use std::path::Path;
 
-/// The message for a recording, its folder taken off. A report must not be left behind.
+/// Message for a recording, without its folder. No report may be left behind.
 fn refusal(text: &str) -> String {
     let folder = Folder::new();
     let (file, leg) = (folder.write("walk.csv", text), folder.write("leg.toml", &leg("")));
@@ -14,7 +15,7 @@ fn refusal(text: &str) -> String {
     message.replace(&folder.path("").display().to_string(), "")
 }
 
-/// The message for a good recording whose line 102 is replaced.
+/// Message for a valid recording with line 102 replaced.
 fn refusal_with(line: &str) -> String {
     let good = Motion::default().csv();
     let mut lines: Vec<&str> = good.lines().collect();
@@ -104,7 +105,7 @@ fn time_in_another_unit_is_refused_by_the_rate_with_the_likely_unit() {
          seconds: are these milliseconds? In milliseconds it would be 500 Hz\n"
     );
     assert!(refused(1e6).ends_with("are these microseconds? In microseconds it would be 500 Hz\n"));
-    // Sample numbers.
+    // Sample numbers instead of times.
     assert!(refused(500.0).contains("are these milliseconds or sample numbers?"));
 }
 
@@ -125,12 +126,12 @@ fn legs_that_do_not_exist_or_cannot_be_are_refused() {
     assert!(message.contains("missing field `gravity`"), "{message}");
     let message = refused(&folder.write("leg.toml", &leg("direction = 2\n")));
     assert!(message.contains("leg.toml:7: "), "{message}");
-    // A leg of two joints and a recording of one.
+    // Leg of two joints and a recording of one.
     let message = refused(Path::new("mujoco-leg"));
     assert!(message.contains("walk.csv:1: the header has no column `q2_rad`"), "{message}");
 }
 
-/// Verdict's reasons for a recording of the MuJoCo leg whose header is replaced.
+/// Reasons of the verdict for a recording of the MuJoCo leg with a replaced header.
 fn reasons_with_header(header: &str, arguments: &str) -> Vec<String> {
     let folder = Folder::new();
     let text = std::fs::read_to_string(MUJOCO).expect("the recording");
@@ -162,7 +163,7 @@ fn a_motionless_joint_is_refused_as_unexcited() {
     let folder = Folder::new();
     let leg = folder.write("leg.toml", &leg(""));
     let json = folder.path("report.json");
-    // An encoder's last bit and a torque that wanders change nothing.
+    // A flickering encoder bit and a drifting torque change nothing.
     let still: Vec<[f64; 3]> = (0..5000)
         .map(|k| [f64::from(k) * 0.002, 0.3 + 3.8e-4 * f64::from(k % 7 / 6), 1.5 + 1e-4 * f64::from(k)])
         .collect();
@@ -171,7 +172,7 @@ fn a_motionless_joint_is_refused_as_unexcited() {
     assert!(run.printed.contains("unexcited: joint 1 hardly moved"), "{}", run.printed);
     assert!(reasons(&folder.json("report.json")).contains(&"unexcited"));
 
-    // One joint of two: the knee's column repeats its first angle.
+    // Only one joint moves: the knee's column repeats its first angle.
     let text = std::fs::read_to_string(MUJOCO).expect("the recording");
     let knee_still: Vec<String> = text
         .lines()

@@ -1,4 +1,4 @@
-//! The report page: whole, well-formed, honest about what is not known, and safe against what a file may contain.
+//! Report page: complete, well-formed, explicit about unknowns, and safe against the contents of files.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use scraper::{Html, Selector};
 
 const LEG: &str = include_str!("../../legs/x2-wearer-75kg.toml");
 
-/// A page as a browser reads it.
+/// Page as parsed by a browser.
 struct Page {
     text: String,
     document: Html,
@@ -97,7 +97,7 @@ fn counts_are_whole_numbers_and_values_have_the_digits_of_their_sigma() {
     for cell in ["1.000", "2.000", "3.000"] {
         assert!(!cells.iter().any(|found| found == cell), "a count is shown as {cell}");
     }
-    // The rest of a zero of the prior.
+    // Rounding remainder of a prior's zero.
     let hidden = report["parameters"][2]["value"].as_f64().expect("XZ1");
     assert!(hidden != 0.0 && hidden.abs() < 1e-12, "XZ1 of this run is rounding: {hidden}");
     for row in page.all("table.parameters tbody tr") {
@@ -108,7 +108,7 @@ fn counts_are_whole_numbers_and_values_have_the_digits_of_their_sigma() {
         rows.into_iter().find(|row| row.starts_with(name)).unwrap_or_else(|| panic!("no {name}"))
     };
     assert!(row("XZ1").starts_with("XZ10\u{2013}"), "{}", row("XZ1"));
-    // Two digits of sigma and the value to the same place; three digits without sigma.
+    // Two digits of sigma and the value to the same decimal place; three digits without sigma.
     let digits = |name: &str| row(name)[name.len()..].split_once(['k', 'N']).expect("a unit").0.to_owned();
     let known = report["parameters"].as_array().expect("a list").iter().find(|one| one["name"] == "FC1");
     let of = |key: &str| known.expect("FC1")[key].as_f64().expect("a number");
@@ -162,7 +162,7 @@ fn what_a_leg_is_called_is_text_and_nothing_else() {
 #[test]
 fn a_refused_run_says_so_first_and_gives_every_reason() {
     let folder = Folder::new();
-    // A recording whose torque is another joint's motion: nothing explains it.
+    // Recording with another joint's torque: nothing explains it.
     let recording = fs::read_to_string(MUJOCO).expect("a recording");
     let mut lines = recording.lines();
     let header = lines.next().expect("a header");
@@ -191,7 +191,7 @@ fn a_refused_run_says_so_first_and_gives_every_reason() {
     }
     let residual = given.iter().find(|words| words.starts_with("residual")).expect("a reason");
     assert!(residual.contains("joint 1 is off by") && residual.contains("at most"), "{residual}");
-    // Nothing that failed is left out, and the table marks it.
+    // Every failure is listed, and the table marks it.
     for finding in report["findings"].as_array().expect("a list") {
         let words = finding["words"].as_str().expect("a sentence");
         assert!(finding["passed"] == true || page.one(".verdict").contains(words), "{words}");
@@ -205,14 +205,14 @@ fn what_a_recording_without_a_prior_does_not_tell_is_a_dash() {
     let (page, json) = (folder.path("report.html"), folder.path("run.json"));
     let arguments =
         format!("replay {MUJOCO} --leg mujoco-leg --prior none --json {} --report", json.display());
-    // Whether it is accepted is not this test's matter.
+    // The verdict is irrelevant here.
     scarab(&arguments, &[&page]);
     let page = Page::read(&folder);
     let report = folder.json("run.json");
     let unknown = report["parameters"].as_array().expect("a list").iter();
     let unknown: Vec<_> = unknown.filter(|parameter| parameter["value"].is_null()).collect();
     assert!(unknown.len() > 10, "a planar leg without a prior knows few of its parameters");
-    // Name, value and sigma of each; a value that is not known has no bar either.
+    // Name, value and sigma of each parameter; an unknown value has no bar.
     let rows = page.all("table.parameters tbody tr");
     assert_eq!((rows.len(), page.all("svg.bar").len()), (28, 28 - unknown.len()));
     for parameter in unknown {
@@ -235,7 +235,7 @@ fn many_runs_are_a_page_of_how_they_lie_about_truth() {
     for (row, base) in rows.iter().zip(runs[0]["base_parameters"].as_array().expect("a list")) {
         assert!(row.starts_with(base["name"].as_str().expect("a name")) && row.ends_with('6'), "{row}");
     }
-    // Mean error of the first parameter in the sigma of each run, as the page says it.
+    // Mean error of the first parameter in the sigma of each run, as printed on the page.
     let errors = runs.iter().map(|run| {
         let of = |key: &str| run["base_parameters"][0][key].as_f64().expect("a number");
         (of("value") - of("truth")) / of("sigma")

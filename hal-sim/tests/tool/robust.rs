@@ -1,4 +1,4 @@
-//! Wild samples, pushes and Stribeck friction: what robust identification is worth against plain least squares.
+//! Outliers, pushes and Stribeck friction: robust identification compared with plain least squares.
 
 use hal_sim::tool::leg_file::LegFile;
 
@@ -8,7 +8,8 @@ use serde_json::Value;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Errors of the base parameters of all runs over their Cramer-Rao bounds, root mean square; static friction apart.
+/// Errors of the base parameters of all runs over their Cramer-Rao bounds, root mean square;
+/// without static friction.
 fn pooled_error(runs: &Value) -> f64 {
     let runs = runs["runs"].as_array().expect("runs").iter();
     let bases = runs.flat_map(|run| run["base_parameters"].as_array().expect("a list"));
@@ -35,7 +36,7 @@ fn a_rough_leg_is_identified_three_times_closer_to_truth_than_by_plain_least_squ
     let (robust, plain) = (run("robust"), run("plain"));
     let errors = [pooled_error(&robust), pooled_error(&plain)];
     println!("pooled errors over the Cramer-Rao bound: robust {:.2}, plain {:.1}", errors[0], errors[1]);
-    // Fifty seeds: 1.33 and 24.
+    // Over fifty seeds: 1.33 and 24.
     assert!(errors[1] > 3.0 * errors[0], "{errors:?}");
     assert!(errors[0] < 2.0, "{errors:?}");
     for run in robust["runs"].as_array().expect("runs") {
@@ -64,14 +65,14 @@ fn no_joint_of_the_default_leg_shows_stribeck_friction_and_next_to_nothing_is_se
     let run = folder.json("run.json");
     assert_eq!(run["stribeck"], serde_json::json!([]));
     let replaced = run["outliers"]["replaced"].as_array().expect("a list").iter();
-    // 6 in 100,000 over 200 seeds: three of 44,000 values.
+    // Measured over 200 seeds: 6 in 100,000, or three of 44,000 values.
     assert!(replaced.map(|count| count.as_u64().expect("a count")).sum::<u64>() < 12);
     for share in run["outliers"]["disturbed_share"].as_array().expect("a list") {
         assert!(share.as_f64().expect("a share") < 0.05, "{share}");
     }
 }
 
-/// Numbers from 0 to 1, the same every time.
+/// Reproducible random numbers from 0 to 1.
 struct Dice(u64);
 
 impl Dice {
@@ -85,8 +86,8 @@ impl Dice {
     }
 }
 
-/// The recording with 3 % of its torques wild by one to two times their greatest, 3 % of its angles by 0.05 to 0.3 rad, and
-/// pushes of 0.3 of the greatest torque for 0.3 s, so many a minute on each joint.
+/// Recording with 3 % of its torques off by one to two times their maximum, and 3 % of its angles by 0.05
+/// to 0.3 rad. Pushes of 0.3 of the largest torque last 0.3 s, at the given rate per minute on each joint.
 fn corrupted(recording: &Path, pushes_per_minute: f64) -> String {
     let mut table = Table::read(recording.to_str().expect("a path"));
     let mut dice = Dice(1);
@@ -106,7 +107,7 @@ fn corrupted(recording: &Path, pushes_per_minute: f64) -> String {
             }
         }
         for push in 0..if torque { pushes } else { 0 } {
-            // Never both joints at once: that would be contact.
+            // Never both joints at once: that would count as contact.
             let phase = if name == "tau1_Nm" { 0.1 } else { 0.6 };
             let share = (push as f64 + phase + 0.2 * dice.roll()) / pushes as f64;
             let (begin, size) = (time[0] + share * (time[time.len() - 1] - time[0]), dice.sign());
@@ -120,8 +121,8 @@ fn corrupted(recording: &Path, pushes_per_minute: f64) -> String {
     format!("{}\n{}\n", table.header.join(","), rows.join("\n"))
 }
 
-/// Root mean square distance of least squares on the corrupted recording from the robust result on the clean one, in its
-/// sigma: robust and plain; the robust report is looked at by `check`.
+/// Root mean square distance of least squares on the corrupted recording from the robust result on
+/// the clean one, in its sigma: robust and plain. The robust report is passed to `check`.
 fn distances(recording: &Path, arguments: &str, pushes_per_minute: f64, check: impl Fn(&Value)) -> [f64; 2] {
     let folder = Folder::new();
     let bad = folder.write("bad.csv", &corrupted(recording, pushes_per_minute));
@@ -151,13 +152,13 @@ fn distances(recording: &Path, arguments: &str, pushes_per_minute: f64, check: i
 #[test]
 fn a_recording_corrupted_afterwards_gives_the_parameters_it_had_before() {
     let [robust, plain] = distances(Path::new(MUJOCO), "--leg mujoco-leg --bandwidth 8", 8.0, |report| {
-        // Whether a leg that is pushed in both joints is taken for one that stands on the floor is not this test's matter.
-        // 3 % of 15,000 angles and as many torques of each joint are 900; a few are not found or are too many.
+        // Whether pushes in both joints count as contact with the floor is irrelevant here. 3 % of
+        // 15,000 angles and as many torques of each joint are 900; a few are missed or are false.
         for count in report["outliers"]["replaced"].as_array().expect("a list") {
             assert!((800..1000).contains(&count.as_u64().expect("a count")), "{count}");
         }
     });
-    // Measured 0.31 and 137; three other draws 0.24 to 0.38 and 145 to 147.
+    // Measured 0.31 and 137; three other draws gave 0.24 to 0.38 and 145 to 147.
     assert!(robust < 0.7, "{robust} sigma");
     assert!(plain > 3.0 * robust, "plain {plain} sigma, robust {robust}");
 }
@@ -165,17 +166,18 @@ fn a_recording_corrupted_afterwards_gives_the_parameters_it_had_before() {
 #[test]
 fn wild_samples_are_replaced_at_the_rate_of_the_recording_not_after_resampling_smeared_them() {
     let Some(recordings) = std::env::var_os("SCARAB_RECORDINGS").map(PathBuf::from) else {
-        // Past the harness, which keeps back what a passing test prints.
+        // Bypasses the test harness, which suppresses the output of passing tests.
         let notice = "SKIPPED the corrupted pendulum: SCARAB_RECORDINGS names no folder";
         writeln!(std::io::stderr(), "{notice}").expect("standard error");
         return;
     };
-    // Its stamps are jittered, so it is interpolated. No pushes: 6 s are too short to find them.
+    // The stamps are jittered, so the recording is interpolated. No pushes: 6 s are too short to find them.
     let [robust, plain] =
         distances(&recordings.join("sp/ddp.csv"), "--leg sp --bandwidth 5", 0.0, |report| {
             assert_eq!(reasons(report), Vec::<&str>::new());
         });
-    // Four other draws: 0.05 to 0.26 sigma, plain 9 to 11; replaced after resampling 1.0 to 3.8 and refused.
+    // Four other draws: 0.05 to 0.26 sigma, plain 9 to 11; with replacement after resampling 1.0 to
+    // 3.8 and rejected.
     assert!(robust < 0.6, "{robust} sigma");
     assert!(plain > 3.0 * robust, "plain {plain} sigma, robust {robust}");
 }
@@ -183,7 +185,7 @@ fn wild_samples_are_replaced_at_the_rate_of_the_recording_not_after_resampling_s
 #[test]
 fn the_band_of_a_prediction_counts_what_is_not_known_of_stribeck_friction() {
     let folder = Folder::new();
-    // The rough leg on a calm day: nobody pushes, no sample is wild.
+    // The rough leg without pushes and outliers.
     let mut calm = LegFile::load("x2-rough").expect("shipped");
     calm.pushes = None;
     calm.joints.iter_mut().for_each(|joint| joint.outliers = None);

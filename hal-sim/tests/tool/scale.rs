@@ -1,4 +1,4 @@
-//! Known masses on the command line: what is found, what is said, what is refused.
+//! Known masses on the command line: results, messages, rejections.
 
 use crate::command::{Folder, scarab};
 
@@ -29,7 +29,7 @@ fn a_known_mass_makes_the_report_absolute_and_widens_sigma() {
     assert_eq!(absolute["payload"]["joint"], 2);
     for constant in absolute["torque_constant"].as_array().expect("one per joint") {
         let (found, sigma) = (constant["identified"].as_f64(), constant["sigma"].as_f64());
-        // 0.3 % of sigma at most; four of them.
+        // Sigma is at most 0.3 %; the tolerance is four times that.
         assert!((found.expect("found") - 1.5).abs() < 0.018 && sigma.expect("known") < 0.0045);
         assert_eq!(constant["consistent"], true);
     }
@@ -39,7 +39,7 @@ fn a_known_mass_makes_the_report_absolute_and_widens_sigma() {
         // The records differ by less than a percent.
         assert!(wide > 0.98 * narrow, "{base}");
     }
-    // HX2 is known to 0.17 %, the constants to 0.16 and 0.22 %: it must show.
+    // HX2 is known to 0.17 %, the constants to 0.16 and 0.22 %: the effect must be visible.
     assert!(sigma(&absolute, 4) > sigma(&relative, 4).map(|sigma| 1.2 * sigma));
 }
 
@@ -73,7 +73,8 @@ fn masses_that_cannot_be_meant_are_refused_by_option_and_reason() {
 
 #[test]
 fn geometry_is_asked_of_corrected_torques_too() {
-    // Without a known mass each of them is refused; a constant that makes up for a wrong length must not excuse it.
+    // Without a known mass each of them is rejected; a constant that compensates a wrong length
+    // must not hide it.
     for options in [
         "--perturb length=1.1 --payload 5@knee:0.2",
         "--perturb length=1.05 --payload 5@knee:0.2",

@@ -1,4 +1,4 @@
-//! What a simulated run says of itself beside its parameters.
+//! Messages of a simulated run beside its parameters.
 
 use crate::command::{Folder, scarab};
 
@@ -21,7 +21,8 @@ fn what_a_blocked_joint_does_not_show_has_neither_value_nor_sigma_nor_bound() {
 
 #[test]
 fn a_length_and_a_zero_that_hide_each_other_are_seen_beside_each_other() {
-    // Each alone asks for nothing; seeds in which noise leaves too little of both exist (16 of 20 are refused).
+    // Their apparent misalignments cancel. In some seeds noise leaves too little of both (16 of 20 are
+    // rejected).
     let folder = Folder::new();
     scarab("identify --perturb length=1.1 --perturb zero=-5 --json", &[&folder.path("run.json")])
         .ends_with(3);

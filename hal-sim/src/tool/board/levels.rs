@@ -1,4 +1,4 @@
-//! The firmware's levels put together as on the board, over simulated registers.
+//! The firmware's levels composed as on the board, over simulated registers.
 //!
 //! Fault campaign, `serve` and complete drives run this one composition. It holds no decisions: each method runs one level of
 //! `scarab::operation`, and the owner of the plant calls them in this order:
@@ -39,52 +39,52 @@ use crate::tool::leg_file::LegFile;
 use crate::tool::pair::DeviceLeg;
 use crate::world::World;
 
-/// PWM periods between two rounds of the housekeeping, and between two looks of the watch.
+/// PWM periods between two rounds of the housekeeping, and between two checks of the watch.
 const PERIODS_PER_ROUND: u64 = (CURRENT_RATE_HZ / RATE_HZ) as u64;
 const PERIODS_PER_LOOK: u64 = (CURRENT_RATE_HZ / GUARD_RATE_HZ) as u64;
-/// Processor cycles of one period; the second axis is half of it later.
+/// Processor cycles of one period; the second axis is delayed by half of it.
 const CYCLES: NonZeroU32 = NonZeroU32::new(7000).expect("more than one");
-/// Code of a bus of 48 V, until it is read.
+/// Converter code of a 48 V bus, until the first reading.
 const BUS_CODE: u16 = 3136;
 
-/// The part of the bus that is not registers.
+/// Bus level without its registers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BusLevel<const N: usize> {
     queues: Locked<BusQueues<N>>,
     round: BusRound,
-    /// What a host wants stored.
+    /// Data that a host wants stored.
     pub storage: Handover<Keep<N>>,
 }
 
-/// Contacts of the board and missing parts of a tick, as they are in one period.
+/// Contacts of the board and conversions in one period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
-    /// The emergency stop's contact is open.
+    /// Emergency-stop contact is open.
     pub emergency_stop: bool,
     /// A gate driver reports a fault.
     pub gate_fault: bool,
-    /// Both shunts of the axis were converted.
+    /// Both shunt currents of the axis were converted.
     pub complete: bool,
     /// The bus voltage was converted.
     pub supply: bool,
 }
 
 impl Conditions {
-    /// Nothing is wrong.
+    /// Conditions without any fault.
     pub const SOUND: Self = Self { emergency_stop: false, gate_fault: false, complete: true, supply: true };
 }
 
-/// All levels of a board of `N` axes, but the leg, which they work on.
+/// Levels of a board of `N` axes, except the leg on which they work.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Levels<const N: usize> {
     /// Registers, contacts and pins.
     pub registers: Registers<N>,
-    /// Words that all levels share.
+    /// Signals shared by all levels.
     pub signals: Signals<N>,
     queues: Locked<Queues<N>>,
-    /// Level 0.
+    /// Current loops, level 0.
     pub loops: CurrentLoops<N>,
-    /// The bus, where the board is on one.
+    /// Bus level, if the board is on a bus.
     pub bus: Option<Box<BusLevel<N>>>,
     events: Locked<EventQueue<N>>,
     servo: ServoLevel<N>,
@@ -97,8 +97,8 @@ pub struct Levels<const N: usize> {
 }
 
 impl<const N: usize> Levels<N> {
-    /// A board that is ready: motors calibrated on a stand, counts those of the pose in which the world's leg stands. `believed` is
-    /// the leg as the firmware has it, `description` what is simulated.
+    /// Ready board: motors calibrated on a stand, counters at the initial pose of the world's leg.
+    /// `believed` is the leg as the firmware has it, `description` the simulated one.
     pub fn ready<const B: usize>(
         believed: &LegFile,
         description: &CompleteDescription<N>,
@@ -117,7 +117,7 @@ impl<const N: usize> Levels<N> {
         Ok(levels)
     }
 
-    /// A board that starts: nothing calibrated, nothing begun.
+    /// Board at power-up: nothing calibrated or started.
     fn cold<const B: usize>(
         settings: HousekeepingSettings<N>,
         chopper: Chopper,
@@ -153,7 +153,7 @@ impl<const N: usize> Levels<N> {
         *self = Self { registers, ..Self::cold(self.settings, self.chopper, leg, self.following.take()) };
     }
 
-    /// Puts the board on a bus, before it ticks.
+    /// Connects the board to a bus, before its first tick.
     pub fn join_bus<const B: usize>(&mut self, leg: &DeviceLeg<N, B>, following: Following<N>) {
         let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
         let derating = drives::derating(DIVIDER);
@@ -161,7 +161,7 @@ impl<const N: usize> Levels<N> {
         (self.bus, self.following) = (Some(Box::default()), Some(following));
     }
 
-    /// Exchanges two axes, calibrations included: their motors hang on each other's connectors.
+    /// Exchanges two axes with their calibrations: their motors are on each other's connectors.
     pub fn exchange(&mut self, one: usize, other: usize) {
         if let (Some(first), Some(second)) =
             (self.loops.stage(one).copied(), self.loops.stage(other).copied())
@@ -179,19 +179,19 @@ impl<const N: usize> Levels<N> {
         self.queues.get()
     }
 
-    /// Level 6, in the periods in which it is due.
+    /// Housekeeping, level 6, in the periods in which it is due.
     pub fn housekeeping(&mut self) {
         let mut ends = self.queues.get().split(self.events.get()).housekeeping;
         self.housekeeper.round(&mut ends, &self.signals, &mut self.registers);
     }
 
-    /// A round of the housekeeping is due in this period.
+    /// Whether a round of the housekeeping is due in this period.
     #[must_use]
     pub fn is_round_due(period: u64) -> bool {
         period.is_multiple_of(PERIODS_PER_ROUND)
     }
 
-    /// Level 1; `None` while the joints' samples are invalid.
+    /// Servo, level 1; `None` while the joints' samples are invalid.
     pub fn servo(&mut self, control: &mut Control<N>, gravity: [f32; 3]) -> Option<ControlOutput<N>> {
         let mut ends = self.queues.get().split(self.events.get()).servo;
         ends.host = self.bus.as_mut().map(|bus| bus.queues.get().split().1);
@@ -200,13 +200,13 @@ impl<const N: usize> Levels<N> {
         output
     }
 
-    /// Thread level: what the servo sent, then a slice of the search.
+    /// Thread level: processes the servo's samples, then a slice of the search.
     pub fn identify<const B: usize>(&mut self, leg: &mut DeviceLeg<N, B>, evaluations: u32) -> Slice<N> {
         let mut ends = self.queues.get().split(self.events.get()).identification;
         let (_, identification) = leg.halves();
         self.identification.hear(identification, &mut ends, |_| {}, |_| {});
         while ends.notes.dequeue().is_some() {}
-        // Results are read where they are: nothing is published.
+        // Results are read directly: nothing is published.
         self.identification.published();
         self.identification.work(identification, evaluations, &mut ends, &self.signals, |_| {})
     }
@@ -217,7 +217,7 @@ impl<const N: usize> Levels<N> {
         self.identification.seed()
     }
 
-    /// Level 0: one tick of one axis in a period.
+    /// Current tick, level 0, of one axis in a period.
     pub fn current(&mut self, axis: usize, period: u64, sample: &AxisSample, conditions: Conditions) {
         let Conditions { emergency_stop, gate_fault, complete, supply } = conditions;
         let now = (period as u32).wrapping_mul(CYCLES.get()).wrapping_add(axis as u32 * CYCLES.get() / 2);
@@ -227,14 +227,14 @@ impl<const N: usize> Levels<N> {
         self.loops.tick(axis, &tick, &mut ends, &self.signals, &mut self.registers);
     }
 
-    /// Level 6, at the end of each period: guard of the current ticks, and the watchdog's check.
+    /// Watch, level 6, at the end of each period: guard of the current ticks, and the watchdog's check.
     pub fn watch(&mut self, period: u64) {
         if period.is_multiple_of(PERIODS_PER_LOOK) {
             self.watch.look(&self.signals, &mut self.registers);
         }
     }
 
-    /// Newest samples of the joints that wait for the servo.
+    /// Newest joint samples waiting for the servo.
     #[must_use]
     pub fn samples(&self) -> Option<[JointSample; N]> {
         let queues = self.queues.lock();
@@ -245,18 +245,18 @@ impl<const N: usize> Levels<N> {
         Some(samples)
     }
 
-    /// Asks the servo for something that the operator's contacts do not.
+    /// Requests an action from the servo that the operator's contacts cannot request.
     pub fn ask(&mut self, request: ControlRequest<N>) {
         let _ = self.queues().requests().enqueue(request);
     }
 
-    /// The first axis that released itself, and why.
+    /// First axis that switched itself off, and its fault.
     #[must_use]
     pub fn fault(&self) -> Option<(usize, AxisFault)> {
         (0..N).find_map(|axis| Some((axis, self.loops.stage(axis)?.fault()?)))
     }
 
-    /// Level 4: a frame came; one without room is lost.
+    /// Receives a frame, level 4; without space it is lost.
     pub fn receive(&mut self, frame: &Frame) {
         let Some(bus) = &mut self.bus else { return };
         if bus.queues.get().split().0.enqueue(*frame).is_err() {
@@ -265,7 +265,7 @@ impl<const N: usize> Levels<N> {
         self.registers.bus_due = true;
     }
 
-    /// Level 5 at this time: a round of the bus.
+    /// Round of the bus, level 5, at this time.
     pub fn bus_round<R: Results, const LOG: usize>(
         &mut self,
         now_ns: u64,

@@ -1,13 +1,13 @@
-//! A value that threads may share, each for as long as it locks it: `heapless`' queues are not `Sync`.
+//! Value that threads share through a lock: `heapless` queues are not `Sync`.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// The value behind its lock. Compared and cloned as the value is.
+/// Locked value; compared and cloned by content.
 #[derive(Debug, Default)]
 pub struct Locked<T>(Mutex<T>);
 
 impl<T> Locked<T> {
-    /// The value.
+    /// Wraps a value.
     pub fn new(value: T) -> Self {
         Self(Mutex::new(value))
     }
@@ -17,7 +17,7 @@ impl<T> Locked<T> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The value, without locking it.
+    /// Accesses the value without locking.
     pub fn get(&mut self) -> &mut T {
         self.0.get_mut().unwrap_or_else(PoisonError::into_inner)
     }

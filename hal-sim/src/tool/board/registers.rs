@@ -1,4 +1,4 @@
-//! What lies beneath the firmware's levels in place of a board's registers.
+//! Simulated registers below the firmware's levels.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
@@ -7,15 +7,15 @@ use scarab::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
 
 use crate::tool::bus::wire::Mailbox;
 
-/// Code of the thermistor of a bridge at 41 degrees Celsius.
+/// Thermistor code of a bridge at 41 degrees Celsius.
 pub const WARM_CODE: u16 = 1500;
-/// What the dearest common frame of the bus takes the processor, 2,403 instructions under the levels above it. Each reading of the
-/// clock within a round of the bus is so much later than the one before.
+/// Time for the most expensive common frame of the bus: 2,403 instructions, interrupted by the
+/// levels above. Each reading of the clock within a round of the bus is later by this.
 const FRAME_US: u64 = 20;
-/// The watchdog's time during a flash write over its usual time: 8 s, 16 ms.
+/// Factor on the watchdog's time during a flash write: 8 s instead of 16 ms.
 pub const STRETCHED: u64 = 500;
 
-/// How often the clock was read in a round of the bus.
+/// Readings of the clock in a round of the bus.
 #[derive(Debug, Default)]
 struct Readings(AtomicU64);
 
@@ -31,14 +31,14 @@ impl PartialEq for Readings {
     }
 }
 
-/// Bus controller: its state, and the frames that wait in its three mailboxes.
+/// State of the bus controller, and the frames in its three mailboxes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CanController {
     /// Transmit mailboxes.
     pub mailbox: Mailbox,
     /// State that the firmware reads.
     pub state: Controller,
-    /// A frame was lost and the firmware has not read it yet.
+    /// Whether a frame was lost and the firmware has not yet read this.
     pub overrun: bool,
     /// Time, nanoseconds.
     pub now_ns: u64,
@@ -49,36 +49,36 @@ pub struct CanController {
 pub struct Registers<const N: usize> {
     /// The operator's contacts.
     pub contacts: Contacts,
-    /// What each bridge does in its next period.
+    /// Command of each bridge for its next period.
     pub commands: [AxisCommand; N],
-    /// The brake resistor's share of time.
+    /// Duty cycle of the brake resistor.
     pub brake: f32,
     /// Encoder counters.
     pub encoders: [u16; N],
-    /// The gate drivers hold their configuration.
+    /// Whether the gate drivers hold their configuration.
     pub gates: [bool; N],
-    /// The gate drivers have their supply.
+    /// Whether the gate drivers are powered.
     pub gates_on: bool,
-    /// The gate drivers were configured since this was cleared: a reset has ended.
+    /// Whether the gate drivers were configured since this was cleared: a reset has ended.
     pub configured: bool,
     /// Codes of the thermistors.
     pub thermistors: [u16; N],
-    /// The servo was requested.
+    /// Whether the servo was requested.
     pub servo_due: bool,
-    /// A round of the bus was requested.
+    /// Whether a round of the bus was requested.
     pub bus_due: bool,
     /// The bus controller.
     pub can: CanController,
-    /// The watchdog was fed since this was cleared.
+    /// Whether the watchdog was fed since this was cleared.
     pub fed: bool,
-    /// How many times its usual time the watchdog has, if that changed.
+    /// Factor on the watchdog's usual time, if it changed.
     pub stretched: Option<u64>,
     /// Readings of the clock in this round of the bus.
     readings: Readings,
 }
 
 impl<const N: usize> Registers<N> {
-    /// As after the start: bridges off, contacts open.
+    /// State after power-up: bridges off, contacts open.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -104,7 +104,7 @@ impl<const N: usize> Registers<N> {
         }
     }
 
-    /// Sets the time, nanoseconds; a round of the bus begins.
+    /// Sets the time, nanoseconds, at the start of a round of the bus.
     pub fn set_time(&mut self, now_ns: u64) {
         self.can.now_ns = now_ns;
         self.readings = Readings::default();

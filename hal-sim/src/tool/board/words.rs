@@ -1,8 +1,8 @@
-//! What the firmware's axes refuse or report, as sentences with the key of the leg file that mends it.
+//! Describes rejections and faults of the firmware's axes, with the key of the leg file that corrects them.
 
 use scarab::motor::{AxisError, AxisFault, Phase, Refusal};
 
-/// Why the firmware refuses an axis' configuration.
+/// Reason why the firmware rejects an axis configuration.
 #[must_use]
 pub fn axis_error(error: AxisError) -> String {
     let words = match error {
@@ -29,7 +29,7 @@ pub fn axis_error(error: AxisError) -> String {
     format!("the firmware refuses its configuration: {words}")
 }
 
-/// Why the firmware found no calibration.
+/// Reason for a failed calibration.
 #[must_use]
 pub fn refusal(reason: Refusal) -> String {
     let words = match reason {
@@ -79,7 +79,7 @@ const fn name(phase: Phase) -> &'static str {
     }
 }
 
-/// Why an axis released its bridge.
+/// Reason why an axis switched its bridge off.
 #[must_use]
 pub const fn axis_fault(fault: AxisFault) -> &'static str {
     match fault {

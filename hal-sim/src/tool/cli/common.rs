@@ -1,4 +1,4 @@
-//! What several commands have in common.
+//! Arguments shared by several commands.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::tool::setup::PriorChoice;
 use crate::tool::spread::Spread;
 use crate::tool::{figures, html, tables, temperature};
 
-/// How parameters are found from the joints' rows.
+/// Plan of the estimate.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum PlanArgument {
     /// All joints at once, weighted by their noise.
@@ -34,12 +34,12 @@ impl From<PlanArgument> for Plan {
     }
 }
 
-/// How disturbances are met.
+/// Treatment of disturbances.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum EstimatorArgument {
-    /// Wild samples are replaced, disturbed stretches count for less, Stribeck friction is looked for.
+    /// Outliers are replaced, disturbed stretches weigh less, Stribeck friction is searched for.
     Robust,
-    /// Every sample counts alike.
+    /// Every sample has the same weight.
     Plain,
 }
 
@@ -52,24 +52,25 @@ impl From<EstimatorArgument> for Estimator {
     }
 }
 
-/// What identification and replay have in common.
+/// Arguments shared by identification and replay.
 #[derive(Args, Debug)]
 pub struct Common {
     #[command(flatten)]
     pub leg: LegOptions,
-    /// Of the swarm's random numbers.
+    /// Seed of the swarm's random numbers.
     #[arg(long)]
     pub swarm_seed: Option<u64>,
     /// One-time or sequential.
     #[arg(long, value_enum, default_value = "one-time")]
     pub plan: PlanArgument,
-    /// How outliers and disturbances are met.
+    /// Treatment of outliers and disturbances.
     #[arg(long, value_enum, default_value = "robust")]
     pub estimator: EstimatorArgument,
     /// none, file, or wrong:PERCENT; the leg file's unless given.
     #[arg(long)]
     pub prior: Option<PriorChoice>,
-    /// Temperature of the drives, degrees Celsius (-40 to 125), kept with the result; the leg file's unless given.
+    /// Temperature of the drives, degrees Celsius (-40 to 125), stored with the result; the leg
+    /// file's unless given.
     #[arg(long, value_name = "C", allow_negative_numbers = true, value_parser = temperature::parse)]
     temperature: Option<f64>,
     /// Write the report here, for exit codes 0 and 3.
@@ -87,19 +88,19 @@ pub struct Common {
 }
 
 impl Common {
-    /// The leg as it is set, at the temperature that is stated.
+    /// Leg with its options and the stated temperature.
     pub fn leg(&self) -> Result<LegFile, ToolError> {
         let leg = self.leg.load()?;
         Ok(LegFile { temperature_c: self.temperature.or(leg.temperature_c), ..leg })
     }
 
-    /// Whether curves are wanted.
+    /// Whether curves are needed.
     pub fn is_drawn(&self) -> bool {
         self.figures.is_some() || self.report.is_some()
     }
 }
 
-/// Draws figures and page where they are asked for, and says where they are.
+/// Draws requested figures and page, and prints their paths.
 pub fn draw(
     leg: &LegFile,
     common: &Common,
@@ -111,7 +112,7 @@ pub fn draw(
     draw_into(leg, directory, page, run, series, sources)
 }
 
-/// The same into a directory and a page, where they are named.
+/// Draws into a directory and a page, if given.
 pub fn draw_into(
     leg: &LegFile,
     directory: Option<&Path>,
@@ -138,7 +139,7 @@ pub fn draw_into(
     Ok(())
 }
 
-/// Draws many runs of one leg where they are asked for, and says where they are.
+/// Draws many runs of one leg if requested, and prints the paths.
 pub fn draw_runs(leg: &LegFile, common: &Common, runs: &[RunReport]) -> Result<(), ToolError> {
     if !common.is_drawn() {
         return Ok(());
@@ -157,7 +158,7 @@ pub fn draw_runs(leg: &LegFile, common: &Common, runs: &[RunReport]) -> Result<(
     Ok(())
 }
 
-/// Writes and prints what was found; `preface` stands before it.
+/// Writes and prints the result; `preface` precedes it.
 pub fn finish(run: &RunReport, common: &Common, preface: &str) -> Result<u8, ToolError> {
     if let Some(path) = &common.json {
         write_json(path, run)?;

@@ -1,4 +1,4 @@
-//! `eds`: what host software of the bus wants to know of a node before it sees one.
+//! `eds`: electronic data sheets of the nodes, for host software of the bus.
 
 use clap::Args;
 
@@ -7,18 +7,18 @@ use crate::tool::error::{EXIT_ACCEPTED, ToolError};
 use crate::tool::files::{self, OutputFolder};
 use crate::tool::tables;
 
-/// A node for each: hip and knee of a board.
+/// Joints with a node: hip and knee of a board.
 const JOINTS: [&str; 2] = ["hip", "knee"];
 
-/// Where to.
+/// Destination of the data sheets.
 #[derive(Args, Debug)]
 pub struct EdsArguments {
-    /// Folder for the sheets, one per joint; it is made where there is none.
+    /// Folder for the sheets, one per joint; created if missing.
     #[arg(long)]
     out: OutputFolder,
 }
 
-/// Writes the files; the exit code.
+/// Writes the files and returns the exit code.
 pub fn run(arguments: &EdsArguments) -> Result<u8, ToolError> {
     let folder = &arguments.out;
     for joint in JOINTS {

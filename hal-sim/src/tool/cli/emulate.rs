@@ -15,15 +15,15 @@ use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
 use crate::tool::trace::{log, run as told, run_report};
 
-/// Exit code of a run in which a tick was missed, and of a crash that was not handled as it has to be.
+/// Exit code of a run with a missed tick, or of a crash that was not handled correctly.
 const EXIT_MISSED: u8 = 1;
 
-/// A leg, and what to keep of its run.
+/// Leg, and outputs of its run.
 #[derive(Args, Debug)]
 pub struct EmulateArguments {
     #[command(flatten)]
     leg: LegOptions,
-    /// Of noise and swarm.
+    /// Seed of noise and swarm.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
     /// Keep the records here as the image sent them, for `cargo sim trace`.
@@ -32,11 +32,12 @@ pub struct EmulateArguments {
     /// Write the report here, for exit codes 0 and 3.
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
-    /// Write the 500 Hz log of the motion identified from here, in the format that replay reads; the image then tells every sample.
+    /// Write the 500 Hz log of the motion identified from here, in the format that replay reads;
+    /// the image then sends every sample.
     #[arg(long, value_name = "FILE")]
     csv: Option<Output>,
-    /// Crash while the leg identifies, and show what comes of it: exit code 0 if the bridges were released first, the record
-    /// survived and the next start refused to enable, else 1.
+    /// Crash while the leg identifies, and evaluate it. Exit code 0 if the bridges were off first,
+    /// the record survived and the next start refused to enable; else 1.
     #[arg(long, value_name = "KIND", conflicts_with_all = ["json", "csv"])]
     crash: Option<CrashKind>,
     /// Servo tick (of 4,000 per second) in which it crashes.
@@ -44,7 +45,7 @@ pub struct EmulateArguments {
     crash_tick: u32,
 }
 
-/// Builds, runs, decodes; the exit code.
+/// Builds, runs and decodes; returns the exit code.
 pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load_for_image()?;
     let image = build(&leg, arguments.seed, arguments.csv.is_some())?;
@@ -82,7 +83,7 @@ pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
     })
 }
 
-/// Crashes the image and says what came of it.
+/// Crashes the image and prints the evaluation.
 fn show(kind: CrashKind, tick: u32, image: &Path, trace: &Path) -> Result<u8, ToolError> {
     let [log, lines] = ["log", "txt"].map(|kind| image.with_extension(kind));
     let begun = crash(image, trace, &log, kind, tick)?;
@@ -93,7 +94,7 @@ fn show(kind: CrashKind, tick: u32, image: &Path, trace: &Path) -> Result<u8, To
         Ok::<_, ToolError>(String::from_utf8_lossy(&bytes).into_owned())
     };
     let report = CrashReport::new(kind, &text(&lines)?, &text(&log)?, begun, image)?;
-    // Megabytes.
+    // Logs of some megabytes.
     for file in [log, lines] {
         let _ = std::fs::remove_file(file);
     }

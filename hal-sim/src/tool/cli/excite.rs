@@ -1,4 +1,4 @@
-//! `excite`: designs an exciting motion and says what it will tell, before anything moves.
+//! `excite`: designs an exciting motion and predicts its result before anything moves.
 
 use clap::Args;
 
@@ -18,7 +18,7 @@ use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
 use crate::with_leg_size;
 
-/// Which leg is to be excited, and what to keep of the design.
+/// Leg to be excited, and outputs of the design.
 #[derive(Args, Debug)]
 pub struct ExciteArguments {
     #[command(flatten)]
@@ -34,19 +34,19 @@ pub struct ExciteArguments {
     duration: f64,
     #[command(flatten)]
     noise: NoiseOptions,
-    /// Percent by which each base parameter may be off when the torque is bounded.
+    /// Assumed error of each base parameter in the bound on torque, percent.
     #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
     torque_margin: f64,
-    /// Reckon with the truth of the leg file, not with its prior.
+    /// Assume the truth of the leg file, not its prior.
     #[arg(long)]
     assume_truth: bool,
-    /// Look at this motion instead of designing one.
+    /// Check this motion instead of designing one.
     #[arg(long)]
     excitation: Option<Input>,
-    /// Of the swarm's random numbers.
+    /// Seed of the swarm's random numbers.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
-    /// Curves the swarm may look at.
+    /// Curves the swarm may evaluate.
     #[arg(long, default_value_t = EVALUATIONS, value_parser = clap::value_parser!(u32).range(600..=10_000_000))]
     evaluations: u32,
     /// Write the report here.
@@ -54,10 +54,10 @@ pub struct ExciteArguments {
     json: Option<Output>,
 }
 
-/// Some five seconds of one core for two joints.
+/// Evaluations by default: about five seconds of one core for two joints.
 const EVALUATIONS: u32 = 48_000;
 
-/// Designs, reports and writes; the exit code.
+/// Designs, reports and writes; returns the exit code.
 pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
     let leg = &arguments.noise.on(arguments.leg.load()?)?;
     let torque_noise_percent = arguments.noise.percent()?;

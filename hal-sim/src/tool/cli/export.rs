@@ -1,4 +1,4 @@
-//! `export`: a kept model for other rigid-body software.
+//! `export`: writes a stored model for other rigid-body software.
 
 use clap::Args;
 
@@ -9,21 +9,21 @@ use crate::tool::model_file::{ModelFile, refuse_another_leg};
 use crate::tool::tables;
 use crate::tool::urdf;
 
-/// Which model and where to.
+/// Model and destination.
 #[derive(Args, Debug)]
 pub struct ExportArguments {
-    /// Written by --save-model.
+    /// Model written by --save-model.
     #[arg(long)]
     model: Input,
     /// Write a robot description (URDF) here.
     #[arg(long)]
     urdf: Output,
-    /// With any of these a model that is not this leg's is refused.
+    /// With any of these options, a model of another leg is rejected.
     #[command(flatten)]
     leg: Option<LegOptions>,
 }
 
-/// Writes the file; the exit code.
+/// Writes the file and returns the exit code.
 pub fn run(arguments: &ExportArguments) -> Result<u8, ToolError> {
     let file = arguments.model.display().to_string();
     let leg = arguments.leg.as_ref().map(LegOptions::load).transpose()?;

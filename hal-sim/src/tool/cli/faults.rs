@@ -1,4 +1,4 @@
-//! `faults`: the fault catalogue injected into the whole firmware, and what it makes of each.
+//! `faults`: injects the fault catalogue into the whole firmware and reports its reactions.
 
 use std::time::Instant;
 
@@ -21,41 +21,44 @@ use crate::tool::{figures, tables};
 
 /// Kind and name of the table's place in a document.
 const DOCUMENT: [&str; 2] = ["faults", "table"];
-/// More runs of one fault are a mistake.
+/// Limit of the runs of one fault.
 const MOST_SEEDS: u64 = 1_000_000;
 
-/// Which faults, how often.
+/// Faults and the number of their runs.
 #[derive(Args, Debug)]
 pub struct FaultsArguments {
     #[command(flatten)]
     leg: LegOptions,
-    /// A row of the catalogue by its id, or `sweep` or `pairs`, of which then as many are run as of a row; may be repeated. All rows
-    /// unless given.
+    /// Row of the catalogue by its id, or `sweep` or `pairs`, which then run as often as a row; may
+    /// be repeated. All rows unless given.
     #[arg(long, value_name = "ID")]
     fault: Vec<String>,
     /// Runs of each fault.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     seeds: Option<u64>,
-    /// The emergency stop also at every servo tick of a whole identification, and at every current tick of one second of it.
+    /// The emergency stop also at every servo tick of a whole identification, and at every current
+    /// tick of one second of it.
     #[arg(long)]
     every_tick: bool,
-    /// Runs of the sweep: each channel of a sensor spoilt in each way; nothing may be broken.
+    /// Runs of the sweep: each channel of a sensor faulted in each way; no invariant may be violated.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=MOST_SEEDS))]
     sweep: Option<u64>,
-    /// Runs of two random faults within 50 ms; nothing may be broken.
+    /// Runs of two random faults within 50 ms; no invariant may be violated.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=MOST_SEEDS))]
     pairs: Option<u64>,
-    /// Simulated hours of normal motion with noise and a pushing wearer; nothing may be raised.
+    /// Simulated hours of normal motion with noise and a pushing wearer; no fault may be raised.
     #[arg(long, value_name = "H", default_value_t = 0.0)]
     hours: f64,
-    /// The full campaign: 1,000 runs of each fault, every tick, a sweep of 8,000, 10,000 pairs, 10 hours; what is given beside counts instead.
+    /// The full campaign: 1,000 runs of each fault, every tick, a sweep of 8,000, 10,000 pairs, 10
+    /// hours; options given beside override these.
     #[arg(long, conflicts_with_all = ["blind", "replay"])]
     full: bool,
-    /// Switch the detectors of each fault off: the campaign has to fail for each, or nothing would notice a broken one. Exit code 0 if it does.
+    /// Switch the detectors of each fault off. The campaign must then fail for each fault; exit
+    /// code 0 if it does.
     #[arg(long, conflicts_with = "every_tick")]
     blind: bool,
-    /// Only the run of this seed of each fault, told in full; `--fault sweep` and `--fault pairs` name runs of those. It is the same run to
-    /// the bit where --seconds, the leg and the program are.
+    /// Only the run of this seed of each fault, reported in full; `--fault sweep` and `--fault pairs` name
+    /// runs of those. The run repeats bit for bit for equal --seconds, leg and program.
     #[arg(long, value_name = "SEED", conflicts_with_all = ["seeds", "every_tick", "sweep", "pairs"], value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     replay: Option<u64>,
     /// Inject only in the first seconds of each identification.
@@ -83,7 +86,7 @@ fn rows(names: &[String], full: bool) -> Result<Vec<Entry>, ToolError> {
         }
     }
     let is_asked = |entry: &Entry| names.is_empty() || names.iter().any(|name| name == entry.head().id);
-    // An image has to be built for those: only where they are named, or everything is meant.
+    // Emulated rows need an image to be built: they run only if named, or in the full campaign.
     let is_meant = |entry: &Entry| full || !names.is_empty() || !matches!(entry, Entry::Emulated(_));
     Ok(all.into_iter().filter(is_asked).filter(is_meant).collect())
 }
@@ -101,14 +104,14 @@ fn page(leg: &LegFile, report: &CampaignReport, found: &Campaign) -> Result<Stri
     Ok(html::faults::page(&Circumstances::now(leg), report, &lines, &figures))
 }
 
-/// Of the full campaign.
+/// Defaults of the full campaign.
 const FULL_SEEDS: u64 = 1000;
 const FULL_SWEEP: u64 = 8000;
 const FULL_PAIRS: u64 = 10_000;
 const FULL_HOURS: f64 = 10.0;
-/// Of a blind campaign: of fewer some rows have no run that is seen.
+/// Fewest runs of a blind campaign: with fewer, some rows have no detectable run.
 const FEWEST_BLIND: usize = 16;
-/// Without it.
+/// Default number of runs.
 const SEEDS: u64 = 20;
 
 impl FaultsArguments {
@@ -143,7 +146,8 @@ impl FaultsArguments {
         }
         let seeds = self.seeds.unwrap_or(if self.full { FULL_SEEDS } else { SEEDS });
         let seeds: Vec<u64> = self.replay.map_or_else(|| (1..=seeds).collect(), |seed| vec![seed]);
-        // Named, as many as of a row; without any name all of them are meant, in the full campaign.
+        // `sweep` and `pairs` run as often as a row if named. Without names, the full campaign runs
+        // all of them.
         let trials = |kind: &str, given: Option<u64>, full: u64| match given {
             Some(most) => (1..=most).collect(),
             None if self.full && (self.fault.is_empty() || self.names(kind)) => (1..=full).collect(),
@@ -167,11 +171,11 @@ impl FaultsArguments {
     }
 }
 
-/// Injects and reports; exit code 3 where anything was missed.
+/// Injects and reports; exit code 3 if anything was missed.
 pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     let options = arguments.options()?;
     let leg = arguments.leg.load()?;
-    // Before hours of runs whose table has no place.
+    // Checked first: hours of runs must not end without a place for their table.
     if let Some(path) = &arguments.docs {
         document::check(path, DOCUMENT[0], DOCUMENT[1])?;
     }

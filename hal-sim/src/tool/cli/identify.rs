@@ -1,4 +1,4 @@
-//! `identify`: a simulated leg, from excitation to verdict.
+//! `identify`: a simulated leg from excitation to verdict.
 
 use clap::{Args, ValueEnum};
 use scarab::model::Payload;
@@ -18,14 +18,14 @@ use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::simulate::{DriveModel, SimulationOptions};
 use crate::with_leg_size;
 
-/// What to identify and what to keep of it.
+/// Leg to be identified, and outputs.
 #[derive(Args, Debug)]
 pub struct IdentifyArguments {
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
     model: ModelArguments,
-    /// Of noise, pushes and a wrong prior.
+    /// Seed of noise, pushes and a wrong prior.
     #[arg(long, conflicts_with = "seeds")]
     seed: Option<u64>,
     /// A run for each seed, A..B with both ends.
@@ -36,13 +36,15 @@ pub struct IdentifyArguments {
     /// Ideal currents, or motors, bridges and sensors under the board's current loops.
     #[arg(long, value_enum, default_value = "ideal")]
     drive: DriveArgument,
-    /// Identify again with a known mass, KG@JOINT:X_M[:Y_M] (JOINT: name or number; X along the link): tells the torque constants.
+    /// Identify again with a known mass, KG@JOINT:X_M[:Y_M] (JOINT: name or number; X along the
+    /// link): determines the torque constants.
     #[arg(long)]
     payload: Option<PlacedMass>,
-    /// The leg carries a known mass all the time, stated likewise; the parameters are those of the leg without it.
+    /// Known mass that the leg carries all the time, in the same format; the parameters are those
+    /// of the leg without it.
     #[arg(long)]
     load: Option<PlacedMass>,
-    /// Make something wrong on purpose, to see the verdict: NAME or NAME=VALUE, repeatable.
+    /// Inject a deliberate error to test the verdict: NAME or NAME=VALUE, repeatable.
     #[arg(long, value_name = "NAME[=VALUE]")]
     perturb: Vec<Perturbation>,
     /// Excite with this motion (from `excite`) instead of the default one.
@@ -53,7 +55,7 @@ pub struct IdentifyArguments {
     log: Option<Output>,
 }
 
-/// Which drives are simulated.
+/// Kind of simulated drives.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum DriveArgument {
     /// A current that follows its target with a lag.
@@ -84,10 +86,10 @@ pub(super) fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
     }
 }
 
-/// More runs at once are a mistake.
+/// Limit of the runs at once.
 const LARGEST_SEED_COUNT: u64 = 100_000;
 
-/// Identifies and reports; the exit code.
+/// Identifies and reports; returns the exit code.
 pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
     let leg = &arguments.noise.on(arguments.common.leg()?)?;
     let torque_noise_percent = arguments.noise.percent()?;
@@ -104,7 +106,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
     }
     let excitation = arguments.excitation.as_deref().map(Excitation::load).transpose()?;
     if let (Some(motion), Some(file)) = (&excitation, &arguments.excitation) {
-        // Without and with what is hung on for the second run.
+        // Checked without and with the mass of the second run.
         let carried: &Vec<_> = &load.into_iter().collect();
         with_leg_size!(leg, check(leg, file, motion, carried))?;
         if let Some(payload) = payload {

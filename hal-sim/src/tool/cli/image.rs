@@ -1,4 +1,4 @@
-//! `fw` and `flash-leg`: the flash image, its size, and the way onto a board.
+//! `fw` and `flash-leg`: builds the flash image, prints its size, and writes it to a board.
 
 use clap::Args;
 
@@ -13,18 +13,18 @@ use crate::tool::image::size::ImageSize;
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
 
-/// What an image is built with.
+/// Options of an image.
 #[derive(Args, Debug)]
 pub struct ImageOptions {
     #[command(flatten)]
     leg: LegOptions,
-    /// The image tells every sample of the 500 Hz log.
+    /// The image sends every sample of the 500 Hz log.
     #[arg(long)]
     log: bool,
     /// A brake resistor is connected: the image uses it.
     #[arg(long)]
     brake_resistor: bool,
-    /// 24 or 56: of a board on which the factory has written no version; one that has keeps its own.
+    /// 24 or 56: voltage of a board without a factory version; a board with one keeps its own.
     #[arg(long, value_name = "V", value_parser = board_volts)]
     board_volts: Option<u8>,
 }
@@ -48,7 +48,7 @@ impl ImageOptions {
     }
 }
 
-/// The image and its size.
+/// Image and outputs of its size.
 #[derive(Args, Debug)]
 pub struct FirmwareArguments {
     #[command(flatten)]
@@ -61,17 +61,17 @@ pub struct FirmwareArguments {
     source: Option<Output>,
 }
 
-/// Onto the board.
+/// Image and options of the probe.
 #[derive(Args, Debug)]
 pub struct FlashArguments {
     #[command(flatten)]
     image: ImageOptions,
-    /// Handed on to `probe-rs run`.
+    /// Passed on to `probe-rs run`.
     #[arg(last = true)]
     probe: Vec<String>,
 }
 
-/// Builds and prints the sizes; exit code 3 where a goal is not kept or an interrupt can panic.
+/// Builds and prints the sizes; exit code 3 if a goal is missed or an interrupt can panic.
 pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     let options = arguments.image.load()?;
     if let Some(path) = &arguments.source {
@@ -97,7 +97,7 @@ pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
     Ok(if kept { EXIT_ACCEPTED } else { EXIT_REFUSED })
 }
 
-/// Builds, checks the size, writes it onto the board and prints its records.
+/// Builds, checks the size, writes the image to the board and prints its records.
 pub fn flash_leg(arguments: &FlashArguments) -> Result<u8, ToolError> {
     arguments.image.leg.require("cargo flash-leg --leg my-leg.toml")?;
     let image = build(&arguments.image.load()?)?;

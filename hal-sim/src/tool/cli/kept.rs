@@ -1,4 +1,4 @@
-//! `kept`: what a board remembers over the power, as TOML and back.
+//! `kept`: persistent data of a board, as TOML and back.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -11,12 +11,12 @@ use crate::tool::files::{self, Input, Output, Updated};
 use crate::tool::kept_file::KeptFile;
 use crate::tool::tables;
 
-/// Boards that a flash file may hold, as many as `serve` serves.
+/// Boards in a flash file, as many as `serve` supports.
 const BOARDS: usize = 4;
-/// Larger files are something else.
+/// Size limit of a file, bytes.
 const LARGEST_FILE_BYTES: u64 = 1 << 20;
 
-/// Which way.
+/// Direction of the transfer.
 #[derive(Args, Debug)]
 pub struct KeptArguments {
     #[command(subcommand)]
@@ -25,30 +25,30 @@ pub struct KeptArguments {
 
 #[derive(Subcommand, Debug)]
 enum Way {
-    /// Read a board's flash and write what is kept in it as TOML; exit code 3 where something is damaged.
+    /// Read a board's flash and write its stored data as TOML; exit code 3 if something is damaged.
     Export {
-        /// As `serve --flash` has it: 256 KB per board.
+        /// Flash file of `serve --flash`: 256 KB per board.
         flash: Input,
-        /// Which board of the file.
+        /// Number of the board in the file.
         #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=BOARDS as i64))]
         board: u8,
-        /// Where to; standard output where it is not given.
+        /// Destination; standard output unless given.
         #[arg(long, value_name = "FILE.toml")]
         out: Option<Output>,
     },
-    /// Write what a TOML file says into a board's flash, all of it or nothing; what the file does not name stays.
+    /// Write the contents of a TOML file into a board's flash, all or nothing; parts not named stay.
     Import {
-        /// As `export` writes it.
+        /// File written by `export`.
         file: Input,
-        /// As `serve --flash` has it; it is made where there is none.
+        /// Flash file of `serve --flash`; created if missing.
         flash: Updated,
-        /// Which board of the file.
+        /// Number of the board in the file.
         #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=BOARDS as i64))]
         board: u8,
     },
 }
 
-/// Reads or writes; the exit code.
+/// Reads or writes; returns the exit code.
 pub fn run(arguments: &KeptArguments) -> Result<u8, ToolError> {
     match &arguments.way {
         Way::Export { flash, board, out } => export(flash, usize::from(*board), out.as_deref()),
@@ -56,7 +56,7 @@ pub fn run(arguments: &KeptArguments) -> Result<u8, ToolError> {
     }
 }
 
-/// The flash of all boards of a file; `None` where there is no file.
+/// Flash of all boards of a file; `None` if there is no file.
 fn read(path: &Path) -> Result<Option<Vec<u8>>, ToolError> {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
@@ -105,7 +105,7 @@ fn import(file: &Path, flash: &Path, board: usize) -> Result<u8, ToolError> {
     let text = std::fs::read_to_string(file).map_err(unreadable)?;
     let kept = KeptFile::parse(&text, &name)?;
     let mut bytes = read(flash)?.unwrap_or_default();
-    // Boards that the file does not hold yet are erased ones.
+    // Boards beyond the end of the file count as erased.
     if bytes.len() < board * BYTES {
         bytes.resize(board * BYTES, 0xFF);
     }

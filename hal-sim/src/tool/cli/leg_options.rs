@@ -1,4 +1,4 @@
-//! Which leg, set to which wearer, on which side, below which trunk.
+//! Leg with its wearer, side and trunk.
 
 use clap::{Args, ValueEnum};
 
@@ -13,14 +13,14 @@ use crate::tool::size::{Person, Size};
 pub enum SideArgument {
     /// Drives mounted mirrored.
     Left,
-    /// As the drives are described.
+    /// Drives mounted as described.
     Right,
 }
 
-/// A leg and how it is set.
+/// Leg and its settings.
 #[derive(Args, Clone, Debug)]
 pub struct LegOptions {
-    /// Name of a shipped leg, or a leg file; x2-wearer-75kg unless given, but replay and flash-leg have to be given one.
+    /// Name of a shipped leg, or a leg file; x2-wearer-75kg unless given. Replay and flash-leg require it.
     #[arg(long)]
     leg: Option<LegName>,
     /// Set the thigh to this length, m (0.402 to 0.505).
@@ -29,19 +29,19 @@ pub struct LegOptions {
     /// Set the shank to this length, m (0.397 to 0.506).
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     shank: Option<f64>,
-    /// On a wearer of this body mass and height, who sets the lengths that are not given.
+    /// Body mass and height of the wearer; the height determines the lengths not given.
     #[arg(long, value_name = "KG,M")]
     wearer: Option<Person>,
     /// The leg's side of the body; the leg file's unless given.
     #[arg(long, value_enum)]
     side: Option<SideArgument>,
-    /// The trunk leans forward by so many degrees and is known to.
+    /// The trunk leans forward by this angle, known to the firmware.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     trunk_pitch: Option<f64>,
 }
 
 impl LegOptions {
-    /// Refuses a command line without a leg; `example` shows one with it.
+    /// Rejects a command line without a leg; `example` shows a correct one.
     pub fn require(&self, example: &str) -> Result<(), ToolError> {
         if self.leg.is_some() {
             return Ok(());
@@ -53,12 +53,12 @@ impl LegOptions {
         )))
     }
 
-    /// The leg as it is set. What was changed is part of its name.
+    /// Loads the leg with its settings; changes become part of its name.
     pub fn load(&self) -> Result<LegFile, ToolError> {
         self.set(LegFile::load(self.name())?)
     }
 
-    /// Loads the leg of an image; its file has to state every key of the machine.
+    /// Loads the leg of an image; its file must state every key of the machine.
     pub fn load_for_image(&self) -> Result<LegFile, ToolError> {
         self.set(LegFile::load_for_image(self.name(), self.side.is_some())?)
     }

@@ -1,4 +1,4 @@
-//! What `identify` and `replay` do with model files: compare with one, keep one.
+//! Model files of `identify` and `replay`: comparison and storage.
 
 use clap::Args;
 
@@ -9,10 +9,10 @@ use crate::tool::model_file::{ModelFile, comparison, refuse_another_leg};
 use crate::tool::report::RunReport;
 use crate::tool::tables;
 
-/// Where a model is kept and with which one the result is compared.
+/// Model to be compared with, and destination of the result.
 #[derive(Args, Debug)]
 pub struct ModelArguments {
-    /// Keep an accepted result here, for predict, export and comparison; a refused one is not written.
+    /// Store an accepted result here, for predict, export and comparison; a rejected one is not written.
     #[arg(long)]
     save_model: Option<Output>,
     /// Compare the result with this model, which must be one of the same leg.
@@ -21,7 +21,7 @@ pub struct ModelArguments {
 }
 
 impl ModelArguments {
-    /// The model to compare with, if one is named: read, and refused where it is not the leg's, before anything runs.
+    /// Reads the model to compare with, if named; a model of another leg is rejected before anything runs.
     pub fn kept(&self, leg: &LegFile) -> Result<Option<ModelFile>, ToolError> {
         let Some(path) = &self.compare_model else { return Ok(None) };
         let model = ModelFile::load(path)?;
@@ -29,14 +29,14 @@ impl ModelArguments {
         Ok(Some(model))
     }
 
-    /// Notes in the report how the result compares.
+    /// Adds the comparison to the report.
     pub fn compare(&self, kept: Option<&ModelFile>, run: &mut RunReport) {
         if let (Some(path), Some(model)) = (&self.compare_model, kept) {
             run.compared = comparison::compare(model, &path.display().to_string(), run);
         }
     }
 
-    /// Keeps an accepted result, found with this bandwidth (Hz).
+    /// Stores an accepted result, identified with this bandwidth (Hz).
     pub fn save(&self, leg: &LegFile, run: &RunReport, bandwidth_hz: f64) -> Result<(), ToolError> {
         let Some(path) = &self.save_model else { return Ok(()) };
         match ModelFile::of(leg, run, bandwidth_hz) {

@@ -1,4 +1,4 @@
-//! `monitor`: a leg is identified and walks, something changes, and what the firmware makes of it.
+//! `monitor`: a leg is identified and walks, something changes, and the firmware's reaction is reported.
 
 use clap::Args;
 use rayon::prelude::*;
@@ -14,19 +14,19 @@ use crate::tool::report::SCHEMA;
 use crate::tool::setup::DEFAULT_SEED;
 use crate::with_leg_size;
 
-/// What changes, when, and how long nothing changes.
+/// Changes, their time, and the time without a change.
 #[derive(Args, Debug)]
 pub struct MonitorArguments {
     #[command(flatten)]
     leg: LegOptions,
-    /// KG@JOINT:X_M[:Y_M]: a mass, with a minus to take one off, fixed to a link while it walks; 3 kg at 0.2 m of the last
-    /// link unless anything else is asked for.
+    /// Mass fixed to a link during the walk, KG@JOINT:X_M[:Y_M]; a minus removes one. Default: 3 kg
+    /// at 0.2 m of the last link.
     #[arg(long, allow_hyphen_values = true)]
     payload: Option<String>,
-    /// Coulomb and viscous friction of all joints times this.
+    /// Factor on Coulomb and viscous friction of all joints.
     #[arg(long, allow_hyphen_values = true)]
     friction: Option<f64>,
-    /// The friction changes in the course of this many seconds.
+    /// Duration of the change of friction, seconds.
     #[arg(long, requires = "friction", default_value_t = 0.0)]
     over: f64,
     /// Seconds of walking before the change.
@@ -35,10 +35,10 @@ pub struct MonitorArguments {
     /// Hours of walking without a change, for false alarms.
     #[arg(long, default_value_t = 0.0)]
     hours: f64,
-    /// PER_MINUTE:PEAK_NM: the wearer pushes while walking, half a second on average.
+    /// Pushes of the wearer while walking, PER_MINUTE:PEAK_NM; half a second each on average.
     #[arg(long)]
     pushes: Option<String>,
-    /// Of noise and pushes.
+    /// Seed of noise and pushes.
     #[arg(long, conflicts_with = "seeds")]
     seed: Option<u64>,
     /// A run for each seed, A..B with both ends.
@@ -49,7 +49,7 @@ pub struct MonitorArguments {
     json: Option<Output>,
 }
 
-/// Far beyond what joints rub or people walk; beyond, the text was mistaken.
+/// Limits far beyond plausible friction and duration of a walk; larger values are typing errors.
 const LARGEST_FRICTION_FACTOR: f64 = 10.0;
 const LARGEST_WAIT_S: f64 = 3600.0;
 const LARGEST_HOURS: f64 = 200.0;
@@ -63,7 +63,7 @@ fn in_range(option: &str, value: f64, low: f64, high: f64) -> Result<f64, ToolEr
     Err(ToolError::input(format!("{option}: {value} is not from {low} to {high}")))
 }
 
-/// A mass put on, or with a minus before it taken off.
+/// Parses a mass to be attached, or with a leading minus to be removed.
 fn payload(leg: &LegFile, text: &str) -> Result<Disturbance, ToolError> {
     let (off, stated) = text.strip_prefix('-').map_or((false, text), |rest| (true, rest));
     let placed: PlacedMass =
@@ -91,7 +91,7 @@ fn pushes(text: &str) -> Result<PushesFile, ToolError> {
     })
 }
 
-/// Watches and reports; the exit code is that of the worst run.
+/// Monitors and reports; the exit code is that of the worst run.
 pub fn run(arguments: &MonitorArguments) -> Result<u8, ToolError> {
     let leg = &arguments.leg.load()?;
     let mut disturbances = Vec::new();

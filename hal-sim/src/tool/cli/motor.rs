@@ -1,4 +1,4 @@
-//! `motor`: the board's current loop on one of a leg's motors.
+//! `motor`: measures the board's current loop with one of a leg's motors.
 
 use clap::Args;
 
@@ -11,7 +11,7 @@ use crate::tool::motor::{measure, text};
 use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
 
-/// Which motor, and what to keep.
+/// Motor and outputs.
 #[derive(Args, Debug)]
 pub struct MotorArguments {
     #[command(flatten)]
@@ -19,7 +19,7 @@ pub struct MotorArguments {
     /// Joint whose motor is measured, its name or its number from 1.
     #[arg(long, default_value = "1")]
     joint: String,
-    /// Of the sensors' noise.
+    /// Seed of the sensors' noise.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
     /// Write the report here, with the curves.
@@ -30,7 +30,7 @@ pub struct MotorArguments {
     figures: Option<OutputFolder>,
 }
 
-/// Measures and prints; the exit code.
+/// Measures and prints; returns the exit code.
 pub fn run(arguments: &MotorArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load()?;
     let by_name = leg.joints.iter().position(|joint| joint.name == arguments.joint);

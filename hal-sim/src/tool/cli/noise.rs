@@ -1,18 +1,18 @@
-//! How much the logged torque scatters: asked of every command that reckons with it.
+//! Noise of the logged torque: arguments of every command that needs it.
 
 use clap::Args;
 
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 
-/// Noise of the logged torque instead of the leg file's.
+/// Noise of the logged torque, instead of the leg file's.
 #[derive(Args, Debug)]
 pub struct NoiseOptions {
-    /// Noise of the logged torque in percent of each joint's mean absolute torque on the default motion; the leg file's
-    /// unless given.
+    /// Noise of the logged torque in percent of each joint's mean absolute torque on the default
+    /// motion; the leg file's unless given.
     #[arg(long, allow_negative_numbers = true)]
     torque_noise: Option<f64>,
-    /// The same in N m, one number or one for each joint: the standard deviation of the logged torque at rest.
+    /// Noise in N m, one number or one for each joint: the standard deviation of the logged torque at rest.
     #[arg(
         long,
         value_name = "NM[,NM..]",
@@ -23,14 +23,14 @@ pub struct NoiseOptions {
     torque_noise_nm: Vec<f64>,
 }
 
-/// No torque sensor of a leg scatters by more, N m.
+/// Largest plausible noise of a torque, N m.
 const LARGEST_NM: f64 = 1000.0;
 
 impl NoiseOptions {
-    /// Percent, if it was given.
+    /// Percentage, if given.
     ///
     /// # Errors
-    /// Where it is no percentage.
+    /// The value is not a valid percentage.
     pub fn percent(&self) -> Result<Option<f64>, ToolError> {
         if self.torque_noise.is_some_and(|percent| !(0.0..=1000.0).contains(&percent)) {
             return Err(ToolError::input("--torque-noise: a percentage from 0 to 1000"));
@@ -38,10 +38,10 @@ impl NoiseOptions {
         Ok(self.torque_noise)
     }
 
-    /// The leg with the noise in N m that was given in the place of its own, if one was.
+    /// Leg with the given noise in N m instead of its own.
     ///
     /// # Errors
-    /// Where there are not as many numbers as joints, or one is no noise.
+    /// The number of values differs from the number of joints, or one is invalid.
     pub fn on(&self, leg: LegFile) -> Result<LegFile, ToolError> {
         let (given, joints) = (&self.torque_noise_nm, leg.joints.len());
         if let Some(noise) = given.iter().find(|noise| !(0.0..=LARGEST_NM).contains(*noise)) {

@@ -1,4 +1,4 @@
-//! `paper`: the paper's tables and figures, run again and put beside what it prints.
+//! `paper`: reproduces the paper's tables and figures and compares them with its printed results.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
@@ -11,7 +11,7 @@ use crate::tool::paper::contenders::Algorithm;
 use crate::tool::paper::{self, PaperOptions, Part, document};
 use crate::tool::tables;
 
-/// More runs at once are a mistake.
+/// Limit of the runs.
 const MOST_SEEDS: u64 = 100_000;
 
 /// A table of the paper.
@@ -26,10 +26,10 @@ enum TableArgument {
     /// The chain's parameters one by one; always with VI.
     #[value(name = "V")]
     Five,
-    /// The chain's combinations that torque determines; always with V.
+    /// The combinations of the chain's parameters that torque determines; always with V.
     #[value(name = "VI")]
     Six,
-    /// The chain identified before and after its load changes; no table of the paper, but what it argues from.
+    /// The chain identified before and after its load changes; no table of the paper, but its argument.
     LoadChange,
     /// Iterations of the default swarm on identification problems; no table of the paper.
     Convergence,
@@ -38,15 +38,15 @@ enum TableArgument {
 /// A figure of the paper.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum FigureArgument {
-    /// The swarms' ways on f1 to f4.
+    /// Paths of the swarms on f1 to f4.
     #[value(name = "5")]
     Five,
-    /// The chain's torque, predicted and real.
+    /// Torque of the chain, predicted and real.
     #[value(name = "7")]
     Seven,
 }
 
-/// Which tables and figures, of how many runs, and what to keep.
+/// Tables and figures, number of runs, and outputs.
 #[derive(Args, Debug)]
 pub struct PaperArguments {
     /// A table; may be repeated. Without a table and a figure everything is made.
@@ -55,7 +55,7 @@ pub struct PaperArguments {
     /// A figure; may be repeated.
     #[arg(long, value_enum)]
     figure: Vec<FigureArgument>,
-    /// Runs of each row, each with a seed of its own.
+    /// Runs of each row, each with its own seed.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     seeds: Option<u64>,
     /// A search of Table IV; may be repeated. All of them unless given.
@@ -105,7 +105,7 @@ impl PaperArguments {
     }
 }
 
-/// Runs, prints and keeps; the exit code.
+/// Runs, prints and writes; returns the exit code.
 pub fn run(arguments: &PaperArguments) -> Result<u8, ToolError> {
     let options = PaperOptions { seeds: arguments.seeds, algorithms: arguments.algorithm.clone() };
     let parts = arguments.parts();
@@ -116,7 +116,7 @@ pub fn run(arguments: &PaperArguments) -> Result<u8, ToolError> {
         parts.iter().try_for_each(|part| document::check(path, "paper", part.section_name()))?;
     }
     let sections = paper::run(&parts, &options)?;
-    // First what cannot fail: runs take minutes.
+    // Outputs that cannot fail come first: runs take minutes.
     for section in &sections {
         tables::print(&format!("{}\n", section.markdown))?;
     }

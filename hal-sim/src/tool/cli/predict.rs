@@ -1,4 +1,4 @@
-//! `predict`: torque of given states after a kept model.
+//! `predict`: torque of given states from a stored model.
 
 use clap::Args;
 
@@ -10,15 +10,15 @@ use crate::tool::model_file::{ModelFile, refuse_another_leg};
 use crate::tool::predict;
 use crate::tool::{tables, temperature};
 
-/// Which model and which states.
+/// Model and states.
 #[derive(Args, Debug)]
 pub struct PredictArguments {
-    /// Written by --save-model.
+    /// Model written by --save-model.
     #[arg(long)]
     model: Input,
     #[command(flatten)]
     states: StatesOptions,
-    /// With any of these a model that is not this leg's is refused.
+    /// With any of these options, a model of another leg is rejected.
     #[command(flatten)]
     leg: Option<LegOptions>,
     /// Write the table here instead of to standard output.
@@ -26,7 +26,7 @@ pub struct PredictArguments {
     out: Option<Output>,
 }
 
-/// Prints or writes the table; the exit code.
+/// Prints or writes the table; returns the exit code.
 pub fn run(arguments: &PredictArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.as_ref().map(LegOptions::load).transpose()?;
     let model = ModelFile::load(&arguments.model)?;

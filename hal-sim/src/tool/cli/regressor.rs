@@ -8,7 +8,7 @@ use crate::tool::error::{EXIT_ACCEPTED, ToolError};
 use crate::tool::regressor::{self, RegressorOptions};
 use crate::tool::tables;
 
-/// Which states of which leg.
+/// Leg and states.
 #[derive(Args, Debug)]
 pub struct RegressorArguments {
     #[command(flatten)]
@@ -20,7 +20,7 @@ pub struct RegressorArguments {
     f32: bool,
 }
 
-/// Prints the table; the exit code.
+/// Prints the table and returns the exit code.
 pub fn run(arguments: &RegressorArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load()?;
     let options = RegressorOptions { angles: arguments.states.angles(), single_precision: arguments.f32 };

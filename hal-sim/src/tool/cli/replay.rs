@@ -1,4 +1,4 @@
-//! `replay`: a leg identified from recordings.
+//! `replay`: identifies a leg from recordings.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use crate::tool::setup::DEFAULT_SEED;
 use crate::tool::tables;
 use crate::with_leg_size;
 
-/// What to identify from and what to keep of it.
+/// Recordings, and outputs.
 #[derive(Args, Debug)]
 pub struct ReplayArguments {
     /// Recordings: t_s, q1_rad[, q2_rad..], tau1_Nm[, tau2_Nm..]; several are one training set.
@@ -29,7 +29,7 @@ pub struct ReplayArguments {
     /// The first fraction of each file trains, the rest validates.
     #[arg(long, allow_negative_numbers = true)]
     split: Option<f64>,
-    /// Where the low-pass of the filter chain is 3 dB down, Hz; the leg file's (8 unless it says otherwise) unless given.
+    /// -3 dB frequency of the filter chain's low-pass, Hz; the leg file's (8 by default) unless given.
     #[arg(long, allow_negative_numbers = true)]
     bandwidth: Option<f64>,
     /// Write measured and predicted torque of the validation part here.
@@ -41,7 +41,7 @@ fn paths(files: &[Input]) -> Vec<PathBuf> {
     files.iter().map(|file| file.to_path_buf()).collect()
 }
 
-/// Identifies and reports; the exit code.
+/// Identifies and reports; returns the exit code.
 pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
     arguments.common.leg.require("cargo sim replay run.csv --leg my-leg.toml")?;
     let leg = &arguments.common.leg()?;

@@ -1,4 +1,4 @@
-//! `serve`: legs on a CANopen bus behind a port that host software speaks to.
+//! `serve`: legs on a CANopen bus, reached by host software through a TCP port.
 
 use std::net::SocketAddr;
 use std::path::Path;
@@ -13,12 +13,12 @@ use crate::tool::files::Updated;
 use crate::tool::setup::DEFAULT_SEED;
 use crate::with_leg_size;
 
-/// Which legs, where, how fast.
+/// Legs, address and speed.
 #[derive(Args, Debug)]
 pub struct ServeArguments {
     #[command(flatten)]
     leg: LegOptions,
-    /// Address and port of the CAN adapter that is simulated (slcan over TCP); port 0 is any that is free.
+    /// Address and port of the simulated CAN adapter (slcan over TCP); port 0 selects a free one.
     #[arg(long, value_name = "HOST:PORT")]
     slcan: SocketAddr,
     /// Boards on the bus, each with this leg.
@@ -27,23 +27,23 @@ pub struct ServeArguments {
     /// Simulated seconds per second.
     #[arg(long, value_name = "K", default_value_t = 1.0)]
     speed: f64,
-    /// Bit rate of the wire, kbit/s.
+    /// Bit rate of the bus, kbit/s.
     #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates())]
     bit_rate: u64,
-    /// The boards' flash; it is made where there is none.
+    /// File of the boards' flash; created if missing.
     #[arg(long, value_name = "FILE")]
     flash: Option<Updated>,
-    /// Of noise.
+    /// Seed of the noise.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
 }
 
-/// Bit rates that the board's controller has, kbit/s (object 2002).
+/// Bit rates of the board's controller, kbit/s (object 2002).
 fn bit_rates() -> impl TypedValueParser<Value = u64> {
     PossibleValuesParser::new(["125", "250", "500", "1000"]).try_map(|rate| rate.parse::<u64>())
 }
 
-/// Serves until SIGTERM; the exit code.
+/// Serves until SIGTERM; returns the exit code.
 pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
     let leg = arguments.leg.load()?;
     if !(arguments.speed > 0.0 && arguments.speed <= 100.0) {

@@ -1,4 +1,4 @@
-//! Which states of motion, and how their angles are counted.
+//! States of motion and the convention of their angles.
 
 use clap::Args;
 
@@ -8,8 +8,8 @@ use crate::tool::states::Angles;
 /// States for `predict` and `regressor`.
 #[derive(Args, Debug)]
 pub struct StatesOptions {
-    /// States of motion, CSV: columns q1.. (or q1_rad..), qd1.., qdd1.. in rad and s, anatomical as in recordings; predict
-    /// copies t_s.
+    /// States of motion, CSV: columns q1.. (or q1_rad..), qd1.., qdd1.. in rad and s, anatomical as
+    /// in recordings; predict copies t_s.
     #[arg(long)]
     pub states: Input,
     /// Angles in and torques out are those of the D-H frames instead of anatomical ones.
@@ -18,7 +18,7 @@ pub struct StatesOptions {
 }
 
 impl StatesOptions {
-    /// How angles and torques are counted.
+    /// Convention of angles and torques.
     pub fn angles(&self) -> Angles {
         if self.dh { Angles::DenavitHartenberg } else { Angles::Anatomical }
     }

@@ -1,4 +1,4 @@
-//! `trace`: what a board told, decoded and reported.
+//! `trace`: decodes and reports the records of a board.
 
 use clap::Args;
 
@@ -11,10 +11,11 @@ use crate::tool::tables;
 use crate::tool::trace::curves::curves;
 use crate::tool::trace::{Trace, log, run as told, run_report};
 
-/// What to read and what to keep of it.
+/// Trace and outputs.
 #[derive(Args, Debug)]
 pub struct TraceArguments {
-    /// A recorded trace, or - for standard input: text as a debug probe prints it, or with --image a defmt stream.
+    /// A recorded trace, or - for standard input: text as a debug probe prints it, or with --image
+    /// a defmt stream.
     file: Input,
     /// The image (ELF) that sent the stream; it holds the texts of the records.
     #[arg(long, value_name = "ELF")]
@@ -28,13 +29,13 @@ pub struct TraceArguments {
     /// Write the 500 Hz log of one motion here, in the format that replay reads.
     #[arg(long)]
     csv: Option<Output>,
-    /// Which one: 0 is the motion identified from, 1 and more are those that were only predicted.
+    /// Motion for --csv: 0 is the motion identified from, 1 and more are those that were only predicted.
     #[arg(long, value_name = "NUMBER", requires = "csv", default_value_t = log::TRAINING)]
     csv_motion: u8,
     /// Write the run as one HTML page here.
     #[arg(long)]
     report: Option<Output>,
-    /// Draw what the trace tells into this directory, as SVG.
+    /// Draw the contents of the trace into this directory, as SVG.
     #[arg(long)]
     figures: Option<OutputFolder>,
     /// Write the records here as lines of text, which can be read without the image.
@@ -47,7 +48,7 @@ pub struct TraceArguments {
     model: ModelArguments,
 }
 
-/// Reads and reports; the exit code.
+/// Reads and reports; returns the exit code.
 pub fn run(arguments: &TraceArguments) -> Result<u8, ToolError> {
     let trace = told::read(&arguments.file, arguments.image.as_deref(), arguments.text.as_deref())?;
     tables::print(&told::preface(&trace))?;

@@ -1,11 +1,17 @@
-//! A crash of the emulated board, and what came of it (`cargo emulate --crash`).
+//! Evaluates a crash of the emulated board (`cargo emulate --crash`).
 //!
-//! Two witnesses: the records of the three starts (before the crash, after it, after one more reset), and the emulator's own log of
-//! every exception, every write to a timer it does not model (the bridges' are) and every reset, in their order.
+//! Two sources: the records of three starts (before the crash, after it, after one more reset), and
+//! the emulator's log. The log contains every exception, reset, and write to a timer that the
+//! emulator does not model (the bridges' timers), in order.
 //!
-//! What has to hold: the drive was enabled and the leg identifying; between the first write that releases a bridge and the reset no
-//! exception was taken, so no current loop could switch it on again; the release came within 10 us of emulated time; the next
-//! start tells this crash and refuses to enable until the operator resets; the start after that knows nothing of it.
+//! Requirements:
+//!
+//! - Before the crash the drive was enabled and the leg identifying.
+//! - Between the first write that switches a bridge off and the reset no exception was taken, so no current
+//!   loop could switch it on again.
+//! - The bridges were off within 10 us of emulated time.
+//! - The next start reports this crash and refuses to enable until the operator resets.
+//! - The start after that no longer reports it.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -15,22 +21,22 @@ use scarab::trace::Line;
 
 use crate::tool::error::ToolError;
 
-/// What is to happen.
+/// Kind of crash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 #[value(rename_all = "snake_case")]
 pub enum CrashKind {
-    /// An index out of range at thread level.
+    /// Index out of range at thread level.
     Panic,
-    /// A read where no memory is, in the servo's interrupt.
+    /// Read of unmapped memory in the servo's interrupt.
     HardFault,
-    /// A recursion without end at thread level.
+    /// Endless recursion at thread level.
     StackOverflow,
-    /// An interrupt that nobody handles.
+    /// Interrupt without a handler.
     Interrupt,
 }
 
 impl CrashKind {
-    /// The word of command line and records.
+    /// Word on the command line and in records.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -42,26 +48,26 @@ impl CrashKind {
     }
 }
 
-/// Registers with the main outputs, as the emulator's log names them.
+/// Registers of the main outputs, as named in the emulator's log.
 const RELEASES: [&str; 2] = ["timer[1]: unimplemented device write", "timer[8]: unimplemented device write"];
 const RESET: &str = "CPU Reset";
 const EXCEPTION: &str = "Taking exception";
-/// Between exception and release, as a share of a second.
+/// Limit between exception and outputs off, as a fraction of a second.
 const LIMIT_PER_S: u32 = 100_000;
 
-/// What the emulator saw of the crash.
+/// Crash as seen by the emulator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Witness {
-    /// Both bridges were released.
+    /// Whether both bridges were switched off.
     pub released: bool,
-    /// Exceptions between the first release and the reset.
+    /// Exceptions between the first switch-off and the reset.
     pub exceptions: u32,
-    /// Resets after that, the crash's own among them.
+    /// Resets after that, including the crash's own.
     pub resets: u32,
 }
 
 impl Witness {
-    /// Of the emulator's log.
+    /// Reads the emulator's log.
     #[must_use]
     pub fn of(log: &str) -> Self {
         let mut seen = [false; 2];
@@ -78,23 +84,23 @@ impl Witness {
     }
 }
 
-/// What came of a crash.
+/// Result of a crash.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CrashReport {
-    /// As it was told.
+    /// Reported cause.
     pub cause: String,
     /// File and line, function, or number of the interrupt.
     pub place: String,
-    /// Instructions from before what crashed to both bridges off.
+    /// Instructions from just before the crash until both bridges are off.
     pub released_after: u32,
-    /// And to the complete record.
+    /// Instructions until the record is complete.
     pub kept_after: u32,
-    /// What was not as it has to be.
+    /// Violated requirements.
     pub complaints: Vec<String>,
 }
 
 impl CrashReport {
-    /// Of the records as lines, the emulator's log, and the clock when the crash was begun.
+    /// Evaluates the records as lines, the emulator's log, and the clock at the start of the crash.
     pub fn new(
         kind: CrashKind,
         records: &str,
@@ -145,7 +151,7 @@ impl CrashReport {
         Ok(report)
     }
 
-    /// Some lines for people.
+    /// Summary in a few lines.
     #[must_use]
     pub fn lines(&self) -> String {
         let Self { cause, place, released_after, kept_after, complaints } = self;
@@ -166,7 +172,7 @@ impl CrashReport {
     }
 }
 
-/// The records of each start.
+/// Records of each start.
 fn starts(records: &str) -> Vec<Vec<Line<'_>>> {
     let mut starts: Vec<Vec<Line<'_>>> = Vec::new();
     for line in records.lines().filter_map(|line| Line::parse(line).ok()) {
@@ -184,21 +190,21 @@ fn all<'a>(start: &[Line<'a>], kind: &str) -> Vec<Line<'a>> {
     start.iter().filter(|line| line.kind() == kind).copied().collect()
 }
 
-/// In the end the drive was enabled and identified.
+/// Whether the drive was enabled and identifying at the end.
 fn is_identifying(start: &[Line<'_>]) -> bool {
     all(start, "state").last().is_some_and(|state| {
         state.text("drive") == Ok("operation_enabled") && state.text("activity") == Ok("identify")
     })
 }
 
-/// Before anything was enabled it was said why that may not be, and what was asked for was refused.
+/// Whether the inhibit reason was reported before any enabling, and the request refused.
 fn is_refused(start: &[Line<'_>]) -> bool {
     let told = all(start, "refused").iter().any(|refused| refused.text("why") == Ok("crash"));
     let mut until = start.iter().take_while(|line| line.text("drive") != Ok("operation_enabled"));
     told && until.any(|line| line.kind() == "request" && line.text("accepted") == Ok("false"))
 }
 
-/// Where it happened.
+/// Location of the crash.
 fn place(kind: CrashKind, crash: &Line<'_>, image: &Path) -> Result<String, ToolError> {
     let text = |key: &'static str| crash.text(key).unwrap_or("?").to_owned();
     let function = |key: &'static str| function(crash.hex(key).unwrap_or(0), image);
@@ -210,12 +216,12 @@ fn place(kind: CrashKind, crash: &Line<'_>, image: &Path) -> Result<String, Tool
     })
 }
 
-/// The function that an address lies in.
+/// Function that contains an address.
 fn function(address: u32, image: &Path) -> Result<String, ToolError> {
     let wrong = |error: &dyn std::fmt::Display| ToolError::input(format!("{}: {error}", image.display()));
     let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
     let file = object::File::parse(&*bytes).map_err(|error| wrong(&error))?;
-    // Of a Thumb function the lowest bit is set, of a return address as well.
+    // The lowest bit is set in addresses of Thumb functions and in return addresses.
     let address = u64::from(address & !1);
     let found = file.symbols().find(|symbol| {
         symbol.kind() == object::SymbolKind::Text

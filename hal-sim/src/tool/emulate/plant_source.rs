@@ -1,21 +1,21 @@
-//! The simulated leg as a constant of the emulated image: exactly what a simulation on the host starts from.
+//! Simulated leg as a constant of the emulated image: the initial state of a simulation on the host.
 
 use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 use crate::tool::pair::{Context, start_position};
 use crate::tool::simulate::SimulationOptions;
 
-/// Joints and base parameters of the legs an image can hold.
+/// Joints and base parameters of the legs that an image supports.
 const JOINTS: usize = 2;
 /// See [`JOINTS`].
 const BASE: usize = 13;
 
-/// The constants of `hal_sim::world::World` as Rust source.
+/// Constants of `hal_sim::world::World` as Rust source.
 pub fn source(leg: &LegFile, seed: u64) -> Result<String, ToolError> {
     let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(seed))?;
     let plant = leg.description::<JOINTS>()?;
     let noise = context.current_noise(leg);
-    // The debug form of plain data is its source; `?` writes numbers so that they are read back bit for bit.
+    // The debug form of plain data is valid source; `?` writes numbers that read back bit for bit.
     Ok(format!(
         "// The simulated leg `{}`, written by `cargo emulate` from its leg file.\n\n\
          #[rustfmt::skip]\n\

@@ -1,4 +1,4 @@
-//! What an emulated run adds to the report of an identification.
+//! Report of an identification on the emulated microcontroller.
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -6,39 +6,39 @@ use sha2::{Digest, Sha256};
 use crate::tool::report::RunReport;
 use crate::tool::trace::loops::LoopReport;
 
-/// An identification that ran on the emulated microcontroller.
+/// Identification on the emulated microcontroller.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EmulationReport {
-    /// As of any trace.
+    /// Report as of any trace.
     #[serde(flatten)]
     pub run: RunReport,
-    /// Current and servo ticks that came late or not at all.
+    /// Current and servo ticks that were late or missed.
     pub missed_ticks: u32,
-    /// Longest servo tick, current ticks in it included.
+    /// Longest servo tick including its current ticks.
     pub worst_tick_instructions: u32,
-    /// Counted by the firmware while it ran.
+    /// Instructions counted by the firmware during the run.
     pub instructions: Instructions,
-    /// Of the stack, at its deepest.
+    /// Deepest use of the stack.
     pub stack_bytes: u32,
-    /// Of the records as they were sent.
+    /// Size of the records as sent.
     pub trace_bytes: usize,
-    /// Of the same, base 16.
+    /// SHA-256 of the records as sent, hexadecimal.
     pub trace_sha256: String,
 }
 
-/// One instruction takes 8 ns of the emulated time.
+/// Instruction counts; one instruction takes 8 ns of emulated time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Instructions {
     /// Longest current tick of both axes together, at 24 kHz.
     pub current_tick_worst: u32,
-    /// Longest servo tick, current ticks in it included, at 4 kHz.
+    /// Longest servo tick including its current ticks, at 4 kHz.
     pub servo_tick_worst: u32,
-    /// That pass between two servo ticks.
+    /// Instructions between two servo ticks.
     pub servo_period: u32,
 }
 
 impl EmulationReport {
-    /// Of a run, its loops, and its records as they were sent.
+    /// Report of a run with its loops and its records as sent.
     #[must_use]
     pub fn new(run: RunReport, loops: &LoopReport, trace: &[u8]) -> Self {
         Self {
@@ -56,7 +56,7 @@ impl EmulationReport {
         }
     }
 
-    /// A few lines for people.
+    /// Summary in a few lines.
     #[must_use]
     pub fn lines(&self, stack_there_is: u32, wall_s: f64) -> String {
         let Instructions { current_tick_worst, servo_tick_worst, servo_period } = self.instructions;

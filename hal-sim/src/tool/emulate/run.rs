@@ -25,19 +25,19 @@ const ARGUMENTS: [&str; 10] = [
     "--features",
     "emulated",
 ];
-/// Below the target directory.
+/// Path of the image below the target directory.
 const IMAGE: &str = "firmware/thumbv7em-none-eabihf/image/emulated";
 const EMULATOR: &str = "qemu-system-arm";
 const MACHINE: [&str; 9] =
     ["-M", "netduinoplus2", "-nographic", "-monitor", "none", "-serial", "null", "-icount", "shift=3"];
-/// Records leave by the debugger's calls, and what the image is asked for comes by them.
+/// Semihosting carries the records out and the requests to the image in.
 const SEMIHOSTING: [&str; 2] = ["-semihosting-config", "enable=on,target=native"];
-/// Exceptions, resets, and what is written to devices that are not modelled.
+/// Logged events: exceptions, resets, and writes to unmodelled devices.
 const LOGGED: [&str; 2] = ["-d", "int,unimp,cpu_reset"];
-/// An identification takes some tens of seconds.
+/// Limit of a run; an identification takes some tens of seconds.
 const LONGEST: Duration = Duration::from_secs(300);
 
-/// Whether there is an emulator.
+/// Whether the emulator is installed.
 #[must_use]
 pub fn is_there() -> bool {
     let silent = || Stdio::null();
@@ -46,7 +46,7 @@ pub fn is_there() -> bool {
     emulator.status().is_ok_and(|status| status.success())
 }
 
-/// Builds the image of a leg; `log`: it tells every sample of the 500 Hz log.
+/// Builds the image of a leg; with `log` it sends every sample of the 500 Hz log.
 pub fn build(leg: &LegFile, seed: u64, log: bool) -> Result<PathBuf, ToolError> {
     let directory = target_directory().join("firmware");
     let (description, _) = leg_source::describe(leg, seed)?;
@@ -58,7 +58,7 @@ pub fn build(leg: &LegFile, seed: u64, log: bool) -> Result<PathBuf, ToolError> 
     Ok(target_directory().join(IMAGE))
 }
 
-/// Runs an image to its end; its records go to a file. How long it took.
+/// Runs an image to its end and writes its records to a file; returns the duration.
 pub fn run(image: &Path, trace: &Path) -> Result<Duration, ToolError> {
     let started = Instant::now();
     let mut emulator = Command::new(EMULATOR);
@@ -67,7 +67,8 @@ pub fn run(image: &Path, trace: &Path) -> Result<Duration, ToolError> {
     Ok(started.elapsed())
 }
 
-/// Has an image crash in a servo tick; its records go to a file, the emulator's log to another. The clock when it was begun.
+/// Crashes an image in a servo tick; writes its records and the emulator's log to files. Returns
+/// the clock at the start of the crash.
 pub fn crash(image: &Path, trace: &Path, log: &Path, kind: CrashKind, tick: u32) -> Result<u32, ToolError> {
     let [option, semihosting] = SEMIHOSTING;
     let asked = format!("{semihosting},arg=scarab,arg=crash={}@{tick}", kind.name());
@@ -81,7 +82,7 @@ pub fn crash(image: &Path, trace: &Path, log: &Path, kind: CrashKind, tick: u32)
     })
 }
 
-/// Waits for the emulator's end; what it said, where that is kept.
+/// Waits for the end of the emulator and returns its captured output.
 fn wait(mut emulator: Command, trace: &Path) -> Result<String, ToolError> {
     let output = NewFile::create(trace)?;
     let started = Instant::now();
@@ -93,7 +94,7 @@ fn wait(mut emulator: Command, trace: &Path) -> Result<String, ToolError> {
     })?;
     loop {
         let ended = emulator.try_wait().map_err(|error| ToolError::input(format!("{EMULATOR}: {error}")))?;
-        // What the image thinks of its end is in its records.
+        // The image's own view of its end is in its records.
         if ended.is_some() {
             output.finish()?;
             let mut said = String::new();

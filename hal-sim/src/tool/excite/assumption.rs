@@ -1,29 +1,29 @@
-//! What is taken for the leg before it has moved.
+//! Leg assumed by a design before the leg has moved.
 //!
-//! Information of a motion is geometry, but how much torque it takes and what noise it will meet depend on a leg
-//! nobody has measured yet. So the design works on an assumed leg, in the open: the leg file's `prior`, or its `truth`
-//! where it has no prior or is asked for it. Nothing else of `truth` is looked at.
+//! The information of a motion is geometry, but its torque and noise depend on a leg that is not
+//! yet measured. The design therefore states its assumption: the leg file's `prior`, or its `truth`
+//! without a prior or on request. No other key of `truth` is used.
 
 use crate::tool::leg_file::LegFile;
 use crate::tool::setup::SetupError;
 
-/// Which description of the leg a design believes.
+/// Description of the leg that a design uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Assumption {
-    /// The prior, else the truth.
+    /// Prior if present, else truth.
     #[default]
     Best,
-    /// What the simulated leg is made of.
+    /// Parameters of the simulated leg.
     Truth,
 }
 
-/// The leg as it is assumed to be, with the word for what was assumed.
+/// Assumed leg, and the word for its origin.
 ///
-/// Its `truth` is the assumption, so that it can be simulated; the wearer does not push. Stribeck friction belongs to
-/// the simulated leg and is left out of an assumed one.
+/// Its `truth` is the assumption, so that it can be simulated; the wearer does not push. Stribeck
+/// friction belongs to the simulated leg and is omitted.
 ///
 /// # Errors
-/// Where the leg file has neither for every joint, or not the one asked for.
+/// Not every joint has a prior or truth, or the requested one.
 pub fn assumed(leg: &LegFile, assumption: Assumption) -> Result<(LegFile, &'static str), SetupError> {
     let has = |joints: &dyn Fn(&crate::tool::leg_file::JointFile) -> bool| leg.joints.iter().all(joints);
     let prior = assumption == Assumption::Best && has(&|joint| joint.prior.is_some());

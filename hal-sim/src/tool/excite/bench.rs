@@ -1,4 +1,4 @@
-//! What motions of one leg are reckoned with: the assumed leg, its limits, what scores and rehearses a motion.
+//! Assumed leg with its limits, and everything that scores and simulates its motions.
 
 use std::path::PathBuf;
 
@@ -22,54 +22,54 @@ use crate::tool::pair::{Context, Pair};
 use crate::tool::simulate::SimulationOptions;
 use crate::tool::words::leg_error;
 
-/// What is asked for.
+/// Options of `excite`.
 #[derive(Clone, Debug)]
 pub struct ExciteOptions {
     /// Duration, seed and effort of a design.
     pub design: DesignOptions,
-    /// Looked at instead of designing one.
+    /// Motion to be checked instead of a design.
     pub given: Option<(PathBuf, Excitation)>,
-    /// Instead of the leg file's.
+    /// Replaces the noise of the leg file, percent.
     pub torque_noise_percent: Option<f64>,
     /// Known masses that the leg carries.
     pub carried: Vec<Payload<f64>>,
-    /// How far off each base parameter may be, percent.
+    /// Assumed error of each base parameter, percent.
     pub margin_percent: f64,
-    /// What is taken for the leg.
+    /// Description of the leg to be assumed.
     pub assumption: Assumption,
 }
 
-/// What the noise was reckoned from.
+/// Reference of the torque noise.
 #[derive(Clone, Copy, Debug)]
 pub struct NoiseOrigin {
-    /// Of each joint's mean absolute torque on the default motion; zero where only N m are stated.
+    /// Percent of each joint's mean absolute torque on the default motion; zero if only N m are stated.
     pub percent: f64,
-    /// Whose torque: `truth` or `prior`.
+    /// Leg whose torque is meant: `truth` or `prior`.
     pub of: &'static str,
 }
 
-/// Everything that motions of one leg are reckoned with.
+/// Everything needed to score and simulate motions of one leg.
 #[derive(Clone, Debug)]
 pub struct Bench<const N: usize, const B: usize> {
-    /// As it is assumed to be.
+    /// Assumed leg.
     pub leg: LegFile,
     /// `prior` or `truth`.
     pub assumed: &'static str,
-    /// What the firmware and the plant are made from.
+    /// Data from which firmware and plant are built.
     pub context: Context<N, B>,
-    /// What scores a curve.
+    /// Scores a curve.
     pub scorer: Scorer<N, B>,
-    /// Of torque limit and current limit the lower, N m.
+    /// Lower of torque limit and current limit, N m.
     pub torque_limit: [f64; N],
-    /// Where the noise of the torque comes from.
+    /// Reference of the torque noise.
     pub noise: NoiseOrigin,
 }
 
 impl<const N: usize, const B: usize> Bench<N, B> {
-    /// For one leg.
+    /// Prepares one leg.
     ///
     /// # Errors
-    /// Where the leg cannot be worked with.
+    /// The leg file cannot be used.
     pub fn new(leg: &LegFile, options: &ExciteOptions) -> Result<Self, ToolError> {
         let file = leg;
         let (leg, word) = assumed(leg, options.assumption)?;
@@ -78,8 +78,8 @@ impl<const N: usize, const B: usize> Bench<N, B> {
             estimator: Estimator::Plain,
             ..SimulationOptions::of_seed(1)
         };
-        // Noise belongs to the sensors, which are there already: whoever will meet it has measured it at rest. So it is the
-        // simulated leg's even where its torque is not believed.
+        // Noise belongs to the sensors, which already exist and can be measured at rest. The
+        // simulated leg's noise is therefore used even if its torque is not.
         let simulated = file.joints.iter().all(|joint| joint.truth.is_some());
         let noise = if simulated {
             Context::<N, B>::new(file, &simulation)?.noise
@@ -91,7 +91,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         let leg = leg.with_torque_noise(&noise);
         let simulation = SimulationOptions { torque_noise_percent: None, ..simulation };
         let context = Context::<N, B>::new(&leg, &simulation)?;
-        // A leg that the firmware does not take is refused before anything is searched.
+        // Rejects a leg that the firmware does not accept before any search.
         Pair::new(&leg, &context, simulation.seed)?;
         let model = context.background.model.clone();
         let mut parameters = context.background.truth.unwrap_or([[0.0; PARAMETERS_PER_JOINT]; N]);
@@ -115,7 +115,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         Ok(Self { leg, assumed: word, context, scorer, torque_limit, noise: origin })
     }
 
-    /// Refuses to expect a sigma where the noise that it follows from is not stated.
+    /// Rejects an expected sigma if the noise it follows from is not stated.
     ///
     /// # Errors
     /// Names the joint, the keys and the option.
@@ -130,7 +130,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         )))
     }
 
-    /// What a design works within.
+    /// Limits of a design.
     #[must_use]
     pub fn frame(&self) -> Frame<'_, N, B> {
         Frame {
@@ -141,18 +141,19 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         }
     }
 
-    /// A run of the motion on the assumed leg.
+    /// Runs the motion on the assumed leg.
     ///
     /// # Errors
-    /// Where the drive stops.
+    /// The drive stops.
     pub fn rehearse(&self, table: &ExcitationTable<N>) -> Result<Rehearsal<N, B>, ToolError> {
         rehearse(&self.leg, table)
     }
 
-    /// A motion from a file: proved by the firmware, its torque without margin within the limits.
+    /// Reads a motion from a file; the firmware must accept it, and its torque without margin must
+    /// keep the limits.
     ///
     /// # Errors
-    /// In words, without the file's name.
+    /// Describes the fault, without the file's name.
     pub fn given(&self, given: &Excitation) -> Result<Candidate<N>, ToolError> {
         let (table, motion) = (given.table::<N>(&self.leg).map_err(ToolError::input)?, given.motion()?);
         let proof = self.context.configuration.prove(motion);
@@ -176,8 +177,8 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         Ok(Candidate { table, motion, demand })
     }
 
-    /// The best of 300 random motions, as many cycles as fill a duration; fewer where the limits slow it down; and
-    /// whether it keeps the limits of torque that a design keeps.
+    /// The best of 300 random motions, and whether it keeps the torque limits of a design. As many
+    /// cycles as fit the duration; fewer where the limits slow the motion down.
     #[must_use]
     pub fn random(&self, duration_s: f64, cycles: u32) -> Option<(Rehearsal<N, B>, bool)> {
         let steady = duration_s - 2.0 * f64::from(BLEND_S);
@@ -185,7 +186,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
         let limits = self.context.configuration.envelope();
         let motion = random_excitation(&self.context.background.model, &limits, period, cycles)?;
         let table = table_of(&motion);
-        // A tick of rounding does not cost a cycle.
+        // One tick of rounding must not cost a cycle.
         let fitting = ((steady + 0.01) / f64::from(table.period_s)) as u32;
         let table = ExcitationTable { cycles: cycles.min(fitting.max(1)), ..table };
         let demand = demand(&self.scorer, &self.context.configuration, &motion);
@@ -194,7 +195,7 @@ impl<const N: usize, const B: usize> Bench<N, B> {
     }
 }
 
-/// Noise to weigh the joints with, N m; where a motion is only checked, none need be stated.
+/// Noise that weights the joints, N m; a motion that is only checked needs none.
 fn reference_noise<const N: usize>(noise_nm: &[f64; N]) -> [f64; N] {
     noise_nm.map(|noise| if noise > 0.0 { noise } else { 1.0 })
 }

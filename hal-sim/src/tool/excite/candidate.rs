@@ -1,28 +1,28 @@
-//! From coordinates in a box to a curve within the limits of angle, speed and acceleration.
+//! Maps coordinates in a box to a curve within the limits of angle, speed and acceleration.
 //!
 //! ```text
 //! s_k = x / k,  c_k = x' / k           x, x' in -1..1, k = 1..H
-//! curve -> stretched to the share `g` of the inner range, g in 0.3..1, moved by `m` of what that leaves free
+//! curve -> stretched to the share `g` of the inner range, g in 0.3..1, moved by `m` of the free rest
 //! g is lowered until speed and acceleration, blends included, keep their limits
 //! ```
 //!
-//! So every point of the box is a curve that can be proved; torque alone remains a condition. The inner range keeps
-//! the share [`RANGE_MARGIN`] free at both ends, for what the position loop is off.
+//! Every point of the box is thus a curve that the firmware accepts; only torque remains a condition. The
+//! inner range leaves the share [`RANGE_MARGIN`] free at both ends for errors of the position loop.
 
 use scarab::motion::{Fourier, HARMONICS, JointEnvelope};
 use scarab::units::{Radian, Second};
 
-/// Share of the range that is kept free at both ends.
+/// Share of the range left free at both ends.
 pub const RANGE_MARGIN: f32 = 0.06;
-/// Share of the speed and acceleration limits that is used at most: what the position loop overshoots.
+/// Largest used share of the speed and acceleration limits; the rest is for overshoot of the position loop.
 pub const RATE_SHARE: f32 = 0.9;
 /// Smallest share of the inner range.
 const LEAST_SHARE: f64 = 0.3;
 
-/// Coordinates of each joint: its amplitudes, the share of the range and the place in it.
+/// Coordinates of each joint: its amplitudes, the share of the range and the position in it.
 pub const PER_JOINT: usize = 2 * HARMONICS + 2;
 
-/// The curve at a point of the box; `None` only where the coordinates give no curve at all.
+/// Curve at a point of the box; `None` only if the coordinates define no curve.
 #[must_use]
 pub fn curve<const N: usize>(
     coordinates: &[f64],

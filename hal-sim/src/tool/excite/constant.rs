@@ -1,4 +1,4 @@
-//! An exciting motion as Rust source: a constant that an image can hold.
+//! Exciting motion as Rust source: a constant for an image.
 
 use std::fmt::Write;
 
@@ -6,7 +6,7 @@ use scarab::motion::HARMONICS;
 
 use super::file::Excitation;
 
-/// Source of a module with one constant, `EXCITATION`; needs nothing but `scarab::motion`.
+/// Source of a module with one constant, `EXCITATION`; depends only on `scarab::motion`.
 #[must_use]
 pub fn source(motion: &Excitation) -> String {
     let joints = motion.joints.len();

@@ -1,14 +1,17 @@
-//! The torque a whole motion takes, the way to it and its blends included, before anything moves.
+//! Torque of a whole motion including its approach and blends, computed before anything moves.
 //!
-//! Angle, speed and acceleration are proved from the coefficients (`scarab::motion`). Torque depends on a leg nobody
-//! has measured, so it is reckoned for the assumed leg at **every** servo tick of the commanded motion, with each base
-//! parameter off by the margin in the worst sense at once. The way there may begin anywhere: it is reckoned from every
-//! corner of the range and from its middle, as the firmware would go it. The firmware's monitor also takes torque from a
-//! joint that runs towards an end of its range faster than it could stop (`scarab::safety::Barrier`): a motion it
-//! touches is not the motion that was designed, so it must not touch any tick.
+//! Angle, speed and acceleration are proved from the coefficients (`scarab::motion`). Torque
+//! depends on a leg that is not yet measured. It is computed for the assumed leg at **every** servo
+//! tick of the commanded motion. All base parameters are off by the margin in the worst sense at
+//! once. The approach may begin anywhere: it is computed from every corner of the range and from
+//! its middle, along the firmware's path.
 //!
-//! Known limits: friction at rest and what the position loop adds at a reversal are not in it; the margin is for them
-//! too.
+//! The firmware's monitor also reduces the torque of a joint that runs towards an end of its range
+//! faster than it could stop (`scarab::safety::Barrier`). That would change the designed motion, so
+//! no tick may be affected.
+//!
+//! Known limits: friction at rest and the position loop's torque at a reversal are not included;
+//! the margin covers them too.
 
 use scarab::leg::LegConfiguration;
 use scarab::motion::{MotionState, Periodic, Ramp};
@@ -16,37 +19,37 @@ use scarab::servo::SERVO_RATE_HZ;
 
 use super::score::Scorer;
 
-/// What one joint's torque comes to, N m, model's sign.
+/// Torque of one joint, N m, model's sign.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Demand {
-    /// Smallest of the assumed leg.
+    /// Smallest torque of the assumed leg.
     pub low_nm: f64,
-    /// Largest of the assumed leg.
+    /// Largest torque of the assumed leg.
     pub high_nm: f64,
     /// Largest magnitude with the margin.
     pub bound_nm: f64,
-    /// Largest magnitude with the margin on the way there.
+    /// Largest magnitude with the margin during the approach.
     pub approach_nm: f64,
-    /// Largest torque that the monitor would take from the motion, margin included: it must be able to stop a joint
+    /// Largest reduction of torque by the monitor, margin included: it must be able to stop a joint
     /// before its range ends.
     pub cut_nm: f64,
 }
 
 impl Demand {
-    /// The most of all, N m.
+    /// Largest magnitude of motion and approach, N m.
     #[must_use]
     pub fn largest(&self) -> f64 {
         self.bound_nm.max(self.approach_nm)
     }
 
-    /// Below a limit, N m, and left alone by the monitor.
+    /// Whether the torque is below a limit, N m and never reduced by the monitor.
     #[must_use]
     pub fn is_within(&self, limit_nm: f64) -> bool {
         self.largest() <= limit_nm && self.cut_nm <= 0.0
     }
 }
 
-/// Every tick of the motion, and the ways to it.
+/// Torque at every tick of the motion, and on its approaches.
 #[must_use]
 pub fn demand<const N: usize, const B: usize>(
     scorer: &Scorer<N, B>,
@@ -55,7 +58,7 @@ pub fn demand<const N: usize, const B: usize>(
 ) -> [Demand; N] {
     let mut demand = [Demand { low_nm: f64::INFINITY, high_nm: f64::NEG_INFINITY, ..Demand::default() }; N];
     let period = motion.blend_ticks() + motion.period_ticks();
-    // One cycle is like the others; then the blend that leaves.
+    // All cycles are alike; only the final blend differs.
     let leaving = motion.duration_ticks() - motion.blend_ticks();
     for tick in (0..=period).chain(leaving..=motion.duration_ticks()) {
         let state = motion.state_at(tick);
@@ -93,7 +96,8 @@ pub fn demand<const N: usize, const B: usize>(
     demand
 }
 
-/// A ramp is a polynomial of a second and more: its torque hardly changes in 2 ms.
+/// Ticks between two instants of a ramp: a polynomial of at least a second, whose torque hardly
+/// changes in 2 ms.
 const APPROACH_STEP: usize = 8;
 
 fn torques<const N: usize, const B: usize>(scorer: &Scorer<N, B>, state: &MotionState<N>) -> [(f64, f64); N] {

@@ -1,18 +1,19 @@
-//! Searches the exciting motion: the beetle swarm over Fourier coefficients, once for each pace.
+//! Designs the exciting motion: the beetle swarm over Fourier coefficients, once for each pace.
 //!
 //! ```text
 //! for each number of cycles that fits the duration:
-//!     swarm over (amplitudes, share of the range, place)  ->  least  -ln det A + penalty on torque        (score)
-//!     rounded to a microradian, shrunk until the torque of every tick keeps its limit                     (demand)
-//!     run on the assumed leg through the firmware's filters                                              (expectation)
+//!     swarm over (amplitudes, share of the range, position)  ->  least  -ln det A + torque penalty   (score)
+//!     rounded to a microradian, shrunk until the torque of every tick keeps its limit               (demand)
+//!     run on the assumed leg through the firmware's filters                                    (expectation)
 //! the most informative of them is the design
 //! ```
 //!
-//! Why several paces: how fast a motion should be is a trade of inertia against friction, limits and rows lost at
-//! reversals, and few cycles of many are another landscape than many of few; the swarm need not jump between them.
-//! Cost: [`DesignOptions::evaluations`] curves of about 0.2 ms in all; a run on the assumed leg for each pace.
+//! Why several paces: the best speed is a trade-off of inertia, friction, limits and rows lost at
+//! reversals. A slow and a fast motion are different landscapes, and the swarm need not jump between them.
+//! Cost: [`DesignOptions::evaluations`] curves of about 0.2 ms in all; one run on the assumed leg per pace.
 //!
-//! Known limits: the search ends by count, not at a proved optimum; another seed gives a similar motion, not the same.
+//! Known limits: the search ends by count, not at a proved optimum; another seed gives a similar
+//! motion, not an identical one.
 
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -29,49 +30,51 @@ use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 use crate::tool::setup::SetupError;
 
-/// From rest to full speed and back, s.
+/// Duration of a blend between rest and full speed, s.
 pub const BLEND_S: f32 = 1.0;
-/// Shortest cycle, s: its highest harmonic lies at a third of the position loop's 6 Hz, or the leg would not follow.
+/// Shortest cycle, s: its highest harmonic lies at a third of the position loop's 6 Hz, so the leg
+/// can follow.
 const SHORTEST_PERIOD_S: f64 = 3.0;
-/// Share of the rows' bandwidth that the highest harmonic may reach: products of two harmonics still lie in the
-/// flat band, 0.55 of it.
+/// Largest share of the rows' bandwidth for the highest harmonic: products of two harmonics still
+/// lie in the flat band, 0.55 of it.
 const BANDWIDTH_SHARE: f64 = 0.275;
-/// Longest cycle, s: a slower one hardly moves.
+/// Longest cycle, s; slower ones hardly move.
 const LONGEST_PERIOD_S: f64 = 12.0;
-/// Paces that are tried.
+/// Limit of the paces tried.
 const MOST_PACES: usize = 6;
 const BEETLES: usize = 20;
 /// Coordinates of three joints.
 const CAPACITY: usize = 3 * PER_JOINT;
-/// Cost of a torque that exceeds its limit by the limit, or that the monitor would cut by as much, in units of ln det.
+/// Cost of exceeding the torque limit by 100 %, or of an equal reduction by the monitor, in units
+/// of ln det.
 const TORQUE_PENALTY: f64 = 1e3;
-/// Evaluations between two looks at the progress.
+/// Evaluations between two updates of the progress bar.
 const SLICE: u32 = 100;
-/// Coefficients are rounded to this, rad: what a file holds is what was proved.
+/// Rounding of the coefficients, rad: the file holds exactly what was proved.
 const GRID_RAD: f64 = 1e-6;
-/// Each shrinking of a motion that takes too much torque, and how often.
+/// Factor per shrinking of a motion with too much torque, and limit of the steps.
 const SHRINK: f32 = 0.98;
 const SHRINKINGS: u32 = 60;
 
-/// What is wanted.
+/// Options of a design.
 #[derive(Clone, Copy, Debug)]
 pub struct DesignOptions {
-    /// Blends included.
+    /// Duration with blends, s.
     pub duration_s: f64,
-    /// Of the swarm.
+    /// Seed of the swarm.
     pub seed: u64,
-    /// Curves that are scored, all paces together.
+    /// Scored curves, all paces together.
     pub evaluations: u32,
 }
 
-/// What a design works within.
+/// Limits of a design.
 #[derive(Clone, Debug)]
 pub struct Frame<'a, const N: usize, const B: usize> {
-    /// For messages.
+    /// Leg, for messages.
     pub leg: &'a LegFile,
-    /// What scores a curve.
+    /// Scores a curve.
     pub scorer: &'a Scorer<N, B>,
-    /// The firmware's.
+    /// Configuration of the firmware.
     pub configuration: &'a LegConfiguration<N, B>,
     /// Largest torque of each joint, N m.
     pub torque_limit: [f64; N],
@@ -80,18 +83,18 @@ pub struct Frame<'a, const N: usize, const B: usize> {
 /// A motion within all limits.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate<const N: usize> {
-    /// As it is written.
+    /// Table as written to the file.
     pub table: ExcitationTable<N>,
     /// The motion of the table.
     pub motion: Periodic<N>,
-    /// Its torque.
+    /// Torque of each joint.
     pub demand: [Demand; N],
 }
 
-/// The best motion found at each pace.
+/// Returns the best motion found at each pace.
 ///
 /// # Errors
-/// Where no pace fits the duration, or no motion fits the limits.
+/// No pace fits the duration, or no motion fits the limits.
 pub fn candidates<const N: usize, const B: usize>(
     frame: &Frame<'_, N, B>,
     options: &DesignOptions,
@@ -140,7 +143,7 @@ fn paces(duration_s: f64, bandwidth_hz: f64) -> Vec<(f64, u32)> {
     paces
 }
 
-/// The cost the swarm sees.
+/// Cost for the swarm.
 struct Cost<'a, const N: usize, const B: usize> {
     frame: &'a Frame<'a, N, B>,
     envelope: [JointEnvelope; N],
@@ -193,7 +196,7 @@ fn search<const N: usize, const B: usize>(
     within_limits(frame, &curve, cycles, 1.0)
 }
 
-/// The same motion, a little smaller.
+/// Shrinks a motion slightly.
 #[must_use]
 pub fn smaller<const N: usize, const B: usize>(
     frame: &Frame<'_, N, B>,
@@ -202,7 +205,7 @@ pub fn smaller<const N: usize, const B: usize>(
     within_limits(frame, candidate.motion.curve(), candidate.table.cycles, SHRINK)
 }
 
-/// The curve as it will be written, shrunk about its centre until everything is proved.
+/// Rounds the curve as in the file and shrinks it about its centre until everything is proved.
 fn within_limits<const N: usize, const B: usize>(
     frame: &Frame<'_, N, B>,
     curve: &Fourier<N>,

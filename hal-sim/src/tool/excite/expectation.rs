@@ -1,22 +1,23 @@
-//! What an identification from a motion will be able to say, before anything moves.
+//! Predicts the result of an identification from a motion before anything moves.
 //!
 //! ```text
-//! assumed leg + plant, no noise --> the firmware excites, logs, filters, leaves out rows --> record
-//! residual_i += v_i S (n_i - k_i / (m S))        v_i torque noise of joint i, S = sum h^2, m = 10      (I5)
+//! assumed leg + plant, no noise --> the firmware excites, logs, filters, excludes rows --> record
+//! residual_i += v_i S (n_i - k_i / (m S))     v_i torque noise of joint i, S = sum h^2, m = 10     (I5)
 //! record --> the firmware's weights, covariance, status
 //! ```
 //!
-//! Why a whole run and not a formula: which rows count depends on where friction holds a joint, and that on the
-//! position loop. One noise-free run with the real filter chain knows it, and takes a tenth of a second. What noise will
-//! leave in the residual is known in the mean ((I5) read backwards), so it is added, and everything after that is the
-//! firmware's own code: the sigma here is the one that an identification reports, without its scatter.
+//! Why a whole run and not a formula: the rows that count depend on where friction holds a joint, and that
+//! on the position loop. One noise-free run with the real filter chain shows them in a tenth of a second.
+//! The mean residual from noise is known ((I5) read backwards) and is added. All later steps are the
+//! firmware's own code: this sigma is the one that an identification reports, without its scatter.
 //!
-//! Nothing disturbs this run, so every row counts alike (`Estimator::Plain`): without noise the robust estimator would
-//! take each reversal for a disturbance. On data that are only noisy it costs less than a hundredth of sigma.
+//! The run is undisturbed, so every row has the same weight (`Estimator::Plain`). Without noise the
+//! robust estimator would take each reversal for a disturbance. On data with noise only it costs
+//! less than a hundredth of sigma.
 //!
-//! The same run tells what is wrong without any noise: its parameters less the assumed ones are the error that encoder
-//! steps, sticking and the drive's lag make in this motion (`systematic`). It is one sample of an error that depends on the
-//! motion, not a standard deviation, and no average over runs removes it.
+//! The run also shows the error without noise (`systematic`): its parameters minus the assumed ones.
+//! Encoder steps, sticking and the drive's lag cause it. The value is one sample of an error that depends
+//! on the motion; it is not a standard deviation, and averaging over runs does not remove it.
 
 use scarab::ident::{DECIMATION, Estimate, Estimator, Plan, Problem, Record, RowModel, Selection};
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase};
@@ -31,42 +32,42 @@ use crate::tool::setup::SetupError;
 use crate::tool::simulate::SimulationOptions;
 use crate::world::TICK_S;
 
-/// No excitation takes longer, s.
+/// Limit of an excitation, s.
 const LONGEST_S: f64 = 200.0;
 
-/// A motion run on the assumed leg without noise.
+/// Run of a motion on the assumed leg without noise.
 #[derive(Clone, Debug)]
 pub struct Rehearsal<const N: usize, const B: usize> {
     record: Record<f64, N, B>,
     model: RowModel<f64, N, B>,
     assumed: [f64; B],
-    /// Standard deviation of each joint's logged torque after the leg file, N m.
+    /// Standard deviation of each joint's logged torque according to the leg file, N m.
     pub noise_nm: [f64; N],
-    /// Share of each joint's rows that are left out because it stands still.
+    /// Share of each joint's rows excluded because it stands still.
     pub lost_share: [f64; N],
-    /// What the plant really did.
+    /// Extremes of the plant's motion.
     pub seen: [Seen; N],
 }
 
-/// What is expected of one motion at one noise.
+/// Expected result of one motion at one noise.
 #[derive(Clone, Debug)]
 pub struct Expectation<const N: usize, const B: usize> {
-    /// Record as noise will leave it on average.
+    /// Record with the mean effect of noise.
     pub record: Record<f64, N, B>,
-    /// Covariance and what is determined; values are those of the noise-free run.
+    /// Covariance and determined parameters; values are those of the noise-free run.
     pub estimate: Estimate<f64, B>,
     /// ln det of the information of all base parameters.
     pub log_determinant: f64,
     /// Condition of the scaled, weighted problem.
     pub condition: Option<f64>,
-    /// Value of each base parameter less that of the assumed leg, without any noise.
+    /// Base parameters minus those of the assumed leg, without any noise.
     pub systematic: [f64; B],
 }
 
 /// Runs a motion on the assumed leg.
 ///
 /// # Errors
-/// Where the leg cannot be simulated or the drive stops.
+/// The leg cannot be simulated, or the drive stops.
 pub fn rehearse<const N: usize, const B: usize>(
     assumed: &LegFile,
     table: &ExcitationTable<N>,
@@ -106,7 +107,7 @@ pub fn rehearse<const N: usize, const B: usize>(
     let Some(solver) = pair.leg.identification().solver() else {
         return Err(SetupError::new(assumed, "the excitation ended without a record").into());
     };
-    // What data will leave out is not known beforehand: every column counts.
+    // The selection from data is not known beforehand: every column counts.
     let record = Record { selection: Selection::all(), ..solver.record().convert::<f64>() };
     let model = context.background.model.clone();
     let assumed = context.background.truth.map_or([0.0; B], |truth| model.base.project(&truth));
@@ -117,7 +118,7 @@ pub fn rehearse<const N: usize, const B: usize>(
 }
 
 impl<const N: usize, const B: usize> Rehearsal<N, B> {
-    /// What an identification will say at this noise of each joint's logged torque, N m.
+    /// Expected identification at this noise of each joint's logged torque, N m.
     #[must_use]
     pub fn at_noise(&self, noise_nm: &[f64; N]) -> Expectation<N, B> {
         let mut record = self.record.clone();
@@ -133,7 +134,8 @@ impl<const N: usize, const B: usize> Rehearsal<N, B> {
     }
 }
 
-/// Adds what white noise leaves in the residual on average, so that the firmware's own estimate of the noise finds it.
+/// Adds the mean effect of white noise to the residual, so that the firmware's own estimate of the
+/// noise finds it.
 fn add_noise<const N: usize, const B: usize>(record: &mut Record<f64, N, B>, noise_nm: &[f64; N]) {
     let information = record.row_information;
     for joint in 0..N {
@@ -141,7 +143,7 @@ fn add_noise<const N: usize, const B: usize>(record: &mut Record<f64, N, B>, noi
         let fitted = (0..B).filter(|&column| factor.triangle()[column][column] != 0.0).count();
         let free = (f64::from(record.rows[joint]) - fitted as f64 / information).max(1.0);
         let variance = noise_nm[joint] * noise_nm[joint] * information / DECIMATION as f64;
-        // A row of zeros is explained by no parameter: its right-hand side is residual.
+        // No parameter explains a row of zeros: its right-hand side is residual.
         factor.insert(&[0.0; B], (variance * free).sqrt());
     }
 }

@@ -1,9 +1,9 @@
-//! An exciting motion as a file: written by a design, read by people, taken by `identify`.
+//! File of an exciting motion: written by a design, read by people, used by `identify`.
 //!
-//! TOML, `schema = 1`. Angles are the model's (D-H) joint angles in rad, because those are what the firmware proves;
-//! the limits beside them are anatomical and in degrees, because those are what a leg file states. What `identify` uses
-//! is period, cycles, blend and coefficients; `proved` and `expected` are what was said of them. Nothing in a file is
-//! believed: geometry and joint names must be the leg's, and the firmware proves the motion again.
+//! TOML, `schema = 1`. Angles are the model's (D-H) joint angles in rad, which the firmware proves.
+//! The limits beside them are anatomical and in degrees, as in a leg file. `identify` uses period,
+//! cycles, blend and coefficients; `proved` and `expected` are information. Nothing in a file is
+//! trusted: geometry and joint names must be the leg's, and the firmware proves the motion again.
 
 use std::path::Path;
 
@@ -17,9 +17,9 @@ use crate::tool::leg_file::LegFile;
 
 /// Version of the file.
 pub const SCHEMA: u32 = 1;
-/// Longest motion that is taken, s.
+/// Longest accepted motion, s.
 pub const LONGEST_S: f64 = 120.0;
-/// No coefficient is larger, rad.
+/// Largest accepted coefficient, rad.
 const LARGEST_COEFFICIENT: f64 = 100.0;
 
 /// An exciting motion of 1 to 3 joints.
@@ -28,56 +28,56 @@ const LARGEST_COEFFICIENT: f64 = 100.0;
 pub struct Excitation {
     /// [`SCHEMA`].
     pub schema: u32,
-    /// Name in the leg file it was designed for.
+    /// Name of the leg in the leg file of the design.
     pub leg: String,
-    /// Of that leg: [`geometry`].
+    /// Fingerprint of that leg: [`geometry`].
     pub geometry: String,
-    /// One cycle, s.
+    /// Duration of one cycle, s.
     pub period_s: f32,
     /// Cycles at full speed.
     pub cycles: u32,
-    /// From rest to full speed and back, s.
+    /// Duration of a blend between rest and full speed, s.
     pub blend_s: f32,
-    /// Proximal first.
+    /// Joints, proximal first.
     #[serde(rename = "joint")]
     pub joints: Vec<ExcitedJoint>,
-    /// What was said of it before it moved.
+    /// Expected result of an identification.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expected: Option<Expected>,
 }
 
-/// One joint's series.
+/// Fourier series of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExcitedJoint {
     /// Name in the leg file.
     pub name: String,
-    /// rad, model's angle.
+    /// Centre of the model's angle, rad.
     pub centre_rad: f32,
-    /// rad, lowest harmonic first.
+    /// Sine coefficients, rad, lowest harmonic first.
     pub sine_rad: Vec<f32>,
-    /// rad, lowest harmonic first.
+    /// Cosine coefficients, rad, lowest harmonic first.
     pub cosine_rad: Vec<f32>,
-    /// What it was shown to keep.
+    /// Proved bounds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub proved: Option<Proved>,
 }
 
-/// Bounds of one joint, anatomical.
+/// Proved anatomical bounds of one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Proved {
-    /// Degrees, from the coefficients.
+    /// Range of the angle from the coefficients, degrees.
     pub angle_deg: [f64; 2],
-    /// Degrees per second, from the coefficients.
+    /// Speed from the coefficients, degrees per second.
     pub speed_deg_s: f64,
-    /// Degrees per second squared, from the coefficients, blends included.
+    /// Acceleration from the coefficients, blends included, degrees per second squared.
     pub acceleration_deg_s2: f64,
-    /// N m of the assumed leg, margin and the way there included.
+    /// Torque of the assumed leg, N m, margin and approach included.
     pub torque_nm: f64,
 }
 
-/// What was expected, and of whom.
+/// Expected result, and the leg it refers to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expected {
@@ -85,12 +85,12 @@ pub struct Expected {
     pub assumed: String,
     /// Standard deviation of each joint's logged torque, N m.
     pub torque_noise_nm: Vec<f64>,
-    /// Every sum that torque tells.
+    /// Expected base parameters.
     pub base_parameter: Vec<ExpectedBase>,
 }
 
-/// Fingerprint of what a motion's angles mean: names, Denavit-Hartenberg numbers and anatomical convention of every
-/// joint (FNV-1a, 64 bits). Gravity, limits and masses are not in it: they are checked on their own.
+/// Fingerprint of the meaning of a motion's angles (FNV-1a, 64 bits). It covers names, Denavit-Hartenberg
+/// numbers and anatomical convention of every joint. Gravity, limits and masses are checked separately.
 #[must_use]
 pub fn geometry(leg: &LegFile) -> String {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
@@ -104,7 +104,7 @@ pub fn geometry(leg: &LegFile) -> String {
         add(&[0]);
         add(&joint.direction.to_le_bytes());
         for number in [joint.dh.alpha, joint.dh.a, joint.dh.d, joint.zero_offset_deg] {
-            // Plus zero, so that -0 and 0 are one geometry.
+            // Adding zero makes -0 and 0 the same geometry.
             add(&(number + 0.0).to_bits().to_le_bytes());
         }
     }
@@ -112,7 +112,7 @@ pub fn geometry(leg: &LegFile) -> String {
 }
 
 impl Excitation {
-    /// A motion of a leg, nothing said of it yet.
+    /// Motion of a leg, without proof or expectation.
     #[must_use]
     pub fn of<const N: usize>(leg: &LegFile, table: &ExcitationTable<N>) -> Self {
         let joints = leg.joints.iter().enumerate().take(N).map(|(index, joint)| ExcitedJoint {
@@ -137,7 +137,7 @@ impl Excitation {
     /// Reads a file.
     ///
     /// # Errors
-    /// Names the file, and the line where one is to blame.
+    /// Names the file, and the line if one is at fault.
     pub fn load(path: &Path) -> Result<Self, ToolError> {
         let file = path.display();
         let text = std::fs::read_to_string(path)
@@ -191,16 +191,16 @@ impl Excitation {
         Ok(())
     }
 
-    /// Blends included, s.
+    /// Duration with blends, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         f64::from(self.period_s) * f64::from(self.cycles) + 2.0 * f64::from(self.blend_s)
     }
 
-    /// The motion's numbers, if they are meant for this leg.
+    /// Coefficients, after a check that they belong to this leg.
     ///
     /// # Errors
-    /// What is different, in words.
+    /// Describes the difference.
     pub fn table<const N: usize>(&self, leg: &LegFile) -> Result<ExcitationTable<N>, String> {
         if self.joints.len() != N {
             return Err(format!(
@@ -229,7 +229,7 @@ impl Excitation {
         self.numbers().ok_or_else(|| "the motion has another number of joints".into())
     }
 
-    /// The motion's numbers for a leg of `N` joints, whichever it is.
+    /// Coefficients for a leg of `N` joints, unchecked.
     #[must_use]
     pub fn numbers<const N: usize>(&self) -> Option<ExcitationTable<N>> {
         if self.joints.len() != N {
@@ -255,17 +255,17 @@ impl Excitation {
         Some(table)
     }
 
-    /// The motion of a leg of `N` joints; not yet proved, nor shown to be meant for it.
+    /// Motion for a leg of `N` joints; not yet proved, nor checked against the leg.
     ///
     /// # Errors
-    /// In words, without the file's name.
+    /// Describes the fault, without the file's name.
     pub fn motion<const N: usize>(&self) -> Result<Periodic<N>, ToolError> {
         let table =
             self.numbers::<N>().ok_or_else(|| ToolError::input("the motion has another number of joints"))?;
         table.motion(SERVO_RATE_HZ).map_err(|error| ToolError::input(motion_error(error)))
     }
 
-    /// As TOML text that [`Excitation::load`] reads back unchanged.
+    /// TOML text that [`Excitation::load`] reads back unchanged.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let body = toml::to_string(self)
@@ -284,7 +284,7 @@ const HEADER: &str = "\
 
 ";
 
-/// Why numbers make no motion, in words.
+/// Describes why the numbers do not define a motion.
 #[must_use]
 pub fn motion_error(error: MotionError) -> String {
     match error {

@@ -1,17 +1,17 @@
-//! Designs an exciting motion, says beforehand what it will tell, and keeps it as a file.
+//! Designs an exciting motion, predicts its result, and stores it as a file.
 //!
-//! | part | what it does |
+//! | part | contents |
 //! | --- | --- |
-//! | [`assumption`] | what is taken for the leg before it has moved |
-//! | [`mod@bench`] | the assumed leg with all that its motions are reckoned with |
+//! | [`assumption`] | leg assumed before the leg has moved |
+//! | [`mod@bench`] | the assumed leg with everything that its motions need |
 //! | [`candidate`] | coordinates in a box to a curve within angle, speed and acceleration |
 //! | [`score`] | information and torque of a curve, cheaply |
-//! | [`demand`] | torque of every tick, blends and the way there included |
+//! | [`demand`] | torque of every tick, blends and approach included |
 //! | [`design`] | the swarm over the curves |
 //! | [`expectation`] | sigma and status of every parameter, through the firmware's own chain |
 //! | [`mod@file`], [`constant`] | the motion as TOML, and as a constant for an image |
 //! | [`run`] | a designed or given motion with its report |
-//! | [`report`], [`text`] | what is known of it, as data and in words |
+//! | [`report`], [`text`] | its properties as data and in words |
 
 pub mod assumption;
 pub mod bench;

@@ -1,6 +1,6 @@
-//! What is known of a motion before it moves, as plain data: written as JSON, printed as tables.
+//! Properties of a motion before it moves, as plain data: written as JSON, printed as tables.
 //!
-//! The names of the fields are an interface. A number that is not known is `null`, never NaN.
+//! The names of the fields are an interface. An unknown number is `null`, never NaN.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,94 +9,94 @@ use crate::tool::report::Number;
 /// Version of the JSON.
 pub const SCHEMA: u32 = 1;
 
-/// One combination of parameters that torque determines, in a motion's file.
+/// One base parameter in a motion's file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExpectedBase {
-    /// The carrying parameter; with an `R` where others are regrouped into it.
+    /// Carrying parameter, with an `R` if others are regrouped into it.
     pub name: String,
-    /// SI.
+    /// SI unit.
     pub unit: String,
     /// Value of the assumed leg.
     pub assumed: f64,
-    /// Standard deviation that an identification reports; left out where the motion does not determine it.
+    /// Standard deviation that an identification reports; absent if the motion does not determine it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
-    /// Error without any noise: encoder, friction at reversals, lag.
+    /// Error without noise: encoder, friction at reversals, lag.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub systematic: Option<f64>,
 }
 
-/// The same beside what a random motion gives.
+/// Base parameter, compared with a random motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ComparedBase {
-    /// As in the file.
+    /// Entry of the file.
     #[serde(flatten)]
     pub expected: ExpectedBase,
-    /// Sigma over that from the best of 300 random motions of two cycles in the same duration, at the same noise in N m.
+    /// Ratio to the sigma of the best of 300 random motions: two cycles, equal duration and noise in N m.
     pub ratio_to_random: Number,
 }
 
-/// One of a joint's fourteen parameters.
+/// Expected result of one of a joint's fourteen parameters.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExpectedParameter {
     /// `XX1`, `IA2`: symbol and joint.
     pub name: String,
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
-    /// SI.
+    /// SI unit.
     pub unit: &'static str,
     /// Value of the assumed leg.
     pub assumed: Number,
     /// `identified`, `grouped`, `weak` or `prior`.
     pub status: &'static str,
-    /// Standard deviation; unknown unless it will be measured alone.
+    /// Standard deviation; unknown unless the parameter is identified alone.
     pub sigma: Number,
-    /// The others of its base parameters.
+    /// Other parameters of its base parameters.
     pub grouped_with: Vec<String>,
 }
 
-/// What one joint does, anatomical.
+/// Anatomical motion of one joint, and its limits.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointReport {
     /// Name in the leg file.
     pub name: String,
-    /// Proved smallest and largest angle, degrees.
+    /// Proved range of the angle, degrees.
     pub angle_deg: [f64; 2],
-    /// Allowed.
+    /// Allowed range of the angle, degrees.
     pub range_deg: [f64; 2],
-    /// Proved, degrees per second.
+    /// Proved speed, degrees per second.
     pub speed_deg_s: f64,
-    /// Allowed.
+    /// Allowed speed, degrees per second.
     pub speed_limit_deg_s: f64,
-    /// Proved, degrees per second squared.
+    /// Proved acceleration, degrees per second squared.
     pub acceleration_deg_s2: f64,
-    /// Allowed.
+    /// Allowed acceleration, degrees per second squared.
     pub acceleration_limit_deg_s2: f64,
     /// Smallest and largest torque of the assumed leg, N m.
     pub torque_nm: [f64; 2],
-    /// Largest magnitude with the margin, the way there included, N m.
+    /// Largest magnitude with the margin, approach included, N m.
     pub torque_with_margin_nm: f64,
-    /// Allowed by torque limit and current limit, N m.
+    /// Torque allowed by torque limit and current limit, N m.
     pub torque_limit_nm: f64,
     /// Standard deviation of the logged torque, N m.
     pub torque_noise_nm: f64,
-    /// Share of its rows that are left out because it stands still, 0..1.
+    /// Share of its rows excluded because the joint stands still, 0..1.
     pub lost_share: f64,
-    /// What the simulated assumed leg did, the way there included.
+    /// Extremes of the simulated assumed leg, approach included.
     pub simulated: Seen,
 }
 
 /// Extremes of a simulated joint, anatomical.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Seen {
-    /// Degrees.
+    /// Range of the angle, degrees.
     pub angle_deg: [f64; 2],
-    /// Degrees per second.
+    /// Largest speed, degrees per second.
     pub speed_deg_s: f64,
-    /// N m, what friction at a reversal and the position loop add included.
+    /// Largest torque, N m, including friction at a reversal and the position loop.
     pub torque_nm: f64,
-    /// Ticks of which the monitor took torque.
+    /// Ticks at which the monitor reduced the torque.
     pub limited_ticks: u32,
 }
 
@@ -112,7 +112,7 @@ impl Default for Seen {
 }
 
 impl Seen {
-    /// Takes one instant: rad, rad/s, N m, whether the monitor took torque.
+    /// Adds one instant: rad, rad/s, N m, and whether the monitor reduced the torque.
     pub fn add(&mut self, position: f64, velocity: f64, torque: f64, limited: bool) {
         self.limited_ticks += u32::from(limited);
         let angle = position.to_degrees();
@@ -122,57 +122,58 @@ impl Seen {
     }
 }
 
-/// What a design is compared with.
+/// Reference of a design.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RandomMotion {
     /// ln det of the information, at the noise of the reference motion.
     pub log_determinant: Number,
-    /// Whether it keeps the limits of torque, margin included, and is left alone by the monitor; random motions are not
-    /// asked to.
+    /// Whether the motion keeps the torque limits, margin included, without reduction by the
+    /// monitor; random motions need not.
     pub keeps_torque_limits: bool,
 }
 
-/// Everything that is known of a motion before it moves.
+/// Report of a motion before it moves.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExciteReport {
     /// [`SCHEMA`].
     pub schema: u32,
     /// Name in the leg file.
     pub leg: String,
-    /// Of its geometry, as in the file.
+    /// Fingerprint of the geometry, as in the file.
     pub geometry: String,
-    /// `prior` or `truth`: what torque, noise and sigma were reckoned for.
+    /// `prior` or `truth`: the leg assumed for torque, noise and sigma.
     pub assumed: &'static str,
-    /// Of the swarm; unknown for a motion from a file.
+    /// Seed of the swarm; unknown for a motion from a file.
     pub seed: Option<u64>,
-    /// Torque noise in percent of the mean absolute torque on the default motion; zero where only N m are stated.
+    /// Torque noise in percent of the mean absolute torque on the default motion; zero if only N m
+    /// are stated.
     pub torque_noise_percent: f64,
-    /// Whose torque that is: `truth` (of the simulated leg) or `prior`.
+    /// Leg to which the percentage refers: `truth` (simulated leg) or `prior`.
     pub torque_noise_of: &'static str,
-    /// How far off each base parameter may be in the torque's bound, percent.
+    /// Assumed error of each base parameter in the torque bound, percent.
     pub margin_percent: f64,
-    /// Blends included, s.
+    /// Duration with blends, s.
     pub duration_s: f64,
-    /// One cycle, s.
+    /// Duration of one cycle, s.
     pub period_s: f64,
     /// Cycles.
     pub cycles: u32,
-    /// One blend, s.
+    /// Duration of one blend, s.
     pub blend_s: f64,
     /// ln det of the information of the base parameters, at the noise of the reference motion.
     pub log_determinant: Number,
-    /// The best of 300 random motions, two cycles in the same duration as the default one.
+    /// Best of 300 random motions; two cycles in the same duration, as in the default motion.
     pub random: RandomMotion,
-    /// The best of 300 with as many cycles as the design has.
+    /// Best of 300 random motions with as many cycles as the design.
     pub random_same_pace: RandomMotion,
-    /// Of the scaled, weighted problem.
+    /// Condition number of the scaled, weighted problem.
     pub condition: Number,
-    /// Proximal first.
+    /// Joints, proximal first.
     pub joints: Vec<JointReport>,
-    /// Every sum that torque tells.
+    /// Base parameters.
     pub base_parameters: Vec<ComparedBase>,
-    /// All fourteen of every joint.
+    /// Fourteen parameters of every joint.
     pub parameters: Vec<ExpectedParameter>,
-    /// What to know before it moves.
+    /// Warnings to be read before the motion is run.
     pub warnings: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! From a leg file to a designed motion with its report.
+//! Designs a motion for a leg file, or checks a given one, and reports it.
 
 use std::path::Path;
 
@@ -21,17 +21,17 @@ use crate::tool::leg_file::LegFile;
 use crate::tool::motions::EXCITATION_CYCLES;
 use crate::tool::report::Number;
 
-/// A motion with everything that is known of it.
+/// Motion with its report.
 #[derive(Clone, Debug)]
 pub struct Excited {
-    /// As it is written.
+    /// Motion as written to the file.
     pub motion: Excitation,
-    /// What is known of it.
+    /// Report.
     pub report: ExciteReport,
 }
 
-/// Refuses a motion that is not this leg's or leaves its limits of angle, speed, acceleration or torque; the last with the
-/// masses it carries.
+/// Rejects a motion that belongs to another leg, or exceeds the limits of angle, speed,
+/// acceleration or torque. The torque includes carried masses.
 ///
 /// # Errors
 /// Names the file.
@@ -41,7 +41,7 @@ pub fn check<const N: usize, const B: usize>(
     motion: &Excitation,
     carried: &[Payload<f64>],
 ) -> Result<(), ToolError> {
-    // Before the leg is asked for more: another leg's motion is the likeliest fault.
+    // First: another leg's motion is the most likely mistake.
     motion.table::<N>(leg).map_err(|reason| about(file, &reason))?;
     let options = ExciteOptions {
         design: DesignOptions { duration_s: 0.0, seed: 0, evaluations: 0 },
@@ -55,20 +55,20 @@ pub fn check<const N: usize, const B: usize>(
     Ok(())
 }
 
-/// An error about a motion's file names the file.
+/// Error about a motion's file.
 fn about(file: &Path, reason: &dyn std::fmt::Display) -> ToolError {
     ToolError::input(format!("{}: {reason}", file.display()))
 }
 
-/// Designs a motion, or looks at a given one.
+/// Designs a motion, or checks a given one.
 ///
 /// # Errors
-/// Where the leg cannot be worked with or no motion fits.
+/// The leg file cannot be used, or no motion fits.
 pub fn excite<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ExciteOptions,
 ) -> Result<Excited, ToolError> {
-    // Before the leg is asked for more: another leg's motion is the likeliest fault.
+    // First: another leg's motion is the most likely mistake.
     if let Some((file, given)) = &options.given {
         given.table::<N>(leg).map_err(|reason| about(file, &reason))?;
     }
@@ -102,8 +102,8 @@ pub fn excite<const N: usize, const B: usize>(
     }
 }
 
-/// Makes a motion smaller until the monitor takes no torque from it even as the plant goes it: what friction at a
-/// reversal and the position loop add is not in the reckoning.
+/// Shrinks a motion until the monitor never reduces the simulated plant's torque. Friction at a
+/// reversal and the position loop add torque that the computed demand does not contain.
 fn untouched<const N: usize, const B: usize>(
     bench: &Bench<N, B>,
     mut candidate: Candidate<N>,
@@ -123,7 +123,7 @@ fn untouched<const N: usize, const B: usize>(
     )))
 }
 
-/// How often a motion is made smaller.
+/// Limit of the shrinking steps.
 const SMALLER: u32 = 12;
 
 fn design<const N: usize, const B: usize>(
@@ -149,7 +149,8 @@ impl<const N: usize, const B: usize> Bench<N, B> {
     ) -> Excited {
         let mut motion = Excitation::of(&self.leg, &candidate.table);
         let expectation = &rehearsal.at_noise(&rehearsal.noise_nm);
-        // The comparison is made at one noise, or the motion that takes less torque would win by that alone.
+        // All motions are compared at one noise; otherwise the motion with less torque would win by
+        // that alone.
         let designed = rehearsal.at_noise(&self.scorer.noise_nm);
         let at_same_noise =
             |(rehearsal, keeps): (Rehearsal<N, B>, bool)| (rehearsal.at_noise(&self.scorer.noise_nm), keeps);
@@ -257,7 +258,7 @@ fn millis(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }
 
-/// All fourteen of every joint with the status that the firmware will give.
+/// Fourteen parameters of every joint with the status that the firmware will assign.
 fn parameters<const N: usize, const B: usize>(
     background: &Background<N, B>,
     expectation: &Expectation<N, B>,

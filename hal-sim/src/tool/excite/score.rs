@@ -1,24 +1,28 @@
-//! How much a curve would tell, and how much torque it would take: cheap enough to ask ten thousand times.
+//! Information and torque of a curve, cheap enough for ten thousand evaluations.
 //!
 //! ```text
-//! A       = sum_i (cycles / s_i^2) sum over the rows of joint i   y_i' y_i            information of the base parameters
-//! s_i^2   = noise_i^2 / 10                                                           variance of one 50 Hz row
+//! A       = sum_i (cycles / s_i^2) sum over the rows of joint i  y_i' y_i   information matrix
+//! s_i^2   = noise_i^2 / 10                                            variance of one 50 Hz row
 //! merit   = ln det A
-//! torque  = max over t   |y_i b| + margin sum_k |y_ik b_k|                           each b_k off by the margin
-//! cut     = max over t   what the monitor would take from y_i b +- that margin       near an end, too fast to stop
+//! torque  = max over t  |y_i b| + margin sum_k |y_ik b_k|             each b_k off by the margin
+//! cut     = max over t  reduction of y_i b +- that margin by the monitor     near an end, too fast to stop
 //! ```
 //!
-//! `y_i` the base row of joint i (N m per unit), at 50 Hz along one cycle of the commanded curve; `b` the base
-//! parameters of the assumed leg; noise_i of the logged torque, N m, the same for every curve: noise in percent of a
-//! curve's own torque would be beaten by hanging the leg where it takes none (tried: the hip between 5 and 29 degrees).
-//! A row counts unless the joint stands still in too much of its window, the rule of `ident::record`; shares of
-//! stillness come from speeds at 100 Hz, straight in between, and the magnitude of the low-pass. The filters
-//! themselves are left out: a curve's harmonics lie in their flat band ([`super::design`] keeps them there). D-optimality
-//! after J. Swevers et al., "Optimal robot excitation and identification", IEEE Trans. Robotics and Automation 13
-//! (1997), section III.
+//! `y_i` is the base row of joint i (N m per unit), at 50 Hz along one cycle of the commanded
+//! curve; `b` are the base parameters of the assumed leg. `noise_i` is the noise of the logged
+//! torque in N m, equal for every curve. Noise in percent of a curve's own torque would favour a
+//! leg that hangs where it needs none. This was tried: the hip stayed between 5 and 29 degrees.
 //!
-//! Known limits: blends are not counted, and friction holds a real joint a little longer at each reversal than its
-//! command; [`super::expectation`] knows both.
+//! A row counts unless the joint stands still in too much of its window, the rule of
+//! `ident::record`. Shares of stillness come from speeds at 100 Hz, linear in between, and the
+//! magnitude of the low-pass. The filters themselves are omitted: a curve's harmonics lie in their
+//! flat band ([`super::design`] ensures it).
+//!
+//! Source of D-optimality: J. Swevers et al., "Optimal robot excitation and identification", IEEE
+//! Trans. Robotics and Automation 13 (1997), section III.
+//!
+//! Known limits: blends are not counted, and friction holds a real joint a little longer at each
+//! reversal than its command; [`super::expectation`] includes both.
 
 use nalgebra::SMatrix;
 use scarab::ident::record::STILL_SPEED;
@@ -29,15 +33,15 @@ use scarab::units::{NewtonMetre, Radian, RadianPerSecond};
 
 use crate::tool::pair::TAPS;
 
-/// Instants of the stillness rule, Hz, and how many of them make a row.
+/// Rate of the stillness rule, Hz, and instants per row.
 const SPEED_RATE_HZ: f64 = 100.0;
 const SPEEDS_PER_ROW: usize = 2;
-/// Of samples in `SPEED_RATE_HZ`.
+/// Samples per instant of `SPEED_RATE_HZ`.
 const SAMPLES_PER_SPEED: usize = 5;
 /// Merit of a curve that leaves a parameter undetermined.
 const NOTHING: f64 = -1e4;
 
-/// What curves are scored with.
+/// Data for scoring curves.
 #[derive(Clone, Debug)]
 pub struct Scorer<const N: usize, const B: usize> {
     /// Geometry, gravity, base parameters.
@@ -46,27 +50,27 @@ pub struct Scorer<const N: usize, const B: usize> {
     pub values: [f64; B],
     /// Standard deviation of each joint's logged torque, N m.
     pub noise_nm: [f64; N],
-    /// How far each base parameter may be off, as a share.
+    /// Assumed error of each base parameter, as a share.
     pub margin: f64,
-    /// What the firmware's monitor lets each joint do.
+    /// Limits of each joint in the firmware's monitor.
     pub barriers: [Barrier; N],
     /// Share of the low-pass's magnitude in each 10 ms, from its centre outwards.
     weights: Vec<f64>,
 }
 
-/// What one curve amounts to.
+/// Score of one curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Score<const N: usize> {
     /// ln det of the information of the base parameters.
     pub merit: f64,
     /// Largest torque of each joint, margin included, N m.
     pub torque: [f64; N],
-    /// Largest torque that the monitor would take from each joint, N m.
+    /// Largest reduction of each joint's torque by the monitor, N m.
     pub cut: [f64; N],
 }
 
 impl<const N: usize, const B: usize> Scorer<N, B> {
-    /// Scores for rows at a bandwidth; `None` where the filter cannot be built.
+    /// Creates a scorer for rows of a bandwidth; `None` if the filter cannot be built.
     #[must_use]
     pub fn new(
         model: RowModel<f64, N, B>,
@@ -93,7 +97,7 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
         self.model.rows(&Smoothed { position, velocity, acceleration, torque: [0.0; N] }).regressor
     }
 
-    /// Torque of one row, and how far it may be off.
+    /// Torque of one row, and its error bound.
     #[must_use]
     pub fn torque(&self, row: &[f64; B]) -> (f64, f64) {
         let terms = row.iter().zip(&self.values).map(|(element, value)| element * value);
@@ -102,13 +106,14 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
         (sum, self.margin * absolute)
     }
 
-    /// What the monitor would take from a joint's torque at one instant, N m: it must still be able to stop.
+    /// Reduction of a joint's torque by the monitor at one instant, N m; the monitor must still be
+    /// able to stop the joint.
     #[must_use]
     pub fn cut(&self, joint: usize, position: f32, velocity: f32, torque: f64, doubt: f64) -> f64 {
         [torque + doubt, torque - doubt].into_iter().fold(0.0, |cut: f64, wanted| {
             let (position, velocity) = (Radian(position), RadianPerSecond(velocity));
             let (allowed, _) = self.barriers[joint].bound(position, velocity, NewtonMetre(wanted as f32));
-            // Single precision of a torque is nothing that is taken.
+            // Differences within single precision do not count as a reduction.
             cut.max((wanted - f64::from(allowed.0)).abs() - 1e-5 * wanted.abs())
         })
     }
@@ -159,7 +164,7 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
                 continue;
             }
             for (away, weight) in self.weights.iter().enumerate() {
-                // The interval from `index` to the next instant, seen from both of its ends outwards.
+                // The interval from `index` to the next instant, seen from both ends outwards.
                 shares[(index + count - away % count) % count] += weight * still;
                 shares[(index + 1 + away) % count] += weight * still;
             }
@@ -168,7 +173,7 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
     }
 }
 
-/// Share of an interval in which a speed that runs straight from one value to another is below the rule's.
+/// Share of an interval in which a linearly changing speed is below the stillness limit.
 fn still_share(from: f64, to: f64) -> f64 {
     let (low, high) = if from < to { (from, to) } else { (to, from) };
     if high - low < 1e-12 {

@@ -1,4 +1,4 @@
-//! What is known of a motion before it moves, in words and tables.
+//! Report of a motion in words and tables.
 
 use comfy_table::{CellAlignment, Table};
 use scarab::servo::SERVO_RATE_HZ;
@@ -8,12 +8,12 @@ use super::report::{ComparedBase, ExciteReport, ExpectedParameter, JointReport};
 use crate::tool::leg_file::LegFile;
 use crate::tool::tables::{headed, number};
 
-/// A systematic error above this many sigma is worth a warning.
+/// Systematic error above which a warning is printed, sigma.
 const SYSTEMATIC_SIGMAS: f64 = 1.0;
-/// More rows lost than this is worth a warning.
+/// Share of lost rows above which a warning is printed.
 const LOST_SHARE: f64 = 0.4;
 
-/// What to know before it moves.
+/// Warnings to be read before the motion is run.
 #[must_use]
 pub fn warnings(
     leg: &LegFile,
@@ -74,7 +74,7 @@ pub fn warnings(
     warnings
 }
 
-/// The report on standard output.
+/// Formats the report for standard output.
 #[must_use]
 pub fn report(report: &ExciteReport) -> String {
     let mut lines = vec![

@@ -1,4 +1,4 @@
-//! What all figures share: size, palette, fonts, axes, legend.
+//! Size, palette, fonts, axes and legend of all figures.
 
 use std::ops::Range;
 
@@ -12,14 +12,14 @@ use plotters::prelude::{Cartesian2d, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{BLACK, Color, IntoFont, RGBColor, ShapeStyle, TextStyle, WHITE};
 
-/// Drawn this many times larger than shown.
+/// Factor between the drawn and the shown size.
 const OVERSAMPLING: u32 = 4;
 
-/// Lines of the grid.
+/// Grid lines.
 pub const GRID: RGBColor = RGBColor(228, 228, 228);
-/// Lines of the axes.
+/// Axis lines.
 const AXIS: RGBColor = RGBColor(90, 90, 90);
-/// What is pale and wide: a tint of Okabe and Ito's blue.
+/// Wide, pale curves: a tint of Okabe and Ito's blue.
 pub const PALE: RGBColor = RGBColor(158, 198, 230);
 /// Okabe and Ito's blue.
 pub const BLUE: RGBColor = RGBColor(0, 114, 178);
@@ -27,31 +27,29 @@ pub const BLUE: RGBColor = RGBColor(0, 114, 178);
 pub const VERMILION: RGBColor = RGBColor(213, 94, 0);
 /// Okabe and Ito's bluish green, darkened for thin lines.
 pub const GREEN: RGBColor = RGBColor(0, 128, 95);
-/// What is thin.
+/// Thin curves.
 pub const DARK: RGBColor = BLACK;
-/// Background of what is left out.
+/// Background of excluded ranges.
 pub const SHADE: RGBColor = RGBColor(222, 222, 222);
-/// Background of what is expected.
+/// Background of expected ranges.
 pub const BAND: RGBColor = RGBColor(224, 237, 248);
 
-/// Part of a figure.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// A part with two axes.
 pub type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-/// What drawing into a text can fail with.
+/// Error of drawing into a string.
 pub type DrawingError = DrawingAreaErrorKind<std::io::Error>;
 
-/// Pixels as shown to units as drawn.
+/// Converts shown pixels to drawn units.
 pub const fn px(pixels: i32) -> i32 {
     pixels * OVERSAMPLING as i32
 }
 
-/// A line so many quarters of a pixel wide.
+/// Line with a width in quarters of a pixel.
 pub fn line(colour: RGBColor, quarters: u32) -> ShapeStyle {
     colour.stroke_width(quarters)
 }
 
-/// Draws a figure of this size as shown, and returns its text.
+/// Draws a figure of the given shown size and returns its text.
 pub fn render(
     width: u32,
     height: u32,
@@ -69,12 +67,12 @@ pub fn render(
     Ok(svg.replacen(&size(drawn), &size((width, height)), 1))
 }
 
-/// Text of a size in pixels.
+/// Font of a size in pixels.
 pub fn font(pixels: i32) -> TextStyle<'static> {
     ("sans-serif", px(pixels)).into_font().color(&BLACK)
 }
 
-/// Writes at a point of the area, in pixels as shown.
+/// Writes text at a point of the area, in shown pixels.
 pub fn text(
     area: &Area<'_>,
     (x, y): (i32, i32),
@@ -86,24 +84,24 @@ pub fn text(
     area.draw(&Text::new(words.into(), (px(x), px(y)), style))
 }
 
-/// Exponents of a unit raised: `kg m2` becomes `kg m\u{b2}`.
+/// Raises the exponents of a unit: `kg m2` becomes `kg m\u{b2}`.
 pub fn unit(plain: &str) -> String {
     plain.replace("m2", "m\u{b2}")
 }
 
-/// What a legend explains.
+/// Symbol of a legend entry.
 pub enum Key {
-    /// A curve.
     Curve(ShapeStyle),
-    /// A curve of dashes: their length and gap, pixels.
+    /// Dashed curve: lengths of dash and gap, pixels.
     Dashes(ShapeStyle, i32, i32),
-    /// A background.
+    /// Background colour.
     Field(RGBColor),
-    /// A dot of a radius in pixels.
+    /// Dot with a radius in pixels.
     Dot(RGBColor, i32),
 }
 
-/// Meanings from left to right, one below the other where the width ends; each takes the width of its words.
+/// Draws legend entries from left to right; each takes the width of its text, and a new line begins
+/// at the right edge.
 pub fn legend(
     area: &Area<'_>,
     (left, mut y): (i32, i32),
@@ -140,7 +138,7 @@ pub fn legend(
     Ok(())
 }
 
-/// How two axes are drawn; a label that is empty takes no room.
+/// Style of two axes; an empty label takes no space.
 #[derive(Clone)]
 pub struct Axes<'s> {
     pub x: Range<f64>,
@@ -151,12 +149,12 @@ pub struct Axes<'s> {
     pub y_ticks: usize,
 }
 
-/// Room to the left of a frame, pixels.
+/// Space to the left of a frame, pixels.
 pub const LEFT: i32 = 58;
-/// Part of it beyond the axis label.
+/// Part of [`LEFT`] beyond the axis label.
 const EDGE: i32 = 8;
 
-/// Axes with a light grid; all frames begin at the same distance from the left.
+/// Draws axes with a light grid; all frames begin at the same distance from the left.
 pub fn axes<'a, 'b>(area: &'a Area<'b>, axes: &Axes<'_>) -> Result<Chart<'a, 'b>, DrawingError> {
     let below = if axes.x_label.is_empty() { 18 } else { 34 };
     let mut chart = ChartBuilder::on(area)
@@ -184,24 +182,24 @@ pub fn axes<'a, 'b>(area: &'a Area<'b>, axes: &Axes<'_>) -> Result<Chart<'a, 'b>
     Ok(chart)
 }
 
-/// Fewer labels do not show the scale of an axis.
+/// With fewer labels the scale of an axis cannot be read.
 const LEAST_LABELS: usize = 3;
 
-/// Labels to ask for on an axis: `most`, or more where plotters would draw fewer than [`LEAST_LABELS`].
+/// Labels to request for an axis: `most`, or more where plotters would draw fewer than [`LEAST_LABELS`].
 fn labels(range: &Range<f64>, most: usize) -> usize {
     let axis = RangedCoordf64::from(range.clone());
     let drawn = |count: &usize| axis.key_points(BoldPoints(*count)).len();
     (most..=most + 2 * LEAST_LABELS).find(|count| drawn(count) >= LEAST_LABELS).unwrap_or(most)
 }
 
-/// A number on an axis, with a true minus and without the last digits of a sum of tenths.
+/// Formats a number on an axis with a true minus sign and without rounding noise.
 pub fn short(value: f64) -> String {
     let rounded = (value * 1e6).round() / 1e6;
     let words = format!("{}", if rounded == 0.0 { 0.0 } else { rounded });
     words.replace('-', "\u{2212}")
 }
 
-/// Smallest range of all values, a twentieth wider to both sides.
+/// Range of all values, widened by a twentieth on both sides.
 pub fn range<'a>(values: impl Iterator<Item = &'a f64>) -> Range<f64> {
     let (low, high) = values
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
@@ -212,7 +210,7 @@ pub fn range<'a>(values: impl Iterator<Item = &'a f64>) -> Range<f64> {
     low - margin..high + margin
 }
 
-/// From minus to plus the largest size of any value, a tenth wider; at least `least`.
+/// Symmetric range of all values, a tenth wider than the largest magnitude; at least `least`.
 pub fn symmetric(values: impl Iterator<Item = f64>, least: f64) -> Range<f64> {
     let largest = values.map(f64::abs).filter(|size| size.is_finite()).fold(least, f64::max);
     let end = if largest > 0.0 { 1.1 * largest } else { 1.0 };

@@ -1,4 +1,5 @@
-//! Figure 7 of the paper, remade: torque of the three-joint chain on the verification motion, and its error over noise.
+//! Figure 7 of the paper, reproduced: torque of the three-joint chain on the verification motion,
+//! and its error over noise.
 
 use plotters::element::{Circle, EmptyElement, PathElement, Rectangle};
 use plotters::series::PointSeries;
@@ -12,39 +13,39 @@ use super::canvas::{
 };
 use super::{Figure, Group, WIDTH, curve};
 
-/// Of title and legend, of a joint; pixels.
+/// Heights of title with legend, and of a joint; pixels.
 const HEAD: i32 = 58;
 const JOINT: i32 = 230;
-/// Of a joint's torque within it.
+/// Height of a joint's torque within [`JOINT`], pixels.
 const TORQUE: i32 = 122;
-/// Of the curves over time; the rest is for the noise.
+/// Width of the curves over time, pixels; the rest is for the noise.
 const TIME: i32 = 570;
 
-/// A method's error over time.
+/// Error of a method over time.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Of the sequential method, else of the one-time one.
+    /// Sequential method, else the one-time method.
     pub sequential: bool,
-    /// Predicted less noise-free, N m.
+    /// Predicted minus noise-free torque, N m.
     pub nm: Vec<f64>,
 }
 
-/// One joint over time, everything through the filter.
+/// Torque of one joint over time, all filtered.
 #[derive(Clone, Debug)]
 pub struct JointTorque<'n> {
-    /// Of the joint.
+    /// Name of the joint.
     pub name: &'n str,
-    /// s.
+    /// Time, s.
     pub time_s: Vec<f64>,
-    /// The joint stands still: left out.
+    /// Samples excluded because the joint stands still.
     pub still: Vec<bool>,
-    /// N m.
+    /// Measured torque, N m.
     pub measured: Vec<f64>,
-    /// Noise-free, N m.
+    /// Noise-free torque, N m.
     pub real: Vec<f64>,
-    /// One-time, N m.
+    /// Torque predicted by the one-time method, N m.
     pub predicted: Vec<f64>,
-    /// Of both methods.
+    /// Errors of both methods.
     pub errors: [Curve; 2],
 }
 
@@ -53,11 +54,11 @@ pub struct JointTorque<'n> {
 pub struct Level {
     /// Noise, percent.
     pub noise_percent: f64,
-    /// From 0.
+    /// Joint, from 0.
     pub joint: usize,
-    /// Of the sequential method.
+    /// Sequential method, else the one-time method.
     pub sequential: bool,
-    /// Against the noise-free torque.
+    /// Error relative to the noise-free torque, percent.
     pub percent: f64,
 }
 
@@ -65,7 +66,7 @@ fn style(sequential: bool) -> ShapeStyle {
     if sequential { line(VERMILION, 10) } else { line(DARK, 5) }
 }
 
-/// `figure-7.svg`; `paper` are its percentages.
+/// Draws `figure-7.svg`; `paper` are the paper's percentages.
 pub fn drawn(joints: &[JointTorque<'_>], levels: &[Level], paper: &[f64]) -> Result<Figure, ToolError> {
     let file = "figure-7.svg".to_owned();
     let height = (HEAD + JOINT * joints.len().max(1) as i32).unsigned_abs();

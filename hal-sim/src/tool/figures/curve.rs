@@ -1,4 +1,4 @@
-//! Long curves as figures hold them: no more points than can be seen, and gaps where nothing is known.
+//! Reduces long curves to the points that can be seen, with gaps where a value is unknown.
 
 use std::ops::Range;
 
@@ -8,10 +8,10 @@ use plotters::style::{Color, RGBColor, ShapeStyle};
 
 use super::canvas::{Chart, DrawingError, px};
 
-/// Points of one curve: some three for each pixel of the widest frame.
+/// Points of one curve: about three per pixel of the widest frame.
 const MOST_POINTS: usize = 1200;
 
-/// A curve through these points, drawn with its extremes where there are more than can be seen; `None` is a gap.
+/// Draws a curve, reduced to its extremes where it has too many points; `None` is a gap.
 pub fn draw(
     chart: &mut Chart<'_, '_>,
     time_s: &[f64],
@@ -33,7 +33,7 @@ pub fn draw(
     Ok(())
 }
 
-/// Draws a short curve in dashes; lengths of a dash and of a gap in pixels.
+/// Draws a short dashed curve; lengths of dash and gap in pixels.
 pub fn dashed(
     chart: &mut Chart<'_, '_>,
     points: impl Iterator<Item = (f64, f64)>,
@@ -44,7 +44,7 @@ pub fn dashed(
     chart.draw_series(DashedLineSeries::new(points, px(length), px(gap), style)).map(|_| ())
 }
 
-/// The least and the largest of every so many points, in their order.
+/// Minimum and maximum of each group of points, in their order.
 fn extremes(points: &[(f64, f64)], per_pair: usize) -> Vec<(f64, f64)> {
     if per_pair <= 2 {
         return points.to_vec();
@@ -64,7 +64,7 @@ fn extremes(points: &[(f64, f64)], per_pair: usize) -> Vec<(f64, f64)> {
     kept
 }
 
-/// Fills the background where something holds.
+/// Fills the background where the condition holds.
 pub fn shade(
     chart: &mut Chart<'_, '_>,
     height: &Range<f64>,

@@ -1,4 +1,5 @@
-//! A run with a fault, drawn: what the joints did, what the motors and the supply did, and when the bridges let go.
+//! Draws a run with a fault: joints, motors and supply, and the time at which the bridges were
+//! switched off.
 
 use plotters::style::text_anchor::HPos;
 
@@ -10,11 +11,11 @@ use super::canvas::{
 };
 use super::{Figure, Group, WIDTH, curve};
 
-/// Of a frame, of title and legend; pixels.
+/// Heights of a frame, and of title with legend; pixels.
 const ROW: i32 = 170;
 const HEAD: i32 = 44;
 
-/// One figure of one run; `what` names it.
+/// Draws one run; `what` is the title.
 pub fn drawn(file: String, what: &str, recording: &Recording) -> Result<Figure, ToolError> {
     let height = (HEAD + 3 * ROW) as u32;
     let svg = render(WIDTH, height, &|area| whole(area, what, recording))

@@ -16,14 +16,14 @@ use super::canvas::{
 };
 use super::{WIDTH, curve};
 
-/// Heights of a row of frames, and of title and legend, pixels.
+/// Heights of a row of frames, and of title with legend; pixels.
 const ROW: i32 = 210;
 const HEAD: i32 = 56;
 
-/// Lengths of a dash and of a gap, pixels.
+/// Lengths of dash and gap, pixels.
 const DASHES: (i32, i32) = (5, 4);
 
-/// How a curve is drawn and what it shows. No two curves of a frame share colour, width and dashes.
+/// Style of a curve. No two curves of a frame share colour, width and dashes.
 #[derive(Clone, Copy)]
 struct Line {
     style: ShapeStyle,
@@ -47,7 +47,6 @@ impl Line {
     }
 }
 
-/// A curve over time.
 struct Trace<'a> {
     time: &'a [f64],
     values: &'a [f64],
@@ -58,7 +57,7 @@ fn thin(colour: RGBColor) -> ShapeStyle {
     line(colour, 6)
 }
 
-/// A frame with curves.
+/// Draws a frame with curves.
 fn frame(
     area: &Area<'_>,
     title: &str,
@@ -129,7 +128,7 @@ fn steps(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
 fn limit(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     let title = "From a current that a weak supply cannot hold, back within the limit";
     text(area, (12, 14), 13, HPos::Left, title)?;
-    // The weak supply, then the strong one.
+    // First the weak supply, then the strong one.
     let quadrature = [Line::solid(thin(VERMILION)), Line::solid(line(PALE, 18))];
     let direct = [Line::dashed(line(DARK, 5)), Line::solid(line(GREEN, 5))];
     let label = |index: usize, words: &str| {
@@ -143,7 +142,7 @@ fn limit(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     let (_, cells) = area.split_vertically(px(HEAD));
     for (part, pair) in cells.split_evenly((1, 2)).iter().zip(report.limit.chunks(2)) {
         let mut traces = Vec::new();
-        // The wide curve lies below the thin one.
+        // The thin curve is drawn over the wide one.
         for (limit, line) in pair.iter().zip(quadrature).rev() {
             traces.push(Trace { time: &limit.time_ms, values: &limit.quadrature_a, line });
         }
@@ -199,7 +198,7 @@ fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     let quiet: Vec<_> = report.ripple.iter().filter(|ripple| !ripple.noise).collect();
     let largest =
         quiet.iter().map(|ripple| ripple.torque_percent.max(ripple.sixth_percent)).fold(0.01, f64::max);
-    // The axis: a line every tenth of a percent, or every tenth of the largest power of ten.
+    // Axis ticks every 0.1 %, or every tenth of the largest power of ten.
     let step = 0.1 * 10_f64.powf((largest.log10() + 0.5).floor());
     let bottom = 20 * quiet.len() as i32 + 4;
     for tick in 0..=(largest / step) as i32 {
@@ -224,7 +223,7 @@ fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
     Ok(())
 }
 
-/// Draws all of them into a directory, which is made if need be.
+/// Draws all figures into a directory, creating it if necessary.
 pub fn write(directory: &Path, report: &MotorReport) -> Result<(), ToolError> {
     type Drawing = fn(&Area<'_>, &MotorReport) -> Result<(), DrawingError>;
     let quiet = report.ripple.iter().filter(|ripple| !ripple.noise).count() as i32;

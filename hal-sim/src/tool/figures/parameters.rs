@@ -1,5 +1,5 @@
-//! Errors of the base parameters in reported standard deviations; where no truth is known, those deviations in percent
-//! of the value.
+//! Errors of the base parameters in reported standard deviations; without a known truth, standard
+//! deviations in percent of the value.
 
 use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::combinators::IntoLogRange;
@@ -17,7 +17,7 @@ use super::canvas::{Area, DARK, DrawingError, GRID, font, line, px, text, unit};
 pub const ONE_SIGMA: RGBColor = RGBColor(190, 205, 225);
 pub const THREE_SIGMA: RGBColor = RGBColor(228, 235, 244);
 
-/// With values, standard deviations and truths.
+/// Draws values, standard deviations and truths.
 pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, format!("{}: {}", run.leg, what(run)))?;
     let (_, area) = area.split_vertically(px(30));
@@ -32,7 +32,7 @@ pub fn whole(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
     })
 }
 
-/// With values alone.
+/// Draws the values only.
 pub fn small(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, format!("Base parameters: {}", what(run)))?;
     let (_, area) = area.split_vertically(px(30));
@@ -42,10 +42,10 @@ pub fn small(area: &Area<'_>, run: &RunReport) -> Result<(), DrawingError> {
     })
 }
 
-/// In the place of a value.
+/// Text in place of a value.
 const NOT_DETERMINED: &str = "not determined";
 
-/// What is drawn, which depends on whether a truth is known.
+/// Title of the figure: it depends on whether the truth is known.
 pub fn what(run: &RunReport) -> &'static str {
     if truth_is_known(run) { "errors, bands of one and three sigma" } else { "sigma in percent of the value" }
 }
@@ -65,7 +65,7 @@ fn error(base: &BaseReport) -> Option<f64> {
     Some((base.value.known()? - base.truth.known()?) / sigma)
 }
 
-/// One row for each; `margins` to the left and right in pixels hold names and `values`.
+/// Draws one row per parameter; `margins` in pixels to the left and right hold names and `values`.
 fn dots(
     area: &Area<'_>,
     run: &RunReport,
@@ -95,17 +95,17 @@ fn dots(
     }
 }
 
-/// Of the logarithmic axis.
+/// Ends of the logarithmic axis.
 const PERCENT: (f64, f64) = (0.01, 1000.0);
 
-/// Room for names and values beside the axes.
+/// Reserves space for names and values beside the axes.
 pub fn frame<'a, 'b>(area: &'a Area<'b>, (left, right): (i32, i32)) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
     let mut builder = ChartBuilder::on(area);
     builder.margin_left(px(left)).margin_right(px(right)).x_label_area_size(px(36));
     builder
 }
 
-/// Errors about truth in sigma: bands of one and three, a line at none.
+/// Axis of errors in sigma: bands of one and three, a line at zero.
 pub fn sigma_axis(
     chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
     rows: f64,
@@ -117,7 +117,7 @@ pub fn sigma_axis(
     chart.draw_series([PathElement::new(vec![(0.0, 0.0), (0.0, rows)], line(DARK, 3))]).map(|_| ())
 }
 
-/// Lines up from one axis of numbers.
+/// Draws vertical grid lines from one numeric axis.
 pub fn mesh<'b, X: Ranged<ValueType = f64> + ValueFormatter<f64>>(
     chart: &mut ChartContext<'_, SVGBackend<'b>, Cartesian2d<X, RangedCoordf64>>,
     label: &str,
@@ -159,7 +159,7 @@ fn rows_of<X: Ranged<ValueType = f64>>(
     Ok(())
 }
 
-/// A name to the left and words to the right of a row at `y`, counted from the figure's corner.
+/// Writes a name to the left and text to the right of a row at `y`, relative to the figure's corner.
 pub fn labels(
     area: &Area<'_>,
     y: i32,
@@ -167,7 +167,7 @@ pub fn labels(
     (name, words): (String, String),
 ) -> Result<(), DrawingError> {
     let (width, _) = area.dim_in_pixel();
-    // From the figure's corner to the area's own.
+    // Offset between the figure's corner and the area's own.
     let (_, y0) = area.get_base_pixel();
     let text = |words: String, x: i32, anchor| {
         Text::new(words, (x, y - y0), font(12).pos(Pos::new(anchor, VPos::Center)))

@@ -1,7 +1,8 @@
-//! What is left of the torque: is it noise?
+//! Distribution and autocorrelation of the residual torque, compared with noise.
 //!
-//! Left, the distribution of the residuals in units of the noise's standard deviation, against the normal one. Right,
-//! their autocorrelation against that of white noise behind the same filter: what lies above it is not noise.
+//! Left: distribution of the residuals in units of the noise's standard deviation, against the
+//! normal distribution. Right: their autocorrelation, against that of white noise behind the same
+//! filter. A residual above that curve is not noise.
 
 use plotters::element::{PathElement, Rectangle};
 use plotters::style::Color;
@@ -10,23 +11,22 @@ use plotters::style::text_anchor::HPos;
 use super::super::series::{Role, Series, autocorrelation};
 use super::canvas::{Area, Axes, BLUE, DARK, DrawingError, Key, LEFT, PALE, axes, legend, line, px, text};
 
-/// Of one joint, pixels.
+/// Height of one joint, pixels.
 const JOINT_HEIGHT: i32 = 190;
-/// Of title and legend.
+/// Height of title and legend.
 const HEAD: i32 = 56;
-/// Widest residual that has a bar of its own, sigma.
+/// Widest residual with a bar of its own, sigma.
 const WIDEST: f64 = 4.5;
-/// Of one bar, sigma.
+/// Width of one bar, sigma.
 const BAR: f64 = 0.5;
-/// From one row to the next, s.
+/// Time from one row to the next, s.
 const ROW_S: f64 = scarab::ident::DECIMATION as f64 / scarab::ident::SAMPLE_RATE_HZ;
 
-/// Of the figure, pixels.
 pub fn height(joints: usize) -> u32 {
     (HEAD + JOINT_HEIGHT * joints.max(1) as i32).unsigned_abs()
 }
 
-/// A row for each joint.
+/// Draws a row for each joint.
 pub fn whole(area: &Area<'_>, joints: &[&str], series: &Series) -> Result<(), DrawingError> {
     let title = "Residuals where the joint moves: distribution, and autocorrelation of those of the motion identified from";
     text(area, (12, 14), 13, HPos::Left, title)?;
@@ -52,7 +52,7 @@ pub fn whole(area: &Area<'_>, joints: &[&str], series: &Series) -> Result<(), Dr
     Ok(())
 }
 
-/// Share of residuals per sigma in each bar from -WIDEST on; what is wider is in the outermost.
+/// Share of residuals per sigma in each bar from -WIDEST on; wider residuals count in the outermost bars.
 fn density(residuals: &[Vec<Option<f64>>], sigma: f64) -> Vec<f64> {
     let bars = (2.0 * WIDEST / BAR) as usize;
     let mut counts = vec![0_u32; bars];

@@ -1,4 +1,4 @@
-//! The swarm's way down to the optimum of its box.
+//! Descent of the swarm to the optimum of its box.
 
 use plotters::chart::ChartBuilder;
 use plotters::coord::combinators::IntoLogRange;
@@ -10,14 +10,14 @@ use super::super::precision::plain;
 use super::super::series::Series;
 use super::canvas::{Area, DARK, DrawingError, GRID, Key, VERMILION, font, legend, line, px, text};
 
-/// Excesses below are drawn here, chi-square units: single precision of the cost hides what is smaller.
+/// Smallest drawn excess, chi-square units; single precision of the cost hides smaller ones.
 const FLOOR: f64 = 1e-7;
-/// J_C - J_LS below this is rounding, chi-square units.
+/// Limit below which J_C - J_LS is rounding, chi-square units.
 const SMALLEST_FLOOR: f64 = 1e-6;
 /// Excess that moves no parameter by more than a fraction of its standard deviation.
 const GOAL: f64 = 0.5;
 
-/// Cost above the optimum after each iteration.
+/// Draws the cost above the optimum after each iteration.
 pub fn whole(area: &Area<'_>, series: &Series) -> Result<(), DrawingError> {
     let floor = match series.floor_chi2 {
         Some(above) if above > SMALLEST_FLOOR => {

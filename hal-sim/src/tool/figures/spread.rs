@@ -1,4 +1,5 @@
-//! Base parameters over many runs: a dot for each run, a bar from one standard deviation below their mean to one above.
+//! Base parameters over many runs: a dot per run, and a bar of one standard deviation to both sides
+//! of their mean.
 
 use plotters::element::{Circle, PathElement};
 use plotters::style::Color;
@@ -9,16 +10,16 @@ use plotters::style::text_anchor::HPos;
 use super::canvas::{Area, BLUE, DARK, DrawingError, Key, legend, line, px, text};
 use super::parameters::{ONE_SIGMA, THREE_SIGMA, frame, labels, sigma_axis};
 
-/// More dots are a blot; what is said in numbers counts all.
+/// Most dots that remain readable; the numbers count all runs.
 pub const LARGEST_RUNS: usize = 500;
 
-/// Up to so many runs have larger dots.
+/// Most runs that are drawn with larger dots.
 const FEW_RUNS: usize = 100;
 
 /// Height of title and legend, pixels.
 pub const HEAD: u32 = 50;
 
-/// One row for each parameter, errors about truth in reported sigma.
+/// Draws one row per parameter: errors in reported sigma.
 pub fn whole(area: &Area<'_>, leg: &str, spreads: &[Spread]) -> Result<(), DrawingError> {
     let runs = spreads.iter().map(|spread| spread.errors.len()).max().unwrap_or(0);
     let radius = if runs > FEW_RUNS { 1 } else { 2 };
@@ -40,7 +41,7 @@ pub fn whole(area: &Area<'_>, leg: &str, spreads: &[Spread]) -> Result<(), Drawi
     sigma_axis(&mut chart, rows)?;
     for (row, spread) in spreads.iter().enumerate() {
         let middle = rows - row as f64 - 0.5;
-        // In three lanes, so that dots of like errors stay apart.
+        // Three lanes keep dots with similar errors apart.
         let lane = |run: usize| middle + 0.2 * (run % 3) as f64 - 0.2;
         let dots = spread.errors.iter().take(LARGEST_RUNS).enumerate();
         chart.draw_series(dots.map(|(run, error)| {

@@ -1,4 +1,4 @@
-//! How swarms walk on a function of the plane: paths over contours, traces over iterations, convergence.
+//! Paths of swarms on a function of the plane: over contours, over iterations, and convergence.
 
 use std::ops::Range;
 
@@ -20,24 +20,24 @@ use super::canvas::{
 };
 use super::{Figure, Group, WIDTH};
 
-/// Of the row of contour maps, of the row of curves, of title and legend; pixels.
+/// Heights of the contour maps, the curves, and title with legend; pixels.
 const MAPS: u32 = 420;
 const CURVES: u32 = 310;
 const HEAD: u32 = 54;
-/// Points of the contours' grid along each axis.
+/// Points of the contour grid along each axis.
 const GRID_POINTS: usize = 101;
 /// Share of the window's values that lie below each contour.
 const LEVELS: [f64; 6] = [0.02, 0.08, 0.2, 0.4, 0.65, 0.9];
-/// Values below are drawn here: beyond what the searches are used for.
+/// Smallest drawn value; the searches are not used beyond it.
 const FLOOR: f64 = 1e-10;
-/// Contours.
+/// Colour of the contours.
 const LEVEL: RGBColor = RGBColor(165, 165, 165);
 
-/// The path of the best beetle.
+/// Path of the best beetle.
 pub struct Walk {
-    /// The search.
+    /// Name of the search.
     pub name: &'static str,
-    /// One place after every iteration.
+    /// Position after each iteration.
     pub places: Vec<[f64; 2]>,
 }
 
@@ -54,13 +54,13 @@ pub struct Band {
 }
 
 impl Band {
-    /// Of curves over iterations, as far as the shortest goes.
+    /// Quartiles over iterations, up to the length of the shortest curve.
     #[must_use]
     pub fn over_iterations(curves: &[&[f64]]) -> Self {
         Self::of(curves, 1)
     }
 
-    /// Of curves over evaluations: no more points than can be seen.
+    /// Quartiles over evaluations, one value per `STRIDE`.
     #[must_use]
     pub fn over_evaluations(curves: &[&[f64]]) -> Self {
         Self::of(curves, STRIDE)
@@ -81,9 +81,9 @@ impl Band {
     }
 }
 
-/// How a search comes down.
+/// Convergence of one search.
 pub struct Convergence {
-    /// The search.
+    /// Name of the search.
     pub name: &'static str,
     /// f - f* after every iteration.
     pub by_iteration: Band,
@@ -91,7 +91,7 @@ pub struct Convergence {
     pub by_evaluation: Band,
 }
 
-/// Colour, width and dashes (length and gap in pixels; none: a full line) of a search.
+/// Colour, width and dashes of a search; dash and gap in pixels, `None` for a solid line.
 fn look(name: &str) -> (ShapeStyle, Option<(i32, i32)>) {
     match name {
         "pso" => (line(GREEN, 6), Some((9, 4))),
@@ -101,7 +101,7 @@ fn look(name: &str) -> (ShapeStyle, Option<(i32, i32)>) {
     }
 }
 
-/// The whole figure of one function.
+/// Draws the whole figure of one function.
 pub fn figure(
     file: String,
     title: &str,
@@ -136,7 +136,7 @@ fn key(name: &str) -> Key {
     dashes.map_or(Key::Curve(style), |(length, gap)| Key::Dashes(style, length, gap))
 }
 
-/// A square that holds all places and the minima next to them, no larger than the box.
+/// Square window with all positions and the nearest minima, no larger than the box.
 fn window(half: f64, minimisers: &[[f64; 2]], walks: &[Walk]) -> [Range<f64>; 2] {
     let places = || walks.iter().flat_map(|walk| &walk.places).chain(minimisers);
     let reach = |axis: usize| {
@@ -153,7 +153,7 @@ fn window(half: f64, minimisers: &[[f64; 2]], walks: &[Walk]) -> [Range<f64>; 2]
     })
 }
 
-/// Contours, and the way of the best beetle over them.
+/// Draws contours and the paths of the best beetles.
 fn map(
     area: &Area<'_>,
     problem: &TestProblem,
@@ -200,7 +200,7 @@ fn contours(
         .filter_map(|share| sorted.get((share * sorted.len() as f64) as usize))
         .copied()
         .collect();
-    // The grid's first value lies half a cell inside of the builder's origin.
+    // The first value of the grid lies half a cell inside the builder's origin.
     let builder = ContourBuilder::new(GRID_POINTS, GRID_POINTS, true)
         .x_origin(x.start - step(x) / 2.0)
         .y_origin(y.start - step(y) / 2.0)
@@ -218,7 +218,7 @@ fn contours(
     Ok(())
 }
 
-/// Both coordinates of the best beetle over the iterations.
+/// Draws both coordinates of the best beetle over the iterations.
 fn trace(area: &Area<'_>, walks: &[Walk]) -> Result<(), DrawingError> {
     text(area, (LEFT, 10), 12, HPos::Left, "place of the best: x full, y dotted")?;
     let (_, area) = area.split_vertically(px(20));
@@ -251,7 +251,7 @@ fn trace(area: &Area<'_>, walks: &[Walk]) -> Result<(), DrawingError> {
     Ok(())
 }
 
-/// The iteration from which on nothing of the way is to be seen any more.
+/// Iteration after which no movement is visible.
 fn settled(places: &[[f64; 2]]) -> usize {
     let Some(end) = places.last() else { return 0 };
     let distance = |place: &[f64; 2]| (place[0] - end[0]).hypot(place[1] - end[1]);
@@ -261,7 +261,7 @@ fn settled(places: &[[f64; 2]]) -> usize {
 
 type LogChart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, LogCoord<f64>>>;
 
-/// f - f* of all searches.
+/// Draws f - f* of all searches.
 fn descent(
     area: &Area<'_>,
     x_label: &str,

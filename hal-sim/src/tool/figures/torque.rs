@@ -1,4 +1,4 @@
-//! Torque over time: measured, predicted, noise-free, and what is left.
+//! Torque over time: measured, predicted, noise-free, and residual.
 
 use plotters::element::Rectangle;
 use plotters::style::text_anchor::HPos;
@@ -11,21 +11,19 @@ use super::canvas::{
 };
 use super::curve;
 
-/// Of one motion: its title, its torque, its residual; pixels.
+/// Heights of one motion's title, torque and residual; pixels.
 const CELL: (i32, i32, i32) = (20, 150, 102);
-/// Of title and legend.
+/// Height of title and legend.
 const HEAD: i32 = 56;
-/// Of one joint in the small figure, pixels.
+/// Height of one joint in the small figure, pixels.
 const JOINT_HEIGHT: i32 = 181;
-/// Of title and legends there.
+/// Height of title and legends in the small figure.
 const REST_HEIGHT: i32 = 74;
 
-/// Of the small figure, pixels.
 pub fn small_height(joints: usize) -> u32 {
     (REST_HEIGHT + JOINT_HEIGHT * joints.max(1) as i32).unsigned_abs()
 }
 
-/// Of the whole figure, pixels.
 pub fn height(motions: &[MotionSeries]) -> u32 {
     let (title, upper, lower) = CELL;
     (HEAD + (title + upper + lower) * motions.len().div_ceil(2) as i32).unsigned_abs()
@@ -43,12 +41,12 @@ fn predicted() -> ShapeStyle {
     line(DARK, 4)
 }
 
-/// Of measured minus predicted.
+/// Style of measured minus predicted torque.
 fn measured_error() -> ShapeStyle {
     line(BLUE, 3)
 }
 
-/// One joint on all motions, two side by side; `sigma` is the noise of its filtered torque.
+/// Draws one joint on all motions, two side by side; `sigma` is the noise of its filtered torque.
 pub fn whole(
     area: &Area<'_>,
     name: &str,
@@ -97,7 +95,7 @@ pub fn whole(
     Ok(())
 }
 
-/// All joints on one motion.
+/// Draws all joints on one motion.
 pub fn small(area: &Area<'_>, joints: &[&str], motion: &MotionSeries) -> Result<(), DrawingError> {
     text(area, (12, 14), 13, HPos::Left, format!("Torque on {} ({})", motion.name, motion.role.name()))?;
     let mut entries = vec![("measured", Key::Curve(measured())), ("predicted", Key::Curve(predicted()))];
@@ -149,7 +147,7 @@ fn torques(curves: &JointCurves) -> impl Iterator<Item = &f64> {
     curves.measured_nm.iter().chain(&curves.predicted_nm).chain(&curves.noise_free_nm)
 }
 
-/// Residuals that the range must hold: measured ones of the instants at which the joint moves.
+/// Residuals that the axis must show: measured ones while the joint moves.
 fn errors_seen(curves: &JointCurves) -> impl Iterator<Item = f64> + '_ {
     curves.residual_nm().flatten()
 }

@@ -1,4 +1,4 @@
-//! Angles over time: commanded, measured, and what lies between them.
+//! Angles over time: commanded, measured, and their deviation.
 
 use plotters::style::text_anchor::HPos;
 use plotters::style::{RGBColor, ShapeStyle};
@@ -10,14 +10,14 @@ use super::canvas::{
 };
 use super::curve;
 
-/// Of one motion: its title, its angles, its deviation; pixels.
+/// Heights of one motion's title, angles and deviation; pixels.
 const CELL: (i32, i32, i32) = (20, 140, 92);
-/// Of one motion without commands.
+/// Heights of one motion without commands.
 const BARE_CELL: (i32, i32) = (20, 170);
-/// Of title and legend.
+/// Height of title and legend.
 const HEAD: i32 = 56;
 
-/// Of each joint: of the command, of the measurement.
+/// Colours of command and measurement of each joint.
 const COLOURS: [(RGBColor, RGBColor); 3] =
     [(RGBColor(158, 198, 230), BLUE), (RGBColor(245, 195, 155), VERMILION), (RGBColor(160, 215, 198), GREEN)];
 
@@ -25,7 +25,6 @@ fn commanded(motions: &[MotionSeries]) -> bool {
     motions.iter().flat_map(|motion| &motion.joints).any(|curves| !curves.commanded_deg.is_empty())
 }
 
-/// Of the figure, pixels.
 pub fn height(motions: &[MotionSeries]) -> u32 {
     let cell = if commanded(motions) { CELL.0 + CELL.1 + CELL.2 } else { BARE_CELL.0 + BARE_CELL.1 };
     (HEAD + cell * motions.len().div_ceil(2) as i32).unsigned_abs()
@@ -36,7 +35,7 @@ fn style(joint: usize) -> (ShapeStyle, ShapeStyle) {
     (line(pale, 18), line(full, 5))
 }
 
-/// All motions, two side by side.
+/// Draws all motions, two side by side.
 pub fn whole(area: &Area<'_>, joints: &[&str], motions: &[MotionSeries]) -> Result<(), DrawingError> {
     let with_commands = commanded(motions);
     let title =

@@ -1,8 +1,8 @@
-//! Finds files that a command would overwrite or cannot write, before it computes anything.
+//! Detects files that a command would overwrite or cannot write, before it computes anything.
 //!
-//! The roles of its arguments ([`super::role`]) say what a command does with each file, so that one check serves every
-//! command: each file that is written is held against every other file of the command, by its path without links and by the
-//! file's own number (hard links), then tried for whether it can be written.
+//! The roles of its arguments ([`super::role`]) define the use of each file, so one check serves
+//! every command. Each written file is compared with every other file of the command, by its
+//! resolved path and by its file number (hard links). Then a write is tried.
 
 use std::any::TypeId;
 use std::path::{Path, PathBuf};
@@ -14,10 +14,10 @@ use super::write::{can_write_in, can_write_over};
 use super::{folder_of, is_device, resolved};
 use crate::tool::error::ToolError;
 
-/// Kinds of files that a command writes into a folder under names of its own.
+/// Kinds of files that a command writes into a folder under its own names.
 const WRITTEN_INTO_FOLDERS: [&str; 2] = ["svg", "eds"];
 
-/// What a command does with a file.
+/// Use of a file by a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
     Input,
@@ -29,13 +29,13 @@ enum Role {
 /// One file of a command.
 #[derive(Debug)]
 struct Named {
-    /// Option or argument that names it.
+    /// Option or argument of the file.
     argument: String,
     path: PathBuf,
     role: Role,
-    /// Without links; the same for every spelling.
+    /// Resolved path; equal for every spelling.
     place: PathBuf,
-    /// Device and number of a file that exists.
+    /// Device and number of an existing file.
     number: Option<(u64, u64)>,
 }
 
@@ -53,7 +53,7 @@ impl Named {
         self.place == other.place || self.number.is_some() && self.number == other.number
     }
 
-    /// Whether the command may write this file into its folder under a name of its own.
+    /// Whether the command may write this file into its folder under its own name.
     fn may_lie_in(&self, folder: &Self) -> bool {
         let kind = self.place.extension().and_then(|extension| extension.to_str()).unwrap_or("");
         folder.role == Role::Folder
@@ -61,7 +61,7 @@ impl Named {
             && WRITTEN_INTO_FOLDERS.contains(&kind.to_ascii_lowercase().as_str())
     }
 
-    /// A message about this file.
+    /// Error about this file.
     fn refused(&self, reason: &str) -> ToolError {
         ToolError::input(format!("{} {}: {reason}", self.argument, self.path.display()))
     }
@@ -78,7 +78,7 @@ fn number(_: &Path) -> Option<(u64, u64)> {
     None
 }
 
-/// Refuses a command line whose outputs are inputs, each other, or cannot be written.
+/// Rejects a command line whose outputs are inputs, coincide, or cannot be written.
 ///
 /// # Errors
 /// Names option, file and reason.
@@ -96,7 +96,7 @@ pub fn check(command: &Command, matches: &ArgMatches) -> Result<(), ToolError> {
     files.iter().filter(|file| file.is_written()).try_for_each(|file| check_writable(file, &files))
 }
 
-/// Whether the type of an argument says what is done with the file it names.
+/// Whether the type of an argument defines the use of its file.
 #[must_use]
 pub fn has_role(argument: &Arg) -> bool {
     let kind = argument.get_value_parser().type_id();
@@ -111,7 +111,7 @@ pub fn has_role(argument: &Arg) -> bool {
     .any(|role| kind == *role)
 }
 
-/// The files that an argument names.
+/// Collects the files of an argument.
 fn collect(argument: &Arg, matches: &ArgMatches, files: &mut Vec<Named>) {
     if !has_role(argument) {
         return;
@@ -130,7 +130,7 @@ fn collect(argument: &Arg, matches: &ArgMatches, files: &mut Vec<Named>) {
     values::<Updated>(matches, id).for_each(|file| add(file, Role::Updated));
 }
 
-/// The values of an argument, if they are of this type.
+/// Values of an argument, if they are of this type.
 fn values<'a, T: Clone + Send + Sync + 'static>(
     matches: &'a ArgMatches,
     id: &str,
@@ -138,7 +138,7 @@ fn values<'a, T: Clone + Send + Sync + 'static>(
     matches.try_get_many::<T>(id).ok().flatten().into_iter().flatten()
 }
 
-/// No file is written that the command reads, or writes a second time.
+/// Rejects files that are both read and written, or written twice.
 fn check_apart(files: &[Named]) -> Result<(), ToolError> {
     for (index, written) in files.iter().enumerate().filter(|(_, file)| file.is_written()) {
         for (_, other) in files.iter().enumerate().filter(|(number, _)| *number != index) {
@@ -161,7 +161,7 @@ fn check_apart(files: &[Named]) -> Result<(), ToolError> {
     Ok(())
 }
 
-/// The file can be written: nothing is left of the attempt.
+/// Checks that the file can be written, without leaving anything behind.
 fn check_writable(file: &Named, files: &[Named]) -> Result<(), ToolError> {
     let cannot = |reason: &str| file.refused(&format!("cannot be written: {reason}"));
     let place = &file.place;
@@ -175,7 +175,7 @@ fn check_writable(file: &Named, files: &[Named]) -> Result<(), ToolError> {
         Ok(_) if !is_folder => can_write_over(place).map_err(|error| cannot(&error.to_string()))?,
         _ => {}
     }
-    // Folders that the command makes need not exist.
+    // Folders that the command creates need not exist.
     let mut folder = if is_folder { place.clone() } else { folder_of(place) };
     let is_made =
         is_folder || files.iter().any(|other| other.role == Role::Folder && folder.starts_with(&other.place));

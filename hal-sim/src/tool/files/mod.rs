@@ -1,16 +1,16 @@
-//! Files of a command: what it reads, what it writes, and how they are written.
+//! Files of a command: inputs, outputs, and how they are written.
 //!
-//! Why one place: a command that writes over its own recording destroys data that nobody can bring back. So every
-//! command's files are checked before anything is computed, and no other module of the tool writes a file.
+//! Why one place: a command that overwrites its own recording destroys data for good. The files of every
+//! command are therefore checked before any computation, and no other module of the tool writes a file.
 //!
-//! | part | what it does |
+//! | part | contents |
 //! | --- | --- |
-//! | [`role`] | types of command-line arguments that say what a command does with a file |
-//! | [`mod@check`] | finds files that a command would overwrite or cannot write, from the parsed arguments of any command |
+//! | [`role`] | types of command-line arguments that define the use of a file |
+//! | [`mod@check`] | detects files that a command would overwrite or cannot write |
 //! | [`mod@write`] | writes a temporary file in the same folder and renames it |
 //!
-//! Known limits: names that differ in case only are different files, which some file systems do not know. A file that the
-//! shell redirects the output to is the shell's.
+//! Known limits: names that differ in case only count as different files, also on file systems that
+//! ignore case. Redirections of the shell are not checked.
 
 pub mod check;
 pub mod role;
@@ -22,20 +22,20 @@ pub use write::{NewFile, write};
 
 use std::path::{Path, PathBuf};
 
-/// Streams of the process, which may lead to files that the shell has opened.
+/// Streams of the process, which may be files opened by the shell.
 const OPEN_STREAMS: [&str; 3] = ["/dev/stdout", "/dev/stderr", "/dev/fd"];
-/// Links that are followed by hand before a path counts as a circle.
+/// Limit of followed links before a path counts as a cycle.
 const MOST_LINKS: usize = 40;
 
-/// The path without links, `.` and `..`, as far as its parts exist: two spellings of one file, existing or not, give the
-/// same.
+/// Path without links, `.` and `..`, as far as its parts exist. All spellings of one file give the
+/// same result, whether it exists or not.
 fn resolved(path: &Path) -> PathBuf {
     let mut path = path.to_owned();
     for _ in 0..MOST_LINKS {
         if let Ok(real) = path.canonicalize() {
             return real;
         }
-        // A link to a file that does not exist yet.
+        // Link to a file that does not exist yet.
         let Ok(target) = path.read_link() else { break };
         path = folder_of(&path).join(target);
     }
@@ -48,7 +48,7 @@ fn resolved(path: &Path) -> PathBuf {
     }
 }
 
-/// The folder that a path lies in.
+/// Folder of a path.
 fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(parent) if parent.as_os_str().is_empty() => PathBuf::from("."),
@@ -57,7 +57,7 @@ fn folder_of(path: &Path) -> PathBuf {
     }
 }
 
-/// Whether the path is a terminal, a pipe or another device: it is written to directly, and by as many as like.
+/// Whether the path is a terminal, pipe or other device: these are written directly and may be shared.
 fn is_device(path: &Path) -> bool {
     OPEN_STREAMS.iter().any(|stream| path.starts_with(stream))
         || path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())

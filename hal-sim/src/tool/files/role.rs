@@ -1,4 +1,4 @@
-//! Types of command-line arguments that say what a command does with a file.
+//! Types of command-line arguments that define the use of a file.
 
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use clap::builder::{
 
 use crate::tool::leg_file::SHIPPED_LEGS;
 
-/// A path in a role, as an argument of the command line.
+/// Declares a path in a role, as an argument of the command line.
 macro_rules! role {
     ($(#[$words:meta])* $name:ident) => {
         $(#[$words])*
@@ -35,28 +35,28 @@ macro_rules! role {
 }
 
 role! {
-    /// A file that is only read.
+    /// File that is only read.
     Input
 }
 role! {
-    /// A file that is written as a whole.
+    /// File that is written as a whole.
     Output
 }
 role! {
-    /// A folder that files are written into; it is made if it does not exist.
+    /// Folder for output files; created if missing.
     OutputFolder
 }
 role! {
-    /// A file that is read and written again.
+    /// File that is read and written again.
     Updated
 }
 
-/// A shipped leg by its name, or a leg file that is read.
+/// Shipped leg by its name, or a leg file that is read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LegName(String);
 
 impl LegName {
-    /// The file, unless a shipped leg is meant.
+    /// File, unless a shipped leg is meant.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         let is_shipped = SHIPPED_LEGS.iter().any(|(name, _)| *name == self.0);

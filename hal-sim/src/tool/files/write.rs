@@ -1,10 +1,11 @@
-//! Files that are there as a whole or not at all: written beside their place first, then renamed.
+//! Writes files atomically: to a temporary file first, then renamed.
 //!
 //! ```text
 //! folder of the file --> .scarab-PROCESS-NUMBER.tmp --> all bytes --> rename over the file
 //! ```
 //!
-//! A command that fails on the way leaves the file as it was. A link stays a link: the file that it leads to is replaced.
+//! A command that fails before the end leaves the file unchanged. A link stays a link: its target
+//! is replaced.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -14,31 +15,31 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use super::{folder_of, is_device, resolved};
 use crate::tool::error::ToolError;
 
-/// Writes a file as a whole; its folder is made if it does not exist.
+/// Writes a whole file; its folder is created if missing.
 ///
 /// # Errors
-/// Where it cannot be written; the file is then as it was.
+/// The file cannot be written; it is unchanged.
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), ToolError> {
     let mut file = NewFile::create(path)?;
     file.write_all(bytes.as_ref()).map_err(|error| ToolError::cannot_write(path, &error))?;
     file.finish()
 }
 
-/// A file that takes its place when it is finished, and leaves no trace if it never is.
+/// File that takes its place when finished, and leaves no trace otherwise.
 #[derive(Debug)]
 pub struct NewFile {
     out: BufWriter<File>,
-    /// As the user named it.
+    /// Path as given by the user.
     named: PathBuf,
-    /// Temporary file and the place it takes; none of a device, which is written to directly.
+    /// Temporary file and its destination; `None` for a device, which is written directly.
     rename: Option<(PathBuf, PathBuf)>,
 }
 
 impl NewFile {
-    /// Begins a file; its folder is made if it does not exist.
+    /// Starts a file; its folder is created if missing.
     ///
     /// # Errors
-    /// Where nothing can be written there.
+    /// The file cannot be created.
     pub fn create(path: &Path) -> Result<Self, ToolError> {
         let cannot = |error: io::Error| ToolError::cannot_write(path, &error);
         if is_device(path) {
@@ -49,25 +50,25 @@ impl NewFile {
         let folder = folder_of(&place);
         std::fs::create_dir_all(&folder).map_err(cannot)?;
         let (temporary, file) = temporary_in(&folder).map_err(cannot)?;
-        // The permissions of the file stay as they were.
+        // The permissions of the file stay unchanged.
         if let Ok(metadata) = place.metadata() {
             let _ = file.set_permissions(metadata.permissions());
         }
         Ok(Self { out: BufWriter::new(file), named: path.to_owned(), rename: Some((temporary, place)) })
     }
 
-    /// The file behind it, for another program to write to.
+    /// File handle, for another program to write to.
     ///
     /// # Errors
-    /// Where the system has no further handle.
+    /// The system has no further handle.
     pub fn handle(&self) -> Result<File, ToolError> {
         self.out.get_ref().try_clone().map_err(|error| ToolError::cannot_write(&self.named, &error))
     }
 
-    /// Puts the file in its place.
+    /// Moves the file to its destination.
     ///
     /// # Errors
-    /// Where it cannot be written to its end or renamed; the file in its place is then as it was.
+    /// The file cannot be written completely or renamed; the destination is unchanged.
     pub fn finish(mut self) -> Result<(), ToolError> {
         let named = &self.named;
         self.out.flush().map_err(|error| ToolError::cannot_write(named, &error))?;
@@ -97,18 +98,18 @@ impl Drop for NewFile {
     }
 }
 
-/// Whether a file can be made in a folder: one is, and removed again.
+/// Tests whether a file can be created in a folder, by creating and removing one.
 pub(super) fn can_write_in(folder: &Path) -> io::Result<()> {
     let (temporary, _) = temporary_in(folder)?;
     std::fs::remove_file(temporary)
 }
 
-/// Whether a file that exists can be written: it is opened, and left as it is.
+/// Tests whether an existing file can be written, by opening it unchanged.
 pub(super) fn can_write_over(file: &Path) -> io::Result<()> {
     OpenOptions::new().append(true).open(file).map(drop)
 }
 
-/// A new file under a name that is not taken.
+/// Creates a file with an unused name.
 fn temporary_in(folder: &Path) -> io::Result<(PathBuf, File)> {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
     let number = NUMBER.fetch_add(1, Ordering::Relaxed);

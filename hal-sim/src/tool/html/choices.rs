@@ -1,4 +1,4 @@
-//! What the model includes and why, and what was set aside of the motion identified from.
+//! Sections on the model terms and why, and on excluded data.
 
 use maud::{Markup, html};
 
@@ -7,7 +7,7 @@ use super::super::model_choice::ModelChoiceReport;
 use super::super::report::{Number, RunReport};
 use super::{exact, joint_name, measured, number, sigma};
 
-/// Terms of each joint's model, with Stribeck and directional friction where they were found.
+/// Terms of each joint's model, with identified Stribeck and directional friction.
 pub fn model(run: &RunReport, leg: &LegFile) -> Markup {
     let row = |choice: &ModelChoiceReport| {
         html! { tr {
@@ -94,7 +94,7 @@ pub fn outliers(run: &RunReport, leg: &LegFile) -> Markup {
     }
 }
 
-/// Comparison with a stored model; nothing where none was given.
+/// Comparison with a stored model; empty if none was given.
 pub fn comparison(run: &RunReport) -> Markup {
     html! { @if let Some(compared) = &run.compared {
         section {

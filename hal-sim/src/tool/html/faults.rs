@@ -1,4 +1,4 @@
-//! A campaign as one page: the table, what failed, and runs that were repeated, drawn.
+//! Page of a fault campaign: the table, failures, and curves of repeated runs.
 
 use maud::{DOCTYPE, html};
 
@@ -6,12 +6,12 @@ use super::super::faults::report::CampaignReport;
 use super::super::figures::Figure;
 use super::{Circumstances, drawing, page_head};
 
-/// A number, a share or two numbers, which stay on one line.
+/// Whether a cell holds a number, a share or two numbers, which stay on one line.
 fn is_number(cell: &str) -> bool {
     cell.chars().all(|letter| letter.is_ascii_digit() || " -/.%".contains(letter))
 }
 
-/// The whole page; `told` are lines about single runs.
+/// Creates the page; `told` are lines about single runs.
 #[must_use]
 pub fn page(
     circumstances: &Circumstances,

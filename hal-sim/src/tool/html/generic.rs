@@ -1,7 +1,7 @@
-//! What the page has no words of its own for: any key of the report's JSON, as a table.
+//! Tables for keys of the report's JSON without a section of their own.
 //!
-//! A count stays a whole number, another number gets three digits. A list of objects becomes a table with a
-//! column for each key, an object a table of two columns.
+//! A count stays a whole number, other numbers get three digits. A list of objects becomes a table
+//! with a column for each key, an object a table of two columns.
 
 use maud::{Markup, html};
 use serde_json::{Map, Value};
@@ -10,7 +10,7 @@ use super::super::error::ToolError;
 use super::super::report::{Number, RunReport};
 use super::{number, typeset};
 
-/// Keys that the page shows in sections of their own.
+/// Keys with their own sections on the page.
 const KNOWN: [&str; 34] = [
     "schema",
     "leg",
@@ -47,10 +47,10 @@ const KNOWN: [&str; 34] = [
     "outliers",
     "compared",
 ];
-/// Nothing is nested deeper than this on the page.
+/// Limit of nesting on the page.
 const DEEPEST: usize = 3;
 
-/// The keys of a report that no section shows, in their order; those without content are left out.
+/// Keys of a report without a section, in their order; empty ones are omitted.
 pub fn unknown_keys(run: &RunReport) -> Result<Map<String, Value>, ToolError> {
     let value = serde_json::to_value(run)
         .map_err(|error| ToolError::input(format!("the report cannot be shown: {error}")))?;
@@ -70,7 +70,7 @@ fn is_empty(value: &Value) -> bool {
     }
 }
 
-/// `model_choice` becomes `Model choice`, `longest_s` becomes `Longest, s`.
+/// Title of a key: `model_choice` becomes `Model choice`, `longest_s` becomes `Longest, s`.
 pub fn words(key: &str) -> String {
     let units =
         [("_s", ", s"), ("_nm", ", N m"), ("_deg", ", deg"), ("_kg", ", kg"), ("_m", ", m"), ("_hz", ", Hz")];
@@ -83,12 +83,12 @@ pub fn words(key: &str) -> String {
     words + unit
 }
 
-/// One key as a section.
+/// Section of one key.
 pub fn section(name: &str, value: &Value) -> Markup {
     html! { section { h2 { (words(name)) } (content(value, 0)) } }
 }
 
-/// Any value.
+/// Formats any value.
 pub fn content(value: &Value, depth: usize) -> Markup {
     match value {
         Value::Array(items) if depth < DEEPEST && items.iter().any(Value::is_object) => rows(items, depth),
@@ -115,7 +115,7 @@ pub fn content(value: &Value, depth: usize) -> Markup {
     }
 }
 
-/// A table with a column for each key of any item.
+/// Table with a column for each key of any item.
 fn rows(items: &[Value], depth: usize) -> Markup {
     let mut columns: Vec<&str> = Vec::new();
     for key in items.iter().filter_map(Value::as_object).flat_map(Map::keys) {

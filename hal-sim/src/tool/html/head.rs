@@ -1,4 +1,4 @@
-//! Title, what was run, the few numbers that matter.
+//! Head of the page: title, circumstances, and the main numbers.
 
 use maud::{Markup, html};
 
@@ -6,7 +6,7 @@ use super::super::leg_file::LegFile;
 use super::super::report::{FitReport, RunReport};
 use super::{Circumstances, exact, joint_name, number, signed};
 
-/// Name of the leg and date.
+/// Title: name of the leg and date.
 pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
     let kind = match (&run.trace, run.seed) {
         (Some(_), _) => "trace of a board",
@@ -22,7 +22,7 @@ pub fn title(circumstances: &Circumstances, run: &RunReport) -> Markup {
     }
 }
 
-/// What was run.
+/// Circumstances of the run.
 pub fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
     let leg = &circumstances.leg;
     let joints: Vec<&str> = leg.joints.iter().map(|joint| joint.name.as_str()).collect();
@@ -65,7 +65,7 @@ pub fn facts(circumstances: &Circumstances, run: &RunReport) -> Markup {
     }
 }
 
-/// Words for the simulated drives.
+/// Description of the simulated drives.
 pub fn drive(name: &str) -> String {
     match name {
         "ideal" => "simulated; currents follow their targets with a lag".into(),
@@ -74,7 +74,7 @@ pub fn drive(name: &str) -> String {
     }
 }
 
-/// Words for a prior.
+/// Description of a prior.
 pub fn prior(name: &str) -> String {
     match (name, name.strip_prefix("wrong:")) {
         ("none", _) => "none".into(),
@@ -84,7 +84,7 @@ pub fn prior(name: &str) -> String {
     }
 }
 
-/// The worst of each kind, and its motion.
+/// Worst value of each kind, and its motion.
 pub fn numbers(run: &RunReport, leg: &LegFile) -> Markup {
     let worst = |value: &dyn Fn(&FitReport) -> Option<f64>| -> Option<(f64, String)> {
         let known = run
@@ -124,7 +124,7 @@ pub fn numbers(run: &RunReport, leg: &LegFile) -> Markup {
     } } }
 }
 
-/// The last line.
+/// Last line of the page.
 pub fn colophon(run: &RunReport) -> Markup {
     let time = if run.trace.is_some() { String::new() } else { format!(" in {:.2} s", run.wall_s) };
     html! {

@@ -1,11 +1,11 @@
-//! What torque cannot tell, said of this run.
+//! Section on parameters that torque cannot determine in this run.
 
 use maud::{Markup, html};
 
 use super::super::report::RunReport;
 use super::count;
 
-/// The paragraph, with the parameters it is about.
+/// Paragraph with the affected parameters.
 pub fn section(run: &RunReport) -> Markup {
     let with = |status: &str| -> Vec<&str> {
         let all = run.parameters.iter().filter(|parameter| parameter.status == status);

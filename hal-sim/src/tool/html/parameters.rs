@@ -1,4 +1,5 @@
-//! Parameters as tables: base parameters, and all fourteen of every joint with a bar of their uncertainty.
+//! Tables of base parameters, and of all fourteen parameters of every joint with a bar of their
+//! uncertainty.
 
 use maud::{Markup, html};
 
@@ -9,7 +10,7 @@ use super::{exact, measured, sigma, signed, unit};
 /// Width and height of a bar, pixels.
 const BAR: (f64, f64) = (150.0, 16.0);
 
-/// What torque determines.
+/// Table of the base parameters.
 pub fn base(run: &RunReport) -> Markup {
     let known = run.base_parameters.iter().any(|base| base.truth.known().is_some());
     let bounded = run.base_parameters.iter().any(|base| base.cramer_rao.known().is_some());
@@ -55,7 +56,7 @@ fn terms(terms: &std::collections::BTreeMap<String, f64>) -> String {
         if !sum.is_empty() || *factor < 0.0 {
             sum += &format!(" {sign} ");
         }
-        // A factor of one that was computed is one to rounding.
+        // A computed factor of one equals one up to rounding.
         if (factor.abs() - 1.0).abs() > 1e-9 {
             sum += &format!("{}\u{a0}", exact(factor.abs().into()));
         }
@@ -64,7 +65,7 @@ fn terms(terms: &std::collections::BTreeMap<String, f64>) -> String {
     sum
 }
 
-/// All parameters of every joint.
+/// Table of all parameters of every joint.
 pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
     let truth = run.parameters.iter().any(|parameter| parameter.truth.known().is_some());
     let joints = run.parameters.iter().map(|parameter| parameter.joint).max().unwrap_or(0);
@@ -100,18 +101,18 @@ pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
     }
 }
 
-/// Half of the range around the value that a bar shows: four sigma, and the truth if it is known.
+/// Half the range of a bar around the value: four sigma, including the truth if known.
 fn half_range(parameter: &ParameterReport, value: f64) -> f64 {
     let sigma = parameter.sigma.known().map_or(0.0, |sigma| 4.0 * sigma);
     let truth = parameter.truth.known().map_or(0.0, |truth| 1.2 * (truth - value).abs());
     let prior = parameter.prior.known().map_or(0.0, |prior| 1.2 * (prior - value).abs());
-    // Without a sigma nothing would be lost by a wide range; with one it must stay visible.
+    // Without a sigma the range may be wide; with one the sigma must stay visible.
     let half = if sigma > 0.0 { sigma.max(truth) } else { truth.max(prior) };
-    // Below that lies the rounding of a zero.
+    // Smaller ranges are the rounding of a zero.
     if half > 1e-9 { half } else { value.abs().max(1e-9) }
 }
 
-/// Value, sigma, truth and prior on one line.
+/// Bar with value, sigma, truth and prior.
 fn bar(parameter: &ParameterReport) -> Markup {
     let Some(value) = parameter.value.known() else {
         return html! { "\u{2013}" };

@@ -1,4 +1,4 @@
-//! Motions, torques, search and tracking: words and tables beside their figures.
+//! Sections on motions, torques, search and tracking: text and tables beside their figures.
 
 use maud::{Markup, html};
 
@@ -9,7 +9,7 @@ use super::super::scale;
 use super::super::series::Role;
 use super::{joint_name, number};
 
-/// Files of a replay.
+/// Table of a replay's files.
 pub fn sources(sources: &[Source]) -> Markup {
     html! {
         section {
@@ -33,7 +33,7 @@ pub fn sources(sources: &[Source]) -> Markup {
     }
 }
 
-/// What the figure of the angles shows.
+/// Caption of the angles.
 pub fn trajectory_words(run: &RunReport) -> Markup {
     let words = if run.seed.is_some() {
         "The first motion is identified from, the others are only predicted. The deviation is that of the position loop \
@@ -46,7 +46,7 @@ pub fn trajectory_words(run: &RunReport) -> Markup {
     html! { p { (words) } }
 }
 
-/// What the figures of the torque show.
+/// Caption of the torques.
 pub fn torque_words(run: &RunReport) -> Markup {
     html! { p {
         "Measured and predicted torque, both through the filter of the identification. The blue band is two standard \
@@ -56,7 +56,7 @@ pub fn torque_words(run: &RunReport) -> Markup {
     } }
 }
 
-/// What the figure of the residuals shows.
+/// Caption of the residuals.
 pub fn residual_words() -> Markup {
     html! { p {
         "A model that lacks nothing leaves noise. Then the bars follow the normal curve, and the autocorrelation that of \
@@ -64,11 +64,11 @@ pub fn residual_words() -> Markup {
     } }
 }
 
-/// How well every motion is explained.
+/// Table of the residuals on every motion.
 pub fn fits(run: &RunReport, leg: &LegFile) -> Markup {
     let all = || run.training.iter().chain(&run.validation);
     let truth = all().any(|fit| fit.percent_of_mean_abs_vs_truth.known().is_some());
-    // Figures name the motion identified from like this, too.
+    // Figures use this name for the motion identified from, too.
     let is_recorded = run.seed.is_none() && run.trace.is_none();
     let motion = |fit: &FitReport, role: Role| match role {
         Role::Training if !is_recorded => "excitation".to_owned(),
@@ -102,7 +102,7 @@ pub fn fits(run: &RunReport, leg: &LegFile) -> Markup {
     }
 }
 
-/// What the search did.
+/// Text about the search.
 pub fn search(run: &RunReport) -> Markup {
     if run.trace.is_some() {
         return html! { p {
@@ -122,7 +122,7 @@ pub fn search(run: &RunReport) -> Markup {
     } }
 }
 
-/// What the parameters are measured in, and what the leg carried; nothing for a recording, whose torques come as such.
+/// Units of the parameters and load of the leg; empty for a recording, which contains torques.
 pub fn scale(run: &RunReport) -> Markup {
     let lines = scale::lines(run);
     html! { @if !lines.is_empty() {
@@ -135,7 +135,7 @@ fn capital(words: &str) -> String {
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Searches for a leg that can exist.
+/// Searches for a physically consistent leg.
 pub fn consistent(run: &RunReport) -> Markup {
     let found = &run.consistent;
     let row = |words: &str, name: &str, search: &ConsistentSearchReport| {
@@ -168,7 +168,7 @@ pub fn consistent(run: &RunReport) -> Markup {
     }
 }
 
-/// What the model is worth to the servo.
+/// Effect of the model on the servo.
 pub fn tracking(run: &RunReport, leg: &LegFile) -> Markup {
     html! {
         section {

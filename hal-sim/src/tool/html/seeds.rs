@@ -1,4 +1,5 @@
-//! Many runs of one leg as one page: verdicts, how parameters lie about truth, how near the tests came to their limits.
+//! Page of many runs of one leg: verdicts, distribution of parameters about the truth, margins of
+//! the tests.
 
 use maud::{DOCTYPE, Markup, html};
 
@@ -13,7 +14,7 @@ use super::{
     verdict,
 };
 
-/// The page of runs that differ in their seed.
+/// Creates the page of runs that differ in their seed.
 pub fn page(
     circumstances: &Circumstances,
     runs: &[RunReport],
@@ -64,7 +65,7 @@ fn seeds(runs: &[RunReport]) -> String {
     }
 }
 
-/// How many were accepted, and what the others were refused for.
+/// Number of accepted runs, and the reasons of the rejected ones.
 fn verdicts(runs: &[RunReport]) -> Markup {
     let accepted = runs.iter().filter(|run| run.accepted()).count();
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
@@ -92,7 +93,7 @@ fn verdicts(runs: &[RunReport]) -> Markup {
     }
 }
 
-/// Of the seeds that were refused for one reason.
+/// Limit of the seeds listed for one reason.
 const SEEDS_SHOWN: usize = 20;
 
 fn parameters(spreads: &[Spread]) -> Markup {
@@ -117,7 +118,7 @@ fn parameters(spreads: &[Spread]) -> Markup {
     }
 }
 
-/// Median and worst of each joint on each motion, against the noise-free torque.
+/// Median and worst error of each joint on each motion, against the noise-free torque.
 fn torque(runs: &[RunReport], leg: &LegFile) -> Markup {
     let mut cases: Vec<(&str, usize)> = Vec::new();
     for fit in runs.iter().flat_map(|run| &run.validation) {

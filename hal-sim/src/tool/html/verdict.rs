@@ -1,4 +1,4 @@
-//! The verdict: one word, the sentences of what failed, and how near every test came to its limit.
+//! Section on the verdict: result, sentences of failures, and the margin of every test.
 
 use maud::{Markup, html};
 
@@ -8,7 +8,7 @@ use super::super::report::{Number, RunReport};
 use super::super::tables;
 use super::{count, exact, joint_name, number};
 
-/// The verdict, large and in words, with each reason and what it was measured against.
+/// Verdict in large type and in words, with each reason and its limit.
 pub fn banner(run: &RunReport) -> Markup {
     let validated = !run.validation.is_empty();
     html! {
@@ -30,7 +30,7 @@ pub fn banner(run: &RunReport) -> Markup {
     }
 }
 
-/// What a board told that must not be overlooked; nothing for a run without.
+/// Faults and warnings of a board; empty for other runs.
 pub fn alarms(run: &RunReport) -> Markup {
     let told = run.trace.as_ref();
     let (faults, warnings) = told.map_or((&[][..], &[][..]), |told| (&told.faults, &told.warnings));
@@ -55,7 +55,7 @@ fn passed(run: &RunReport) -> String {
     }
 }
 
-/// What failed for a reason: its sentences, or what the reason means in general.
+/// Failures for a reason: their sentences, or the general explanation.
 fn sentences(reason: &str, run: &RunReport) -> Markup {
     let failed = run.findings.iter().filter(|finding| finding.reason == reason && !finding.passed);
     let words: Vec<&str> =
@@ -70,7 +70,7 @@ fn sentences(reason: &str, run: &RunReport) -> Markup {
     }
 }
 
-/// Whether a limit is a least and not a most, and what a test looks at.
+/// Whether the limit is a minimum, and the subject of the test.
 fn meaning(test: &str) -> (bool, &str) {
     match test {
         "rows" => (true, "filtered rows in which the joint moves"),
@@ -100,10 +100,10 @@ fn meaning(test: &str) -> (bool, &str) {
     }
 }
 
-/// Tests whose value is 1 where they passed, else 0.
+/// Tests with the value 1 if passed, else 0.
 const YES_OR_NO: [&str; 2] = ["search", "drive"];
 
-/// How near a test came to its limit: 1 at it.
+/// Ratio of a test's value to its limit: 1 at the limit.
 fn nearness(finding: &FindingReport) -> f64 {
     let (value, limit) =
         (finding.value.known().unwrap_or(f64::INFINITY).abs(), finding.limit.known().unwrap_or(0.0));
@@ -112,7 +112,7 @@ fn nearness(finding: &FindingReport) -> f64 {
     if share.is_nan() { 0.0 } else { share }
 }
 
-/// Every kind of test, with the case that came nearest to its limit.
+/// Every kind of test with its case nearest to the limit.
 pub fn tests(findings: &[FindingReport], leg: &LegFile) -> Markup {
     let mut kinds: Vec<(&str, &str)> = Vec::new();
     for finding in findings {
@@ -160,7 +160,7 @@ fn row(findings: &[FindingReport], (reason, test): (&str, &str), leg: &LegFile) 
     } }
 }
 
-/// Counts without decimals.
+/// Formats a count without decimals.
 fn whole(value: Number) -> String {
     match value.known() {
         Some(known) if known.abs() < 1e6 && known == known.round() => {
@@ -200,7 +200,7 @@ mod tests {
         assert!(
             nearness(&finding("condition", 900.0, 1000.0)) > nearness(&finding("condition", 9.0, 1000.0))
         );
-        // A zero that may not be exceeded and is not, and an offset of either sign.
+        // Limits of zero without a violation, and offsets of either sign.
         assert_eq!(nearness(&finding("not_finite", 0.0, 0.0)), 0.0);
         assert_eq!(nearness(&finding("encoder_zero", -0.5, 1.0)), 0.5);
     }

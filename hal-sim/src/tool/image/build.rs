@@ -1,4 +1,4 @@
-//! Builds the image with whichever compiler the machine has for it, and puts it onto a board.
+//! Builds the image with the compiler installed for it, and writes it to a board.
 
 use std::env;
 use std::ffi::OsStr;
@@ -11,7 +11,7 @@ use crate::tool::files;
 use crate::tool::leg_file::LegFile;
 use crate::tool::setup::DEFAULT_SEED;
 
-/// Feature and package of the one board there is.
+/// Feature and package of the only board.
 const ARGUMENTS: [&str; 8] = [
     "--quiet",
     "--profile",
@@ -22,36 +22,36 @@ const ARGUMENTS: [&str; 8] = [
     "scarab",
     "--features=board-odrive-v3-6",
 ];
-/// Below the target directory.
+/// Path of the image below the target directory.
 const IMAGE: &str = "firmware/thumbv7em-none-eabihf/image/scarab";
-/// Of the microcontroller, as `probe-rs` knows it.
+/// Name of the microcontroller for `probe-rs`.
 const CHIP: &str = "STM32F405RGTx";
 
-/// What an image is built with.
+/// Options of an image.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Its leg.
+    /// Leg of the image.
     pub leg: LegFile,
-    /// Every sample of the 500 Hz log is told.
+    /// Whether every sample of the 500 Hz log is sent.
     pub log: bool,
-    /// A brake resistor is connected.
+    /// Whether a brake resistor is connected.
     pub brake_resistor: bool,
-    /// Voltage of a board on which the factory has written no version.
+    /// Voltage of a board without a factory version.
     pub board_volts: Option<u8>,
 }
 
-/// The workspace this tool was built from.
+/// Workspace from which this tool was built.
 fn workspace() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
-/// Where everything is built.
+/// Directory of all builds.
 #[must_use]
 pub fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from)
 }
 
-/// Builds the image; where it lies.
+/// Builds the image and returns its path.
 pub fn build(options: &Options) -> Result<PathBuf, ToolError> {
     let (description, _) = describe(&options.leg, DEFAULT_SEED)?;
     let constant = target_directory().join("firmware").join("leg.rs");
@@ -69,7 +69,7 @@ pub fn build(options: &Options) -> Result<PathBuf, ToolError> {
     Ok(image.canonicalize().unwrap_or(image))
 }
 
-/// Untouched where nothing changed, so that nothing is compiled again; the whole path.
+/// Writes a file unless it is unchanged, to avoid recompilation; returns the whole path.
 pub fn write_if_changed(path: &Path, text: &str) -> Result<PathBuf, ToolError> {
     if std::fs::read_to_string(path).ok().as_deref() != Some(text) {
         files::write(path, text)?;
@@ -77,14 +77,14 @@ pub fn write_if_changed(path: &Path, text: &str) -> Result<PathBuf, ToolError> {
     path.canonicalize().map_err(|error| ToolError::cannot_write(path, &error))
 }
 
-/// The build for the microcontroller; `log`: the image tells every sample of the 500 Hz log.
+/// Build command for the microcontroller; with `log` the image sends every sample of the 500 Hz log.
 #[must_use]
 pub fn firmware_build(log: bool) -> Command {
     let mut command = Command::new(workspace().join("scripts/firmware-build"));
     command.env("DEFMT_LOG", "info");
-    // Room for a report's records while the probe looks elsewhere.
+    // Capacity for a report's records between two polls of the probe.
     command.env("DEFMT_RTT_BUFFER_SIZE", "4096");
-    // What this tool was built with is not what the image is built with.
+    // Settings of this tool's build must not affect the image.
     for name in ["RUSTFLAGS", "RUSTC", "RUSTUP_TOOLCHAIN", "CARGO"] {
         command.env_remove(name);
     }
@@ -97,7 +97,7 @@ pub fn firmware_build(log: bool) -> Command {
     command
 }
 
-/// Writes an image onto the board that hangs on a probe, starts it and prints its records until interrupted.
+/// Writes an image to the board on the probe, starts it and prints its records until interrupted.
 pub fn flash(image: &Path, further: &[String]) -> Result<(), ToolError> {
     let mut command = Command::new("probe-rs");
     command.args([OsStr::new("run"), OsStr::new("--chip"), OsStr::new(CHIP)]);

@@ -1,7 +1,7 @@
-//! A leg file as a constant of the firmware.
+//! Writes a leg file as a constant of the firmware.
 //!
-//! The numbers are those of the configuration that the simulation runs with, in the device's precision; the board makes
-//! the same configuration of them again, and a test holds the two against each other.
+//! The numbers are those of the simulation's configuration in the device's precision. The board
+//! derives the same configuration from them, and a test compares the two.
 
 use nalgebra::Matrix3;
 use scarab::ident::{LinkPrior, Plan};
@@ -14,15 +14,15 @@ use scarab::units::{Radian, Weber};
 use crate::tool::leg_file::{JointFile, LegFile, Side};
 use crate::tool::setup::{PriorChoice, SetupError, background, base_rank, chain, configuration};
 
-/// Joints and base parameters of the legs an image can hold.
+/// Joints and base parameters of the legs that an image supports.
 const JOINTS: usize = 2;
 /// See [`JOINTS`].
 const BASE: usize = 13;
 
-/// What an image holds of a leg, and the configuration it stands for.
+/// Constant of an image, and the configuration it stands for.
 pub type Described = (LegDescription<JOINTS>, LegConfiguration<JOINTS, BASE>);
 
-/// The description of a leg of two joints with up to 13 base parameters: what the board can hold.
+/// Description of a leg of two joints with up to 13 base parameters, the capacity of the board.
 pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, SetupError> {
     if leg.joints.len() != JOINTS || base_rank(leg) > BASE {
         return Err(SetupError::new(leg, "an image holds two joints with up to 13 base parameters"));
@@ -78,7 +78,7 @@ pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, SetupError>
     Ok((description, configuration))
 }
 
-/// The motor as the leg file states it; why it cannot be commutated where it does not.
+/// Motor according to the leg file; without one, the reason why it cannot be commutated.
 fn motor(joint: &JointFile) -> Result<MotorDescription, &'static str> {
     let Some(motor) = &joint.motor else {
         return Err("has no `[joint.motor]`: an image needs the motor's pole pairs and flux");
@@ -119,10 +119,10 @@ fn table(motion: &Periodic<JOINTS>) -> ExcitationTable<JOINTS> {
     }
 }
 
-/// The constant as Rust source, to be included where `crate` is the firmware.
+/// Constant as Rust source, to be included where `crate` is the firmware.
 #[must_use]
 pub fn source(description: &LegDescription<JOINTS>) -> String {
-    // The debug form of plain data is its source; `?` writes numbers so that they are read back bit for bit.
+    // The debug form of plain data is valid source; `?` writes numbers that read back bit for bit.
     format!(
         "// The leg `{}`, written by `cargo fw --leg ... --source ...` from its leg file: not to be changed by hand.\n\n\
          #[rustfmt::skip]\n\

@@ -1,11 +1,11 @@
-//! The flash image seen from the host: the leg it is built for, its build, its size, and the way onto a board.
+//! Flash image on the host: its leg, build and size, and flashing.
 //!
-//! | module | what lives there |
+//! | module | contents |
 //! | --- | --- |
-//! | [`leg_source`] | a leg file as the constant that an image holds |
+//! | [`leg_source`] | a leg file as the constant of an image |
 //! | [`build`] | the build, by `scripts/firmware-build`; flashing by `probe-rs` |
 //! | [`size`] | sections, memory, largest symbols, and the goals |
-//! | [`panics`] | where an image can panic, and what its interrupts reach of it |
+//! | [`panics`] | locations at which an image can panic, and those within its interrupts |
 
 pub mod build;
 pub mod leg_source;

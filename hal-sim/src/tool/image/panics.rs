@@ -1,27 +1,29 @@
-//! Where an image can panic, and which of these places its interrupts reach.
+//! Finds the locations at which an image can panic, and those that its interrupts reach.
 //!
-//! Why: a panic of the current loops or the servo would stop the leg, so there is to be none, and no compiler says whether there is. The
-//! image says it: every branch to one of the functions with which the language panics is a place, and the functions that the
-//! vectors reach by branches are the interrupts'.
-//!
-//! ```text
-//! BL      11110 S imm10 | 11 J1 1 J2 imm11       target = pc + 4 + imm25, I = not(J xor S)        call
-//! B.W     11110 S imm10 | 10 J1 1 J2 imm11       the same                                        last call
-//! Bc.W    11110 S c imm6 | 10 J1 0 J2 imm11      target = pc + 4 + imm21                         to a cold end
-//! B, Bc   11100 imm11, 1101 c imm8               target = pc + 4 + imm12, imm9                   to a neighbour
-//! ```
-//!
-//! Source: Armv7-M Architecture Reference Manual (DDI 0403), A7.7.12, A7.7.18. Words between code are known by the mapping symbols
-//! `$t` and `$d` (Arm ELF, IHI 0044, 4.5.5).
-//!
-//! The name of a panic does not say which one it is: the image's handler ignores messages, so the compiler merges all panics without arguments
-//! into one function. What tells them apart is the place in the source that they are given, loaded by the two instructions before the branch:
+//! Why: a panic of the current loops or the servo would stop the leg, so none may exist, and no
+//! compiler guarantees it. The image shows it: every branch to one of the language's panic
+//! functions is a location. Functions that the vectors reach by branches belong to the interrupts.
 //!
 //! ```text
-//! MOVW r0, MOVT r0    11110 i 10 s100 imm4 | 0 imm3 0000 imm8     r0 = address of the file's name, its length, line, column
+//! BL      11110 S imm10 | 11 J1 1 J2 imm11     target = pc + 4 + imm25, I = not(J xor S)   call
+//! B.W     11110 S imm10 | 10 J1 1 J2 imm11     as BL                                       tail call
+//! Bc.W    11110 S c imm6 | 10 J1 0 J2 imm11    target = pc + 4 + imm21                     to a cold end
+//! B, Bc   11100 imm11, 1101 c imm8             target = pc + 4 + imm12, imm9               to a neighbour
 //! ```
 //!
-//! Known limits: calls by a pointer are counted and not followed; remainders by the capacity of a queue (`QUEUE`) are reported and not refused.
+//! Source: Armv7-M Architecture Reference Manual (DDI 0403), A7.7.12, A7.7.18. Mapping symbols `$t`
+//! and `$d` mark words between code (Arm ELF, IHI 0044, 4.5.5).
+//!
+//! The name of a panic does not identify it: the image's handler ignores messages, so the compiler
+//! merges all panics without arguments into one function. Their argument distinguishes them: the
+//! source location, loaded by the two instructions before the branch:
+//!
+//! ```text
+//! MOVW r0, MOVT r0   11110 i 10 s100 imm4 | 0 imm3 0000 imm8   r0 = address of name, length, line, column
+//! ```
+//!
+//! Known limits: calls by a pointer are counted but not followed; remainders by the capacity of a
+//! queue (`QUEUE`) are reported but accepted.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -32,7 +34,7 @@ use crate::tool::error::ToolError;
 
 /// Vectors of levels 0 and 1: converters, index pulses, servo.
 const VECTORS: [&str; 4] = ["ADC", "EXTI9_5", "EXTI15_10", "OTG_HS"];
-/// How the names of functions begin with which the language and `defmt` panic.
+/// Prefixes of the panic functions of the language and of `defmt`.
 const PANICS: [&str; 8] = [
     "core::panicking::",
     "core::option::unwrap_failed",
@@ -43,39 +45,39 @@ const PANICS: [&str; 8] = [
     "_defmt_panic",
     "__defmt_default_panic",
 ];
-/// The file whose panics interrupts may have: a queue of `heapless` keeps its capacity as a value and takes the remainder of an index by it, and
-/// the compiler does not see that every capacity is a constant above zero.
+/// File with tolerated panics in interrupts. A queue of `heapless` stores its capacity as a value and takes
+/// the remainder of an index by it. The compiler does not see that every capacity is a constant above zero.
 const QUEUE: [&str; 2] = ["heapless-", "/src/spsc.rs"];
 
 /// A branch to a panic.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Place {
-    /// Function.
+    /// Function that contains the branch.
     pub within: String,
-    /// Which panic.
+    /// Name of the panic.
     pub panic: String,
-    /// File of the source in which it is; empty where the image does not say.
+    /// Source file; empty if the image does not contain it.
     pub file: String,
 }
 
 impl Place {
-    /// Remainder of a queue's index by its capacity.
+    /// Whether the panic is the remainder of a queue's index by its capacity.
     fn is_of_a_queue(&self) -> bool {
         let [begin, end] = QUEUE;
         self.file.starts_with(begin) && self.file.ends_with(end)
     }
 }
 
-/// Places of an image.
+/// Panic locations of an image.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Panics {
-    /// All of them.
+    /// All locations.
     pub all: Vec<Place>,
-    /// Those that levels 0 and 1 reach.
+    /// Locations that levels 0 and 1 reach.
     pub interrupts: Vec<Place>,
     /// Functions that levels 0 and 1 reach.
     pub reached: usize,
-    /// Calls in them by a pointer.
+    /// Calls by a pointer in those functions.
     pub by_pointer: usize,
 }
 
@@ -91,12 +93,12 @@ struct Function {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Branch {
     to: u32,
-    /// What the two instructions before it load into the first register.
+    /// Value of the first register, loaded by the two instructions before the branch.
     argument: Option<u32>,
 }
 
 impl Panics {
-    /// Of an image.
+    /// Finds the locations of an image.
     pub fn of(image: &Path) -> Result<Self, ToolError> {
         let wrong = |error: &dyn std::fmt::Display| ToolError::input(format!("{}: {error}", image.display()));
         let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
@@ -110,7 +112,7 @@ impl Panics {
             let end = begin + symbol.size() as u32;
             let name = format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or("?")));
             let (branches, by_pointer) = words.branches(begin, end);
-            // Of several names for one place a vector's is kept.
+            // If an address has several names, a vector's name has priority.
             let known = functions.get(&begin).is_some_and(|known: &Function| VECTORS.contains(&&*known.name));
             if !known {
                 functions.insert(begin, Function { name, end, branches, by_pointer });
@@ -122,7 +124,7 @@ impl Panics {
         Ok(Self::within(&functions, |location| source_file(&file, location)))
     }
 
-    /// `file_of` has the name of the file to which a place in the source belongs.
+    /// Finds the locations among functions; `file_of` returns the file name of a source location.
     fn within(functions: &BTreeMap<u32, Function>, file_of: impl Fn(u32) -> Option<String>) -> Self {
         let mut reached: BTreeSet<u32> = BTreeSet::new();
         let mut open: Vec<u32> = functions
@@ -154,7 +156,7 @@ impl Panics {
         panics
     }
 
-    /// What interrupts may not have, in words.
+    /// Violations in interrupts, in words.
     #[must_use]
     pub fn missed(&self) -> Vec<String> {
         let others = self.interrupts.iter().filter(|place| !place.is_of_a_queue());
@@ -164,7 +166,7 @@ impl Panics {
         others.map(text).collect()
     }
 
-    /// Some lines.
+    /// Summary.
     #[must_use]
     pub fn text(&self) -> String {
         let functions: BTreeSet<&str> = self.all.iter().map(|place| &*place.within).collect();
@@ -184,7 +186,7 @@ impl Panics {
     }
 }
 
-/// Functions that a function's branches lead to, itself not among them, and the first argument of each; one for each branch.
+/// Targets of a function's branches except itself, with the first argument of each; one entry per branch.
 fn callees(functions: &BTreeMap<u32, Function>, begin: u32) -> impl Iterator<Item = (u32, Option<u32>)> {
     let function = functions.get(&begin);
     let branches = function.map_or(&[][..], |function| &function.branches);
@@ -195,7 +197,7 @@ fn callees(functions: &BTreeMap<u32, Function>, begin: u32) -> impl Iterator<Ite
     })
 }
 
-/// Name of the file of a `core::panic::Location`, which begins with the name's address and length.
+/// File name of a `core::panic::Location`, which begins with the name's address and length.
 fn source_file(file: &object::File<'_>, location: u32) -> Option<String> {
     let bytes = |address: u32, length: u32| {
         file.sections().find_map(|section| {
@@ -210,7 +212,7 @@ fn is_panic(functions: &BTreeMap<u32, Function>, begin: u32) -> bool {
     functions.get(&begin).is_some_and(|function| PANICS.iter().any(|panic| function.name.starts_with(panic)))
 }
 
-/// Addresses between `$d` and the next `$t`.
+/// Address ranges between `$d` and the next `$t`.
 fn data_ranges(file: &object::File<'_>) -> Vec<(u32, u32)> {
     let mut marks: Vec<(u32, bool)> = file
         .symbols()
@@ -227,7 +229,7 @@ fn data_ranges(file: &object::File<'_>) -> Vec<(u32, u32)> {
     pairs.map(|pair| (pair[0].0, pair[1].0)).collect()
 }
 
-/// The instructions of an image.
+/// Instructions of an image.
 struct Code<'a> {
     base: u32,
     bytes: &'a [u8],
@@ -241,7 +243,7 @@ impl Code<'_> {
         Some(u32::from(u16::from_le_bytes([pair[0], pair[1]])))
     }
 
-    /// Branches of a function, and how many calls by a pointer it has.
+    /// Branches of a function, and the number of its calls by a pointer.
     fn branches(&self, begin: u32, end: u32) -> (Vec<Branch>, usize) {
         let (mut branches, mut by_pointer, mut place) = (Vec::new(), 0, begin);
         let mut add = |place: u32, way: Option<i32>| {
@@ -265,7 +267,7 @@ impl Code<'_> {
                 place += 4;
             } else {
                 add(place, narrow(first));
-                // BLX to what a register holds.
+                // BLX to a register.
                 by_pointer += usize::from(first & 0xFF87 == 0x4780);
                 place += 2;
             }
@@ -273,7 +275,7 @@ impl Code<'_> {
         (branches, by_pointer)
     }
 
-    /// What MOVW and MOVT right before an address load into the first register.
+    /// Value loaded into the first register by MOVW and MOVT just before an address.
     fn argument(&self, address: u32) -> Option<u32> {
         let half = |before: u32| self.half(address.checked_sub(before)?);
         let low = immediate(half(8)?, half(6)?, 0xF240)?;
@@ -289,12 +291,12 @@ fn immediate(first: u32, second: u32, code: u32) -> Option<u32> {
     is_one.then_some((first & 0xF) << 12 | part << 11 | (second >> 12 & 7) << 8 | second & 0xFF)
 }
 
-/// Sign of a field of so many bits.
+/// Sign-extends a field of `bits` bits.
 fn signed(field: u32, bits: u32) -> i32 {
     (field << (32 - bits)).cast_signed() >> (32 - bits)
 }
 
-/// How far a branch of 16 bits leads.
+/// Offset of a 16-bit branch.
 fn narrow(code: u32) -> Option<i32> {
     match (code >> 11, code >> 12, code >> 8 & 0xF) {
         (0b11100, ..) => Some(signed((code & 0x7FF) << 1, 12)),
@@ -303,14 +305,14 @@ fn narrow(code: u32) -> Option<i32> {
     }
 }
 
-/// How far a branch of 32 bits leads.
+/// Offset of a 32-bit branch.
 fn wide(first: u32, second: u32) -> Option<i32> {
     if first >> 11 != 0b11110 || second >> 15 == 0 {
         return None;
     }
     let (sign, j1, j2, low) = (first >> 10 & 1, second >> 13 & 1, second >> 11 & 1, (second & 0x7FF) << 1);
     if second >> 12 & 1 == 1 {
-        // Of BLX the core has none: 14 and 12 set are BL, 12 alone B.
+        // The core has no BLX with an offset: bits 14 and 12 set are BL, 12 alone is B.
         let (i1, i2) = (!(j1 ^ sign) & 1, !(j2 ^ sign) & 1);
         return Some(signed(sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12 | low, 25));
     }
@@ -334,7 +336,7 @@ mod tests {
         assert_eq!(narrow(0xD001), Some(0x800019A - 0x8000194 - 4));
         // 8000198: e7fb        b 0x8000192
         assert_eq!(narrow(0xE7FB), Some(0x8000192 - 0x8000198 - 4));
-        // UDF and SVC are no branches, MOVW and a load are none either.
+        // UDF and SVC are not branches, nor are MOVW and a load.
         assert_eq!(
             (narrow(0xDE00), narrow(0xDF00), wide(0xF240, 0x0300), wide(0xF8D0, 0x8000)),
             (None, None, None, None)
@@ -350,7 +352,7 @@ mod tests {
         let code = Code { base: 100, bytes: bytes.as_flattened(), data: Vec::new() };
         assert_eq!(code.argument(108), Some(50_216 | 2051 << 16));
         assert_eq!((code.argument(104), code.argument(100)), (None, None));
-        // movw r1, #50216: another register.
+        // MOVW to another register: movw r1, #50216.
         assert_eq!(immediate(0xF24C, 0x4128, 0xF240), None);
     }
 

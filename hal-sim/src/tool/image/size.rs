@@ -1,4 +1,4 @@
-//! How large an image is: what it takes of flash and memory, and what takes most.
+//! Size of an image in flash and memory, and its largest parts.
 
 use std::path::Path;
 
@@ -8,61 +8,62 @@ use serde::Serialize;
 use crate::tool::error::ToolError;
 use crate::tool::tables::headed;
 
-/// Flash that an image may take, bytes: a quarter of the chip's. Speed goes before size (docs/board.md, section 1).
+/// Flash limit of an image, bytes: a quarter of the chip's. Speed has priority over size
+/// (docs/board.md, section 1).
 pub const FLASH_GOAL: u64 = 256 * 1024;
-/// Memory that its variables may take, bytes, beside the stack and the core-coupled memory.
+/// Memory limit of its variables, bytes, without the stack and the core-coupled memory.
 pub const MEMORY_GOAL: u64 = 48 * 1024;
-/// Core-coupled memory there is, bytes.
+/// Size of the core-coupled memory, bytes.
 pub const CORE_COUPLED: u64 = 64 * 1024;
-/// Symbols that are shown.
+/// Number of listed symbols.
 const LARGEST: usize = 20;
 
-/// Where flash begins, and the two memories.
+/// Base addresses of flash and core-coupled memory.
 const FLASH_BASE: u64 = 0x0800_0000;
 const CORE_COUPLED_BASE: u64 = 0x1000_0000;
 const MEMORY_BASE: u64 = 0x2000_0000;
-/// A section that is loaded or cleared (ELF, SHF_ALLOC).
+/// Flag of a section that is loaded or cleared (ELF, SHF_ALLOC).
 const ALLOCATED: u64 = 2;
 
 /// One section.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Section {
-    /// `.text`, ...
+    /// Name, for example `.text`.
     pub name: String,
     /// Bytes.
     pub bytes: u64,
-    /// Of flash.
+    /// Bytes in flash.
     pub flash: u64,
-    /// Of memory.
+    /// Bytes in memory.
     pub memory: u64,
-    /// Of core-coupled memory.
+    /// Bytes in core-coupled memory.
     pub core_coupled: u64,
 }
 
 /// One symbol.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Symbol {
-    /// As in the source.
+    /// Name as in the source.
     pub name: String,
     /// Bytes.
     pub bytes: u64,
 }
 
-/// An image's size.
+/// Size of an image.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ImageSize {
-    /// In the order of their addresses.
+    /// Sections in the order of their addresses.
     pub sections: Vec<Section>,
-    /// The largest functions and constants.
+    /// Largest functions and constants.
     pub code: Vec<Symbol>,
-    /// The largest variables.
+    /// Largest variables.
     pub variables: Vec<Symbol>,
-    /// Stack that the image sets aside, bytes.
+    /// Stack reserved by the image, bytes.
     pub stack: u64,
 }
 
 impl ImageSize {
-    /// Of an image.
+    /// Reads the size of an image.
     pub fn of(image: &Path) -> Result<Self, ToolError> {
         let wrong = |error: &dyn std::fmt::Display| ToolError::input(format!("{}: {error}", image.display()));
         let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
@@ -99,25 +100,25 @@ impl ImageSize {
         })
     }
 
-    /// Bytes of flash.
+    /// Bytes in flash.
     #[must_use]
     pub fn flash(&self) -> u64 {
         self.sections.iter().map(|section| section.flash).sum()
     }
 
-    /// Bytes of memory beside the stack.
+    /// Bytes in memory without the stack.
     #[must_use]
     pub fn memory(&self) -> u64 {
         self.sections.iter().map(|section| section.memory).sum()
     }
 
-    /// Bytes of core-coupled memory.
+    /// Bytes in core-coupled memory.
     #[must_use]
     pub fn core_coupled(&self) -> u64 {
         self.sections.iter().map(|section| section.core_coupled).sum()
     }
 
-    /// Goals that are not kept, in words.
+    /// Missed goals, in words.
     #[must_use]
     pub fn missed(&self) -> Vec<String> {
         let goals = [
@@ -129,7 +130,7 @@ impl ImageSize {
         missed.map(|(name, bytes, goal)| format!("{name}: {bytes} bytes, at most {goal} may be")).collect()
     }
 
-    /// As tables.
+    /// Formats the size as tables.
     #[must_use]
     pub fn text(&self) -> String {
         let mut sections = headed(&["section", "flash", "memory", "core-coupled"]);
@@ -171,7 +172,7 @@ impl ImageSize {
     }
 }
 
-/// A section that takes room on the device; what is loaded into memory takes flash too.
+/// Section that occupies the device; data loaded into memory also occupy flash.
 fn section<'data>(found: &impl ObjectSection<'data>) -> Option<(u64, Section)> {
     let allocated = match found.flags() {
         SectionFlags::Elf { sh_flags } => sh_flags & ALLOCATED != 0,

@@ -1,4 +1,4 @@
-//! Calibration and model: from the file to what the store keeps, and back; the checks that both ways share.
+//! Converts calibration and model between the file and the store; checks shared by both directions.
 
 use std::f64::consts::PI;
 
@@ -14,10 +14,10 @@ use super::{
 };
 use crate::tool::temperature::RANGE_C;
 
-/// Of an electrical angle.
+/// Units of an electrical angle.
 const UNITS_PER_RAD: f64 = 4_294_967_296.0 / (2.0 * PI);
 
-/// A number as the board has it.
+/// Number in the board's precision, if finite.
 fn finite(name: &str, value: f64) -> Result<f32, String> {
     let single = value as f32;
     if single.is_finite() {
@@ -97,7 +97,7 @@ impl Parameters {
         Self { xx, xy, xz, yy, yz, zz, hx, hy, hz, m, ia, fc, fv, off }
     }
 
-    /// In the order that never changes.
+    /// Values in a fixed order.
     #[must_use]
     pub fn to_array(self) -> [f64; 14] {
         let Self { xx, xy, xz, yy, yz, zz, hx, hy, hz, m, ia, fc, fv, off } = self;
@@ -105,7 +105,7 @@ impl Parameters {
     }
 }
 
-/// What one joint of a model is to the store.
+/// Data of one joint of a model in the store.
 struct KeptJoint {
     parameters: [f32; 14],
     stribeck: Stribeck<f32>,

@@ -1,4 +1,4 @@
-//! A file out of a flash image, and into one.
+//! Reads a file from a flash image, and writes one into it.
 
 use embassy_futures::block_on;
 use scarab::leg::DriveState;
@@ -13,14 +13,14 @@ const OBJECTS: [(Joint, Key); 2] = [(Joint::Hip, Key::Objects1), (Joint::Knee, K
 const CALIBRATIONS: [(Joint, Key); 2] = [(Joint::Hip, Key::Calibration1), (Joint::Knee, Key::Calibration2)];
 const LONGEST: usize = 402;
 
-/// What a flash holds.
+/// Contents of a flash.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Found {
-    /// All that could be read and makes sense.
+    /// All readable and valid data.
     pub file: KeptFile,
-    /// What was never kept, or is not any more.
+    /// Parts that were never stored, or have been erased.
     pub absent: Vec<String>,
-    /// What is there and was left out, and why.
+    /// Rejected parts, and why.
     pub damaged: Vec<String>,
 }
 
@@ -37,7 +37,7 @@ fn load_words(why: LoadError) -> String {
 }
 
 impl Found {
-    /// Notes what became of a part; the part, where it is one.
+    /// Records the state of a part; returns the part if valid.
     fn note<T>(&mut self, what: &str, part: Result<Option<T>, String>) -> Option<T> {
         match part {
             Ok(Some(part)) => return Some(part),
@@ -56,7 +56,7 @@ fn model<const N: usize>(memory: &mut Memory) -> Result<Option<ModelPart>, LoadE
     Ok(load::<KeptModel<N>>(memory, Key::Model)?.map(|kept| ModelPart::of_kept(&kept)))
 }
 
-/// A model of as many joints as the record is long for.
+/// Model with as many joints as the length of its record.
 fn any_model(memory: &mut Memory) -> Result<Option<ModelPart>, String> {
     let other = |found| found == Err(LoadError::Record(RecordError::Length));
     let mut found = model::<2>(memory);
@@ -86,7 +86,7 @@ fn calibration(memory: &mut Memory, joint: Joint, key: Key) -> Result<Option<Axi
     .transpose()
 }
 
-/// A save that went wrong, in words.
+/// Describes a failed save.
 fn saved(done: Option<Result<Saved, SaveError>>, what: &str) -> Result<(), String> {
     match done {
         Some(Ok(_)) => Ok(()),
@@ -98,7 +98,8 @@ fn saved(done: Option<Result<Saved, SaveError>>, what: &str) -> Result<(), Strin
     }
 }
 
-/// Why a flash is not the store's to be written into. The store itself would repair what it takes for cut short, and erase it by that.
+/// Reason why a flash is not the store's and must not be written. The store itself would take it
+/// for an interrupted write, repair it, and thereby erase it.
 fn foreign(memory: &Memory) -> Option<String> {
     let mut readable = memory.clone().bytes().iter().all(|byte| *byte == 0xFF);
     for key in Key::ALL {
@@ -115,7 +116,8 @@ fn foreign(memory: &Memory) -> Option<String> {
 }
 
 impl KeptFile {
-    /// What a board's flash holds. Each part is read from a copy: what the store repairs by the way neither hides another nor is written.
+    /// Contents of a board's flash. Each part is read from a copy: repairs by the store thus
+    /// neither hide another part nor get written.
     #[must_use]
     pub fn of_flash(memory: &Memory) -> Found {
         let mut found = Found { file: Self { schema: KEPT_SCHEMA, ..Self::default() }, ..Found::default() };
@@ -137,10 +139,10 @@ impl KeptFile {
         found
     }
 
-    /// Keeps all that the file names. The image is to be thrown away where this fails.
+    /// Stores everything that the file names. If this fails, discard the image.
     ///
     /// # Errors
-    /// Why something cannot be kept, in words.
+    /// Describes what cannot be stored, and why.
     pub fn write_into(&self, memory: &mut Memory) -> Result<(), String> {
         if let Some(why) = foreign(memory) {
             return Err(format!("{why}: nothing was written"));

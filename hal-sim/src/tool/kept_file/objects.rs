@@ -1,6 +1,7 @@
-//! A node's objects: values to the bytes that the bus keeps, and back.
+//! Objects of a node: conversion between values and the bytes stored by the bus.
 //!
-//! Whether a value can be taken is not judged by rules of this file: a node as after the start takes them back as a board would.
+//! A value is accepted if a node in its initial state accepts it, as a board would; this file has
+//! no rules of its own.
 
 use scarab::bus::dictionary::{Object, Type, find};
 use scarab::bus::drive::{Axis, AxisConstants, Mode};
@@ -22,7 +23,7 @@ fn name(object: Object) -> &'static str {
     row.and_then(|row| NAMES.get(row)).copied().unwrap_or("")
 }
 
-/// Numbers of this type.
+/// Range of this type.
 fn range(kind: Type) -> (i64, i64) {
     match kind {
         Type::I8 => (i8::MIN.into(), i8::MAX.into()),
@@ -34,7 +35,7 @@ fn range(kind: Type) -> (i64, i64) {
     }
 }
 
-/// The number that these low bytes are.
+/// Number in these low bytes.
 fn number(kind: Type, bits: u32) -> i64 {
     match kind {
         Type::I8 => i64::from(bits as i8),
@@ -44,7 +45,7 @@ fn number(kind: Type, bits: u32) -> i64 {
     }
 }
 
-/// The bytes that a board keeps of these objects, in the table's order.
+/// Bytes that a board stores for these objects, in the table's order.
 pub(super) fn to_bytes(objects: &[ObjectValue], joint: Joint) -> Result<Vec<u8>, String> {
     let mut known = Vec::new();
     for given in objects {
@@ -87,7 +88,7 @@ pub(super) fn to_bytes(objects: &[ObjectValue], joint: Joint) -> Result<Vec<u8>,
     Ok(bytes[..length].to_vec())
 }
 
-/// Whether a node takes them all.
+/// Checks that a node accepts them all.
 fn try_on_a_node(bytes: &[u8], joint: Joint) -> Result<(), String> {
     const FIRST: NodeId = NodeId::new(1).expect("a number");
     let number = NodeId::new(1 + joint as u8).unwrap_or(FIRST);
@@ -103,7 +104,7 @@ fn try_on_a_node(bytes: &[u8], joint: Joint) -> Result<(), String> {
     })
 }
 
-/// What the bytes of a node say; whatever of them is none of the table's is named.
+/// Objects in the bytes of a node; entries missing in the table are named in the error.
 pub(super) fn of_bytes(bytes: &[u8], joint: Joint) -> Result<Vec<ObjectValue>, String> {
     let objects: Vec<ObjectValue> = kept_entries(bytes)
         .map(|(object, bits)| ObjectValue {
@@ -117,12 +118,12 @@ pub(super) fn of_bytes(bytes: &[u8], joint: Joint) -> Result<Vec<ObjectValue>, S
     if again.len() == bytes.len() { Ok(objects) } else { Err("bytes that are no entry".into()) }
 }
 
-/// Numbers of which the bits matter.
+/// Whether the number is a bit pattern.
 pub(super) fn is_pattern(object: &ObjectValue) -> bool {
     (0x1005..0x1016).contains(&object.index) || (0x1400..0x1C00).contains(&object.index)
 }
 
-/// Whether a value is one of a wide unsigned type.
+/// Whether the value is of a wide unsigned type.
 pub(super) fn is_wide(object: &ObjectValue) -> bool {
     find(Object::at(object.index, object.subindex)).is_ok_and(|row| row.kind == Type::U32)
 }

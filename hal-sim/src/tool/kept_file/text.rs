@@ -1,4 +1,4 @@
-//! As TOML text: one line for each object and each part of a joint.
+//! Writes TOML text: one line for each object and each part of a joint.
 
 use std::fmt::Display;
 
@@ -13,7 +13,7 @@ const HEAD: &str = "\
 ";
 
 impl KeptFile {
-    /// As TOML text that [`KeptFile::parse`] reads back unchanged.
+    /// TOML text that [`KeptFile::parse`] reads back unchanged.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut out = String::from(HEAD);
@@ -33,10 +33,11 @@ fn quoted(text: &str) -> String {
     toml::Value::from(text).to_string()
 }
 
-/// The shortest digits that restore the f32 this number is.
+/// Shortest digits that restore the f32 of this number.
 fn float(value: f64) -> String {
     let (single, text) = (value as f32, format!("{:?}", value as f32));
-    // Read as an f64 and rounded again: the f64's own digits where twice rounded is another number.
+    // The f64's own digits are used if reading the short form as f64 and rounding again would give
+    // another number.
     let same = f64::from(single) == value && text.parse::<f64>().is_ok_and(|read| read as f32 == single);
     if same { text } else { format!("{value:?}") }
 }

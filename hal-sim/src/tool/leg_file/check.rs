@@ -1,24 +1,24 @@
-//! What a leg must fulfil beyond its types.
+//! Checks a leg beyond its types.
 //!
-//! Bounds are wide: they refuse what no leg and no test stand can be (a slipped decimal point, a wrong unit),
-//! not what is unusual. A body is possible if its mass is positive, its inertia about the centre of mass
-//! positive definite and no principal moment as large as the sum of the two others.
+//! Bounds are wide: they reject impossible values (a slipped decimal point, a wrong unit), not unusual
+//! ones. A body is physically consistent if its mass is positive and its inertia about the centre of mass
+//! positive definite. In addition, no principal moment may reach the sum of the two others.
 
 use super::{JointFile, LegFile, LinkParameters, Switch};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
 
-/// What the firmware's limits take at least.
+/// Smallest range that the firmware's limits accept.
 const SMALLEST_RANGE_DEG: f64 = 2.0;
 
-/// A refused value and where it stands.
+/// Rejected value and its position.
 pub(super) struct Fault {
     pub joint: Option<usize>,
     pub keys: Vec<&'static str>,
     pub reason: String,
 }
 
-/// Where a value stands; makes faults.
+/// Position of a value; creates faults.
 pub(super) struct Place<'a> {
     pub joint: Option<(usize, &'a str)>,
     pub table: Option<&'static str>,
@@ -35,7 +35,7 @@ impl Place<'_> {
         Fault { joint: self.joint.map(|(number, _)| number), keys, reason }
     }
 
-    /// `low..=high`; refuses what is not a number.
+    /// Accepts `low..=high`; rejects NaN.
     pub(super) fn within(&self, key: &'static str, value: f64, low: f64, high: f64) -> Result<(), Fault> {
         if (low..=high).contains(&value) {
             Ok(())
@@ -44,7 +44,7 @@ impl Place<'_> {
         }
     }
 
-    /// Above 0 and at most `high`.
+    /// Accepts values above 0 and up to `high`.
     fn positive(&self, key: &'static str, value: f64, high: f64) -> Result<(), Fault> {
         if value > 0.0 && value <= high {
             Ok(())
@@ -201,6 +201,6 @@ fn link(place: &Place<'_>, link: &LinkParameters) -> Result<(), Fault> {
     place.within("coulomb", link.coulomb, 0.0, 1000.0)?;
     place.within("viscous", link.viscous, 0.0, 1000.0)?;
     place.within("offset", link.offset, -1000.0, 1000.0)?;
-    // Friction feeds nothing in either direction.
+    // Friction must dissipate energy in both directions.
     place.within("asymmetry", link.asymmetry, -link.coulomb, link.coulomb)
 }

@@ -1,4 +1,4 @@
-//! From a leg file to the numbers the plant is made from.
+//! Converts a leg file to the parameters of the plant.
 
 use super::{BodySide, JointFile, LegFile, LegFileError, LinkParameters, PushesFile, Side};
 use crate::description::{
@@ -8,9 +8,9 @@ use crate::description::{
 };
 
 impl LegFile {
-    /// The simulated leg. Its sensors have `current_noise_a` only: `torque_noise_percent` refers to a motion,
-    /// so whoever knows the motion adds it with `World::set_current_noise`. Fails where the leg has not `N`
-    /// joints or a joint has no `truth`.
+    /// Description of the simulated leg. Its sensors have `current_noise_a` only: `torque_noise_percent`
+    /// refers to a motion, for which the caller adds it with `World::set_current_noise`. Fails if the leg
+    /// does not have `N` joints or a joint has no `truth`.
     pub fn description<const N: usize>(&self) -> Result<LegDescription<N>, LegFileError> {
         let refused = |reason: String| LegFileError::of_file(&self.name, reason);
         let mut joints = Vec::with_capacity(N);
@@ -32,7 +32,7 @@ impl LegFile {
 }
 
 impl LegFile {
-    /// The same leg with this standard deviation of each joint's logged torque, N m, in the place of its own noise.
+    /// Replaces the noise by this standard deviation of each joint's logged torque, N m.
     #[must_use]
     pub fn with_torque_noise(mut self, noise_nm: &[f64]) -> Self {
         self.torque_noise_percent = 0.0;
@@ -60,8 +60,8 @@ impl JointFile {
             friction: FrictionDescription {
                 coulomb: truth.coulomb,
                 viscous: truth.viscous,
-                // Friction of coulomb + asymmetry one way and coulomb - asymmetry the other is, moving and at rest alike,
-                // friction of coulomb both ways and a constant torque.
+                // Friction of coulomb + asymmetry one way and coulomb - asymmetry the other is equivalent
+                // to symmetric friction of coulomb and a constant torque. This holds moving and at rest.
                 offset: truth.offset + truth.asymmetry,
                 stribeck: self.stribeck.map(|stribeck| Stribeck {
                     static_level: stribeck.static_nm,

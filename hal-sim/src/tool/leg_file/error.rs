@@ -1,17 +1,17 @@
-//! What is wrong with a leg file, and where.
+//! Error of a leg file with its position.
 
 use super::check::Fault;
 use core::fmt;
 use toml::de::{DeTable, DeValue};
 
-/// A leg file that cannot be used.
+/// Leg file that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct LegFileError {
-    /// Path or name, as it was given.
+    /// Path or name as given.
     pub file: String,
-    /// Counted from 1, where one line is to blame.
+    /// Line, from 1, if one is at fault.
     pub line: Option<usize>,
-    /// In words.
+    /// Description.
     pub reason: String,
 }
 
@@ -25,18 +25,18 @@ impl fmt::Display for LegFileError {
 }
 
 impl LegFileError {
-    /// The file as a whole.
+    /// Error of the file as a whole.
     pub(super) fn of_file(file: &str, reason: String) -> Self {
         Self { file: file.to_owned(), line: None, reason }
     }
 
-    /// Syntax, types and unknown keys.
+    /// Error of syntax, types or unknown keys.
     pub(super) fn of_text(file: &str, text: &str, fault: &toml::de::Error) -> Self {
         let line = fault.span().map(|span| line_of(text, span.start));
         Self { file: file.to_owned(), line, reason: fault.message().replace('\n', ", ") }
     }
 
-    /// A value that was read but cannot be meant.
+    /// Error of a value outside its bounds.
     pub(super) fn of_value(file: &str, text: &str, fault: &Fault) -> Self {
         let line = locate(text, fault.joint, &fault.keys).map(|start| line_of(text, start));
         Self { file: file.to_owned(), line, reason: fault.reason.clone() }
@@ -47,7 +47,7 @@ fn line_of(text: &str, start: usize) -> usize {
     1 + text.as_bytes().iter().take(start).filter(|&&byte| byte == b'\n').count()
 }
 
-/// Where the deepest key of a path that exists begins: a default has no line of its own, its joint has.
+/// Start of the deepest existing key of a path. A default has no line of its own, its joint has.
 fn locate(text: &str, joint: Option<usize>, keys: &[&str]) -> Option<usize> {
     let root = DeTable::parse(text).ok()?;
     let mut table = root.get_ref();

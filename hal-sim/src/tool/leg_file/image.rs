@@ -1,14 +1,15 @@
-//! What a leg file has to state for an image: the board moves a person by these numbers, so none of them is a default.
+//! Keys that a leg file must state for an image: the board moves a person with these numbers, so
+//! none may be a default.
 //!
-//! Keys that only choose what is estimated (`bandwidth_hz`, `offset`, `rotor`, `stribeck_model`, `asymmetric_coulomb`) keep
-//! their defaults, and `current_limit_a` follows from the torque limit.
+//! Keys that only choose estimates (`bandwidth_hz`, `offset`, `rotor`, `stribeck_model`,
+//! `asymmetric_coulomb`) keep their defaults. `current_limit_a` follows from the torque limit.
 
 use toml::{Table, Value};
 
 use super::check::Fault;
 use super::{LegFile, LegFileError, Side};
 
-/// Keys of each joint.
+/// Required keys of each joint.
 const JOINT: [&str; 10] = [
     "direction",
     "zero_offset_deg",
@@ -21,14 +22,15 @@ const JOINT: [&str; 10] = [
     "prior",
     "motor",
 ];
-/// Keys of each joint's `prior`, from which the servo's gains follow.
+/// Required keys of each joint's `prior`, which determines the servo's gains.
 const PRIOR: [&str; 3] = ["rotor_inertia", "coulomb", "viscous"];
 
 impl LegFile {
-    /// A shipped leg by name, or the file at a path, for an image; `side_is_given`: the side is stated elsewhere.
+    /// Loads a shipped leg by name, or the file at a path, for an image. `side_is_given`: the side
+    /// is stated elsewhere.
     ///
     /// # Errors
-    /// Names the keys that the file leaves out, besides everything that [`LegFile::load`] refuses.
+    /// Names the missing keys, besides the errors of [`LegFile::load`].
     pub fn load_for_image(name_or_path: &str, side_is_given: bool) -> Result<Self, LegFileError> {
         let (text, file) = Self::text(name_or_path)?;
         let leg = Self::parse(&text, &file)?;
@@ -39,7 +41,7 @@ impl LegFile {
     }
 }
 
-/// What a checked leg file lacks.
+/// Keys missing in a checked leg file.
 fn left_out(leg: &LegFile, text: &str, side_is_given: bool) -> Option<Fault> {
     let table = text.parse::<Table>().ok()?;
     if !side_is_given && !table.contains_key("side") {
@@ -68,7 +70,7 @@ fn left_out(leg: &LegFile, text: &str, side_is_given: bool) -> Option<Fault> {
     })
 }
 
-/// The keys that a table does not have.
+/// Keys missing in a table.
 fn keys_without<'a>(table: Option<&'a Value>, keys: &'a [&str]) -> impl Iterator<Item = &'a &'a str> {
     keys.iter().filter(move |key| table.is_none_or(|table| table.get(**key).is_none()))
 }

@@ -1,7 +1,8 @@
-//! `[joint.motor]` and `supply`: what a complete drive needs beyond an ideal one.
+//! Keys `[joint.motor]` and `supply` of a complete drive.
 //!
-//! The magnets' flux is not a key: it follows from the torque constant, `torque_per_ampere = 1.5 pole_pairs flux ratio`,
-//! so that both drives of a leg make the same torque of the same current. Bridge, shunts and converter are those of the board
+//! The magnets' flux is not a key. It follows from the torque constant:
+//! `torque_per_ampere = 1.5 pole_pairs flux ratio`. Both drives of a leg thus make the same torque
+//! from the same current. Bridge, shunts and converter are those of the board
 //! ([`crate::drive::description`]).
 
 use super::check::{Fault, Place};
@@ -12,11 +13,13 @@ use crate::drive::description::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Of a winding, s: below it the board cannot measure an inductance within its PWM periods.
+/// Least time constant of a winding, s; below it the board cannot measure an inductance within its
+/// PWM periods.
 const LEAST_TIME_CONSTANT_S: f64 = 80e-6;
-/// Of the supply without load, V: the board's bridges switch from 20 V on, and its brake resistor begins to conduct at 50 V.
+/// Range of the supply voltage without load, V. The board's bridges switch from 20 V on, and its
+/// brake resistor begins to conduct at 50 V.
 const SUPPLY_V: [f64; 2] = [22.0, 50.0];
-/// Of a 16-bit counter.
+/// Range of a 16-bit counter.
 const MOST_COUNTS: u32 = 1 << 16;
 
 /// Motor of a joint.
@@ -25,11 +28,11 @@ const MOST_COUNTS: u32 = 1 << 16;
 pub struct MotorFile {
     /// Electrical turns per turn of the rotor.
     pub pole_pairs: u32,
-    /// Of one phase, ohm.
+    /// Resistance of one phase, ohm.
     pub resistance_ohm: f64,
-    /// Along the magnets' axis, microhenry.
+    /// Inductance along the magnets' axis, microhenry.
     pub inductance_d_uh: f64,
-    /// Across it, microhenry.
+    /// Inductance across the magnets' axis, microhenry.
     pub inductance_q_uh: f64,
     /// Peak of the cogging torque at the rotor, N m.
     #[serde(default)]
@@ -37,16 +40,16 @@ pub struct MotorFile {
     /// Periods of the cogging torque per turn.
     #[serde(default = "default_cogging_periods")]
     pub cogging_periods: u32,
-    /// Electrical angle where the joint's anatomical angle is 0, degrees.
+    /// Electrical angle at the joint's anatomical zero, degrees.
     #[serde(default)]
     pub electrical_zero_deg: f64,
     /// Rotor angle of the encoder's index pulse, degrees.
     #[serde(default)]
     pub index_deg: f64,
-    /// Winding to surroundings, K/W.
+    /// Thermal resistance from winding to ambient, K/W.
     #[serde(default = "default_thermal_resistance")]
     pub thermal_resistance_k_w: f64,
-    /// Of the winding's warming, s.
+    /// Thermal time constant of the winding, s.
     #[serde(default = "default_thermal_time")]
     pub thermal_time_s: f64,
 }
@@ -63,15 +66,15 @@ fn default_thermal_time() -> f64 {
     300.0
 }
 
-/// What feeds the board.
+/// Supply of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupplyFile {
-    /// Without load, V.
+    /// Voltage without load, V.
     pub voltage_v: f64,
-    /// Of source and cable, ohm.
+    /// Resistance of source and cable, ohm.
     pub resistance_ohm: f64,
-    /// Of the bus, microfarad.
+    /// Capacitance of the bus, microfarad.
     pub capacitance_uf: f64,
     /// Brake resistor, ohm.
     pub brake_ohm: f64,
@@ -90,13 +93,13 @@ impl Default for SupplyFile {
 }
 
 impl SupplyFile {
-    /// Whether it is that of a file that says nothing.
+    /// Whether the supply equals the default.
     #[must_use]
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The supply that is simulated.
+    /// Description of the simulated supply.
     #[must_use]
     pub fn description(&self) -> SupplyDescription {
         SupplyDescription {
@@ -125,9 +128,9 @@ impl SupplyFile {
 }
 
 impl MotorFile {
-    /// A motor of the class of ODrive's D5065 with 270 rpm/V: 8.27/270 = 0.0306 N m/A, 7 pole pairs and 12 slots, 65 A at
-    /// most. Resistance and inductance are typical of such outrunners (15..40 mohm, 9..35 uH), cogging (1 % of the greatest
-    /// torque), saliency and thermal values are ours.
+    /// Motor of the class of ODrive's D5065 with 270 rpm/V: 8.27/270 = 0.0306 N m/A, 7 pole pairs and 12
+    /// slots, at most 65 A. Resistance and inductance are typical of such outrunners (15..40 mohm, 9..35
+    /// uH). Cogging (1 % of the greatest torque), saliency and thermal values are our assumptions.
     pub const D5065_CLASS: Self = Self {
         pole_pairs: 7,
         resistance_ohm: 0.039,
@@ -185,7 +188,7 @@ impl MotorFile {
         joint.torque_per_ampere / (1.5 * f64::from(self.pole_pairs) * joint.encoder.ratio)
     }
 
-    /// The axis that is simulated.
+    /// Description of the simulated axis.
     #[must_use]
     pub fn axis(&self, joint: &JointFile) -> AxisDescription {
         AxisDescription {
@@ -215,7 +218,8 @@ impl MotorFile {
 }
 
 impl LegFile {
-    /// The complete drives of the simulated leg. Fails where the leg has not `N` joints or a joint has no motor.
+    /// Complete drives of the simulated leg. Fails if the leg does not have `N` joints or a joint
+    /// has no motor.
     pub fn complete_description<const N: usize>(&self) -> Result<CompleteDescription<N>, LegFileError> {
         let refused = |reason: String| LegFileError::of_file(&self.name, reason);
         let mut axes = Vec::with_capacity(N);

@@ -1,17 +1,17 @@
-//! Links as segments of a body: how long they are, who is in them, on which side.
+//! Links as segments of a body: lengths, wearer and side.
 
 use serde::{Deserialize, Serialize};
 
 use super::LegFile;
 use crate::tool::anthropometry::Wearer;
 
-/// What the last two links are made of, a thigh and a shank with its foot: an exoskeleton on a wearer.
+/// Segments of the last two links: a thigh and a shank with its foot, as an exoskeleton on a wearer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SegmentsFile {
-    /// Knee to ankle, m. The thigh is as long as the way to the last joint.
+    /// Length from knee to ankle, m. The thigh extends to the last joint.
     pub shank_m: f64,
-    /// The wearer's foot, m.
+    /// Length of the wearer's foot, m.
     pub foot_m: f64,
     /// Body mass of the wearer in `truth`, kg.
     pub wearer_kg: f64,
@@ -20,7 +20,7 @@ pub struct SegmentsFile {
 }
 
 impl SegmentsFile {
-    /// Somebody of this mass (kg) with these segments and a thigh of this length (m).
+    /// Wearer of this mass (kg) with these segments and this length of the thigh (m).
     #[must_use]
     pub fn wearer(&self, thigh: f64, mass: f64) -> Wearer {
         Wearer { mass, thigh, shank: self.shank_m, foot: self.foot_m }
@@ -31,21 +31,21 @@ impl SegmentsFile {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BodySide {
-    /// As the drives are described.
+    /// Side for which the drives are described.
     #[default]
     Right,
-    /// Drives mounted mirrored.
+    /// Side with mirrored drives.
     Left,
 }
 
 impl BodySide {
-    /// Whether this is the side that is meant unless another is stated.
+    /// Whether this is the default side.
     #[must_use]
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Sense of motors and encoders in the anatomical one.
+    /// Sign of motors and encoders relative to the anatomical direction.
     #[must_use]
     pub fn mounting(self) -> f64 {
         match self {
@@ -55,12 +55,12 @@ impl BodySide {
     }
 }
 
-/// A link is at least so long, m.
+/// Shortest length of a link, m.
 const SHORTEST_LINK_M: f64 = 0.05;
 
 impl LegFile {
-    /// Length of the link beyond a joint, m: to the next joint's axis; of the last link the shank's where that is stated,
-    /// else twice the distance of its centre of mass, as far as that is known.
+    /// Length of the link beyond a joint, m, up to the next joint's axis. The last link has the
+    /// shank's length if stated, else twice the distance of its centre of mass, if known.
     #[must_use]
     pub fn link_length(&self, joint: usize) -> f64 {
         if let Some(next) = self.joints.get(joint + 1) {

@@ -1,21 +1,21 @@
-//! What of the model is estimated: asked for, ruled out, or left to the data.
+//! Selection of a model term: always, never, or decided by the data.
 
 use serde::{Deserialize, Serialize};
 
-/// Whether something is estimated.
+/// Whether a term is estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Switch {
-    /// If the data tell it.
+    /// Estimated if the data show it.
     Auto,
-    /// It is.
+    /// Always estimated.
     On,
-    /// It is not.
+    /// Never estimated.
     Off,
 }
 
 impl Switch {
-    /// The word in leg files and reports.
+    /// Word in leg files and reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

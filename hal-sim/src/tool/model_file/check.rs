@@ -1,7 +1,7 @@
-//! What a model must fulfil beyond its types: every number one, every name the leg's, a covariance that is one.
+//! Checks a model beyond its types: finite numbers, the leg's names, a valid covariance.
 //!
-//! The covariance was computed in single precision, so its smallest eigenvalue, as a correlation matrix, may be below
-//! zero by rounding.
+//! The covariance was computed in single precision. Rounding may therefore make the smallest
+//! eigenvalue of its correlations slightly negative.
 
 use scarab::model::{PARAMETERS_PER_JOINT, Parameter};
 
@@ -16,7 +16,7 @@ use crate::tool::temperature::RANGE_C;
 
 /// Smallest eigenvalue of the correlations.
 const SMALLEST_EIGENVALUE: f64 = -1e-5;
-/// Relative difference that rounding may leave between numbers that say the same.
+/// Relative tolerance between redundant numbers, for rounding.
 const ROUNDING: f64 = 1e-5;
 const STATUS: [&str; 4] = ["identified", "grouped", "weak", "prior"];
 
@@ -62,7 +62,7 @@ pub(super) fn model(model: &ModelFile) -> Checked {
     full_set(model)
 }
 
-/// By the leg file's own bounds, and against the fingerprint.
+/// Checks the leg by the leg file's own bounds, and against the fingerprint.
 fn leg(model: &ModelFile) -> Checked {
     let steps = [Step::Key("leg")];
     let leg = model.leg.to_leg_file();

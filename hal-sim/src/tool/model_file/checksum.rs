@@ -1,16 +1,16 @@
-//! A checksum of what a file says, not of how it is written.
+//! Checksum of a file's content, independent of its formatting.
 //!
-//! Keys in alphabetical order, each value with its kind and length, floats by their bits: spaces, comments and the
-//! order of keys do not matter, every number and word does.
+//! Keys enter in alphabetical order, each value with its kind and length, floats by their bits.
+//! Spaces, comments and the order of keys do not matter; every number and word does.
 
 use crc::{CRC_64_XZ, Crc, Digest, Table};
 use toml::Value;
 
 const CODE: Crc<u64, Table<1>> = Crc::<u64, Table<1>>::new(&CRC_64_XZ);
-/// The key that holds it.
+/// Key of the checksum.
 pub(super) const KEY: &str = "checksum";
 
-/// Of a parsed file, its checksum left out.
+/// Checksum of a parsed file, without the checksum itself.
 pub(super) fn of(file: &toml::Table) -> String {
     let mut digest = CODE.digest();
     let others: Vec<_> = file.iter().filter(|(key, _)| *key != KEY).collect();

@@ -1,17 +1,17 @@
-//! Whether a new identification found the leg that a kept model describes.
+//! Compares a new identification with a stored model: is it the same leg?
 //!
 //! ```text
-//! chi2 = d' (C_kept + C_found)^-1 d          d: difference of the base parameters both have
-//! chi2 of one leg identified twice has the chi-square distribution with as many degrees of freedom
-//! limit = k (1 - 2/(9 k) + z sqrt(2/(9 k)))^3          its quantile, z that of the normal distribution
+//! chi2 = d' (C_kept + C_found)^-1 d       d: difference of the common base parameters
+//! one leg identified twice: chi2 has the chi-square distribution with as many degrees of freedom, k
+//! limit = k (1 - 2/(9 k) + z sqrt(2/(9 k)))^3     its quantile, z that of the normal distribution
 //! ```
 //!
-//! Why the distance and not each parameter by itself: errors of parameters that are hardly told apart are large and go
-//! together, so that none of them need be far off while their sum is.
+//! Why the distance and not each parameter alone: errors of hardly separable parameters are large
+//! and correlated. Each of them may be off while their sum is accurate.
 //!
 //! Source: E. B. Wilson and M. M. Hilferty, The distribution of chi-square, 1931.
-//! Limits: sigma counts noise of the torque only, so what differs between two days (temperature of the gears, how the
-//! wearer sits in the shell) shows as a change; that is what it is.
+//! Limits: sigma counts noise of the torque only. Differences between two days (temperature of the
+//! gears, fit of the wearer in the shell) therefore appear as a change, which they are.
 
 use nalgebra::SVector;
 
@@ -19,14 +19,14 @@ use super::{LARGEST_BASE_SET, ModelFile, padded};
 use crate::tool::report::{ComparisonReport, DifferenceReport, RunReport};
 use crate::tool::temperature;
 
-/// 999 of 1000 of a normal distribution lie below so many standard deviations.
+/// Quantile of the normal distribution at 0.999, standard deviations.
 const NORMAL_QUANTILE: f64 = 3.090_232;
-/// Added to the diagonal of the correlations: what single precision leaves of the smallest.
+/// Added to the diagonal of the correlations: rounding of the smallest eigenvalue in single precision.
 const ROUNDING: f64 = 1e-6;
-/// Parameters named in the line.
+/// Number of parameters named in the line.
 const NAMED: usize = 3;
 
-/// The run's base set against a kept model's; `None` where they have nothing in common.
+/// Compares the run's base set with a stored model's; `None` without common parameters.
 #[must_use]
 pub fn compare(model: &ModelFile, file: &str, run: &RunReport) -> Option<ComparisonReport> {
     let kept = &model.base_set;
@@ -106,7 +106,7 @@ fn changed_line(differences: &[DifferenceReport], created: &str) -> String {
     format!("changed since {created}: {}", named.join(", "))
 }
 
-/// What chi-square with so many degrees of freedom stays below in 999 of 1000 cases.
+/// Quantile of chi-square at 0.999.
 fn quantile(freedom: usize) -> f64 {
     let freedom = freedom.max(1) as f64;
     let share = 2.0 / (9.0 * freedom);

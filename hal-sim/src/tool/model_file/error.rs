@@ -1,17 +1,17 @@
-//! What is wrong with a model file, and where.
+//! Error of a model file with its position.
 
 use core::fmt;
 
 use toml::de::{DeTable, DeValue};
 
-/// A file that is no model.
+/// File that is not a valid model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct ModelFileError {
-    /// As it was given.
+    /// Path as given.
     pub file: String,
-    /// Counted from 1, where one line is to blame.
+    /// Line, from 1, if one is at fault.
     pub line: Option<usize>,
-    /// In words.
+    /// Description.
     pub reason: String,
 }
 
@@ -24,14 +24,14 @@ impl fmt::Display for ModelFileError {
     }
 }
 
-/// One step into a file.
+/// One step of a path into a file.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Step {
     Key(&'static str),
     Entry(usize),
 }
 
-/// A refused value and where it stands.
+/// Rejected value and its position.
 pub(super) struct Fault {
     pub steps: Vec<Step>,
     pub reason: String,
@@ -42,13 +42,13 @@ impl ModelFileError {
         Self { file: file.to_owned(), line: None, reason }
     }
 
-    /// Syntax, types, unknown and missing keys.
+    /// Error of syntax, types, unknown or missing keys.
     pub(super) fn of_text(file: &str, text: &str, fault: &toml::de::Error) -> Self {
         let line = fault.span().map(|span| line_of(text, span.start));
         Self { file: file.to_owned(), line, reason: fault.message().replace('\n', ", ") }
     }
 
-    /// A value that was read but cannot be meant.
+    /// Error of a value outside its bounds.
     pub(super) fn of_value(file: &str, text: &str, steps: &[Step], reason: String) -> Self {
         let line = locate(text, steps).map(|start| line_of(text, start));
         Self { file: file.to_owned(), line, reason }
@@ -59,7 +59,7 @@ fn line_of(text: &str, start: usize) -> usize {
     1 + text.as_bytes().iter().take(start).filter(|&&byte| byte == b'\n').count()
 }
 
-/// Where the deepest step that exists begins.
+/// Start of the deepest existing step.
 fn locate(text: &str, steps: &[Step]) -> Option<usize> {
     let root = DeTable::parse(text).ok()?;
     let (first, rest) = steps.split_first()?;

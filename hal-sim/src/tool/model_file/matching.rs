@@ -1,9 +1,8 @@
-//! Whether a model is a leg's: what differs, and by how much.
+//! Compares a model with a leg and describes the differences.
 //!
-//! A model of another leg predicts wrongly and nothing in its numbers says so. Everything is compared that gives the
-//! parameters their meaning: side, names and order of the joints, lengths and axes, sense and zero, torque constants,
-//! gravity.
-//! The board compares the fingerprint alone; here the words are added.
+//! A model of another leg predicts wrongly, and its numbers do not show it. Everything that defines the
+//! parameters' meaning is compared: side, names and order of the joints, lengths and axes, sense and zero,
+//! torque constants, gravity. The board compares the fingerprint alone; here the differences are described.
 
 use nalgebra::Vector3;
 use scarab::model::Fingerprint;
@@ -13,10 +12,10 @@ use crate::tool::error::ToolError;
 use crate::tool::leg_file::{BodySide, JointFile, LegFile};
 use crate::tool::setup::{SetupError, anatomy, chain};
 
-/// Differences this small are rounding, in the unit of what is compared.
+/// Differences up to this size are rounding, in the unit of the compared value.
 const ROUNDING: f64 = 1e-9;
 
-/// The fingerprint of a leg as the board computes it, sixteen hexadecimal digits.
+/// Fingerprint of a leg as the board computes it, sixteen hexadecimal digits.
 pub fn fingerprint(leg: &LegFile) -> Result<String, SetupError> {
     fn of<const N: usize>(leg: &LegFile) -> Result<Fingerprint, SetupError> {
         let mounting = if leg.side == BodySide::Left { -1.0 } else { 1.0 };
@@ -32,10 +31,10 @@ pub fn fingerprint(leg: &LegFile) -> Result<String, SetupError> {
     Ok(format!("{:016x}", fingerprint.0))
 }
 
-/// Refuses a model that is not the leg's.
+/// Rejects a model of another leg.
 ///
 /// # Errors
-/// [`ToolError::Refused`] says in which way.
+/// [`ToolError::Refused`] names the differences.
 pub fn refuse_another_leg(model: &ModelFile, file: &str, leg: &LegFile) -> Result<(), ToolError> {
     let differences = differences(model, leg);
     if differences.is_empty() {
@@ -44,7 +43,7 @@ pub fn refuse_another_leg(model: &ModelFile, file: &str, leg: &LegFile) -> Resul
     Err(ToolError::Refused(format!("{file}: not a model of this leg: {}", differences.join("; "))))
 }
 
-/// What differs between a model's leg and a leg; nothing where the model is the leg's.
+/// Differences between a model's leg and a leg; empty if they match.
 #[must_use]
 pub fn differences(model: &ModelFile, leg: &LegFile) -> Vec<String> {
     let stored = &model.leg;
@@ -73,7 +72,7 @@ pub fn differences(model: &ModelFile, leg: &LegFile) -> Vec<String> {
     found
 }
 
-/// A leg's name without the options that set it: what they change is compared itself.
+/// Name of a leg without the options in it; their effects are compared directly.
 fn plain(name: &str) -> &str {
     name.split(" --").next().unwrap_or(name)
 }

@@ -1,4 +1,4 @@
-//! From the report of a run to a model file.
+//! Creates a model file from the report of a run.
 
 use std::path::Path;
 
@@ -16,7 +16,8 @@ use crate::tool::leg_file::LegFile;
 use crate::tool::report::{FitReport, ModelDetail, RunReport};
 
 impl<const N: usize, const B: usize> Background<N, B> {
-    /// What a model file keeps beyond the report. The covariance is symmetric up to rounding and is made exactly so.
+    /// Further data for a model file. The covariance is symmetric up to rounding and is made
+    /// exactly symmetric.
     #[must_use]
     pub fn detail(&self, dropped: &[bool; B], estimate: &Estimate<f32, B>) -> ModelDetail {
         let base = &self.model.base;
@@ -42,8 +43,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
 }
 
 impl ModelFile {
-    /// What an accepted run found, with the bandwidth (Hz) it was found with, as of now. `None` where the run was
-    /// refused: a wrong model is not kept.
+    /// Model of an accepted run with its bandwidth (Hz), dated now. `None` if the run was rejected:
+    /// a wrong model is not stored.
     #[must_use]
     pub fn of(leg: &LegFile, run: &RunReport, bandwidth_hz: f64) -> Option<Self> {
         let leg = &with_identified_constants(leg, run);
@@ -108,13 +109,14 @@ impl ModelFile {
     /// Writes the file.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// The file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), ToolError> {
         files::write(path, self.to_toml())
     }
 }
 
-/// The leg whose torques are true: with the torque constants that a known mass told, where it told all.
+/// Leg with the identified torque constants if a known mass determined all of them; its torques are
+/// then absolute.
 fn with_identified_constants(leg: &LegFile, run: &RunReport) -> LegFile {
     let mut leg = leg.clone();
     if run.scale.scale == "absolute" {

@@ -1,4 +1,4 @@
-//! A model as TOML that people read: one line for each parameter and each row of the covariance.
+//! Writes a model as readable TOML: one line for each parameter and each row of the covariance.
 
 use core::fmt::Write as _;
 
@@ -13,7 +13,7 @@ const HEAD: &str = "\
 ";
 
 impl ModelFile {
-    /// As TOML text that [`ModelFile::parse`] reads back unchanged.
+    /// TOML text that [`ModelFile::parse`] reads back unchanged.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut out = String::from(HEAD);
@@ -53,7 +53,7 @@ impl ModelFile {
         out
     }
 
-    /// With the checksum of its content.
+    /// Adds the checksum of the content.
     pub(super) fn sealed(mut self) -> Self {
         let raw: toml::Table =
             toml::from_str(&self.to_toml()).unwrap_or_else(|fault| unreachable!("own text: {fault}"));

@@ -1,11 +1,11 @@
-//! What came of watching, in words and tables.
+//! Prints the results of monitoring in words and tables.
 
 use super::super::error::ToolError;
 use super::super::report::Number;
 use super::super::tables::{self, number, say};
 use super::report::{MonitorRun, MonitorRuns};
 
-/// A run in a few lines.
+/// Prints a run in a few lines.
 fn print_run(run: &MonitorRun) -> Result<(), ToolError> {
     if !run.refused.is_empty() {
         say!("seed {}: refused, {}: there is no model to watch", run.seed, run.refused.join(", "));
@@ -84,7 +84,7 @@ fn mean_and_spread(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt())
 }
 
-/// Statistics of many runs, or all of a few, on standard output.
+/// Prints statistics of many runs, or all of a few.
 pub fn print_runs(report: &MonitorRuns) -> Result<(), ToolError> {
     let runs = &report.runs;
     say!("{}: walking, 3 s cycle", report.leg);

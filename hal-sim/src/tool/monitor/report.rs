@@ -1,4 +1,4 @@
-//! What came of watching, as data.
+//! Results of monitoring as data.
 //!
 //! The names of the fields are an interface.
 
@@ -12,96 +12,96 @@ use super::super::leg_file::LegFile;
 use super::super::report::Number;
 use super::Disturbance;
 
-/// Many runs.
+/// Results of many runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct MonitorRuns {
     /// Version of the JSON.
     pub schema: u32,
     /// Name in the leg file.
     pub leg: String,
-    /// In the order of their seeds.
+    /// Runs in the order of their seeds.
     pub runs: Vec<MonitorRun>,
 }
 
 /// One run.
 #[derive(Clone, Debug, Serialize)]
 pub struct MonitorRun {
-    /// Of noise and pushes.
+    /// Seed of noise and pushes.
     pub seed: u64,
-    /// Why there was no model to watch; empty where there was.
+    /// Reasons for a rejected identification; empty if there was a model to monitor.
     pub refused: Vec<&'static str>,
     /// Standard deviation of one filtered row of each joint at acceptance.
     pub row_sigma_nm: Vec<Number>,
-    /// What a joint's sum must reach.
+    /// Limit for a joint's sum.
     pub limit: Number,
-    /// Walked without any change.
+    /// Walking time without any change, hours.
     pub hours: f64,
-    /// Alarms while nothing had changed, seconds of walking.
+    /// Alarms without a change, seconds of walking.
     pub false_alarms_at_s: Vec<f64>,
     /// Whether anything was changed.
     pub changed: bool,
-    /// The alarm after the change.
+    /// Alarm after the change.
     pub alarm: Option<AlarmReport>,
-    /// What the quick pass made of it.
+    /// Result of the quick update.
     pub update: Option<UpdateReport>,
-    /// Whether the change was still going on when it was noticed.
+    /// Whether the change was still going on at the alarm.
     pub still_changing: bool,
-    /// Whether the leg complained again within a minute of the update.
+    /// Whether another alarm came within a minute of the update.
     pub alarm_after_update: bool,
     /// Root mean square position error of all joints before the change, degrees.
     pub error_deg_before: Number,
-    /// From the change to the end of the quick pass.
+    /// Position error from the change to the end of the quick update.
     pub error_deg_changed: Number,
-    /// With the update in use.
+    /// Position error with the update in use.
     pub error_deg_updated: Number,
 }
 
 /// An alarm.
 #[derive(Clone, Debug, Serialize)]
 pub struct AlarmReport {
-    /// Seconds after the change.
+    /// Time after the change, s.
     pub after_s: f64,
-    /// How long ago the leg says it happened.
+    /// Estimated time since the change.
     pub since_s: Number,
-    /// Joints it names.
+    /// Names of the affected joints.
     pub joints: Vec<String>,
     /// Sum of each joint.
     pub statistic: Vec<Number>,
 }
 
-/// What the quick pass found.
+/// Result of the quick update.
 #[derive(Clone, Debug, Serialize)]
 pub struct UpdateReport {
     /// `payload`, `friction`, `nothing` or `unexplained`.
     pub cause: &'static str,
     /// The link that carries the payload.
     pub link: Option<String>,
-    /// Of the verdict.
+    /// Reasons of the verdict.
     pub reasons: Vec<&'static str>,
-    /// Whether that is what happened.
+    /// Whether the cause is the true one.
     pub right: bool,
-    /// Seconds from the alarm.
+    /// Time after the alarm, s.
     pub after_s: f64,
-    /// What was compared: the model as it was, a payload on each link, other friction.
+    /// Compared hypotheses: the unchanged model, a payload on each link, other friction.
     pub hypotheses: Vec<HypothesisReport>,
     /// Energy of each joint's residual over that at acceptance.
     pub energy_before: Vec<Number>,
-    /// With the update.
+    /// Residual energy with the update.
     pub energy_after: Vec<Number>,
-    /// Changes of parameters under the cause found; none where nothing explains the change.
+    /// Changes of parameters under the identified cause; empty if nothing explains the change.
     pub values: Vec<ValueReport>,
 }
 
-/// How well one explanation does.
+/// Fit of one hypothesis.
 #[derive(Clone, Debug, Serialize)]
 pub struct HypothesisReport {
     /// `unchanged`, `payload on LINK`, `friction`.
     pub name: String,
-    /// What it leaves unexplained.
+    /// Unexplained chi-square.
     pub chi_square: Number,
-    /// Degrees of freedom of that.
+    /// Its degrees of freedom.
     pub freedom: Number,
-    /// Whether what it leaves is noise.
+    /// Whether the residual is noise.
     pub explains: bool,
 }
 
@@ -110,18 +110,18 @@ pub struct HypothesisReport {
 pub struct ValueReport {
     /// `M2`, `FC1`.
     pub name: String,
-    /// SI.
+    /// SI unit.
     pub unit: &'static str,
-    /// Found.
+    /// Identified change.
     pub value: Number,
-    /// Standard deviation, the accepted model's uncertainty in it.
+    /// Standard deviation, including the accepted model's uncertainty.
     pub sigma: Number,
-    /// What the simulation changed; unknown where the cause found is not what happened.
+    /// Change made by the simulation; unknown if the identified cause is wrong.
     pub truth: Number,
 }
 
 impl MonitorRun {
-    /// Nothing happened yet.
+    /// Report before any event.
     pub(super) fn new(seed: u64) -> Self {
         Self {
             seed,
@@ -141,12 +141,13 @@ impl MonitorRun {
         }
     }
 
-    /// The identification was refused.
+    /// Report of a rejected identification.
     pub(super) fn refused(seed: u64, reasons: Vec<&'static str>) -> Self {
         Self { refused: reasons, ..Self::new(seed) }
     }
 
-    /// A model, no false alarm; a change noticed, rightly explained, and quiet after the update unless it went on.
+    /// Whether all went as required: a model, no false alarm, and a change that was detected and
+    /// correctly explained. After the update there is no alarm unless the change went on.
     #[must_use]
     pub fn is_as_it_should_be(&self) -> bool {
         let quiet = self.still_changing || !self.alarm_after_update;
@@ -155,7 +156,7 @@ impl MonitorRun {
     }
 }
 
-/// What explains these disturbances: only what stands among the firmware's hypotheses, alone.
+/// Cause of these disturbances, if it is a single one among the firmware's hypotheses.
 fn expected(disturbances: &[Disturbance]) -> Cause {
     match disturbances {
         [Disturbance::Payload(payload)] => Cause::Payload { link: payload.joint },
@@ -164,7 +165,7 @@ fn expected(disturbances: &[Disturbance]) -> Cause {
     }
 }
 
-/// The quick pass beside what happened.
+/// Report of the quick update, compared with the actual changes.
 pub(super) fn update_report<const N: usize, const B: usize>(
     leg: &LegFile,
     update: &Update<f32, N, B>,

@@ -1,8 +1,9 @@
-//! A target that the bus voltage cannot hold, and the way back.
+//! Step to a target beyond the voltage limit, and the recovery.
 //!
-//! On a weak supply of 12 V a rotor at the joint's top speed asks for more voltage than there is at 50 A; at 1.3 times that
-//! speed the magnets alone do. 100 ms at the limit, then a target that can be held. An integral that had wound up would
-//! take long to come back; the time is compared with that of the same step at 48 V, where nothing is limited.
+//! On a weak supply of 12 V, 50 A at the joint's top speed need more voltage than is available. At
+//! 1.3 times that speed the back-EMF alone does. The loop is held at the limit for 100 ms, then
+//! gets a target that it can reach. Integrator wind-up would delay the recovery; its time is
+//! compared with the same step at 48 V, where nothing limits.
 
 use scarab::units::Volt;
 use serde::Serialize;
@@ -10,51 +11,52 @@ use serde::Serialize;
 use super::super::error::ToolError;
 use super::{Bench, PERIOD_S};
 
-/// A, or the axis' limit.
+/// Target beyond the limit, A, at most the axis' limit.
 const BEYOND: f64 = 50.0;
-/// Of it, afterwards.
+/// Target afterwards, as a share of the first.
 const WITHIN_SHARE: f64 = 0.2;
-/// V.
+/// Voltage of the weak supply, V.
 const WEAK: f64 = 12.0;
-/// At the limit, s.
+/// Time at the limit, s.
 const LIMITED_S: f64 = 0.1;
-/// Looked at after the way back began, periods: 10 ms.
+/// Recorded periods after the target changes: 10 ms.
 const PERIODS: usize = 240;
-/// Drawn before it, periods.
+/// Drawn periods before the target changes.
 const BEFORE: usize = 24;
-/// Recovered within so much of the current asked for.
+/// Band about the target that counts as recovered, as a share of the requested current.
 const BAND_SHARE: f64 = 0.03;
 
-/// One speed on one supply.
+/// Results at one speed on one supply.
 #[derive(Clone, Debug, Serialize)]
 pub struct LimitReport {
-    /// Of the rotor, rad/s.
+    /// Rotor speed, rad/s.
     pub speed_rad_s: f64,
-    /// Of the supply, V.
+    /// Supply voltage, V.
     pub supply_v: f64,
-    /// Asked for at the limit, A.
+    /// Current requested at the limit, A.
     pub asked_a: f64,
-    /// And then, A.
+    /// Current requested afterwards, A.
     pub target_a: f64,
     /// Quadrature current at the limit, mean of the last 10 ms, A.
     pub reached_a: f64,
-    /// Direct current there, A.
+    /// Direct current at the limit, A.
     pub direct_a: f64,
-    /// From the target's change until the current stays within 3 % of `asked_a` of it, ms; none where it never does.
+    /// Time until the current stays within 3 % of `asked_a` about the new target, ms; `None` if it
+    /// never does.
     pub recovery_ms: Option<f64>,
-    /// Beyond the new target on the way, A.
+    /// Overshoot beyond the new target, A.
     pub overshoot_a: f64,
-    /// The bridge was released by the firmware.
+    /// Whether the firmware switched the bridge off.
     pub released: bool,
-    /// About the change of the target, ms.
+    /// Time relative to the change of the target, ms.
     pub time_ms: Vec<f64>,
-    /// A.
+    /// Quadrature current, A.
     pub quadrature_a: Vec<f64>,
-    /// The direct current, A.
+    /// Direct current, A.
     pub direct_current_a: Vec<f64>,
 }
 
-/// Both speeds on both supplies.
+/// Measures both speeds on both supplies.
 pub fn measure(bench: &Bench) -> Result<Vec<LimitReport>, ToolError> {
     let mut reports = Vec::new();
     let asked = bench.within_limit(BEYOND);

@@ -1,13 +1,14 @@
-//! `motor`: the board's current loop on one of a leg's motors, measured on a test stand.
+//! `motor`: measures the board's current loop with one of a leg's motors on a test stand.
 //!
-//! | part | what is measured |
+//! | part | measurement |
 //! | --- | --- |
-//! | [`step`] | steps of current at rest and at three speeds, with and without feedforward, against the designed loop |
+//! | [`step`] | current steps at rest and at three speeds, with and without feedforward, against the design |
 //! | [`ripple`] | torque ripple: fast against exact sine, with and without dead-time compensation |
-//! | [`limit`] | a target that the voltage cannot hold, and the way back |
+//! | [`limit`] | a target beyond the voltage limit, and the recovery |
 //! | [`regeneration`] | a spinning inertia braked, with and without the chopper |
 //!
-//! The stand's motor is calibrated first, by the firmware. Currents are those that flow, not those that are measured.
+//! The firmware first calibrates the motor on the stand. Reported currents are actual currents, not
+//! measured ones.
 
 pub mod limit;
 pub mod regeneration;
@@ -30,33 +31,33 @@ use super::report::SCHEMA;
 use crate::drive::description::{AxisDescription, SupplyDescription};
 use crate::drive::stand::{Load, Stand};
 
-/// A rotor turns so long before the bridge switches, s.
+/// Time for which a rotor turns before the bridge switches, s.
 const TRACKED_S: f64 = 0.02;
 
 /// PWM period, s.
 pub const PERIOD_S: f64 = 1.0 / CURRENT_RATE_HZ as f64;
 
-/// A motor with its board, before anything is changed about it.
+/// Motor with its board in the initial state.
 #[derive(Clone, Debug)]
 pub struct Bench {
     /// Joint whose motor it is.
     pub joint: String,
-    /// The firmware's.
+    /// Configuration of the firmware's axis.
     pub configuration: AxisConfiguration,
-    /// What is simulated.
+    /// Simulated axis.
     pub axis: AxisDescription,
-    /// What feeds it.
+    /// Simulated supply.
     pub supply: SupplyDescription,
-    /// What the firmware found on the stand.
+    /// Calibration found by the firmware on the stand.
     calibration: Calibration,
     /// Rotor speed at the joint's speed limit, rad/s.
     pub top_speed: f64,
-    /// Of the sensors' noise.
+    /// Seed of the sensor noise.
     pub seed: u64,
 }
 
 impl Bench {
-    /// The motor of a joint, by its place in the leg.
+    /// Prepares the motor of a joint.
     pub fn new(leg: &LegFile, joint: usize, seed: u64) -> Result<Self, ToolError> {
         let found = leg.joints.get(joint).and_then(|joint| Some((joint, joint.motor.as_ref()?)));
         let Some((file, motor)) = found else {
@@ -77,7 +78,7 @@ impl Bench {
         })
     }
 
-    /// On its stand again, rotor turned at `speed` from `angle` on (rad/s, rad).
+    /// New stand with a rotor turning at `speed` from `angle` on (rad/s, rad).
     pub fn rig(&self, speed: f64, angle: f64) -> Result<Rig, ToolError> {
         let mut stand = Stand::new(&self.axis, &self.supply, Load::Turned(speed), angle, self.seed);
         let sample = stand.period(&AxisCommand::RELEASED, 0.0);
@@ -85,20 +86,20 @@ impl Bench {
             ToolError::input(format!("axis `{}`: {}", self.joint, words::axis_error(error)))
         })?;
         let mut rig = Rig { stand, axis, command: AxisCommand::RELEASED, chopper: None, brake: 0.0, sample };
-        // The rotor turns already: its speed is found before anything switches.
+        // The rotor already turns: its speed is estimated before the bridge switches.
         for _ in 0..(TRACKED_S / PERIOD_S) as u32 {
             rig.tick(AxisRequest::RELEASED);
         }
         Ok(rig)
     }
 
-    /// A current, or the axis' limit where that is smaller, A.
+    /// Limits a current to the axis' limit, A.
     #[must_use]
     pub fn within_limit(&self, current: f64) -> f64 {
         current.min(f64::from(self.configuration.current_limit.0))
     }
 
-    /// Refuses what was measured of an axis that had released itself.
+    /// Rejects a measurement of an axis that has switched itself off.
     pub fn must_hold(&self, rig: &Rig, what: &str, speed: f64) -> Result<(), ToolError> {
         let Some(fault) = rig.axis.fault() else { return Ok(()) };
         Err(ToolError::Refused(format!(
@@ -109,7 +110,7 @@ impl Bench {
     }
 }
 
-/// A motor on its stand under the board's current loop.
+/// Motor on its stand under the board's current loop.
 #[derive(Clone, Debug)]
 pub struct Rig {
     /// The plant.
@@ -124,14 +125,14 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// With the board's brake chopper.
+    /// Adds the board's brake chopper.
     #[must_use]
     pub fn with_chopper(mut self) -> Self {
         self.chopper = Chopper::new(BRAKE[0], BRAKE[1]);
         self
     }
 
-    /// One PWM period with this target; the currents that flow along and across the magnets' axis at its end, A.
+    /// Runs one PWM period with this target; returns direct and quadrature current at its end, A.
     pub fn period(&mut self, target: f64) -> [f64; 2] {
         self.tick(AxisRequest { enabled: true, current: Ampere(target as f32) });
         self.stand.rotor_currents()
@@ -146,7 +147,7 @@ impl Rig {
         }
     }
 
-    /// So many seconds with this target.
+    /// Holds this target for a time, s.
     pub fn hold(&mut self, target: f64, seconds: f64) {
         for _ in 0..(seconds / PERIOD_S) as u32 {
             self.period(target);
@@ -154,30 +155,30 @@ impl Rig {
     }
 }
 
-/// Everything that `motor` measures.
+/// Results of all measurements.
 #[derive(Clone, Debug, Serialize)]
 pub struct MotorReport {
-    /// Of the JSON.
+    /// Version of the JSON.
     pub schema: u32,
     /// Name of the leg.
     pub leg: String,
     /// Name of the joint.
     pub joint: String,
-    /// Of the current loop, Hz.
+    /// Bandwidth of the current loop, Hz.
     pub bandwidth_hz: f64,
-    /// The loop as designed.
+    /// Designed step response.
     pub designed: step::Shape,
-    /// Steps.
+    /// Steps of the current.
     pub steps: Vec<step::StepReport>,
-    /// Ripple.
+    /// Torque ripple.
     pub ripple: Vec<ripple::RippleReport>,
     /// Voltage limit.
     pub limit: Vec<limit::LimitReport>,
-    /// Braking.
+    /// Regenerative braking.
     pub regeneration: Vec<regeneration::RegenerationReport>,
 }
 
-/// Measures everything.
+/// Runs all measurements.
 pub fn measure(leg: &LegFile, joint: usize, seed: u64) -> Result<MotorReport, ToolError> {
     let bench = Bench::new(leg, joint, seed)?;
     Ok(MotorReport {

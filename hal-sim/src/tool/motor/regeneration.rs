@@ -1,7 +1,7 @@
-//! A spinning inertia is braked into a supply that takes nothing back.
+//! Braking of a spinning inertia into a supply that absorbs no energy.
 //!
-//! The inertia is that of a leg's joint of 2.5 kg m^2 as the motor feels it through the joint's gear, at the joint's top speed;
-//! braked with 50 A to a tenth of it. With and without the brake chopper.
+//! The inertia is a leg joint's 2.5 kg m^2, reduced to the motor by the joint's gear, at the joint's top
+//! speed. A current of 50 A brakes it to a tenth of that speed, with and without the brake chopper.
 
 use scarab::motor::AxisFault;
 use serde::Serialize;
@@ -10,43 +10,44 @@ use super::super::error::ToolError;
 use super::{Bench, PERIOD_S};
 use crate::drive::stand::Load;
 
-/// Of a joint, kg m^2.
+/// Inertia of the joint, kg m^2.
 const INERTIA: f64 = 2.5;
-/// A, or the axis' limit.
+/// Braking current, A, at most the axis' limit.
 const CURRENT: f64 = 50.0;
-/// Of the initial speed, where braking ends.
+/// Share of the initial speed at which braking ends.
 const END: f64 = 0.1;
-/// At the latest, s.
+/// Limit of the braking time, s.
 const LONGEST_S: f64 = 1.0;
-/// Drawn is every so manieth period.
+/// Periods between two drawn points.
 const STRIDE: usize = 24;
 
-/// One braking.
+/// Results of one braking.
 #[derive(Clone, Debug, Serialize)]
 pub struct RegenerationReport {
-    /// The chopper works.
+    /// Whether the chopper works.
     pub chopper: bool,
-    /// Braked with, A.
+    /// Braking current, A.
     pub current_a: f64,
-    /// V.
+    /// Highest bus voltage, V.
     pub highest_bus_v: f64,
-    /// Energy of the motion at the beginning, J.
+    /// Kinetic energy at the beginning, J.
     pub motion_j: f64,
-    /// Given back to the bus while the motor generated, J; at low speed the windings take more than the motion gives.
+    /// Energy returned to the bus while the motor generated, J; at low speed the windings take
+    /// more than the motion gives.
     pub returned_j: f64,
-    /// Of it into the brake resistor, J.
+    /// Part of the returned energy that went into the brake resistor, J.
     pub brake_j: f64,
-    /// Why the firmware released the bridge, if it did.
+    /// Fault for which the firmware switched the bridge off, if any.
     pub fault: Option<&'static str>,
-    /// ms.
+    /// Time, ms.
     pub time_ms: Vec<f64>,
-    /// V.
+    /// Bus voltage, V.
     pub bus_v: Vec<f64>,
-    /// Of the rotor, rad/s.
+    /// Rotor speed, rad/s.
     pub speed_rad_s: Vec<f64>,
 }
 
-/// With and without.
+/// Measures with and without the chopper.
 pub fn measure(bench: &Bench) -> Result<Vec<RegenerationReport>, ToolError> {
     [true, false].into_iter().map(|chopper| one(bench, chopper)).collect()
 }
@@ -71,7 +72,7 @@ fn one(bench: &Bench, chopper: bool) -> Result<RegenerationReport, ToolError> {
         let (bus, speed) = (rig.stand.supply().voltage(), rig.stand.rotor().speed);
         highest = highest.max(bus);
         let ended = speed < END * bench.top_speed || rig.axis.fault().is_some();
-        // The last one too: it is the highest where the axis releases.
+        // The last period is included: its voltage is the highest if the axis switches off.
         if ended || period.is_multiple_of(STRIDE) {
             time_ms.push(1e3 * period as f64 * PERIOD_S);
             bus_v.push(bus);

@@ -1,8 +1,8 @@
 //! Torque ripple at constant speed and current.
 //!
-//! The torque of each PWM period over whole turns of the rotor, without cogging: rms about its mean, and the amplitude of its
-//! sixth harmonic per electrical turn, which dead time makes. With the board's noise, and besides with sensors without any, so
-//! that what the sine costs can be seen.
+//! Uses the torque of each PWM period over whole turns of the rotor, without cogging. Reported are its rms
+//! about the mean, and its sixth harmonic per electrical turn, which dead time causes. The measurement is
+//! made with the board's noise and with noise-free sensors, which shows the effect of the sine.
 
 use core::f64::consts::TAU;
 
@@ -12,40 +12,41 @@ use serde::Serialize;
 use super::super::error::ToolError;
 use super::{Bench, PERIOD_S};
 
-/// A.
+/// Current, A.
 const CURRENT: f64 = 20.0;
-/// rad/s of the rotor, its top speed at most: a joint of the default leg at 0.2 rad/s, and at a third of its top speed.
+/// Rotor speeds, rad/s, at most the top speed: a joint of the default leg at 0.2 rad/s, and at a
+/// third of its top speed.
 const SPEEDS: [f64; 2] = [10.0, 75.0];
-/// To rest before, s.
+/// Settling time, s.
 const SETTLE_S: f64 = 0.1;
-/// Looked at, turns of the rotor.
+/// Measured turns of the rotor.
 const TURNS: f64 = 1.0;
 const HARMONIC: f64 = 6.0;
 
-/// One kind of loop at one speed.
+/// Results of one kind of loop at one speed.
 #[derive(Clone, Debug, Serialize)]
 pub struct RippleReport {
-    /// Of the rotor, rad/s.
+    /// Rotor speed, rad/s.
     pub speed_rad_s: f64,
-    /// Asked for, A.
+    /// Requested current, A.
     pub current_a: f64,
     /// `fast` or `exact`.
     pub sine: &'static str,
-    /// Dead time given back.
+    /// Whether dead time is compensated.
     pub compensated: bool,
-    /// Sensors with the board's noise.
+    /// Whether the sensors have the board's noise.
     pub noise: bool,
     /// Standard deviation of the torque, percent of its mean.
     pub torque_percent: f64,
     /// Amplitude of the sixth harmonic, percent of the mean.
     pub sixth_percent: f64,
-    /// Mean torque against 1.5 pole pairs flux current, percent.
+    /// Error of the mean torque against 1.5 pole pairs flux current, percent.
     pub mean_error_percent: f64,
     /// Standard deviation of the direct current, A.
     pub direct_a: f64,
 }
 
-/// All kinds at all speeds.
+/// Measures all kinds of loop at all speeds.
 pub fn measure(bench: &Bench) -> Result<Vec<RippleReport>, ToolError> {
     let mut reports = Vec::new();
     for speed in SPEEDS.map(|speed| speed.min(bench.top_speed)) {

@@ -1,8 +1,11 @@
 //! Steps of the quadrature current.
 //!
-//! From 5 to 25 A, or the same shares of a smaller current limit, at constant speed; the mean over eight rotor angles, so that ripple and timer steps average out and what is
-//! left is the loop. Designed is `i[k+1] = i[k] + w T (target - i[k-1])`, w = 2 pi f: the integrator that the controller's zero
-//! leaves of motor and controller, one period late and held for one. The step comes with the sample of index 0.
+//! Steps from 5 to 25 A, or the same shares of a smaller current limit, at constant speed. The mean
+//! over eight rotor angles averages ripple and timer steps; the rest is the loop.
+//!
+//! The designed response is `i[k+1] = i[k] + w T (target - i[k-1])` with w = 2 pi f. The
+//! controller's zero cancels the motor's pole, and an integrator remains, delayed by one period and
+//! held for one. The step comes with the sample of index 0.
 
 use core::f64::consts::TAU;
 
@@ -11,54 +14,54 @@ use serde::Serialize;
 use super::super::error::ToolError;
 use super::{Bench, PERIOD_S};
 
-/// Before and after, A.
+/// Currents before and after the step, A.
 const FROM: f64 = 5.0;
 const TO: f64 = 25.0;
-/// Looked at after the step, PWM periods: 2.5 ms.
+/// Recorded PWM periods after the step: 2.5 ms.
 const PERIODS: usize = 60;
-/// To rest before the step, s.
+/// Settling time before the step, s.
 const SETTLE_S: f64 = 0.03;
-/// Rotor angles.
+/// Number of rotor angles.
 const ANGLES: u32 = 8;
-/// Parts of the joint's top speed.
+/// Shares of the joint's top speed.
 const SPEEDS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
 
-/// What a step response looks like.
+/// Shape of a step response.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Shape {
-    /// From 10 to 90 % of the step, ms; none where it does not get there.
+    /// Rise time from 10 to 90 % of the step, ms; `None` if 90 % is not reached.
     pub rise_ms: Option<f64>,
-    /// Beyond the target, percent of the step.
+    /// Overshoot beyond the target, percent of the step.
     pub overshoot_percent: f64,
 }
 
-/// One speed, one kind of loop.
+/// Results of one kind of loop at one speed.
 #[derive(Clone, Debug, Serialize)]
 pub struct StepReport {
-    /// Of the rotor, rad/s.
+    /// Rotor speed, rad/s.
     pub speed_rad_s: f64,
-    /// Cross-coupling and back-EMF fed forward.
+    /// Whether cross-coupling and back-EMF are fed forward.
     pub feedforward: bool,
-    /// Before the step, A.
+    /// Current before the step, A.
     pub from_a: f64,
-    /// What is asked for with it, A.
+    /// Current requested by the step, A.
     pub to_a: f64,
-    /// Of the quadrature current.
+    /// Shape of the quadrature current.
     #[serde(flatten)]
     pub shape: Shape,
     /// Largest direct current during the step, percent of the step.
     pub coupling_percent: f64,
     /// Mean error of the quadrature current over the last fifth, A.
     pub error_a: f64,
-    /// From the step on, ms.
+    /// Time from the step on, ms.
     pub time_ms: Vec<f64>,
-    /// A.
+    /// Quadrature current, A.
     pub quadrature_a: Vec<f64>,
-    /// A.
+    /// Direct current, A.
     pub direct_a: Vec<f64>,
 }
 
-/// Of a normalised response at the ends of periods.
+/// Shape of a normalised response, sampled at the ends of periods.
 fn shape(values: &[f64]) -> Shape {
     let crossing = |level: f64| -> Option<f64> {
         let after = values.iter().position(|value| *value >= level)?;
@@ -73,7 +76,7 @@ fn shape(values: &[f64]) -> Shape {
     }
 }
 
-/// The response that the bandwidth promises.
+/// Response of the designed bandwidth.
 #[must_use]
 pub fn response(bandwidth_hz: f64) -> Vec<f64> {
     let gain = TAU * bandwidth_hz * PERIOD_S;
@@ -84,13 +87,13 @@ pub fn response(bandwidth_hz: f64) -> Vec<f64> {
     values
 }
 
-/// Its shape.
+/// Shape of the designed response.
 #[must_use]
 pub fn designed(bandwidth_hz: f64) -> Shape {
     shape(&response(bandwidth_hz))
 }
 
-/// All speeds, with and without feedforward.
+/// Measures all speeds, with and without feedforward.
 pub fn measure(bench: &Bench) -> Result<Vec<StepReport>, ToolError> {
     let mut steps = Vec::new();
     for share in SPEEDS {
@@ -151,7 +154,7 @@ mod tests {
     fn a_response_that_never_arrives_has_no_rise() {
         assert_eq!(shape(&[0.0, 0.05, 0.3, 0.6]).rise_ms, None);
         assert_eq!(shape(&[0.0; 8]).rise_ms, None);
-        // 0.1 at 0.5 periods, 0.9 at 4.5.
+        // Crossings: 0.1 at 0.5 periods, 0.9 at 4.5.
         let line: Vec<_> = (0..8).map(|period| 0.2 * f64::from(period)).collect();
         let rise = shape(&line).rise_ms.expect("it arrives");
         assert!((rise - 4e3 * PERIOD_S).abs() < 1e-12, "{rise}");

@@ -1,9 +1,9 @@
-//! What `motor` measured, as tables.
+//! Formats the measurements of `motor` as tables.
 
 use super::super::tables::headed;
 use super::MotorReport;
 
-/// All tables.
+/// Formats all tables.
 #[must_use]
 pub fn tables(report: &MotorReport) -> String {
     let [from, to] = report.steps.first().map_or([0.0; 2], |step| [step.from_a, step.to_a]);
@@ -112,7 +112,7 @@ pub fn tables(report: &MotorReport) -> String {
     text + &table.trim_fmt() + "\n"
 }
 
-/// Whole amperes without a fraction.
+/// Formats whole amperes without decimals.
 fn ampere(current: f64) -> String {
     if current.fract() == 0.0 { format!("{current:.0}") } else { format!("{current:.2}") }
 }

@@ -1,12 +1,15 @@
-//! The paper's three-joint chain through the whole firmware: one identification, then the paper's verification motion.
+//! Runs the whole firmware on the paper's three-joint chain: one identification, then the paper's
+//! verification motion.
 //!
-//! Why its own runner: `identify` validates on motions of its own, the paper verifies on Equations (31) and (32). Here
-//! these take the place of the first validation motion, and everything else is what `identify` does: the plant of this
-//! crate under the firmware's servo, its logging, identification and verdict. Nothing is identified here.
+//! Why a separate runner: `identify` validates on its own motions, the paper verifies on Equations (31) and
+//! (32). Here these replace the first validation motion. Everything else is as in `identify`: the plant of
+//! this crate under the firmware's servo, its logging, identification and verdict.
 //!
-//! Every sample counts alike (`identify --estimator plain`), as in the paper: nothing is wild here, and what the robust
-//! estimator would take for it is the servo of the slow first joint. The plant is the leg file `paper-chain`: links 2 and 3 are the real values of the paper's Table V. Rotors and friction
-//! are the leg file's; the paper's tables list neither.
+//! Every sample has the same weight (`identify --estimator plain`), as in the paper. The data have
+//! no outliers; the robust estimator would reject the servo motion of the slow first joint.
+//!
+//! The plant is the leg file `paper-chain`: links 2 and 3 are the real values of the paper's Table
+//! V. Rotors and friction are the leg file's; the paper's tables list neither.
 
 use std::time::Instant;
 
@@ -34,7 +37,7 @@ use crate::tool::simulate::{Driven, SimulationOptions, drive};
 
 /// Joints of the chain.
 pub const JOINTS: usize = 3;
-/// Room for its base parameters, of which there are 25.
+/// Capacity for its base parameters, of which there are 25.
 pub const ROOM: usize = 28;
 /// Name of its leg file.
 pub const LEG: &str = "paper-chain";
@@ -43,25 +46,25 @@ pub const NOISE_PERCENT: f64 = 7.0;
 /// Both methods, in the order of all tables.
 pub const PLANS: [Plan; 2] = [Plan::OneTime, Plan::Sequential];
 
-/// The chain as it is simulated and believed: friction has the columns that it has, no curve is looked for.
+/// The chain as plant and as model: friction without a Stribeck curve, and none is searched for.
 pub fn leg() -> Result<LegFile, ToolError> {
     let mut leg = LegFile::load(LEG)?;
     leg.joints.iter_mut().for_each(|joint| joint.stribeck_model = Switch::Off);
     Ok(leg)
 }
 
-/// One run.
+/// Options of one run.
 #[derive(Clone, Copy, Debug)]
 pub struct ChainOptions {
-    /// Of noise and swarm.
+    /// Seed of noise and swarm.
     pub seed: u64,
-    /// As [`NOISE_PERCENT`].
+    /// Noise as in [`NOISE_PERCENT`].
     pub noise_percent: f64,
     /// One-time or sequential.
     pub plan: Plan,
-    /// Of the exciting motion.
+    /// Cycles of the exciting motion.
     pub cycles: u32,
-    /// Whether curves are kept.
+    /// Whether curves are recorded.
     pub with_series: bool,
 }
 
@@ -73,59 +76,59 @@ impl ChainOptions {
     }
 }
 
-/// What a run left behind.
+/// Results of a run.
 pub struct ChainRun {
-    /// As `identify` has it; its first validation motion is the paper's.
+    /// Report as from `identify`; its first validation motion is the paper's.
     pub report: RunReport,
-    /// Base parameters of the result.
+    /// Identified base parameters.
     pub values: [f32; ROOM],
-    /// Those of least squares over all rows at once, every joint's alike whatever its noise.
+    /// Least squares over all rows at once, with the same weight for every joint whatever its noise.
     pub unweighted: [f32; ROOM],
-    /// Of the joints' anatomical angles and torques against the model's, 1 or -1.
+    /// Sign of the joints' anatomical angles and torques relative to the model's, 1 or -1.
     pub direction: [i64; JOINTS],
     /// Terms of the base parameters.
     pub model: RowModel<f32, JOINTS, ROOM>,
     /// The verification motion.
     pub verification: Verification,
-    /// Curves; empty unless asked for.
+    /// Curves; empty unless requested.
     pub series: Series,
 }
 
-/// One pass along the verification motion.
+/// One pass over the verification motion.
 pub struct Verification {
     /// Rows through the filter of the identification, with the noise-free torque.
     pub noise_free: Vec<FilteredRows<f32, JOINTS, ROOM>>,
-    /// The same with the measured torque, as a factor.
+    /// Rows with the measured torque, as a factor.
     measured: Record<f32, JOINTS, ROOM>,
-    /// Measured torque of the same rows, N m.
+    /// Measured torque of these rows, N m.
     pub filtered_nm: Vec<[f32; JOINTS]>,
-    /// Every sample with its unfiltered measured torque.
+    /// All samples with their unfiltered measured torque.
     samples: Samples,
 }
 
-/// Motion and torque, sample by sample.
+/// Motion and torque of each sample.
 type Samples = Vec<Smoothed<f32, JOINTS>>;
 
-/// How well one joint's torque is predicted.
+/// Prediction error of one joint's torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fit {
-    /// Mean absolute noise-free torque, N m: what all percentages are of.
+    /// Mean absolute noise-free torque, N m; all percentages refer to it.
     pub mean_absolute_nm: f64,
     /// Equation (33) against the noise-free torque, N m.
     pub rms_nm: f64,
-    /// The same in percent.
+    /// Equation (33) against the noise-free torque, percent.
     pub percent_of_truth: f64,
-    /// Against the measured torque through the same filter, percent.
+    /// Error against the measured torque behind the same filter, percent.
     pub percent_filtered: f64,
-    /// Against every measured sample as it was logged, percent.
+    /// Error against every measured sample as logged, percent.
     pub percent_of_samples: f64,
-    /// Share of the rows left out because the joint stood still.
+    /// Share of the rows excluded because the joint stood still.
     pub still_share: f64,
 }
 
 impl Verification {
-    /// Torque by these base parameters against what was there, Equation (33); rows in which the joint stands still are left
-    /// out, for friction at rest is whatever it need be.
+    /// Torque predicted by these base parameters against the actual one, Equation (33). Rows in
+    /// which the joint stands still are excluded: friction at rest is undetermined.
     #[must_use]
     pub fn fit(&self, model: &RowModel<f32, JOINTS, ROOM>, values: &[f32; ROOM]) -> [Fit; JOINTS] {
         core::array::from_fn(|joint| {
@@ -153,7 +156,7 @@ impl Verification {
         })
     }
 
-    /// Root mean square over the samples in which the joint moves.
+    /// Root mean square error over the samples in which the joint moves.
     fn sample_error(&self, model: &RowModel<f32, JOINTS, ROOM>, joint: usize, values: &[f32; ROOM]) -> f64 {
         let moving =
             self.samples.iter().filter(|sample| f64::from(sample.velocity[joint].abs()) >= STILL_SPEED);
@@ -166,13 +169,14 @@ impl Verification {
     }
 }
 
-/// A row of the regressor times base parameters, N m.
+/// Torque of a regressor row with these base parameters, N m.
 #[must_use]
 pub fn predicted(row: &[f32; ROOM], values: &[f32; ROOM]) -> f64 {
     row.iter().zip(values).map(|(&element, &value)| f64::from(element) * f64::from(value)).sum()
 }
 
-/// Identifies `plant` with a firmware that believes in `believed`; they differ where a load is not known to it.
+/// Identifies `plant` with a firmware configured for `believed`; the two differ if a load is
+/// unknown to the firmware.
 pub fn run(plant: &LegFile, believed: &LegFile, options: &ChainOptions) -> Result<ChainRun, ToolError> {
     let started = Instant::now();
     let simulation = SimulationOptions {
@@ -215,13 +219,13 @@ pub fn run(plant: &LegFile, believed: &LegFile, options: &ChainOptions) -> Resul
     })
 }
 
-/// The same motion for so many cycles.
+/// Repeats a motion for a number of cycles.
 fn repeated(motion: &Periodic<JOINTS>, cycles: u32) -> Result<Periodic<JOINTS>, MotionError> {
     let blend = Second(motion.blend_ticks() as f32 / SERVO_RATE_HZ as f32);
     Periodic::new(*motion.curve(), blend, cycles, SERVO_RATE_HZ)
 }
 
-/// Least squares with one weight for all joints.
+/// Least squares with the same weight for all joints.
 fn unweighted(record: &Record<f32, JOINTS, ROOM>, rank: usize) -> [f32; ROOM] {
     let mut all = Factor::<f64, ROOM>::new();
     for factor in &record.factors {
@@ -230,13 +234,13 @@ fn unweighted(record: &Record<f32, JOINTS, ROOM>, rank: usize) -> [f32; ROOM] {
     all.solve(rank).map(|value| value as f32)
 }
 
-/// Puts the paper's motion in the place of the first that is predicted.
+/// Replaces the first validation motion by the paper's.
 fn verify_on(context: &mut Context<JOINTS, ROOM>, motion: Periodic<JOINTS>) {
     context.motions.validation[0] = motion;
     context.configuration.validation[0] = motion;
 }
 
-/// Motion and torque of every sample that has whole windows about it, and the filtered torque of the rows.
+/// Motion and torque of every sample with complete windows, and the filtered torque of the rows.
 fn smoothed(
     model: &RowModel<f32, JOINTS, ROOM>,
     bandwidth_hz: f32,
@@ -257,7 +261,7 @@ fn smoothed(
     Ok((instants, filtered))
 }
 
-/// Many runs in parallel, in the order of their options.
+/// Runs many cases in parallel; results are in the order of `options`.
 pub fn run_all<O: Sync, R: Send>(
     what: &str,
     options: &[O],
@@ -278,7 +282,7 @@ pub fn run_all<O: Sync, R: Send>(
     runs
 }
 
-/// The middle of the sorted list, the mean of its two middle ones where their number is even.
+/// Median: the mean of the two middle values if their number is even.
 #[must_use]
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<_> = values.into_iter().collect();

@@ -1,21 +1,28 @@
-//! The searches of Table IV: those of the firmware, and those of two other crates as they come.
+//! Searches of Table IV: the firmware's own, and those of two other crates in their default form.
 //!
 //! | name | search | constants | iterations | evaluations at most |
 //! | --- | --- | --- | --- | --- |
 //! | `pso` | particle swarm, 20 particles | the paper's: w 0.8, c 1.4 | one move of all | E |
-//! | `pso-constriction` | the same | w 0.7298, c 1.496 (Clerc, Kennedy, 2002) | one move of all | E |
+//! | `pso-constriction` | as `pso` | w 0.7298, c 1.496 (Clerc, Kennedy, 2002) | one move of all | E |
 //! | `bas` | beetle antennae search | the paper's | one step | 3,001: the paper's 1,000 iterations |
-//! | `bso-paper` | beetle swarm as printed, (29) corrected, 20 beetles | the paper's | one move of all | 60,020: 1,000 iterations |
-//! | `bso` | the default beetle swarm, 20 beetles | its own | rounds of its best, 20 evaluations and more | 1,000 iterations |
+//! | `bso-paper` | beetle swarm as printed, 20 beetles | the paper's | one move of all | 60,020 |
+//! | `bso` | the default beetle swarm, 20 beetles | its own | rounds of its best | 1,000 iterations |
 //! | `cma-es` | crate `cmaes`, population 4 + 3 ln D, active | its own | one generation | E |
-//! | `cma-es-20` | the same with a population of 20 | its own | one generation | E |
-//! | `cma-es-restarts` | `cma-es`, begun anew with twice the population where it ends (Auger, Hansen, 2005) | its own | one generation | E |
+//! | `cma-es-20` | as `cma-es`, population 20 | its own | one generation | E |
+//! | `cma-es-restarts` | `cma-es` with restarts | its own | one generation | E |
 //! | `pso-argmin` | crate `argmin`, 20 particles | its own: those of SPSO 2011 | one move of all | E |
 //!
-//! E = 20 + 1,000 (20 + 2 min(20, D)) is what 1,000 usual iterations of the default swarm evaluate at D = 2 (24,020), 10 and 30
-//! (60,020), the dimensions of Table IV; leaps and scattering cost more, up to 6 % at D = 2 where it stands still. All start in the same box: swarms scatter uniformly, CMA-ES draws its centre uniformly and begins
-//! with a sigma of 0.3 of the box's width. Outside of the box CMA-ES is given the value at the nearest point of it and
-//! the squared distance to it in the coordinates' unit on top; swarms stay inside by themselves.
+//! Equation (29) of `bso-paper` is corrected; its 60,020 evaluations are 1,000 iterations. A round
+//! of `bso` takes at least 20 evaluations. `cma-es-restarts` restarts with twice the population
+//! where `cma-es` ends (Auger, Hansen, 2005).
+//!
+//! E = 20 + 1,000 (20 + 2 min(20, D)) is the number of evaluations of 1,000 usual iterations of the
+//! default swarm. In the dimensions of Table IV these are 24,020 (D = 2) and 60,020 (D = 10 and
+//! 30). Leaps and scattering cost more, up to 6 % at D = 2 where the swarm stagnates.
+//!
+//! All searches start in the same box. Swarms scatter uniformly; CMA-ES draws its centre uniformly and
+//! begins with a sigma of 0.3 of the box's width. Outside the box CMA-ES receives the value at the nearest
+//! point of it, plus the squared distance to it in the coordinates' unit. Swarms stay inside by themselves.
 //! A first scattered swarm is iteration 0; CMA-ES has none, its first generation is iteration 1.
 
 use argmin::core::{CostFunction, Error, Executor, PopulationState};
@@ -37,9 +44,9 @@ use crate::tool::error::ToolError;
 pub const SWARM: u32 = 20;
 /// Iterations of the default swarm, and of the paper's searches.
 pub const ITERATIONS: u32 = 1_000;
-/// First standard deviation of CMA-ES, share of the box's width.
+/// Initial standard deviation of CMA-ES, share of the box's width.
 const FIRST_SIGMA: f64 = 0.3;
-/// No population grows beyond: more than any budget here.
+/// Limit of a population: more than any budget here.
 const LARGEST_POPULATION: usize = 1 << 16;
 
 /// A search of Table IV.
@@ -49,7 +56,7 @@ pub enum Algorithm {
     Pso,
     /// Particle swarm, constriction constants.
     PsoConstriction,
-    /// Particle swarm of another crate.
+    /// Particle swarm of the crate `argmin`.
     PsoArgmin,
     /// Beetle antennae search.
     Bas,
@@ -66,7 +73,7 @@ pub enum Algorithm {
 }
 
 impl Algorithm {
-    /// In the order of the report.
+    /// All searches, in the order of the report.
     pub const ALL: [Self; 9] = [
         Self::Pso,
         Self::PsoConstriction,
@@ -95,13 +102,13 @@ impl Algorithm {
         }
     }
 
-    /// Whether it is CMA-ES.
+    /// Whether the search is CMA-ES.
     #[must_use]
     pub const fn is_cma_es(self) -> bool {
         matches!(self, Self::CmaEs | Self::CmaEsTwenty | Self::CmaEsRestarts)
     }
 
-    /// Whether it is a particle swarm.
+    /// Whether the search is a particle swarm.
     #[must_use]
     pub const fn is_pso(self) -> bool {
         matches!(self, Self::Pso | Self::PsoConstriction | Self::PsoArgmin)
@@ -114,7 +121,7 @@ impl Serialize for Algorithm {
     }
 }
 
-/// What 1,000 usual iterations of the default swarm evaluate, in the dimensions of Table IV.
+/// Evaluations of 1,000 usual iterations of the default swarm, in the dimensions of Table IV.
 #[must_use]
 pub fn budget(dimension: usize) -> u32 {
     SWARM + ITERATIONS * (SWARM + 2 * SWARM.min(dimension as u32))
@@ -179,7 +186,7 @@ pub fn run(
     }
 }
 
-/// One evaluation at a time; `first` of them belong to iteration 0.
+/// Drives a search by single evaluations; the first `first` belong to iteration 0.
 fn follow<T: Real>(
     mut search: impl Search<T>,
     recorder: &Recorder<'_, T, impl Objective<T>>,
@@ -195,7 +202,7 @@ fn follow<T: Real>(
     }
 }
 
-/// Generation after generation; where CMA-ES ends by its own criteria, the run is over or begins anew.
+/// Drives CMA-ES by generations; when its own criteria end it, the run ends or restarts.
 fn cma_es(
     recorder: &Recorder<'_, f64, impl Objective<f64>>,
     mut population: usize,
@@ -232,7 +239,7 @@ fn cma_es(
     }
 }
 
-/// The value at the nearest point of the box, and the squared distance to it.
+/// Value at the nearest point of the box plus the squared distance to it.
 fn inside(objective: &impl Objective<f64>, bounds: &[(f64, f64)], position: &[f64]) -> f64 {
     let nearest: Vec<f64> =
         position.iter().zip(bounds).map(|(x, (low, high))| x.clamp(*low, *high)).collect();
@@ -240,7 +247,7 @@ fn inside(objective: &impl Objective<f64>, bounds: &[(f64, f64)], position: &[f6
     objective.evaluate(&nearest) + distance
 }
 
-/// What `argmin` minimises.
+/// Objective for `argmin`.
 struct Cost<'r, 'o, O>(&'r Recorder<'o, f64, O>);
 
 impl<O: Objective<f64>> CostFunction for Cost<'_, '_, O> {

@@ -1,31 +1,35 @@
-//! How many iterations the beetle swarm needs on identification problems.
+//! Iterations of the beetle swarm on identification problems.
 //!
-//! Every run has a record of its own: one of several exciting motions, a noise of its own, the whole firmware up to the
-//! moment at which the search would begin. Then the default swarm searches sets of unknowns from a cold start, in single
-//! precision as on the device: single parameters, base parameters, log-Cholesky coordinates, all and those that count.
+//! Every run has its own record: one of several exciting motions, its own noise, and the whole
+//! firmware up to the start of the search. Then the default swarm searches sets of unknowns from a
+//! cold start, in single precision as on the device. The sets are single parameters, base
+//! parameters and log-Cholesky coordinates, the latter complete and reduced.
 //!
 //! ```text
-//! reached where   J / J_opt - 1 <= 1e-3,    J = J_LS + (J(p) - J_LS), chi-square units of the data alone
-//! over the rows       J_LS = sum of squares of the filtered rows, about m S for each: what identification minimises
-//! over the samples    J_LS = number of logged samples: what the paper minimises; the same J(p) - J_LS
+//! reached where   J / J_opt - 1 <= 1e-3,  J = J_LS + (J(p) - J_LS), chi-square units of the data alone
+//! over the rows     J_LS = sum of squares of the filtered rows, about m S each: identification minimises it
+//! over the samples  J_LS = number of logged samples: the paper minimises it; the same J(p) - J_LS
 //! ```
 //!
-//! Both are told because the share means nothing by itself: filtering takes noise away and keeps what the parameters do.
+//! Both are reported because the share alone means nothing: filtering removes noise and leaves the
+//! parameters' effect.
 //!
 //! | row | unknowns | box | J_opt, in double precision |
 //! | --- | --- | --- | --- |
-//! | raw | every parameter that torque sees | what the prior allows each | active set over the single parameters |
-//! | base | base parameters | sums of that | active set |
-//! | log-Cholesky | 10 of every link, logarithms of IA, FC, FV, and OFF | section 7 of the identification | barriers of 1e-8 |
-//! | seen | those without the nine that do nothing of a link along gravity, see [`super::seen_links`] | the same | the same |
+//! | raw | every parameter with an effect on torque | prior's range | active set over single parameters |
+//! | base | base parameters | sums of those ranges | active set |
+//! | log-Cholesky | 10 per link, logs of IA, FC, FV, and OFF | identification, section 7 | barriers of 1e-8 |
+//! | seen | without the nine of a link along gravity, see [`super::seen_links`] | as above | as above |
 //!
-//! `chain` and `leg` have links and friction, as the paper's equation (6); `whole` adds what a real drive has, a rotor and an
-//! offset for each joint. `leg-28` is the whole leg in log-Cholesky coordinates.
+//! `chain` and `leg` have links and friction, as the paper's Equation (6); `whole` adds a rotor and
+//! an offset per joint, as a real drive has. `leg-28` is the whole leg in log-Cholesky coordinates.
 //!
-//! J and J_opt are computed in double precision whatever the swarm sees. Single parameters have flat directions: a
-//! millionth of a chi-square unit for each range of the box makes their optimum unique and is not counted.
+//! J and J_opt are computed in double precision, whatever the swarm's precision. Single parameters
+//! have flat directions. A penalty of a millionth of a chi-square unit per range of the box makes
+//! their optimum unique; the result excludes it.
 //!
-//! Limits: 1e-3 of J_LS is some tenths of a chi-square unit at these durations and would be another number at others.
+//! Limits: 1e-3 of J_LS is a few tenths of a chi-square unit at these durations, and another number
+//! at others.
 
 use rayon::prelude::*;
 use scarab::ident::Record;
@@ -46,26 +50,26 @@ use crate::tool::report::Number;
 use crate::tool::setup::SetupError;
 use crate::tool::simulate::SimulationOptions;
 
-/// Runs of each row unless asked for otherwise.
+/// Runs per row by default.
 const RUNS: u64 = 100;
 /// Exciting motions, each the best of some random ones.
 const MOTIONS: u64 = 5;
 const CANDIDATES: u64 = 40;
 const MOTION_SEED: u64 = 3_000_000;
 const PERIOD: Second = Second(10.0);
-/// The longest exciting motion with its way there, s.
+/// Duration of the longest exciting motion including its approach, s.
 const LONGEST_RUN_S: f64 = 120.0;
 
-/// What it took, over all runs.
+/// Iterations and evaluations over all runs.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Spent {
-    /// Reached, 0..1.
+    /// Share of runs that reached the goal, 0..1.
     pub success_rate: f64,
-    /// Over all runs, failures as infinite; null where that is infinite.
+    /// Median over all runs, failures counted as infinite; null if infinite.
     pub iterations_median: Number,
-    /// Likewise.
+    /// 95th percentile; failures and null as above.
     pub iterations_p95: Number,
-    /// Likewise.
+    /// Median of the evaluations; failures and null as above.
     pub evaluations_median: Number,
 }
 
@@ -90,41 +94,41 @@ impl Spent {
 pub struct ConvergenceRow {
     /// `chain-raw`, `leg-whole-base`, ...
     pub problem: String,
-    /// Unknowns.
+    /// Number of unknowns.
     pub dimension: usize,
     /// Runs.
     pub runs: u64,
-    /// By the cost over the filtered rows.
+    /// Results for the cost over the filtered rows.
     #[serde(flatten)]
     pub rows: Spent,
-    /// By the cost over the logged samples.
+    /// Results for the cost over the logged samples.
     pub over_samples: Spent,
-    /// Least J - J_opt of any run, chi-square units: not below zero, or the optimum were none.
+    /// Least J - J_opt of any run, chi-square units; a negative value would disprove the optimum.
     pub lowest_chi2: Number,
-    /// What was set out to be reached in 95 % of the runs.
+    /// Goal for the iterations of 95 % of the runs.
     pub goal_iterations_p95: u32,
 }
 
 /// All rows.
 #[derive(Clone, Debug, Serialize)]
 pub struct ConvergenceReport {
-    /// Exciting motions.
+    /// Number of exciting motions.
     pub motions: u64,
-    /// J / J_opt - 1.
+    /// Tolerance on J / J_opt - 1.
     pub tolerance: f64,
-    /// Of the swarm.
+    /// Precision of the swarm.
     pub precision: &'static str,
-    /// Leg by leg.
+    /// Rows, leg by leg.
     pub rows: Vec<ConvergenceRow>,
 }
 
-/// Runs everything and tells it.
+/// Runs the experiment and formats its section.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let report = report(options.seeds.unwrap_or(RUNS))?;
     Section::of(Part::Convergence, "convergence", &report, words(&report), Vec::new())
 }
 
-/// The runs and what they say.
+/// Runs the experiment.
 pub fn report(runs: u64) -> Result<ConvergenceReport, ToolError> {
     let (chain, leg) = (LegFile::load(LEG)?, LegFile::load(DEFAULT_LEG)?);
     let plain = [("raw", 75), ("base", 75), ("log-cholesky", 75), ("log-cholesky-seen", 75)];
@@ -138,7 +142,7 @@ pub fn report(runs: u64) -> Result<ConvergenceReport, ToolError> {
     Ok(ConvergenceReport { motions: MOTIONS, tolerance: SHARE, precision: "f32", rows })
 }
 
-/// The leg without rotors and offsets, in the plant and in what is estimated: what the paper has.
+/// The leg without rotors and offsets, in the plant and in the estimate, as in the paper.
 fn links_and_friction(leg: &LegFile) -> LegFile {
     let mut leg = leg.clone();
     for joint in &mut leg.joints {
@@ -150,7 +154,8 @@ fn links_and_friction(leg: &LegFile) -> LegFile {
     leg
 }
 
-/// Sets of unknowns, each with its name and what 95 % of the runs are to reach; the last where the leg has such links.
+/// Sets of unknowns with name and goal for 95 % of the runs; the last only for legs with a link
+/// along gravity.
 fn leg_rows<const N: usize, const B: usize>(
     leg: &LegFile,
     name: &str,
@@ -183,7 +188,7 @@ fn leg_rows<const N: usize, const B: usize>(
     Ok((0..4).filter_map(row).collect())
 }
 
-/// What 95 of 100 do not exceed.
+/// Value that 95 % do not exceed.
 fn ninety_five(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(((0.95 * values.len() as f64).ceil() as usize).saturating_sub(1)).copied()
@@ -200,7 +205,7 @@ fn motions<const N: usize, const B: usize>(leg: &LegFile) -> Result<Vec<Periodic
     (0..MOTIONS).into_par_iter().map(best).collect()
 }
 
-/// The leg driven along a motion: what the search would begin with.
+/// Drives the leg along a motion and returns the record from which the search begins.
 fn recorded<const N: usize, const B: usize>(
     leg: &LegFile,
     seed: u64,

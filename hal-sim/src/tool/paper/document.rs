@@ -1,7 +1,8 @@
-//! Sections put into a document, each between its markers.
+//! Writes sections into a document, each between its markers.
 //!
-//! Why: what a document says was measured cannot go stale while one command writes it. A place begins with a line
-//! `<!-- KIND: NAME -->` and ends with `<!-- end of NAME -->`; what stands between is replaced, all else stays.
+//! Why: measured values in a document stay current because a command writes them. A place begins
+//! with the line `<!-- KIND: NAME -->` and ends with `<!-- end of NAME -->`. The text between is
+//! replaced; all else stays.
 
 use std::path::Path;
 
@@ -23,7 +24,7 @@ pub fn replace(path: &Path, kind: &str, name: &str, content: &str) -> Result<(),
     files::write(path, text)
 }
 
-/// Refuses a document that lacks the place to be replaced.
+/// Returns an error if the document lacks the place.
 pub fn check(path: &Path, kind: &str, name: &str) -> Result<(), ToolError> {
     replaced(&read(path)?, kind, name, "").map(drop).ok_or_else(|| no_place(path, kind, name))
 }
@@ -32,7 +33,6 @@ fn no_place(path: &Path, kind: &str, name: &str) -> ToolError {
     ToolError::input(format!("{}: has no `<!-- {kind}: {name} -->` with its end", path.display()))
 }
 
-/// A document's text.
 fn read(path: &Path) -> Result<String, ToolError> {
     std::fs::read_to_string(path)
         .map_err(|error| ToolError::input(format!("{}: cannot be read: {error}", path.display())))

@@ -1,9 +1,10 @@
-//! Figure 5: how the swarms walk on f1 to f4 in the plane.
+//! Figure 5: paths of the swarms on f1 to f4 in the plane.
 //!
-//! The paper shows, for each function, the trace of the best beetle, its path over the contour map, and convergence
-//! curves over iterations. Here: the same for the swarm as printed and for the default one, and the convergence over
-//! evaluations beside, since iterations of different searches cost differently. Paths and traces are those of the first
-//! run; curves are the median of all runs with their middle half. Drawing: `figures::swarm`.
+//! For each function the paper shows the trace of the best beetle, its path over the contour map,
+//! and convergence over iterations. Reproduced here for the swarm as printed and for the default
+//! one. Convergence over evaluations is added, since iterations of different searches cost
+//! differently. Paths and traces are those of the first run; curves are the median of all runs with
+//! the interquartile range. Drawing: `figures::swarm`.
 
 use scarab::swarm::{
     Bas, BasSettings, Bso, BsoSettings, Pso, PsoSettings, Search, SwarmError, TestFunction, TestProblem,
@@ -16,11 +17,11 @@ use super::{PaperOptions, Part, Section, table_three};
 use crate::tool::error::ToolError;
 use crate::tool::figures::swarm::{self, Band, Convergence, Walk};
 
-/// Runs of each search unless asked for otherwise.
+/// Runs of each search by default.
 const RUNS: u64 = 101;
-/// Iterations that are shown.
+/// Iterations drawn.
 const ITERATIONS: usize = 60;
-/// Evaluations that are shown.
+/// Evaluations drawn.
 const EVALUATIONS: usize = 1_500;
 
 const FUNCTIONS: [(&str, &str, TestFunction); 4] = [
@@ -32,17 +33,17 @@ const FUNCTIONS: [(&str, &str, TestFunction); 4] = [
 
 const SEARCHES: [Algorithm; 4] = [Algorithm::Pso, Algorithm::Bas, Algorithm::BsoPaper, Algorithm::Bso];
 
-/// What one run did.
+/// Course of one run.
 struct Way {
-    /// Best position after every iteration, the scattered swarm's first.
+    /// Best position after every iteration, beginning with the scattered swarm's.
     places: Vec<[f64; 2]>,
-    /// f - f* there.
+    /// f - f* at these positions.
     by_iteration: Vec<f64>,
     /// f - f* of the best after every evaluation.
     by_evaluation: Vec<f64>,
 }
 
-/// The part: four figures.
+/// Draws the four figures.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let runs = options.seeds.unwrap_or(RUNS);
     let mut figures = Vec::new();
@@ -95,7 +96,7 @@ fn way(algorithm: Algorithm, problem: &TestProblem, seed: ReportSeed) -> Result<
     })
 }
 
-/// Follows a search by single evaluations, the first so many of which are iteration 0.
+/// Drives a search by single evaluations; the first `first` belong to iteration 0.
 fn walk(mut search: impl Search<f64>, problem: &TestProblem, first: usize) -> Way {
     let mut way = Way { places: Vec::new(), by_iteration: Vec::new(), by_evaluation: Vec::new() };
     while way.by_iteration.len() <= ITERATIONS || way.by_evaluation.len() < EVALUATIONS {

@@ -1,11 +1,12 @@
-//! Figure 7 and Equation (33): the chain's torque on the verification motion, predicted and real, for noise of 0 to 15 %.
+//! Figure 7 and Equation (33): predicted and real torque of the chain on the verification motion,
+//! for noise of 0 to 15 %.
 //!
-//! What is compared: the base parameters of both methods, each times the rows of the verification motion, with the torque
-//! that the plant's motors made. Against the noise-free torque the error is that of the parameters; against the measured
-//! one it holds the noise, which no prediction knows.
+//! The base parameters of both methods, multiplied by the rows of the verification motion, are compared
+//! with the torque of the plant's motors. The error against the noise-free torque is that of the
+//! parameters. The error against the measured torque includes noise, which cannot be predicted.
 //!
-//! Limits: it is another plant than the paper's (its geometry, motion of joint 1, noise and samples are not printed), so
-//! its percentages stand beside ours, not against them.
+//! Limits: the plant differs from the paper's, whose geometry, motion of joint 1, noise and samples
+//! are not printed. The paper's percentages are therefore listed for information only.
 
 use scarab::ident::Plan;
 use serde::Serialize;
@@ -24,20 +25,20 @@ use crate::tool::figures::chain::{Curve, JointTorque, Level, drawn};
 use crate::tool::motions::EXCITATION_CYCLES;
 use crate::tool::report::Number;
 
-/// Runs of each method at each level of noise unless asked for otherwise.
+/// Runs per method and noise level by default.
 const RUNS: u64 = 10;
 /// Levels of noise, percent.
 const LEVELS: [f64; 7] = [0.0, 1.0, 3.0, 5.0, NOISE_PERCENT, 10.0, 15.0];
-/// What the prediction has to reach against the noise-free torque at [`NOISE_PERCENT`], percent.
+/// Goal for the prediction against the noise-free torque at [`NOISE_PERCENT`], percent.
 pub const GOAL_PERCENT: f64 = 2.0;
 
-/// All joints' rows alike, whatever their noise.
+/// Method with the same weight for all joints' rows, whatever their noise.
 const UNWEIGHTED: &str = "least squares, unweighted";
-/// Sequential, from a longer motion.
+/// Sequential method on a longer motion.
 const LONG: &str = "sequential, 60 s";
 const LONG_CYCLES: u32 = 6;
 
-/// What is run.
+/// Configuration of a set of runs.
 #[derive(Clone, Copy)]
 struct Case {
     noise_percent: f64,
@@ -52,56 +53,57 @@ impl Case {
     }
 }
 
-/// One joint, one method, one level of noise, over all runs.
+/// One joint, method and noise level over all runs.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct FitLine {
-    /// Of the torque in the identification and on the verification motion.
+    /// Noise of the torque in the identification and on the verification motion.
     pub noise_percent: f64,
-    /// `one-time` or `sequential`, by the swarm; at 7 % also `least squares, unweighted` and `sequential, 60 s`.
+    /// Plan `one-time` or `sequential`, by the swarm; at 7 % also `least squares, unweighted` and
+    /// `sequential, 60 s`.
     pub method: &'static str,
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
-    /// Noise-free, on the motion: what percentages are of.
+    /// Mean absolute noise-free torque on the motion; percentages refer to it.
     pub mean_absolute_nm: Number,
     /// Equation (33) against the noise-free torque, median.
     pub rms_nm: Number,
-    /// The same, percent, median.
+    /// Equation (33) against the noise-free torque, percent, median.
     pub percent_of_truth: Number,
-    /// Of the worst run.
+    /// Equation (33) in percent, worst run.
     pub percent_of_truth_worst: Number,
     /// Against the measured torque through the same filter, median.
     pub percent_filtered: Number,
     /// Against every measured sample, median.
     pub percent_of_samples: Number,
-    /// Left out because the joint stood still.
+    /// Share of rows excluded because the joint stood still.
     pub still_share: Number,
 }
 
-/// What the paper prints of a joint.
+/// Torque error of a joint as printed in the paper.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct PaperFit {
-    /// N m.
+    /// Root mean square error, N m.
     pub rms_nm: f64,
-    /// Of mean absolute torque.
+    /// Error in percent of mean absolute torque.
     pub percent: f64,
 }
 
-/// The whole verification.
+/// Report of the verification.
 #[derive(Clone, Debug, Serialize)]
 pub struct VerificationReport {
     /// Name of the leg file.
     pub leg: &'static str,
-    /// Of each method at each level.
+    /// Runs of each method at each level.
     pub runs: u64,
     /// Mean absolute torque of the links alone on (31) and (32) with joint 1 held still, N m.
     pub links_alone_nm: [f64; JOINTS],
-    /// Proximal first.
+    /// The paper's errors, proximal joint first.
     pub paper: [PaperFit; JOINTS],
-    /// Level by level, method by method, joint by joint.
+    /// Results by level, method and joint.
     pub lines: Vec<FitLine>,
 }
 
-/// Runs everything, draws and tells it.
+/// Runs the experiment, draws it and formats its section.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let report = report(options.seeds.unwrap_or(RUNS), &LEVELS)?;
     let leg = chain::leg()?;
@@ -120,7 +122,7 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     Section::of(Part::FigureSeven, "verification", &report, words(&report), vec![figure])
 }
 
-/// The runs and what they say.
+/// Runs the experiment.
 pub fn report(runs: u64, levels: &[f64]) -> Result<VerificationReport, ToolError> {
     let leg = chain::leg()?;
     let mut cases: Vec<Case> = Vec::new();
@@ -183,7 +185,7 @@ fn level(line: &FitLine) -> Option<Level> {
     })
 }
 
-/// One run of both methods over time.
+/// Curves of one run of each method over time.
 fn curves<'n>(names: &[&'n str], one_time: &ChainRun, sequential: &ChainRun) -> Vec<JointTorque<'n>> {
     let Some(motion) = one_time.series.motions.iter().find(|motion| motion.name == "gait-6.5") else {
         return Vec::new();
@@ -191,7 +193,7 @@ fn curves<'n>(names: &[&'n str], one_time: &ChainRun, sequential: &ChainRun) -> 
     let joints = names.iter().zip(&motion.joints).enumerate();
     joints
         .map(|(joint, (&name, curves))| {
-            // The sign of the anatomical torque, which the series has and the rows have not.
+            // Sign of the anatomical torque: the series is anatomical, the rows are not.
             let sign = |run: &ChainRun| if run.direction[joint] < 0 { -1.0 } else { 1.0 };
             let of = |run: &ChainRun, values: &dyn Fn(&ChainRun, usize) -> f64| -> Vec<f64> {
                 let count = run.verification.noise_free.len().min(motion.time_s.len());
@@ -222,7 +224,7 @@ fn curves<'n>(names: &[&'n str], one_time: &ChainRun, sequential: &ChainRun) -> 
         .collect()
 }
 
-/// By one of both methods as they are.
+/// Whether the line is from one of the two plain methods.
 fn is_plain(line: &FitLine) -> bool {
     PLANS.iter().any(|&plan| plan_name(plan) == line.method)
 }

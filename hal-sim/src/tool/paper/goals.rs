@@ -1,15 +1,15 @@
-//! What the default swarm is to reach, held against the rows of Table IV in both precisions.
+//! Goals of the default swarm for the rows of Table IV, in both precisions.
 
 use super::contenders::Algorithm;
 use super::problems::Reading;
 use super::statistics::Row;
 
-/// Iterations to 0.1, with every run successful.
+/// Limits on the iterations to 0.1, with every run successful.
 #[derive(Clone, Copy, Debug)]
 pub struct Goal {
-    /// Name of the function, as intended.
+    /// Name of the function, intended reading.
     pub function: &'static str,
-    /// Coordinates.
+    /// Number of coordinates.
     pub dimension: usize,
     /// Most iterations of the median run.
     pub median: u32,
@@ -33,7 +33,7 @@ pub const GOALS: [Goal; 7] = [
 ];
 
 impl Goal {
-    /// The default swarm's row in a precision.
+    /// Row of the default swarm in a precision.
     pub fn row<'r>(&self, rows: &'r [Row], precision: &str) -> Option<&'r Row> {
         rows.iter().find(|row| {
             (row.function, row.dimension) == (self.function, self.dimension)
@@ -44,7 +44,7 @@ impl Goal {
         })
     }
 
-    /// Whether the row reaches it.
+    /// Whether the row reaches the goal.
     #[must_use]
     pub fn is_reached_by(&self, row: &Row) -> bool {
         let within = |count: Option<u32>, most: u32| count.is_some_and(|count| count <= most);

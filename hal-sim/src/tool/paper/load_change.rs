@@ -1,16 +1,16 @@
-//! The load changes: the experiment that the paper argues from and does not show.
+//! Load-change experiment: the paper argues from it but does not show it.
 //!
-//! The paper says that combined values "are susceptible to load changes" and have to be identified again, single values
-//! not. So the chain is identified, a mass is fixed to its third link that the firmware does not know of, and it is
-//! identified again; what was found to change is held against what did change.
+//! The paper says that combined values "are susceptible to load changes" and have to be identified again,
+//! single values not. Here the chain is identified, a mass unknown to the firmware is fixed to its third
+//! link, and the chain is identified again. The identified changes are compared with the true ones.
 //!
 //! ```text
-//! base' = base + K p_load            K: terms of the base parameters, p_load: the load's ten parameters
-//! M_load = (HX2R' - HX2R) / a        a: length of the thigh; the other links' own parts cancel
+//! base' = base + K p_load       K: terms of the base parameters, p_load: the load's ten parameters
+//! M_load = (HX2R' - HX2R) / a   a: length of the thigh; the other links' own parts cancel
 //! ```
 //!
-//! So a load that is known is added to the combinations without moving at all, and of one that is not the mass follows
-//! from their difference: differences of combinations tell what the combinations themselves do not.
+//! A known load can thus be added to the combinations without any motion. The mass of an unknown
+//! load follows from their difference, although the combinations themselves do not determine it.
 
 use nalgebra::Vector3;
 use scarab::ident::Plan;
@@ -27,85 +27,85 @@ use crate::tool::leg_file::{LegFile, LinkParameters};
 use crate::tool::report::{BaseReport, Number};
 use crate::tool::setup::{self, SetupError};
 
-/// Pairs of runs unless asked for otherwise.
+/// Pairs of runs by default.
 const RUNS: u64 = 20;
-/// Noise of the second identification is not that of the first.
+/// Offset of the second identification's noise seed.
 const SECOND_STREAM: u64 = 1_000_000;
-/// Changes beyond are taken for real, standard deviations.
+/// Changes above this limit count as detected, standard deviations.
 const TOLD: f64 = 3.0;
 
-/// The load: on the last link near the foot, beside the plane of the leg.
+/// Load on the last link near the foot, beside the plane of the leg.
 #[must_use]
 pub fn load() -> Payload<f64> {
     Payload { joint: JOINTS - 1, mass: 5.0, place: Vector3::new(0.0, 0.40, 0.05) }
 }
 
-/// One combination before and after.
+/// One combination before and after the load change.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChangeLine {
-    /// As Table VI names it.
+    /// Name as in Table VI.
     pub name: String,
-    /// SI.
+    /// SI unit.
     pub unit: &'static str,
-    /// Before the change.
+    /// True value before the change.
     pub truth: Number,
-    /// Of the truth.
+    /// Change of the true value.
     pub true_change: Number,
-    /// Median.
+    /// Identified change, median.
     pub found_change: Number,
-    /// Of the difference, median.
+    /// Standard deviation of the identified change, median.
     pub sigma: Number,
-    /// Found change over its sigma, median.
+    /// Identified change over its sigma, median.
     pub found_over_sigma: Number,
-    /// Root mean square of (found - true change) over sigma.
+    /// Root mean square of (identified - true change) over sigma.
     pub error_over_sigma: Number,
-    /// Share of the runs in which more than three sigma were found, 0..1.
+    /// Share of the runs in which the change exceeded three sigma, 0..1.
     pub told_share: f64,
 }
 
-/// Torque of the loaded chain on the verification motion.
+/// Torque error of the loaded chain on the verification motion.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct LoadedTorque {
-    /// Whose parameters.
+    /// Name of the parameter set.
     pub parameters: &'static str,
-    /// Of each joint's mean absolute noise-free torque, median.
+    /// Error in percent of each joint's mean absolute noise-free torque, median.
     pub percent_of_truth: [Number; JOINTS],
 }
 
-/// The experiment.
+/// Report of the experiment.
 #[derive(Clone, Debug, Serialize)]
 pub struct LoadReport {
-    /// kg.
+    /// Mass of the load, kg.
     pub load_kg: f64,
-    /// In the third link's frame, m.
+    /// Position in the third link's frame, m.
     pub load_place_m: [f64; 3],
     /// Pairs of runs.
     pub runs: u64,
-    /// Per logged sample.
+    /// Noise per logged sample.
     pub noise_percent: f64,
-    /// Of the 20 parameters of Table V, those whose true values change.
+    /// Parameters of Table V whose true values change.
     pub changed_of_table_v: Vec<&'static str>,
     /// Every base parameter.
     pub lines: Vec<ChangeLine>,
-    /// Mass by the difference of HX2R, kg: median, its sigma.
+    /// Mass from the difference of HX2R, kg: median and sigma.
     pub mass_found_kg: [Number; 2],
-    /// With three sets of parameters.
+    /// Torque errors with three sets of parameters.
     pub torque: Vec<LoadedTorque>,
 }
 
-/// Runs everything and tells it.
+/// Runs the experiment and formats its section.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let report = report(options.seeds.unwrap_or(RUNS))?;
     Section::of(Part::LoadChange, "load_change", &report, words(&report), Vec::new())
 }
 
-/// One chain before and after.
+/// Chain before and after the load change.
 struct Pair {
     before: ChainRun,
     after: ChainRun,
 }
 
-/// The runs and what they say.
+/// Runs the experiment.
 pub fn report(runs: u64) -> Result<LoadReport, ToolError> {
     let leg = chain::leg()?;
     let load = load();
@@ -134,7 +134,7 @@ pub fn report(runs: u64) -> Result<LoadReport, ToolError> {
     })
 }
 
-/// The leg with a mass fixed to a link.
+/// Leg with a mass fixed to a link.
 fn loaded(leg: &LegFile, load: &Payload<f64>) -> Result<LegFile, ToolError> {
     let links = setup::links::<JOINTS>(leg, |joint| joint.truth.as_ref());
     let link = links.and_then(|links| links.get(load.joint).copied());
@@ -158,7 +158,7 @@ fn loaded(leg: &LegFile, load: &Payload<f64>) -> Result<LegFile, ToolError> {
     Ok(loaded)
 }
 
-/// A found change of one run.
+/// Identified change of one run.
 struct Difference {
     found: f64,
     sigma: f64,
@@ -185,7 +185,7 @@ fn change_line(base: &BaseReport, pairs: &[Pair]) -> ChangeLine {
     let squares =
         changes.iter().map(|change| ((change.found - change.truth) / change.sigma).powi(2)).sum::<f64>();
     let told = changes.iter().filter(|change| change.found.abs() > TOLD * change.sigma).count();
-    // What two sums of the same numbers differ by.
+    // Rounding error between two sums of the same numbers.
     let rounding = 1e-12 * base.truth.known().map_or(1.0, f64::abs).max(1.0);
     let truth = changes.first().map(|change| if change.truth.abs() < rounding { 0.0 } else { change.truth });
     ChangeLine {
@@ -213,7 +213,7 @@ fn changed(pairs: &[Pair]) -> Vec<&'static str> {
     TABLE_FIVE.iter().map(|line| line.name).filter(moves).collect()
 }
 
-/// Base parameters to predict with.
+/// Selects the base parameters for the prediction.
 type Values<'v> = dyn Fn(&Pair) -> [f32; ROOM] + 'v;
 
 fn torque(leg: &LegFile, load: &Payload<f64>, pairs: &[Pair]) -> Result<Vec<LoadedTorque>, ToolError> {

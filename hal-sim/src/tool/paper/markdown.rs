@@ -1,24 +1,24 @@
-//! Tables as Markdown, with columns of even width: read in a terminal and in a document alike.
+//! Markdown tables with aligned columns, readable in a terminal and in a document.
 
 use core::fmt;
 
 use crate::tool::report::Number;
 use crate::tool::tables;
 
-/// A table; the first column is left, the others are right.
+/// Table with a left-aligned first column; the others are right-aligned.
 #[derive(Clone, Debug)]
 pub struct Table {
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// With these heads.
+    /// Creates a table with a header row.
     #[must_use]
     pub fn new(heads: &[&str]) -> Self {
         Self { rows: vec![heads.iter().map(|&head| head.to_owned()).collect()] }
     }
 
-    /// One line more.
+    /// Adds a row.
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(cells.into_iter().collect());
     }
@@ -54,7 +54,7 @@ impl fmt::Display for Table {
     }
 }
 
-/// Four digits, or a dash.
+/// Formats a number with four digits; a dash if unknown.
 #[must_use]
 pub fn number(value: Number) -> String {
     match value.known() {
@@ -63,7 +63,7 @@ pub fn number(value: Number) -> String {
     }
 }
 
-/// Two digits after the point below ten, fewer above; a dash where nothing is known.
+/// Formats a percentage: two decimals below ten, fewer above; a dash if unknown.
 #[must_use]
 pub fn percent(value: Option<f64>) -> String {
     match value {

@@ -1,16 +1,16 @@
-//! `paper`: the experiments of the paper, each run here and set beside what it prints.
+//! `paper`: reproduces the experiments of the paper and compares them with its printed results.
 //!
-//! Why one command: what a document says of the paper is only as good as the run behind it. Each part yields one
-//! [`Section`], from which the terminal, the JSON report, the figures and `docs/paper.md` are made.
+//! Why one command: each statement about the paper needs a run behind it. Each part yields one
+//! [`Section`], the source of terminal output, JSON report, figures and `docs/paper.md`.
 //!
-//! | part | what is made |
+//! | part | contents |
 //! | --- | --- |
 //! | [`table_three`] | the test functions as printed and as intended, and their least values |
-//! | [`table_four`] | the searches on them and on further functions: [`searches`], [`contenders`], [`goals`] |
-//! | [`figure_five`] | the searches' ways in the plane |
-//! | [`problems`], [`seeds`], [`recorder`], [`statistics`] | what is searched, from which seeds, what is counted, rows |
+//! | [`table_four`] | the searches on test functions: [`searches`], [`contenders`], [`goals`] |
+//! | [`figure_five`] | paths of the searches in the plane |
+//! | [`problems`], [`seeds`], [`recorder`], [`statistics`] | test problems, seeds, evaluation counts, rows |
 //! | [`tables_five_six`] | parameters of the three-joint chain, by both methods |
-//! | [`figure_seven`] | its torque on the verification motion |
+//! | [`figure_seven`] | torque of the chain on the verification motion |
 //! | [`load_change`] | the chain identified before and after its load changes |
 //! | [`convergence`] | iterations of the default swarm on identification problems |
 
@@ -51,20 +51,20 @@ pub enum Part {
     TableThree,
     /// The searches.
     TableFour,
-    /// The searches' ways in the plane.
+    /// Paths of the searches in the plane.
     FigureFive,
-    /// The chain's parameters; both tables come from the same runs.
+    /// Parameters of the chain; both tables come from the same runs.
     TablesFiveSix,
-    /// The chain's torque on the verification motion.
+    /// Torque of the chain on the verification motion.
     FigureSeven,
     /// The chain before and after its load changes.
     LoadChange,
-    /// The swarm on identification problems.
+    /// Convergence of the swarm on identification problems.
     Convergence,
 }
 
 impl Part {
-    /// Everything, in the paper's order.
+    /// All parts, in the paper's order.
     pub const ALL: [Self; 6] = [
         Self::TableThree,
         Self::TableFour,
@@ -74,7 +74,7 @@ impl Part {
         Self::LoadChange,
     ];
 
-    /// Name of its place in a document ([`document`]).
+    /// Name of the part's place in a document ([`document`]).
     #[must_use]
     pub const fn section_name(self) -> &'static str {
         match self {
@@ -89,30 +89,30 @@ impl Part {
     }
 }
 
-/// What holds for all parts.
+/// Options of all parts.
 #[derive(Clone, Debug)]
 pub struct PaperOptions {
-    /// Runs of each row; every part has a number of its own where it is not given.
+    /// Runs of each row; `None` uses the default of each part.
     pub seeds: Option<u64>,
-    /// Searches of Table IV; all where none is named.
+    /// Searches of Table IV; empty for all.
     pub algorithms: Vec<contenders::Algorithm>,
 }
 
-/// What one part found.
+/// Results of one part.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// Name of its place in a document ([`document`]).
+    /// Name of the section's place in a document ([`document`]).
     pub name: &'static str,
-    /// Tables and words, Markdown.
+    /// Tables and text, Markdown.
     pub markdown: String,
     /// Drawings.
     pub figures: Vec<Figure>,
-    /// Its entries of the JSON report.
+    /// Entries for the JSON report.
     pub json: Map<String, Value>,
 }
 
 impl Section {
-    /// A report in words, with its entry of the JSON report and what was drawn.
+    /// Section from a report, with its entry of the JSON report and its figures.
     fn of(
         part: Part,
         entry: &str,
@@ -131,7 +131,7 @@ impl Section {
     }
 }
 
-/// Makes these parts, one after the other.
+/// Runs these parts, one after the other.
 pub fn run(parts: &[Part], options: &PaperOptions) -> Result<Vec<Section>, ToolError> {
     parts.iter().map(|part| section(*part, options)).collect()
 }
@@ -148,7 +148,7 @@ fn section(part: Part, options: &PaperOptions) -> Result<Section, ToolError> {
     }
 }
 
-/// The JSON report: the schema, the rows of Table IV and whatever else was made.
+/// JSON report: schema, rows of Table IV, and the entries of the other parts.
 #[must_use]
 pub fn report(sections: &[Section]) -> Value {
     let mut report = Map::new();

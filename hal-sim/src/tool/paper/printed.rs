@@ -1,20 +1,20 @@
-//! What the paper prints of its identification: Tables V and VI, and the errors of its torque.
+//! Results printed in the paper: Tables V and VI, and the torque errors.
 
 /// One line of Table V or VI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Printed {
-    /// As reports of this project name it.
+    /// Name in the reports of this project.
     pub name: &'static str,
-    /// "X_rea".
+    /// Column "X_rea".
     pub real: f64,
-    /// "X_ide".
+    /// Column "X_ide".
     pub identified: f64,
-    /// "e", percent; none where a dash is printed.
+    /// Column "e", percent; `None` where a dash is printed.
     pub error_percent: Option<f64>,
 }
 
 impl Printed {
-    /// Equation (30) with the sign it lacks, percent; none where the real value is zero.
+    /// Equation (30) with the sign corrected, percent; `None` for a real value of zero.
     #[must_use]
     pub fn error(&self) -> Option<f64> {
         (self.real != 0.0).then(|| 100.0 * (self.real - self.identified).abs() / self.real.abs())
@@ -29,7 +29,7 @@ const fn dash(name: &'static str, real: f64, identified: f64) -> Printed {
     Printed { name, real, identified, error_percent: None }
 }
 
-/// Table V: sequentially, by the paper's swarm.
+/// Table V: sequential method, by the paper's swarm.
 pub const TABLE_FIVE: [Printed; 20] = [
     line("ZZ1", 3.825, 4.128, 7.92),
     line("XX2", 0.123, 0.063, 48.78),
@@ -53,7 +53,7 @@ pub const TABLE_FIVE: [Printed; 20] = [
     line("M3", 48.537, 50.705, 4.47),
 ];
 
-/// Table VI: at one time.
+/// Table VI: one-time method.
 pub const TABLE_SIX: [Printed; 15] = [
     line("ZZ1", 26.486, 19.35, 26.94),
     line("XX2", -22.27, -24.22, 8.76),
@@ -72,7 +72,8 @@ pub const TABLE_SIX: [Printed; 15] = [
     line("HY3", 11.447, 12.358, 7.96),
 ];
 
-/// Root mean square torque error of each joint on the verification motion, N m, and percent of mean absolute torque.
+/// Root mean square torque error of each joint on the verification motion, N m, and percent of mean
+/// absolute torque.
 pub const FIGURE_SEVEN: [(f64, f64); 3] = [(23.85, 7.42), (20.39, 6.5), (9.26, 4.91)];
 
 #[cfg(test)]
@@ -84,7 +85,7 @@ mod tests {
         let mut dashes = Vec::new();
         for line in TABLE_FIVE.iter().chain(&TABLE_SIX) {
             match (line.error(), line.error_percent) {
-                // Two or three digits are printed of values and errors.
+                // Values and errors are printed with two or three digits.
                 (Some(own), Some(printed)) => assert!((own - printed.abs()).abs() < 0.02, "{line:?}: {own}"),
                 (Some(own), None) => dashes.push((line.name, own.round())),
                 (None, printed) => assert_eq!(printed, None, "{line:?}"),

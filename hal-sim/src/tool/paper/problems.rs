@@ -1,11 +1,11 @@
-//! The test functions by the names of the report, in their readings and dimensions.
+//! Test functions by their names in the report, in their readings and dimensions.
 //!
-//! Why beside `scarab::swarm::TestProblem`: the functions are the firmware's, so that the device meets the same; names,
-//! readings and a fresh shift and rotation for every run are matters of the report.
+//! Why beside `scarab::swarm::TestProblem`: the functions are the firmware's, so the device evaluates the
+//! same ones. Names, readings, and a new shift and rotation for every run belong to the report.
 //!
-//! `f4-shifted-rotated` is f(x) = Ackley(R (x - c)): c uniform within half of the half-box, R uniform over the
-//! orthogonal matrices (Haar), both new for every run, from the run's seed.
-//! Source of R: Gram-Schmidt on rows of normal numbers (Stewart, 1980). Cost: D^2 operations per evaluation.
+//! `f4-shifted-rotated` is f(x) = Ackley(R (x - c)). The shift c is uniform within half of the half-box,
+//! the rotation R uniform over the orthogonal matrices (Haar). Both are drawn from the run's seed. Source
+//! of R: Gram-Schmidt on rows of normal numbers (Stewart, 1980). Cost: D^2 operations per evaluation.
 
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -16,16 +16,16 @@ use serde::Serialize;
 
 use super::seeds::ReportSeed;
 
-/// Most coordinates of any problem here.
+/// Most coordinates of any problem.
 pub const MOST_COORDINATES: usize = 30;
 
-/// The paper's function, or what it must have meant.
+/// Reading of a function: as the paper prints it, or as it must have meant it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Reading {
-    /// The standard function.
+    /// Standard function.
     Intended,
-    /// As the paper prints it.
+    /// Function as the paper prints it.
     Printed,
 }
 
@@ -34,12 +34,12 @@ pub enum Reading {
 pub struct Case {
     /// Name in the report.
     pub id: &'static str,
-    /// Which form.
+    /// Reading of the function.
     pub reading: Reading,
-    /// Coordinates.
+    /// Number of coordinates.
     pub dimension: usize,
     function: TestFunction,
-    /// Shifted and rotated anew for every run.
+    /// Whether the function is shifted and rotated for every run.
     is_moved: bool,
 }
 
@@ -55,7 +55,7 @@ const fn moved(id: &'static str, function: TestFunction, dimension: usize) -> Ca
     Case { id, reading: Reading::Intended, dimension, function, is_moved: true }
 }
 
-/// All that Table IV is made of: the paper's in the plane, the paper's in thirty dimensions, and further ones.
+/// All cases of Table IV: the paper's in the plane, the paper's in thirty dimensions, and further ones.
 pub const CASES: [Case; 20] = [
     case("f1", TestFunction::Sphere, 2),
     case("f2", TestFunction::SixHumpCamel, 2),
@@ -80,19 +80,19 @@ pub const CASES: [Case; 20] = [
 ];
 
 impl Case {
-    /// The least value.
+    /// Least value of the function.
     #[must_use]
     pub fn minimum(&self) -> f64 {
         self.plain().minimum()
     }
 
-    /// The box is plus and minus this in every coordinate.
+    /// Half the width of the box in every coordinate.
     #[must_use]
     pub fn half_width(&self) -> f64 {
         self.plain().half_width()
     }
 
-    /// As a run meets it.
+    /// Problem of one run.
     #[must_use]
     pub fn problem<T: Real>(&self, seed: ReportSeed) -> Problem<T> {
         let motion =
@@ -105,14 +105,13 @@ impl Case {
     }
 }
 
-/// A test function as one run meets it.
+/// Test function of one run.
 #[derive(Clone, Debug)]
 pub struct Problem<T> {
     plain: TestProblem,
     motion: Option<Motion<T>>,
 }
 
-/// A shift and a rotation.
 #[derive(Clone, Debug)]
 struct Motion<T> {
     centre: Vec<T>,
@@ -133,7 +132,7 @@ impl<T: Real> Motion<T> {
         let mut rows: Vec<Vec<f64>> = Vec::with_capacity(dimension);
         while rows.len() < dimension {
             let mut row: Vec<f64> = (0..dimension).map(|_| StandardNormal.sample(&mut random)).collect();
-            // Twice: what rounding leaves of the first is removed by the second.
+            // Repeated once: the second pass removes the rounding error of the first.
             for _ in 0..2 {
                 for known in &rows {
                     let along = dot(known, &row);

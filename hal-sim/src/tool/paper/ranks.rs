@@ -1,7 +1,9 @@
-//! How many combinations of the chain's parameters torque determines, and whether moving joints one by one tells more.
+//! Number of combinations of the chain's parameters that torque determines, for joint motion
+//! together and one by one.
 //!
-//! The rank is that of the regressor over random motions, in double precision. *Joint by joint* is how the paper identifies:
-//! one joint moves at a time, the others stand in some posture, and its own torque is read.
+//! The rank is that of the regressor over random motions, in double precision. The paper's method
+//! is *joint by joint*: one joint moves at a time while the others stand in some posture. Only the
+//! moving joint's torque is measured.
 
 use nalgebra::Vector3;
 use rand_core::{Rng, SeedableRng};
@@ -21,26 +23,26 @@ use crate::tool::setup;
 /// Postures and motions of each joint.
 const STATES: u32 = 200;
 const SEED: u64 = 20;
-/// A column of which less is independent of those before it is not determined.
+/// Columns whose independent part is smaller are not determined.
 const DETERMINED: f64 = 1e-9;
 
-/// How many combinations torque determines.
+/// Number of combinations that torque determines.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Ranks {
-    /// Of the 20 parameters of Table V.
+    /// Rank of the 20 parameters of Table V.
     pub of_table_v: usize,
-    /// Of all 30 inertial parameters of three links.
+    /// Rank of all 30 inertial parameters of three links.
     pub of_all_inertial: usize,
-    /// Of these, where one joint moves at a time and its own torque is read.
+    /// Rank of the inertial parameters if one joint moves at a time and its own torque is measured.
     pub joint_by_joint: usize,
-    /// Of what is estimated here, rotors, friction and offsets included.
+    /// Rank of all estimated parameters, including rotors, friction and offsets.
     pub of_the_leg: usize,
-    /// So many are estimated.
+    /// Number of estimated parameters.
     pub columns: usize,
 }
 
 impl Ranks {
-    /// Of the chain, and of one run on it.
+    /// Ranks of the chain, and of one run on it.
     pub fn of(leg: &LegFile, run: Option<&RunReport>) -> Result<Self, ToolError> {
         let listed = |joint: usize, parameter: Parameter| {
             TABLE_FIVE.iter().any(|line| line.name == parameter_name(joint, parameter))

@@ -1,16 +1,18 @@
-//! The identification's cost over single parameters, as the paper's swarm searches it: more unknowns than torque tells.
+//! Identification cost over single parameters, as searched by the paper's swarm: more unknowns than
+//! torque determines.
 //!
 //! ```text
-//! J(p) - J_LS = |R K p - z|^2        K: terms of the base parameters, R and z: the factor of all weighted rows
+//! J(p) - J_LS = |R K p - z|^2     K: terms of the base parameters, R and z: factor of all weighted rows
 //! ```
 //!
-//! So the cost is flat along the null space of K, 15 of 36 directions of the chain's inertias and frictions for instance.
+//! The cost is flat along the null space of K, for example 15 of 36 directions of the chain's
+//! inertias and frictions.
 
 use scarab::ident::{LinkPrior, RowModel, Stage, parameter_box};
 use scarab::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter, Standing};
 use scarab::swarm::Objective;
 
-/// Joint and place of every parameter that torque sees.
+/// Joint and index of every parameter with an effect on torque.
 fn seen<const N: usize, const B: usize>(model: &RowModel<f32, N, B>) -> Vec<(usize, usize)> {
     let all = (0..N).flat_map(|joint| Parameter::ALL.map(|parameter| (joint, parameter)));
     all.filter(|&(joint, parameter)| {
@@ -29,13 +31,13 @@ pub struct RawCost<'a, const N: usize, const B: usize> {
 }
 
 impl<'a, const N: usize, const B: usize> RawCost<'a, N, B> {
-    /// The cost of `stage` within what `prior` allows.
+    /// Cost of `stage` within the ranges of `prior`.
     #[must_use]
     pub fn new(model: &'a RowModel<f32, N, B>, stage: Stage<f32, B>, prior: &[LinkPrior<f32>; N]) -> Self {
         Self { model, stage, bounds: parameter_box(model, prior), places: seen(model) }
     }
 
-    /// Joint and place of every coordinate.
+    /// Joint and parameter index of every coordinate.
     #[must_use]
     pub fn places(&self) -> &[(usize, usize)] {
         &self.places

@@ -1,24 +1,24 @@
-//! An objective that counts its calls and remembers when each goal was first met.
+//! Objective that counts its calls and stores when each goal was first met.
 //!
-//! Why: searches of several crates are compared by what they ask of the objective, not by what each of them counts.
-//! The first evaluation whose value is within the tolerance counts, whoever asked for it: a whisker, a particle or
-//! a sample. Iterations are told by whoever drives the search; what a search evaluates first is iteration 0.
+//! Why: searches of several crates are compared by their evaluations, not by their own counters.
+//! The first evaluation within the tolerance counts, whether of a whisker, a particle or a sample.
+//! The driver of the search reports the iterations; initial evaluations are iteration 0.
 
 use std::cell::{Cell, RefCell};
 
 use scarab::real::Real;
 use scarab::swarm::Objective;
 
-/// When a goal was met.
+/// Time at which a goal was met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hit {
-    /// The iteration in which it was.
+    /// Iteration in which the goal was met.
     pub iterations: u32,
-    /// Evaluations up to and with the one that met it.
+    /// Evaluations up to and including the one that met the goal.
     pub evaluations: u32,
 }
 
-/// Counts what passes through it.
+/// Counting wrapper of an objective.
 #[derive(Debug)]
 pub struct Recorder<'o, T, O> {
     objective: &'o O,
@@ -41,12 +41,12 @@ impl<'o, T: Real, O: Objective<T>> Recorder<'o, T, O> {
         }
     }
 
-    /// What is evaluated from now on belongs to this iteration.
+    /// Starts an iteration; all further evaluations belong to it.
     pub fn begin(&self, iteration: u32) {
         self.iteration.set(iteration);
     }
 
-    /// Calls so far.
+    /// Evaluations so far.
     pub fn evaluations(&self) -> u32 {
         self.evaluations.get()
     }
@@ -56,12 +56,12 @@ impl<'o, T: Real, O: Objective<T>> Recorder<'o, T, O> {
         self.hits.borrow().len() == self.goals.len()
     }
 
-    /// The smallest of the goals.
+    /// Smallest goal.
     pub fn last_goal(&self) -> Option<T> {
         self.goals.last().copied()
     }
 
-    /// For every goal, when it was met.
+    /// Time at which each goal was met.
     pub fn into_hits(self) -> Vec<Option<Hit>> {
         let mut hits: Vec<_> = self.hits.into_inner().into_iter().map(Some).collect();
         hits.resize(self.goals.len(), None);

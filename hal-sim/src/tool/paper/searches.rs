@@ -1,8 +1,9 @@
 //! All runs of Table IV, in parallel.
 //!
-//! A row is a function, a search, a precision and a tolerance; one run serves all tolerances of its precision. Single
-//! precision is run for the default swarm and to 0.1 only: it cannot represent a millionth of values of 20.
-//! Run number r of every row has the same seed, so that all searches meet the same shifts and rotations.
+//! A row is a function, a search, a precision and a tolerance; one run serves all tolerances of its
+//! precision. Single precision is run for the default swarm and to 0.1 only: it cannot resolve a
+//! millionth at values of 20. Run number r of every row has the same seed, so all searches meet the
+//! same shifts and rotations.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
@@ -15,13 +16,13 @@ use super::seeds::ReportSeed;
 use super::statistics::Row;
 use crate::tool::error::ToolError;
 
-/// The paper's tolerance and one that asks for digits, largest first.
+/// The paper's tolerance, and one that requires precision; largest first.
 pub const TOLERANCES: [f64; 2] = [0.1, 1e-6];
 
 /// Hits of one run, by tolerance.
 type Hits = Vec<Option<Hit>>;
 
-/// All rows of these searches, each of so many runs.
+/// All rows of these searches, each from `runs` runs.
 pub fn rows(algorithms: &[Algorithm], runs: u64) -> Result<Vec<Row>, ToolError> {
     let contests = CASES.iter().flat_map(|case| algorithms.iter().map(move |algorithm| (case, *algorithm)));
     let precisions = |algorithm: &Algorithm| if *algorithm == Algorithm::Bso { 2 } else { 1 };

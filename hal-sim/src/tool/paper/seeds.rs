@@ -1,9 +1,10 @@
-//! Seeds of the report, kept apart from those that anything was chosen with.
+//! Seeds of the report, separate from those used for tuning.
 //!
-//! Why a type: a table made of the seeds on which constants were tuned flatters them. A [`ReportSeed`] cannot be made of
-//! a number of one's choice, and [`CHOOSING`] holds whatever was used while the swarm was designed: the tests'
-//! first seeds (90,001 in `tests/swarm_tables.rs`), the examples' (1), and those of the experiments behind the
-//! constants (31, 55, 31337, 31338); [`LEAPS`] those behind the leaps' constants.
+//! Why a type: results on the seeds with which constants were tuned are biased. A [`ReportSeed`]
+//! cannot be made from an arbitrary number. [`CHOOSING`] covers the seeds used while the swarm was
+//! designed. These are the tests' first seeds (90,001 in `tests/swarm_tables.rs`), the examples'
+//! (1), and those of the experiments behind the constants (31, 55, 31337, 31338). [`LEAPS`] covers
+//! those behind the leaps' constants.
 
 use std::ops::Range;
 
@@ -21,24 +22,24 @@ const _: () = assert!(CHOOSING.end <= REPORT.start && LEAPS.end <= REPORT.start)
 pub struct ReportSeed(u64);
 
 impl ReportSeed {
-    /// Seed of the run so many after the first; the last one's beyond the end.
+    /// Seed of run number `run`; runs beyond the range get its last seed.
     #[must_use]
     pub fn of_run(run: u64) -> Self {
         Self(REPORT.start.saturating_add(run).min(REPORT.end - 1))
     }
 
-    /// Seeds of so many runs, for a search or a whole experiment.
+    /// Search seeds of `runs` runs, for a search or a whole experiment.
     pub fn searches(runs: u64) -> impl Iterator<Item = u64> + Clone {
         (0..runs).map(|run| Self::of_run(run).search())
     }
 
-    /// For a search.
+    /// Seed of the search.
     #[must_use]
     pub fn search(self) -> u64 {
         self.0
     }
 
-    /// For what the search is set to work on: other random numbers than the search's own.
+    /// Seed of the problem: another random sequence than the search's own.
     #[must_use]
     pub fn problem(self) -> u64 {
         self.0 ^ 0x5eed_0000_0000_0000
@@ -56,7 +57,7 @@ mod tests {
             assert!(REPORT.contains(&seed.search()) && !CHOOSING.contains(&seed.search()), "{seed:?}");
             assert!(!CHOOSING.contains(&seed.problem()) && !REPORT.contains(&seed.problem()), "{seed:?}");
         }
-        // tests and experiments whose seeds are known
+        // seeds known from tests and experiments
         for used in [1, 31, 55, 31_337, 31_338, 90_001] {
             assert!(CHOOSING.contains(&used));
         }

@@ -1,29 +1,30 @@
-//! Log-Cholesky coordinates without those that no torque depends on.
+//! Log-Cholesky coordinates without those that have no effect on torque.
 //!
-//! Of a link that turns about an axis along gravity torque sees one number, the inertia about that axis. Nine of its ten
-//! coordinates then say nothing that the tenth does not, and a search over them is a search over nothing. Held here are
-//! shape and centre of mass of such a link, at a ball of the prior's radius of gyration about the prior's centre of mass;
-//! alpha, half the logarithm of its mass, is left and scales its inertia. Of the paper's chain 27 coordinates of 36 are left.
+//! A link that turns about an axis along gravity affects torque only by the inertia about that
+//! axis. Nine of its ten coordinates are then redundant, and a search over them is wasted. Its
+//! shape and centre of mass are held: a ball of the prior's radius of gyration about the prior's
+//! centre of mass. Alpha, half the logarithm of its mass, stays free and scales its inertia. The
+//! paper's chain keeps 27 of 36 coordinates.
 //!
-//! Why this loses nothing: torques reached stay the same while the inertia can take every value the prior allows, and it
-//! goes with exp(2 alpha), from a fifth to five times the ball's.
+//! Why this loses nothing: the set of reachable torques stays the same if the inertia covers the
+//! prior's range. The inertia goes with exp(2 alpha), from a fifth to five times the ball's.
 
 use scarab::ident::FullObjective;
 use scarab::model::{BaseParameters, INERTIAL_PARAMETERS, LegParameters, Parameter, Standing};
 use scarab::swarm::Objective;
 
-/// Largest extent of a link over a ball's, both in the prior's radius of gyration: 1.58 sqrt(3).
+/// Ratio of a link's largest extent to a ball's, both in the prior's radius of gyration: 1.58 sqrt(3).
 const LARGEST_OVER_BALL: f64 = 2.736_64;
 
-/// A leg's cost over the coordinates that count.
+/// Cost of a leg over the coordinates with an effect on torque.
 pub struct SeenLinks<'a, const N: usize> {
     whole: &'a FullObjective<'a, f32, N>,
-    /// Every coordinate of `whole`, with its value where it is held.
+    /// Every coordinate of `whole`; `Some` holds it at a value.
     held: Vec<Option<f32>>,
 }
 
 impl<'a, const N: usize> SeenLinks<'a, N> {
-    /// `None` where every link is seen by more than one number.
+    /// Creates the cost; `None` if every link affects torque by more than one number.
     #[must_use]
     pub fn new<const B: usize>(
         whole: &'a FullObjective<'a, f32, N>,
@@ -51,7 +52,7 @@ impl<'a, const N: usize> SeenLinks<'a, N> {
         held.iter().any(Option::is_some).then_some(Self { whole, held })
     }
 
-    /// The leg at a position.
+    /// Parameters of the leg at a position.
     #[must_use]
     pub fn parameters(&self, position: &[f32]) -> LegParameters<f32, N> {
         self.whole.parameters(&self.all(position))

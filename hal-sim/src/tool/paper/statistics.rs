@@ -1,6 +1,6 @@
 //! Rows of Table IV: many runs of one search on one function, as medians and percentiles.
 //!
-//! A run that fails counts as endless: a median or percentile that falls on a failed run is not known (`null`).
+//! A failed run counts as infinite: a median or percentile that falls on a failed run is unknown (`null`).
 
 use serde::Serialize;
 
@@ -8,14 +8,14 @@ use super::contenders::Algorithm;
 use super::problems::{Case, Reading};
 use super::recorder::Hit;
 
-/// One row of the report: an interface.
+/// One row of the report; its fields are an interface.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// Name of the function.
     pub function: &'static str,
-    /// As printed or as intended.
+    /// Printed or intended reading.
     pub reading: Reading,
-    /// Coordinates.
+    /// Number of coordinates.
     pub dimension: usize,
     /// The search.
     pub algorithm: Algorithm,
@@ -23,7 +23,7 @@ pub struct Row {
     pub tolerance: f64,
     /// Runs, each with a seed of its own.
     pub runs: usize,
-    /// Share of the runs that succeed, 0 to 1.
+    /// Share of the runs that succeed, 0..1.
     pub success_rate: f64,
     /// Iterations of the median run.
     pub iterations_median: Option<u32>,
@@ -36,7 +36,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// The row of these runs.
+    /// Row of these runs.
     #[must_use]
     pub fn of(
         case: &Case,
@@ -66,14 +66,14 @@ impl Row {
         }
     }
 
-    /// Whether the row is of this case.
+    /// Whether the row belongs to this case.
     #[must_use]
     pub fn is_of(&self, case: &Case) -> bool {
         (self.function, self.reading, self.dimension) == (case.id, case.reading, case.dimension)
     }
 }
 
-/// The smallest count that a share of all runs does not exceed; `sorted` holds those of the successful ones.
+/// Smallest count that a share of all runs does not exceed; `sorted` holds the successful runs.
 fn quantile(sorted: &[u32], share: f64, runs: usize) -> Option<u32> {
     let rank = (share * runs as f64).ceil() as usize;
     sorted.get(rank.max(1) - 1).copied()

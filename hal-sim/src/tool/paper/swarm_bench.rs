@@ -1,7 +1,7 @@
-//! One record, and what the default swarm makes of it: sets of unknowns, each against its optimum.
+//! Compares the default swarm with the optimum on one record, for several sets of unknowns.
 //!
-//! The swarm sees the device's cost in single precision; how far it got is told in double precision. See
-//! [`super::convergence`] for the unknowns and what is meant by reached.
+//! The swarm sees the device's cost in single precision; its result is evaluated in double
+//! precision. See [`super::convergence`] for the unknowns and the definition of reached.
 
 use scarab::ident::{
     DECIMATION, Effort, Factor, FullObjective, FullSearch, LegCost, Limits, ParameterBox, Plan, Problem,
@@ -16,19 +16,20 @@ use crate::tool::consistent;
 use crate::tool::error::ToolError;
 use crate::tool::pair::Context;
 
-/// Reached where J is above J_opt by less than this share of it.
+/// A search has reached the optimum if J exceeds J_opt by less than this share of it.
 pub const SHARE: f64 = 1e-3;
-/// No search takes longer.
+/// Limit of a search.
 const MOST_ITERATIONS: u32 = 400;
-/// Room for all parameters of three joints.
+/// Capacity for all parameters of three joints.
 const DIMENSIONS: usize = 42;
 
-/// Where a search got to.
+/// Result of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct Trial {
-    /// Unknowns.
+    /// Number of unknowns.
     pub dimension: usize,
-    /// Iterations and evaluations, by the cost over the filtered rows and by that over the logged samples.
+    /// Iterations and evaluations until reached, by the cost over the filtered rows and over the
+    /// logged samples.
     pub reached: [Option<(u32, u32)>; 2],
     /// Least J - J_opt, chi-square units.
     pub lowest: f64,
@@ -40,7 +41,7 @@ impl Trial {
     }
 }
 
-/// One record with what its searches are measured by.
+/// One record with the reference for its searches.
 pub struct Bench<'a, const N: usize, const B: usize> {
     context: &'a Context<N, B>,
     solver: Box<Solver<f32, N, B>>,
@@ -48,13 +49,13 @@ pub struct Bench<'a, const N: usize, const B: usize> {
     exact: Factor<f64, B>,
     /// J_LS over the filtered rows.
     least_squares: f64,
-    /// The same over the logged samples: as many as there are.
+    /// J_LS over the logged samples: their number.
     samples: f64,
     seed: u64,
 }
 
 impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
-    /// Ready to search.
+    /// Prepares the record for searches.
     pub fn new(context: &'a Context<N, B>, record: Record<f32, N, B>, seed: u64) -> Result<Self, ToolError> {
         let prior = context.configuration.prior.as_ref();
         let model = &context.background.device;
@@ -67,7 +68,8 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         Ok(Self { context, solver, exact: costs.factor, least_squares: costs.least_squares, samples, seed })
     }
 
-    /// Notes what base values that were found after so much reach of an optimum `above` least squares; whether all.
+    /// Records base values found after the effort `spent`; the optimum is `above` least squares.
+    /// Returns whether both goals are met.
     fn note(&self, trial: &mut Trial, values: &[f32; B], above: f64, spent: (u32, u32)) -> bool {
         let excess = self.exact.excess(&values.map(f64::from)) - above;
         trial.lowest = trial.lowest.min(excess);
@@ -79,7 +81,7 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         trial.reached.iter().all(Option::is_some)
     }
 
-    /// The device's own search.
+    /// Runs the device's own search.
     pub fn base(&self) -> Trial {
         let above = self.context.background.costs(&self.solver).above;
         let model = &self.context.background.device;
@@ -102,7 +104,7 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         }
     }
 
-    /// Every parameter that torque sees, each in its own range.
+    /// Searches every parameter with an effect on torque, each in its own range.
     pub fn raw(&self) -> Trial {
         let model = &self.context.background.device;
         let Some(prior) = self.context.configuration.prior.as_ref() else { return Trial::of(0) };
@@ -112,7 +114,7 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         self.searched(&objective, above, |position| objective.base(position))
     }
 
-    /// The swarm alone, until `values` of its best are at the optimum.
+    /// Runs the swarm alone until the base values of its best reach the optimum.
     fn searched(
         &self,
         objective: &impl Objective<f32>,
@@ -170,7 +172,7 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         self.exact.excess(&base.project(&parameters))
     }
 
-    /// The swarm over log-Cholesky coordinates: all, and without those of links that torque sees by one number.
+    /// Searches log-Cholesky coordinates: all, and without those of links that affect torque by one number.
     pub fn whole_legs(&self) -> (Trial, Option<Trial>) {
         let background = &self.context.background;
         let (above, _) = consistent::optimum(background, &self.solver);

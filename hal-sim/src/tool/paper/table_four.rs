@@ -1,4 +1,4 @@
-//! Table IV: the searches on the test functions, beside what the paper prints.
+//! Table IV: searches on the test functions, compared with the paper's printed results.
 
 use serde_json::Map;
 
@@ -11,17 +11,17 @@ use super::statistics::Row;
 use super::{PaperOptions, Part, Section};
 use crate::tool::error::ToolError;
 
-/// Runs of each row unless asked for otherwise.
+/// Runs of each row by default.
 const RUNS: u64 = 100;
 
-/// The paper's Table IV: iterations on f1 to f4.
+/// Iterations on f1 to f4 in the paper's Table IV.
 const PRINTED: [(Algorithm, [u32; 4]); 3] = [
     (Algorithm::Pso, [99, 38, 42, 52]),
     (Algorithm::Bas, [748, 678, 603, 688]),
     (Algorithm::BsoPaper, [39, 15, 18, 27]),
 ];
 
-/// The part: tables, words and JSON.
+/// Tables, text and JSON of this part.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let all = Algorithm::ALL.into_iter();
     let wanted = all.filter(|one| options.algorithms.is_empty() || options.algorithms.contains(one));
@@ -76,13 +76,13 @@ fn find<'r>(
     })
 }
 
-/// Function, reading where it is not the intended one, and dimension.
+/// Function, dimension, and the reading if it is not the intended one.
 fn name(case: &Case) -> String {
     let reading = if case.reading == Reading::Printed { ", printed" } else { "" };
     format!("{} ({}{reading})", case.id, case.dimension)
 }
 
-/// A count, or the share of runs that succeed where too few do.
+/// Count, or the share of successful runs if too few succeed.
 fn count(value: Option<u32>, row: &Row) -> String {
     value.map_or_else(|| format!("- ({} %)", percent(row)), |value| value.to_string())
 }
@@ -99,7 +99,7 @@ fn iterations(row: &Row, _best: Option<u32>) -> String {
     }
 }
 
-/// In bold where fewer than the default swarm's.
+/// Evaluations; in bold if fewer than the default swarm's.
 fn evaluations(row: &Row, default: Option<u32>) -> String {
     let text = count(row.evaluations_median, row);
     match (row.evaluations_median, default) {
@@ -109,7 +109,7 @@ fn evaluations(row: &Row, default: Option<u32>) -> String {
     }
 }
 
-/// Functions down, searches across.
+/// Table with a row per function and a column per search.
 fn matrix(rows: &[Row], tolerance: f64, title: &str, cell: fn(&Row, Option<u32>) -> String) -> String {
     let run: Vec<_> =
         Algorithm::ALL.into_iter().filter(|one| rows.iter().any(|row| row.algorithm == *one)).collect();
@@ -125,7 +125,7 @@ fn matrix(rows: &[Row], tolerance: f64, title: &str, cell: fn(&Row, Option<u32>)
     table.to_string().trim_end().to_owned()
 }
 
-/// The paper's figures for f1 to f4 above ours in the plane.
+/// Compares the paper's iterations for f1 to f4 in the plane with ours.
 fn beside_the_paper(rows: &[Row]) -> String {
     let header = ["iterations to 0.1", "f1", "f2", "f3", "f4"].map(str::to_owned);
     let mut table = headed(header);
@@ -148,7 +148,8 @@ fn beside_the_paper(rows: &[Row]) -> String {
     table.to_string().trim_end().to_owned()
 }
 
-/// Where other searches need fewer evaluations than the default swarm although it succeeds.
+/// Cases in which another search needs fewer evaluations than the default swarm although the latter
+/// succeeds.
 fn comparisons(rows: &[Row]) -> String {
     let mut lines = Vec::new();
     for (kind, is_kind) in [
@@ -185,7 +186,7 @@ fn comparisons(rows: &[Row]) -> String {
     lines.join("\n")
 }
 
-/// The default swarm in single precision beside double.
+/// Compares the default swarm in single and double precision.
 fn precisions(rows: &[Row]) -> String {
     let header = ["bso to 0.1: function (D)", "f64", "success", "f32", "success"].map(str::to_owned);
     let mut table = headed(header);
@@ -199,7 +200,7 @@ fn precisions(rows: &[Row]) -> String {
     table.to_string().trim_end().to_owned()
 }
 
-/// The goals of the default swarm.
+/// Table of the goals of the default swarm.
 fn goals(rows: &[Row]) -> String {
     let header =
         ["bso, goal: function (D)", "at most", "f64", "reached", "f32", "reached"].map(str::to_owned);

@@ -1,10 +1,13 @@
-//! Table III: the paper's four functions, as intended and as printed, and where their least values lie.
+//! Table III: the paper's four functions, as intended and as printed, and the positions of their
+//! least values.
 //!
-//! Why: success in Table IV is the distance to the least value, and those that the paper lists are wrong. Here they
-//! are searched for, without trust in what `TestProblem::minimum` states: a grid over the box, then a compass
-//! search (Hooke, Jeeves, 1961, without its pattern moves) from the best points of the grid.
-//! Cost: 4 million evaluations of functions of the plane, a fraction of a second.
-//! Known limits: a minimum narrower than the grid's spacing of 1/1000 of the box could hide between its points.
+//! Why: success in Table IV is the distance to the least value, and the paper's list of these
+//! values is wrong. They are searched for here, independently of `TestProblem::minimum`. A grid
+//! over the box is followed by a compass search from the best points of the grid (Hooke, Jeeves,
+//! 1961, without its pattern moves).
+//!
+//! Cost: 4 million evaluations of functions of the plane, a fraction of a second. Known limits: a
+//! minimum narrower than the grid's spacing of 1/1000 of the box could hide between its points.
 
 use std::fmt::Write;
 
@@ -18,11 +21,12 @@ use crate::tool::error::ToolError;
 
 /// Points of the grid along each axis.
 const GRID_POINTS: u32 = 1001;
-/// The grid on which the paper's least value of Branin's function is found.
+/// Points of the coarser grid on which the paper's least value of Branin's function is found.
 const COARSE_GRID_POINTS: u32 = 51;
-/// Points of the grid from which the compass search starts.
+/// Grid points from which the compass search starts.
 const STARTS: usize = 12;
-/// A least value and what was found agree to this, relative to 1 + |value|: what a double's rounding leaves of an exact zero.
+/// Tolerance between a stated and a found least value, relative to 1 + |value|: a double's rounding
+/// of an exact zero.
 const AGREEMENT: f64 = 1e-9;
 
 /// A function of Table III in one reading.
@@ -31,7 +35,7 @@ struct Entry {
     reading: &'static str,
     function: TestFunction,
     formula: &'static str,
-    /// As the paper's Table III lists it.
+    /// Value listed in the paper's Table III.
     listed: f64,
 }
 
@@ -87,7 +91,7 @@ const ENTRIES: [Entry; 7] = [
     },
 ];
 
-/// What was found of one function, as the JSON report has it.
+/// Results for one function, as written to the JSON report.
 #[derive(Clone, Debug, Serialize)]
 struct Found {
     function: &'static str,
@@ -96,11 +100,11 @@ struct Found {
     minimum_listed: f64,
     minimum: f64,
     minimiser: [f64; 2],
-    /// On a grid of 51 x 51 points over the box.
+    /// Least value on a grid of 51 x 51 points over the box.
     coarse_grid_minimum: f64,
 }
 
-/// The part: table, words and JSON.
+/// Table, text and JSON of this part.
 pub fn section() -> Result<Section, ToolError> {
     let found = ENTRIES.iter().map(find).collect::<Result<Vec<_>, _>>()?;
     let heads = ["function, D = 2", "box", "f_min listed", "found", "at x", "y", "on 51 x 51 points"];
@@ -131,13 +135,13 @@ pub fn section() -> Result<Section, ToolError> {
     Ok(Section { name: Part::TableThree.section_name(), markdown, figures: Vec::new(), json })
 }
 
-/// A number with so many decimals, zero without a sign.
+/// Formats a number with `digits` decimals; zero has no sign.
 fn decimals(value: f64, digits: i32) -> String {
     let unit = 10_f64.powi(digits);
     format!("{:.*}", digits as usize, (value * unit).round() / unit + 0.0)
 }
 
-/// Searches one function's box, and holds what the firmware's table states against it.
+/// Searches one function's box and compares the result with the firmware's table.
 fn find(entry: &Entry) -> Result<Found, ToolError> {
     let problem = TestProblem::new(entry.function, 2);
     let half = problem.half_width();
@@ -166,7 +170,7 @@ fn find(entry: &Entry) -> Result<Found, ToolError> {
     })
 }
 
-/// Every place that the search finds and where the value is the least.
+/// All distinct positions of the least value.
 #[must_use]
 pub fn minimisers(problem: &TestProblem) -> Vec<[f64; 2]> {
     let near = |one: &[f64; 2], other: &[f64; 2]| {
@@ -182,7 +186,7 @@ pub fn minimisers(problem: &TestProblem) -> Vec<[f64; 2]> {
     found
 }
 
-/// Ends of the compass searches from the best points of the grid.
+/// End points of the compass searches from the best points of the grid.
 fn descents(problem: &TestProblem) -> Vec<Point> {
     let mut points = grid(problem, GRID_POINTS);
     points.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
@@ -190,7 +194,7 @@ fn descents(problem: &TestProblem) -> Vec<Point> {
     points.iter().take(STARTS).map(|start| compass(problem, *start, spacing)).collect()
 }
 
-/// A value and where it is taken.
+/// Value and its position.
 type Point = (f64, [f64; 2]);
 
 fn grid(problem: &TestProblem, points: u32) -> Vec<Point> {
@@ -203,7 +207,7 @@ fn grid(problem: &TestProblem, points: u32) -> Vec<Point> {
         .collect()
 }
 
-/// Goes along the axes while that helps, with steps that are halved where it does not, to the last digits.
+/// Compass search: steps along the axes while the value falls, halves the step otherwise, down to rounding.
 fn compass(problem: &TestProblem, start: Point, mut step: f64) -> Point {
     let half = problem.half_width();
     let mut best = start;

@@ -1,12 +1,14 @@
-//! Tables V and VI: what torque tells of the three-joint chain, by both methods, beside what the paper lists.
+//! Tables V and VI: identified parameters of the three-joint chain by both methods, compared with
+//! the paper's.
 //!
-//! Both tables come from the same runs: the default exciting motion of `identify`, all joints moving, each seed once by the
-//! one-time plan and once by the sequential one, searched by the beetle swarm; least squares beside it. A parameter is
-//! compared one by one in Table V, as the paper does, and in the combinations that torque determines in Table VI.
+//! Both tables come from the same runs: the default exciting motion of `identify`, with all joints
+//! moving. Each seed runs once by the one-time plan and once by the sequential one, searched by the
+//! beetle swarm; least squares is listed beside. Table V compares single parameters, as the paper
+//! does. Table VI compares the combinations that torque determines.
 //!
 //! ```text
-//! error      median over the runs of |value - truth| / |truth|, percent; none where the truth is zero
-//! error/sigma    root mean square over the runs of (value - truth) / sigma, sigma that of each run
+//! error        median over the runs of |value - truth| / |truth|, percent; none where the truth is zero
+//! error/sigma  root mean square over the runs of (value - truth) / sigma, sigma that of each run
 //! ```
 
 use scarab::ident::Plan;
@@ -22,24 +24,24 @@ use crate::tool::analysis::plan_name;
 use crate::tool::error::ToolError;
 use crate::tool::report::{Number, RunReport};
 
-/// Runs of each method unless asked for otherwise.
+/// Runs of each method by default.
 const RUNS: u64 = 20;
 
-/// One value as one method finds it, over all runs.
+/// Estimate of one value by one method, over all runs.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Found {
-    /// Median.
+    /// Median estimate.
     pub value: Number,
-    /// Median of the reported standard deviation; null unless it is measured alone.
+    /// Median of the reported standard deviation; null unless the parameter is identified alone.
     pub sigma: Number,
-    /// Median size of the error, percent of the truth.
+    /// Median absolute error, percent of the truth.
     pub error_percent: Number,
     /// Root mean square of error over sigma.
     pub error_over_sigma: Number,
 }
 
 impl Found {
-    /// From each run's value and sigma.
+    /// Summary of each run's value and sigma.
     fn of(truth: Number, runs: &[(Number, Number)]) -> Self {
         let values = || runs.iter().filter_map(|(value, _)| value.known());
         let sigmas = || runs.iter().filter_map(|(_, sigma)| sigma.known());
@@ -66,16 +68,16 @@ impl Found {
     }
 }
 
-/// What the paper prints of a value.
+/// Value as printed in the paper.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct PaperValue {
-    /// "X_rea".
+    /// Column "X_rea".
     pub real: f64,
-    /// "X_ide".
+    /// Column "X_ide".
     pub identified: f64,
-    /// "e" as printed, percent; null for a dash.
+    /// Column "e" as printed, percent; null for a dash.
     pub error_printed_percent: Option<f64>,
-    /// Equation (30) of the two values before it, percent.
+    /// Equation (30) of the two values above, percent.
     pub error_percent: Option<f64>,
 }
 
@@ -95,57 +97,57 @@ impl From<&Printed> for PaperValue {
 pub struct ParameterLine {
     /// Symbol and joint.
     pub name: String,
-    /// SI.
+    /// SI unit.
     pub unit: &'static str,
-    /// As printed.
+    /// Printed values.
     pub paper: PaperValue,
-    /// Of the simulated chain.
+    /// True value of the simulated chain.
     pub truth: Number,
-    /// `identified`, `weak`, `grouped` or `prior`, by the one-time plan; that of most runs.
+    /// Most frequent status by the one-time plan: `identified`, `weak`, `grouped` or `prior`.
     pub status: &'static str,
-    /// The others of its sums.
+    /// Other parameters of the same sums.
     pub grouped_with: Vec<String>,
-    /// One-time, by the swarm.
+    /// One-time plan, by the swarm.
     pub one_time: Found,
-    /// Sequential, by the swarm.
+    /// Sequential plan, by the swarm.
     pub sequential: Found,
 }
 
 /// A line of Table VI.
 #[derive(Clone, Debug, Serialize)]
 pub struct BaseLine {
-    /// Its carrier, with an `R` where others are regrouped into it.
+    /// Carrier, followed by `R` if others are regrouped into it.
     pub name: String,
-    /// The weighted sum.
+    /// Weighted sum of the parameters.
     pub terms: String,
-    /// SI.
+    /// SI unit.
     pub unit: &'static str,
-    /// As printed.
+    /// Printed values.
     pub paper: PaperValue,
-    /// Of the simulated chain.
+    /// True value of the simulated chain.
     pub truth: Number,
-    /// One-time, by the swarm.
+    /// One-time plan, by the swarm.
     pub one_time: Found,
-    /// Sequential, by the swarm.
+    /// Sequential plan, by the swarm.
     pub sequential: Found,
-    /// One-time, in closed form.
+    /// One-time plan, in closed form.
     pub least_squares: Found,
 }
 
-/// Both tables.
+/// Report of both tables.
 #[derive(Clone, Debug, Serialize)]
 pub struct TablesReport {
     /// Name of the leg file.
     pub leg: &'static str,
-    /// Per logged 500 Hz sample, of each joint's mean absolute torque on the exciting motion.
+    /// Noise per logged 500 Hz sample, percent of each joint's mean absolute torque on the exciting motion.
     pub noise_percent: f64,
-    /// Of each method.
+    /// Runs of each method.
     pub runs: u64,
-    /// Accepted by the verdict, one-time and sequential.
+    /// Runs accepted by the verdict, one-time and sequential.
     pub accepted: [usize; 2],
     /// Median iterations of the swarm, one-time and sequential.
     pub iterations_median: [Number; 2],
-    /// What torque determines.
+    /// Number of combinations that torque determines.
     pub rank: Ranks,
     /// The paper's 20 parameters.
     pub table_v: Vec<ParameterLine>,
@@ -153,13 +155,13 @@ pub struct TablesReport {
     pub table_vi: Vec<BaseLine>,
 }
 
-/// Runs everything and tells it.
+/// Runs the experiment and formats its section.
 pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
     let report = report(options.seeds.unwrap_or(RUNS))?;
     Section::of(Part::TablesFiveSix, "tables_v_vi", &report, words(&report), Vec::new())
 }
 
-/// The runs and what they say.
+/// Runs the experiment.
 pub fn report(runs: u64) -> Result<TablesReport, ToolError> {
     let leg = chain::leg()?;
     let options: Vec<_> = PLANS

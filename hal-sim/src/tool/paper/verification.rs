@@ -1,14 +1,14 @@
-//! The paper's verification motion, Equations (31) and (32), repaired, for the three-joint chain.
+//! Verification motion of the paper, Equations (31) and (32), repaired, for the three-joint chain.
 //!
 //! ```text
-//! hip, knee      scarab::motion::gait: (31), and (32) with a tenth of its two large amplitudes; closed, six harmonics,
-//!                offset into the paper's working range; one cycle of 6.5 s, entered and left at rest
+//! hip, knee      scarab::motion::gait: (31), and (32) with a tenth of its two large amplitudes; closed,
+//!                six harmonics, offset into the paper's working range; one 6.5 s cycle, from and to rest
 //! hip rotation   10 degrees sin(2 pi t / 6.5 s), ours
 //! ```
 //!
-//! Why a motion of joint 1: (31) and (32) say nothing of it. Axis 1 lies along gravity, so the other two move its torque
-//! only through what lies beside the plane of the leg, and a joint that stands still holds by friction whatever little
-//! that is. Its torque would be no test of anything.
+//! Why a motion of joint 1: (31) and (32) do not define one. Axis 1 lies along gravity. The other
+//! joints change its torque only through masses beside the plane of the leg. Friction holds a
+//! standing joint against that small torque, which would then be no test.
 
 use scarab::ident::{Smoothed, prior_parameters};
 use scarab::motion::gait::{self, GaitJoint};
@@ -21,9 +21,9 @@ use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 use crate::tool::setup::{self, SetupError};
 
-/// One cycle; the repaired knee then has the paper's acceleration.
+/// Period of one cycle; the repaired knee then has the paper's acceleration.
 pub const PERIOD: Second = Second(6.5);
-/// Of the hip's rotation, either way.
+/// Amplitude of the hip's rotation.
 pub const ROTATION_DEG: f32 = 10.0;
 const BLEND: Second = Second(1.0);
 
@@ -46,7 +46,8 @@ fn curve(leg: &LegFile) -> Result<Fourier<JOINTS>, MotionError> {
     Fourier::new(PERIOD, centre, sine, cosine)?.mapped(scale, offset)
 }
 
-/// Mean absolute torque of the links alone, without rotors and friction, on the walking cycle with joint 1 held still, N m.
+/// Mean absolute torque of the links alone, without rotors and friction, on the gait cycle with
+/// joint 1 held still, N m.
 pub fn links_alone(leg: &LegFile) -> Result<[f64; JOINTS], ToolError> {
     const INSTANTS: u32 = 1000;
     let model = setup::row_model::<JOINTS, ROOM>(leg)?;

@@ -1,4 +1,4 @@
-//! CSV by column names: the header is looked through once, then every row is checked against it.
+//! CSV by column names: the header is parsed once, then every row is checked against it.
 
 use std::fs;
 use std::path::Path;
@@ -7,13 +7,13 @@ use csv::StringRecord;
 
 use super::fault::{Fault, RecordingError};
 
-/// The text of a file.
+/// Reads the text of a file.
 pub(in crate::tool) fn read_text(file: &Path) -> Result<String, RecordingError> {
     let bytes = fs::read(file).map_err(|error| refuse(file, None, Fault::Unreadable(error)))?;
     String::from_utf8(bytes).map_err(|_| refuse(file, None, Fault::NotText))
 }
 
-/// Gives the header to `find` and every row after it to `take`; returns the byte offset of each row.
+/// Passes the header to `find` and every row after it to `take`; returns the byte offset of each row.
 pub(in crate::tool) fn for_each_row<C>(
     file: &Path,
     text: &str,
@@ -23,7 +23,7 @@ pub(in crate::tool) fn for_each_row<C>(
     if text.trim().is_empty() {
         return Err(refuse(file, None, Fault::Empty));
     }
-    // Lines are found again from byte offsets: the reader's own count stops at blank lines.
+    // Lines are located by byte offsets: the reader's own count skips blank lines.
     let refuse_at = |offset: usize, fault| refuse(file, Some(line_at(text, offset)), fault);
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
@@ -60,13 +60,13 @@ pub(in crate::tool) fn refuse(file: &Path, line: Option<usize>, fault: Fault) ->
     RecordingError { file: file.to_owned(), line, fault }
 }
 
-/// The line, from 1, of the first row at or after a byte of the text.
+/// Line, from 1, of the first row at or after a byte of the text.
 pub(in crate::tool) fn line_at(text: &str, offset: usize) -> usize {
     let blank = text[offset..].bytes().take_while(|byte| matches!(byte, b'\r' | b'\n')).count();
     1 + text[..offset + blank].matches('\n').count()
 }
 
-/// A column of the file: where it stands and what it is called.
+/// Column of the file: its index and name.
 pub(in crate::tool) struct Column {
     index: usize,
     name: String,
@@ -85,7 +85,7 @@ impl Column {
         }
     }
 
-    /// The finite number of this column, of at most `limit` in magnitude.
+    /// Finite number in this column, at most `limit` in magnitude.
     pub(in crate::tool) fn number(&self, row: &StringRecord, limit: f64) -> Result<f64, Fault> {
         let text = row.get(self.index).unwrap_or("");
         let (column, text) = (self.name.clone(), text.to_owned());

@@ -1,4 +1,4 @@
-//! Why a file is no recording: every refusal in plain words, with the place where it shows.
+//! Errors of recordings: every rejection in plain words, with its position.
 
 use std::fmt;
 use std::io;
@@ -6,19 +6,19 @@ use std::path::PathBuf;
 
 use super::{MINIMUM_DURATION_S, MINIMUM_RATE_HZ, MINIMUM_SAMPLES};
 
-/// Why a file is no recording, and where it shows. Displays as `file:line: reason`.
+/// Reason why a file is not a recording, with its position. Displays as `file:line: reason`.
 #[derive(Debug, thiserror::Error)]
 #[error("{}{}: {fault}", .file.display(), LineSuffix(*.line))]
 pub struct RecordingError {
-    /// The file as it was named.
+    /// File as named.
     pub file: PathBuf,
-    /// Counted from 1, header included; none where the whole file is meant.
+    /// Line, from 1, header included; `None` for the whole file.
     pub line: Option<usize>,
     /// The reason.
     pub fault: Fault,
 }
 
-/// What is wrong with a recording, in plain words.
+/// Fault of a recording, in plain words.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
     /// The file cannot be opened or read.
@@ -27,49 +27,49 @@ pub enum Fault {
     /// The bytes are not UTF-8.
     #[error("not a text file")]
     NotText,
-    /// Nothing, or blank lines only.
+    /// The file is empty or has blank lines only.
     #[error("the file is empty")]
     Empty,
-    /// A quotation mark that is never closed, or the like.
+    /// Invalid CSV, for example an unclosed quotation mark.
     #[error("not a CSV file ({0})")]
     NotCsv(csv::Error),
     /// The header lacks a column that the leg needs.
     #[error("the header has no column `{column}`; its columns are: {}{}", Excerpt(.present), Separator(.present))]
     MissingColumn {
-        /// Name looked for.
+        /// Requested name.
         column: String,
-        /// Names found.
+        /// Names in the header.
         present: String,
     },
-    /// Two columns of one name: nobody can know which is meant.
+    /// Two columns have the same name, which is ambiguous.
     #[error("the header has the column `{0}` twice")]
     RepeatedColumn(String),
     /// A truncated line, decimal commas, or a line of another file.
     #[error("{found} fields, but the header has {expected}: {}",
         if .found < .expected { "is the line truncated?" } else { "are these decimal commas?" })]
     FieldCount {
-        /// In this line.
+        /// Fields in this line.
         found: usize,
-        /// In the header.
+        /// Fields in the header.
         expected: usize,
     },
-    /// Letters, an empty field.
+    /// The field is empty or not a number.
     #[error("`{}` in column `{column}` is not a number", Excerpt(.text))]
     NotANumber {
         /// Column name.
         column: String,
-        /// The field as it stands in the file.
+        /// Field as written in the file.
         text: String,
     },
-    /// `NaN` or `inf`.
+    /// The number is `NaN` or infinite.
     #[error("`{}` in column `{column}` is not finite", Excerpt(.text))]
     NotFinite {
         /// Column name.
         column: String,
-        /// The field as it stands in the file.
+        /// Field as written in the file.
         text: String,
     },
-    /// A number no leg can reach.
+    /// The number is beyond any leg's range.
     #[error("{} in column `{column}` is beyond {}: is it in another unit?", Short(*.value), Short(*.limit))]
     Absurd {
         /// Column name.
@@ -79,24 +79,24 @@ pub enum Fault {
         /// Largest magnitude accepted.
         limit: f64,
     },
-    /// Finite numbers whose torque is not.
+    /// The numbers are finite, but their torque is not.
     #[error("the torque of this state is beyond the range of the numbers computed with")]
     OutOfRange,
     /// Time does not increase.
     #[error("time {} from {} s to {} s",
         if *.time < *.previous { "goes back" } else { "stands still" }, Short(*.previous), Short(*.time))]
     TimeNotIncreasing {
-        /// The stamp before.
+        /// Previous stamp.
         previous: f64,
-        /// This line's stamp.
+        /// Stamp of this line.
         time: f64,
     },
     /// Samples are missing.
     #[error("{gap:.3} s without a sample before this line; at most {limit:.3} s are bridged")]
     Gap {
-        /// Length, s.
+        /// Duration of the gap, s.
         gap: f64,
-        /// Longest accepted in this recording, s.
+        /// Longest accepted gap in this recording, s.
         limit: f64,
     },
     /// Most samples are too far apart.
@@ -105,24 +105,24 @@ pub enum Fault {
         Short(*.step_s), rounded(1.0 / .step_s), OtherUnit(*.step_s, *.counts)
     )]
     TooSlow {
-        /// Median distance of two samples, s.
+        /// Median time between two samples, s.
         step_s: f64,
-        /// Each stamp is one more than the one before.
+        /// Whether each stamp is one more than the previous one.
         counts: bool,
     },
-    /// Too little to identify anything.
+    /// The recording is too short for an identification.
     #[error(
         "too short: {samples} samples over {duration:.3} s, but at least {MINIMUM_SAMPLES} over {MINIMUM_DURATION_S} s are needed"
     )]
     TooShort {
         /// Number of samples.
         samples: usize,
-        /// From first to last, s.
+        /// Time from first to last sample, s.
         duration: f64,
     },
 }
 
-/// `:12` after the file's name, or nothing.
+/// Suffix `:12` of the file's name, or nothing.
 struct LineSuffix(Option<usize>);
 
 impl fmt::Display for LineSuffix {
@@ -131,10 +131,10 @@ impl fmt::Display for LineSuffix {
     }
 }
 
-/// Most characters of a file that a message repeats: it may be any file, of any size.
+/// Limit of characters of a file in a message: the file may be of any kind and size.
 const EXCERPT: usize = 200;
 
-/// What stands in a file, on one line and not at length.
+/// Excerpt of a file on one line.
 struct Excerpt<'a>(&'a str);
 
 impl fmt::Display for Excerpt<'_> {
@@ -150,7 +150,7 @@ impl fmt::Display for Excerpt<'_> {
     }
 }
 
-/// A hint where the header is a single column with another separator in it.
+/// Hint for a header of a single column with another separator in it.
 struct Separator<'a>(&'a str);
 
 impl fmt::Display for Separator<'_> {
@@ -166,7 +166,7 @@ impl fmt::Display for Separator<'_> {
 /// Units of time that recorders use, in seconds.
 const UNITS: [(&str, f64); 3] = [("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)];
 
-/// The unit in which stamps so far apart would be a recording's, if there is one.
+/// Unit in which these stamps would be a valid recording, if any.
 struct OtherUnit(f64, bool);
 
 impl fmt::Display for OtherUnit {
@@ -180,12 +180,12 @@ impl fmt::Display for OtherUnit {
     }
 }
 
-/// Four digits.
+/// Rounds to four digits.
 fn rounded(rate: f64) -> f64 {
     format!("{rate:.3e}").parse().unwrap_or(rate)
 }
 
-/// A number as one reads it, not with three hundred digits.
+/// Short form of a number without hundreds of digits.
 struct Short(f64);
 
 impl fmt::Display for Short {

@@ -1,22 +1,23 @@
-//! Wild samples of a recording, replaced at its own rate: resampling would smear each over its neighbours.
+//! Replaces outliers of a recording at its own rate: resampling would smear each over its neighbours.
 //!
-//! The same filter as the board's ([`scarab::ident::hampel`]). Two things a recording has and the board has not:
+//! The filter is the board's ([`scarab::ident::hampel`]). Two cases occur in recordings only:
 //!
-//! - Recordings slower than [`SPARSEST_HZ`]: a machine's own vibration is then as fast as its samples, and neighbours do
-//!   not predict it (of an honest one at 200 Hz 2 to 3 % would be called wild). There only the filter behind the
-//!   resampling works.
-//! - Coarse sensors: a last bit that flickers at rest is no outlier. What lies within [`QUANTA`] steps of the sensor stays.
+//! - Recordings slower than [`SPARSEST_HZ`]: vibrations of the machine are as fast as its samples, and
+//!   neighbours do not predict them. Of a correct recording at 200 Hz 2 to 3 % would count as outliers. Only
+//!   the filter after resampling is used there.
+//! - Coarse sensors: a last bit that flickers at rest is not an outlier. Deviations within [`QUANTA`] steps
+//!   of the sensor stay.
 
 use scarab::ident::hampel::{Cleaned, Hampel, Quantity};
 
 use crate::tool::recording::Recording;
 
-/// Rate from which neighbours predict a sample: four of them are then 10 ms.
+/// Rate from which neighbours predict a sample: four of them then span 10 ms.
 const SPARSEST_HZ: f64 = 400.0;
-/// Steps of the sensor within which nothing is wild.
+/// Steps of the sensor within which no sample is an outlier.
 const QUANTA: f64 = 2.0;
 
-/// The recording without its isolated wild samples, and how many each joint had.
+/// Recording without its isolated outliers, and their number for each joint.
 pub(super) fn cleaned<const N: usize>(recording: &Recording) -> (Recording, [u32; N]) {
     let (mut clean, mut replaced) = (recording.clone(), [0; N]);
     if !(recording.median_step_s() * SPARSEST_HZ <= 1.0) {
@@ -46,7 +47,7 @@ fn clean_series(values: &mut [f64], quantity: Quantity) -> u32 {
     replaced
 }
 
-/// The smallest step between two samples that differ: the sensor's last bit, or less than any noise.
+/// Smallest step between two different samples: the sensor's last bit, or less than any noise.
 fn quantum(values: &[f64]) -> f64 {
     let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|&step| step > 0.0);
     let smallest = steps.fold(f64::INFINITY, f64::min);

@@ -1,4 +1,4 @@
-//! The table of predicted torques that `--csv` writes.
+//! Table of predicted torques for `--csv`.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -16,7 +16,7 @@ pub(super) struct Prediction<const N: usize> {
     pub predicted: [f32; N],
 }
 
-/// Writes them as a table of anatomical torques.
+/// Writes a table of anatomical torques.
 pub(super) fn write_predictions<const N: usize>(
     path: &Path,
     predictions: &[Prediction<N>],

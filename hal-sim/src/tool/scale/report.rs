@@ -1,4 +1,4 @@
-//! What is said about scale and load.
+//! Report of scale and load.
 
 use scarab::ident::ConstantRatio;
 use scarab::model::Payload;
@@ -9,33 +9,34 @@ use super::super::precision::{exact, sigma, value};
 use super::super::report::{Number, RunReport};
 use super::Scale;
 
-/// What the parameters of a run are measured in, and what the leg carried.
+/// Units of a run's parameters, and the load of the leg.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScaleReport {
-    /// `relative` to the torque constants that were used, or `absolute`.
+    /// `relative` to the assumed torque constants, or `absolute`.
     pub scale: &'static str,
-    /// One per joint of a simulated leg; empty in a replay, whose torques come as such.
+    /// Torque constants, one per joint of a simulated leg; empty in a replay, whose recordings
+    /// contain torques.
     pub torque_constant: Vec<TorqueConstantReport>,
-    /// The known mass of the second run.
+    /// Known mass of the second run.
     pub payload: Option<MassReport>,
-    /// What the leg carried in every run; the parameters are those without it.
+    /// Known load in every run; the parameters exclude it.
     pub load: Option<MassReport>,
 }
 
-/// The torque constant of one joint, N m/A at the joint.
+/// Torque constant of one joint, N m/A at the joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TorqueConstantReport {
-    /// Counted from 1.
+    /// Joint, from 1.
     pub joint: usize,
-    /// By the firmware.
+    /// Constant assumed by the firmware.
     pub used: Number,
-    /// From the known mass; unknown where the joint does not feel it.
+    /// Constant from the known mass; unknown if the joint is not loaded by it.
     pub identified: Number,
-    /// Of that.
+    /// Standard deviation of the identified constant.
     pub sigma: Number,
-    /// Whether the two runs differ by the stated mass at the stated place, as far as the joint tells.
+    /// Whether the two runs differ by the stated mass at the stated position, as far as this joint shows.
     pub consistent: Option<bool>,
-    /// Whether the mass is heavy enough for the joint to tell.
+    /// Whether the mass is heavy enough to determine this constant.
     #[serde(skip)]
     pub told: bool,
 }
@@ -43,11 +44,11 @@ pub struct TorqueConstantReport {
 /// A known mass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MassReport {
-    /// kg.
+    /// Mass, kg.
     pub mass: f64,
-    /// Counted from 1: the one whose link carries it.
+    /// Joint whose link carries it, from 1.
     pub joint: usize,
-    /// In the joint's frame, m.
+    /// Position in the joint's frame, m.
     pub place: [f64; 3],
 }
 
@@ -64,7 +65,7 @@ impl Default for ScaleReport {
 }
 
 impl ScaleReport {
-    /// What was found by a firmware with the constants of `context`.
+    /// Results of a firmware with the constants of `context`.
     #[must_use]
     pub fn of<const N: usize, const B: usize>(scale: &Scale<N, B>, context: &Context<N, B>) -> Self {
         let of = |joint: usize, ratio: &Option<ConstantRatio<f32>>| {
@@ -89,7 +90,7 @@ impl ScaleReport {
     }
 }
 
-/// Scale and load of a run in words, a line each; nothing for a replay.
+/// Scale and load of a run in words, a line each; empty for a replay.
 #[must_use]
 pub fn lines(run: &RunReport) -> Vec<String> {
     let scale = &run.scale;
@@ -146,7 +147,7 @@ fn constant(joint: &TorqueConstantReport) -> String {
     }
 }
 
-/// The constants of many runs, a line per joint; nothing without a known mass.
+/// Constants of many runs, a line per joint; empty without a known mass.
 #[must_use]
 pub fn summary(runs: &[RunReport]) -> Vec<String> {
     let joints = runs.first().map_or(0, |run| run.scale.torque_constant.len());

@@ -14,7 +14,7 @@ fn sized(thigh: Option<f64>, shank: Option<f64>, wearer: Option<(f64, f64)>) -> 
     size(thigh, shank, wearer).of(&default_leg()).expect("within the ranges")
 }
 
-/// M, HX, HY, ZZ about the joint.
+/// Sums M, HX, HY, ZZ about the joint.
 fn sums(link: &LinkParameters) -> [f64; 4] {
     let [x, y, _] = link.com;
     [link.mass, link.mass * x, link.mass * y, link.inertia_com[5] + link.mass * (x * x + y * y)]
@@ -22,7 +22,8 @@ fn sums(link: &LinkParameters) -> [f64; 4] {
 
 #[test]
 fn stretching_is_close_to_a_telescope() {
-    // The derivation moves the lower parts of the exoskeleton as a whole, the rule stretches what is in the file.
+    // The derivation moves the lower parts of the exoskeleton as a whole, the rule stretches the
+    // file's body.
     for (mass, height) in [(60.0, 1.65), (75.0, 1.75), (95.0, 2.05)] {
         let ruled = sized(None, None, Some((mass, height)));
         let derived = x2::leg_file_of(&Wearer::of_height(mass, height), 70.0 / 75.0 * mass);

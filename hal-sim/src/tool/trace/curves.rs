@@ -1,7 +1,7 @@
 //! The log of a trace as curves, for figures: measured and predicted torque, residuals.
 //!
-//! The samples of the identification that is reported go once more through the filter chain, as those of a simulated run do.
-//! A motion of which a sample is missing is not drawn: the filter would join what does not belong together.
+//! The reported identification's samples pass the filter chain once more, as those of a simulated run do. A
+//! motion with a missing sample is not drawn: the filter would join samples that do not belong together.
 
 use scarab::ident::no_stribeck;
 use scarab::model::Parameter;
@@ -20,10 +20,10 @@ use crate::tool::series::{Anatomy, Reader, Role, Series};
 use crate::tool::setup::anatomy;
 use crate::with_leg_size;
 
-/// Of the last complete result; without motions where none was logged.
+/// Curves of the last complete result; no motions where none was logged.
 ///
 /// # Errors
-/// The result is not of this leg.
+/// The result belongs to another leg.
 pub fn curves(trace: &Trace, leg: &LegFile) -> Result<Series, ToolError> {
     let Some(told) = trace.results.last() else { return Ok(Series::default()) };
     with_leg_size!(leg, of_size(trace, told, leg))
@@ -82,8 +82,8 @@ fn of_size<const N: usize, const B: usize>(
         motions.push(reader.motion(name, role, 0.0, samples));
     }
     let fits = told.fits.iter().filter(|fit| fit.motion == 0);
-    // The noise of filtered torque is what the model leaves of the motion identified from; a motion has far more rows than
-    // there are parameters.
+    // The noise of filtered torque is the model's residual on the motion identified from. Its
+    // degrees of freedom need no correction: a motion has far more rows than there are parameters.
     let noise_nm = fits.map(|fit| f64::from(fit.rms_nm)).collect();
     Ok(Series { noise_nm, ..reader.of_motions(motions) })
 }

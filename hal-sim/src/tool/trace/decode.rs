@@ -1,12 +1,13 @@
-//! From a `defmt` stream to lines.
+//! Decodes a `defmt` stream into lines.
 //!
-//! The device sends indices and bare values; the image that runs there holds the texts. Frames end with a zero and hold none
-//! (rzCOBS), so a listener who joins late or loses bytes finds the next frame again: what does not decode is counted and
-//! passed over. Single-precision values come back with the same bits: `defmt-decoder` writes the shortest digits that do so.
+//! The device sends indices and bare values; the texts are in the image that runs there. Frames end
+//! with a zero byte and contain none (rzCOBS). A listener that joins late or loses bytes therefore
+//! finds the next frame. Frames that do not decode are counted and skipped. Single-precision values
+//! return with the same bits, since `defmt-decoder` writes the shortest digits that do so.
 //!
-//! Cost: one frame is kept at a time, however long the stream is.
-//! Limits: an image that sends frames without an encoding is refused, since nothing could be found again after a gap. A frame
-//! that was damaged and still decodes is told as it reads; its number then hardly continues the others.
+//! Cost: memory for one frame, however long the stream is. Limits: an image that sends frames without an
+//! encoding is rejected, since decoding could not resume after a gap. A damaged frame that still decodes is
+//! reported as it reads; its record number then rarely continues the sequence.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -14,19 +15,19 @@ use defmt_decoder::{Encoding, Table};
 
 use crate::tool::error::ToolError;
 
-/// Longer frames are no frames: the longest record has fewer than 200 bytes.
+/// Limit above which a frame is invalid, bytes; the longest record has fewer than 200.
 const LONGEST_FRAME: usize = 4096;
 
-/// What did not decode.
+/// Input that did not decode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Skipped {
-    /// Frames.
+    /// Frames that did not decode.
     pub frames: u64,
-    /// Bytes of them.
+    /// Bytes in those frames.
     pub bytes: u64,
-    /// Bytes of them before the first frame that decoded: a listener who joined late.
+    /// Bytes before the first frame that decoded: the listener joined late.
     pub first_bytes: u64,
-    /// Bytes at the end without an end of their frame.
+    /// Bytes at the end of an incomplete frame.
     pub cut_bytes: u64,
 }
 
@@ -35,7 +36,7 @@ pub struct Skipped {
 pub struct Decoder {
     table: Table,
     frame: Vec<u8>,
-    /// Bytes of a frame that was too long to be kept.
+    /// Bytes of a frame beyond [`LONGEST_FRAME`].
     overlong: u64,
     decoded: u64,
     skipped: Skipped,
@@ -45,7 +46,7 @@ impl Decoder {
     /// A decoder with the texts of an image (ELF).
     ///
     /// # Errors
-    /// Not an image, one of another program or without `defmt`, or of another version of `defmt`.
+    /// The file is no image, belongs to another program, or has no `defmt` or another version of it.
     pub fn new(image: &[u8]) -> Result<Self, ToolError> {
         let table = Table::parse(image)
             .map_err(|error| ToolError::input(format!("cannot be used as an image: {error}")))?
@@ -63,7 +64,7 @@ impl Decoder {
         Ok(Self { table, frame: Vec::new(), overlong: 0, decoded: 0, skipped: Skipped::default() })
     }
 
-    /// Takes bytes as they come, in pieces of any size; hands on each line.
+    /// Takes bytes in pieces of any size; passes each line on.
     pub fn feed(&mut self, bytes: &[u8], mut line: impl FnMut(&str)) {
         for &byte in bytes {
             if byte != 0 {
@@ -89,7 +90,7 @@ impl Decoder {
         }
     }
 
-    /// The stream is at its end: what did not decode of it.
+    /// Ends the stream and returns what did not decode.
     pub fn finish(&mut self) -> Skipped {
         self.skipped.cut_bytes += self.frame.len() as u64 + self.overlong;
         self.frame.clear();
@@ -112,12 +113,12 @@ impl Decoder {
         }
     }
 
-    /// The frame that is complete, as text.
+    /// Decodes the completed frame to text.
     fn frame(&self) -> Option<String> {
         if self.overlong > 0 {
             return None;
         }
-        // The decoder trusts its image; bytes that only look like a frame must not end the tool.
+        // The decoder trusts its image; bytes that only look like a frame must not panic the tool.
         catch_unwind(AssertUnwindSafe(|| {
             let mut stream = self.table.new_stream_decoder();
             stream.received(&self.frame);
@@ -130,7 +131,7 @@ impl Decoder {
 }
 
 impl Skipped {
-    /// In words; `None` where everything decoded.
+    /// Summary in words; `None` where everything decoded.
     #[must_use]
     pub fn words(&self) -> Option<String> {
         let mut words = Vec::new();

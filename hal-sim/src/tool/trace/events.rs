@@ -1,31 +1,31 @@
-//! The timeline: what happened, in the order it was told, in words.
+//! The timeline in words: events in the order in which they were reported.
 //!
-//! What a person who straps the leg on must not overlook (a fault, a crash, a refusal) has a weight of its own and is printed
-//! before the tables and again behind the verdict.
+//! Faults, crashes and refusals have a weight of their own: the person who straps the leg on must
+//! not overlook them. They are printed before the tables and again behind the verdict.
 
 use scarab::trace::{GRAMMAR, Line, LineError};
 
 use super::fields::{Board, Boot, State, hex, list, text, value};
 
-/// How much it matters.
+/// Severity of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Weight {
-    /// For the record.
+    /// Information only.
     Note,
-    /// Something was refused, lost or not as it should be.
+    /// Something was refused, lost or out of order.
     Warning,
-    /// The drive stopped, or may not be enabled.
+    /// The drive stopped, or must not be enabled.
     Fault,
 }
 
-/// Something that happened.
+/// One event of the timeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
-    /// Since the start, s; unknown of records without a tick.
+    /// Time since the start, s; unknown for records without a tick.
     pub time_s: Option<f64>,
-    /// How much it matters.
+    /// Severity.
     pub weight: Weight,
-    /// In words.
+    /// Description.
     pub words: String,
 }
 
@@ -49,10 +49,10 @@ impl Event {
 
 type Read<T> = Result<T, LineError<'static>>;
 
-/// What a record means for the timeline; `None` for kinds that do not belong there.
+/// Event of a record; `None` for kinds that do not belong to the timeline.
 ///
 /// # Errors
-/// A key that is missing, a value that is none.
+/// A key is missing or a value is invalid.
 pub fn of(line: &Line<'_>, servo_hz: f64) -> Read<Option<Event>> {
     let tick = || -> Read<Option<f64>> { Ok(Some(f64::from(value::<u32>(line, "tick")?) / servo_hz)) };
     let event = |time_s, weight, words| Ok(Some(Event { time_s, weight, words }));
@@ -127,7 +127,7 @@ fn boot(line: &Line<'_>) -> Read<Option<Event>> {
     Ok(Some(Event { time_s: None, weight, words }))
 }
 
-/// Which board, in words.
+/// Description of the board.
 #[must_use]
 pub fn board(board: &Board) -> String {
     if is_emulated(board) {
@@ -147,7 +147,7 @@ pub fn board(board: &Board) -> String {
     )
 }
 
-/// Its plant is the one of the leg file, so that the truth is known.
+/// Returns whether the board is emulated; then its plant is that of the leg file and the truth is known.
 #[must_use]
 pub fn is_emulated(board: &Board) -> bool {
     (board.uid0, board.uid1, board.uid2) == (0, 0, 0)
@@ -160,7 +160,7 @@ fn crash(line: &Line<'_>) -> Read<String> {
         u32::MAX => String::new(),
         address => format!(", address {address:#010x}"),
     };
-    // Older images do not tell these.
+    // Older images do not send these keys.
     let clock = |key| value::<u32>(line, key);
     let kept = match (clock("released"), clock("kept")) {
         (Ok(released), Ok(kept)) => {
@@ -168,7 +168,7 @@ fn crash(line: &Line<'_>) -> Read<String> {
         }
         _ => String::new(),
     };
-    // Zero is where nothing is known: a panic has its file and line instead.
+    // Zero means unknown: a panic has its file and line instead.
     let known = |words: &str, key| match hex(line, key)? {
         0 => Read::Ok(String::new()),
         known => Ok(format!(", {words} {known:#010x}")),
@@ -182,7 +182,7 @@ fn crash(line: &Line<'_>) -> Read<String> {
     ))
 }
 
-/// What the leg does, in words.
+/// Description of the leg's activity.
 #[must_use]
 pub fn doing(state: &State) -> String {
     let phase = if state.phase == "-" { String::new() } else { format!(", {}", spaced(&state.phase)) };
@@ -242,7 +242,7 @@ fn joint(line: &Line<'_>) -> Read<String> {
     })
 }
 
-/// A word of the grammar as it is read.
+/// Replaces the underscores of a word by spaces.
 fn spaced(word: &str) -> String {
     word.replace('_', " ")
 }

@@ -1,11 +1,11 @@
-//! Records to values: every key that a report needs, or which one is missing.
+//! Reads records into typed values; a missing key or invalid value is an error.
 
 use scarab::trace::{Line, LineError};
 
 /// Most joints of a leg.
 pub const JOINTS: usize = 3;
 
-/// A list of as many as there are.
+/// Reads a list of values of any length.
 pub fn list<V: std::str::FromStr>(line: &Line<'_>, key: &'static str) -> Result<Vec<V>, LineError<'static>> {
     let wrong = LineError::Value(key);
     let text = text(line, key)?;
@@ -16,25 +16,25 @@ pub fn list<V: std::str::FromStr>(line: &Line<'_>, key: &'static str) -> Result<
     inside.split(", ").map(|item| item.parse().map_err(|_| wrong)).collect()
 }
 
-/// A value.
+/// Reads a value.
 pub fn value<V: std::str::FromStr>(line: &Line<'_>, key: &'static str) -> Result<V, LineError<'static>> {
     text(line, key)?.parse().map_err(|_| LineError::Value(key))
 }
 
-/// A word.
+/// Reads a word.
 pub fn text(line: &Line<'_>, key: &'static str) -> Result<String, LineError<'static>> {
-    // The line's own lookup ties the error to the line's text; here only the key is wanted.
+    // The line's own lookup ties the error to the line's text; only the key is needed here.
     line.text(key).map(str::to_owned).map_err(|_| LineError::Missing(key))
 }
 
-/// A number in base 16.
+/// Reads a hexadecimal number.
 pub fn hex(line: &Line<'_>, key: &'static str) -> Result<u32, LineError<'static>> {
     let text = text(line, key)?;
     let digits = text.strip_prefix("0x").ok_or(LineError::Value(key))?;
     u32::from_str_radix(digits, 16).map_err(|_| LineError::Value(key))
 }
 
-/// What is wrong, in words.
+/// Description of an error.
 #[must_use]
 pub fn words(kind: &str, error: LineError<'_>) -> String {
     match error {
@@ -45,7 +45,7 @@ pub fn words(kind: &str, error: LineError<'_>) -> String {
     }
 }
 
-/// Declares a record that is read: its fields are the keys, read in the way that is named.
+/// Declares a record: its fields are the keys, each read by the named function.
 macro_rules! told {
     ($(#[$about:meta])* $name:ident { $( $(#[$what:meta])* $field:ident: $type:ty = $way:ident, )* }) => {
         $(#[$about])*
@@ -53,10 +53,10 @@ macro_rules! told {
         pub struct $name { $( $(#[$what])* pub $field: $type, )* }
 
         impl $name {
-            /// Reads a record.
+            /// Reads the record from a line.
             ///
             /// # Errors
-            /// A key that is missing, a value that is none.
+            /// A key is missing or a value is invalid.
             pub fn read(line: &Line<'_>) -> Result<Self, LineError<'static>> {
                 Ok(Self { $( $field: $way(line, stringify!($field))?, )* })
             }
@@ -65,112 +65,112 @@ macro_rules! told {
 }
 
 told! {
-    /// The image started.
+    /// Start of the image.
     Boot {
-        /// Of the records.
+        /// Version of the records' grammar.
         grammar: u8 = value,
-        /// Of the firmware.
+        /// Version of the firmware.
         version: String = text,
-        /// It is built for.
+        /// Leg that the image is built for.
         leg: String = text,
-        /// Of the leg.
+        /// Number of joints.
         joints: usize = value,
-        /// Base parameters.
+        /// Number of base parameters.
         base: usize = value,
-        /// Ticks per second.
+        /// Servo ticks per second.
         servo_hz: u32 = value,
-        /// Samples per second.
+        /// Logged samples per second.
         log_hz: u32 = value,
-        /// Why it started.
+        /// Cause of the reset.
         reset: String = text,
     }
 }
 told! {
-    /// Which board.
+    /// Identity of the board.
     Board {
-        /// Unique number.
+        /// Unique number of the processor, first word.
         uid0: u32 = hex,
-        /// The same.
+        /// Unique number, second word.
         uid1: u32 = hex,
-        /// The same.
+        /// Unique number, third word.
         uid2: u32 = hex,
-        /// Burnt in.
+        /// Hardware version burnt into the board.
         version: u8 = value,
-        /// The same.
+        /// Minor hardware version.
         version_minor: u8 = value,
-        /// The same.
+        /// Voltage variant of the hardware.
         version_volt: u8 = value,
-        /// Of the processor.
+        /// Clock of the processor, Hz.
         clock_hz: u32 = value,
     }
 }
 told! {
-    /// The search goes on.
+    /// Progress of a running search.
     Progress {
         /// Servo tick.
         tick: u32 = value,
-        /// Of the swarm.
+        /// Iterations the swarm has run.
         iterations: u32 = value,
-        /// Of the swarm.
+        /// Evaluations of the swarm's cost.
         evaluations: u32 = value,
-        /// Above least squares.
+        /// Chi-square of the best cost above least squares.
         excess_chi2: f32 = value,
     }
 }
 told! {
-    /// What the leg does.
+    /// State of the leg.
     State {
         /// Servo tick.
         tick: u32 = value,
-        /// Of the drive.
+        /// State of the drive.
         drive: String = text,
-        /// Of the leg.
+        /// Activity of the leg.
         activity: String = text,
-        /// Of the activity.
+        /// Phase of the activity.
         phase: String = text,
-        /// Of the validation, from 1.
+        /// Motion of the validation, from 1.
         motion: u8 = value,
     }
 }
 told! {
     /// One sample of the log.
     Sample {
-        /// Last of its servo ticks.
+        /// Last of the sample's eight servo ticks.
         tick: u32 = value,
-        /// What for.
+        /// Purpose: training or validation.
         segment: String = text,
-        /// Of the validation, from 1.
+        /// Motion of the validation, from 1.
         motion: u8 = value,
-        /// Of the model.
+        /// Joint angles in the model's convention.
         position_rad: Vec<f32> = list,
-        /// Of the model.
+        /// Joint torques in the model's convention.
         torque_nm: Vec<f32> = list,
-        /// Sums.
+        /// Sums of eight encoder counts, in the drive's sign: the same angles, exact.
         counts: Vec<i32> = list,
     }
 }
 told! {
-    /// How the loops do.
+    /// Statistics of the loops.
     Loops {
         /// Servo tick.
         tick: u32 = value,
-        /// Longest since the record before.
+        /// Longest current tick since the last record.
         current_worst: u32 = value,
-        /// Longest since the record before.
+        /// Longest servo tick since the last record.
         servo_worst: u32 = value,
-        /// Since the start.
+        /// Current ticks missed since the start.
         current_missed: u32 = value,
-        /// Since the start.
+        /// Servo ticks missed since the start.
         servo_missed: u32 = value,
-        /// Of the servo.
+        /// Processor cycles per servo tick.
         cycles_per_tick: u32 = value,
-        /// Deepest.
+        /// Deepest use of the stack, bytes.
         stack_used: u32 = value,
-        /// There are.
+        /// Size of the stack, bytes.
         stack_bytes: u32 = value,
-        /// Since the start.
+        /// Samples lost since the start.
         samples_lost: u32 = value,
-        /// Since the start.
+        /// Records lost since the start.
         records_lost: u32 = value,
     }
 }
@@ -179,13 +179,13 @@ told! {
     Supply {
         /// Servo tick.
         tick: u32 = value,
-        /// Lowest since the record before.
+        /// Lowest bus voltage since the last record.
         bus_low_v: f32 = value,
-        /// Highest since the record before.
+        /// Highest bus voltage since the last record.
         bus_high_v: f32 = value,
-        /// Of each bridge.
+        /// Temperature of each bridge.
         bridge_c: Vec<f32> = list,
-        /// Of the chopper.
+        /// Temperature of the brake chopper.
         chopper_c: f32 = value,
     }
 }

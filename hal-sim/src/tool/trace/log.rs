@@ -1,4 +1,4 @@
-//! The 500 Hz log of a trace as recordings that `replay` reads, one motion a file.
+//! Writes the 500 Hz log of a trace as recordings for `replay`, one motion per file.
 
 use std::path::Path;
 
@@ -12,22 +12,22 @@ use crate::tool::identify::write_log;
 use crate::tool::leg_file::LegFile;
 use crate::with_leg_size;
 
-/// What was written.
+/// Size of a written recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// Samples.
+    /// Samples written.
     pub samples: usize,
-    /// Samples that are missing between them.
+    /// Samples missing between them.
     pub missing: u64,
 }
 
-/// Number of the motion identified from; those that were only predicted follow.
+/// Number of the motion identified from; predicted motions follow.
 pub const TRAINING: u8 = 0;
 
-/// Writes one motion of the last identification that logged it: anatomical angles and torques.
+/// Writes one motion of the last identification that logged it, as anatomical angles and torques.
 ///
 /// # Errors
-/// It was not logged, the leg has other joints, or the file cannot be written.
+/// The motion was not logged, the leg has another number of joints, or the file cannot be written.
 pub fn write(trace: &Trace, leg: &LegFile, motion: u8, path: &Path) -> Result<Written, ToolError> {
     let of_motion = || trace.log.iter().filter(|(_, sample)| number(sample) == Some(motion));
     let Some((last, _)) = of_motion().next_back() else {
@@ -44,7 +44,7 @@ pub fn write(trace: &Trace, leg: &LegFile, motion: u8, path: &Path) -> Result<Wr
         let (told, own) = (sample.counts.len(), leg.joints.len());
         return Err(ToolError::input(format!("--csv: the log is of {told} joints, the leg has {own}")));
     }
-    // An identification that was begun twice logs its motion twice: the last one counts.
+    // A restarted identification logs its motion twice: the last one counts.
     let begins = samples.windows(2).rposition(|pair| is_another_motion(pair[0].tick, pair[1].tick));
     let samples = &samples[begins.map_or(0, |before| before + 1)..];
     let steps =
@@ -54,7 +54,7 @@ pub fn write(trace: &Trace, leg: &LegFile, motion: u8, path: &Path) -> Result<Wr
     Ok(Written { samples: samples.len(), missing })
 }
 
-/// The other motions that were logged, as a list; empty where there are none.
+/// Comma-separated list of the other logged motions; empty without any.
 #[must_use]
 pub fn others(trace: &Trace, motion: u8) -> String {
     let mut numbers: Vec<u8> = trace.log.iter().filter_map(|(_, sample)| number(sample)).collect();
@@ -64,7 +64,7 @@ pub fn others(trace: &Trace, motion: u8) -> String {
     others.collect::<Vec<_>>().join(", ")
 }
 
-/// Of the motion that a sample belongs to.
+/// Number of the motion that a sample belongs to.
 fn number(sample: &Sample) -> Option<u8> {
     match sample.segment.as_str() {
         "training" => Some(TRAINING),
@@ -73,7 +73,7 @@ fn number(sample: &Sample) -> Option<u8> {
     }
 }
 
-/// The ticks began anew, or nothing was logged for longer than a gap may be.
+/// Returns whether the ticks restarted, or the log paused for longer than a gap may last.
 fn is_another_motion(before: u32, after: u32) -> bool {
     const LONGEST_TICKS: u32 = scarab::servo::SERVO_RATE_HZ;
     after <= before || after - before > LONGEST_TICKS

@@ -1,49 +1,49 @@
-//! How loops, stack and supply did over a whole trace.
+//! Statistics of loops, stack and supply over a whole trace.
 
 use serde::Serialize;
 
 use super::fields::{Loops, Supply};
 
-/// Over all records; counts since a start are added up over the starts.
+/// Statistics over all records; counts since a start are summed over the starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LoopReport {
     /// Longest current tick, processor cycles (instructions in the emulator).
     pub current_worst: u32,
-    /// Longest servo tick, the same; interrupted by current ticks.
+    /// Longest servo tick, processor cycles, including the current ticks that interrupt it.
     pub servo_worst: u32,
-    /// Current ticks that came late or not at all.
+    /// Current ticks that were late or missed.
     pub current_missed: u32,
-    /// Servo ticks, the same.
+    /// Servo ticks that were late or missed.
     pub servo_missed: u32,
-    /// Of the servo.
+    /// Processor cycles per servo tick.
     pub cycles_per_tick: u32,
-    /// Deepest.
+    /// Deepest use of the stack, bytes.
     pub stack_used: u32,
-    /// There are.
+    /// Size of the stack, bytes.
     pub stack_bytes: u32,
     /// Logged samples that identification did not take in time.
     pub samples_lost: u32,
-    /// Records that the board gave up because nobody read.
+    /// Records that the board discarded because its buffer was not read.
     pub records_lost: u32,
 }
 
-/// Lowest, highest.
+/// Range of the supply, and highest temperatures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SupplySeen {
-    /// V.
+    /// Lowest bus voltage, V.
     pub low_v: f32,
-    /// V.
+    /// Highest bus voltage, V.
     pub high_v: f32,
     /// Hottest bridge, degrees Celsius.
     pub bridge_c: f32,
-    /// Degrees Celsius.
+    /// Temperature of the brake chopper, degrees Celsius.
     pub chopper_c: f32,
 }
 
-/// Collects records.
+/// Collects the records of loops and supply.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Statistics {
-    /// Of earlier starts.
+    /// Sums over earlier starts.
     before: LoopReport,
     now: Option<LoopReport>,
     seen: bool,
@@ -51,7 +51,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// A record of loops.
+    /// Takes a record of the loops.
     pub fn take(&mut self, loops: &Loops) {
         let now = self.now.unwrap_or_default();
         self.seen = true;
@@ -68,7 +68,7 @@ impl Statistics {
         });
     }
 
-    /// A record of the supply. What is not a number counts for nothing.
+    /// Takes a record of the supply; values that are not numbers are ignored.
     pub fn take_supply(&mut self, supply: &Supply) {
         let before = self.supply.unwrap_or(SupplySeen {
             low_v: f32::NAN,
@@ -84,7 +84,7 @@ impl Statistics {
         });
     }
 
-    /// The board started anew: its counts begin at zero.
+    /// Starts a new count: the board restarted and its counts begin at zero.
     pub fn restart(&mut self) {
         if let Some(all) = self.loops() {
             self.before = all;
@@ -92,7 +92,7 @@ impl Statistics {
         self.now = None;
     }
 
-    /// Over all starts; `None` where nothing was told.
+    /// Statistics over all starts; `None` without a record.
     #[must_use]
     pub fn loops(&self) -> Option<LoopReport> {
         if !self.seen {
@@ -119,7 +119,7 @@ impl Statistics {
         })
     }
 
-    /// In words, a line each.
+    /// Description, a line each.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
@@ -153,7 +153,7 @@ impl Statistics {
         lines
     }
 
-    /// What should not be, in words.
+    /// Complaints: missed ticks, lost samples and records.
     #[must_use]
     pub fn complaints(&self) -> Vec<String> {
         let Some(loops) = self.loops() else { return Vec::new() };

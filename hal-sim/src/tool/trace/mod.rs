@@ -1,25 +1,26 @@
-//! `trace`: what a board told, read back and reported as a run is.
+//! `trace`: reads the records of a board and reports them like a simulated run.
 //!
-//! Why: the board identifies on its own and tells it in records (`scarab::trace`). Whoever listened, with a debug probe, in the
-//! emulator or from a file a year later, wants the tables, the JSON, the page and the exit code that a simulated run has.
+//! Why: the board identifies on its own and logs the result as records (`scarab::trace`). A
+//! listener may be a debug probe, the emulator, or a file read a year later. Each gets the tables,
+//! JSON, page and exit code of a simulated run.
 //!
 //! ```text
 //! defmt stream + image --decode--> lines --read--> Trace --report--> RunReport: tables, JSON, page
 //! text of a probe's log ----------/              \--log--> recording for `replay`
 //! ```
 //!
-//! | module | what lives there |
+//! | module | contents |
 //! | --- | --- |
 //! | [`decode`] | frames of a `defmt` stream to lines |
-//! | [`text`] | the record in a line of text, whatever a logger put around it |
-//! | [`read`] | [`Trace`]: lines to what was told, in order, with what was lost |
+//! | [`text`] | finds the record in a line of text, whatever a logger put around it |
+//! | [`read`] | [`Trace`]: lines to records in order, with what was lost |
 //! | [`fields`] | records to values |
-//! | [`told`] | one identification's result as it was told |
+//! | [`told`] | records of one identification's result |
 //! | [`events`] | the timeline in words |
 //! | [`loops`] | statistics of loops, stack and supply |
 //! | [`report`] | the last complete result as a run's report |
-//! | [`log`], [`curves`] | the 500 Hz log as a recording, and drawn |
-//! | [`run`] | all of it for the command line |
+//! | [`log`], [`curves`] | the 500 Hz log as a recording, and as curves |
+//! | [`run`] | the whole trace for the command line |
 
 pub mod curves;
 pub mod decode;

@@ -1,9 +1,11 @@
-//! Lines to what was told: in order, with what was lost on the way.
+//! Reads lines into a [`Trace`]: records in order, with what was lost on the way.
 //!
-//! Nothing on the board waits for a listener, so a trace may begin late, have gaps and end anywhere. What is missing is told
-//! by the records' numbers; what cannot be read is told with its line; kinds that are not known are passed over.
+//! The board never waits for a listener, so a trace may begin late, have gaps and end anywhere. The
+//! records' numbers show what is missing. Records that cannot be read are reported with their line;
+//! unknown kinds are skipped.
 //!
-//! Cost: the records of a result, the log (60 bytes a sample) and the timeline are kept; everything else is counted.
+//! Cost: the records of a result, the log (60 bytes per sample) and the timeline are stored;
+//! everything else is counted.
 
 use scarab::trace::Line;
 
@@ -13,71 +15,71 @@ use super::loops::Statistics;
 use super::text;
 use super::told::{KINDS, Told};
 
-/// Of the servo, unless the board says otherwise.
+/// Servo rate, Hz, unless the board reports another.
 const SERVO_HZ: f64 = scarab::servo::SERVO_RATE_HZ as f64;
-/// More complaints about lines are counted, not kept.
+/// Limit of stored complaints about lines; further ones are only counted.
 const MOST_PROBLEMS: usize = 20;
 
-/// Records that were lost, by number.
+/// Range of lost records, by number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
-    /// The first that is missing.
+    /// First missing record.
     pub first: u32,
-    /// The last that is missing.
+    /// Last missing record.
     pub last: u32,
 }
 
 impl Gap {
-    /// Records.
+    /// Number of missing records.
     #[must_use]
     pub fn count(&self) -> u64 {
         u64::from(self.last - self.first) + 1
     }
 }
 
-/// Everything that was told.
+/// Contents of a trace.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
-    /// The last start.
+    /// Record of the last start.
     pub boot: Option<Boot>,
-    /// The last one told of.
+    /// Last board that was reported.
     pub board: Option<Board>,
-    /// How often a start was told.
+    /// Number of reported starts.
     pub starts: u32,
-    /// In order.
+    /// Timeline, in order.
     pub events: Vec<Event>,
     /// Complete results, in order.
     pub results: Vec<Told>,
-    /// Why other results are not complete, in order.
+    /// Reasons why other results are incomplete, in order.
     pub incomplete: Vec<String>,
-    /// What the leg did last.
+    /// Last reported state of the leg.
     pub state: Option<State>,
-    /// Of a search that goes on.
+    /// Progress of a running search.
     pub progress: Option<Progress>,
-    /// Loops, stack, supply.
+    /// Statistics of loops, stack and supply.
     pub statistics: Statistics,
-    /// The 500 Hz log, in order; each sample with the number of results before it.
+    /// 500 Hz log in order; each sample with the number of results before it.
     pub log: Vec<(usize, Sample)>,
-    /// Lost records.
+    /// Gaps in the numbering of the records.
     pub gaps: Vec<Gap>,
-    /// Records before the first that was heard.
+    /// Records sent before the first that was received.
     pub unheard: u32,
-    /// Lines that are records but cannot be read, and why.
+    /// Unreadable records, and why; up to a limit.
     pub problems: Vec<String>,
-    /// How many there are of them.
+    /// Number of unreadable records.
     pub problem_count: u64,
-    /// Lines.
+    /// Lines read.
     pub lines: u64,
-    /// Records.
+    /// Records read.
     pub records: u64,
-    /// Records of kinds that are not known here.
+    /// Records of unknown kinds.
     pub unknown: u64,
     pending: Option<Told>,
     next: Option<u32>,
 }
 
 impl Trace {
-    /// Takes a line, whatever it holds.
+    /// Takes any line, with or without a record.
     pub fn push(&mut self, line: &str) {
         self.lines += 1;
         let Some(record) = text::record(line) else { return };
@@ -90,18 +92,18 @@ impl Trace {
         }
     }
 
-    /// No more lines will come: a result that was being told is incomplete.
+    /// Ends the trace: a result that is still open is incomplete.
     pub fn finish(&mut self) {
         self.abandon();
     }
 
-    /// Records that were lost.
+    /// Number of lost records.
     #[must_use]
     pub fn lost(&self) -> u64 {
         self.gaps.iter().map(Gap::count).sum()
     }
 
-    /// Ticks of the servo per second.
+    /// Servo ticks per second.
     #[must_use]
     pub fn servo_hz(&self) -> f64 {
         let told = self.boot.as_ref().map(|boot| f64::from(boot.servo_hz)).filter(|rate| *rate > 0.0);
@@ -113,7 +115,7 @@ impl Trace {
         self.events.iter().filter(|event| event.weight == Weight::Fault)
     }
 
-    /// What should not be and is no fault, in order.
+    /// Warnings, in order.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let events = self.events.iter().filter(|event| event.weight == Weight::Warning);
@@ -123,7 +125,7 @@ impl Trace {
         words
     }
 
-    /// Why a trace without a complete result has none: how far it went.
+    /// Explains why a trace has no complete result, and how far it went.
     #[must_use]
     pub fn without_result(&self) -> String {
         if self.records == 0 {
@@ -155,7 +157,7 @@ impl Trace {
         }
     }
 
-    /// Keeps count of the records' numbers.
+    /// Checks the numbering of the records.
     fn number(&mut self, number: u32, starts: bool) {
         match self.next {
             None => self.unheard = number,
@@ -171,7 +173,7 @@ impl Trace {
         self.next = Some(number.saturating_add(1));
     }
 
-    /// What was going on ends with the image.
+    /// Ends whatever was running when the image restarted.
     fn restart(&mut self) {
         self.abandon();
         self.statistics.restart();
@@ -206,7 +208,7 @@ impl Trace {
             "board" => self.board = Some(Board::read(line)?),
             "state" => {
                 let state = State::read(line)?;
-                // The search runs while the leg settles and until it is done.
+                // The search runs while the leg settles and until the search is done.
                 if !["settle", "solve"].contains(&state.phase.as_str()) {
                     self.progress = None;
                 }
@@ -234,7 +236,7 @@ impl Trace {
         Ok(())
     }
 
-    /// A record of a result: `solver` begins one, `end` ends it.
+    /// Takes a record of a result: `solver` begins one, `end` ends it.
     fn result(&mut self, line: &Line<'_>) -> Result<(), scarab::trace::LineError<'static>> {
         if line.kind() == "solver" {
             self.abandon();
@@ -273,7 +275,7 @@ impl Trace {
         }
     }
 
-    /// What was lost on the way, in words.
+    /// Description of what was lost on the way.
     fn loss(&self) -> Vec<String> {
         let mut words = Vec::new();
         if self.unheard > 0 {

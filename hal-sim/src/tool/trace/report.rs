@@ -1,8 +1,9 @@
-//! The last complete result of a trace as the report of a run: same schema, same names.
+//! Reports the last complete result of a trace as a run, with the same schema and names.
 //!
-//! Values, sigma, fits, findings and verdict are the board's own. Names, groups and units come from the leg file, which must be
-//! the one the image was built from: joints, base parameters and their carriers are compared. What the board does not tell
-//! (costs of the searches in double precision, gains of columns) is unknown; truth is known of an emulated board only.
+//! Values, sigma, fits, findings and verdict are the board's own. Names, groups and units come from
+//! the leg file, which must be the one that the image was built from. Joints, base parameters and
+//! their carriers are compared. Values that the board does not send (search costs in double
+//! precision, gains of columns) are unknown. The truth is known for an emulated board only.
 
 use scarab::ident::{Estimate, Estimator, Evidence, Plan, Reason, Selection, Status, Test};
 use scarab::model::Parameter;
@@ -26,31 +27,31 @@ use crate::tool::scale::ScaleReport;
 use crate::tool::setup::{PriorChoice, background};
 use crate::with_leg_size;
 
-/// What else a board told.
+/// Further data of a board's trace.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TraceReport {
     /// Version of the firmware.
     pub firmware: Option<String>,
-    /// Which board.
+    /// Description of the board.
     pub board: Option<String>,
     /// Records read.
     pub records: u64,
     /// Records lost on the way.
     pub lost_records: u64,
-    /// Lines that are records but cannot be read.
+    /// Unreadable lines that contain a record.
     pub unreadable_lines: u64,
-    /// Identifications that were told completely; the last one is reported.
+    /// Complete identifications in the trace; the last one is reported.
     pub identifications: usize,
     /// Faults, crashes and refusals to be enabled, in order.
     pub faults: Vec<String>,
-    /// What else should not be.
+    /// Other warnings.
     pub warnings: Vec<String>,
-    /// How the loops did.
+    /// Statistics of the loops.
     pub loops: Option<LoopReport>,
 }
 
 impl TraceReport {
-    /// Of a trace that is at its end.
+    /// Report of a finished trace.
     #[must_use]
     pub fn of(trace: &Trace) -> Self {
         Self {
@@ -67,10 +68,10 @@ impl TraceReport {
     }
 }
 
-/// The last complete result.
+/// Report of the last complete result.
 ///
 /// # Errors
-/// There is none, or it is not of this leg.
+/// The trace has no complete result, or the result belongs to another leg.
 pub fn run_report(trace: &Trace, leg: &LegFile) -> Result<RunReport, ToolError> {
     let told = trace
         .results
@@ -80,10 +81,10 @@ pub fn run_report(trace: &Trace, leg: &LegFile) -> Result<RunReport, ToolError> 
     with_leg_size!(leg, of_size(trace, told, leg))
 }
 
-/// The leg that the image says it is for.
+/// Compares the leg file with the leg that the image was built for.
 fn check_leg(trace: &Trace, leg: &LegFile) -> Result<(), ToolError> {
     let Some(boot) = &trace.boot else { return Ok(()) };
-    // A word of the grammar holds no space.
+    // Words of the grammar contain no space.
     if boot.leg != "-" && boot.leg != leg.name.replace(' ', "_") {
         return Err(other(leg, format!("the image is built for the leg `{}`", boot.leg)));
     }
@@ -139,7 +140,7 @@ fn of_size<const N: usize, const B: usize>(
             base_parameters: background
                 .kept(&dropped)
                 .map(|base| (background.base_name(base), found.least_squares(base)))
-                // What static friction least squares would have is not told.
+                // The board does not send the static friction of the least-squares solution.
                 .chain(stribeck.iter().map(|found| (surplus_name(found.joint - 1), Number::UNKNOWN)))
                 .collect(),
             cost: Number::UNKNOWN,
@@ -165,13 +166,13 @@ fn of_size<const N: usize, const B: usize>(
     })
 }
 
-/// What is known of the leg beside the trace; a prior only where the board had one.
+/// Background of the leg; a prior only where the board had one.
 pub(super) fn known<const N: usize, const B: usize>(
     trace: &Trace,
     told: &Told,
     leg: &LegFile,
 ) -> Result<Background<N, B>, ToolError> {
-    // Only a prior splits sums and fills in what torque does not see.
+    // Only a prior splits sums and fills in parameters that torque does not determine.
     let split = told.parameters.iter().filter(|told| ["grouped", "prior"].contains(&told.status.as_str()));
     let has_prior = split.into_iter().any(|told| told.value.is_finite() && told.value != 0.0);
     let choice = if has_prior { PriorChoice::Default } else { PriorChoice::None };
@@ -187,7 +188,7 @@ pub(super) fn known<const N: usize, const B: usize>(
     Ok(background)
 }
 
-/// A result beside what is known of its leg.
+/// Result together with the background of its leg.
 pub(super) struct Found<'a, const N: usize, const B: usize> {
     pub background: &'a Background<N, B>,
     pub leg: &'a LegFile,
@@ -195,7 +196,7 @@ pub(super) struct Found<'a, const N: usize, const B: usize> {
 }
 
 impl<const N: usize, const B: usize> Found<'_, N, B> {
-    /// Values and covariance, and what is held at zero; the base parameters must be the leg file's.
+    /// Values, covariance and dropped columns; the base parameters must be the leg file's.
     pub fn base(&self, solver: &Solver) -> Result<(Estimate<f32, B>, [bool; B]), ToolError> {
         let base = &self.background.model.base;
         let rank = base.rank();
@@ -276,7 +277,7 @@ impl<const N: usize, const B: usize> Found<'_, N, B> {
         .collect()
     }
 
-    /// Gains of columns are not told; that of Stribeck friction is where it was found.
+    /// The board does not send the gains of columns, except for detected Stribeck friction.
     fn model_choice(&self, dropped: &[bool; B]) -> Vec<crate::tool::model_choice::ModelChoiceReport> {
         let found = |joint: usize| self.told.stribeck.iter().find(|told| told.joint == joint + 1);
         let gain =
@@ -340,7 +341,7 @@ fn consistent(solver: &Solver) -> ConsistentReport {
     }
 }
 
-/// Unused motions have the names of a simulated run's.
+/// Motions of the validation have the names that a simulated run gives them.
 fn motion_name(motion: usize) -> String {
     let name = motion.checked_sub(1).and_then(|unused| VALIDATION_NAMES.get(unused));
     name.map_or_else(|| format!("motion {motion}"), |name| (*name).to_owned())
@@ -381,7 +382,7 @@ fn finding(told: &super::told::Finding) -> Result<FindingReport, ToolError> {
     Ok(FindingReport::new(&evidence, &VALIDATION_NAMES))
 }
 
-/// A word of a closed list.
+/// Looks a word up in a closed list.
 fn word(told: &str, all: &[&'static str], what: &str) -> Result<&'static str, ToolError> {
     all.iter().find(|word| **word == told).copied().ok_or_else(|| {
         ToolError::input(format!(

@@ -1,4 +1,4 @@
-//! All of a trace for the command line: read, told in words, reported.
+//! Reads, describes and reports a trace for the command line.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -12,10 +12,10 @@ use crate::tool::files::NewFile;
 
 /// Bytes read at a time.
 const PIECE: usize = 64 * 1024;
-/// A line without an end is no line.
+/// Limit of a line, bytes; the rest is discarded.
 const LONGEST_LINE: usize = 64 * 1024;
 
-/// Reads a file, or `-` for standard input; writes the records as lines where `text` says.
+/// Reads a file, or `-` for standard input; writes the records as lines to `text`.
 pub fn read(source: &Path, image: Option<&Path>, text: Option<&Path>) -> Result<Trace, ToolError> {
     let cannot = |path: &Path, error: &dyn std::fmt::Display| {
         ToolError::input(format!("{}: cannot be read: {error}", path.display()))
@@ -49,7 +49,7 @@ pub fn read(source: &Path, image: Option<&Path>, text: Option<&Path>) -> Result<
     reader.finish(source)
 }
 
-/// Bytes to a trace, text or `defmt` frames.
+/// Reads bytes of text or `defmt` frames into a trace.
 pub struct StreamReader {
     decoder: Option<Decoder>,
     trace: Trace,
@@ -59,13 +59,13 @@ pub struct StreamReader {
 }
 
 impl StreamReader {
-    /// Frames where there is a decoder, text where there is none.
+    /// Creates a reader of frames if there is a decoder, of text otherwise.
     #[must_use]
     pub fn new(decoder: Option<Decoder>) -> Self {
         Self { decoder, trace: Trace::default(), line: Vec::new(), zeros: 0, text: None }
     }
 
-    /// Takes bytes as they come.
+    /// Takes the next bytes.
     ///
     /// # Errors
     /// The file of lines cannot be written.
@@ -93,10 +93,10 @@ impl StreamReader {
         Ok(())
     }
 
-    /// The stream is at its end. `source` is named in errors.
+    /// Ends the stream. Errors name `source`.
     ///
     /// # Errors
-    /// There is no record in it, or the file of lines cannot be written.
+    /// The stream contains no record, or the file of lines cannot be written.
     pub fn finish(mut self, source: &Path) -> Result<Trace, ToolError> {
         if !self.line.is_empty() {
             push(&mut self.trace, &mut self.text, &String::from_utf8_lossy(&self.line))?;
@@ -125,7 +125,7 @@ impl StreamReader {
     }
 }
 
-/// A line to the trace, and its record to the file of lines.
+/// Adds a line to the trace, and its record to the file of lines.
 fn push(trace: &mut Trace, text: &mut Option<(PathBuf, NewFile)>, line: &str) -> Result<(), ToolError> {
     trace.push(line);
     if let (Some((path, out)), Some(record)) = (text, super::text::record(line)) {
@@ -134,7 +134,7 @@ fn push(trace: &mut Trace, text: &mut Option<(PathBuf, NewFile)>, line: &str) ->
     Ok(())
 }
 
-/// Timeline and loops, to stand before the tables.
+/// Timeline and loops, printed before the tables.
 #[must_use]
 pub fn preface(trace: &Trace) -> String {
     let mut lines: Vec<String> = trace.events.iter().map(Event::line).collect();
@@ -158,7 +158,7 @@ fn count(count: u64, words: &str) -> String {
     if count == 0 { String::new() } else { format!(", {count} {words}") }
 }
 
-/// What must not be overlooked, to stand behind everything.
+/// Faults and warnings, printed after everything else.
 #[must_use]
 pub fn attention(trace: &Trace) -> String {
     let faults: Vec<String> = trace.faults().map(|event| format!("  !! {}", event.words)).collect();

@@ -1,13 +1,14 @@
-//! The record in a line of text.
+//! Finds the record in a line of text.
 //!
-//! A debug probe's program puts time, level, place or colours around what the board told. A record is found where a kind is
-//! followed by ` n=` and digits: at the start of the line any kind, behind something else only one that is known.
+//! A debug probe's program puts time, level, source location or colours around the board's line. A
+//! record is a kind followed by ` n=` and digits. At the start of a line any kind is accepted,
+//! elsewhere only a known one.
 
 use std::borrow::Cow;
 
 use scarab::trace::{Line, LineError, Record};
 
-/// A kind of this version's grammar.
+/// Returns whether the grammar of this version has the kind.
 #[must_use]
 pub fn is_known(kind: &str) -> bool {
     Record::<1>::FORMATS
@@ -15,7 +16,7 @@ pub fn is_known(kind: &str) -> bool {
         .any(|format| format.strip_prefix(kind).is_some_and(|rest| rest.starts_with(' ')))
 }
 
-/// The record's part of a line; `None` where there is none.
+/// Record within a line; `None` for a line without one.
 #[must_use]
 pub fn record(line: &str) -> Option<Cow<'_, str>> {
     let line = without_colours(line);
@@ -26,7 +27,7 @@ pub fn record(line: &str) -> Option<Cow<'_, str>> {
     })
 }
 
-/// Where the record begins and ends.
+/// Start and end of the record.
 fn place(line: &str) -> Option<(usize, usize)> {
     let trimmed = line.trim_end();
     for (at, _) in trimmed.match_indices(" n=") {
@@ -44,7 +45,7 @@ fn place(line: &str) -> Option<(usize, usize)> {
     None
 }
 
-/// Without the place in the source that a logger puts behind, ` (scarab src/leg/control.rs:12)`.
+/// End of the record without the source location that a logger appends, ` (scarab src/leg/control.rs:12)`.
 fn end(line: &str, start: usize) -> usize {
     let without = line.ends_with(')').then(|| line.rfind(" (")).flatten();
     match without {
@@ -63,7 +64,7 @@ fn is_number(digits: &str) -> bool {
     !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Without terminal colours (`ESC [ ... letter`).
+/// Removes terminal colours (`ESC [ ... letter`).
 fn without_colours(line: &str) -> Cow<'_, str> {
     if !line.contains('\u{1b}') {
         return Cow::Borrowed(line);
@@ -111,7 +112,7 @@ mod tests {
         ] {
             assert_eq!(record(line), None, "{line}");
         }
-        // A kind that this version does not know stands alone.
+        // Without a prefix, an unknown kind is accepted too.
         assert_eq!(record("later_kind n=7 a=1").as_deref(), Some("later_kind n=7 a=1"));
     }
 }

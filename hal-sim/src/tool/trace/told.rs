@@ -1,206 +1,207 @@
-//! One identification's result as it was told, record by record.
+//! Records of one identification's result.
 //!
-//! It is complete when its `end` counts as many records as were read, its verdict among them with all reasons. Nothing else is
-//! reported: a value that was lost must not look like one that is not known, nor a refusal like an acceptance.
+//! A result is complete when the count in its `end` equals the records read, and its verdict came
+//! with all reasons. Incomplete results are not reported. A lost value must not look like an
+//! unknown one, nor a rejection like an acceptance.
 
 use scarab::trace::{Line, LineError};
 
 use super::fields::{text, told, value};
 
 told! {
-    /// The solver.
+    /// How the result was found.
     Solver {
         /// One-time or sequential.
         plan: String = text,
-        /// Of the swarm.
+        /// Seed of the swarm.
         swarm_seed: u64 = value,
-        /// Of the search.
+        /// Final state of the search.
         state: String = text,
-        /// Of the swarm.
+        /// Iterations the swarm has run.
         iterations: u32 = value,
-        /// Of the swarm.
+        /// Evaluations of the swarm's cost.
         evaluations: u32 = value,
-        /// Of the completion.
+        /// Steps of the completion.
         steps: u32 = value,
-        /// Determined.
+        /// Rank: base parameters that the data determine.
         rank: usize = value,
-        /// There are.
+        /// Number of base parameters.
         base: usize = value,
-        /// Of the scaled problem.
+        /// Condition number of the scaled problem.
         condition: f32 = value,
-        /// Of a leg that can exist.
+        /// Chi-square that a physically consistent leg costs above least squares.
         consistency_chi2: f32 = value,
     }
 }
 told! {
-    /// One of a joint's fourteen.
+    /// One of the fourteen parameters of a joint.
     Parameter {
-        /// From 1.
+        /// Joint, from 1.
         joint: usize = value,
-        /// Which.
+        /// Symbol of the parameter.
         symbol: String = text,
-        /// SI.
+        /// Estimate, SI units.
         value: f32 = value,
-        /// Standard deviation.
+        /// Standard deviation, SI units.
         sigma: f32 = value,
-        /// Where it is from.
+        /// `identified`, `grouped`, `weak` or `prior`
         status: String = text,
     }
 }
 told! {
     /// One base parameter.
     Base {
-        /// From 0.
+        /// Index of the base parameter, from 0.
         index: usize = value,
-        /// Of the carrier, from 1.
+        /// Joint of the carrier, from 1.
         joint: usize = value,
-        /// Of the carrier.
+        /// Symbol of the carrier.
         symbol: String = text,
-        /// Others are in it.
+        /// Whether other parameters are grouped into it.
         grouped: bool = value,
-        /// Held at zero.
+        /// Whether the base parameter is held at zero.
         dropped: bool = value,
-        /// SI.
+        /// Estimate, SI units.
         value: f32 = value,
-        /// Standard deviation.
+        /// Standard deviation, SI units.
         sigma: f32 = value,
-        /// Of the closed form.
+        /// Least-squares solution, SI units.
         least_squares: f32 = value,
     }
 }
 told! {
-    /// One element.
+    /// One element of the covariance.
     Covariance {
-        /// From 0.
+        /// Row, from 0.
         row: usize = value,
-        /// From 0.
+        /// Column, from 0.
         column: usize = value,
-        /// SI.
+        /// Covariance, SI units.
         value: f32 = value,
     }
 }
 told! {
-    /// Stribeck friction.
+    /// Stribeck friction of one joint.
     Stribeck {
-        /// From 1.
+        /// Joint, from 1.
         joint: usize = value,
-        /// Above Coulomb's.
+        /// Static friction above Coulomb friction.
         surplus_nm: f32 = value,
-        /// Standard deviation.
+        /// Standard deviation of `surplus_nm`.
         surplus_sigma_nm: f32 = value,
-        /// Of the fall.
+        /// Speed at which the surplus has fallen to 1/e.
         speed_rad_s: f32 = value,
-        /// Standard deviation.
+        /// Standard deviation of `speed_rad_s`.
         speed_sigma_rad_s: f32 = value,
-        /// Explained.
+        /// Chi-square explained by the Stribeck column.
         gain_chi2: f32 = value,
     }
 }
 told! {
     /// A recorded motion.
     Motion {
-        /// 0 is the one identified from.
+        /// 0 is the motion identified from.
         motion: usize = value,
-        /// At 500 Hz.
+        /// Recorded samples, at 500 Hz.
         samples: u32 = value,
-        /// Of all joints.
+        /// Longest stretch in which all joints' rows were disturbed at once.
         longest_common_s: f32 = value,
     }
 }
 told! {
-    /// One joint on one motion.
+    /// Residual of one joint on one motion.
     Fit {
-        /// 0 is the one identified from.
+        /// 0 is the motion identified from.
         motion: usize = value,
-        /// From 1.
+        /// Joint, from 1.
         joint: usize = value,
-        /// Measured minus predicted.
+        /// RMS of measured minus predicted torque.
         rms_nm: f32 = value,
-        /// Of the torque.
+        /// Mean absolute torque.
         mean_abs_nm: f32 = value,
-        /// Of the torque.
+        /// RMS torque.
         torque_rms_nm: f32 = value,
-        /// Of the rows.
+        /// Share of disturbed rows.
         disturbed_share: f32 = value,
-        /// At a stretch.
+        /// Longest stretch of disturbed rows.
         disturbed_longest_s: f32 = value,
-        /// Samples.
+        /// Samples replaced as outliers.
         replaced: u32 = value,
     }
 }
 told! {
-    /// One test.
+    /// One test of the result.
     Finding {
-        /// If it failed.
+        /// Reason for rejection if the test failed.
         reason: String = text,
-        /// Which.
+        /// Name of the test.
         test: String = text,
-        /// From 1; 0 for none.
+        /// Joint, from 1; 0 for none.
         joint: usize = value,
-        /// From 1; 0 for the one identified from, or all.
+        /// Motion, from 1; 0 for the one identified from, or all.
         motion: usize = value,
-        /// Seen.
+        /// Tested value.
         value: f32 = value,
-        /// Allowed.
+        /// Limit of the value.
         limit: f32 = value,
-        /// Within it.
+        /// Whether the value is within the limit.
         passed: bool = value,
     }
 }
 told! {
-    /// One reason.
+    /// Reason for rejection.
     Reason {
-        /// Of the closed list.
+        /// Word of the closed list of reasons.
         reason: String = text,
     }
 }
 told! {
-    /// The last word.
+    /// Verdict on the result.
     Verdict {
         /// `accepted` or `refused`.
         verdict: String = text,
-        /// How many.
+        /// Number of reasons.
         reasons: usize = value,
     }
 }
 told! {
-    /// All is told.
+    /// End of the result.
     End {
-        /// This one not included.
+        /// Records of the result, without this one.
         records: u32 = value,
     }
 }
 
-/// A result, as far as it was told.
+/// Records of one result, as far as they were received.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Told {
-    /// How it was found.
+    /// How the result was found.
     pub solver: Option<Solver>,
-    /// All fourteen of every joint.
+    /// Fourteen parameters of every joint.
     pub parameters: Vec<Parameter>,
-    /// What torque determines.
+    /// Base parameters: the combinations that torque determines.
     pub base: Vec<Base>,
-    /// On and below the diagonal.
+    /// Elements on and below the diagonal.
     pub covariance: Vec<Covariance>,
-    /// Of joints that show it.
+    /// Joints with Stribeck friction.
     pub stribeck: Vec<Stribeck>,
-    /// Recorded.
+    /// Recorded motions.
     pub motions: Vec<Motion>,
-    /// Of every joint on every motion.
+    /// Residuals of every joint on every motion.
     pub fits: Vec<Fit>,
-    /// Every test.
+    /// All tests.
     pub findings: Vec<Finding>,
-    /// Against it.
+    /// Reasons for rejection.
     pub reasons: Vec<Reason>,
-    /// The last word.
+    /// Verdict, once received.
     pub verdict: Option<Verdict>,
-    /// How many records it has.
+    /// End record, once received.
     pub end: Option<End>,
-    /// How many were read, the end not included.
+    /// Records read, without the end.
     pub records: u32,
 }
 
-/// Kinds that belong to a result.
+/// Kinds of record that belong to a result.
 pub const KINDS: [&str; 11] = [
     "solver",
     "parameter",
@@ -219,7 +220,7 @@ impl Told {
     /// Takes a record of one of [`KINDS`].
     ///
     /// # Errors
-    /// A key that is missing, a value that is none; then the result stays incomplete.
+    /// A key is missing or a value invalid; then the result stays incomplete.
     pub fn take(&mut self, line: &Line<'_>) -> Result<(), LineError<'static>> {
         match line.kind() {
             "solver" => self.solver = Some(Solver::read(line)?),
@@ -242,7 +243,7 @@ impl Told {
         Ok(())
     }
 
-    /// Why it cannot be reported; `None` for a complete result with a verdict.
+    /// Reason why the result cannot be reported; `None` for a complete result with a verdict.
     #[must_use]
     pub fn lacks(&self) -> Option<String> {
         let read = self.records;

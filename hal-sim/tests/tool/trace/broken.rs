@@ -1,4 +1,5 @@
-//! Traces as they come from the field: late, with gaps, cut, with a logger's words around them, of another leg, with faults.
+//! Traces from the field: late, with gaps, cut, with a logger's text around them, of another leg,
+//! with faults.
 
 use std::path::Path;
 
@@ -44,14 +45,14 @@ fn a_trace_cut_anywhere_says_how_far_it_went() {
 #[test]
 fn records_that_were_lost_are_told_by_number_and_a_result_with_a_gap_is_none() {
     let lines = quiet();
-    // Before the result: told, and the result stands.
+    // Gap before the result: reported, and the result stands.
     let mut gap = lines.clone();
     gap.drain(5..8);
     let trace = read(&gap);
     assert_eq!((trace.lost(), trace.gaps[0].first, trace.gaps[0].last), (3, 5, 7));
     assert!(trace.warnings().iter().any(|words| words.contains("3 records are LOST (n = 5-7)")));
     assert_eq!(run_report(&trace, &default_leg()).expect("complete").trace.expect("a trace").lost_records, 3);
-    // Any one record of the result: it is no longer reported.
+    // Without any one record of the result, the result is not reported.
     let begin = lines.iter().position(|line| line.starts_with("solver ")).expect("a solver");
     let end = lines.iter().position(|line| line.starts_with("end ")).expect("an end");
     for lost in (begin..=end).step_by(7).chain([begin, end]) {
@@ -62,7 +63,7 @@ fn records_that_were_lost_are_told_by_number_and_a_result_with_a_gap_is_none() {
         let error = run_report(&trace, &default_leg()).expect_err("incomplete").to_string();
         assert!(error.contains("holds no complete result"), "{error}");
     }
-    // A listener who joined late.
+    // Listener that joined late.
     let trace = read(&lines[4..]);
     assert_eq!((trace.unheard, trace.lost(), trace.results.len()), (4, 0, 1));
 }
@@ -193,12 +194,12 @@ fn bad_input_is_refused_with_what_is_wrong() {
     let empty = folder.write("empty.txt", "nothing here\n");
     assert!(refused("trace", &empty).contains("holds no record of a trace"));
     assert!(refused("trace", &folder.path("none.txt")).contains("cannot be read"));
-    // Another leg's image under this leg's name: joints or base parameters differ.
+    // Image of another leg under this leg's name: joints or base parameters differ.
     let other: Vec<String> =
         quiet().iter().map(|line| line.replace("symbol=FC grouped", "symbol=FV grouped")).collect();
     let other = folder.write("other.txt", &text(&other));
     assert!(refused("trace", &other).contains("its base parameter"), "carriers are compared");
-    // A trace that does not name its leg.
+    // Trace that does not name its leg.
     let nameless = folder.write("nameless.txt", &text(&quiet()[1..]));
     assert!(refused("trace", &nameless).contains("--leg"));
     scarab("trace --leg x2-wearer-75kg", &[&nameless]).ends_with(0);

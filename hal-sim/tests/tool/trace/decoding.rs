@@ -1,7 +1,8 @@
-//! Frames of a `defmt` stream, made by defmt's own encoder, decoded with an image that holds the records' formats.
+//! Frames of a `defmt` stream from defmt's own encoder, decoded with an image that holds the
+//! records' formats.
 //!
-//! The image is made here: an ELF of symbols only, as a linker would leave them for the formats of this version. That a real
-//! image has them is shown by the emulator.
+//! The image is made here: an ELF with symbols only, as a linker would write them for the formats
+//! of this version. The emulator tests cover a real image.
 
 use std::path::Path;
 
@@ -14,9 +15,9 @@ use scarab::trace::{Line, Record};
 use super::session::{accepted, quiet, text};
 use crate::command::{Folder, scarab};
 
-/// Formats of types that records use besides their own, and where they stand in the image.
+/// Formats of types used by records besides their own, and their addresses in the image.
 const PRIMITIVES: [(u16, &str); 4] = [(1, "{=[?;2]}"), (2, "{=f32}"), (3, "{=i32}"), (4, "{=bool}")];
-/// Where the records' formats begin.
+/// Address of the first record format.
 const FIRST: u16 = 16;
 
 fn image(version: &str, encoding: &str, formats: &[&str]) -> Vec<u8> {
@@ -59,7 +60,7 @@ fn own_image() -> Vec<u8> {
     image("4", "rzcobs", Record::<2>::FORMATS)
 }
 
-/// One value as the device writes it behind its index.
+/// Encodes one value as the device sends it after its index.
 fn value(hint: &str, text: &str, out: &mut Vec<u8>) {
     let number = || text.strip_prefix("0x").map_or_else(|| text.parse(), |hex| u64::from_str_radix(hex, 16));
     let number = || number().expect("a number").to_le_bytes();
@@ -97,7 +98,7 @@ fn value(hint: &str, text: &str, out: &mut Vec<u8>) {
     }
 }
 
-/// A line as a frame, zeros before and behind it.
+/// Encodes a line as a frame, with zeros before and after it.
 fn frame(line: &str) -> Vec<u8> {
     let read = Line::parse(line).expect(line);
     let own = |format: &str| format.split(' ').next() == Some(read.kind());
@@ -125,7 +126,7 @@ fn decoded(stream: &[u8], piece: usize) -> (Vec<String>, Decoder) {
     (lines, decoder)
 }
 
-/// Pairs with numbers as their bits: two ways to write a number are one.
+/// Pairs with numbers as bits: different spellings of a number are equal.
 fn meaning(line: &str) -> Vec<(String, Vec<String>)> {
     let line = Line::parse(line).expect(line);
     let bits =
@@ -166,7 +167,7 @@ fn what_was_sent_is_decoded_bit_for_bit_in_pieces_of_any_size() {
 fn a_listener_who_joins_late_or_loses_bytes_finds_the_next_frame() {
     let lines = quiet();
     let whole = stream(&lines);
-    // The rest of a frame, noise, then everything.
+    // Rest of a frame, noise, then everything.
     let mut late = frame(&lines[2])[9..].to_vec();
     late.extend((0..300_u32).map(|place| (place * 37 % 251) as u8));
     late.push(0);
@@ -179,7 +180,7 @@ fn a_listener_who_joins_late_or_loses_bytes_finds_the_next_frame() {
     assert_eq!(skipped.bytes, skipped.first_bytes);
 
     let shortest = lines.iter().map(|line| frame(line).len()).min().expect("frames");
-    // Cut anywhere, bytes lost anywhere, bytes turned anywhere: no panic, and what is left is read.
+    // Truncated, lost or inverted bytes at any position: no panic, and the rest is read.
     for place in (0..whole.len()).step_by(whole.len() / 200) {
         let (cut, mut decoder) = decoded(&whole[..place], 64);
         assert!(cut.len() <= lines.len());
@@ -196,7 +197,7 @@ fn a_listener_who_joins_late_or_loses_bytes_finds_the_next_frame() {
         turned[place] ^= 0x55;
         assert!(decoded(&turned, 64).0.len() + 3 >= lines.len());
     }
-    // Without any end of a frame memory stays what it is, and the next frame is found.
+    // Without the end of a frame memory stays bounded, and the next frame is found.
     let mut endless = vec![0x5a; 1 << 20];
     endless.push(0);
     endless.extend(&whole);
@@ -222,7 +223,7 @@ fn a_stream_and_its_text_are_reported_alike() {
     assert_eq!(folder.json("one.json"), folder.json("other.json"));
     let again = std::fs::read_to_string(lines_again).expect("written");
     assert!(again.lines().map(meaning).eq(lines.iter().map(|line| meaning(line))), "the lines need no image");
-    // A stream without its image, text with one.
+    // Stream without its image, text with one.
     let told = scarab("trace", &[&bytes]).ends_with(2).errors;
     assert!(told.contains("--image"), "{told}");
     let told = scarab("trace --image", &[&elf, &plain]).ends_with(2).errors;
@@ -245,7 +246,7 @@ fn an_image_that_cannot_have_sent_the_stream_is_refused() {
         assert!(error.to_string().contains(words), "{error}");
         assert_eq!(error.exit_code(), 2);
     }
-    // The right image, and bytes of another: none of it is a record.
+    // Right image with bytes of another: none of it is a record.
     let mut reader = StreamReader::new(Some(Decoder::new(&own_image()).expect("an image")));
     reader.feed(&[1, 2, 3, 0, 9, 9, 9, 9, 0, 0, 0, 7]).expect("nothing is written");
     assert!(reader.finish(Path::new("stream")).is_err());

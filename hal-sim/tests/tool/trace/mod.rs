@@ -1,5 +1,5 @@
-//! What a board tells is what the host reports: a simulated leg tells its identification in records, and the report of those is
-//! the run's own.
+//! Records of a board against the report of the host: a simulated leg sends its identification as
+//! records, and their report equals the run's own.
 
 mod broken;
 mod decoding;

@@ -1,4 +1,4 @@
-//! The report of a trace against the run's own.
+//! Report of a trace compared with the run's own.
 
 use hal_sim::tool::simulate::{SimulationOptions, simulate};
 use hal_sim::tool::trace::curves::curves;
@@ -8,8 +8,8 @@ use serde_json::Value;
 use super::session::{accepted, default_leg, quiet, read, refused, renumbered, text};
 use crate::command::{Folder, base, reasons, scarab};
 
-/// Keys of a run's report that a board does not tell: searches in double precision, gains of columns, the noise's seed,
-/// noise-free torques, the Cramer-Rao bound, tracking, constants.
+/// Keys of a run's report that a board does not send: searches in double precision, gains of
+/// columns, the noise's seed, noise-free torques, the Cramer-Rao bound, tracking, constants.
 const NOT_TOLD: [&str; 25] = [
     "seed",
     "cramer_rao",
@@ -38,8 +38,8 @@ const NOT_TOLD: [&str; 25] = [
     "FS2",
 ];
 
-/// Every value that is told is the run's own to the last bit: single precision on both sides, written so that reading gives
-/// the same bits, and the same sums made of it.
+/// Every reported value equals the run's own to the last bit. Both sides use single precision,
+/// numbers are written so that reading restores their bits, and sums are computed alike.
 fn compare(path: &str, told: &Value, own: &Value, compared: &mut usize) {
     match (told, own) {
         (Value::Object(told), Value::Object(own)) => {
@@ -79,7 +79,7 @@ fn the_report_of_a_trace_is_that_of_the_run_that_told_it() {
     let json = |run| serde_json::to_value(run).expect("JSON");
     let mut compared = 0;
     compare("", &json(&told), &json(&own), &mut compared);
-    // 28 parameters, 13 base parameters with their terms, 8 fits, findings: this many values and words.
+    // At least 28 parameters, 13 base parameters with their terms, 8 fits and the findings.
     assert!(compared > 600, "{compared}");
     assert_eq!(told.detail, own.detail, "what a model file keeps");
     assert_eq!((told.validated, told.verdict), (true, "accepted"));
@@ -99,7 +99,7 @@ fn the_log_of_a_trace_is_the_log_of_the_run_and_replay_finds_the_same_parameters
     assert!(same, "the trace's log differs from the run's");
     assert!(run.printed.contains("samples of motion 0; the trace holds motions 1, 2, 3"), "{}", run.printed);
 
-    // Another motion on request: that many samples of it were told, at its own angles.
+    // Another motion on request: the expected number of samples at its own angles.
     let other = folder.path("other.csv");
     scarab("trace --csv-motion 2 --csv", &[&other, &trace]).ends_with(0);
     let told = accepted().iter().filter(|line| line.contains("segment=validation motion=2 ")).count();
@@ -114,7 +114,8 @@ fn the_log_of_a_trace_is_the_log_of_the_run_and_replay_finds_the_same_parameters
         assert!(page.contains(figure), "{figure} is drawn from the log");
     }
 
-    // The host resamples and filters anew: what it finds from the log is the board's result within a quarter of a sigma.
+    // The host resamples and filters anew: its result from the log is the board's within a quarter
+    // of a sigma.
     let replayed = folder.path("replayed.json");
     scarab("replay --leg x2-wearer-75kg --json", &[&replayed, &log]).ends_with(0);
     let (told, replayed) = (folder.json("told.json"), folder.json("replayed.json"));
@@ -147,7 +148,7 @@ fn a_refused_result_exits_with_three_and_its_reasons() {
 #[test]
 fn of_two_identifications_the_last_is_reported_and_both_are_kept() {
     let (first, second) = (refused(), quiet());
-    // Without a start between them the numbers go on.
+    // Without a start between them the numbering continues.
     let all = renumbered(first.iter().chain(second.iter().filter(|line| !line.starts_with("boot "))));
     for (lines, starts) in [(all, 1), ([first, second.as_slice()].concat(), 2)] {
         let trace = read(&lines);
@@ -195,7 +196,7 @@ fn every_kind_and_key_is_documented_and_none_that_there_is_not() {
     assert!(rows.iter().all(|(.., about)| *about > 5));
 }
 
-/// Curves from the board's log are those of the run itself: same samples, same filter, same result.
+/// Curves from the board's log equal those of the run: samples, filter and result are shared.
 #[test]
 fn the_curves_of_a_trace_are_those_of_the_run() {
     let leg = default_leg();
@@ -211,11 +212,11 @@ fn the_curves_of_a_trace_are_those_of_the_run() {
             assert_eq!((&told.measured_deg, &told.still), (&own.measured_deg, &own.still));
         }
     }
-    // The noise is what is left over; the identification counts its parameters off, thirteen of a thousand rows.
+    // The noise is the residual; the identification subtracts its parameters, thirteen of a thousand rows.
     for (told, own) in told.noise_nm.iter().zip(&own.noise_nm) {
         assert!((told / own - 1.0).abs() < 0.02, "{told} {own}");
     }
-    // A motion with a hole is not drawn.
+    // A motion with a missing sample is not drawn.
     let hole =
         accepted().iter().position(|line| line.contains(" segment=validation motion=2 ")).expect("a log");
     let mut lines = accepted().to_vec();

@@ -1,4 +1,4 @@
-//! A simulated leg that tells what it does, as a board would.
+//! Simulated leg that sends records as a board would.
 
 use std::sync::OnceLock;
 
@@ -18,14 +18,14 @@ type Pair = pair::Pair<JOINTS, BASE>;
 
 /// Ticks between two records of the search.
 const PROGRESS_TICKS: u64 = 100;
-/// An identification takes 53 s.
+/// Limit of an identification, ticks; one takes 53 s.
 const LONGEST: u64 = 100 * 4000;
 
 pub fn default_leg() -> LegFile {
     LegFile::load(DEFAULT_LEG).expect("shipped")
 }
 
-/// Lines with their numbers.
+/// Lines with their record numbers.
 #[derive(Default)]
 pub struct Teller {
     pub lines: Vec<String>,
@@ -106,7 +106,7 @@ impl Teller {
     }
 }
 
-/// Identifies the leg `simulated`, believed to be the default one, and tells all of it.
+/// Identifies the leg `simulated`, assumed to be the default one, and returns all records.
 fn told_by(simulated: &LegFile, seed: u64) -> Vec<String> {
     let context = Context::new(&default_leg(), &SimulationOptions::of_seed(seed))
         .expect("the default leg is simulated");
@@ -146,18 +146,18 @@ fn told_by(simulated: &LegFile, seed: u64) -> Vec<String> {
     teller.lines
 }
 
-/// All that the default leg tells with seed 1, the log included.
+/// Records of the default leg with seed 1, including the log.
 pub fn accepted() -> &'static [String] {
     static LINES: OnceLock<Vec<String>> = OnceLock::new();
     LINES.get_or_init(|| told_by(&default_leg(), 1))
 }
 
-/// The same without the log.
+/// Records without the log.
 pub fn quiet() -> Vec<String> {
     renumbered(accepted().iter().filter(|line| !line.starts_with("log ")))
 }
 
-/// A leg whose shank hangs 10 % lower than believed.
+/// Records of a leg whose shank hangs 10 % lower than assumed.
 pub fn refused() -> &'static [String] {
     static LINES: OnceLock<Vec<String>> = OnceLock::new();
     LINES.get_or_init(|| {
@@ -167,7 +167,7 @@ pub fn refused() -> &'static [String] {
     })
 }
 
-/// With numbers from 0 on.
+/// Records renumbered from 0.
 pub fn renumbered<'a>(lines: impl Iterator<Item = &'a String>) -> Vec<String> {
     lines.enumerate().map(|(number, line)| with_number(line, number)).collect()
 }
@@ -182,7 +182,7 @@ pub fn text(lines: &[String]) -> String {
     lines.join("\n") + "\n"
 }
 
-/// Read to its end.
+/// Trace read to its end.
 pub fn read(lines: &[String]) -> Trace {
     let mut trace = Trace::default();
     lines.iter().for_each(|line| trace.push(line));
