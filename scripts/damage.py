@@ -254,6 +254,8 @@ class Kind:
     words: str = ""
     # A disturbance that robust identification has to bear: a refusal is wrong.
     must_accept: bool = False
+    # False where torque does not tell which joint it is: the ratio of two torque scales, and the mirror image of a planar leg.
+    tells_joint: bool = True
 
 
 SAME = lambda size: size
@@ -263,7 +265,7 @@ KINDS = {
     "low_pass": Kind(low_pass, [20.0, 10.0, 5.0], {"torque_filter", "delay"}, show="%g Hz", direction="delay",
                      injected=lambda size: 1.0 / (2.0 * np.pi * size)),
     "encoder_scale": Kind(encoder_scale, [0.01, 0.02, 0.05], {"encoder_scale"}, True, False, show="%g", direction="encoder_scale", injected=SAME),
-    "gain": Kind(gain, [0.03, 0.1, 0.3], {"torque_scale"}, True, False, 2, show="%g", direction="torque_scale", injected=SAME),
+    "gain": Kind(gain, [0.03, 0.1, 0.3], {"torque_scale"}, True, False, 2, show="%g", direction="torque_scale", injected=SAME, tells_joint=False),
     "clip": Kind(clip, [0.8, 0.6, 0.3], {"saturation"}),
     "clip_one_side": Kind(clip_one_side, [0.8, 0.6, 0.3], {"saturation"}),
     "clip_filtered": Kind(clip_filtered, [0.8, 0.6, 0.3], {"saturation"}),
@@ -282,7 +284,7 @@ KINDS = {
     "degrees": Kind(degrees, [0], {"angle_unit"}, True, show="-", words=r"degree|unit"),
     "millinewtons": Kind(millinewtons, [0], {"torque_unit"}, show="-", words=r"mN|unit"),
     "negate": Kind(negate, [0], {"torque_sign"}, True, show="-"),
-    "reverse": Kind(reverse, [0], {"direction"}, True, False, 2, show="-"),
+    "reverse": Kind(reverse, [0], {"direction"}, True, False, 2, show="-", tells_joint=False),
     "push": Kind(push, [0.1, 0.3, 0.6], set(), least_training_s=15.0, must_accept=True),
 }
 

@@ -295,7 +295,7 @@ def generate(count, seed, rate, encoder_bits, stribeck, noise):
     return {
         "arms": arms, "prior": prior, "t": rows * STEP, "q": measured, "qd": v[rows], "clean": clean, "noisy": noisy,
         "sigma": sigma, "turns": turns, "lines": lines, "directions": directions, "offsets": offsets, "low": low,
-        "high": high, "sticking": np.mean(abs(v[rows]) < 1e-9, axis=0),
+        "high": high, "stribeck": stribeck, "sticking": np.mean(abs(v[rows]) < 1e-9, axis=0),
     }
 
 
@@ -338,12 +338,13 @@ def truth(run, k):
         standard.update({
             "M" + joint: mass, "HX" + joint: mass * x, "HY" + joint: mass * y,
             "ZZ" + joint: own["i" + joint] + mass * (x**2 + y**2), "IA" + joint: own["r" + joint],
-            "FC" + joint: own["fc" + joint], "FV" + joint: own["fv" + joint], "OFF" + joint: 0.0,
+            "FC" + joint: own["fc" + joint], "FS" + joint: own["fc" + joint] * (1.0 + run["stribeck"]), "FV" + joint: own["fv" + joint], "OFF" + joint: 0.0,
         })
     return {
         "arm": own,
         # About the joint's axis, in the joint's frame: what a torque equation of the arm is linear in.
         "standard_parameters": standard,
+        "stribeck_share": run["stribeck"],
         "noise_nm": [float(x) for x in run["sigma"][:, k]],
         "noise_validation_nm": [float(x) for x in run["sigma"][:, count + k]],
         "rms_torque_nm": [float(x) for x in np.sqrt(np.mean(run["clean"][:, :, k] ** 2, axis=0))],

@@ -39,11 +39,6 @@ class Outcome:
         rows = (self.report or {}).get("base_parameters", [])
         return {r["name"]: (r["terms"], r["value"], r["sigma"]) for r in rows if r["sigma"] is not None}
 
-    def directions(self):
-        """What was estimated beside the parameters: (name, joint) -> (value, sigma)."""
-        rows = (self.report or {}).get("directions", [])
-        return {(r["name"], r.get("joint")): (r["value"], r["sigma"]) for r in rows if r.get("sigma") is not None}
-
 
 def binary(path):
     """The command that runs the tool: a binary, or `cargo sim`, which builds it first."""
