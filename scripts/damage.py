@@ -332,7 +332,7 @@ def main():
     parser.add_argument("--size", type=float, default=0.0)
     parser.add_argument("--joint", type=int, help="from 1; every joint unless given")
     parser.add_argument("--leg", action="store_true", help="the files are leg files (gravity)")
-    options = parser.parse_args()
+    options = parser.parse_intermixed_args()
     if options.list:
         for name, kind in KINDS.items():
             sizes = "" if kind.show == "-" else ", ".join(kind.show % size for size in kind.sizes)
