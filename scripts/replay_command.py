@@ -1,0 +1,59 @@
+"""Runs `scarab-sim replay` and reads what it reports; shared by `plant_coverage` and `damage_table`."""
+
+import json
+import os
+import subprocess
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+CARGO = ["cargo", "run", "--quiet", "--package", "hal-sim", "--bin", "scarab-sim", "--"]
+
+
+class Outcome:
+    """One identification: exit code, report (None where there is none), the printed errors."""
+
+    def __init__(self, code, report, errors):
+        self.code, self.report, self.errors = code, report, errors
+
+    @property
+    def accepted(self):
+        return self.code == 0
+
+    @property
+    def verdict(self):
+        return {0: "accepted", 3: "refused", 2: "bad input"}.get(self.code, f"exit code {self.code}")
+
+    @property
+    def reasons(self):
+        return self.report["reasons"] if self.report else []
+
+    @property
+    def cause(self):
+        """`likely_cause` as (name, joint, value, sigma), or None where the report has none."""
+        found = (self.report or {}).get("likely_cause")
+        return (found["name"], found.get("joint"), found.get("value"), found.get("sigma")) if found else None
+
+    def parameters(self):
+        """Base parameters that have a sigma: name -> (terms, value, sigma)."""
+        rows = (self.report or {}).get("base_parameters", [])
+        return {r["name"]: (r["terms"], r["value"], r["sigma"]) for r in rows if r["sigma"] is not None}
+
+
+def binary(path):
+    """The command that runs the tool: a binary, or `cargo sim`, which builds it first."""
+    return [str(Path(path).resolve())] if path else CARGO
+
+
+def run(command, files, leg, options=(), csv=None):
+    """Identifies a leg from recordings. Adds `--json` and, on request, `--csv`."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "run.json"
+        arguments = ["replay", *map(str, files), "--leg", str(leg), "--json", str(report), *map(str, options)]
+        if csv:
+            arguments += ["--csv", str(csv)]
+        done = subprocess.run([*command, *arguments], cwd=ROOT, env=os.environ, capture_output=True, text=True)
+        if done.returncode not in (0, 2, 3):
+            raise SystemExit(f"error: {' '.join(arguments)}: exit code {done.returncode}\n{done.stderr}")
+        content = json.loads(report.read_text()) if report.exists() else None
+        return Outcome(done.returncode, content, done.stderr.strip())
