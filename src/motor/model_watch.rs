@@ -328,3 +328,78 @@ fn residual(limits: &ModelLimits, now: &Shown<'_>) -> Rotating<f32> {
         q: integral.q - r * q.0 - speed * (l.d * d.0 + limits.flux_vs),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motor::testing::CONFIGURATION;
+    use crate::units::{Henry, Ohm, Volt, Weber};
+
+    const MOTOR: MotorConstants = MotorConstants {
+        resistance: Ohm(0.05),
+        direct_inductance: Henry(24e-6),
+        quadrature_inductance: Henry(27e-6),
+        flux: Weber(2.9e-3),
+    };
+
+    fn limits() -> ModelLimits {
+        let scale = CountScale::new(8192, 7).expect("usual");
+        ModelLimits::new(&CONFIGURATION, &MOTOR, scale)
+    }
+
+    /// A period at rest with this integral of the current loop and this current.
+    fn shown<'a>(
+        current_loop: &'a CurrentLoop,
+        current: Rotating<Ampere>,
+        angle: ElectricalAngle,
+    ) -> Shown<'a> {
+        Shown { current_loop, current, speed_rad_per_s: 0.0, place: 0, angle, sine: Sine::Exact }
+    }
+
+    #[test]
+    fn a_position_is_doubted_only_while_voltages_disagree_and_the_counter_stands() {
+        let limits = limits();
+        let suspicious = ModelWatch { suspicion: 1, ..ModelWatch::EMPTY };
+        assert!(!ModelWatch::EMPTY.doubts(&limits, 0) && !suspicious.doubts(&limits, 100));
+        assert!(suspicious.doubts(&limits, 0));
+    }
+
+    #[test]
+    fn warm_copper_is_no_fault_whatever_the_direction_of_the_current() {
+        let limits = limits();
+        for (d, q) in [(50.0, 50.0), (50.0, -50.0), (-50.0, 50.0), (70.0, 0.0), (0.0, -70.0)] {
+            let current = Rotating { d: Ampere(d), q: Ampere(q) };
+            // 30 % more resistance than was measured.
+            let held = Rotating { d: Volt(1.3 * 0.05 * d), q: Volt(1.3 * 0.05 * q) };
+            let current_loop = CurrentLoop::holding(held);
+            let mut watch = ModelWatch::EMPTY;
+            let now = shown(&current_loop, current, ElectricalAngle::default());
+            // The counter moves: a change of the current at a standing one would be a fault of its own.
+            let seen = (0..3 * i32::from(PATIENCE))
+                .find_map(|period| watch.look(&limits, &Shown { place: 10 * period, ..now }));
+            assert_eq!(seen, None, "{d} {q}");
+        }
+    }
+
+    #[test]
+    fn a_drifted_zero_is_seen_after_the_same_turns_in_either_direction() {
+        let limits = limits();
+        let size = 1.5 * sqrt(limits.mean_square);
+        // 90 periods at rest, then 40 a turn; the drift begins within the second turn.
+        let seen = [1.0_f32, -1.0].map(|sign| {
+            let mut watch = ModelWatch::EMPTY;
+            (0_u32..400).find(|period| {
+                let turns = sign * period.saturating_sub(90) as f32 * 0.024_9;
+                let angle = ElectricalAngle::from_turns(turns);
+                let drift = if *period < 150 { 0.0 } else { size };
+                let residual =
+                    Stationary { alpha: drift, beta: 0.0 }.to_rotating(angle.rotation(Sine::Exact));
+                let held = Rotating { d: Volt(residual.d), q: Volt(residual.q) };
+                let none = Rotating { d: Ampere::ZERO, q: Ampere::ZERO };
+                let current_loop = CurrentLoop::holding(held);
+                watch.look(&limits, &shown(&current_loop, none, angle)) == Some(AxisFault::CurrentZero)
+            })
+        });
+        assert!(seen[0].is_some() && seen[0] == seen[1], "{seen:?}");
+    }
+}

@@ -111,4 +111,18 @@ mod tests {
         }
         assert!(scale.currents([372, 3723], ZEROS).is_some());
     }
+
+    #[test]
+    fn rails_lie_on_both_sides_of_the_middle_and_within_the_converter() {
+        for (rails, sensible) in [
+            ([2047, 2049], true),
+            ([2048, 2049], false),
+            ([2047, 2048], false),
+            ([0, 4095], true),
+            ([0, 4096], false),
+        ] {
+            let scale = SenseScale { rails, ..SenseScale::ODRIVE_3_6 };
+            assert_eq!(scale.is_sensible(), sensible, "{rails:?}");
+        }
+    }
 }

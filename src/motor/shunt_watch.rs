@@ -107,3 +107,25 @@ impl Shunt {
         self.overdue >= PATIENCE
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_up_to_2_a_in_any_direction_may_begin() {
+        for (alpha, beta, begins) in [
+            (1.99, 0.0, true),
+            (0.0, -1.99, true),
+            (-1.4, 1.4, true),
+            (2.01, 0.0, false),
+            (0.0, -2.01, false),
+            (0.5, 1.95, false),
+            (f32::NAN, 0.0, false),
+        ] {
+            let zero = Stationary { alpha, beta };
+            let mut watch = ShuntWatch { zero, ..ShuntWatch::EMPTY };
+            assert_eq!(watch.begins_at_zero(), begins, "{zero:?}");
+        }
+    }
+}

@@ -165,3 +165,12 @@ fn absurd_motors_and_bandwidths_are_refused() {
     );
     assert!(refused(|m| m.quadrature_inductance.0 = 1.0, 1000.0) && refused(|m| m.flux.0 = -1.0, 1000.0));
 }
+
+#[test]
+fn a_loop_that_takes_over_goes_on_with_the_voltage_that_held_the_current() {
+    let gains = CurrentGains::new(&MOTOR, Hertz(1000.0), false).expect("usual");
+    let held = Rotating { d: Volt(1.5), q: Volt(-0.5) };
+    let current = Rotating { d: Ampere::ZERO, q: Ampere(7.0) };
+    let voltage = CurrentLoop::holding(held).voltage(&gains, Ampere(7.0), current, 0.0, Volt(20.0));
+    assert!((voltage.d.0 - 1.5).abs() < 1e-6 && (voltage.q.0 + 0.5).abs() < 1e-6, "{voltage:?}");
+}

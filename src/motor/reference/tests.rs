@@ -116,3 +116,16 @@ fn settings_that_make_no_sense_are_refused() {
     assert!(refused(|s| s.tolerance = i32::MAX) && refused(|s| s.way = i32::MAX));
     assert!(refused(|s| s.way = 0) && refused(|s| s.back_off = 50) && !refused(|_| ()));
 }
+
+#[test]
+fn a_search_has_twice_the_time_of_its_way_and_5_s() {
+    // The joint creeps over its way in 30 s; the way takes 10 s at the speed of the search.
+    let mut machine = EndStopSearch::new(SETTINGS).expect("sensible");
+    let ticks = (1..=120_000).find(|tick| {
+        let counts = 77_000 - tick * 199 / 120;
+        let sample = JointSample { encoder_counts: counts, ..JointSample::default() };
+        machine.tick(&sample) == ReferenceStep::Refused(ReferenceRefusal::TimeOut)
+    });
+    // 25 s of 4,000 ticks.
+    assert_eq!(ticks, Some(100_001));
+}

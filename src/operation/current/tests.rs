@@ -243,3 +243,14 @@ fn a_bus_voltage_that_is_no_longer_converted_releases_at_the_second_period() {
     assert_eq!(causes, [0, 0, 0, Cause::Conversion.bit()]);
     assert_eq!(bench.hardware.brake, 0.0);
 }
+
+#[test]
+fn a_stand_of_2_ms_keeps_the_joint_zeros_and_a_longer_one_does_not() {
+    for (stood, forgets) in [(CERTAIN_PERIODS, false), (CERTAIN_PERIODS + 1, true)] {
+        let mut bench = Bench::new(&CONFIGURATION);
+        bench.store();
+        bench.stand(stood, 0.0);
+        bench.stored();
+        assert_eq!(bench.outcomes.contains(&(0, Outcome::StoodStill)), forgets, "{stood}");
+    }
+}

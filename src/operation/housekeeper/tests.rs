@@ -107,8 +107,12 @@ fn what_was_kept_is_checked_and_what_was_not_is_measured() {
     assert_eq!(bench.press(), [(0, anew())]);
     let mut bench = Bench::new(Housekeeper::new(HOUSE).with_stored([Some(stored), None]));
     assert_eq!(bench.press(), [(0, checked(stored))]);
+    // The axis takes its rotor's position from where the counter stands now.
+    bench.hardware.encoder_counts = [4321, 0];
+    let sample = AxisSample { encoder_count: 4321, ..AxisSample::default() };
+    let running = Axis::new(&CONFIGURATION, &calibration, &sample).expect("usual");
     let orders = bench.ends(0, Outcome::Calibrated(calibration));
-    assert!(matches!(orders[..], [(0, Order::Run(_)), (1, Order::Calibrate(_))]));
+    assert!(matches!(orders[..], [(0, Order::Run(axis)), (1, Order::Calibrate(_))] if axis == running));
     assert_eq!(orders[1].1, anew());
     // Either is told to whoever keeps it.
     bench.ends(1, Outcome::Calibrated(calibration));

@@ -219,3 +219,17 @@ fn what_is_told_again_is_told_in_its_order_whatever_mailboxes_it_was_in() {
         assert_eq!(told, [0xFF0D, 0], "{node}");
     }
 }
+
+#[test]
+fn a_frame_waits_10_ms_in_a_passive_controller_and_no_longer() {
+    let mut bench = Bench::new();
+    bench.set(Controller::Passive, true);
+    while bench.hardware.can.waiting.is_empty() {
+        bench.round();
+    }
+    // The round that gave it did not see it wait yet.
+    bench.run(1 + (PATIENCE_US / ROUND_US) as u32);
+    assert_eq!(bench.hardware.can.aborted, 0);
+    bench.round();
+    assert_eq!(bench.hardware.can.aborted, 1);
+}
