@@ -96,4 +96,15 @@ mod tests {
         use Reading::{Good, Jumped, Rejected};
         assert_eq!(readings, [Good, Rejected, Rejected, Jumped, Good]);
     }
+
+    #[test]
+    fn a_new_zero_of_the_counts_is_no_step() {
+        for shift in [1_000_000, -1_000_000, i32::MIN] {
+            let mut gate = StepGate::new(100);
+            assert_eq!(gate.judge(50), Reading::Good);
+            gate.shift(shift);
+            assert_eq!(gate.judge(120_i32.wrapping_add(shift)), Reading::Good);
+            assert_eq!(gate.judge(120), Reading::Rejected);
+        }
+    }
 }
