@@ -123,6 +123,15 @@ mod tests {
     }
 
     #[test]
+    fn large_counts_have_means_although_their_sum_wraps() {
+        let mut averager = LogAverager::EMPTY;
+        let counts = [1_600_000_000, -1_600_000_000];
+        let logged = (0..8).find_map(|tick| averager.push(tick, &sample(counts, 0.0), &[HIP, KNEE]));
+        let expected = [HIP.position(counts[0] as f32).0, KNEE.position(counts[1] as f32).0];
+        assert_eq!(logged.map(|logged| logged.position_rad), Some(expected));
+    }
+
+    #[test]
     fn a_sample_comes_every_eighth_tick_and_shares_nothing_with_the_last() {
         let mut averager = LogAverager::EMPTY;
         let mut logged = 0;

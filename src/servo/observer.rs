@@ -163,6 +163,14 @@ mod tests {
     }
 
     #[test]
+    fn the_nearest_count_is_rounded_on_both_sides_of_the_reading() {
+        for (deviation, nearest) in [(0.4, 70), (0.6, 71), (1.4, 71), (-0.4, 70), (-0.6, 69), (-1.6, 68)] {
+            let observer = Observer { reading: Some(70), deviation, velocity_per_s: 0.0 };
+            assert_eq!(observer.nearest_counts(), nearest, "{deviation}");
+        }
+    }
+
+    #[test]
     fn position_and_velocity_follow_as_far_as_stated() {
         // The discrete loop differs from the continuous figures by some w T / 4: 4 %.
         let half_power = core::f64::consts::FRAC_1_SQRT_2;
