@@ -31,5 +31,6 @@ mod replay_refusals;
 mod report_page;
 mod robust;
 mod scale;
+mod serve;
 mod trace;
 mod verdict;
