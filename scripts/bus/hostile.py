@@ -1,8 +1,9 @@
-"""Hostile frames through the port: `hostile.py HOST:PORT [--frames N] [--pid PID]`.
+"""Hostile frames through the port: `hostile.py HOST:PORT [--frames N] [--taken N] [--pid PID]`.
 
-Random frames of every identifier and length, broken lines and lines that never end, as fast as the port takes them. Every line has to be answered,
-no more frames may be taken than the wire carries, the process with that number may not grow by more than 32 MB, and the nodes have to answer
-afterwards. The last line is `hostile: ok`.
+Random frames of every identifier and length, broken lines and lines that never end, as fast as the port takes them: a million, or so many, and
+until so many were taken for the wire instead of being refused. Every line has to be answered, no more frames may be taken than the
+wire carries, the process with that number may not grow by more than 32 MB, and the nodes have to answer afterwards. The last line is
+`hostile: ok`.
 """
 
 import argparse
@@ -76,6 +77,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("address")
     parser.add_argument("--frames", type=int, default=1_000_000)
+    parser.add_argument("--taken", type=int, default=0)
     parser.add_argument("--pid", type=int)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
@@ -86,7 +88,7 @@ def main():
     port.send(b"C\rS8\rO\r")
     before = memory_kb(arguments.pid) if arguments.pid else 0
     most, begin, sent, port.taken, port.bells = before, time.monotonic(), 0, 0, 0
-    while sent < arguments.frames:
+    while sent < arguments.frames or port.taken < arguments.taken:
         port.send(dice.choice(chunks))
         sent += CHUNK
         if arguments.pid:

@@ -30,7 +30,6 @@ def set_up(network, number, sheet):
     node.tpdo[1].event_timer = PERIOD_MS
     node.tpdo[1].save()
     node.nmt.state = "OPERATIONAL"
-    # It reads the mapping again; the node's state is known from here, not from a heartbeat.
     node.setup_402_state_machine()
     return node
 

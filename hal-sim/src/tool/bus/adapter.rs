@@ -30,7 +30,7 @@ const MOST_LEAVING_NS: u64 = 200_000_000;
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     frame: Frame,
-    /// It was sent at this instant or later.
+    /// Earliest instant at which the client may have sent the frame.
     since: Instant,
     is_stop: bool,
 }
@@ -324,11 +324,11 @@ mod tests {
     #[test]
     fn a_stop_finds_room_in_a_full_queue() {
         let mut bench = Bench::new();
-        while bench.push(0x301, &[0x55; 4]) {}
+        assert!((0..10_000).any(|_| !bench.push(0x301, &[0x55; 4])), "the queue has no bound");
         assert!(bench.push(0x201, &[0, 0]));
         let dropped = bench.adapter.take_dropped();
         assert_eq!(dropped, Dropped { refused: 1, displaced: 1, old: 0 });
-        // Of stops alone there is a bound as well.
+        // Stops alone are bounded as well.
         let taken = (0..10_000).filter(|_| bench.push(0x201, &[0, 0])).count();
         assert!((1000..2000).contains(&taken), "{taken}");
         bench.run(101);

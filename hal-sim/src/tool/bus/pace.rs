@@ -60,7 +60,7 @@ impl Pace {
         (late.mul_f64(self.speed).as_nanos() / u128::from(TICK_NS)) as u64
     }
 
-    /// Once a second, what it was like.
+    /// Figures of the second that has just ended, if one has.
     pub fn second(&mut self, now: Instant, now_ns: u64) -> Option<Second> {
         let (begin, begin_ns) = self.second;
         let lasted = now.saturating_duration_since(begin);

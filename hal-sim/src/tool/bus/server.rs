@@ -31,9 +31,9 @@ pub enum What {
     Opened,
     /// The client closed the channel, and may open it again.
     Closed,
-    /// It is gone, for this reason; it was the client (`true`).
+    /// The connection ended, for this reason; `true`: that of the client.
     Gone(&'static str, bool),
-    /// It was refused, for the client of this address.
+    /// The client of this address has the channel.
     Refused(SocketAddr),
 }
 
