@@ -300,8 +300,8 @@ mod tests {
         }
         bench.now += 101 * MS;
         bench.run(2);
-        assert_eq!(bench.carried_out(), [(0x201, 2), (0x750, 5), (0, 2)]);
-        assert_eq!(bench.adapter.take_dropped(), Dropped { old: 3, ..Dropped::default() });
+        assert_eq!(bench.carried_out(), [(0x80, 0), (0x201, 2), (0x750, 5), (0, 2)]);
+        assert_eq!(bench.adapter.take_dropped(), Dropped { old: 2, ..Dropped::default() });
         // Younger ones are carried out, whatever they do.
         assert!(bench.push(0x201, &[15, 0]));
         bench.now += 90 * MS;

@@ -25,7 +25,7 @@ const MOST_FRAMES: usize = 32;
 pub enum Effect {
     /// Network management, or a controlword that disables, stops or resets.
     Stop,
-    /// A target, SYNC, or a controlword that enables or goes on.
+    /// A target, a controlword that enables or goes on, or a SYNC for which one of them waits.
     SetPoint,
     /// Neither.
     Other,
@@ -36,7 +36,6 @@ pub enum Effect {
 struct Recorder {
     stops: bool,
     moves: bool,
-    synchronised: bool,
 }
 
 impl Objects for Recorder {
@@ -63,10 +62,6 @@ impl Objects for Recorder {
     fn lost(&mut self, _: Lost) {}
 
     fn reset(&mut self) {}
-
-    fn synchronise(&mut self) {
-        self.synchronised = true;
-    }
 }
 
 /// Identifier of a node's SYNC.
@@ -99,12 +94,12 @@ impl Effect {
             let synchronise = |node: &mut Node, objects: &mut Recorder| {
                 syncs.iter().for_each(|sync| _ = node.on_frame(sync, now_us, objects));
             };
-            // What waits for a SYNC is not this frame's.
-            synchronise(&mut node, &mut Recorder::default());
+            if frame.id() != sync {
+                // What waits for a SYNC is not this frame's.
+                synchronise(&mut node, &mut Recorder::default());
+            }
             let _ = node.on_frame(frame, now_us, &mut found);
-            found.moves |= found.synchronised;
             synchronise(&mut node, &mut found);
-            found.synchronised = false;
         }
         match found {
             Recorder { stops: true, .. } => Self::Stop,
@@ -165,7 +160,7 @@ mod tests {
             assert_eq!(of(&node, 0x601, &download), effect, "SDO, {word:x}");
         }
         assert_eq!(of(&node, 0, &[129, 0]), Effect::Stop);
-        assert_eq!(of(&node, 0x80, &[]), Effect::SetPoint);
+        assert_eq!(of(&node, 0x80, &[]), Effect::Other);
         // Reading, a heartbeat, another node's word.
         for (id, data) in [(0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0][..]), (0x750, &[5]), (0x202, &[15, 0])]
         {
@@ -191,10 +186,13 @@ mod tests {
         assert_eq!(of(&node, 0x345, &[1, 2, 3, 4, 0, 0]), Effect::Stop);
         assert_eq!(of(&node, 0x345, &[1, 2, 3, 4, 15, 0]), Effect::SetPoint);
         assert_eq!(of(&node, 0x201, &[0, 0]), Effect::Other);
+        assert_eq!(of(&node, 0x6A0, &[]), Effect::Other);
+        // A word that waits for SYNC is SYNC's and not the next frame's.
+        hear(&mut node, 0x345, &[1, 2, 3, 4, 15, 0]);
         assert_eq!(of(&node, 0x6A0, &[]), Effect::SetPoint);
         assert_eq!(of(&node, 0x80, &[]), Effect::Other);
-        // A word that waits for SYNC is not the next frame's.
         hear(&mut node, 0x345, &[1, 2, 3, 4, 0, 0]);
+        assert_eq!(of(&node, 0x6A0, &[]), Effect::Stop);
         assert_eq!(of(&node, 0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]), Effect::Other);
     }
 }
