@@ -32,5 +32,6 @@ mod replay_refusals;
 mod report_page;
 mod robust;
 mod scale;
+mod serve;
 mod trace;
 mod verdict;

@@ -186,6 +186,12 @@ impl<const N: usize, const B: usize> Board<N, B> {
         can.state = if readable { controller } else { Controller::Active };
     }
 
+    /// Pulls the plug of the bus, or puts it back. Without it no frame passes; the controller is passive, since nobody acknowledges.
+    pub fn set_plugged(&mut self, plugged: bool) {
+        self.set_controller(if plugged { Controller::Active } else { Controller::Passive }, true);
+        self.mailbox().is_off = !plugged;
+    }
+
     /// One servo tick of the leg; each of its PWM periods is shown when it is over.
     pub fn tick(&mut self, now_ns: u64, mut show: impl FnMut(&Rig<N, B>)) {
         if self.flashing.stands(now_ns) {

@@ -3,6 +3,7 @@
 use scarab::bus::Frame;
 
 use super::board::{Board, TICK_NS};
+use super::effect::Effect;
 use super::wire::{Mailbox, Sent, Wire};
 use crate::tool::faults::rig::Rig;
 
@@ -41,6 +42,24 @@ impl<const N: usize, const B: usize> Network<N, B> {
     /// A frame of the host's that is to leave at an instant to come.
     pub fn send_at(&mut self, frame: Frame, at_ns: u64) {
         self.host.push(frame, at_ns);
+    }
+
+    /// Takes back the host's frames that are not on the wire.
+    pub fn recall(&mut self) {
+        self.host.clear();
+    }
+
+    /// Pulls the plug of every board, or puts it back.
+    pub fn set_plugged(&mut self, plugged: bool) {
+        for board in &mut self.boards {
+            board.set_plugged(plugged);
+        }
+    }
+
+    /// What a frame of the host's would do at its nodes now.
+    #[must_use]
+    pub fn effect(&self, frame: &Frame) -> Effect {
+        Effect::of(frame, self.boards.iter().flat_map(|board| board.nodes()), self.now_ns / 1000)
     }
 
     /// From now on another node sends this as often as the wire lets it; or no longer does.

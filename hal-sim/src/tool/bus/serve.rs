@@ -1,28 +1,29 @@
 //! Legs on the bus at the pace of a clock, until the process is told to end.
 
-use std::io::Write;
+use std::fs::File;
+use std::io::{Read, Write};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::board::{Board, TICK_NS};
+use super::adapter::{Adapter, Dropped, MOST_AGE};
+use super::board::Board;
 use super::memory::{BYTES, Memory};
 use super::network::Network;
-use super::server::Server;
+use super::pace::{Pace, judge, reachable};
+use super::server::{Event, Server, What};
 use crate::tool::error::ToolError;
 use crate::tool::files;
 use crate::tool::leg_file::LegFile;
 use crate::tool::pair::Context;
 use crate::tool::simulate::{DriveModel, SimulationOptions};
 
-/// A simulation that is so far behind the clock lets the rest go.
-const MOST_LATE: Duration = Duration::from_millis(100);
 /// Ticks between two looks at the port: 1 ms.
-const TICKS_PER_LOOK: u32 = 4;
+const TICKS_PER_LOOK: u64 = 4;
 /// Ticks of the longest change of the flash: 5 s.
-const MOST_STORING: u32 = 20_000;
+const MOST_STORING: u64 = 20_000;
 /// Nothing is due before.
 const NAP: Duration = Duration::from_micros(200);
 
@@ -65,6 +66,19 @@ pub fn network<const N: usize, const B: usize>(
 pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptions) -> Result<(), ToolError> {
     let flash = options.flash.as_deref().map(|path| read(path, options.legs)).transpose()?.flatten();
     let mut network = network::<N, B>(leg, options, flash.as_deref())?;
+    // Written once before anybody connects: what a host stores later must not be lost.
+    write(options.flash.as_deref(), &mut network)?;
+    if let Some(warning) =
+        judge(options.speed, reachable(&network), options.legs).map_err(ToolError::input)?
+    {
+        eprintln!("warning: {warning}");
+    }
+    if !options.address.ip().is_loopback() {
+        eprintln!(
+            "warning: {} can be reached from other machines, and slcan asks for no password: anybody who connects commands the legs",
+            options.address
+        );
+    }
     let refused = |error: std::io::Error| ToolError::input(format!("{}: {error}", options.address));
     let mut server = Server::new(options.address).map_err(refused)?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -73,27 +87,28 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
     }
     println!("listening {}", server.address().map_err(refused)?);
     std::io::stdout().flush().map_err(refused)?;
-    let mut start = Instant::now();
-    let mut before_ns = 0;
+    let mut adapter = Adapter::new(options.bits_per_s, options.speed);
+    let mut pace = Pace::new(options.speed, Instant::now(), network.now_ns());
     let mut alarms = vec![None; options.legs];
     while !stop.load(Ordering::Relaxed) {
-        server.poll(|frame| network.send(frame));
-        let late = start
-            .elapsed()
-            .mul_f64(options.speed)
-            .saturating_sub(Duration::from_nanos(network.now_ns() - before_ns));
-        if late > MOST_LATE.mul_f64(options.speed) {
-            (start, before_ns) = (Instant::now(), network.now_ns());
-        }
-        let due = (late.as_nanos() / u128::from(TICK_NS)).min(TICKS_PER_LOOK.into()) as u32;
+        let now = Instant::now();
+        let take = |frame, since| adapter.push(frame, since, network.effect(&frame));
+        let events = server.poll(now, take);
+        report(&events, &mut adapter, network.now_ns());
+        let due = pace.due(now, network.now_ns()).min(TICKS_PER_LOOK);
         for _ in 0..due {
-            network.tick(|sent| {
+            adapter.tick(&mut network, Instant::now(), |sent| {
                 if sent.sender > 0 {
                     server.tell(&sent.frame);
                 }
             });
         }
-        server.flush();
+        let events = server.flush();
+        report(&events, &mut adapter, network.now_ns());
+        if let Some(second) = pace.second(now, network.now_ns()) {
+            let reports = [second.report(options.speed), not_carried_out(adapter.take_dropped())];
+            reports.iter().flatten().for_each(|report| eprintln!("last second: {report}"));
+        }
         for (place, (board, told)) in network.boards().iter().zip(&mut alarms).enumerate() {
             let alarm = board.rig.alarm();
             if let Some(code) = alarm.filter(|_| alarm != *told) {
@@ -119,19 +134,49 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
     write(options.flash.as_deref(), &mut network)
 }
 
+/// Prints what became of connections; the plug follows the client.
+fn report(events: &[Event], adapter: &mut Adapter, now_ns: u64) {
+    for event in events {
+        eprintln!("{event}");
+        match event.what {
+            What::Opened => adapter.opened(),
+            _ if event.ends() => adapter.closed(now_ns),
+            _ => {}
+        }
+    }
+}
+
+/// What is to be reported of a client's frames, if any was not carried out.
+fn not_carried_out(dropped: Dropped) -> Option<String> {
+    let Dropped { refused, displaced, old } = dropped;
+    (dropped != Dropped::default()).then(|| {
+        format!(
+            "frames of the client not carried out: {refused} refused (the queue held all that the wire carries in {} ms), {displaced} \
+             displaced by a stop, {old} set-points older than that",
+            MOST_AGE.as_millis()
+        )
+    })
+}
+
 /// The flash of all boards; none where the file is not there yet.
 fn read(path: &Path, legs: usize) -> Result<Option<Vec<u8>>, ToolError> {
-    match std::fs::read(path) {
-        Ok(bytes) if bytes.len() == legs * BYTES => Ok(Some(bytes)),
-        Ok(bytes) => Err(ToolError::input(format!(
-            "{}: {} bytes, the flash of {legs} boards has {}",
-            path.display(),
-            bytes.len(),
-            legs * BYTES
-        ))),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(ToolError::input(format!("{}: {error}", path.display()))),
+    let failed = |error: std::io::Error| ToolError::input(format!("{}: {error}", path.display()));
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(failed(error)),
+    };
+    let (mut bytes, length) = (Vec::new(), legs * BYTES);
+    // A device may have no end.
+    file.take(length as u64 + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() == length {
+        return Ok(Some(bytes));
     }
+    let found = if bytes.len() > length { format!("more than {length}") } else { bytes.len().to_string() };
+    Err(ToolError::input(format!(
+        "{}: {found} bytes, the flash of {legs} boards has {length}",
+        path.display()
+    )))
 }
 
 fn write<const N: usize, const B: usize>(

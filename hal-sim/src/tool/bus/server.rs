@@ -1,25 +1,154 @@
 //! One client at a time that speaks slcan over TCP.
+//!
+//! A connection becomes the client when it opens the channel. One that is silent keeps nobody out; one that comes while another has the
+//! channel is refused with a line that says why, and a bell.
 
+use core::fmt::{Display, Formatter, Result as Formatted};
+use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::time::{Duration, Instant};
 
 use scarab::bus::Frame;
 
-use super::slcan::{Line, tell};
+use super::slcan::{BELL, DONE, Heard, Line, TAKEN, tell};
 
 /// A client that leaves so many bytes unread is gone.
 const MOST_UNREAD: usize = 1 << 22;
+/// Bytes that are taken from a connection at once: several times what the wire carries until the next time.
+const MOST_AT_ONCE: usize = 4096;
+/// Connections without a channel; the oldest gives way to a further one. And refused ones that have not read why.
+const MOST_CONNECTIONS: usize = 8;
+/// For so long a refused connection may read why.
+const REFUSED_FOR: Duration = Duration::from_secs(1);
 
-struct Client {
+/// What became of a connection.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum What {
+    /// There is a connection; it has no channel yet.
+    Connected,
+    /// The channel was opened: it is the client.
+    Opened,
+    /// The client closed the channel, and may open it again.
+    Closed,
+    /// The connection ended, for this reason; `true`: that of the client.
+    Gone(&'static str, bool),
+    /// The client of this address has the channel.
+    Refused(SocketAddr),
+}
+
+/// See [`What`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Event {
+    /// Address of the connection.
+    pub peer: SocketAddr,
+    /// What became of it.
+    pub what: What,
+}
+
+impl Event {
+    /// The client is no longer there.
+    #[must_use]
+    pub const fn ends(&self) -> bool {
+        matches!(self.what, What::Closed | What::Gone(_, true))
+    }
+}
+
+impl Display for Event {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Formatted {
+        write!(f, "client {}: ", self.peer)?;
+        match self.what {
+            What::Connected => f.write_str("connected"),
+            What::Opened => f.write_str("opened the channel"),
+            What::Closed => f.write_str("closed the channel: the boards' plug is pulled"),
+            What::Gone(why, true) => write!(f, "disconnected ({why}): the boards' plug is pulled"),
+            What::Gone(why, false) => write!(f, "disconnected ({why})"),
+            What::Refused(client) => write!(f, "refused, {client} has the channel"),
+        }
+    }
+}
+
+struct Connection {
     stream: TcpStream,
+    peer: SocketAddr,
     line: Line,
+    /// Bytes that were read but not taken.
+    heard: VecDeque<u8>,
     out: Vec<u8>,
 }
 
-/// The port and who is connected.
+/// The port and its connections.
 pub struct Server {
     listener: TcpListener,
-    client: Option<Client>,
+    client: Option<Connection>,
+    waiting: VecDeque<Connection>,
+    refused: VecDeque<(TcpStream, Instant)>,
+    /// Everything that was sent before this instant has been taken.
+    drained: Instant,
+}
+
+impl Connection {
+    /// Reads and takes some of what was sent; whether that was all of it.
+    fn hear(
+        &mut self,
+        client: Option<SocketAddr>,
+        mut take: impl FnMut(Frame) -> bool,
+    ) -> Result<bool, What> {
+        let mut bytes = [0; MOST_AT_ONCE];
+        let is_client = client == Some(self.peer);
+        let gone = |why| Err(What::Gone(why, is_client));
+        let mut ended = None;
+        if self.heard.is_empty() {
+            match self.stream.read(&mut bytes) {
+                Ok(0) => ended = Some("end of the connection"),
+                Ok(count) => self.heard.extend(&bytes[..count]),
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+                    return Ok(error.kind() == ErrorKind::WouldBlock);
+                }
+                Err(error) if error.kind() == ErrorKind::ConnectionReset => {
+                    ended = Some("reset by the client")
+                }
+                Err(_) => ended = Some("error of the connection"),
+            }
+        }
+        while let Some(byte) = self.heard.pop_front() {
+            match self.line.hear(byte, &mut self.out) {
+                None => {}
+                Some(Heard::Frame(frame)) => {
+                    let answer = if take(frame) { TAKEN } else { BELL };
+                    self.out.extend_from_slice(answer);
+                }
+                Some(Heard::Open) => {
+                    if let Some(client) = client.filter(|_| !is_client) {
+                        return Err(What::Refused(client));
+                    }
+                    self.out.extend_from_slice(DONE);
+                    return Err(What::Opened);
+                }
+                Some(Heard::Close) => {
+                    self.out.extend_from_slice(DONE);
+                    return Err(What::Closed);
+                }
+            }
+        }
+        ended.map_or(Ok(false), gone)
+    }
+
+    /// Sends what waits, as much as the other side takes; why not.
+    fn flush(&mut self) -> Result<(), &'static str> {
+        while !self.out.is_empty() {
+            match self.stream.write(&self.out) {
+                Ok(0) => return Err("end of the connection"),
+                Ok(count) => {
+                    self.out.drain(..count);
+                }
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => return Err("error of the connection"),
+            }
+        }
+        if self.out.len() > MOST_UNREAD { Err("4 MB left unread") } else { Ok(()) }
+    }
 }
 
 impl Server {
@@ -27,72 +156,127 @@ impl Server {
     pub fn new(address: SocketAddr) -> std::io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
-        Ok(Self { listener, client: None })
+        Ok(Self {
+            listener,
+            client: None,
+            waiting: VecDeque::new(),
+            refused: VecDeque::new(),
+            drained: Instant::now(),
+        })
     }
 
-    /// Where.
+    /// The address it listens at.
     pub fn address(&self) -> std::io::Result<SocketAddr> {
         self.listener.local_addr()
     }
 
-    /// Takes what the client sent, and a new client once there is none.
-    pub fn poll(&mut self, mut take: impl FnMut(Frame)) {
-        self.read(&mut take);
-        while let Ok((stream, _)) = self.listener.accept() {
-            // One at a time: whoever comes second is sent away.
-            if self.client.is_none()
-                && stream.set_nonblocking(true).is_ok()
-                && stream.set_nodelay(true).is_ok()
-            {
-                self.client = Some(Client { stream, line: Line::default(), out: Vec::new() });
-            }
-        }
-        self.read(&mut take);
-    }
-
-    fn read(&mut self, take: &mut impl FnMut(Frame)) {
-        let Some(client) = &mut self.client else { return };
-        let mut bytes = [0; 4096];
-        loop {
-            match client.stream.read(&mut bytes) {
-                Ok(0) => break self.client = None,
-                Ok(count) => {
-                    for byte in &bytes[..count] {
-                        if let Some(frame) = client.line.hear(*byte, &mut client.out) {
-                            take(frame);
-                        }
+    /// Accepts connections, and takes some of what the client sent: each frame with the earliest instant at which it may have been sent;
+    /// one that is not taken is answered by a bell. After the end of a client no frame of another one is taken in the same call.
+    pub fn poll(&mut self, now: Instant, mut take: impl FnMut(Frame, Instant) -> bool) -> Vec<Event> {
+        let mut events = Vec::new();
+        self.forget_refused(now);
+        let since = self.drained;
+        let mut is_drained = true;
+        if let Some(client) = &mut self.client {
+            let peer = client.peer;
+            match client.hear(Some(peer), |frame| take(frame, since)) {
+                Ok(all) => is_drained = all,
+                Err(what) => {
+                    if let (What::Closed, Some(client)) = (&what, self.client.take()) {
+                        self.waiting.push_back(client);
                     }
+                    events.push(Event { peer, what });
+                    return events;
                 }
-                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(_) => break self.client = None,
             }
         }
+        // After the client was read: one that is gone keeps nobody out.
+        while let Ok((stream, peer)) = self.listener.accept() {
+            if stream.set_nonblocking(true).is_err() || stream.set_nodelay(true).is_err() {
+                continue;
+            }
+            if let Some(client) = &self.client {
+                let client = client.peer;
+                self.refuse(stream, client, now);
+                events.push(Event { peer, what: What::Refused(client) });
+                continue;
+            }
+            if self.waiting.len() >= MOST_CONNECTIONS
+                && let Some(oldest) = self.waiting.pop_front()
+            {
+                let what = What::Gone("too many connections without a channel", false);
+                events.push(Event { peer: oldest.peer, what });
+            }
+            events.push(Event { peer, what: What::Connected });
+            let (heard, out) = (VecDeque::new(), Vec::new());
+            self.waiting.push_back(Connection { stream, peer, line: Line::default(), heard, out });
+        }
+        for _ in 0..self.waiting.len() {
+            let Some(mut connection) = self.waiting.pop_front() else { break };
+            let (peer, client) = (connection.peer, self.client.as_ref().map(|client| client.peer));
+            match connection.hear(client, |_| false) {
+                Ok(_) => self.waiting.push_back(connection),
+                Err(What::Opened) => {
+                    self.client = Some(connection);
+                    is_drained = false;
+                    events.push(Event { peer, what: What::Opened });
+                }
+                Err(what) => {
+                    if let What::Refused(client) = what {
+                        self.refuse(connection.stream, client, now);
+                    }
+                    events.push(Event { peer, what });
+                }
+            }
+        }
+        if is_drained {
+            self.drained = now;
+        }
+        events
     }
 
-    /// A frame for the client, if it listens.
+    /// Says why, and waits a while until it was read: closed at once, the connection would be reset.
+    fn refuse(&mut self, mut stream: TcpStream, client: SocketAddr, now: Instant) {
+        let _ = stream.write_all(format!("#refused: {client} has the channel\r\u{7}").as_bytes());
+        let _ = stream.shutdown(Shutdown::Write);
+        if self.refused.len() >= MOST_CONNECTIONS {
+            self.refused.pop_front();
+        }
+        self.refused.push_back((stream, now));
+    }
+
+    fn forget_refused(&mut self, now: Instant) {
+        let mut bytes = [0; MOST_AT_ONCE];
+        self.refused.retain_mut(|(stream, since)| {
+            let goes_on = match stream.read(&mut bytes) {
+                Ok(count) => count > 0,
+                Err(error) => error.kind() == ErrorKind::WouldBlock,
+            };
+            goes_on && now.saturating_duration_since(*since) < REFUSED_FOR
+        });
+    }
+
+    /// A frame for the client, if there is one.
     pub fn tell(&mut self, frame: &Frame) {
-        if let Some(client) = self.client.as_mut().filter(|client| client.line.is_open()) {
+        if let Some(client) = &mut self.client {
             tell(frame, &mut client.out);
         }
     }
 
-    /// Sends what waits, as much as the client takes.
-    pub fn flush(&mut self) {
-        let Some(client) = &mut self.client else { return };
-        while !client.out.is_empty() {
-            match client.stream.write(&client.out) {
-                Ok(0) => return self.client = None,
-                Ok(count) => {
-                    client.out.drain(..count);
-                }
-                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(_) => return self.client = None,
-            }
-        }
-        if client.out.len() > MOST_UNREAD {
+    /// Sends what waits, as much as each connection takes.
+    pub fn flush(&mut self) -> Vec<Event> {
+        let mut events = Vec::new();
+        if let Some(client) = &mut self.client
+            && let Err(why) = client.flush()
+        {
+            events.push(Event { peer: client.peer, what: What::Gone(why, true) });
             self.client = None;
         }
+        self.waiting.retain_mut(|connection| {
+            let Err(why) = connection.flush() else { return true };
+            events.push(Event { peer: connection.peer, what: What::Gone(why, false) });
+            false
+        });
+        events
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! S0 .. S8, s...   bit rate            answered by CR            O, L   open         CR          C   close    CR
-//! tIIILDD..        frame               z CR                      TIIIIIIIILDD..      29-bit identifier: z CR, and dropped
+//! tIIILDD..        frame               z CR, bell: queue full    TIIIIIIIILDD..      29-bit identifier: z CR, and dropped
 //! rIIIL            remote frame        z CR, and dropped         V, v, N, F, Z, M, m version, number, flags, settings
 //! anything else, or not while it is open: bell
 //! ```
@@ -11,18 +11,25 @@
 
 use scarab::bus::Frame;
 
-/// What a line asks for.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A line that needs a decision. The receiver of this value answers it; all other lines are answered here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// A frame for the bus.
+    /// A frame for the bus: [`TAKEN`] or [`BELL`].
     Frame(Frame),
-    /// Nothing but the answer.
-    Nothing,
+    /// The closed channel is to be opened: [`DONE`], or a refusal.
+    Open,
+    /// The open channel was closed: [`DONE`].
+    Close,
 }
 
 /// The longest line: a frame with 29-bit identifier.
 const LONGEST: usize = 1 + 8 + 1 + 16;
-const BELL: u8 = 7;
+/// Answer to a line that was not carried out.
+pub const BELL: &[u8] = b"\x07";
+/// Answer to a frame that was put into the queue.
+pub const TAKEN: &[u8] = b"z\r";
+/// Answer to a command.
+pub const DONE: &[u8] = b"\r";
 
 /// One client's side of the line.
 #[derive(Clone, Debug, Default)]
@@ -40,19 +47,18 @@ impl Line {
         self.is_open
     }
 
-    /// A byte from the client; what is answered goes to `out`.
-    pub fn hear(&mut self, byte: u8, out: &mut Vec<u8>) -> Option<Frame> {
+    /// Takes a byte from the client. Answers go to `out`, except that to a returned line.
+    pub fn hear(&mut self, byte: u8, out: &mut Vec<u8>) -> Option<Heard> {
         match byte {
             b'\r' => {
                 let bytes = std::mem::take(&mut self.bytes);
-                let spoilt = std::mem::take(&mut self.spoilt);
-                match self.obey(&bytes).filter(|_| !spoilt) {
-                    Some((Heard::Frame(frame), answer)) => {
-                        out.extend_from_slice(answer);
-                        return Some(frame);
-                    }
-                    Some((Heard::Nothing, answer)) => out.extend_from_slice(answer),
-                    None => out.push(BELL),
+                if std::mem::take(&mut self.spoilt) {
+                    out.extend_from_slice(BELL);
+                    return None;
+                }
+                match self.obey(&bytes) {
+                    Ok(heard) => return Some(heard),
+                    Err(answer) => out.extend_from_slice(answer),
                 }
             }
             b'\n' => {}
@@ -62,28 +68,26 @@ impl Line {
         None
     }
 
-    fn obey(&mut self, line: &[u8]) -> Option<(Heard, &'static [u8])> {
-        let nothing = |answer: &'static [u8]| Some((Heard::Nothing, answer));
+    fn obey(&mut self, line: &[u8]) -> Result<Heard, &'static [u8]> {
         match line {
-            // Clients send a few empty lines to begin with.
-            [] => nothing(b"\r"),
-            [b'S' | b's', ..] if !self.is_open => nothing(b"\r"),
-            [b'O' | b'L'] => {
+            [b'S' | b's', ..] if self.is_open => Err(BELL),
+            [b'O' | b'L'] if !self.is_open => {
                 self.is_open = true;
-                nothing(b"\r")
+                Ok(Heard::Open)
             }
-            [b'C'] => {
+            [b'C'] if self.is_open => {
                 self.is_open = false;
-                nothing(b"\r")
+                Ok(Heard::Close)
             }
-            [b'V'] => nothing(b"V1013\r"),
-            [b'v'] => nothing(b"v1013\r"),
-            [b'N'] => nothing(b"N5CA2\r"),
-            [b'F'] => nothing(b"F00\r"),
-            [b'Z' | b'M' | b'm', ..] => nothing(b"\r"),
-            [b't', rest @ ..] if self.is_open => Some((Heard::Frame(frame(rest)?), b"z\r")),
-            [b'T' | b'r' | b'R', ..] if self.is_open => nothing(b"z\r"),
-            _ => None,
+            // Clients send a few empty lines to begin with.
+            [] | [b'O' | b'L' | b'C'] | [b'S' | b's' | b'Z' | b'M' | b'm', ..] => Err(DONE),
+            [b'V'] => Err(b"V1013\r"),
+            [b'v'] => Err(b"v1013\r"),
+            [b'N'] => Err(b"N5CA2\r"),
+            [b'F'] => Err(b"F00\r"),
+            [b't', rest @ ..] if self.is_open => frame(rest).map(Heard::Frame).ok_or(BELL),
+            [b'T' | b'r' | b'R', ..] if self.is_open => Err(TAKEN),
+            _ => Err(BELL),
         }
     }
 }
@@ -123,7 +127,17 @@ mod tests {
 
     fn say(line: &mut Line, text: &str) -> (Vec<Frame>, String) {
         let mut out = Vec::new();
-        let frames = text.bytes().filter_map(|byte| line.hear(byte, &mut out)).collect();
+        let mut frames = Vec::new();
+        for byte in text.bytes() {
+            match line.hear(byte, &mut out) {
+                Some(Heard::Frame(frame)) => {
+                    frames.push(frame);
+                    out.extend_from_slice(TAKEN);
+                }
+                Some(Heard::Open | Heard::Close) => out.extend_from_slice(DONE),
+                None => {}
+            }
+        }
         (frames, String::from_utf8(out).expect("ASCII"))
     }
 

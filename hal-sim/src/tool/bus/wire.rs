@@ -113,13 +113,14 @@ impl Mailbox {
 
     /// Place of the frame that it puts on the wire at an instant.
     fn first(&self, now_ns: u64) -> Option<usize> {
-        let places = self.waiting.iter().enumerate();
-        let first = if self.in_order {
-            places.map(|(place, _)| place).next()
-        } else {
-            places.min_by_key(|(_, waiting)| waiting.frame.id()).map(|(place, _)| place)
-        };
-        first.filter(|place| !self.is_off && self.waiting[*place].asked_ns <= now_ns)
+        let places = self.waiting.iter().enumerate().filter(|_| !self.is_off);
+        let mut ready = places.filter(|(place, waiting)| {
+            // Behind the first of an adapter's queue, none is ready.
+            waiting.asked_ns <= now_ns && (*place == 0 || !self.in_order)
+        });
+        let first =
+            if self.in_order { ready.next() } else { ready.min_by_key(|(_, waiting)| waiting.frame.id()) };
+        first.map(|(place, _)| place)
     }
 }
 
@@ -226,6 +227,16 @@ mod tests {
         // The adapter's SYNC waits behind its own SDO.
         assert_eq!(sent, [0x181, 0x281, 0x381, 0x601, 0x080]);
         assert!(wire.busy_ns() > 5 * 47_000 && wire.busy_ns() < 5 * 135_000);
+    }
+
+    #[test]
+    fn a_frame_that_came_later_keeps_no_earlier_one_from_leaving() {
+        let mut node = Mailbox::default();
+        node.push(Frame::new(0x82, &[]), 1000);
+        node.push(Frame::new(0x81, &[]), 5000);
+        let mut wire = Wire::new(1_000_000);
+        let sent = core::iter::from_fn(|| wire.advance(2_000_000, &mut [&mut node]));
+        assert_eq!(sent.map(|sent| sent.frame.id()).collect::<Vec<_>>(), [0x82, 0x81]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! `serve`: legs on a CANopen bus, reached by host software through a TCP port.
 
-use std::net::SocketAddr;
+use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::Path;
 
 use clap::Args;
@@ -19,7 +19,7 @@ pub struct ServeArguments {
     #[command(flatten)]
     leg: LegOptions,
     /// Address and port of the simulated CAN adapter (slcan over TCP); port 0 selects a free one.
-    #[arg(long, value_name = "HOST:PORT")]
+    #[arg(long, value_name = "HOST:PORT", value_parser = address)]
     slcan: SocketAddr,
     /// Boards on the bus, each with this leg.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=4))]
@@ -36,6 +36,13 @@ pub struct ServeArguments {
     /// Seed of the noise.
     #[arg(long, default_value_t = DEFAULT_SEED)]
     seed: u64,
+}
+
+/// Resolves a host name or number; of several addresses the first of version 4.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let mut found: Vec<SocketAddr> = text.to_socket_addrs().map_err(|error| error.to_string())?.collect();
+    found.sort_by_key(SocketAddr::is_ipv6);
+    found.first().copied().ok_or_else(|| "no address".into())
 }
 
 /// Bit rates of the board's controller, kbit/s (object 2002).

@@ -1,0 +1,120 @@
+"""Hostile frames through the port: `hostile.py HOST:PORT [--frames N] [--taken N] [--pid PID]`.
+
+Random frames of every identifier and length, broken lines and lines that never end, as fast as the port takes them: a million, or so many, and
+until so many were taken for the wire instead of being refused. Every line has to be answered, no more frames may be taken than the
+wire carries, the process with that number may not grow by more than 32 MB, and the nodes have to answer afterwards. The last line is
+`hostile: ok`.
+"""
+
+import argparse
+import random
+import select
+import socket
+import time
+
+CHUNK = 2000
+# The shortest frame that is sent, bits; the wire's, bits per second.
+SHORTEST, WIRE = 47, 1_000_000
+MOST_GROWN_KB = 32_000
+
+
+def lines(dice):
+    """A chunk of lines, and how many answers it has."""
+    out = []
+    for _ in range(CHUNK):
+        kind = dice.random()
+        if kind < 0.9:
+            data = dice.randbytes(dice.randint(0, 8))
+            identifier = dice.choice((dice.randint(0, 0x7FF), 0, 0x80, 0x201, 0x301, 0x601, 0x602))
+            out.append(f"t{identifier:03X}{len(data)}{data.hex().upper()}")
+        elif kind < 0.95:
+            # No command of an adapter, nor one that closes or opens the channel.
+            out.append("".join(dice.choice("tTrRx0123456789ABDE") for _ in range(dice.randint(1, 40))))
+        else:
+            out.append("t601" + "8" * dice.randint(1, 300))
+    return "".join(line + "\r" for line in out).encode()
+
+
+def memory_kb(pid):
+    """The process's memory now."""
+    with open(f"/proc/{pid}/status", encoding="ascii") as status:
+        return next(int(line.split()[1]) for line in status if line.startswith("VmRSS:"))
+
+
+class Port:
+    """The port, and how its answers were."""
+
+    def __init__(self, address):
+        host, _, number = address.rpartition(":")
+        self.socket = socket.create_connection((host, int(number)))
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.rest, self.taken, self.bells, self.frames = b"", 0, 0, []
+
+    def read(self, wait_s):
+        """Counts the answers that are there."""
+        if not select.select([self.socket], [], [], wait_s)[0]:
+            return
+        received = self.socket.recv(1 << 18)
+        if not received:
+            raise SystemExit("the port closed the connection")
+        *told, self.rest = (self.rest + received).replace(b"\x07", b"\x07\r").split(b"\r")
+        for line in told:
+            self.taken += line == b"z"
+            self.bells += line == b"\x07"
+            if line[:1] == b"t":
+                self.frames = self.frames[-99:] + [line]
+
+    def send(self, data):
+        """Sends while it reads: a port that waits for its answers to be read is not hung."""
+        while data:
+            _, writable, _ = select.select([], [self.socket], [], 0)
+            if writable:
+                data = data[self.socket.send(data[:1 << 14]):]
+            self.read(0 if writable else 0.01)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("address")
+    parser.add_argument("--frames", type=int, default=1_000_000)
+    parser.add_argument("--taken", type=int, default=0)
+    parser.add_argument("--pid", type=int)
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    dice = random.Random(arguments.seed)
+    # A few chunks, sent in random order: making a million lines takes longer than sending them.
+    chunks = [lines(dice) for _ in range(40)]
+    port = Port(arguments.address)
+    port.send(b"C\rS8\rO\r")
+    before = memory_kb(arguments.pid) if arguments.pid else 0
+    most, begin, sent, port.taken, port.bells = before, time.monotonic(), 0, 0, 0
+    while sent < arguments.frames or port.taken < arguments.taken:
+        port.send(dice.choice(chunks))
+        sent += CHUNK
+        if arguments.pid:
+            most = max(most, memory_kb(arguments.pid))
+    end = time.monotonic() + 60
+    while port.taken + port.bells < sent:
+        port.read(0.5)
+        if time.monotonic() > end:
+            raise SystemExit(f"{sent} lines, {port.taken + port.bells} answers")
+    seconds = time.monotonic() - begin
+    carries = (seconds + 0.2) * WIRE / SHORTEST
+    print(f"{sent} lines in {seconds:.1f} s: {port.taken} frames taken, {port.bells} refused; memory {before} KB, at most {most} KB")
+    assert port.bells > 0 and port.taken <= carries + 0.02 * sent, f"{port.taken} taken, the wire carries {carries:.0f}"
+    assert most - before < MOST_GROWN_KB, "the memory is not bounded"
+    # Whatever was written: all nodes begin anew, and say so.
+    port.frames.clear()
+    boots, end = set(), time.monotonic() + 20
+    while len(boots) < 2:
+        port.send(b"t00028100\r")
+        port.read(0.2)
+        boots |= {line for line in port.frames if line[:2] == b"t7" and line[4:] == b"100"}
+        if time.monotonic() > end:
+            raise SystemExit(f"after a reset of all nodes two boot-up messages are missing: {boots}")
+        time.sleep(0.2)
+    print("hostile: ok")
+
+
+if __name__ == "__main__":
+    main()

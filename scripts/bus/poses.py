@@ -1,0 +1,170 @@
+"""Stop and enable from random poses: `poses.py HOST:PORT [--poses COUNT] [--seed SEED] [--leg FILE]`.
+
+Each time the leg goes to a random pose of its range and is stopped in one of five ways, each of which lets it fall. Then it is enabled again.
+Where it is not, the nodes have to say why (a bit of 60FD that was not set before, an emergency message, 603F), and a host that
+does no more than reset faults and ask again has to get it back. The last line is `poses: ok`.
+"""
+
+import argparse
+import math
+import os
+import random
+import re
+import time
+
+from scarab_bus import MICRO, Joint, connect, until
+
+NODES = (1, 2)
+DEFAULT_LEG = "x2-wearer-75kg.toml"
+WAYS = ("disable voltage", "quick stop", "reset of the nodes", "connection cut", "disable operation, then shut-down and off")
+STEPS = ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27))
+# A leg that fell is given some time to come to rest.
+ENABLE_WITHIN_S, BACK_WITHIN_S, FALL_S = 2.0, 60.0, 1.5
+
+
+class Leg:
+    """A connection and the joints behind it."""
+
+    def __init__(self, address):
+        self.address = address
+        self.open()
+
+    def open(self):
+        self.network = connect(self.address)
+        self.network.nmt.state = "OPERATIONAL"
+        self.joints = [Joint(self.network, number) for number in NODES]
+
+    def close(self):
+        self.network.disconnect()
+
+
+def is_up(joints, longest_s):
+    """Whether 6, 7, F enable the leg."""
+    end = time.monotonic() + longest_s
+    for word, state in STEPS:
+        for joint in joints:
+            joint.write(0x6040, 0, word, "<H")
+        while any(joint.read(0x6041, 0, "<H") & 0x806F != state for joint in joints):
+            if time.monotonic() > end:
+                return False
+    return True
+
+
+def off(joints):
+    """Faults reset, controlword 0."""
+    for joint in joints:
+        joint.write(0x6040, 0, 0x00, "<H")
+        joint.write(0x6040, 0, 0x80, "<H")
+        joint.write(0x6040, 0, 0x00, "<H")
+
+
+def ranges(path):
+    """The joints' ranges, rad, of a leg file."""
+    with open(path, encoding="utf-8") as file:
+        found = re.findall(r"^range_deg = \[(.+), (.+)\]", file.read(), re.MULTILINE)
+    return [tuple(math.radians(float(end)) for end in pair) for pair in found]
+
+
+def pose(joints, limits, dice):
+    """A random pose of the range, reached as far as it is in 10 s."""
+    goals = []
+    for joint, (low, high) in zip(joints, limits):
+        goals.append(round(dice.uniform(low + 0.02 * (high - low), high - 0.02 * (high - low)) / MICRO))
+        joint.write(0x6081, 0, 1_500_000)
+        joint.write(0x607A, 0, goals[-1], "<i")
+        joint.write(0x6060, 0, 1, "<b")
+        until("mode 1", lambda: joint.read(0x6061, 0, "<b") == 1)
+    for joint in joints:
+        joint.write(0x6040, 0, 0x3F, "<H")
+    end = time.monotonic() + 10
+    while time.monotonic() < end and not all(
+            abs(joint.position() - goal * MICRO) < 0.02 for joint, goal in zip(joints, goals)):
+        time.sleep(0.01)
+    return [goal * MICRO for goal in goals]
+
+
+def stop(leg, way):
+    """Stops the leg in a way that lets it fall."""
+    joints = leg.joints
+    if way in WAYS[:2]:
+        for joint in joints:
+            joint.write(0x6040, 0, 0x02 if way == WAYS[1] else 0x00, "<H")
+    elif way == WAYS[2]:
+        leg.network.nmt.send_command(129)
+        time.sleep(0.2)
+        leg.network.nmt.state = "OPERATIONAL"
+    elif way == WAYS[3]:
+        leg.close()
+        leg.open()
+    elif way == WAYS[4]:
+        for word in (0x07, 0x06, 0x00):
+            for joint in joints:
+                joint.write(0x6040, 0, word, "<H")
+    joints = leg.joints
+    for joint in joints:
+        until(f"node {joint.number} off after {way}", lambda: joint.read(0x6041, 0, "<H") & 0x4F in (0x40, 0x08), 30)
+    off(joints)
+    time.sleep(FALL_S)
+
+
+def reason(joints, inputs):
+    """Why the leg is not enabled, in the nodes' words."""
+    found = []
+    for joint, before in zip(joints, inputs):
+        now = joint.read(0x60FD)
+        found += [f"node {joint.number}: 60FD is {now:08X}, {before:08X} before"] * (now != before)
+        found += [f"node {joint.number}: emergency {code:04X}" for code in joint.emergencies if code]
+        code = joint.read(0x603F, 0, "<H")
+        found += [f"node {joint.number}: 603F is {code:04X}"] * (code != 0)
+    return found
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("address")
+    parser.add_argument("--poses", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--leg", default=os.path.join(os.path.dirname(__file__), "../../hal-sim/legs", DEFAULT_LEG))
+    arguments = parser.parse_args()
+    count, dice, limits = arguments.poses, random.Random(arguments.seed), ranges(arguments.leg)
+    leg = Leg(arguments.address)
+    off(leg.joints)
+    if not is_up(leg.joints, 10):
+        raise SystemExit(f"not enabled at the start: {reason(leg.joints, [0, 0])}")
+    inputs = [joint.read(0x60FD) for joint in leg.joints]
+    refused, silent, locked = 0, [], []
+    for number in range(1, count + 1):
+        goals = pose(leg.joints, limits, dice)
+        way = dice.choice(WAYS)
+        stop(leg, way)
+        for joint in leg.joints:
+            joint.emergencies.clear()
+        rests = [joint.position() for joint in leg.joints]
+        where = f"pose {number} ({', '.join(f'{goal:.2f}' for goal in goals)}), {way}, rests at {', '.join(f'{rest:.2f}' for rest in rests)}"
+        if is_up(leg.joints, ENABLE_WITHIN_S):
+            continue
+        refused += 1
+        why = reason(leg.joints, inputs)
+        print(f"{where}: not enabled; {'; '.join(why) or 'NO REASON'}", flush=True)
+        if not why:
+            silent.append(where)
+        end = time.monotonic() + BACK_WITHIN_S
+        while time.monotonic() < end:
+            off(leg.joints)
+            if is_up(leg.joints, ENABLE_WITHIN_S):
+                break
+        else:
+            locked.append(where)
+            print(f"{where}: LOCKED OUT", flush=True)
+            # Another one cannot be tried from here.
+            break
+    off(leg.joints)
+    leg.close()
+    print(f"{number} poses, {refused} not enabled at once, {len(silent)} of them without a reason, {len(locked)} locked out")
+    if silent or locked:
+        raise SystemExit("poses: failed")
+    print("poses: ok")
+
+
+if __name__ == "__main__":
+    main()
