@@ -30,6 +30,8 @@ pub struct JointDescription {
     pub body: BodyDescription,
     /// Rotor inertia as the joint feels it (gear ratio squared times the rotor's own), kg m^2.
     pub rotor_inertia: f64,
+    /// Angles of the mechanical end stops, rad, anatomical; a joint without them turns freely.
+    pub stops: Option<[f64; 2]>,
     /// What resists the joint.
     pub friction: FrictionDescription,
     /// Motor and current loop.

@@ -138,6 +138,11 @@ impl Emergency {
         self.active.iter().flatten().fold(0, |register, error| register | error.register())
     }
 
+    /// Object 603F: code of the newest error in the list, 0 where it is empty.
+    pub(super) fn newest(&self) -> u32 {
+        self.history(1).unwrap_or(0) & 0xFFFF
+    }
+
     /// Object 1003.
     pub(super) fn history(&self, sub: u8) -> Result<u32, Abort> {
         match sub.checked_sub(1) {

@@ -92,6 +92,11 @@ impl Course {
         self.position = clamp(self.position, place - window, place + window);
     }
 
+    /// No lower and no higher.
+    pub fn keep_between(&mut self, low: f32, high: f32) {
+        self.position = clamp(self.position, low, high);
+    }
+
     /// One tick towards a position.
     pub fn approach(&mut self, target: f32, rates: &Rates, tick_s: f32) {
         // Near the target what the sum has lost is as large as the last steps.

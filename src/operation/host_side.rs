@@ -4,11 +4,11 @@
 
 use super::queues::HostEnds;
 use super::signals::Signals;
-use crate::bus::station::{LegRequest, LegTold};
+use crate::bus::station::{LegOrder, LegRequest, LegTold};
 use crate::hal::{Hardware, Sample};
 use crate::leg::{
     Activity, Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand,
-    JointStatus, Plan, PowerRequest,
+    JointStatus, Plan, PowerRequest, Refusal,
 };
 
 /// Ticks between two reports to the bus: 2 kHz, twice the fastest cycle that fits the wire.
@@ -24,7 +24,10 @@ pub struct HostSide<const N: usize> {
     commands: Option<[JointCommand; N]>,
     request: Option<LegRequest>,
     cancel: bool,
-    refused: bool,
+    refused: Option<Refusal>,
+    /// The bus refused a step by itself, which no record tells of yet.
+    noted: Option<Refusal>,
+    may_return: [bool; N],
     tick: u32,
 }
 
@@ -37,7 +40,16 @@ impl<const N: usize> HostSide<N> {
     /// Nothing received yet.
     #[must_use]
     pub const fn new(following: Following<N>) -> Self {
-        Self { following, commands: None, request: None, cancel: false, refused: false, tick: 0 }
+        Self {
+            following,
+            commands: None,
+            request: None,
+            cancel: false,
+            refused: None,
+            noted: None,
+            may_return: [true; N],
+            tick: 0,
+        }
     }
 
     /// The joints have other zeros than before.
@@ -52,13 +64,32 @@ impl<const N: usize> HostSide<N> {
         signals: &Signals<N>,
         hardware: &mut impl Hardware<N>,
     ) {
-        while ends.orders.dequeue().is_some() {}
+        while let Some(order) = ends.orders.dequeue() {
+            self.note(&order);
+        }
         (self.commands, self.request, self.cancel) = (None, None, false);
         if self.is_due(ends, hardware) {
-            let blocked = !signals.inhibit.is_clear();
+            let causes = signals.inhibit.causes();
+            let (blocked, calibrated) = (causes != 0, signals.is_calibrated());
             let held = is_held(signals, hardware);
-            let _ = ends.told.enqueue(LegTold { blocked, held, ..LegTold::NONE });
+            let _ = ends.told.enqueue(LegTold { blocked, causes, calibrated, held, ..LegTold::NONE });
         }
+    }
+
+    fn note(&mut self, order: &LegOrder<N>) {
+        self.may_return = order.may_return;
+        self.noted = order.refused.or(self.noted);
+    }
+
+    /// What the bus refused by itself, once.
+    pub fn take_noted(&mut self) -> Option<Refusal> {
+        self.noted.take()
+    }
+
+    /// Joints that a host lets return into their range.
+    #[must_use]
+    pub const fn may_return(&self) -> [bool; N] {
+        self.may_return
     }
 
     /// Takes the newest order, unless a request still waits behind the operator's. Reports the faults that a lost host means.
@@ -66,6 +97,7 @@ impl<const N: usize> HostSide<N> {
         while self.request.is_none()
             && let Some(order) = ends.orders.dequeue()
         {
+            self.note(&order);
             self.commands = order.commands;
             for (joint, code) in order.faults.into_iter().enumerate() {
                 if let Some(code) = code {
@@ -135,7 +167,7 @@ impl<const N: usize> HostSide<N> {
             // The host sees by its tick that one is missing.
             let _ = ends.logged.enqueue(logged);
         }
-        self.refused |= output.servo.decision.refused.is_some();
+        self.refused = output.servo.decision.refused.or(self.refused);
         if !self.is_due(ends, hardware) {
             return;
         }
@@ -155,6 +187,8 @@ impl<const N: usize> HostSide<N> {
             refused: core::mem::take(&mut self.refused),
             held: is_held(signals, hardware),
             blocked: !signals.inhibit.is_clear(),
+            causes: signals.inhibit.causes(),
+            calibrated: true,
             rests: false,
         };
         let _ = ends.told.enqueue(told);

@@ -187,6 +187,8 @@ notices! {
     StoreFailed = 0x5530;
     /// The flash is about to be written: the node may be silent for seconds, heartbeats included.
     Storing = 0xFF0D;
+    /// A step towards enabled was refused: joint (from 1; 0 the leg), reason (bit of 60FD), causes.
+    NotEnabled = 0xFF0E;
 }
 
 /// A fault and the joint it was seen at; it stops the whole leg.
@@ -243,7 +245,7 @@ mod tests {
         for (code, number) in numbers {
             assert_eq!(code.number(), number, "{code:?}");
         }
-        assert_eq!(NoticeCode::ALL.map(NoticeCode::number), [0x8110, 0x8210, 0x5530, 0xFF0D]);
+        assert_eq!(NoticeCode::ALL.map(NoticeCode::number), [0x8110, 0x8210, 0x5530, 0xFF0D, 0xFF0E]);
     }
 
     #[test]

@@ -167,6 +167,17 @@ impl<const N: usize> Servo<N> {
         self.monitor.report(fault);
     }
 
+    /// Joints that may be enabled outside their range, see [`Monitor::permit_return`].
+    pub const fn permit_return(&mut self, joints: [bool; N]) {
+        self.monitor.permit_return(joints);
+    }
+
+    /// Joints that return into their range.
+    #[must_use]
+    pub fn returns(&self) -> [bool; N] {
+        self.monitor.returns()
+    }
+
     /// What temperature and bus voltage leave of the torque caps from the next tick on.
     pub fn derate(&mut self, derating: &Derating) {
         self.monitor.derate(derating);

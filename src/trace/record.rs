@@ -103,11 +103,11 @@ records! {
         /// Or refused.
         accepted: bool,
     }
-    /// The monitor did not enable the drive.
+    /// A step towards an enabled drive was refused.
     NotEnabled "not_enabled n={=u32} tick={=u32} joint={=u8} why={=str}" {
         /// Servo tick.
         tick: u32,
-        /// From 1.
+        /// From 1; 0 is the leg.
         joint: u8,
         /// [`super::words::refusal`].
         why: &'static str,

@@ -12,10 +12,12 @@
 //! ```
 //! Source: CiA 402, controlword.
 
+use super::coupling::level;
 use super::status::state_bits;
 use super::{JointCommand, JointStatus, Mode, SetPoint, Target};
+use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::Lost;
-use crate::leg::{DriveEvent, DriveState, FaultCode, PowerRequest};
+use crate::leg::{DriveEvent, DriveState, FaultCode, PowerRequest, RefusalReason};
 use crate::units::{Ampere, NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
 
 const RESET: u16 = 1 << 7;
@@ -63,6 +65,7 @@ pub(super) struct Settings {
     pub outputs: u32,
     pub target_velocity: i32,
     pub feedforward: bool,
+    pub returns: bool,
     pub node_id: u8,
     pub bit_rate: u16,
 }
@@ -98,6 +101,7 @@ impl Settings {
         outputs: 0,
         target_velocity: 0,
         feedforward: false,
+        returns: true,
         node_id: 0,
         bit_rate: USUAL_KBIT,
     };
@@ -123,6 +127,10 @@ pub struct Axis {
     fault: Option<FaultCode>,
     /// A host has sent a controlword that says something.
     pub(super) commanded: bool,
+    /// A step towards enabled was asked for and not looked at yet.
+    rises: bool,
+    /// Why such a step is refused, as long as that lasts.
+    pub(in crate::bus) refused: Option<ErrorReport>,
 }
 
 /// The fault of a lost host.
@@ -160,6 +168,8 @@ impl Axis {
             asked: 0,
             fault: None,
             commanded: false,
+            rises: false,
+            refused: None,
         }
     }
 
@@ -179,6 +189,17 @@ impl Axis {
         self.settings.bit_rate = kbit_per_s;
     }
 
+    /// Object 2012.
+    #[must_use]
+    pub const fn may_return(&self) -> bool {
+        self.settings.returns
+    }
+
+    /// A step towards enabled was asked for since this was asked last.
+    pub(in crate::bus) fn take_rises(&mut self) -> bool {
+        core::mem::take(&mut self.rises)
+    }
+
     /// Where the leg's drive stands.
     #[must_use]
     pub const fn drive(&self) -> DriveState {
@@ -193,7 +214,7 @@ impl Axis {
 
     /// Something forbids to enable.
     pub(in crate::bus) const fn is_blocked(&self) -> bool {
-        self.status.inputs & super::BLOCKED != 0
+        self.status.inputs & RefusalReason::Blocked.bit() != 0
     }
 
     /// This joint is enabled, and so is the leg.
@@ -210,6 +231,13 @@ impl Axis {
             self.resets = self.own.fault().is_some();
         }
         if word & RESET == 0 {
+            let wanted = match word & 0xF {
+                0b0110 | 0b1110 => 1,
+                0b0111 => 2,
+                0b1111 => 3,
+                _ => 0,
+            };
+            self.rises |= wanted > level(self.own);
             self.ask(word);
         }
         self.taken &= word & NEW != 0;

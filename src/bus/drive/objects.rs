@@ -6,7 +6,6 @@ use crate::bus::abort::Abort;
 use crate::bus::dictionary::Object;
 use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::{Lost, Objects};
-use crate::leg::NO_ERROR;
 
 /// The low bytes of a signed number.
 macro_rules! bits {
@@ -30,11 +29,11 @@ impl Objects for Axis {
             (0x2001, _) => u32::from(settings.node_id),
             (0x2002, _) => u32::from(settings.bit_rate),
             (0x2011, _) => u32::from(settings.feedforward),
+            (0x2012, _) => u32::from(settings.returns),
             // The leg's, which is not asked here.
             (0x2100..=0x2198, _) => return Err(Abort::NoData),
             (0x219A | 0x60FD, _) => status.inputs,
             (0x6007, _) => bits!(settings.connection_option),
-            (0x603F, _) => u32::from(self.own.fault().map_or(NO_ERROR, |fault| fault.code.number())),
             (0x6040, _) => u32::from(self.controlword),
             (0x6041, _) => u32::from(self.statusword()),
             (0x605A, _) => bits!(settings.quick_stop_option),
@@ -88,6 +87,7 @@ impl Objects for Axis {
             (0x2001, _) if value <= 127 => settings.node_id = value as u8,
             (0x2002, _) if matches!(value, 125 | 250 | 500 | 1000) => settings.bit_rate = value as u16,
             (0x2011, _) if value <= 1 => settings.feedforward = value == 1,
+            (0x2012, _) if value <= 1 => settings.returns = value == 1,
             (0x6007, _) if is(&[0, 1, 2, 3]) => settings.connection_option = value as i16,
             (0x6040, _) => self.control(value as u16),
             // What a fault does is chosen per fault, and a halt slows down along the profile.
@@ -130,6 +130,7 @@ impl Objects for Axis {
                 0x2001
                 | 0x2002
                 | 0x2011
+                | 0x2012
                 | 0x6007
                 | 0x605A..=0x605E
                 | 0x6083
@@ -147,7 +148,7 @@ impl Objects for Axis {
     }
 
     fn error(&self) -> Option<ErrorReport> {
-        let fault = self.own.fault()?;
+        let Some(fault) = self.own.fault() else { return self.refused };
         Some(ErrorReport { code: fault.code.number(), information: [fault.joint + 1, 0, 0, 0, 0] })
     }
 

@@ -116,7 +116,7 @@ fn a_fault_of_the_leg_is_told_by_both_nodes_and_reset_by_a_rising_edge() {
     let told: std::vec::Vec<_> = frames.iter().map(|frame| (frame.id(), frame.data().to_vec())).collect();
     let data = [0x00, 0x84, 0b10_0001, 2, 0, 0, 0, 0].to_vec();
     assert_eq!(told, [(0x81, data.clone()), (0x82, data)]);
-    assert_eq!(board.axes[0].read(Object::at(0x603F, 0)), Ok(0x8400));
+    assert_eq!(board.read(0x603F, 0), Ok(0x8400));
     board.run(5);
     assert_eq!(board.states(), [0x08; 2]);
     assert_eq!(board.control([15, 15]), [0x08; 2]);

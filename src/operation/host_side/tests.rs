@@ -104,7 +104,7 @@ const SAMPLE: Sample<2> = Sample {
 };
 
 fn order(request: Option<LegRequest>) -> LegOrder<2> {
-    LegOrder { commands: Some(commanded()), request, faults: [None; 2] }
+    LegOrder { commands: Some(commanded()), request, faults: [None; 2], may_return: [true; 2], refused: None }
 }
 
 const UP: PowerRequest = PowerRequest::EnableOperation;
@@ -202,8 +202,11 @@ fn the_bus_runs_after_every_second_tick_and_is_told_once_it_has_taken_what_it_ha
     let (cause, verdict) = (Cause::Friction, Verdict::ACCEPTED);
     control.receive(Finding::Updated { cause, verdict, model: Some(model()) });
     (0..4).for_each(|_| bench.report(&control, &plain));
-    let told: Vec<(bool, bool, bool, [bool; 2])> =
-        bench.told.iter().map(|told| (told.refused, told.blocked, told.held, told.change)).collect();
+    let told: Vec<(bool, bool, bool, [bool; 2])> = bench
+        .told
+        .iter()
+        .map(|told| (told.refused.is_some(), told.blocked, told.held, told.change))
+        .collect();
     let expected = [(true, false, true, [true; 2]), (false, false, true, [true; 2])];
     assert_eq!((bench.hardware.bus_pended, &told[..]), (5, &expected[..]));
 }
@@ -222,7 +225,9 @@ fn a_report_says_whether_the_switch_is_held_and_what_forbids_to_enable() {
         let told = bench.told[0];
         assert_eq!((told.held, told.blocked, told.rests), (switch == [true; 2], blocked, false));
         (0..2).for_each(|_| bench.rest());
-        assert_eq!(bench.told[1], LegTold { held: told.held, blocked, ..LegTold::NONE });
+        let causes = if blocked { crate::safety::Cause::GateFault.bit() } else { 0 };
+        let held = told.held;
+        assert_eq!(bench.told[1], LegTold { held, blocked, causes, ..LegTold::NONE });
     }
 }
 
@@ -238,7 +243,8 @@ fn what_is_asked_of_a_leg_without_zeros_is_forgotten() {
         bench.rest();
     }
     assert_eq!((bench.waiting(), bench.told.len()), (0, 1));
-    assert_eq!(bench.told[0], LegTold::NONE);
+    let causes = crate::safety::Cause::EmergencyStop.bit();
+    assert_eq!(bench.told[0], LegTold { causes, ..LegTold::NONE });
     bench.hear(unreported);
     assert_eq!((bench.side.request(None), bench.commands()), (None, None));
 }

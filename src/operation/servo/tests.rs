@@ -104,7 +104,7 @@ impl Bench {
 
     /// The bus orders.
     fn order(&mut self, commands: Option<[JointCommand; 2]>, request: Option<LegRequest>) {
-        let order = LegOrder { commands, request, faults: [None; 2] };
+        let order = LegOrder { commands, request, faults: [None; 2], may_return: [true; 2], refused: None };
         assert!(self.bus.orders.enqueue(order).is_ok(), "full");
     }
 

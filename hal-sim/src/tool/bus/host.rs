@@ -349,4 +349,92 @@ mod tests {
         assert!(host.is_enabled());
         assert!(there.iter().zip(stands).all(|(there, stands)| (there - stands).abs() < 0.02));
     }
+
+    /// Ticks of a second.
+    const SECOND: u64 = 4000;
+
+    /// Steps of an unmodified host towards enabled; whether the leg is.
+    fn enable(host: &mut Host) -> bool {
+        for word in [6, 7, ENABLED] {
+            NODES.into_iter().for_each(|node| host.command(node, word));
+            host.run(40);
+        }
+        host.is_enabled()
+    }
+
+    /// A set-point in mode 1 at each joint, micro-radian.
+    fn point(host: &mut Host, places: [i32; JOINTS]) {
+        for (node, place) in NODES.into_iter().zip(places) {
+            host.write(node, 0x607A, 0, place as u32, 4).expect("a target");
+            host.command(node, ENABLED);
+            host.command(node, ENABLED | 0x30);
+        }
+    }
+
+    /// Poses of one host: how many of them ended outside a joint's range.
+    fn poses(leg: &LegFile, seed: u64, count: u32) -> u32 {
+        let mut dice = crate::tool::faults::dice::Dice::new("poses", seed);
+        let ranges = leg.joints.iter().map(|joint| joint.range_deg.map(f64::to_radians)).collect::<Vec<_>>();
+        let micro = |joint: usize, share: f64| {
+            let [low, high] = ranges[joint];
+            (1e6 * (low + share * (high - low))) as i32
+        };
+        let mut host = host(leg);
+        host.begin().expect("nodes that answer");
+        for node in NODES {
+            for (object, value, size) in
+                [(0x6060, 1, 1), (0x6081, 1_500_000, 4), (0x6083, 8_000_000, 4), (0x6084, 8_000_000, 4)]
+            {
+                host.write(node, object, 0, value, size).expect("a setting");
+            }
+        }
+        let mut fallen = 0;
+        for pose in 0..count {
+            let words = format!("seed {seed}, pose {pose}");
+            host.told.clear();
+            for tries in 0.. {
+                if enable(&mut host) {
+                    break;
+                }
+                // Whoever is not enabled knows why, and waits no longer than the leg swings.
+                let code = host.read(1, 0x603F, 0).expect("an error code");
+                assert_eq!(code, 0xFF0E, "{words}: {:?} {:x?}", host.rig().state(), host.told);
+                assert!(tries < 20, "{words}: {:x?}", host.told);
+                host.run(SECOND / 4);
+            }
+            let outside = |host: &mut Host| {
+                let places = host.rig().world.anatomical_position();
+                (0..JOINTS).any(|joint| {
+                    let [low, high] = ranges[joint];
+                    places[joint] < low - 0.0088 || places[joint] > high + 0.0088
+                })
+            };
+            fallen += u32::from(outside(&mut host));
+            point(&mut host, [micro(0, 0.4), micro(1, 0.4)]);
+            host.run(4 * SECOND);
+            assert!(
+                host.is_enabled() && !outside(&mut host),
+                "{words}: {:?} {:x?}",
+                host.rig().state(),
+                host.told
+            );
+            let places = [0, 1].map(|joint| micro(joint, dice.uniform(0.02, 0.98)));
+            point(&mut host, places);
+            host.run(1 + dice.below(5 * SECOND / 4));
+            let stop = if dice.coin() { 0 } else { 2 };
+            NODES.into_iter().for_each(|node| host.command(node, stop));
+            host.run(2 * SECOND);
+            assert!(!host.is_enabled());
+        }
+        fallen
+    }
+
+    #[test]
+    fn none_of_a_hundred_poses_locks_a_host_out_after_a_stop() {
+        use rayon::prelude::*;
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let fallen: u32 = (1..=4_u64).into_par_iter().map(|seed| poses(&leg, seed, 25)).sum();
+        // What made it necessary: legs that fall out of their range.
+        assert!(fallen >= 20, "{fallen}");
+    }
 }
