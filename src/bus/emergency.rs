@@ -32,9 +32,11 @@ pub enum Source {
     Controller,
     /// What is kept over the power.
     Store,
+    /// The host's cycle.
+    Silence,
 }
 
-const SOURCES: usize = 5 + PDOS;
+const SOURCES: usize = 6 + PDOS;
 
 impl Source {
     const fn place(self) -> usize {
@@ -44,7 +46,8 @@ impl Source {
             Self::Heartbeat(_) => 2,
             Self::Controller => 3,
             Self::Store => 4,
-            Self::Receive(pdo) => 5 + pdo as usize,
+            Self::Silence => 5,
+            Self::Receive(pdo) => 6 + pdo as usize,
         }
     }
 }

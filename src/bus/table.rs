@@ -141,6 +141,7 @@ rows! {
     0x2010, 0, I16, Read, Transmit, 0, "Velocity actual value, short";
     0x2011, 0, U8, Both, No, 0, "Model in the feedforward";
     0x2012, 0, U8, Both, No, 1, "Return into the range";
+    0x2013, 0, U8, Both, No, 1, "Silent host is missed";
     0x2100, 0, U8, Const, No, 12, "Number of entries";
     0x2100, 1, U8, Both, No, 0, "Command";
     0x2100, 2, U8, Read, Transmit, 0, "State";

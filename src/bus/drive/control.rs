@@ -66,6 +66,7 @@ pub(super) struct Settings {
     pub target_velocity: i32,
     pub feedforward: bool,
     pub returns: bool,
+    pub watches: bool,
     pub node_id: u8,
     pub bit_rate: u16,
 }
@@ -102,6 +103,7 @@ impl Settings {
         target_velocity: 0,
         feedforward: false,
         returns: true,
+        watches: true,
         node_id: 0,
         bit_rate: USUAL_KBIT,
     };
@@ -138,6 +140,7 @@ const fn code(why: Lost) -> Option<FaultCode> {
     match why {
         Lost::Heartbeat => Some(FaultCode::Heartbeat),
         Lost::ReceivedPdo => Some(FaultCode::LatePdo),
+        Lost::Silent => Some(FaultCode::HostSilent),
         Lost::Bus(true) => Some(FaultCode::BusOff),
         Lost::Bus(false) => Some(FaultCode::BusPassive),
         Lost::Stopped | Lost::Reset => None,

@@ -6,6 +6,7 @@ use crate::bus::abort::Abort;
 use crate::bus::dictionary::Object;
 use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::{Lost, Objects};
+use crate::leg::DriveState;
 
 /// The low bytes of a signed number.
 macro_rules! bits {
@@ -30,6 +31,7 @@ impl Objects for Axis {
             (0x2002, _) => u32::from(settings.bit_rate),
             (0x2011, _) => u32::from(settings.feedforward),
             (0x2012, _) => u32::from(settings.returns),
+            (0x2013, _) => u32::from(settings.watches),
             // The leg's, which is not asked here.
             (0x2100..=0x2198, _) => return Err(Abort::NoData),
             (0x219A | 0x60FD, _) => status.inputs,
@@ -88,6 +90,7 @@ impl Objects for Axis {
             (0x2002, _) if matches!(value, 125 | 250 | 500 | 1000) => settings.bit_rate = value as u16,
             (0x2011, _) if value <= 1 => settings.feedforward = value == 1,
             (0x2012, _) if value <= 1 => settings.returns = value == 1,
+            (0x2013, _) if value <= 1 => settings.watches = value == 1,
             (0x6007, _) if is(&[0, 1, 2, 3]) => settings.connection_option = value as i16,
             (0x6040, _) => self.control(value as u16),
             // What a fault does is chosen per fault, and a halt slows down along the profile.
@@ -131,6 +134,7 @@ impl Objects for Axis {
                 | 0x2002
                 | 0x2011
                 | 0x2012
+                | 0x2013
                 | 0x6007
                 | 0x605A..=0x605E
                 | 0x6083
@@ -154,6 +158,10 @@ impl Objects for Axis {
 
     fn lost(&mut self, why: Lost) {
         self.lose(why);
+    }
+
+    fn misses_host(&self) -> bool {
+        self.settings.watches && self.commanded && self.own == DriveState::OperationEnabled
     }
 
     fn reset(&mut self) {

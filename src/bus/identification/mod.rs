@@ -252,6 +252,10 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
         self.axis.lost(why);
     }
 
+    fn misses_host(&self) -> bool {
+        self.axis.misses_host()
+    }
+
     fn reset(&mut self) {
         self.axis.reset();
     }
