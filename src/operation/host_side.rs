@@ -8,11 +8,14 @@ use crate::bus::station::{LegOrder, LegRequest, LegTold};
 use crate::hal::{Hardware, Sample};
 use crate::leg::{
     Activity, Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand,
-    JointStatus, Plan, PowerRequest, Refusal,
+    JointStatus, Permission, Plan, PowerRequest, Refusal,
 };
+use crate::units::{NewtonMetre, Volt};
 
 /// Ticks between two reports to the bus: 2 kHz, twice the fastest cycle that fits the wire.
 const TICKS: u32 = 2;
+/// Time constant of the torque that a host is told, ticks: 2 ms.
+const LAG_TICKS: f32 = 8.0;
 
 /// A request and, where it begins an identification, its plan and seed.
 pub type HostRequest<const N: usize> = (ControlRequest<N>, Option<(Plan, u64)>);
@@ -28,6 +31,9 @@ pub struct HostSide<const N: usize> {
     /// The bus refused a step by itself, which no record tells of yet.
     noted: Option<Refusal>,
     may_return: [bool; N],
+    /// Of the measured currents, model's sign, smoothed; none of a released bridge, whose reading is noise.
+    torque: [NewtonMetre; N],
+    volt_per_code: Volt,
     tick: u32,
 }
 
@@ -39,7 +45,7 @@ fn is_held<const N: usize>(signals: &Signals<N>, hardware: &impl Hardware<N>) ->
 impl<const N: usize> HostSide<N> {
     /// Nothing received yet.
     #[must_use]
-    pub const fn new(following: Following<N>) -> Self {
+    pub const fn new(following: Following<N>, volt_per_code: Volt) -> Self {
         Self {
             following,
             commands: None,
@@ -48,6 +54,8 @@ impl<const N: usize> HostSide<N> {
             refused: None,
             noted: None,
             may_return: [true; N],
+            torque: [NewtonMetre::ZERO; N],
+            volt_per_code,
             tick: 0,
         }
     }
@@ -72,7 +80,8 @@ impl<const N: usize> HostSide<N> {
             let causes = signals.inhibit.causes();
             let (blocked, calibrated) = (causes != 0, signals.is_calibrated());
             let held = is_held(signals, hardware);
-            let _ = ends.told.enqueue(LegTold { blocked, causes, calibrated, held, ..LegTold::NONE });
+            let joints = [JointStatus { bus: self.bus(signals), ..JointStatus::NONE }; N];
+            let _ = ends.told.enqueue(LegTold { joints, blocked, causes, calibrated, held, ..LegTold::NONE });
         }
     }
 
@@ -168,17 +177,16 @@ impl<const N: usize> HostSide<N> {
             let _ = ends.logged.enqueue(logged);
         }
         self.refused = output.servo.decision.refused.or(self.refused);
+        self.smooth(control, sample, output);
         if !self.is_due(ends, hardware) {
             return;
         }
         let activity = control.activity();
         let mut joints = [JointStatus::NONE; N];
         for (joint, slot) in joints.iter_mut().enumerate() {
-            let torque = control.torque(joint, sample);
-            let status = torque.and_then(|torque| {
-                self.following.status(joint, torque, activity == Activity::Follow, output)
-            });
-            *slot = status.unwrap_or(JointStatus::NONE);
+            let torque = self.torque.get(joint).copied().unwrap_or(NewtonMetre::ZERO);
+            let status = self.following.status(joint, torque, activity == Activity::Follow, output);
+            *slot = JointStatus { bus: self.bus(signals), ..status.unwrap_or(JointStatus::NONE) };
         }
         let told = LegTold {
             joints,
@@ -192,6 +200,19 @@ impl<const N: usize> HostSide<N> {
             rests: false,
         };
         let _ = ends.told.enqueue(told);
+    }
+
+    /// A first-order lag of [`LAG_TICKS`], as long as the bridges switch.
+    fn smooth(&mut self, control: &Control<N>, sample: &Sample<N>, output: &ControlOutput<N>) {
+        let is_off = output.servo.decision.state.permission() == Permission::Released;
+        for (joint, torque) in self.torque.iter_mut().enumerate() {
+            let measured = control.torque(joint, sample).filter(|_| !is_off);
+            *torque = measured.map_or(NewtonMetre::ZERO, |now| *torque + (now - *torque) * (1.0 / LAG_TICKS));
+        }
+    }
+
+    fn bus(&self, signals: &Signals<N>) -> Volt {
+        self.volt_per_code * signals.statistics.bus[0].get() as f32
     }
 
     /// The bus has to run, and has taken the report before.

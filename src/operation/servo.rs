@@ -71,7 +71,7 @@ impl<const N: usize> ServoLevel<N> {
             supply: SupplyWatch::default(),
             ramps,
             volt_per_code,
-            host: following.map(HostSide::new),
+            host: following.map(|following| HostSide::new(following, volt_per_code)),
             prepared: None,
             refused: None,
         }

@@ -503,3 +503,35 @@ fn an_operator_who_identifies_outside_the_range_is_led_back_slowly_as_well() {
         assert!(matches!(activity(&hosted.pair), Activity::Identify(_)));
     }
 }
+
+#[test]
+fn homing_without_a_method_is_an_error_and_moves_no_zero() {
+    let mut hosted = Hosted::new();
+    hosted.run(2 * SECOND);
+    let before = hosted.position(0);
+    let command = &mut hosted.commands[0];
+    command.target = Target::Homing { offset: Radian(f32::INFINITY) };
+    command.asked = command.asked.wrapping_add(1);
+    hosted.run(100);
+    assert!(hosted.status[0].deviates && !hosted.status[0].homed);
+    assert!((hosted.position(0) - before).abs() < 1e-3 && is_enabled(&hosted.pair));
+}
+
+/// Published host software looks for a mechanical stop: it moves a joint outwards until 50 N m are measured.
+#[test]
+fn a_host_that_looks_for_a_mechanical_stop_comes_to_the_end_of_the_range_and_no_farther() {
+    for (joint, velocity) in [(0, -0.2), (1, -0.2), (1, 0.4)] {
+        let mut hosted = Hosted::new();
+        hosted.commands[joint].target = Target::ProfileVelocity(RadianPerSecond(velocity));
+        let mut most = 0.0_f32;
+        for _ in 0..6 * SECOND {
+            hosted.run(1);
+            most = most.max(hosted.status[joint].torque_demand.0.abs());
+        }
+        std::println!(
+            "joint {joint} at {velocity} rad/s: {most:.1} N m at most, {:.4} rad",
+            hosted.truth(joint)
+        );
+        assert!(is_enabled(&hosted.pair) && most < 50.0 && beyond(joint, hosted.truth(joint)) < 0.009);
+    }
+}

@@ -18,7 +18,9 @@ use super::{JointCommand, JointStatus, Mode, SetPoint, Target};
 use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::Lost;
 use crate::leg::{DriveEvent, DriveState, FaultCode, PowerRequest, RefusalReason};
-use crate::units::{Ampere, NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
+use crate::units::{
+    Ampere, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond, RadianPerSecondSquared, Second,
+};
 
 const RESET: u16 = 1 << 7;
 const NEW: u16 = 1 << 4;
@@ -35,7 +37,31 @@ pub struct AxisConstants {
     pub rated_current: Ampere,
     /// Modes the leg follows, bits of [`Mode::bit`].
     pub modes: u32,
+    /// Joint torque per motor current.
+    pub torque_per_ampere: NewtonMetrePerAmpere,
+    /// Greatest speed that is commanded.
+    pub speed: RadianPerSecond,
+    /// Encoder counts per turn of the motor.
+    pub counts_per_turn: u32,
+    /// Turns of the motor per turn of the joint.
+    pub ratio: f32,
 }
+
+impl AxisConstants {
+    /// A joint of which nothing is known.
+    pub const UNKNOWN: Self = Self {
+        rated_torque: NewtonMetre(1.0),
+        rated_current: Ampere(1.0),
+        modes: 0,
+        torque_per_ampere: NewtonMetrePerAmpere(1.0),
+        speed: RadianPerSecond::ZERO,
+        counts_per_turn: 0,
+        ratio: 0.0,
+    };
+}
+
+/// No method of homing was written: none is begun.
+const NO_METHOD: i8 = -1;
 
 /// What a host writes and reads again; the numbers are the objects'.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,7 +119,7 @@ impl Settings {
         profile_acceleration: 2_000_000,
         profile_deceleration: 2_000_000,
         torque_slope: 1000,
-        homing_method: 0,
+        homing_method: NO_METHOD,
         velocity_offset: 0,
         torque_offset: 0,
         interpolation_data: 0,
@@ -355,7 +381,10 @@ impl Axis {
             Some(Mode::ProfilePosition) => Target::ProfilePosition(self.set_point),
             Some(Mode::ProfileVelocity) => Target::ProfileVelocity(velocity),
             Some(Mode::ProfileTorque) => Target::ProfileTorque(target_torque),
-            Some(Mode::Homing) if settings.homing_method == 0 => Target::Hold,
+            // Nowhere in the range: a homing error.
+            Some(Mode::Homing) if settings.homing_method == NO_METHOD => {
+                Target::Homing { offset: Radian(f32::INFINITY) }
+            }
             Some(Mode::Homing) => Target::Homing { offset: radian(settings.home_offset) },
             Some(Mode::CyclicPosition) => Target::CyclicPosition {
                 position: radian(settings.target_position),

@@ -311,3 +311,24 @@ fn a_mode_that_the_leg_does_not_follow_is_refused() {
     axis.reset();
     assert_eq!(axis.read(Object::at(0x6060, 0)), Ok(0));
 }
+
+#[test]
+fn homing_is_done_by_the_methods_that_were_written_and_by_no_other() {
+    let offset = |method: Option<u32>| {
+        let mut board = Board::enabled();
+        board.axes[0].write(Object::at(0x607C, 0), 500_000).expect("an offset");
+        board.axes[0].write(Object::at(0x6060, 0), 6).expect("a mode");
+        if let Some(method) = method {
+            board.axes[0].write(Object::at(0x6098, 0), method).expect("a method");
+        }
+        match board.axes[0].command().target {
+            Target::Homing { offset } => (offset.0 * 1e3 + 0.5) as u32,
+            other => panic!("{other:?}"),
+        }
+    };
+    // 0 that was written: here is home, as 35 and 37.
+    assert_eq!([0, 35, 37].map(|method| offset(Some(method))), [500; 3]);
+    // None written: nowhere, which the leg answers by a homing error.
+    assert_eq!(offset(None), u32::MAX);
+    assert_eq!(Board::enabled().axes[0].read(Object::at(0x6098, 0)), Ok(0));
+}

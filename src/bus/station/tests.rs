@@ -36,6 +36,7 @@ impl Bench {
             rated_torque: NewtonMetre(40.0),
             rated_current: Ampere(20.0),
             modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+            ..AxisConstants::UNKNOWN
         };
         let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));
         let station = Station::new(own, IDENTITY, [constants; 2], Plan::OneTime, 1);

@@ -27,7 +27,7 @@ use crate::model::AnatomicalJoint;
 use crate::motion::{Course, MotionState};
 use crate::safety::{Fault, FaultCode, RANGE_TOLERANCE, RefusalReason};
 use crate::servo::{Effort, JointScale, ServoOutput};
-use crate::units::{NewtonMetre, Radian, RadianPerSecond};
+use crate::units::{NewtonMetre, Radian, RadianPerSecond, Volt};
 
 /// What the servo is told at one tick, in the model's angles and signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -165,7 +165,7 @@ impl<const N: usize> Following<N> {
         commanded
     }
 
-    /// What a host is told of a joint whose motor gives this torque of the model's sign; further inputs are the board's.
+    /// What a host is told of a joint whose motor gives this torque of the model's sign; further inputs and the bus voltage are the board's.
     #[must_use]
     pub fn status(
         &self,
@@ -199,6 +199,7 @@ impl<const N: usize> Following<N> {
             homed: follower.homed,
             deviates: follows && follower.deviates,
             inputs: if is_inside { 0 } else { RefusalReason::OutOfRange.bit() },
+            bus: Volt::ZERO,
         })
     }
 }

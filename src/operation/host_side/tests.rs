@@ -31,7 +31,7 @@ impl Bench {
     fn new(orders: &[LegOrder<2>]) -> Self {
         let (hardware, host, bus) = on_a_bus();
         let mut bench = Self {
-            side: HostSide::new(Following::new(&configuration())),
+            side: HostSide::new(Following::new(&configuration()), Volt(0.01)),
             host,
             bus,
             hardware,
@@ -247,4 +247,37 @@ fn what_is_asked_of_a_leg_without_zeros_is_forgotten() {
     assert_eq!(bench.told[0], LegTold { causes, ..LegTold::NONE });
     bench.hear(unreported);
     assert_eq!((bench.side.request(None), bench.commands()), (None, None));
+}
+
+#[test]
+fn a_released_bridge_has_no_torque_and_one_that_switches_a_smoothed_one() {
+    let mut control = Control::new(&configuration()).expect("a leg");
+    let mut output = control.tick(&SAMPLE, None, LEG.gravity);
+    let mut bench = Bench::new(&[]);
+    bench.signals.statistics.see_bus(2400);
+    let mut told = |state: DriveState, ticks: u32| {
+        output.servo.decision.state = state;
+        let mut random = 1_u32;
+        let mut most = 0.0_f32;
+        for tick in 0..ticks {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            // Noise of 3 A around 10 A.
+            let current = 10.0 + 3.0 * ((random >> 8) as f32 / (1 << 23) as f32 - 1.0);
+            let joint = JointSample { current: crate::units::Ampere(current), ..SAMPLE.joints[0] };
+            let Bench { side, host, hardware, signals, .. } = &mut bench;
+            side.report(&control, &Sample { joints: [joint; 2] }, &output, host, signals, hardware);
+            if let Some(told) = bench.bus.told.dequeue()
+                && tick + 100 > ticks
+            {
+                assert_eq!(told.joints[1].bus, Volt(24.0));
+                most = most.max((told.joints[0].torque.0 - 15.0).abs());
+            }
+        }
+        most
+    };
+    // 1.5 N m/A.
+    assert_eq!(told(DriveState::SwitchOnDisabled, 200), 15.0);
+    let noise = told(DriveState::OperationEnabled, 400);
+    assert!(noise < 2.3, "{noise}, of 4.5 N m");
+    assert_eq!(told(DriveState::SwitchedOn, 200), 15.0);
 }

@@ -63,6 +63,8 @@ pub struct Host {
     pub network: Network<JOINTS, BASE>,
     /// What it says.
     pub speaks: Speaks,
+    /// Servo ticks of its cycle.
+    pub cycle: u64,
     ticks: u64,
     /// Where the joints stand, as they told last; where they stood, and how far they are moved, micro-radian.
     places: [i32; JOINTS],
@@ -70,6 +72,8 @@ pub struct Host {
     way: [f64; JOINTS],
     /// When the last bit of its last heartbeat, and of its last targets, was on the wire.
     heard_ns: [u64; 2],
+    /// When the last bit of its last cyclic frame for each node was on the wire.
+    spoke_ns: [u64; JOINTS],
     answer: Option<Frame>,
     /// Codes of emergency messages, by node.
     told: Vec<(u16, u16)>,
@@ -90,7 +94,9 @@ impl Host {
             places: [0; JOINTS],
             from: None,
             way: [0.0; JOINTS],
+            cycle: CYCLE,
             heard_ns: [0; 2],
+            spoke_ns: [0; JOINTS],
             answer: None,
             told: Vec::new(),
         }
@@ -114,7 +120,7 @@ impl Host {
 
     /// One servo tick; each of its PWM periods is shown.
     pub fn tick(&mut self, watch: impl FnMut(&Rig<JOINTS, BASE>)) {
-        if self.speaks.targets && self.ticks.is_multiple_of(CYCLE) {
+        if self.speaks.targets && self.ticks.is_multiple_of(self.cycle) {
             let seconds = self.ticks as f64 * TICK_NS as f64 * 1e-9;
             let share = 0.5 - 0.5 * (TAU * RATE_HZ * seconds).cos();
             // Until the leg is enabled, where it is.
@@ -126,16 +132,22 @@ impl Host {
             self.network.send(Frame::new(SYNC, &[]));
             self.network.send(Frame::new(TARGETS, &targets));
         }
-        if self.speaks.words && self.ticks.is_multiple_of(4 * CYCLE) {
+        if self.speaks.words && self.ticks.is_multiple_of(4 * self.cycle) {
             NODES.into_iter().for_each(|node| self.command(node, ENABLED));
         }
         if self.speaks.heartbeat > 0 && self.ticks.is_multiple_of(self.speaks.heartbeat) {
             self.network.send(Frame::new(HEARTBEAT + NUMBER, &[5]));
         }
-        let (heard_ns, answer) = (&mut self.heard_ns, &mut self.answer);
+        let (heard_ns, answer, spoke_ns) = (&mut self.heard_ns, &mut self.answer, &mut self.spoke_ns);
         let (told, places) = (&mut self.told, &mut self.places);
         let show = |sent: &Sent| {
             let id = sent.frame.id();
+            match (sent.sender, id) {
+                (0, SYNC | TARGETS) => *spoke_ns = [sent.end_ns; JOINTS],
+                (0, 0x201) => spoke_ns[0] = sent.end_ns,
+                (0, 0x202) => spoke_ns[1] = sent.end_ns,
+                _ => {}
+            }
             match (sent.sender, id) {
                 (0, TARGETS) => heard_ns[1] = sent.end_ns,
                 (0, _) if id == HEARTBEAT + NUMBER => heard_ns[0] = sent.end_ns,
@@ -174,6 +186,22 @@ impl Host {
     #[must_use]
     pub fn heard_ns(&self) -> [u64; 2] {
         self.heard_ns
+    }
+
+    /// When its last cyclic frame for each node had been sent: SYNC, targets, controlword.
+    #[must_use]
+    pub fn spoke_ns(&self) -> [u64; JOINTS] {
+        self.spoke_ns
+    }
+
+    /// It was stopped for so many ticks and goes on from where it was.
+    pub fn rewind(&mut self, ticks: u64) {
+        self.ticks -= ticks;
+    }
+
+    /// From now on its targets are where the joints are.
+    pub fn follow_places(&mut self) {
+        self.from = None;
     }
 
     /// Codes of the emergency messages so far, by node.
