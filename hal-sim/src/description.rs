@@ -31,6 +31,8 @@ pub struct JointDescription {
     pub body: BodyDescription,
     /// Rotor inertia reflected to the joint (gear ratio squared times the rotor's own), kg m^2.
     pub rotor_inertia: f64,
+    /// Angles of the mechanical end stops, rad, anatomical; a joint without them turns freely.
+    pub stops: Option<[f64; 2]>,
     /// Friction of the joint.
     pub friction: FrictionDescription,
     /// Motor and current loop.

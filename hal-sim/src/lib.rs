@@ -12,7 +12,7 @@
 //! | [`mechanism`] | rigid bodies: inertia matrix, Christoffel symbols, gravity, energies |
 //! | [`friction`] | Coulomb that sticks, viscous, Stribeck, offset; which joint sticks and which slides |
 //! | [`leg`] | time integration of mechanism and friction |
-//! | [`floor`] | contact under the foot |
+//! | [`end_stop`], [`floor`] | a joint's mechanical end stops; contact under the foot |
 //! | [`drive`] | ideal: a current with lag; complete: motor, bridge, shunts, counter, supply |
 //! | [`faults`] | faults injected into a board's ports at given ticks |
 //! | [`flash`] | flash memory with a power cut at any byte |
@@ -25,6 +25,7 @@
 pub mod conventions;
 pub mod description;
 pub mod drive;
+pub mod end_stop;
 pub mod faults;
 pub mod flash;
 pub mod floor;

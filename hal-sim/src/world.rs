@@ -14,6 +14,7 @@ pub mod periods;
 use crate::conventions::{Anatomy, links_at_reference};
 use crate::description::{LegDescription, PushDescription};
 use crate::drive::Drive;
+use crate::end_stop;
 use crate::floor::Floor;
 use crate::grip::Grip;
 use crate::leg::{Leg, LegState};
@@ -211,8 +212,10 @@ impl<const N: usize> World<N> {
             Some(floor) => floor.torque(self.leg.mechanism(), &self.state, self.tick as f64 * TICK_S),
             None => [0.0; N],
         };
-        let with_floor =
-            |torque: [f64; N]| -> [f64; N] { core::array::from_fn(|joint| torque[joint] + stood[joint]) };
+        let stopped = self.stopped();
+        let with_floor = |torque: [f64; N]| -> [f64; N] {
+            core::array::from_fn(|joint| torque[joint] + stood[joint] + stopped[joint])
+        };
         let from = with_floor(self.joint_torque(&pushed));
         for drive in &mut self.drives {
             drive.advance();
@@ -221,6 +224,15 @@ impl<const N: usize> World<N> {
         self.leg.advance(&mut self.state, &from, &to, TICK_S);
         self.tick += 1;
         self.read_sensors();
+    }
+
+    /// What the mechanical end stops give now, N m, joint sign.
+    fn stopped(&self) -> [f64; N] {
+        let (position, velocity) = (self.anatomical_position(), self.velocity());
+        core::array::from_fn(|joint| {
+            let stops = self.description.joints[joint].stops;
+            self.anatomy[joint].flip(end_stop::torque(stops, position[joint], velocity[joint]))
+        })
     }
 
     /// Motors and pushes on the joints, N m, joint sign.

@@ -8,6 +8,9 @@ use super::objects::Objects;
 /// From here on the values are not the node's.
 pub(super) const PROFILE: u16 = 0x2000;
 
+/// Object 603F, which repeats what 1003 has.
+const ERROR_CODE: u16 = 0x603F;
+
 /// What 1010 and 1011 want to be written: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 const LOAD: u32 = u32::from_le_bytes(*b"load");
@@ -38,7 +41,12 @@ impl<O: Objects> Dictionary<'_, O> {
     /// # Errors
     /// Those of the object.
     pub fn value(&self, object: Object) -> Result<u32, Abort> {
-        if object.index < PROFILE { self.communication.read(object) } else { self.objects.read(object) }
+        match object.index {
+            ..PROFILE => self.communication.read(object),
+            // The newest entry of the list.
+            ERROR_CODE => Ok(self.communication.emergency.newest()),
+            _ => self.objects.read(object),
+        }
     }
 
     /// The row of an object that may be written.

@@ -9,6 +9,7 @@ use super::node_id::NodeId;
 use super::pdo::receive::Receive;
 use super::pdo::transmit::Transmit;
 use super::pdo::{ABSENT, PDOS, Parameters, is_assignable};
+use super::silence::Silence;
 
 /// What is mapped after the start: as host software for exoskeletons has it.
 const RECEIVED: [u32; PDOS] = [0x6040_0010, 0x607A_0020, 0x60FF_0020, 0x6071_0010];
@@ -51,6 +52,8 @@ pub struct Communication {
     pub(super) state: NmtState,
     pub(super) emergency: Emergency,
     pub(super) consumers: [Consumer; WATCHED],
+    /// Of a host without a heartbeat.
+    pub(super) silence: Silence,
     /// 1017, ms.
     pub(super) heartbeat_ms: u16,
     pub(super) heartbeat: Clock,
@@ -84,6 +87,7 @@ impl Communication {
             state: NmtState::Initialising,
             emergency: Emergency::new(u32::from(node.on(0x80))),
             consumers: [Consumer::default(); WATCHED],
+            silence: Silence::default(),
             heartbeat_ms: 0,
             heartbeat: Clock::NEW,
             sync: 0x80,

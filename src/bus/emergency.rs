@@ -32,9 +32,11 @@ pub enum Source {
     Controller,
     /// What is kept over the power.
     Store,
+    /// The host's cycle.
+    Silence,
 }
 
-const SOURCES: usize = 5 + PDOS;
+const SOURCES: usize = 6 + PDOS;
 
 impl Source {
     const fn place(self) -> usize {
@@ -44,7 +46,8 @@ impl Source {
             Self::Heartbeat(_) => 2,
             Self::Controller => 3,
             Self::Store => 4,
-            Self::Receive(pdo) => 5 + pdo as usize,
+            Self::Silence => 5,
+            Self::Receive(pdo) => 6 + pdo as usize,
         }
     }
 }
@@ -136,6 +139,11 @@ impl Emergency {
     #[must_use]
     pub fn register(&self) -> u8 {
         self.active.iter().flatten().fold(0, |register, error| register | error.register())
+    }
+
+    /// Object 603F: code of the newest error in the list, 0 where it is empty.
+    pub(super) fn newest(&self) -> u32 {
+        self.history(1).unwrap_or(0) & 0xFFFF
     }
 
     /// Object 1003.

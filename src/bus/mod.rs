@@ -30,6 +30,7 @@ mod node_id;
 mod objects;
 mod pdo;
 mod sdo;
+mod silence;
 pub mod station;
 pub mod table;
 

@@ -22,6 +22,7 @@ use super::objects::{Lost, Objects};
 use super::pdo::PDOS;
 use super::pdo::receive::Received;
 use super::sdo::Server;
+use super::silence::{Kind, Silence};
 use crate::hal::{Controller, Frame};
 use crate::leg::{FaultCode, NoticeCode};
 
@@ -125,9 +126,12 @@ impl Node {
                     Some(command) => self.obey(command, objects),
                 }
             }
-            id if u32::from(id) == self.communication.sync => self.synchronise(frame, objects),
+            id if u32::from(id) == self.communication.sync => self.synchronise(frame, now_us, objects),
             id if id == node.on(0x600) => {
                 if let (true, Some(request)) = (self.communication.state.serves(), frame.full()) {
+                    if matches!(request, [0x20..=0x3F, 0x40, 0x60, 0, ..]) {
+                        self.hear_cycle(Kind::Word, now_us);
+                    }
                     let mut dictionary = Dictionary { communication: &mut self.communication, objects };
                     self.server.request(request, now_us, &mut dictionary);
                 }
@@ -219,6 +223,7 @@ impl Node {
                 if next == NmtState::Stopped {
                     self.server = Server::IDLE;
                 }
+                self.communication.silence = Silence::default();
                 for receive in &mut self.communication.receive {
                     receive.stop();
                 }
@@ -239,10 +244,17 @@ impl Node {
         }
     }
 
-    fn synchronise<O: Objects>(&mut self, frame: &Frame, objects: &mut O) {
+    /// A frame that a host may send in every cycle.
+    fn hear_cycle(&mut self, kind: Kind, now_us: u64) {
+        self.communication.silence.heard(kind, now_us);
+        self.communication.emergency.set(Source::Silence, None);
+    }
+
+    fn synchronise<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) {
         if self.communication.state != NmtState::Operational {
             return;
         }
+        self.hear_cycle(Kind::Sync, now_us);
         let counter = match (self.communication.sync_overflow, frame.data()) {
             (0, _) => None,
             (overflow, &[counter]) if (1..=overflow).contains(&counter) => Some(counter),
@@ -270,6 +282,7 @@ impl Node {
             return Heard::Nothing;
         };
         let received = receive.take(frame, now_us);
+        self.hear_cycle(Kind::Receive(place as u8), now_us);
         let too_short = ErrorReport::code(NoticeCode::ShortPdo.number());
         let error = (received == Received::TooShort).then_some(too_short);
         self.communication.emergency.set(Source::Receive(place as u8), error);
@@ -339,6 +352,15 @@ impl Node {
                 self.fail(Lost::ReceivedPdo, objects);
             }
         }
+        self.look_for_silence(now_us, objects);
+    }
+
+    fn look_for_silence<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
+        if self.communication.silence.begins(now_us) && objects.misses_host() {
+            let silent = ErrorReport::code(FaultCode::HostSilent.number());
+            self.communication.emergency.set(Source::Silence, Some(silent));
+            self.fail(Lost::Silent, objects);
+        }
     }
 
     /// The board stood still until now, as it does while its flash is written, and heard nobody: that is not a host's fault. Whoever is waited for has
@@ -346,6 +368,7 @@ impl Node {
     pub fn stood_still(&mut self, now_us: u64) {
         self.communication.consumers.iter_mut().for_each(|consumer| consumer.wait(now_us));
         self.communication.receive.iter_mut().for_each(|pdo| pdo.wait(now_us));
+        self.communication.silence.wait(now_us);
         self.server.wait(now_us);
     }
 

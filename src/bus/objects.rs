@@ -13,6 +13,8 @@ pub enum Lost {
     Heartbeat,
     /// A PDO that has an event timer.
     ReceivedPdo,
+    /// It spoke in every cycle and no longer speaks.
+    Silent,
     /// The controller left the bus, or frames were lost (`true`); or it is near leaving it.
     Bus(bool),
     /// The master took the node out of Operational.
@@ -51,6 +53,11 @@ pub trait Objects {
 
     /// The host is lost, the bus is, or the node is told to stop: what moves has to stop as its option codes say.
     fn lost(&mut self, why: Lost);
+
+    /// A host that falls silent is missed: the drive is on, by a host.
+    fn misses_host(&self) -> bool {
+        false
+    }
 
     /// Everything that was written is as after the start again.
     fn reset(&mut self);

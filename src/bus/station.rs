@@ -15,10 +15,14 @@
 //! switch stays in the operator's hand: while it is open, or something blocks, no step towards enabled is passed on, and a host that
 //! asked is told as by a leg that refused.
 //!
+//! **Why not.** A step towards enabled that is refused, here or by the leg, is an error of both nodes (FF0E, with joint, reason and causes) from the
+//! first word that asks for it until the reason is gone or the leg is enabled: reported once, however often a host asks. The leg's side makes a record of it.
+//!
 //! Cost: two polls of a node and one copy of the leg's values; docs/bus.md. Memory: docs/bus.md.
 
 use super::communication::Identity;
-use super::drive::{Axis, AxisConstants, BLOCKED, Coupling, HELD, RESTS};
+use super::drive::{Axis, AxisConstants, Coupling};
+use super::emergency::ErrorReport;
 use super::identification::{Ask, JointObjects, LegObjects, Results};
 use super::kept::KeptNode;
 use super::nmt::Reset;
@@ -26,8 +30,10 @@ use super::node::{Heard, Node, Storing};
 use super::node_id::NodeId;
 use crate::hal::{Controller, Frame};
 use crate::leg::{
-    Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, Permission, Plan, PowerRequest,
+    Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, NoticeCode, Permission, Plan,
+    PowerRequest, Refusal, RefusalReason,
 };
+use crate::safety::RETURN_SPEED;
 
 mod keeping;
 
@@ -43,12 +49,16 @@ pub struct LegTold<const N: usize> {
     pub activity: Activity,
     /// The model no longer fits; an update is offered.
     pub change: [bool; 2],
-    /// The last request for power was refused.
-    pub refused: bool,
+    /// Why the last request for power was refused.
+    pub refused: Option<Refusal>,
     /// The operator holds the enabling switch.
     pub held: bool,
     /// Something forbids to enable.
     pub blocked: bool,
+    /// Bits of what does.
+    pub causes: u32,
+    /// Every axis is calibrated.
+    pub calibrated: bool,
     /// The leg is not calibrated or has no reference: it does not tick.
     pub rests: bool,
 }
@@ -59,11 +69,30 @@ impl<const N: usize> LegTold<N> {
         joints: [JointStatus::NONE; N],
         activity: Activity::Idle,
         change: [false; 2],
-        refused: false,
+        refused: None,
         held: false,
         blocked: true,
+        causes: 0,
+        calibrated: false,
         rests: true,
     };
+
+    /// Whether a reason stands against the leg as a whole.
+    const fn has(&self, reason: RefusalReason) -> bool {
+        match reason {
+            RefusalReason::SwitchOpen => !self.held,
+            RefusalReason::Blocked => self.blocked,
+            RefusalReason::NoReference => self.rests,
+            RefusalReason::NotCalibrated => self.rests && !self.calibrated,
+            _ => false,
+        }
+    }
+
+    /// The first of them.
+    fn stands_against(&self) -> Option<RefusalReason> {
+        use RefusalReason::{Blocked, NoReference, NotCalibrated, SwitchOpen};
+        [NotCalibrated, NoReference, Blocked, SwitchOpen].into_iter().find(|reason| self.has(*reason))
+    }
 }
 
 /// What a leg is asked for beside its joints' targets.
@@ -93,6 +122,10 @@ pub struct LegOrder<const N: usize> {
     pub request: Option<LegRequest>,
     /// What it has to react to, by joint: once.
     pub faults: [Option<FaultCode>; N],
+    /// Joints that may be enabled outside their range.
+    pub may_return: [bool; N],
+    /// What the bus refused by itself: once, for a record.
+    pub refused: Option<Refusal>,
 }
 
 /// What a host wants kept.
@@ -119,6 +152,10 @@ pub struct Station<const N: usize, const LOG: usize> {
     hosted: bool,
     /// A request that could only be refused was not passed on.
     refused: bool,
+    /// What was refused last, as long as that lasts.
+    refusal: Option<Refusal>,
+    /// The same, for a record of the leg's side.
+    noted: Option<Refusal>,
     request: Option<LegRequest>,
     /// What the controller told last that goes on.
     controller: Controller,
@@ -150,6 +187,8 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
             kept: [KeptNode::NOTHING; N],
             hosted: false,
             refused: false,
+            refusal: None,
+            noted: None,
             request: None,
             controller: Controller::Active,
             storing: Storing::Done,
@@ -246,15 +285,15 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     /// What the leg tells of a tick; what it is asked then has to be taken by [`Self::order`] before the next.
     pub fn told(&mut self, told: &LegTold<N>) {
         let drive = told.joints.first().map_or(DriveState::NotReadyToSwitchOn, |joint| joint.drive);
-        let bit = |is_set: bool, bit: u32| u32::from(is_set) * bit;
-        let inputs = bit(told.held, HELD) | bit(told.blocked, BLOCKED) | bit(told.rests, RESTS);
-        for (axis, status) in self.axes.iter_mut().zip(&told.joints) {
+        let inputs = self.inputs(told);
+        for ((axis, status), inputs) in self.axes.iter_mut().zip(&told.joints).zip(inputs) {
             axis.update(&JointStatus { inputs, ..*status });
         }
+        let rises = self.axes.iter_mut().fold(false, |rises, axis| axis.take_rises() || rises);
         (self.leg.activity, self.leg.change) = (told.activity, told.change);
         let commanded = self.axes.iter().any(Axis::is_commanded);
         self.hosted = commanded || self.hosted && drive.permission() != Permission::Released;
-        let refused = core::mem::take(&mut self.refused) || told.refused;
+        let refused = core::mem::take(&mut self.refused) || told.refused.is_some();
         if !self.hosted {
             self.coupling.look_on(self.axes.each_mut(), drive);
         }
@@ -267,7 +306,7 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
             Some(_) => None,
         };
         self.request = match (power, asked) {
-            (Some(power), _) if power.enables() && (told.blocked || told.rests || !told.held) => {
+            (Some(power), _) if power.enables() && told.stands_against().is_some() => {
                 self.refused = true;
                 None
             }
@@ -281,6 +320,40 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
             (None, Some(Ask::TakeUpdate)) => Some(LegRequest::TakeUpdate),
             (None, None) => None,
         };
+        self.explain(told, rises || self.refused);
+    }
+
+    /// Digital inputs of each joint.
+    fn inputs(&self, told: &LegTold<N>) -> [u32; N] {
+        let bit = |is_set: bool, reason: RefusalReason| u32::from(is_set) * reason.bit();
+        use RefusalReason::{Blocked, NoReference, NotCalibrated, SwitchOpen};
+        let whole = [Blocked, NoReference, NotCalibrated]
+            .into_iter()
+            .fold(bit(told.held, SwitchOpen), |bits, reason| bits | bit(told.has(reason), reason));
+        core::array::from_fn(|joint| {
+            let of_joint = self.refusal.filter(|refusal| usize::from(refusal.joint) == joint);
+            let status = told.joints.get(joint).map_or(0, |status| status.inputs);
+            whole | status | of_joint.map_or(0, |refusal| refusal.reason.bit())
+        })
+    }
+
+    /// Why a step towards enabled is refused, from when it is until that is over.
+    fn explain(&mut self, told: &LegTold<N>, asked: bool) {
+        let before = self.refusal.filter(|refusal| self.hosted && still(told, *refusal));
+        let own = told.stands_against().filter(|_| asked && self.hosted);
+        let own = own.map(|reason| Refusal { joint: Refusal::LEG, reason });
+        self.refusal = told.refused.filter(|_| self.hosted).or(own).or(before);
+        if self.refusal.is_some() && self.refusal == before {
+            return;
+        }
+        // What the leg refused it records itself.
+        self.noted = self.refusal.filter(|refusal| refusal.joint == Refusal::LEG).or(self.noted);
+        let report = self.refusal.map(|refusal| {
+            let [low, high, ..] = told.causes.to_le_bytes();
+            let information = [refusal.number(), refusal.reason as u8, low, high, 0];
+            ErrorReport { code: NoticeCode::NotEnabled.number(), information }
+        });
+        self.axes.iter_mut().for_each(|axis| axis.refused = report);
     }
 
     /// What the leg is to do now; targets that came since the leg was heard are in it.
@@ -290,6 +363,8 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
             request: self.request.take(),
             // A bus that is lost takes nothing from who does not use it.
             faults: self.axes.each_mut().map(|axis| axis.take_fault().filter(|_| self.hosted)),
+            may_return: self.axes.each_ref().map(Axis::may_return),
+            refused: self.noted.take(),
         }
     }
 
@@ -326,6 +401,17 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
     pub const fn nodes(&self) -> &[Node; N] {
         &self.nodes
     }
+}
+
+/// Whether what was refused would be refused again.
+fn still<const N: usize>(told: &LegTold<N>, refusal: Refusal) -> bool {
+    let Some(joint) = told.joints.get(usize::from(refusal.joint)) else { return told.has(refusal.reason) };
+    let lasts = match refusal.reason {
+        RefusalReason::Moving => joint.velocity.0.abs() > RETURN_SPEED,
+        RefusalReason::OutOfRange => joint.inputs & refusal.reason.bit() != 0,
+        _ => joint.drive == DriveState::SwitchedOn,
+    };
+    lasts && joint.drive != DriveState::OperationEnabled
 }
 
 #[cfg(test)]

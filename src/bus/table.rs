@@ -7,7 +7,7 @@
 //! ```
 //!
 //! The order of a PDO's subindices is CiA 301's, the drive's objects are CiA 402's; 219A is the one object of another
-//! maker that recorded host software maps (docs/bus.md).
+//! maker that recorded host software maps, 2194 one that published host software does (docs/bus.md).
 
 use super::dictionary::{Access, Mapping, Row, Type};
 
@@ -39,6 +39,8 @@ pub static GROUPS: &[(u16, u16, &str, bool)] = &[
     (0x2133, 1, "Fit: rows", true),
     (0x2140, 1, "Log", false),
     (0x607D, 1, "Software position limit", true),
+    (0x608F, 1, "Position encoder resolution", false),
+    (0x6091, 1, "Gear ratio", false),
     (0x60C1, 1, "Interpolation data record", false),
     (0x60C2, 1, "Interpolation time period", false),
     (0x60FE, 1, "Digital outputs", false),
@@ -140,6 +142,8 @@ rows! {
     0x2002, 0, U16, Both, No, 1000, "Bit rate after the next start";
     0x2010, 0, I16, Read, Transmit, 0, "Velocity actual value, short";
     0x2011, 0, U8, Both, No, 0, "Model in the feedforward";
+    0x2012, 0, U8, Both, No, 1, "Return into the range";
+    0x2013, 0, U8, Both, No, 1, "Silent host is missed";
     0x2100, 0, U8, Const, No, 12, "Number of entries";
     0x2100, 1, U8, Both, No, 0, "Command";
     0x2100, 2, U8, Read, Transmit, 0, "State";
@@ -156,7 +160,8 @@ rows! {
     0x2110 x 3, 0, U8, Const, No, 14, "Number of entries";
     0x2110 x 2, 1 x 14, F32, Read, No, 0, "Parameter";
     0x2112, 1 x 14, U8, Read, No, 0, "Parameter";
-    0x2120 x 5, 0, U8, Const, No, 13, "Number of entries";
+    0x2120, 0, U8, Both, No, 13, "Number of entries";
+    0x2121 x 4, 0, U8, Const, No, 13, "Number of entries";
     0x2120 x 2, 1 x 13, F32, Read, No, 0, "Base parameter";
     0x2122, 1 x 13, U16, Read, No, 0, "Base parameter";
     0x2123, 1 x 13, U8, Read, No, 0, "Base parameter";
@@ -169,6 +174,7 @@ rows! {
     0x2140, 2, Domain, Read, No, 0, "Samples";
     0x2140, 3, U32, Read, No, 0, "Samples waiting";
     0x2140, 4, U32, Read, No, 0, "Samples lost";
+    0x2194, 0, U32, Both, Any, 0, "Digital outputs, raw";
     0x219A, 0, U32, Read, Transmit, 0, "Digital inputs, raw";
     0x6007, 0, I16, Both, No, 3, "Abort connection option code";
     0x603F, 0, U16, Read, Transmit, 0, "Error code";
@@ -194,15 +200,25 @@ rows! {
     0x6076, 0, U32, Read, No, 0, "Motor rated torque";
     0x6077, 0, I16, Read, Transmit, 0, "Torque actual value";
     0x607A, 0, I32, Both, Any, 0, "Target position";
+    0x6078, 0, I16, Read, Transmit, 0, "Current actual value";
+    0x6079, 0, U32, Read, Transmit, 0, "DC link circuit voltage";
     0x607C, 0, I32, Both, No, 0, "Home offset";
     0x607D, 0, U8, Const, No, 2, "Number of entries";
     0x607D, 1, I32, Both, No, 0x8000_0000, "Min position limit";
     0x607D, 2, I32, Both, No, 0x7FFF_FFFF, "Max position limit";
+    0x607F, 0, U32, Read, No, 0, "Max profile velocity";
+    0x6080, 0, U32, Read, No, 0, "Max motor speed";
     0x6081, 0, U32, Both, Any, 500_000, "Profile velocity";
     0x6083, 0, U32, Both, Any, 2_000_000, "Profile acceleration";
     0x6084, 0, U32, Both, Any, 2_000_000, "Profile deceleration";
     0x6086, 0, I16, Both, No, 0, "Motion profile type";
     0x6087, 0, U32, Both, Any, 1000, "Torque slope";
+    0x608F, 0, U8, Const, No, 2, "Number of entries";
+    0x608F, 1, U32, Read, No, 0, "Encoder increments";
+    0x608F, 2, U32, Const, No, 1, "Motor revolutions";
+    0x6091, 0, U8, Const, No, 2, "Number of entries";
+    0x6091, 1, U32, Read, No, 0, "Motor revolutions";
+    0x6091, 2, U32, Const, No, 1000, "Shaft revolutions";
     0x6098, 0, I8, Both, No, 0, "Homing method";
     0x60A8, 0, U32, Const, No, 0xFA10_0000, "SI unit position";
     0x60A9, 0, U32, Const, No, 0xFA10_0300, "SI unit velocity";

@@ -13,7 +13,8 @@ use super::succession::Succession;
 use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
-use crate::safety::{DriveState, PowerRequest};
+use crate::real::min;
+use crate::safety::{DriveState, PowerRequest, RETURN_SPEED};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
@@ -344,7 +345,12 @@ impl<const N: usize> Control<N> {
     fn approach(&mut self, activity: Activity, motion: Periodic<N>) {
         let start = Motion::Periodic(motion).start_rad();
         let here = self.motion.state_at(self.motion_tick).position_rad;
-        let ramp = Ramp::between(here, start, self.approach_speed, self.approach_acceleration, SERVO_RATE_HZ);
+        let mut speed = self.approach_speed;
+        for (speed, returns) in speed.iter_mut().zip(self.servo.returns()) {
+            // Outside its range the whole way is as slow as the way back.
+            speed.0 = if returns { min(speed.0, RETURN_SPEED) } else { speed.0 };
+        }
+        let ramp = Ramp::between(here, start, speed, self.approach_acceleration, SERVO_RATE_HZ);
         match ramp {
             Ok(ramp) => {
                 self.activity = activity;

@@ -95,6 +95,11 @@ impl Course {
         self.position = clamp(self.position, place - window, place + window);
     }
 
+    /// Limits the position to a range.
+    pub fn keep_between(&mut self, low: f32, high: f32) {
+        self.position = clamp(self.position, low, high);
+    }
+
     /// Moves one tick towards a position.
     pub fn approach(&mut self, target: f32, rates: &Rates, tick_s: f32) {
         // Near the target the lost part of the sum is as large as the last steps.

@@ -4,15 +4,18 @@
 
 use super::queues::HostEnds;
 use super::signals::Signals;
-use crate::bus::station::{LegRequest, LegTold};
+use crate::bus::station::{LegOrder, LegRequest, LegTold};
 use crate::hal::{Hardware, Sample};
 use crate::leg::{
     Activity, Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand,
-    JointStatus, Plan, PowerRequest,
+    JointStatus, Permission, Plan, PowerRequest, Refusal,
 };
+use crate::units::{NewtonMetre, Volt};
 
 /// Ticks between two reports to the bus: 2 kHz, twice the fastest cycle that fits the wire.
 const TICKS: u32 = 2;
+/// Time constant of the torque that a host is told, ticks: 2 ms.
+const LAG_TICKS: f32 = 8.0;
 
 /// A request and, where it begins an identification, its plan and seed.
 pub type HostRequest<const N: usize> = (ControlRequest<N>, Option<(Plan, u64)>);
@@ -24,7 +27,13 @@ pub struct HostSide<const N: usize> {
     commands: Option<[JointCommand; N]>,
     request: Option<LegRequest>,
     cancel: bool,
-    refused: bool,
+    refused: Option<Refusal>,
+    /// The bus refused a step by itself, which no record tells of yet.
+    noted: Option<Refusal>,
+    may_return: [bool; N],
+    /// Of the measured currents, model's sign, smoothed; none of a released bridge, whose reading is noise.
+    torque: [NewtonMetre; N],
+    volt_per_code: Volt,
     tick: u32,
 }
 
@@ -36,8 +45,19 @@ fn is_held<const N: usize>(signals: &Signals<N>, hardware: &impl Hardware<N>) ->
 impl<const N: usize> HostSide<N> {
     /// Nothing received yet.
     #[must_use]
-    pub const fn new(following: Following<N>) -> Self {
-        Self { following, commands: None, request: None, cancel: false, refused: false, tick: 0 }
+    pub const fn new(following: Following<N>, volt_per_code: Volt) -> Self {
+        Self {
+            following,
+            commands: None,
+            request: None,
+            cancel: false,
+            refused: None,
+            noted: None,
+            may_return: [true; N],
+            torque: [NewtonMetre::ZERO; N],
+            volt_per_code,
+            tick: 0,
+        }
     }
 
     /// The joints have other zeros than before.
@@ -52,13 +72,33 @@ impl<const N: usize> HostSide<N> {
         signals: &Signals<N>,
         hardware: &mut impl Hardware<N>,
     ) {
-        while ends.orders.dequeue().is_some() {}
+        while let Some(order) = ends.orders.dequeue() {
+            self.note(&order);
+        }
         (self.commands, self.request, self.cancel) = (None, None, false);
         if self.is_due(ends, hardware) {
-            let blocked = !signals.inhibit.is_clear();
+            let causes = signals.inhibit.causes();
+            let (blocked, calibrated) = (causes != 0, signals.is_calibrated());
             let held = is_held(signals, hardware);
-            let _ = ends.told.enqueue(LegTold { blocked, held, ..LegTold::NONE });
+            let joints = [JointStatus { bus: self.bus(signals), ..JointStatus::NONE }; N];
+            let _ = ends.told.enqueue(LegTold { joints, blocked, causes, calibrated, held, ..LegTold::NONE });
         }
+    }
+
+    fn note(&mut self, order: &LegOrder<N>) {
+        self.may_return = order.may_return;
+        self.noted = order.refused.or(self.noted);
+    }
+
+    /// What the bus refused by itself, once.
+    pub fn take_noted(&mut self) -> Option<Refusal> {
+        self.noted.take()
+    }
+
+    /// Joints that a host lets return into their range.
+    #[must_use]
+    pub const fn may_return(&self) -> [bool; N] {
+        self.may_return
     }
 
     /// Takes the newest order, unless a request still waits behind the operator's. Reports the faults that a lost host means.
@@ -66,6 +106,7 @@ impl<const N: usize> HostSide<N> {
         while self.request.is_none()
             && let Some(order) = ends.orders.dequeue()
         {
+            self.note(&order);
             self.commands = order.commands;
             for (joint, code) in order.faults.into_iter().enumerate() {
                 if let Some(code) = code {
@@ -139,18 +180,17 @@ impl<const N: usize> HostSide<N> {
             // The host sees by its tick that one is missing.
             let _ = ends.logged.enqueue(logged);
         }
-        self.refused |= output.servo.decision.refused.is_some();
+        self.refused = output.servo.decision.refused.or(self.refused);
+        self.smooth(control, sample, output);
         if !self.is_due(ends, hardware) {
             return;
         }
         let activity = control.activity();
         let mut joints = [JointStatus::NONE; N];
         for (joint, slot) in joints.iter_mut().enumerate() {
-            let torque = control.torque(joint, sample);
-            let status = torque.and_then(|torque| {
-                self.following.status(joint, torque, activity == Activity::Follow, output)
-            });
-            *slot = status.unwrap_or(JointStatus::NONE);
+            let torque = self.torque.get(joint).copied().unwrap_or(NewtonMetre::ZERO);
+            let status = self.following.status(joint, torque, activity == Activity::Follow, output);
+            *slot = JointStatus { bus: self.bus(signals), ..status.unwrap_or(JointStatus::NONE) };
         }
         let told = LegTold {
             joints,
@@ -159,9 +199,24 @@ impl<const N: usize> HostSide<N> {
             refused: core::mem::take(&mut self.refused),
             held: is_held(signals, hardware),
             blocked: !signals.inhibit.is_clear(),
+            causes: signals.inhibit.causes(),
+            calibrated: true,
             rests: false,
         };
         let _ = ends.told.enqueue(told);
+    }
+
+    /// A first-order lag of [`LAG_TICKS`], as long as the bridges switch.
+    fn smooth(&mut self, control: &Control<N>, sample: &Sample<N>, output: &ControlOutput<N>) {
+        let is_off = output.servo.decision.state.permission() == Permission::Released;
+        for (joint, torque) in self.torque.iter_mut().enumerate() {
+            let measured = control.torque(joint, sample).filter(|_| !is_off);
+            *torque = measured.map_or(NewtonMetre::ZERO, |now| *torque + (now - *torque) * (1.0 / LAG_TICKS));
+        }
+    }
+
+    fn bus(&self, signals: &Signals<N>) -> Volt {
+        self.volt_per_code * signals.statistics.bus[0].get() as f32
     }
 
     /// The bus has to run, and has taken the report before.

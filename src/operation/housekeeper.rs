@@ -131,6 +131,7 @@ impl<const N: usize> Housekeeper<N> {
         signals.statistics.rounds.add();
         self.act(&mut Level { ends, signals, hardware });
         signals.set_permits(self.permits());
+        signals.set_calibrated(self.is_calibrated());
     }
 
     fn act(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {

@@ -17,7 +17,7 @@ use crate::checksum::Checksum;
 use crate::hal::{Hardware, JointSample, Sample};
 use crate::leg::{
     Activity, Control, ControlOutput, ControlRequest, DriveState, Following, LimitCodes, Permission, Plan,
-    permitted,
+    Refusal, permitted,
 };
 use crate::safety::{DeratingRamps, Fault, FaultCode, SupplyWatch};
 use crate::servo::SERVO_RATE_HZ;
@@ -47,6 +47,8 @@ pub struct ServoLevel<const N: usize> {
     host: Option<HostSide<N>>,
     /// Plan and seed of a host's identification.
     prepared: Option<(Plan, u64)>,
+    /// Refused last in this state.
+    refused: Option<Refusal>,
 }
 
 impl<const N: usize> ServoLevel<N> {
@@ -69,8 +71,9 @@ impl<const N: usize> ServoLevel<N> {
             supply: SupplyWatch::default(),
             ramps,
             volt_per_code,
-            host: following.map(HostSide::new),
+            host: following.map(|following| HostSide::new(following, volt_per_code)),
             prepared: None,
+            refused: None,
         }
     }
 
@@ -120,6 +123,7 @@ impl<const N: usize> ServoLevel<N> {
         if let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) {
             host.report(control, &sample, &output, ends, signals, hardware);
         }
+        self.report_noted(ends, signals);
         self.report_limits(control, &output, ends, signals);
         self.report(control, request.as_ref(), asked.as_ref(), &output, ends, signals);
         Some(output)
@@ -139,6 +143,7 @@ impl<const N: usize> ServoLevel<N> {
         if let (Some(host), Some(ends)) = (&mut self.host, &mut ends.host) {
             host.rest(ends, signals, hardware);
         }
+        self.report_noted(ends, signals);
     }
 
     /// The operator's request before the host's.
@@ -154,6 +159,7 @@ impl<const N: usize> ServoLevel<N> {
             return by_hand;
         };
         host.hear(ends, |fault| control.report(fault));
+        control.permit_return(host.may_return());
         let (request, prepared) = host.request(by_hand).unzip();
         if let Some(prepared) = prepared {
             self.prepared = prepared;
@@ -177,6 +183,13 @@ impl<const N: usize> ServoLevel<N> {
             control.report(Fault { code: FaultCode::SupplyLost, joint: 0 });
         }
         control.derate(&self.ramps.at(signals.hottest_c(), bus));
+    }
+
+    /// Reports what the bus refused.
+    fn report_noted(&mut self, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>) {
+        if let Some(refused) = self.host.as_mut().and_then(HostSide::take_noted) {
+            send(LegEvent::Record(not_enabled(self.tick, refused)), ends, signals);
+        }
     }
 
     /// Reports limits that act and were not reported in this second, one in a tick.
@@ -239,9 +252,10 @@ impl<const N: usize> ServoLevel<N> {
             let (code, name) = (fault.code.number(), words::fault(fault.code));
             record(Record::Fault { tick, code, name, joint: fault.joint.saturating_add(1) });
         }
-        if let Some(refused) = decision.refused {
-            let why = words::refusal(refused.reason);
-            record(Record::NotEnabled { tick, joint: refused.joint.saturating_add(1), why });
+        let before = self.refused.filter(|_| !changed);
+        self.refused = decision.refused.or(before);
+        if let Some(refused) = decision.refused.filter(|refused| before != Some(*refused)) {
+            record(not_enabled(tick, refused));
         }
         if changed || activity != self.activity {
             let (name, phase, motion) = words::activity(activity);
@@ -267,6 +281,10 @@ impl<const N: usize> ServoLevel<N> {
             send(LegEvent::Activity(activity), ends, signals);
         }
     }
+}
+
+fn not_enabled<const N: usize>(tick: u32, refused: Refusal) -> Record<N> {
+    Record::NotEnabled { tick, joint: refused.number(), why: words::refusal(refused.reason) }
 }
 
 /// Sends an event; one that finds no room is counted.

@@ -248,6 +248,7 @@ pub struct Signals<const N: usize> {
     permission: Word,
     hosted: Word,
     permits: Word,
+    calibrated: Word,
     forgotten: Word,
 }
 
@@ -265,6 +266,7 @@ impl<const N: usize> Signals<N> {
             permission: Word::new(0),
             hosted: Word::new(0),
             permits: Word::new(0),
+            calibrated: Word::new(0),
             forgotten: Word::new(0),
         }
     }
@@ -374,6 +376,17 @@ impl<const N: usize> Signals<N> {
     /// Sets whether the operator lets the leg be enabled.
     pub fn set_permits(&self, permits: bool) {
         self.permits.set(permits.into());
+    }
+
+    /// Every axis has a calibration.
+    #[must_use]
+    pub fn is_calibrated(&self) -> bool {
+        self.calibrated.get() != 0
+    }
+
+    /// Sets whether every axis has a calibration.
+    pub fn set_calibrated(&self, calibrated: bool) {
+        self.calibrated.set(calibrated.into());
     }
 
     /// All stored parameters were erased.

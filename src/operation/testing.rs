@@ -339,6 +339,7 @@ pub(super) fn station() -> Station<2, 4> {
         rated_torque: NewtonMetre(40.0),
         rated_current: Ampere(20.0),
         modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+        ..AxisConstants::UNKNOWN
     };
     let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));
     Station::new(own, Identity::scarab(1, "test"), [constants; 2], Plan::OneTime, 1)

@@ -8,6 +8,8 @@
 //!                                         brake after T with deceleration a stops at the end
 //! v(d) = d / T, at least -speed/4         d < 0: beyond the end, back inwards
 //! torque <= D (min(v(d_high), speed) - qd),    torque >= -D (min(v(d_low), speed) + qd),    |torque| <= cap
+//!
+//! returning   a joint that was enabled beyond an end: 0 towards that end, 0.2 rad/s back, a quarter of the cap
 //! ```
 //!
 //! `a` the deceleration counted on, half of the torque cap over the inertia; `D` = 100/s times the inertia, N m s/rad;
@@ -30,6 +32,12 @@ const DAMPING_PER_INERTIA: f32 = 100.0;
 const REACTION_S: f32 = 0.04;
 /// Share of the greatest speed at which a joint beyond its range is brought back at most.
 const RETURN_SHARE: f32 = 0.25;
+/// Speed at which a joint that was enabled outside its range is commanded back, rad/s.
+pub const RETURN_SPEED: f32 = 0.1;
+/// Share of the torque cap that such a joint has.
+pub const RETURN_TORQUE: f32 = 0.25;
+/// Speed above which its torque brakes, rad/s: twice what is commanded, so that torque is left at that speed.
+const RETURN_BOUND: f32 = 2.0 * RETURN_SPEED;
 
 /// What was taken from a request, per joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -92,37 +100,44 @@ impl Barrier {
         self.left_nm = shares.map(|share| share * self.cap_nm);
     }
 
-    /// The torque nearest to the wanted one that still lets the joint stop in its range, and what was taken.
+    /// The torque nearest to the wanted one that still lets the joint stop in its range, and what was taken. A joint that
+    /// `returns` stands outside: nothing drives it farther out, little drives it back.
     #[must_use]
     pub fn bound(
         &self,
         position: Radian,
         velocity: RadianPerSecond,
         wanted: NewtonMetre,
+        returns: bool,
     ) -> (NewtonMetre, Limited) {
         let mut limited = Limited::default();
+        let cap = if returns { RETURN_TORQUE * self.cap_nm } else { self.cap_nm };
         let [driving, driven] = self.left_nm;
         let left = if wanted.0 * velocity.0 < 0.0 { driven } else { driving };
         let mut torque = wanted.0;
         // Asked for too much, rather than braked too hard.
-        if wanted.abs().0 > left {
-            torque = wanted.limited(NewtonMetre(left)).0;
-            limited.derated = left < self.cap_nm;
+        if wanted.abs().0 > min(left, cap) {
+            torque = wanted.limited(NewtonMetre(min(left, cap))).0;
+            limited.derated = left < cap;
             limited.torque = !limited.derated;
         }
-        let (up, up_is_range) = self.approach_speed(self.high_rad - position.0);
+        let approach_speed = |distance: f32| match returns {
+            false => self.approach_speed(distance),
+            true => (if distance > 0.0 { RETURN_BOUND } else { 0.0 }, true),
+        };
+        let (up, up_is_range) = approach_speed(self.high_rad - position.0);
         let highest = self.damping_nm_s_per_rad * (up - velocity.0);
         if torque > highest {
             torque = highest;
             (limited.range, limited.speed) = (up_is_range, !up_is_range);
         }
-        let (down, down_is_range) = self.approach_speed(position.0 - self.low_rad);
+        let (down, down_is_range) = approach_speed(position.0 - self.low_rad);
         let lowest = -self.damping_nm_s_per_rad * (down + velocity.0);
         if torque < lowest {
             torque = lowest;
             (limited.range, limited.speed) = (down_is_range, !down_is_range);
         }
-        (NewtonMetre(torque).limited(NewtonMetre(self.cap_nm)), limited)
+        (NewtonMetre(torque).limited(NewtonMetre(cap)), limited)
     }
 
     /// With everything of it but what temperature and bus voltage change.
@@ -183,8 +198,12 @@ mod tests {
         for tick in 0..16_000 {
             sensed.push_back(velocity);
             let late = sensed.pop_front().expect("fourteen stay");
-            let (torque, _) =
-                barrier.bound(Radian(position as f32), RadianPerSecond(late as f32), NewtonMetre(wanted_nm));
+            let (torque, _) = barrier.bound(
+                Radian(position as f32),
+                RadianPerSecond(late as f32),
+                NewtonMetre(wanted_nm),
+                false,
+            );
             assert!(torque.abs() <= limits.torque_cap());
             for _ in 0..4 {
                 let dt = 1.0 / 16_000.0;
@@ -267,7 +286,7 @@ mod tests {
             let distance = speed * speed / braking + margin;
             let torque = NewtonMetre(-0.5 * braking * HIP.inertia.0);
             let position = Radian(HIP.high.0 - distance);
-            let (bounded, limited) = barrier.bound(position, RadianPerSecond(speed), torque);
+            let (bounded, limited) = barrier.bound(position, RadianPerSecond(speed), torque, false);
             assert_eq!((bounded, limited), (torque, Limited::default()), "speed {speed}");
         }
     }
@@ -276,13 +295,13 @@ mod tests {
     fn what_was_taken_is_told_apart() {
         let barrier = Barrier::new(&HIP);
         let (middle, still) = (Radian(0.45), RadianPerSecond::ZERO);
-        let (torque, limited) = barrier.bound(middle, still, NewtonMetre(500.0));
+        let (torque, limited) = barrier.bound(middle, still, NewtonMetre(500.0), false);
         assert_eq!((torque, limited), (NewtonMetre(100.0), Limited { torque: true, ..Limited::default() }));
-        let (torque, limited) = barrier.bound(Radian(0.7), RadianPerSecond(2.5), NewtonMetre(10.0));
+        let (torque, limited) = barrier.bound(Radian(0.7), RadianPerSecond(2.5), NewtonMetre(10.0), false);
         assert!(torque.0 < 0.0 && limited.range, "{torque:?}");
         let wide = JointLimits { high: Radian(6.0), low: Radian(-6.0), ..HIP };
         let (torque, limited) =
-            Barrier::new(&wide).bound(Radian::ZERO, RadianPerSecond(3.3), NewtonMetre(10.0));
+            Barrier::new(&wide).bound(Radian::ZERO, RadianPerSecond(3.3), NewtonMetre(10.0), false);
         assert!(torque.0 < 0.0 && limited.speed && !limited.range, "{torque:?}");
     }
 
@@ -294,13 +313,14 @@ mod tests {
             let velocity = sign * (HIP.speed.0 - 0.125);
             let bound = sign * barrier.damping_nm_s_per_rad * (barrier.speed_rad_per_s - velocity.abs());
             assert!(bound.abs() < barrier.cap_nm, "{bound}");
-            let at = |wanted| barrier.bound(Radian::ZERO, RadianPerSecond(velocity), NewtonMetre(wanted));
+            let at =
+                |wanted| barrier.bound(Radian::ZERO, RadianPerSecond(velocity), NewtonMetre(wanted), false);
             assert_eq!(at(bound), (NewtonMetre(bound), Limited::default()));
             let (torque, limited) = at(bound * 1.001);
             assert_eq!((torque.0, limited), (bound, Limited { speed: true, ..Limited::default() }));
             // The cap itself may be asked for.
             let cap = NewtonMetre(sign * barrier.cap_nm);
-            let (torque, limited) = barrier.bound(Radian::ZERO, RadianPerSecond::ZERO, cap);
+            let (torque, limited) = barrier.bound(Radian::ZERO, RadianPerSecond::ZERO, cap, false);
             assert_eq!((torque, limited), (cap, Limited::default()));
         }
     }
@@ -311,14 +331,14 @@ mod tests {
         barrier.derate([0.5, 0.2]);
         let at = |velocity, wanted| {
             let (torque, limited) =
-                barrier.bound(Radian(0.45), RadianPerSecond(velocity), NewtonMetre(wanted));
+                barrier.bound(Radian(0.45), RadianPerSecond(velocity), NewtonMetre(wanted), false);
             (torque.0, limited.derated, limited.torque)
         };
         assert_eq!(at(0.0, 80.0), (50.0, true, false));
         assert_eq!(at(-0.1, 40.0), (20.0, true, false));
         assert_eq!(at(0.1, 40.0), (40.0, false, false));
         barrier.derate([0.0; 2]);
-        let (torque, limited) = barrier.bound(Radian(0.87), RadianPerSecond(1.0), NewtonMetre(40.0));
+        let (torque, limited) = barrier.bound(Radian(0.87), RadianPerSecond(1.0), NewtonMetre(40.0), false);
         assert!(torque.0 < -90.0 && limited.range, "{torque:?}");
         assert!(barrier.damp(RadianPerSecond(-10.0)).0 > 90.0);
     }

@@ -133,6 +133,8 @@ faults! {
     Heartbeat = 0x8130, "B1", "heartbeat", Damp, "the host's heartbeat is missed";
     /// What the host sends in every cycle came late (8250: RPDO timeout).
     LatePdo = 0x8250, "B1", "late_pdo", Damp, "what the host sends in every cycle came late";
+    /// A host that spoke in every cycle fell silent.
+    HostSilent = 0xFF0F, "B5", "host_silent", Damp, "its host fell silent";
     /// The controller left the bus.
     BusOff = 0x8140, "B2", "bus_off", Damp, "the controller left the bus";
     /// The controller counts so many errors that it may no longer disturb others.
@@ -187,6 +189,8 @@ notices! {
     StoreFailed = 0x5530;
     /// The flash is about to be written: the node may be silent for seconds, heartbeats included.
     Storing = 0xFF0D;
+    /// A step towards enabled was refused: joint (from 1; 0 the leg), reason (bit of 60FD), causes.
+    NotEnabled = 0xFF0E;
 }
 
 /// A fault and the joint it was seen at; it stops the whole leg.
@@ -233,6 +237,7 @@ mod tests {
             (FaultCode::FollowingError, 0x8611),
             (FaultCode::Heartbeat, 0x8130),
             (FaultCode::LatePdo, 0x8250),
+            (FaultCode::HostSilent, 0xFF0F),
             (FaultCode::BusOff, 0x8140),
             (FaultCode::BusPassive, 0x8120),
             (FaultCode::Timers, 0xFF07),
@@ -243,7 +248,7 @@ mod tests {
         for (code, number) in numbers {
             assert_eq!(code.number(), number, "{code:?}");
         }
-        assert_eq!(NoticeCode::ALL.map(NoticeCode::number), [0x8110, 0x8210, 0x5530, 0xFF0D]);
+        assert_eq!(NoticeCode::ALL.map(NoticeCode::number), [0x8110, 0x8210, 0x5530, 0xFF0D, 0xFF0E]);
     }
 
     #[test]

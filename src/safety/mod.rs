@@ -14,6 +14,7 @@
 //! | [`DeratingRamps`], [`LimitCode`] | less before nothing, by temperature and bus voltage; codes that are no faults |
 //! | [`SupplyWatch`] | a supply that dies |
 //! | [`Monitor`] | all of it, once per tick |
+//! | [`RefusalReason`] | what stands against enabling |
 //! | [`Cause`], [`TickWatch`], [`ServoWatch`] | why nothing may be enabled, and what every current tick looks at |
 //! | [`CheckIns`], [`TickGuard`] | who has to have run before the watchdog is fed; current ticks that stop |
 //! | [`UpkeepClock`] | what is looked at every few milliseconds: gate drivers' registers, temperatures |
@@ -35,17 +36,19 @@ pub mod fault;
 pub mod interlock;
 pub mod limits;
 pub mod monitor;
+pub mod refusal;
 pub mod state;
 pub mod step_gate;
 pub mod upkeep;
 
-pub use barrier::{Barrier, Limited};
+pub use barrier::{Barrier, Limited, RETURN_SPEED, RETURN_TORQUE};
 pub use check_in::{CheckIns, GUARD_RATE_HZ, TickGuard};
 pub use derating::{Derating, DeratingRamps, LimitCode, LimitCodes, Ramp, SupplyWatch};
 pub use fault::{Fault, FaultCode, NO_ERROR, NoticeCode, Reaction};
 pub use interlock::{Bridges, Cause, ServoWatch, TickState, TickWatch, stays_active};
 pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
-pub use monitor::{Decision, Monitor, Observation, Refusal, RefusalReason, Request};
+pub use monitor::{Decision, Monitor, Observation, RANGE_TOLERANCE, Request};
+pub use refusal::{Refusal, RefusalReason};
 pub use state::{DriveState, Event, Permission, PowerRequest};
 pub use step_gate::{Reading, StepGate};
 pub use upkeep::{BoardFault, UpkeepClock, of_gate_driver, of_temperature};

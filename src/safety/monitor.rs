@@ -6,19 +6,27 @@
 //! 1. Detect, or hear of ([`Monitor::report`]). Anything measured or wanted that is not finite; encoder readings rejected three times in 10 ms; while
 //!    the drive is on, more than 1.1 times the speed limit or 0.5 degrees beyond the range.
 //! 2. Move the state ([`DriveState::after`]): a fault, or the tick and then the operator's request. To enable, the
-//!    joints must stand within range and speed, or the request is refused with its reason.
+//!    joints must stand within range and speed, or the request is refused with its reason ([`RefusalReason`]).
+//!
+//! **The way back.** A leg that is released falls, and may come to rest outside its range. Such a joint is enabled unless
+//! [`Monitor::permit_return`] forbids it, and returns: nothing drives it farther out, little drives it back ([`Barrier::bound`]). How far out it may
+//! stand follows it inwards, and half a degree beyond that is the same fault as leaving the range. From 0.1 degrees on it is
+//! inside and has its usual bounds.
+//!
 //! 3. Permission of the state: released, damp, or the wanted torque within the bounds of [`Barrier`].
 //! 4. Torque to current, and a last look: a current that is not finite releases the bridges.
 //!
 //! Cost: about 60 operations and two square roots per joint.
 
-use super::barrier::{Barrier, Limited};
+use super::barrier::{Barrier, Limited, RETURN_SPEED};
 use super::derating::{Derating, LimitCodes};
 use super::fault::{Fault, FaultCode, Reaction};
 use super::limits::Limits;
+use super::refusal::{Refusal, RefusalReason};
 use super::state::{DriveState, Event, Permission, PowerRequest};
 use crate::checksum::Checksum;
 use crate::hal::DriveCommand;
+use crate::real::{max, min};
 use crate::units::{Ampere, NewtonMetre, Radian, RadianPerSecond};
 
 /// Damping lasts this long at most.
@@ -30,7 +38,9 @@ const GLITCHES_FOR_FAULT: u32 = 3;
 /// A joint is too fast above this multiple of its speed limit.
 const OVERSPEED_FACTOR: f32 = 1.1;
 /// A joint is out of its range beyond this much (0.5 degrees).
-const RANGE_TOLERANCE: Radian = Radian(0.008_727);
+pub const RANGE_TOLERANCE: Radian = Radian(0.008_727);
+/// A joint that returns is inside from this far on (0.1 degrees), where its usual bounds ask for no jump.
+const RETURNED: Radian = Radian(0.001_745);
 
 /// What the sensors say about `N` joints, in the model's angle and sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,26 +64,6 @@ pub struct Request<const N: usize> {
     pub power: Option<PowerRequest>,
 }
 
-/// Why the drive was not enabled although it was asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Refusal {
-    /// Counted from 0.
-    pub joint: u8,
-    /// What stands against it.
-    pub reason: RefusalReason,
-}
-
-/// What stands against enabling.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RefusalReason {
-    /// The joint is out of its range by more than 0.5 degrees.
-    OutOfRange,
-    /// The joint is faster than its limit.
-    Moving,
-    /// The encoder reading of this tick was rejected.
-    Encoder,
-}
-
 /// What the monitor decided at one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision<const N: usize> {
@@ -89,6 +79,8 @@ pub struct Decision<const N: usize> {
     pub fault: Option<Fault>,
     /// Why a request to enable was refused at this tick.
     pub refused: Option<Refusal>,
+    /// Joints that return into their range.
+    pub returns: [bool; N],
 }
 
 /// The monitor of one leg; see the module's steps.
@@ -106,6 +98,9 @@ pub struct Monitor<const N: usize> {
     glitches: [u64; N],
     /// Seen elsewhere, for the next tick.
     reported: Option<Fault>,
+    /// How far out a joint that returns may stand.
+    returns: [Option<[Radian; 2]>; N],
+    may_return: [bool; N],
     state: DriveState,
 }
 
@@ -129,6 +124,8 @@ impl<const N: usize> Monitor<N> {
             glitch_window: u64::MAX.checked_shr(64 - window_ticks).unwrap_or(0),
             glitches: [0; N],
             reported: None,
+            returns: [None; N],
+            may_return: [true; N],
             state: DriveState::NotReadyToSwitchOn,
         }
     }
@@ -161,6 +158,17 @@ impl<const N: usize> Monitor<N> {
         }
     }
 
+    /// Joints that may be enabled outside their range; all of them unless this says otherwise.
+    pub const fn permit_return(&mut self, joints: [bool; N]) {
+        self.may_return = joints;
+    }
+
+    /// Joints that return into their range.
+    #[must_use]
+    pub fn returns(&self) -> [bool; N] {
+        self.returns.map(|ends| ends.is_some() && self.state == DriveState::OperationEnabled)
+    }
+
     /// Codes of what a decision took from each joint.
     #[must_use]
     pub fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
@@ -184,6 +192,7 @@ impl<const N: usize> Monitor<N> {
     /// Drive off and no reading rejected, as after the start.
     pub const fn restart(&mut self) {
         (self.state, self.glitches) = (DriveState::NotReadyToSwitchOn, [0; N]);
+        self.returns = [None; N];
     }
 
     /// Decides one tick.
@@ -200,7 +209,10 @@ impl<const N: usize> Monitor<N> {
                     Some(power) => {
                         let asked = state.after(Event::Asked(power), self.damp_ticks);
                         let enables = asked == DriveState::OperationEnabled && asked != state;
-                        refused = if enables { self.refusal(observation) } else { None };
+                        if enables {
+                            refused = self.refusal(observation);
+                            self.begin_return(observation);
+                        }
                         if refused.is_some() { state } else { asked }
                     }
                 }
@@ -213,6 +225,7 @@ impl<const N: usize> Monitor<N> {
             limited: [Limited::default(); N],
             fault,
             refused,
+            returns: self.returns(),
         };
         match self.state.permission() {
             Permission::Released => return decision,
@@ -227,6 +240,7 @@ impl<const N: usize> Monitor<N> {
                         observation.position[joint],
                         observation.velocity[joint],
                         request.torque[joint],
+                        decision.returns[joint],
                     );
                 }
             }
@@ -262,12 +276,20 @@ impl<const N: usize> Monitor<N> {
                 found = found.or(fault(FaultCode::EncoderStep, joint));
             }
         }
-        if self.state.permission() != Permission::Released {
+        let permission = self.state.permission();
+        if permission != Permission::Released {
             for joint in 0..N {
                 if observation.velocity[joint].abs().0 > self.fault_speed[joint] {
                     found = found.or(fault(FaultCode::Overspeed, joint));
                 }
-                if !self.in_range(joint, observation.position[joint]) {
+                let position = observation.position[joint];
+                let is_outside = match self.returns[joint] {
+                    None => !self.in_range(joint, position),
+                    // A stop is under way already.
+                    Some(_) if permission != Permission::Follow => false,
+                    Some(ends) => self.goes_on_out(joint, position, ends),
+                };
+                if is_outside {
                     found = found.or(fault(FaultCode::PositionLimit, joint));
                 }
             }
@@ -277,9 +299,11 @@ impl<const N: usize> Monitor<N> {
 
     fn refusal(&self, observation: &Observation<N>) -> Option<Refusal> {
         (0..N).find_map(|joint| {
-            let reason = if !self.in_range(joint, observation.position[joint]) {
+            let is_inside = self.in_range(joint, observation.position[joint]);
+            let speed = if is_inside { self.limits.joints()[joint].speed.0 } else { RETURN_SPEED };
+            let reason = if !is_inside && !self.may_return[joint] {
                 RefusalReason::OutOfRange
-            } else if observation.velocity[joint].abs() > self.limits.joints()[joint].speed {
+            } else if observation.velocity[joint].abs().0 > speed {
                 RefusalReason::Moving
             } else if observation.rejected[joint] {
                 RefusalReason::Encoder
@@ -288,6 +312,26 @@ impl<const N: usize> Monitor<N> {
             };
             Some(Refusal { joint: joint as u8, reason })
         })
+    }
+
+    /// What the joints may do from here on that stand outside.
+    fn begin_return(&mut self, observation: &Observation<N>) {
+        for joint in 0..N {
+            let position = observation.position[joint];
+            let is_inside = self.in_range(joint, position);
+            let ends = self.limits.joints()[joint];
+            let ends = [min(ends.low.0, position.0), max(ends.high.0, position.0)];
+            self.returns[joint] = (!is_inside).then_some(ends.map(Radian));
+        }
+    }
+
+    /// Whether a joint that returns moves out instead; what it came nearer by is not given back.
+    fn goes_on_out(&mut self, joint: usize, position: Radian, [low, high]: [Radian; 2]) -> bool {
+        let ends = &self.limits.joints()[joint];
+        let is_back = position >= ends.low - RETURNED && position <= ends.high + RETURNED;
+        let nearer = [max(low.0, min(ends.low.0, position.0)), min(high.0, max(ends.high.0, position.0))];
+        self.returns[joint] = (!is_back).then_some(nearer.map(Radian));
+        position < low - RANGE_TOLERANCE || position > high + RANGE_TOLERANCE
     }
 
     #[inline]

@@ -167,6 +167,17 @@ impl<const N: usize> Servo<N> {
         self.monitor.report(fault);
     }
 
+    /// Permits joints to be enabled outside their range, see [`Monitor::permit_return`].
+    pub const fn permit_return(&mut self, joints: [bool; N]) {
+        self.monitor.permit_return(joints);
+    }
+
+    /// Joints that return into their range.
+    #[must_use]
+    pub fn returns(&self) -> [bool; N] {
+        self.monitor.returns()
+    }
+
     /// Sets the torque caps that temperature and bus voltage allow, from the next tick on.
     pub fn derate(&mut self, derating: &Derating) {
         self.monitor.derate(derating);

@@ -140,10 +140,17 @@ fn join(
     notes: &mut Producer<'static, Record<JOINTS>>,
 ) -> Joined {
     let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
-    let constants = configuration.joints.each_ref().map(|joint| AxisConstants {
-        rated_torque: joint.limits().torque_cap(),
-        rated_current: joint.current,
-        modes,
+    let constants = core::array::from_fn(|joint| {
+        let (joint, motor) = (&configuration.joints[joint], &leg::LEG.joints[joint].motor);
+        AxisConstants {
+            rated_torque: joint.limits().torque_cap(),
+            rated_current: joint.current,
+            modes,
+            torque_per_ampere: joint.scale.torque_per_ampere,
+            speed: joint.speed,
+            counts_per_turn: motor.counts_per_turn,
+            ratio: motor.ratio,
+        }
     });
     let [low, middle, high] = identity.unique;
     let told = crate::bus::Identity::scarab(low ^ middle ^ high, "ODrive v3.6");

@@ -104,11 +104,11 @@ records! {
         /// False if refused.
         accepted: bool,
     }
-    /// Refusal of the monitor to enable the drive.
+    /// Refusal of a step towards an enabled drive.
     NotEnabled "not_enabled n={=u32} tick={=u32} joint={=u8} why={=str}" {
         /// Servo tick.
         tick: u32,
-        /// Joint, from 1.
+        /// Joint, from 1; 0 is the leg.
         joint: u8,
         /// Reason, see [`super::words::refusal`].
         why: &'static str,

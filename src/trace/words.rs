@@ -67,6 +67,10 @@ pub const fn fault(code: FaultCode) -> &'static str {
 #[must_use]
 pub const fn refusal(reason: RefusalReason) -> &'static str {
     match reason {
+        RefusalReason::SwitchOpen => "switch_open",
+        RefusalReason::Blocked => "blocked",
+        RefusalReason::NoReference => "no_reference",
+        RefusalReason::NotCalibrated => "not_calibrated",
         RefusalReason::OutOfRange => "out_of_range",
         RefusalReason::Moving => "moving",
         RefusalReason::Encoder => "encoder",

@@ -41,6 +41,22 @@ impl Hosted {
         hosted
     }
 
+    /// A leg that is enabled where its drive was off, rad.
+    fn enabled_at(position: [f64; JOINTS]) -> Self {
+        let mut hosted = Self::resting_at(position);
+        hosted.pair.leg.command(&[HOLD; JOINTS]);
+        assert!(hosted.pair.enable(context().gravity));
+        hosted.run(10);
+        hosted
+    }
+
+    fn resting_at(position: [f64; JOINTS]) -> Self {
+        let mut pair = Pair::new(&default_leg(), context(), 1).expect("the firmware takes the default leg");
+        pair.world.place(&position);
+        pair.sample = scarab::hal::LegDrives::sample(&mut pair.world);
+        Self { pair, commands: [HOLD; JOINTS], status: [JointStatus::NONE; JOINTS] }
+    }
+
     fn tick(&mut self, request: Option<ControlRequest<JOINTS>>) -> scarab::leg::ControlOutput<JOINTS> {
         self.pair.leg.command(&self.commands);
         let output = tick(&mut self.pair, request);
@@ -348,4 +364,174 @@ fn an_identification_begins_from_rest_and_gives_the_leg_back_to_the_host() {
     hosted.run(2 * SECOND);
     assert!(is_enabled(&hosted.pair) && hosted.status[1].velocity_demand.0 == 0.0);
     assert_eq!(hosted.pair.leg.control().verdict(), None);
+}
+
+/// Ranges of the default leg, rad.
+const RANGES: [[f64; 2]; JOINTS] = [[0.037_873, 0.875_806], [0.119_555, 1.667_313]];
+
+/// How far a joint is beyond its range, rad.
+fn beyond(joint: usize, angle: f64) -> f64 {
+    let [low, high] = RANGES[joint];
+    (low - angle).max(angle - high).max(0.0)
+}
+
+/// Poses outside: joint, its angle, and the sign of the way back. Gravity pulls the hip little at its lower end, and the bent knee inwards.
+const OUTSIDE: [(usize, [f64; JOINTS], f32); 3] =
+    [(0, [-0.04, 0.6], 1.0), (1, [0.3, 0.04], 1.0), (1, [0.3, 1.75], -1.0)];
+
+/// Watches a joint on its way back for so long: farthest out and fastest while it is outside.
+fn watch(hosted: &mut Hosted, joint: usize, ticks: u64) -> [f64; 2] {
+    let mut most = [0.0_f64; 2];
+    for _ in 0..ticks {
+        hosted.run(1);
+        assert!(is_enabled(&hosted.pair), "{:?}", hosted.status);
+        let out = beyond(joint, hosted.truth(joint));
+        if out > 0.002 {
+            most = [most[0].max(out), most[1].max(hosted.pair.world.velocity()[joint].abs())];
+            // A quarter of 85 N m.
+            assert!(hosted.status[joint].torque_demand.0.abs() < 21.26, "{:?}", hosted.status[joint]);
+        }
+    }
+    most
+}
+
+#[test]
+fn a_joint_outside_its_range_is_led_back_by_every_command_that_leads_there() {
+    let targets: [fn(&mut Hosted, usize, f32); 4] = [
+        |hosted, joint, _| hosted.point(joint, if joint == 0 { 0.4 } else { 0.8 }, true),
+        |hosted, joint, sign| {
+            hosted.commands[joint].target = Target::ProfileVelocity(RadianPerSecond(0.4 * sign))
+        },
+        // A host that lets the joint stay where it is.
+        |hosted, joint, _| hosted.cyclic(joint, hosted.position(joint)),
+        |hosted, joint, sign| {
+            hosted.commands[joint].target = Target::CyclicTorque(NewtonMetre(16.0 * sign));
+        },
+    ];
+    for (place, command) in targets.into_iter().enumerate() {
+        for (joint, pose, sign) in OUTSIDE {
+            let mut hosted = Hosted::enabled_at(pose);
+            let from = beyond(joint, hosted.truth(joint));
+            assert!(from > 0.07, "{from}");
+            assert_eq!(hosted.status[joint].inputs, 1 << 20, "bit 20 of 60FD");
+            command(&mut hosted, joint, sign);
+            let mut ticks = 0;
+            let mut most = [0.0_f64; 2];
+            while hosted.status[joint].inputs != 0 {
+                let now = watch(&mut hosted, joint, 1);
+                most = [most[0].max(now[0]), most[1].max(now[1])];
+                ticks += 1;
+                assert!(ticks < 4 * SECOND, "{place} {joint}: {most:?} {}", hosted.truth(joint));
+            }
+            // Commanded are 0.1 rad/s, more while the knee's weight is taken over; a torque alone may reach the bound of 0.2 rad/s.
+            let fastest = if place == 3 { 0.21 } else { 0.16 };
+            assert!(most[0] < from + 0.002 && most[1] < fastest, "{place} {joint}: {from} {most:?}");
+            if place < 3 {
+                let rest = watch(&mut hosted, joint, SECOND);
+                assert!(rest[0] < 0.009, "{place} {joint}: {rest:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn nothing_that_a_host_commands_leads_a_joint_farther_out() {
+    let targets: [fn(&mut Hosted, usize, f32); 5] = [
+        |_, _, _| {},
+        |hosted, joint, sign| hosted.point(joint, hosted.position(joint) - sign, true),
+        |hosted, joint, sign| {
+            hosted.commands[joint].target = Target::ProfileVelocity(RadianPerSecond(-0.4 * sign))
+        },
+        |hosted, joint, sign| {
+            hosted.commands[joint].target = Target::ProfileTorque(NewtonMetre(-60.0 * sign));
+        },
+        |hosted, joint, sign| hosted.commands[joint].target = Target::CyclicTorque(NewtonMetre(-60.0 * sign)),
+    ];
+    for (place, command) in targets.into_iter().enumerate() {
+        for (joint, pose, sign) in OUTSIDE {
+            let mut hosted = Hosted::enabled_at(pose);
+            let from = beyond(joint, hosted.truth(joint));
+            command(&mut hosted, joint, sign);
+            let [farthest, _] = watch(&mut hosted, joint, 2 * SECOND);
+            assert!(farthest < from + 0.002, "{place} {joint}: {from} {farthest}");
+        }
+    }
+}
+
+#[test]
+fn a_joint_that_is_pushed_farther_out_while_it_returns_stops_the_leg() {
+    let mut hosted = Hosted::enabled_at([0.3, 0.04]);
+    hosted.commands[1].target = Target::ProfileVelocity(RadianPerSecond(0.1));
+    hosted.run(SECOND / 4);
+    hosted.pair.world.push(1, -60.0, 0.5);
+    for _ in 0..SECOND {
+        hosted.run(1);
+    }
+    let fault = Fault { code: FaultCode::PositionLimit, joint: 1 };
+    assert_eq!(hosted.pair.leg.control().state().fault(), Some(fault));
+}
+
+#[test]
+fn a_way_back_that_is_forbidden_leaves_the_drive_off_with_its_reason() {
+    let mut hosted = Hosted::resting_at([0.3, 0.04]);
+    hosted.pair.leg.halves().0.permit_return([true, false]);
+    assert!(!hosted.pair.enable(context().gravity));
+    let output = hosted.tick(Some(ControlRequest::Power(PowerRequest::EnableOperation)));
+    let refused = output.servo.decision.refused.expect("a reason");
+    assert_eq!((refused.number(), refused.reason as u8), (2, 20));
+}
+
+#[test]
+fn an_operator_who_identifies_outside_the_range_is_led_back_slowly_as_well() {
+    for (joint, pose, _) in OUTSIDE {
+        let mut hosted = Hosted::resting_at(pose);
+        assert!(hosted.pair.enable(context().gravity));
+        let from = beyond(joint, hosted.truth(joint));
+        // The switch alone moves nothing.
+        (0..SECOND).for_each(|_| {
+            tick(&mut hosted.pair, None);
+        });
+        assert!((beyond(joint, hosted.truth(joint)) - from).abs() < 0.06 && is_enabled(&hosted.pair));
+        tick(&mut hosted.pair, Some(ControlRequest::Identify));
+        let (mut ticks, mut fastest) = (0, 0.0_f64);
+        while beyond(joint, hosted.truth(joint)) > 0.002 {
+            tick(&mut hosted.pair, None);
+            (ticks, fastest) = (ticks + 1, fastest.max(hosted.pair.world.velocity()[joint].abs()));
+            assert!(ticks < 6 * SECOND && is_enabled(&hosted.pair), "{joint}: {}", hosted.truth(joint));
+        }
+        assert!(fastest < 0.15, "{joint}: {fastest}");
+        assert!(matches!(activity(&hosted.pair), Activity::Identify(_)));
+    }
+}
+
+#[test]
+fn homing_without_a_method_is_an_error_and_moves_no_zero() {
+    let mut hosted = Hosted::new();
+    hosted.run(2 * SECOND);
+    let before = hosted.position(0);
+    let command = &mut hosted.commands[0];
+    command.target = Target::Homing { offset: Radian(f32::INFINITY) };
+    command.asked = command.asked.wrapping_add(1);
+    hosted.run(100);
+    assert!(hosted.status[0].deviates && !hosted.status[0].homed);
+    assert!((hosted.position(0) - before).abs() < 1e-3 && is_enabled(&hosted.pair));
+}
+
+/// Published host software looks for a mechanical stop: it moves a joint outwards until 50 N m are measured.
+#[test]
+fn a_host_that_looks_for_a_mechanical_stop_comes_to_the_end_of_the_range_and_no_farther() {
+    for (joint, velocity) in [(0, -0.2), (1, -0.2), (1, 0.4)] {
+        let mut hosted = Hosted::new();
+        hosted.commands[joint].target = Target::ProfileVelocity(RadianPerSecond(velocity));
+        let mut most = 0.0_f32;
+        for _ in 0..6 * SECOND {
+            hosted.run(1);
+            most = most.max(hosted.status[joint].torque_demand.0.abs());
+        }
+        std::println!(
+            "joint {joint} at {velocity} rad/s: {most:.1} N m at most, {:.4} rad",
+            hosted.truth(joint)
+        );
+        assert!(is_enabled(&hosted.pair) && most < 50.0 && beyond(joint, hosted.truth(joint)) < 0.009);
+    }
 }

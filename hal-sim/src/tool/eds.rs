@@ -12,6 +12,10 @@ use scarab::bus::Identity;
 use scarab::bus::dictionary::{Access, Mapping, Row, Type};
 use scarab::bus::table::{GROUPS, NAMES, ROWS};
 
+/// Day and time of the last change to the dictionary, as CiA 306 writes them. They stand in the source, not in a
+/// clock: the sheets of one version are the same whenever they are written.
+const CHANGED: [&str; 2] = ["11-23-2026", "03:30PM"];
+
 /// One subindex of an object.
 struct Part {
     row: &'static Row,
@@ -41,10 +45,13 @@ fn objects() -> BTreeMap<u16, BTreeMap<u8, Part>> {
 }
 
 fn write_all(out: &mut String, joint: &str) -> fmt::Result {
-    let identity = Identity::scarab(0, "");
+    let (identity, [date, time]) = (Identity::scarab(0, ""), CHANGED);
     writeln!(
         out,
-        "[FileInfo]\nFileName=scarab-{joint}.eds\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0\nDescription=Scarab joint drive, {joint}\n"
+        "[FileInfo]\nFileName=scarab-{joint}.eds\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0\nDescription=Scarab joint drive, {joint}\n\
+         CreationDate={date}\nCreationTime={time}\nCreatedBy=Scarab {version}\n\
+         ModificationDate={date}\nModificationTime={time}\nModifiedBy=Scarab {version}\n",
+        version = env!("CARGO_PKG_VERSION")
     )?;
     writeln!(
         out,
@@ -135,4 +142,24 @@ fn write_variable(out: &mut String, index: u16, sub: u8, part: &Part, identity: 
         writeln!(out, "DefaultValue={node}{number}")?;
     }
     writeln!(out, "PDOMapping={}", u8::from(row.mapping != Mapping::No))
+}
+
+#[cfg(test)]
+mod tests {
+    use scarab::checksum::Checksum;
+
+    use super::*;
+
+    #[test]
+    fn the_date_is_that_of_the_last_change_to_the_dictionary() {
+        let text = text("hip");
+        assert_eq!(text, super::text("hip"));
+        assert!(text.contains("\nCreationDate=11-23-2026\nCreationTime=03:30PM\n"));
+        let objects = text.split_once("[DummyUsage]").expect("its sections").1;
+        let sum = objects.bytes().fold(Checksum::EMPTY, |sum, byte| sum.word(u32::from(byte)));
+        // Another dictionary: give CHANGED the day and put its sum here.
+        assert_eq!(format!("{sum:?}"), SUM);
+    }
+
+    const SUM: &str = "?";
 }

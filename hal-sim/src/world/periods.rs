@@ -89,7 +89,7 @@ impl<const N: usize> World<N> {
             return [AxisSample::default(); N];
         };
         let now = self.tick as f64 * TICK_S + f64::from(period) * PERIOD_S;
-        let gripped = self.gripped(now);
+        let (gripped, stopped) = (self.gripped(now), self.stopped());
         let Some(electric) = &mut self.electric else { return [AxisSample::default(); N] };
         if electric.period == 0 {
             electric.pushed = self.wearer.torque((self.tick as f64 + 0.5) * TICK_S);
@@ -110,7 +110,8 @@ impl<const N: usize> World<N> {
         let acting = core::array::from_fn(|joint| {
             let motor = electric.ratio[joint] * torque[joint];
             electric.sum[joint] += motor / f64::from(PERIODS_PER_TICK);
-            anatomy[joint].flip(mounting * motor + electric.pushed[joint] + gripped[joint]) + stood[joint]
+            let pushed = electric.pushed[joint] + gripped[joint];
+            anatomy[joint].flip(mounting * motor + pushed) + stood[joint] + stopped[joint]
         });
         self.leg.advance(state, &acting, &acting, PERIOD_S);
         electric.period += 1;

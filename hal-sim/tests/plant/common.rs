@@ -10,6 +10,7 @@ use hal_sim::description::{
 pub fn joint(frame: [f64; 3], mass: f64, com: [f64; 3], inertia_com: [f64; 6]) -> JointDescription {
     let [alpha, a, d] = frame;
     JointDescription {
+        stops: None,
         frame: DenavitHartenberg { alpha, a, d },
         direction: 1.0,
         zero_offset: 0.0,

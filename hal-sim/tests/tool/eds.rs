@@ -19,7 +19,7 @@ struct Live {
 impl Live {
     fn new() -> Self {
         let constants =
-            AxisConstants { rated_torque: NewtonMetre(40.0), rated_current: Ampere(20.0), modes: 0 };
+            AxisConstants { rated_torque: NewtonMetre(40.0), rated_current: Ampere(20.0), modes: 0, ..AxisConstants::UNKNOWN };
         let node = NodeId::new(NODE).expect("a number");
         let mut live = Self { node: Node::new(node, Identity::scarab(1, "3.6")), axis: Axis::new(constants) };
         assert_eq!(live.node.poll(0, &mut live.axis), Some(Frame::new(0x702, &[0])));

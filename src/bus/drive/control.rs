@@ -12,11 +12,15 @@
 //! ```
 //! Source: CiA 402, controlword.
 
+use super::coupling::level;
 use super::status::state_bits;
 use super::{JointCommand, JointStatus, Mode, SetPoint, Target};
+use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::Lost;
-use crate::leg::{DriveEvent, DriveState, FaultCode, PowerRequest};
-use crate::units::{Ampere, NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
+use crate::leg::{DriveEvent, DriveState, FaultCode, PowerRequest, RefusalReason};
+use crate::units::{
+    Ampere, NewtonMetre, NewtonMetrePerAmpere, Radian, RadianPerSecond, RadianPerSecondSquared, Second,
+};
 
 const RESET: u16 = 1 << 7;
 const NEW: u16 = 1 << 4;
@@ -33,7 +37,31 @@ pub struct AxisConstants {
     pub rated_current: Ampere,
     /// Modes the leg follows, bits of [`Mode::bit`].
     pub modes: u32,
+    /// Joint torque per motor current.
+    pub torque_per_ampere: NewtonMetrePerAmpere,
+    /// Greatest speed that is commanded.
+    pub speed: RadianPerSecond,
+    /// Encoder counts per turn of the motor.
+    pub counts_per_turn: u32,
+    /// Turns of the motor per turn of the joint.
+    pub ratio: f32,
 }
+
+impl AxisConstants {
+    /// A joint of which nothing is known.
+    pub const UNKNOWN: Self = Self {
+        rated_torque: NewtonMetre(1.0),
+        rated_current: Ampere(1.0),
+        modes: 0,
+        torque_per_ampere: NewtonMetrePerAmpere(1.0),
+        speed: RadianPerSecond::ZERO,
+        counts_per_turn: 0,
+        ratio: 0.0,
+    };
+}
+
+/// No method of homing was written: none is begun.
+const NO_METHOD: i8 = -1;
 
 /// What a host writes and reads again; the numbers are the objects'.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +91,8 @@ pub(super) struct Settings {
     pub outputs: u32,
     pub target_velocity: i32,
     pub feedforward: bool,
+    pub returns: bool,
+    pub watches: bool,
     pub node_id: u8,
     pub bit_rate: u16,
 }
@@ -89,7 +119,7 @@ impl Settings {
         profile_acceleration: 2_000_000,
         profile_deceleration: 2_000_000,
         torque_slope: 1000,
-        homing_method: 0,
+        homing_method: NO_METHOD,
         velocity_offset: 0,
         torque_offset: 0,
         interpolation_data: 0,
@@ -98,6 +128,8 @@ impl Settings {
         outputs: 0,
         target_velocity: 0,
         feedforward: false,
+        returns: true,
+        watches: true,
         node_id: 0,
         bit_rate: USUAL_KBIT,
     };
@@ -123,6 +155,10 @@ pub struct Axis {
     fault: Option<FaultCode>,
     /// A host has sent a controlword that says something.
     pub(super) commanded: bool,
+    /// A step towards enabled was asked for and not looked at yet.
+    rises: bool,
+    /// Why such a step is refused, as long as that lasts.
+    pub(in crate::bus) refused: Option<ErrorReport>,
 }
 
 /// The fault of a lost host.
@@ -130,6 +166,7 @@ const fn code(why: Lost) -> Option<FaultCode> {
     match why {
         Lost::Heartbeat => Some(FaultCode::Heartbeat),
         Lost::ReceivedPdo => Some(FaultCode::LatePdo),
+        Lost::Silent => Some(FaultCode::HostSilent),
         Lost::Bus(true) => Some(FaultCode::BusOff),
         Lost::Bus(false) => Some(FaultCode::BusPassive),
         Lost::Stopped | Lost::Reset => None,
@@ -160,6 +197,8 @@ impl Axis {
             asked: 0,
             fault: None,
             commanded: false,
+            rises: false,
+            refused: None,
         }
     }
 
@@ -179,6 +218,17 @@ impl Axis {
         self.settings.bit_rate = kbit_per_s;
     }
 
+    /// Object 2012.
+    #[must_use]
+    pub const fn may_return(&self) -> bool {
+        self.settings.returns
+    }
+
+    /// A step towards enabled was asked for since this was asked last.
+    pub(in crate::bus) fn take_rises(&mut self) -> bool {
+        core::mem::take(&mut self.rises)
+    }
+
     /// Where the leg's drive stands.
     #[must_use]
     pub const fn drive(&self) -> DriveState {
@@ -193,7 +243,7 @@ impl Axis {
 
     /// Something forbids to enable.
     pub(in crate::bus) const fn is_blocked(&self) -> bool {
-        self.status.inputs & super::BLOCKED != 0
+        self.status.inputs & RefusalReason::Blocked.bit() != 0
     }
 
     /// This joint is enabled, and so is the leg.
@@ -210,6 +260,13 @@ impl Axis {
             self.resets = self.own.fault().is_some();
         }
         if word & RESET == 0 {
+            let wanted = match word & 0xF {
+                0b0110 | 0b1110 => 1,
+                0b0111 => 2,
+                0b1111 => 3,
+                _ => 0,
+            };
+            self.rises |= wanted > level(self.own);
             self.ask(word);
         }
         self.taken &= word & NEW != 0;
@@ -324,7 +381,10 @@ impl Axis {
             Some(Mode::ProfilePosition) => Target::ProfilePosition(self.set_point),
             Some(Mode::ProfileVelocity) => Target::ProfileVelocity(velocity),
             Some(Mode::ProfileTorque) => Target::ProfileTorque(target_torque),
-            Some(Mode::Homing) if settings.homing_method == 0 => Target::Hold,
+            // Nowhere in the range: a homing error.
+            Some(Mode::Homing) if settings.homing_method == NO_METHOD => {
+                Target::Homing { offset: Radian(f32::INFINITY) }
+            }
             Some(Mode::Homing) => Target::Homing { offset: radian(settings.home_offset) },
             Some(Mode::CyclicPosition) => Target::CyclicPosition {
                 position: radian(settings.target_position),

@@ -13,7 +13,7 @@ use super::control::Axis;
 use crate::leg::{DriveState, PowerRequest};
 
 /// How far a state is towards enabled.
-const fn level(state: DriveState) -> u8 {
+pub(super) const fn level(state: DriveState) -> u8 {
     match state {
         DriveState::ReadyToSwitchOn => 1,
         DriveState::SwitchedOn => 2,

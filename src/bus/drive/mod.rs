@@ -23,12 +23,5 @@ pub(super) use control::USUAL_KBIT;
 pub use control::{Axis, AxisConstants};
 pub use coupling::Coupling;
 
-/// Digital inputs (60FD) beyond CiA 402's: the enabling switch is held.
-pub(super) const HELD: u32 = 1 << 16;
-/// Something forbids to enable.
-pub(super) const BLOCKED: u32 = 1 << 17;
-/// The leg is not calibrated or has no reference.
-pub(super) const RESTS: u32 = 1 << 18;
-
 #[cfg(test)]
 mod tests;

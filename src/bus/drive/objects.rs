@@ -6,7 +6,7 @@ use crate::bus::abort::Abort;
 use crate::bus::dictionary::Object;
 use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::{Lost, Objects};
-use crate::leg::NO_ERROR;
+use crate::leg::DriveState;
 
 /// The low bytes of a signed number.
 macro_rules! bits {
@@ -22,7 +22,7 @@ fn micro(value: f32) -> u32 {
 
 impl Objects for Axis {
     fn read(&self, object: Object) -> Result<u32, Abort> {
-        let (settings, status) = (&self.settings, &self.status);
+        let (settings, status, constants) = (&self.settings, &self.status, &self.constants);
         let thousandths = |torque: f32| bits!((torque / self.constants.rated_torque.0 * 1e3) as i16);
         Ok(match (object.index, object.sub) {
             // A hundredth of a degree per second and more fits: 0.001 rad/s up to 32 rad/s.
@@ -30,11 +30,13 @@ impl Objects for Axis {
             (0x2001, _) => u32::from(settings.node_id),
             (0x2002, _) => u32::from(settings.bit_rate),
             (0x2011, _) => u32::from(settings.feedforward),
+            (0x2012, _) => u32::from(settings.returns),
+            (0x2013, _) => u32::from(settings.watches),
             // The leg's, which is not asked here.
-            (0x2100..=0x2198, _) => return Err(Abort::NoData),
+            (0x2120, 0) => 13,
+            (0x2100..=0x2193, _) => return Err(Abort::NoData),
             (0x219A | 0x60FD, _) => status.inputs,
             (0x6007, _) => bits!(settings.connection_option),
-            (0x603F, _) => u32::from(self.own.fault().map_or(NO_ERROR, |fault| fault.code.number())),
             (0x6040, _) => u32::from(self.controlword),
             (0x6041, _) => u32::from(self.statusword()),
             (0x605A, _) => bits!(settings.quick_stop_option),
@@ -56,23 +58,33 @@ impl Objects for Axis {
             (0x6075, _) => (self.constants.rated_current.0 * 1e3) as u32,
             (0x6076, _) => (self.constants.rated_torque.0 * 1e3) as u32,
             (0x6077, _) => thousandths(status.torque.0),
+            (0x6078, _) => bits!(
+                (status.torque.0 / constants.torque_per_ampere.0 / constants.rated_current.0 * 1e3) as i16
+            ),
+            (0x6079, _) => (status.bus.0 * 1e3) as u32,
             (0x607A, _) => settings.target_position as u32,
             (0x607C, _) => settings.home_offset as u32,
             (0x607D, 1) => settings.range[0] as u32,
             (0x607D, 2) => settings.range[1] as u32,
+            (0x607F, _) => micro(constants.speed.0),
+            // Turns per minute of the motor.
+            (0x6080, _) => (constants.speed.0 * constants.ratio * (30.0 / core::f32::consts::PI)) as u32,
             (0x6081, _) => settings.profile_velocity,
             (0x6083, _) => settings.profile_acceleration,
             (0x6084, _) => settings.profile_deceleration,
             (0x6086, _) => 0,
             (0x6087, _) => settings.torque_slope,
-            (0x6098, _) => bits!(settings.homing_method),
+            (0x608F, _) => constants.counts_per_turn,
+            // Over 1000 turns of the joint.
+            (0x6091, _) => (constants.ratio * 1e3 + 0.5) as u32,
+            (0x6098, _) => bits!(settings.homing_method.max(0)),
             (0x60B1, _) => settings.velocity_offset as u32,
             (0x60B2, _) => bits!(settings.torque_offset),
             (0x60C1, 1) => settings.interpolation_data as u32,
             (0x60C2, 1) => u32::from(settings.period),
             (0x60C2, 2) => bits!(settings.period_index),
             (0x60F4, _) => micro((status.position_demand - status.position).0),
-            (0x60FE, 1) => settings.outputs,
+            (0x2194 | 0x60FE, _) => settings.outputs,
             (0x60FF, _) => settings.target_velocity as u32,
             (0x6502, _) => self.constants.modes,
             _ => return Err(Abort::NoObject),
@@ -83,11 +95,14 @@ impl Objects for Axis {
         let settings = &mut self.settings;
         let is = |allowed: &[i32]| allowed.contains(&i32::from(value as i16));
         match (object.index, object.sub) {
-            (0x2100..=0x2198, _) => return Err(Abort::State),
+            (0x2120, 0) => {}
+            (0x2100..=0x2193, _) => return Err(Abort::State),
             // 0: as the board has it.
             (0x2001, _) if value <= 127 => settings.node_id = value as u8,
             (0x2002, _) if matches!(value, 125 | 250 | 500 | 1000) => settings.bit_rate = value as u16,
             (0x2011, _) if value <= 1 => settings.feedforward = value == 1,
+            (0x2012, _) if value <= 1 => settings.returns = value == 1,
+            (0x2013, _) if value <= 1 => settings.watches = value == 1,
             (0x6007, _) if is(&[0, 1, 2, 3]) => settings.connection_option = value as i16,
             (0x6040, _) => self.control(value as u16),
             // What a fault does is chosen per fault, and a halt slows down along the profile.
@@ -117,19 +132,21 @@ impl Objects for Axis {
             (0x6084, _) if value > 0 => settings.profile_deceleration = value,
             (0x6086, _) if value as i16 == 0 => {}
             (0x6087, _) => settings.torque_slope = value,
-            // Where it stands is the zero, or no homing.
+            // Where it stands is the place for 607C.
             (0x6098, _) if matches!(value as i8, 0 | 35 | 37) => settings.homing_method = value as i8,
             (0x60B1, _) => settings.velocity_offset = value as i32,
             (0x60B2, _) => settings.torque_offset = value as i16,
             (0x60C1, 1) => settings.interpolation_data = value as i32,
             (0x60C2, 1) if value > 0 => settings.period = value as u8,
             (0x60C2, 2) if matches!(value as i8, -6..=0) => settings.period_index = value as i8,
-            (0x60FE, 1) => settings.outputs = value,
+            (0x2194 | 0x60FE, _) => settings.outputs = value,
             (0x60FF, _) => settings.target_velocity = value as i32,
             (
                 0x2001
                 | 0x2002
                 | 0x2011
+                | 0x2012
+                | 0x2013
                 | 0x6007
                 | 0x605A..=0x605E
                 | 0x6083
@@ -147,12 +164,16 @@ impl Objects for Axis {
     }
 
     fn error(&self) -> Option<ErrorReport> {
-        let fault = self.own.fault()?;
+        let Some(fault) = self.own.fault() else { return self.refused };
         Some(ErrorReport { code: fault.code.number(), information: [fault.joint + 1, 0, 0, 0, 0] })
     }
 
     fn lost(&mut self, why: Lost) {
         self.lose(why);
+    }
+
+    fn misses_host(&self) -> bool {
+        self.settings.watches && self.commanded && self.own == DriveState::OperationEnabled
     }
 
     fn reset(&mut self) {

@@ -116,7 +116,7 @@ fn a_fault_of_the_leg_is_told_by_both_nodes_and_reset_by_a_rising_edge() {
     let told: std::vec::Vec<_> = frames.iter().map(|frame| (frame.id(), frame.data().to_vec())).collect();
     let data = [0x00, 0x84, 0b10_0001, 2, 0, 0, 0, 0].to_vec();
     assert_eq!(told, [(0x81, data.clone()), (0x82, data)]);
-    assert_eq!(board.axes[0].read(Object::at(0x603F, 0)), Ok(0x8400));
+    assert_eq!(board.read(0x603F, 0), Ok(0x8400));
     board.run(5);
     assert_eq!(board.states(), [0x08; 2]);
     assert_eq!(board.control([15, 15]), [0x08; 2]);
@@ -310,4 +310,25 @@ fn a_mode_that_the_leg_does_not_follow_is_refused() {
     axis.lost(Lost::Reset);
     axis.reset();
     assert_eq!(axis.read(Object::at(0x6060, 0)), Ok(0));
+}
+
+#[test]
+fn homing_is_done_by_the_methods_that_were_written_and_by_no_other() {
+    let offset = |method: Option<u32>| {
+        let mut board = Board::enabled();
+        board.axes[0].write(Object::at(0x607C, 0), 500_000).expect("an offset");
+        board.axes[0].write(Object::at(0x6060, 0), 6).expect("a mode");
+        if let Some(method) = method {
+            board.axes[0].write(Object::at(0x6098, 0), method).expect("a method");
+        }
+        match board.axes[0].command().target {
+            Target::Homing { offset } => (offset.0 * 1e3 + 0.5) as u32,
+            other => panic!("{other:?}"),
+        }
+    };
+    // 0 that was written: here is home, as 35 and 37.
+    assert_eq!([0, 35, 37].map(|method| offset(Some(method))), [500; 3]);
+    // None written: nowhere, which the leg answers by a homing error.
+    assert_eq!(offset(None), u32::MAX);
+    assert_eq!(Board::enabled().axes[0].read(Object::at(0x6098, 0)), Ok(0));
 }

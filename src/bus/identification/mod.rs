@@ -218,10 +218,11 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
     fn read(&self, object: Object) -> Result<u32, Abort> {
         match (object.index, object.sub) {
             (0x2100, sub) => self.leg.read(sub, self.results),
+            (0x2120, 0) => self.axis.read(object),
             (0x2140, 1) => Ok(self.leg.log.held()),
             (0x2140, 3) => Ok(self.leg.log.waiting()),
             (0x2140, 4) => Ok(self.leg.log.lost()),
-            (0x2101..=0x2198, _) => self.found(object),
+            (0x2101..=0x2193, _) => self.found(object),
             _ => self.axis.read(object),
         }
     }
@@ -250,6 +251,10 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
 
     fn lost(&mut self, why: Lost) {
         self.axis.lost(why);
+    }
+
+    fn misses_host(&self) -> bool {
+        self.axis.misses_host()
     }
 
     fn reset(&mut self) {

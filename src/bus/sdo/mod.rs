@@ -104,6 +104,8 @@ impl Gathered {
     fn new(row: &Row, declared: Option<u32>) -> Result<Self, Abort> {
         let size = row.kind.size().ok_or(Abort::ReadOnly)?;
         match declared {
+            // Host software writes another maker's INTEGER32 there, which has no effect.
+            _ if (row.index, row.sub) == (0x2120, 0) => Ok(Self { bytes: [0; 4], count: 0, size }),
             Some(declared) if declared > u32::from(size) => Err(Abort::TooLong),
             Some(declared) if declared < u32::from(size) => Err(Abort::TooShort),
             _ => Ok(Self { bytes: [0; 4], count: 0, size }),

@@ -20,6 +20,12 @@ struct Bench {
     held: bool,
     blocked: bool,
     rests: bool,
+    causes: u32,
+    calibrated: bool,
+    /// The leg refuses to be enabled.
+    refuses: Option<Refusal>,
+    refused: Option<Refusal>,
+    velocity: f32,
     now_us: u64,
     orders: Vec<LegOrder<2>>,
 }
@@ -30,6 +36,7 @@ impl Bench {
             rated_torque: NewtonMetre(40.0),
             rated_current: Ampere(20.0),
             modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+            ..AxisConstants::UNKNOWN
         };
         let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));
         let station = Station::new(own, IDENTITY, [constants; 2], Plan::OneTime, 1);
@@ -39,6 +46,11 @@ impl Bench {
             held: true,
             blocked: false,
             rests: false,
+            causes: 0,
+            calibrated: false,
+            refuses: None,
+            refused: None,
+            velocity: 0.0,
             now_us: 0,
             orders: Vec::new(),
         };
@@ -52,17 +64,25 @@ impl Bench {
         for _ in 0..ticks {
             self.now_us += 250;
             self.drive = self.drive.after(crate::leg::DriveEvent::Tick, 4);
-            let joint = JointStatus { drive: self.drive, ..JointStatus::NONE };
+            let drive = if self.rests { DriveState::NotReadyToSwitchOn } else { self.drive };
+            let velocity = crate::units::RadianPerSecond(self.velocity);
+            let joint = JointStatus { drive, velocity, ..JointStatus::NONE };
             let (held, blocked) = (self.held, self.blocked);
             self.station.told(&LegTold {
                 joints: [joint; 2],
                 held,
                 blocked,
                 rests: self.rests,
+                causes: self.causes,
+                calibrated: self.calibrated,
+                refused: self.refused.take(),
                 ..LegTold::NONE
             });
             let order = self.station.order();
-            if let Some(LegRequest::Power(power)) = order.request {
+            if order.request == Some(LegRequest::Power(PowerRequest::EnableOperation)) {
+                self.refused = self.refuses;
+            }
+            if let Some(LegRequest::Power(power)) = order.request.filter(|_| self.refused.is_none()) {
                 self.drive = self.drive.after(crate::leg::DriveEvent::Asked(power), 4);
             }
             self.orders.push(order);
@@ -172,7 +192,7 @@ fn no_step_towards_enabled_is_passed_on_while_the_switch_is_open_or_something_bl
         assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
         assert!(bench.orders.iter().all(|order| order.request.is_none()));
         assert_eq!(bench.read(1, 0x6041) & 0x6F, 0x40, "the node is down with the leg");
-        assert_eq!(bench.read(1, 0x60FD), (u32::from(held) * HELD) | (u32::from(blocked) * BLOCKED));
+        assert_eq!(bench.read(1, 0x60FD), u32::from(held) << 16 | u32::from(blocked) << 17);
         // What was asked before is not done once nothing speaks against it any more.
         (bench.held, bench.blocked) = (true, false);
         bench.run(40);
@@ -345,12 +365,93 @@ fn a_leg_without_a_reference_is_not_enabled_and_says_why() {
     bench.rests = true;
     bench.enable();
     assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
-    assert_eq!(bench.read(1, 0x60FD) >> 16, 0b101);
+    // Neither calibrated nor referenced, as far as it is told.
+    assert_eq!(bench.read(1, 0x60FD) >> 16, 0b1101);
     assert_ne!(bench.read(1, 0x6041) & 0x6F, 0x27);
     // What is kept has nothing to do with it.
     bench.save(1);
     assert!(bench.store(true).is_some());
     bench.rests = false;
+    bench.run(4);
     bench.enable();
     assert_eq!((bench.drive, bench.read(1, 0x60FD) >> 16), (DriveState::OperationEnabled, 0b001));
+}
+
+impl Bench {
+    /// A host that asks for each step again and again, in every cycle; the emergency messages of its nodes.
+    fn insist(&mut self, cycles: u32) -> Vec<Frame> {
+        let mut told = Vec::new();
+        for word in [6, 7, 15].into_iter().cycle().take(3 * cycles as usize) {
+            for node in [1, 2] {
+                told.extend(self.send(0x200 + node, &[word, 0]));
+            }
+        }
+        told.retain(|frame| matches!(frame.id(), 0x81 | 0x82));
+        told
+    }
+}
+
+#[test]
+fn every_reason_against_the_leg_is_told_once_and_until_it_is_over() {
+    type Spoil = fn(&mut Bench);
+    let reasons: [(u8, [u8; 2], Spoil); 4] = [
+        (16, [0; 2], |bench| bench.held = false),
+        (17, [0x21, 0x80], |bench| (bench.blocked, bench.causes) = (true, 0x8021)),
+        (18, [0; 2], |bench| (bench.rests, bench.calibrated) = (true, true)),
+        (19, [0; 2], |bench| bench.rests = true),
+    ];
+    for (reason, [low, high], spoil) in reasons {
+        let mut bench = Bench::new();
+        bench.send(0, &[1, 0]);
+        spoil(&mut bench);
+        let told = |frames: Vec<Frame>| -> Vec<Frame> {
+            frames.into_iter().filter(|frame| frame.id() & !3 == 0x80).collect()
+        };
+        assert_eq!(told(bench.run(40)), [], "nobody asked");
+        bench.orders.clear();
+        let refused = [0x81, 0x82].map(|id| Frame::new(id, &[0x0E, 0xFF, 0x81, 0, reason, low, high, 0]));
+        assert_eq!(bench.insist(30), refused, "{reason}");
+        assert_ne!(bench.drive, DriveState::OperationEnabled);
+        assert_eq!((bench.read(1, 0x603F), bench.read(2, 0x603F)), (0xFF0E, 0xFF0E));
+        let bit = bench.read(1, 0x60FD) >> reason & 1;
+        assert_eq!(bit, u32::from(reason != 16), "{reason}");
+        let noted: Vec<Refusal> = bench.orders.iter().filter_map(|order| order.refused).collect();
+        assert_eq!(
+            noted.iter().map(|noted| (noted.number(), noted.reason as u8)).collect::<Vec<_>>(),
+            [(0, reason)]
+        );
+        (bench.held, bench.blocked, bench.rests) = (true, false, false);
+        let over = [0x81, 0x82].map(|id| Frame::new(id, &[0; 8]));
+        assert_eq!(told(bench.run(8)), over, "{reason}");
+        assert_eq!(bench.insist(1), []);
+        assert_eq!((bench.drive, bench.read(1, 0x603F)), (DriveState::OperationEnabled, 0xFF0E));
+    }
+}
+
+#[test]
+fn what_the_leg_refuses_is_told_with_its_joint_until_it_no_longer_holds() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    let refusal = Refusal { joint: 1, reason: RefusalReason::Moving };
+    (bench.refuses, bench.velocity) = (Some(refusal), 0.5);
+    bench.orders.clear();
+    let refused = [0x81, 0x82].map(|id| Frame::new(id, &[0x0E, 0xFF, 0x81, 2, 21, 0, 0, 0]));
+    assert_eq!(bench.insist(30), refused);
+    assert_eq!((bench.read(1, 0x60FD) >> 21, bench.read(2, 0x60FD) >> 21), (0, 1));
+    // The leg's own side has a record of it.
+    assert!(bench.orders.iter().all(|order| order.refused.is_none()));
+    (bench.refuses, bench.velocity) = (None, 0.0);
+    assert_eq!(bench.insist(1), [0x81, 0x82].map(|id| Frame::new(id, &[0; 8])));
+    assert_eq!((bench.drive, bench.read(2, 0x60FD) >> 21), (DriveState::OperationEnabled, 0));
+}
+
+#[test]
+fn an_operator_whose_leg_is_refused_disturbs_no_host_that_only_listens() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    bench.held = false;
+    bench.refused = Some(Refusal { joint: 0, reason: RefusalReason::Encoder });
+    assert!(bench.run(40).iter().all(|frame| frame.id() & !3 != 0x80));
+    bench.write(1, 0x2012, 0, 0, 1);
+    assert_eq!(bench.orders.last().map(|order| order.may_return), Some([false, true]));
 }

@@ -38,6 +38,7 @@ pub fn axis() -> Axis {
         rated_torque: NewtonMetre(40.0),
         rated_current: Ampere(20.0),
         modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+        ..AxisConstants::UNKNOWN
     })
 }
 

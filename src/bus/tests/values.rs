@@ -13,7 +13,7 @@ fn objects() -> impl Iterator<Item = (Object, &'static dictionary::Row)> {
 
 /// Given by identity, constants, or the leg, and no default of the table's.
 fn is_live(object: Object) -> bool {
-    matches!(object.index, 0x1008..=0x100A | 0x1018 | 0x6075 | 0x6076 | 0x6502)
+    matches!(object.index, 0x1008..=0x100A | 0x1018 | 0x6075 | 0x6076 | 0x607F | 0x6080 | 0x608F | 0x6091 | 0x6502)
         || is_of_the_leg(object)
         // Where a drive stands before anything.
         || matches!(object.index, 0x6041)
@@ -53,10 +53,61 @@ fn every_object_is_read_and_written_as_its_access_says() {
             _ => Err(0x0601_0002),
         };
         assert_eq!(written, expected, "{object:x?}");
-        if row.access == Access::Both {
+        // Of 2120 any size is taken, for what it means elsewhere.
+        if row.access == Access::Both && index != 0x2120 {
             let other = if size == 4 { 2 } else { 4 };
             let wrong = if other < size { Err(0x0607_0013) } else { Err(0x0607_0012) };
             assert_eq!(board.write(index, sub, 0, other), wrong, "{object:x?}");
         }
     }
+}
+
+#[test]
+fn what_host_software_of_another_maker_writes_is_taken_without_effect() {
+    let mut board = Board::started(1);
+    // Recorded software writes its tracking window there, an INTEGER32.
+    assert_eq!(board.write(0x2120, 0, 50_000, 4), Ok(()));
+    assert_eq!(board.read(0x2120, 0), Ok(13));
+    assert_eq!(board.write(0x2121, 0, 13, 1), Err(0x0601_0002));
+    // Mapped beside the controlword, as versions of 2022 to 2025 have it.
+    let (set, off) = (0x1400, 0x8000_0201);
+    for (index, sub, value, size) in [
+        (set, 1, off, 4),
+        (0x1600, 0, 0, 1),
+        (0x1600, 1, 0x6040_0010, 4),
+        (0x1600, 2, 0x2194_0020, 4),
+        (0x1600, 0, 2, 1),
+        (set, 1, 0x201, 4),
+    ] {
+        assert_eq!(board.write(index, sub, value, size), Ok(()), "{index:x} {sub}");
+    }
+    board.run(1);
+    board.hear(0, &[1, 0]);
+    board.hear(0x201, &[6, 0, 0xAA, 0, 0, 0]);
+    assert_eq!(
+        (board.read(0x6040, 0), board.read(0x2194, 0), board.read(0x60FE, 1)),
+        (Ok(6), Ok(0xAA), Ok(0xAA))
+    );
+}
+
+#[test]
+fn what_hosts_of_the_profile_read_has_its_unit() {
+    use crate::units::{NewtonMetrePerAmpere, RadianPerSecond, Volt};
+    let constants = AxisConstants {
+        rated_torque: NewtonMetre(85.0),
+        rated_current: Ampere(50.0),
+        torque_per_ampere: NewtonMetrePerAmpere(1.5),
+        speed: RadianPerSecond(4.5),
+        counts_per_turn: 8192,
+        ratio: 50.0,
+        modes: 0,
+    };
+    let mut axis = Axis::new(constants);
+    axis.update(&JointStatus { torque: NewtonMetre(-30.0), bus: Volt(47.9), ..JointStatus::NONE });
+    let read = |index, sub| axis.read(Object::at(index, sub)).expect("a value");
+    assert_eq!(read(0x6078, 0) as i16, -400, "20 of 50 A");
+    assert!((47_899..=47_900).contains(&read(0x6079, 0)), "mV");
+    // 4.5 rad/s times 50 are 2,148.6 turns per minute.
+    assert_eq!((read(0x6080, 0), read(0x607F, 0)), (2148, 4_500_000));
+    assert_eq!((read(0x608F, 1), read(0x6091, 1)), (8192, 50_000));
 }

@@ -33,6 +33,11 @@ impl<const N: usize> Control<N> {
         self.servo.report(fault);
     }
 
+    /// Joints that may be enabled outside their range, to return into it.
+    pub fn permit_return(&mut self, joints: [bool; N]) {
+        self.servo.permit_return(joints);
+    }
+
     /// What temperature and bus voltage leave of the torque caps from the next tick on.
     pub fn derate(&mut self, derating: &Derating) {
         self.servo.derate(derating);

@@ -3,7 +3,7 @@
 //! The numbers of the modes and what they mean are CiA 402's; its units stay with the bus.
 
 use crate::safety::DriveState;
-use crate::units::{NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second};
+use crate::units::{NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second, Volt};
 
 /// How a joint is told to move (6060).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -179,6 +179,8 @@ pub struct JointStatus {
     pub deviates: bool,
     /// Digital inputs, CiA 402's bits.
     pub inputs: u32,
+    /// Of the supply.
+    pub bus: Volt,
 }
 
 impl JointStatus {
@@ -197,5 +199,6 @@ impl JointStatus {
         homed: false,
         deviates: false,
         inputs: 0,
+        bus: Volt::ZERO,
     };
 }

@@ -13,10 +13,14 @@
 //! range, nor faster than the speed limit. Too far for too long from a commanded position, or a cyclic position that is too far
 //! when the mode begins, is a fault (8611). A joint that is told a velocity is no fault while something holds it: it is then
 //! commanded to be no farther away than the window.
+//!
+//! A joint that returns into its range (`safety::Monitor`) is led there slowly by whatever commands a way: targets are those of the
+//! range, and where it is commanded to be is never farther out than the joint.
 
 use super::command::{JointCommand, Mode, SetPoint, Target};
 use crate::motion::{Course, Rates};
 use crate::real::{abs, clamp, max, min};
+use crate::safety::{RETURN_SPEED, RETURN_TORQUE};
 use crate::servo::{SERVO_RATE_HZ, TICK_S};
 use crate::units::{NewtonMetre, Radian, RadianPerSecond, Second};
 
@@ -48,6 +52,8 @@ pub struct Measured {
     pub velocity: RadianPerSecond,
     /// What was applied.
     pub torque: NewtonMetre,
+    /// It returns into its range.
+    pub returns: bool,
 }
 
 /// What a joint is told at one tick, anatomical.
@@ -88,6 +94,8 @@ pub struct Follower {
     /// Of cyclic positions: what lay between joint and target when the mode began, on its way to zero.
     gap: Course,
     halted: bool,
+    /// It returned at the tick before.
+    returned: bool,
     /// Ticks for which the joint has been too far away, or near enough.
     outside: u32,
     inside: u32,
@@ -114,6 +122,7 @@ impl Follower {
         left: 0,
         gap: Course::at_rest(0.0),
         halted: false,
+        returned: false,
         outside: 0,
         inside: 0,
         reached: false,
@@ -146,6 +155,14 @@ impl Follower {
         }
         let asked = core::mem::replace(&mut self.seen, command.asked) != command.asked;
         let resumes = core::mem::replace(&mut self.halted, command.halt) && !command.halt;
+        let returns = measured.returns;
+        let ends = core::mem::replace(&mut self.returned, returns) && !returns;
+        let slow = Bounds {
+            speed: min(bounds.speed, RETURN_SPEED),
+            torque: RETURN_TORQUE * bounds.torque,
+            ..*bounds
+        };
+        let bounds = if returns { &slow } else { bounds };
         let [low, high] = bounds.range;
         let range = [max(low, command.range[0].0), min(high, command.range[1].0)];
         let rates = Rates {
@@ -208,15 +225,23 @@ impl Follower {
             }
             Target::CyclicPosition { position, velocity_offset, torque_offset } => {
                 let target = self.bounded(position.0, range[0], range[1]);
-                if begins || resumes {
+                // Of a joint outside, the end of the range that it returns to.
+                let place = if returns { clamp(measured.position.0, low, high) } else { measured.position.0 };
+                let is_far = abs(target - place) > command.following_window.0;
+                if begins || resumes || ends {
                     self.gap = Course::moving(self.course.position() - target, self.course.velocity());
                     (self.course, self.target) = (Course::at_rest(target), target);
-                    if abs(target - measured.position.0) > command.following_window.0 {
-                        self.outside = u32::MAX - 1;
-                    }
+                }
+                if is_far && (returns || begins || resumes || ends) {
+                    self.outside = u32::MAX - 1;
                 }
                 self.count(target, period);
-                self.course.interpolate_position(target, self.left, bounds.speed, TICK_S);
+                if returns {
+                    self.close_gap();
+                    self.course.approach(target, &rates, TICK_S);
+                } else {
+                    self.course.interpolate_position(target, self.left, bounds.speed, TICK_S);
+                }
                 self.left = self.left.saturating_sub(1);
                 if self.gap != Course::at_rest(0.0) {
                     self.gap.approach(0.0, &rates, TICK_S);
@@ -238,6 +263,10 @@ impl Follower {
         };
         if let Some(shift) = demand.shift {
             self.course.shift(shift);
+        }
+        if returns {
+            let place = measured.position.0;
+            self.course.keep_between(min(low, place), max(high, place));
         }
         demand.course = self.course();
         demand.failed = demand.shift.is_none() && self.deviated(command, measured);
@@ -335,7 +364,7 @@ impl Follower {
     /// Too far from where it is commanded to be for too long.
     fn deviated(&mut self, command: &JointCommand, measured: &Measured) -> bool {
         let place = match self.mode {
-            Some(Mode::CyclicPosition) => self.target,
+            Some(Mode::CyclicPosition) if !measured.returns => self.target,
             _ => self.course().position(),
         };
         let is_outside = abs(place - measured.position.0) > command.following_window.0;

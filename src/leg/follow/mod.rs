@@ -25,9 +25,9 @@ use super::control::ControlOutput;
 use crate::hal::Sample;
 use crate::model::AnatomicalJoint;
 use crate::motion::{Course, MotionState};
-use crate::safety::{Fault, FaultCode};
+use crate::safety::{Fault, FaultCode, RANGE_TOLERANCE, RefusalReason};
 use crate::servo::{Effort, JointScale, ServoOutput};
-use crate::units::{NewtonMetre, Radian, RadianPerSecond};
+use crate::units::{NewtonMetre, Radian, RadianPerSecond, Volt};
 
 /// What the servo is told at one tick, in the model's angles and signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,6 +128,7 @@ impl<const N: usize> Following<N> {
             position: Radian(anatomy.angle_from_chain(output.position.get(joint)?.0)),
             velocity: RadianPerSecond(anatomy.from_chain(output.velocity.get(joint)?.0)),
             torque: NewtonMetre(anatomy.from_chain(output.decision.torque.get(joint)?.0)),
+            returns: *output.decision.returns.get(joint)?,
         })
     }
 
@@ -164,7 +165,7 @@ impl<const N: usize> Following<N> {
         commanded
     }
 
-    /// What a host is told of a joint whose motor gives this torque of the model's sign; the inputs are the board's.
+    /// What a host is told of a joint whose motor gives this torque of the model's sign; further inputs and the bus voltage are the board's.
     #[must_use]
     pub fn status(
         &self,
@@ -175,6 +176,9 @@ impl<const N: usize> Following<N> {
     ) -> Option<JointStatus> {
         let (follower, anatomy) = (self.joints.get(joint)?, self.anatomy.get(joint)?);
         let measured = self.measured(joint, &output.servo)?;
+        let [low, high] = self.bounds.get(joint)?.range;
+        let tolerance = RANGE_TOLERANCE.0;
+        let is_inside = measured.position.0 >= low - tolerance && measured.position.0 <= high + tolerance;
         let decision = &output.servo.decision;
         Some(JointStatus {
             drive: decision.state,
@@ -194,7 +198,8 @@ impl<const N: usize> Following<N> {
                 || decision.limited.get(joint)?.any(),
             homed: follower.homed,
             deviates: follows && follower.deviates,
-            inputs: 0,
+            inputs: if is_inside { 0 } else { RefusalReason::OutOfRange.bit() },
+            bus: Volt::ZERO,
         })
     }
 }

@@ -31,7 +31,7 @@ impl Bench {
     fn new(orders: &[LegOrder<2>]) -> Self {
         let (hardware, host, bus) = on_a_bus();
         let mut bench = Self {
-            side: HostSide::new(Following::new(&configuration())),
+            side: HostSide::new(Following::new(&configuration()), Volt(0.01)),
             host,
             bus,
             hardware,
@@ -104,7 +104,7 @@ const SAMPLE: Sample<2> = Sample {
 };
 
 fn order(request: Option<LegRequest>) -> LegOrder<2> {
-    LegOrder { commands: Some(commanded()), request, faults: [None; 2] }
+    LegOrder { commands: Some(commanded()), request, faults: [None; 2], may_return: [true; 2], refused: None }
 }
 
 const UP: PowerRequest = PowerRequest::EnableOperation;
@@ -202,8 +202,11 @@ fn the_bus_runs_after_every_second_tick_and_is_told_once_it_has_taken_what_it_ha
     let (cause, verdict) = (Cause::Friction, Verdict::ACCEPTED);
     assert!(!control.receive(Finding::Updated { cause, verdict, model: Some(model()) }));
     (0..4).for_each(|_| bench.report(&control, &plain));
-    let told: Vec<(bool, bool, bool, [bool; 2])> =
-        bench.told.iter().map(|told| (told.refused, told.blocked, told.held, told.change)).collect();
+    let told: Vec<(bool, bool, bool, [bool; 2])> = bench
+        .told
+        .iter()
+        .map(|told| (told.refused.is_some(), told.blocked, told.held, told.change))
+        .collect();
     let expected = [(true, false, true, [true; 2]), (false, false, true, [true; 2])];
     assert_eq!((bench.hardware.bus_pended, &told[..]), (5, &expected[..]));
 }
@@ -222,7 +225,9 @@ fn a_report_says_whether_the_switch_is_held_and_what_forbids_to_enable() {
         let told = bench.told[0];
         assert_eq!((told.held, told.blocked, told.rests), (switch == [true; 2], blocked, false));
         (0..2).for_each(|_| bench.rest());
-        assert_eq!(bench.told[1], LegTold { held: told.held, blocked, ..LegTold::NONE });
+        let causes = if blocked { crate::safety::Cause::GateFault.bit() } else { 0 };
+        let held = told.held;
+        assert_eq!(bench.told[1], LegTold { held, blocked, causes, ..LegTold::NONE });
     }
 }
 
@@ -238,7 +243,8 @@ fn what_is_asked_of_a_leg_without_zeros_is_forgotten() {
         bench.rest();
     }
     assert_eq!((bench.waiting(), bench.told.len()), (0, 1));
-    assert_eq!(bench.told[0], LegTold::NONE);
+    let causes = crate::safety::Cause::EmergencyStop.bit();
+    assert_eq!(bench.told[0], LegTold { causes, ..LegTold::NONE });
     bench.hear(unreported);
     assert_eq!((bench.side.request(None), bench.commands()), (None, None));
 }
@@ -250,4 +256,37 @@ fn a_host_without_the_drive_cancels_by_a_quick_stop() {
     assert_eq!(bench.commands(), None);
     assert_eq!(bench.side.request(None), Some((ControlRequest::Power(PowerRequest::QuickStop), None)));
     assert_eq!(bench.side.request(None), None, "once");
+}
+
+#[test]
+fn a_released_bridge_has_no_torque_and_one_that_switches_a_smoothed_one() {
+    let mut control = Control::new(&configuration()).expect("a leg");
+    let mut output = control.tick(&SAMPLE, None, LEG.gravity);
+    let mut bench = Bench::new(&[]);
+    bench.signals.statistics.see_bus(2400);
+    let mut told = |state: DriveState, ticks: u32| {
+        output.servo.decision.state = state;
+        let mut random = 1_u32;
+        let mut most = 0.0_f32;
+        for tick in 0..ticks {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            // Noise of 3 A around 10 A.
+            let current = 10.0 + 3.0 * ((random >> 8) as f32 / (1 << 23) as f32 - 1.0);
+            let joint = JointSample { current: crate::units::Ampere(current), ..SAMPLE.joints[0] };
+            let Bench { side, host, hardware, signals, .. } = &mut bench;
+            side.report(&control, &Sample { joints: [joint; 2] }, &output, host, signals, hardware);
+            if let Some(told) = bench.bus.told.dequeue()
+                && tick + 100 > ticks
+            {
+                assert_eq!(told.joints[1].bus, Volt(24.0));
+                most = most.max((told.joints[0].torque.0 - 15.0).abs());
+            }
+        }
+        most
+    };
+    // 1.5 N m/A.
+    assert_eq!(told(DriveState::SwitchOnDisabled, 200), 15.0);
+    let noise = told(DriveState::OperationEnabled, 400);
+    assert!(noise < 2.3, "{noise}, of 4.5 N m");
+    assert_eq!(told(DriveState::SwitchedOn, 200), 15.0);
 }

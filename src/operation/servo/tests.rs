@@ -104,7 +104,7 @@ impl Bench {
 
     /// The bus orders.
     fn order(&mut self, commands: Option<[JointCommand; 2]>, request: Option<LegRequest>) {
-        let order = LegOrder { commands, request, faults: [None; 2] };
+        let order = LegOrder { commands, request, faults: [None; 2], may_return: [true; 2], refused: None };
         assert!(self.bus.orders.enqueue(order).is_ok(), "full");
     }
 
@@ -172,7 +172,9 @@ fn nothing_is_done_before_every_joint_has_a_zero() {
     assert_eq!((bench.signals.target(0).enabled, bench.signals.target(1).enabled), (false, false));
     assert_eq!((bench.signals.permission(), bench.level.ticks()), (Permission::Released, 0));
     // The bus is told that the leg rests; what was asked is dropped.
-    assert_eq!(bench.told, Some(LegTold { held: true, blocked: false, ..LegTold::NONE }));
+    let joints = bench.told.expect("a report").joints;
+    assert!(joints.iter().all(|joint| joint.bus.0 > 40.0));
+    assert_eq!(bench.told, Some(LegTold { joints, held: true, blocked: false, ..LegTold::NONE }));
     assert!(bench.bus.orders.ready());
     bench.signals.begin_servo();
     assert!(bench.tick().is_some());

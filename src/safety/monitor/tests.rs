@@ -168,12 +168,92 @@ fn a_leg_out_of_range_or_moving_too_fast_is_not_enabled_and_told_why() {
     ];
     for (observation, reason) in cases {
         let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), RATE_HZ);
+        monitor.permit_return([true, false]);
         let _ = monitor.decide(&STANDING, &ask(PowerRequest::Shutdown));
         let _ = monitor.decide(&STANDING, &ask(PowerRequest::SwitchOn));
         let decision = monitor.decide(&observation, &ask(PowerRequest::EnableOperation));
         assert_eq!(decision.refused, Some(Refusal { joint: 1, reason }));
         assert_eq!((decision.state, decision.command.enabled), (DriveState::SwitchedOn, false));
     }
+}
+
+/// Joints so far beyond the upper and the lower end, rad; the drive is asked to be enabled there.
+fn outside(hip: f32, knee: f32) -> (Monitor<2>, Observation<2>) {
+    let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), RATE_HZ);
+    let position = [HIP.high + Radian(hip), KNEE.low - Radian(knee)];
+    let observation = Observation { position, ..STANDING };
+    for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
+        let _ = monitor.decide(&observation, &ask(power));
+    }
+    (monitor, observation)
+}
+
+#[test]
+fn a_joint_outside_its_range_is_enabled_and_only_led_back_slowly() {
+    let (mut monitor, observation) = outside(0.1, 0.2);
+    assert_eq!((monitor.state(), monitor.returns()), (DriveState::OperationEnabled, [true; 2]));
+    // Outwards: hip up, knee down. Nothing is given; inwards a quarter of 100 N m.
+    let decide = |monitor: &mut Monitor<2>, torque: [f32; 2], speed: f32| {
+        let velocity = [RadianPerSecond(-speed), RadianPerSecond(speed)];
+        let request = Request { torque: torque.map(NewtonMetre), power: None };
+        let decision = monitor.decide(&Observation { velocity, ..observation }, &request);
+        assert_eq!((decision.fault, decision.command.enabled), (None, true));
+        (decision.torque.map(|torque| torque.0), decision.limited)
+    };
+    let (torque, limited) = decide(&mut monitor, [50.0, -50.0], 0.0);
+    assert_eq!((torque, limited.map(|limited| limited.range)), ([0.0; 2], [true; 2]));
+    let (torque, limited) = decide(&mut monitor, [-50.0, 50.0], 0.0);
+    assert_eq!((torque, limited.map(|limited| limited.torque)), ([-25.0, 25.0], [true; 2]));
+    // Faster than twice 0.1 rad/s it is braked, by a quarter as well.
+    assert_eq!(decide(&mut monitor, [-50.0, 50.0], 0.4).0, [25.0, -25.0]);
+    // Inside they are as ever.
+    let decision = monitor.decide(&STANDING, &request(90.0));
+    assert_eq!((decision.fault, monitor.returns()), (None, [false; 2]));
+    assert_eq!(monitor.decide(&STANDING, &request(90.0)).torque, [NewtonMetre(90.0); 2]);
+    let fault = monitor.decide(&observation, &request(0.0)).fault;
+    assert_eq!(fault.map(|fault| fault.code), Some(FaultCode::PositionLimit), "it left its range again");
+}
+
+#[test]
+fn a_joint_that_moves_farther_out_instead_of_returning_stops_the_leg() {
+    for (first, then, faulty) in
+        [(0.1, 0.1085, false), (0.1, 0.1089, true), (0.05, 0.0585, false), (0.05, 0.0589, true)]
+    {
+        // It came nearer before it went out again.
+        let (mut monitor, observation) = outside(0.1, 0.0);
+        let at = |beyond: f32| Observation {
+            position: [HIP.high + Radian(beyond), observation.position[1]],
+            ..STANDING
+        };
+        assert_eq!(monitor.decide(&at(first), &request(0.0)).fault, None);
+        let fault = monitor.decide(&at(then), &request(0.0)).fault;
+        assert_eq!(
+            fault.map(|fault| fault.code),
+            faulty.then_some(FaultCode::PositionLimit),
+            "{first} {then}"
+        );
+        // A stop that is asked for is no fault, though the leg falls in it.
+        let (mut monitor, _) = outside(0.1, 0.0);
+        let _ = monitor.decide(&at(first), &ask(PowerRequest::QuickStop));
+        assert_eq!(monitor.decide(&at(then + 0.1), &request(0.0)).fault, None);
+    }
+    let (mut monitor, observation) = outside(0.1, 0.2);
+    monitor.restart();
+    monitor.permit_return([false; 2]);
+    for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
+        let _ = monitor.decide(&observation, &ask(power));
+    }
+    assert_ne!(monitor.state(), DriveState::OperationEnabled);
+}
+
+#[test]
+fn a_joint_that_still_falls_outside_its_range_is_not_enabled() {
+    let (mut monitor, observation) = outside(0.1, 0.2);
+    let _ = monitor.decide(&observation, &ask(PowerRequest::DisableOperation));
+    let falling = Observation { velocity: [RadianPerSecond(0.12), RadianPerSecond::ZERO], ..observation };
+    let refused = monitor.decide(&falling, &ask(PowerRequest::EnableOperation)).refused;
+    assert_eq!(refused, Some(Refusal { joint: 0, reason: RefusalReason::Moving }));
+    assert_eq!(monitor.decide(&observation, &ask(PowerRequest::EnableOperation)).refused, None);
 }
 
 #[test]

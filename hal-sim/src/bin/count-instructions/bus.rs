@@ -26,7 +26,12 @@ struct Bench {
 impl Bench {
     fn new() -> Option<Self> {
         let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
-        let constants = AxisConstants { rated_torque: NewtonMetre(40.0), rated_current: Ampere(20.0), modes };
+        let constants = AxisConstants {
+            rated_torque: NewtonMetre(40.0),
+            rated_current: Ampere(20.0),
+            modes,
+            ..AxisConstants::UNKNOWN
+        };
         let identity = Identity::scarab(1, TEXT);
         let mut bench = Self {
             node: Node::new(NodeId::new(1)?, identity),

@@ -51,7 +51,12 @@ struct Bench<'a> {
 impl<'a> Bench<'a> {
     fn new(queues: &'a mut BusQueues<2>) -> Option<Self> {
         let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
-        let constants = AxisConstants { rated_torque: NewtonMetre(40.0), rated_current: Ampere(20.0), modes };
+        let constants = AxisConstants {
+            rated_torque: NewtonMetre(40.0),
+            rated_current: Ampere(20.0),
+            modes,
+            ..AxisConstants::UNKNOWN
+        };
         let own = [NodeId::new(1)?, NodeId::new(2)?];
         let station = Station::new(own, Identity::scarab(1, "emulated"), [constants; 2], Plan::OneTime, 1);
         let (frames, servo, ends) = queues.split();

@@ -27,7 +27,7 @@ use super::storing::Flashing;
 use super::wire::Mailbox;
 use crate::tool::error::ToolError;
 use crate::tool::faults::rig::Rig;
-use crate::tool::leg_file::LegFile;
+use crate::tool::leg_file::{EncoderFile, LegFile};
 use crate::tool::pair::Context;
 use crate::world::periods::PERIODS_PER_TICK;
 
@@ -67,13 +67,24 @@ fn own_number(first: u8, joint: usize) -> NodeId {
 }
 
 /// Nodes and axes of which nothing was kept.
-fn station<const N: usize, const B: usize>(context: &Context<N, B>, first: u8) -> Station<N, LOG> {
+fn station<const N: usize, const B: usize>(
+    context: &Context<N, B>,
+    encoders: &[EncoderFile; N],
+    first: u8,
+) -> Station<N, LOG> {
     let configuration = &context.configuration;
     let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit());
-    let constants = configuration.joints.each_ref().map(|joint| AxisConstants {
-        rated_torque: joint.limits().torque_cap(),
-        rated_current: joint.current,
-        modes,
+    let constants = core::array::from_fn(|joint| {
+        let (joint, encoder) = (&configuration.joints[joint], &encoders[joint]);
+        AxisConstants {
+            rated_torque: joint.limits().torque_cap(),
+            rated_current: joint.current,
+            modes,
+            torque_per_ampere: joint.scale.torque_per_ampere,
+            speed: joint.speed,
+            counts_per_turn: encoder.counts,
+            ratio: encoder.ratio as f32,
+        }
     });
     Station::new(
         core::array::from_fn(|joint| own_number(first, joint)),
@@ -95,6 +106,7 @@ pub struct Board<const N: usize, const B: usize> {
     flashing: Flashing<N>,
     /// Number of the first node, unless the memory says otherwise.
     first: u8,
+    encoders: [EncoderFile; N],
 }
 
 impl<const N: usize, const B: usize> Board<N, B> {
@@ -108,8 +120,9 @@ impl<const N: usize, const B: usize> Board<N, B> {
     ) -> Result<Self, ToolError> {
         let mut rig = Rig::on_a_bus(leg, &context, seed)?;
         hold_the_switch(&mut rig);
-        let station = station(&context, first);
-        let mut board = Self { rig, station, memory, context, flashing: Flashing::new(), first };
+        let encoders = core::array::from_fn(|joint| leg.joints[joint].encoder);
+        let station = station(&context, &encoders, first);
+        let mut board = Self { rig, station, memory, context, flashing: Flashing::new(), first, encoders };
         for why in board.recall() {
             eprintln!("warning: {why}");
         }
@@ -119,7 +132,7 @@ impl<const N: usize, const B: usize> Board<N, B> {
     /// The power was away and is back: everything is forgotten but what the memory holds.
     pub fn power_on(&mut self) {
         self.rig.power_on();
-        self.station = station(&self.context, self.first);
+        self.station = station(&self.context, &self.encoders, self.first);
         self.flashing = Flashing::new();
         self.recall();
     }

@@ -63,6 +63,8 @@ pub struct Host {
     pub network: Network<JOINTS, BASE>,
     /// What it says.
     pub speaks: Speaks,
+    /// Servo ticks of its cycle.
+    pub cycle: u64,
     ticks: u64,
     /// Where the joints stand, as they told last; where they stood, and how far they are moved, micro-radian.
     places: [i32; JOINTS],
@@ -70,6 +72,8 @@ pub struct Host {
     way: [f64; JOINTS],
     /// When the last bit of its last heartbeat, and of its last targets, was on the wire.
     heard_ns: [u64; 2],
+    /// When the last bit of its last cyclic frame for each node was on the wire.
+    spoke_ns: [u64; JOINTS],
     answer: Option<Frame>,
     /// Codes of emergency messages, by node.
     told: Vec<(u16, u16)>,
@@ -90,7 +94,9 @@ impl Host {
             places: [0; JOINTS],
             from: None,
             way: [0.0; JOINTS],
+            cycle: CYCLE,
             heard_ns: [0; 2],
+            spoke_ns: [0; JOINTS],
             answer: None,
             told: Vec::new(),
         }
@@ -114,7 +120,7 @@ impl Host {
 
     /// One servo tick; each of its PWM periods is shown.
     pub fn tick(&mut self, watch: impl FnMut(&Rig<JOINTS, BASE>)) {
-        if self.speaks.targets && self.ticks.is_multiple_of(CYCLE) {
+        if self.speaks.targets && self.ticks.is_multiple_of(self.cycle) {
             let seconds = self.ticks as f64 * TICK_NS as f64 * 1e-9;
             let share = 0.5 - 0.5 * (TAU * RATE_HZ * seconds).cos();
             // Until the leg is enabled, where it is.
@@ -126,16 +132,22 @@ impl Host {
             self.network.send(Frame::new(SYNC, &[]));
             self.network.send(Frame::new(TARGETS, &targets));
         }
-        if self.speaks.words && self.ticks.is_multiple_of(4 * CYCLE) {
+        if self.speaks.words && self.ticks.is_multiple_of(4 * self.cycle) {
             NODES.into_iter().for_each(|node| self.command(node, ENABLED));
         }
         if self.speaks.heartbeat > 0 && self.ticks.is_multiple_of(self.speaks.heartbeat) {
             self.network.send(Frame::new(HEARTBEAT + NUMBER, &[5]));
         }
-        let (heard_ns, answer) = (&mut self.heard_ns, &mut self.answer);
+        let (heard_ns, answer, spoke_ns) = (&mut self.heard_ns, &mut self.answer, &mut self.spoke_ns);
         let (told, places) = (&mut self.told, &mut self.places);
         let show = |sent: &Sent| {
             let id = sent.frame.id();
+            match (sent.sender, id) {
+                (0, SYNC | TARGETS) => *spoke_ns = [sent.end_ns; JOINTS],
+                (0, 0x201) => spoke_ns[0] = sent.end_ns,
+                (0, 0x202) => spoke_ns[1] = sent.end_ns,
+                _ => {}
+            }
             match (sent.sender, id) {
                 (0, TARGETS) => heard_ns[1] = sent.end_ns,
                 (0, _) if id == HEARTBEAT + NUMBER => heard_ns[0] = sent.end_ns,
@@ -174,6 +186,22 @@ impl Host {
     #[must_use]
     pub fn heard_ns(&self) -> [u64; 2] {
         self.heard_ns
+    }
+
+    /// When its last cyclic frame for each node had been sent: SYNC, targets, controlword.
+    #[must_use]
+    pub fn spoke_ns(&self) -> [u64; JOINTS] {
+        self.spoke_ns
+    }
+
+    /// It was stopped for so many ticks and goes on from where it was.
+    pub fn rewind(&mut self, ticks: u64) {
+        self.ticks -= ticks;
+    }
+
+    /// From now on its targets are where the joints are.
+    pub fn follow_places(&mut self) {
+        self.from = None;
     }
 
     /// Codes of the emergency messages so far, by node.
@@ -348,5 +376,93 @@ mod tests {
         let stands = place(&mut host);
         assert!(host.is_enabled());
         assert!(there.iter().zip(stands).all(|(there, stands)| (there - stands).abs() < 0.02));
+    }
+
+    /// Ticks of a second.
+    const SECOND: u64 = 4000;
+
+    /// Steps of an unmodified host towards enabled; whether the leg is.
+    fn enable(host: &mut Host) -> bool {
+        for word in [6, 7, ENABLED] {
+            NODES.into_iter().for_each(|node| host.command(node, word));
+            host.run(40);
+        }
+        host.is_enabled()
+    }
+
+    /// A set-point in mode 1 at each joint, micro-radian.
+    fn point(host: &mut Host, places: [i32; JOINTS]) {
+        for (node, place) in NODES.into_iter().zip(places) {
+            host.write(node, 0x607A, 0, place as u32, 4).expect("a target");
+            host.command(node, ENABLED);
+            host.command(node, ENABLED | 0x30);
+        }
+    }
+
+    /// Poses of one host: how many of them ended outside a joint's range.
+    fn poses(leg: &LegFile, seed: u64, count: u32) -> u32 {
+        let mut dice = crate::tool::faults::dice::Dice::new("poses", seed);
+        let ranges = leg.joints.iter().map(|joint| joint.range_deg.map(f64::to_radians)).collect::<Vec<_>>();
+        let micro = |joint: usize, share: f64| {
+            let [low, high] = ranges[joint];
+            (1e6 * (low + share * (high - low))) as i32
+        };
+        let mut host = host(leg);
+        host.begin().expect("nodes that answer");
+        for node in NODES {
+            for (object, value, size) in
+                [(0x6060, 1, 1), (0x6081, 1_500_000, 4), (0x6083, 8_000_000, 4), (0x6084, 8_000_000, 4)]
+            {
+                host.write(node, object, 0, value, size).expect("a setting");
+            }
+        }
+        let mut fallen = 0;
+        for pose in 0..count {
+            let words = format!("seed {seed}, pose {pose}");
+            host.told.clear();
+            for tries in 0.. {
+                if enable(&mut host) {
+                    break;
+                }
+                // Whoever is not enabled knows why, and waits no longer than the leg swings.
+                let code = host.read(1, 0x603F, 0).expect("an error code");
+                assert_eq!(code, 0xFF0E, "{words}: {:?} {:x?}", host.rig().state(), host.told);
+                assert!(tries < 20, "{words}: {:x?}", host.told);
+                host.run(SECOND / 4);
+            }
+            let outside = |host: &mut Host| {
+                let places = host.rig().world.anatomical_position();
+                (0..JOINTS).any(|joint| {
+                    let [low, high] = ranges[joint];
+                    places[joint] < low - 0.0088 || places[joint] > high + 0.0088
+                })
+            };
+            fallen += u32::from(outside(&mut host));
+            point(&mut host, [micro(0, 0.4), micro(1, 0.4)]);
+            host.run(4 * SECOND);
+            assert!(
+                host.is_enabled() && !outside(&mut host),
+                "{words}: {:?} {:x?}",
+                host.rig().state(),
+                host.told
+            );
+            let places = [0, 1].map(|joint| micro(joint, dice.uniform(0.02, 0.98)));
+            point(&mut host, places);
+            host.run(1 + dice.below(5 * SECOND / 4));
+            let stop = if dice.coin() { 0 } else { 2 };
+            NODES.into_iter().for_each(|node| host.command(node, stop));
+            host.run(2 * SECOND);
+            assert!(!host.is_enabled());
+        }
+        fallen
+    }
+
+    #[test]
+    fn none_of_a_hundred_poses_locks_a_host_out_after_a_stop() {
+        use rayon::prelude::*;
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let fallen: u32 = (1..=4_u64).into_par_iter().map(|seed| poses(&leg, seed, 25)).sum();
+        // What made it necessary: legs that fall out of their range.
+        assert!(fallen >= 20, "{fallen}");
     }
 }

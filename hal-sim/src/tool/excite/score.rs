@@ -112,7 +112,8 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
     pub fn cut(&self, joint: usize, position: f32, velocity: f32, torque: f64, doubt: f64) -> f64 {
         [torque + doubt, torque - doubt].into_iter().fold(0.0, |cut: f64, wanted| {
             let (position, velocity) = (Radian(position), RadianPerSecond(velocity));
-            let (allowed, _) = self.barriers[joint].bound(position, velocity, NewtonMetre(wanted as f32));
+            let (allowed, _) =
+                self.barriers[joint].bound(position, velocity, NewtonMetre(wanted as f32), false);
             // Differences within single precision do not count as a reduction.
             cut.max((wanted - f64::from(allowed.0)).abs() - 1e-5 * wanted.abs())
         })

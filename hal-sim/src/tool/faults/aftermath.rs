@@ -51,6 +51,7 @@ pub fn leads_to(code: FaultCode) -> &'static [&'static str] {
         | Code::Overspeed
         | Code::FollowingError
         | Code::Heartbeat
+        | Code::HostSilent
         | Code::LatePdo
         | Code::BusOff
         | Code::BusPassive => &["Damp"],

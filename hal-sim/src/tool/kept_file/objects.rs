@@ -97,6 +97,7 @@ fn try_on_a_node(bytes: &[u8], joint: Joint) -> Result<(), String> {
         rated_torque: NewtonMetre(1.0),
         rated_current: Ampere(1.0),
         modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+        ..AxisConstants::UNKNOWN
     });
     let refused = node.try_recall(bytes, &mut axis);
     refused.map_or(Ok(()), |object| {

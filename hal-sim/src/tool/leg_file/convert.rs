@@ -7,6 +7,15 @@ use crate::description::{
     Stribeck,
 };
 
+/// How far beyond the range the simulated joint meets its mechanical end stops, degrees: so far that the default leg, hanging at its
+/// anatomical zero, is still between them.
+pub const END_STOP_DEG: f64 = 7.0;
+
+/// Mechanical end stops of a joint with this range, rad.
+fn stops([low, high]: [f64; 2]) -> [f64; 2] {
+    [low - END_STOP_DEG, high + END_STOP_DEG].map(f64::to_radians)
+}
+
 impl LegFile {
     /// Description of the simulated leg. Its sensors have `current_noise_a` only: `torque_noise_percent`
     /// refers to a motion, for which the caller adds it with `World::set_current_noise`. Fails if the leg
@@ -57,6 +66,7 @@ impl JointFile {
             zero_offset: self.zero_offset_deg.to_radians(),
             body: BodyDescription { mass: truth.mass, com: truth.com, inertia_com: truth.inertia_com },
             rotor_inertia: truth.rotor_inertia,
+            stops: Some(stops(self.range_deg)),
             friction: FrictionDescription {
                 coulomb: truth.coulomb,
                 viscous: truth.viscous,

@@ -58,7 +58,8 @@ fn a_supply_that_dies_is_a_fault_after_four_ticks() {
 #[test]
 fn a_lost_host_is_the_fault_of_its_joint() {
     let mut bench = Bench::enabled();
-    let order = LegOrder { commands: None, request: None, faults: [None, Some(FaultCode::Heartbeat)] };
+    let faults = [None, Some(FaultCode::Heartbeat)];
+    let order = LegOrder { commands: None, request: None, faults, may_return: [true; 2], refused: None };
     assert!(bench.bus.orders.enqueue(order).is_ok());
     bench.tick();
     assert_eq!(fault(&bench), Some(Fault { code: FaultCode::Heartbeat, joint: 1 }));

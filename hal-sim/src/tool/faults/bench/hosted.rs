@@ -31,9 +31,13 @@ const BATCH: usize = 64;
 
 /// A board with an operator who holds the switch, alone on its bus.
 pub(super) fn board(leg: &LegFile) -> Result<Board<JOINTS, BASE>, ToolError> {
+    Board::new(leg, context(leg)?, 1, 1, Memory::new(None))
+}
+
+/// What such a board is made from.
+pub(super) fn context(leg: &LegFile) -> Result<Context<JOINTS, BASE>, ToolError> {
     let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
-    let context = Context::<JOINTS, BASE>::new(leg, &options)?;
-    Board::new(leg, context, 1, 1, Memory::new(None))
+    Context::new(leg, &options)
 }
 
 /// A host, its nodes started and mapped, the leg off.
@@ -119,8 +123,20 @@ impl Fork<'_> {
 pub(super) fn forked<'a>(
     head: &'a Head,
     leg: &LegFile,
+    base: Host,
+    seeds: &[u64],
+    run: impl Fn(Fork<'a>) -> Result<Outcome, ToolError> + Sync,
+) -> Result<Vec<Outcome>, ToolError> {
+    forked_within(head, leg, base, seeds, Scope { torque: true, range: true, place: true }, run)
+}
+
+/// The same, with invariants of this scope.
+pub(super) fn forked_within<'a>(
+    head: &'a Head,
+    leg: &LegFile,
     mut base: Host,
     seeds: &[u64],
+    scope: Scope,
     run: impl Fn(Fork<'a>) -> Result<Outcome, ToolError> + Sync,
 ) -> Result<Vec<Outcome>, ToolError> {
     let drawn = |seed: &u64| {
@@ -129,7 +145,6 @@ pub(super) fn forked<'a>(
     };
     let mut jobs: Vec<_> = seeds.iter().map(drawn).collect();
     jobs.sort_by_key(|(instant, seed, _)| (*instant, *seed));
-    let whole = Scope { torque: true, range: true, place: true };
     let (mut outcomes, mut now) = (Vec::with_capacity(seeds.len()), 0);
     for jobs in jobs.chunks(BATCH) {
         let mut forks = Vec::with_capacity(BATCH);
@@ -138,7 +153,7 @@ pub(super) fn forked<'a>(
             now = *instant;
             let mut host = base.clone();
             let begun = host.rig().period;
-            let invariants = Invariants::new(leg, whole, host.rig());
+            let invariants = Invariants::new(leg, scope, host.rig());
             forks.push(Fork { head, seed: *seed, dice: dice.clone(), host, invariants, begun });
         }
         let one = |fork: Fork<'a>| {

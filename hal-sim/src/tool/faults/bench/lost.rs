@@ -39,7 +39,7 @@ const HOST: u32 = 0x70;
 /// Of 6007.
 const FAULT: u32 = 1;
 /// Longest that is waited after a host's time is over, ns.
-const LATE_NS: u64 = 20 * MS;
+pub(super) const LATE_NS: u64 = 20 * MS;
 
 pub(super) const HOST_LOST: Bench = Bench {
     head: Head {
@@ -108,6 +108,10 @@ pub(super) fn watched(fork: &mut Fork<'_>, silent: [bool; 2], blind: bool) -> Re
             fork.host.write(node, 0x1401, 5, times_ms[1], 2)?;
         }
     }
+    // What sees a host without heartbeat (B5) is not what is tried here.
+    for node in NODES {
+        fork.host.write(node, 0x2013, 0, 0, 1)?;
+    }
     fork.run(3 * fork.host.speaks.heartbeat);
     Ok(Patience { times_ms, silent, faults: option == FAULT })
 }
@@ -137,7 +141,7 @@ fn tells(fork: &mut Fork<'_>, state: Option<&str>, codes: [FaultCode; 2]) {
 }
 
 /// Damped to its end while nobody speaks, then the host is back as if nothing had been.
-fn comes_back(fork: &mut Fork<'_>, speaks: Speaks, faults: bool) {
+pub(super) fn comes_back(fork: &mut Fork<'_>, speaks: Speaks, faults: bool) {
     fork.host.speaks = Speaks { targets: false, words: false, heartbeat: 0 };
     fork.run(DAMPED);
     if fork.host.rig().is_switching() {

@@ -12,8 +12,10 @@ mod hostile;
 mod kept;
 mod lost;
 pub mod offsets;
+mod outside;
 mod parts;
 mod search;
+mod silent;
 mod stall;
 mod start;
 mod stopped;
@@ -38,7 +40,7 @@ pub struct Bench {
 }
 
 /// All of them.
-pub static BENCHES: [Bench; 18] = [
+pub static BENCHES: [Bench; 20] = [
     offsets::BENCH,
     calibration::BENCH,
     start::ZEROS,
@@ -51,6 +53,8 @@ pub static BENCHES: [Bench; 18] = [
     search::BENCH,
     lost::HOST_LOST,
     lost::BUS_LOST,
+    silent::BENCH,
+    outside::BENCH,
     hostile::FRAMES_BENCH,
     hostile::BABBLE,
     cut::BENCH,

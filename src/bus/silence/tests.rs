@@ -1,0 +1,197 @@
+extern crate std;
+
+use std::vec::Vec;
+
+use super::super::tests::Board;
+use super::*;
+use crate::leg::DriveState;
+
+const MS: u64 = 1000;
+
+/// When silence begins after frames of these kinds at these times, looked at every half millisecond.
+fn begins(frames: &[(Kind, u64)], until_us: u64) -> Option<u64> {
+    let mut silence = Silence::default();
+    let mut frames = frames.iter().peekable();
+    (0..until_us).step_by(500).find(|&now_us| {
+        while let Some((kind, at_us)) = frames.next_if(|(_, at_us)| *at_us <= now_us) {
+            silence.heard(*kind, *at_us);
+        }
+        silence.begins(now_us)
+    })
+}
+
+fn cyclic(kind: Kind, from_us: u64, period_us: u64, count: u64) -> Vec<(Kind, u64)> {
+    (0..count).map(|place| (kind, from_us + place * period_us)).collect()
+}
+
+fn sorted(parts: &[Vec<(Kind, u64)>]) -> Vec<(Kind, u64)> {
+    let mut all = parts.concat();
+    all.sort_by_key(|(_, at_us)| *at_us);
+    all
+}
+
+#[test]
+fn twenty_frames_of_one_kind_arm_it_and_nineteen_do_not() {
+    for kind in [Kind::Sync, Kind::Word, Kind::Receive(0), Kind::Receive(3)] {
+        assert_eq!(begins(&cyclic(kind, MS, 2 * MS, 19), 2000 * MS), None, "{kind:?}");
+        // The last of 20 came at 39 ms.
+        assert_eq!(begins(&cyclic(kind, MS, 2 * MS, 20), 2000 * MS), Some(139 * MS + 500));
+    }
+    // Nineteen of each of two kinds are no cycle either.
+    let two = sorted(&[cyclic(Kind::Sync, MS, 2 * MS, 19), cyclic(Kind::Word, 2 * MS, 2 * MS, 19)]);
+    assert_eq!(begins(&two, 2000 * MS), None);
+}
+
+#[test]
+fn the_time_is_ten_mean_periods() {
+    for period in [20, 100, 240] {
+        let last = MS + 39 * period * MS;
+        let found = begins(&cyclic(Kind::Receive(1), MS, period * MS, 40), last + 4000 * MS);
+        assert_eq!(found, Some(last + 10 * period * MS + 500), "{period}");
+    }
+}
+
+#[test]
+fn frames_that_are_no_cycle_never_arm() {
+    // Slower than four per second: an operator, or software that polls.
+    assert_eq!(begins(&cyclic(Kind::Word, 0, 300 * MS, 200), 120_000 * MS), None);
+    // Bursts of twelve a second.
+    let bursts: Vec<_> =
+        (0..60).flat_map(|second| cyclic(Kind::Word, second * 1000 * MS, 5 * MS, 12)).collect();
+    assert_eq!(begins(&bursts, 70_000 * MS), None);
+}
+
+#[test]
+fn jitter_pauses_and_another_rate_are_no_silence() {
+    let mut random = 1_u64;
+    let mut below = |bound: u64| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 33) % bound
+    };
+    // A minute at 2 ms with everything between 0 and 4 ms, and a pause of up to 95 ms in every hundredth cycle.
+    let mut now = 0;
+    let host: Vec<_> = (0..30_000)
+        .map(|_| {
+            now += if below(100) == 0 { below(95 * MS) } else { below(4 * MS) };
+            (Kind::Sync, now)
+        })
+        .collect();
+    assert_eq!(begins(&host, now), None);
+    // From 2 ms to 60 ms and back.
+    let slow = cyclic(Kind::Sync, 100 * MS, 60 * MS, 100);
+    let fast = cyclic(Kind::Sync, 6100 * MS, MS, 1000);
+    assert_eq!(begins(&sorted(&[cyclic(Kind::Sync, 0, 2 * MS, 50), slow, fast]), 7100 * MS), None);
+}
+
+#[test]
+fn a_kind_that_is_given_up_while_another_goes_on_is_not_missed() {
+    let parts = [cyclic(Kind::Receive(2), 0, 2 * MS, 500), cyclic(Kind::Sync, 0, 10 * MS, 500)];
+    assert_eq!(begins(&sorted(&parts), 5000 * MS), None);
+    let last = 4990 * MS;
+    assert_eq!(begins(&sorted(&parts), 6000 * MS), Some(last + 100 * MS + 500));
+}
+
+impl Board {
+    /// A host's cycle of 2 ms, so many times: SYNC, or a frame of the first node's with the controlword.
+    fn cycles(&mut self, id: u16, data: &[u8], count: u32) {
+        for _ in 0..count {
+            self.hear(id, data);
+            self.run(8);
+        }
+    }
+
+    fn moving() -> Self {
+        let mut board = Self::started(1);
+        board.hear(0, &[1, 0]);
+        for word in [6, 7, 15] {
+            for id in [0x201, 0x202] {
+                board.hear(id, &[word, 0]);
+            }
+            board.run(4);
+        }
+        assert_eq!(board.drive, DriveState::OperationEnabled);
+        board
+    }
+}
+
+#[test]
+fn a_silent_host_stops_the_leg_as_its_option_says_and_is_told() {
+    for (option, enabled) in [(0, true), (2, false), (3, false)] {
+        let mut board = Board::moving();
+        for axis in 0..2 {
+            let object = crate::bus::dictionary::Object::at(0x6007, 0);
+            crate::bus::Objects::write(&mut board.axes[axis], object, option).expect("an option");
+        }
+        board.cycles(0x80, &[], 50);
+        board.run(380);
+        assert_eq!(board.drive, DriveState::OperationEnabled, "98 ms");
+        let frames = board.run(40);
+        assert_eq!(board.drive == DriveState::OperationEnabled, enabled, "{option}");
+        let told: Vec<_> = frames.iter().filter(|frame| frame.data().starts_with(&[0x0F, 0xFF])).collect();
+        assert_eq!(told.iter().map(|frame| frame.id()).collect::<Vec<_>>(), [0x81, 0x82]);
+        assert_eq!(board.read(0x603F, 0), Ok(0xFF0F));
+        // The host is back.
+        board.hear(0, &[1, 0]);
+        board.hear(0x80, &[]);
+        let frames = board.run(4);
+        assert!(frames.iter().any(|frame| frame.id() == 0x81 && frame.data() == [0; 8]), "{frames:?}");
+        assert_eq!(board.drive == DriveState::OperationEnabled, enabled);
+    }
+    let mut board = Board::moving();
+    let object = crate::bus::dictionary::Object::at(0x6007, 0);
+    crate::bus::Objects::write(&mut board.axes[0], object, 1).expect("an option");
+    board.cycles(0x201, &[15, 0], 50);
+    board.run(440);
+    assert_eq!(board.axes[0].take_fault(), Some(crate::leg::FaultCode::HostSilent));
+    assert_eq!(board.axes[1].take_fault(), None, "it has not heard anything cyclic");
+}
+
+#[test]
+fn a_controlword_by_sdo_is_a_kind_of_its_own() {
+    let mut board = Board::moving();
+    board.cycles(0x601, &[0x2B, 0x40, 0x60, 0, 15, 0, 0, 0], 50);
+    board.run(440);
+    assert_ne!(board.drive, DriveState::OperationEnabled);
+    let mut board = Board::moving();
+    // Other requests are not.
+    board.cycles(0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0], 50);
+    board.run(4000);
+    assert_eq!(board.drive, DriveState::OperationEnabled);
+}
+
+#[test]
+fn a_host_that_stops_on_purpose_is_not_missed() {
+    let quiet = |board: &mut Board| {
+        let frames = board.run(4000);
+        assert!(!frames.iter().any(|frame| frame.data().starts_with(&[0x0F, 0xFF])), "{frames:?}");
+        board.nodes[0].state()
+    };
+    // The drive is off.
+    let mut board = Board::moving();
+    board.cycles(0x80, &[], 50);
+    [0x201, 0x202].into_iter().for_each(|id| board.hear(id, &[0, 0]));
+    assert_eq!(quiet(&mut board), crate::bus::NmtState::Operational);
+    // Network management: that stops by itself, without an error.
+    let mut board = Board::moving();
+    board.cycles(0x80, &[], 50);
+    board.hear(0, &[2, 0]);
+    quiet(&mut board);
+    // Switched off.
+    let mut board = Board::moving();
+    for node in 0..2 {
+        let object = crate::bus::dictionary::Object::at(0x2013, 0);
+        crate::bus::Objects::write(&mut board.axes[node], object, 0).expect("off");
+    }
+    board.cycles(0x80, &[], 50);
+    quiet(&mut board);
+    assert_eq!(board.drive, DriveState::OperationEnabled);
+    // The board stood still.
+    let mut board = Board::moving();
+    board.cycles(0x80, &[], 50);
+    board.now_us += 3000 * MS;
+    for place in 0..2 {
+        board.nodes[place].stood_still(board.now_us);
+    }
+    board.run(380);
+    assert_eq!(board.drive, DriveState::OperationEnabled);
+}
