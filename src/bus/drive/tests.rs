@@ -332,3 +332,21 @@ fn homing_is_done_by_the_methods_that_were_written_and_by_no_other() {
     assert_eq!(offset(None), u32::MAX);
     assert_eq!(Board::enabled().axes[0].read(Object::at(0x6098, 0)), Ok(0));
 }
+
+#[test]
+fn a_ramp_without_slope_and_a_switch_beyond_one_are_refused() {
+    let mut board = Board::started(1);
+    for (index, value, accepted) in [
+        (0x2011, 1, true),
+        (0x2011, 2, false),
+        (0x6083, 1, true),
+        (0x6083, 0, false),
+        (0x6084, 1, true),
+        (0x6084, 0, false),
+    ] {
+        let object = Object::at(index, 0);
+        assert_eq!(board.axes[0].write(object, value).is_ok(), accepted, "{index:x} {value}");
+        // What was refused changed nothing.
+        assert_eq!(board.axes[0].read(object), Ok(1), "{index:x}");
+    }
+}

@@ -166,6 +166,16 @@ fn a_number_goes_down_in_blocks_only_whole_and_with_its_check_sum() {
 }
 
 #[test]
+fn a_block_without_check_sum_is_taken_whatever_its_end_says() {
+    let mut board = Board::started(1);
+    assert_eq!(board.ask(request(0xC2, 0x1017, [2, 0, 0, 0])), Some(request(0xA4, 0x1017, [127, 0, 0, 0])));
+    assert_eq!(board.ask([0x81, 0xE8, 0x03, 0, 0, 0, 0, 0]), Some([0xA2, 1, 127, 0, 0, 0, 0, 0]));
+    assert_eq!(board.ask([0xC1 | 5 << 2, 0x12, 0x34, 0, 0, 0, 0, 0]), Some([0xA1, 0, 0, 0, 0, 0, 0, 0]));
+    board.frames();
+    assert_eq!(board.read(0x1017, 0), Ok(1000));
+}
+
+#[test]
 fn a_number_goes_down_in_segments_only_whole() {
     let mut board = Board::started(1);
     let begun = board.ask(request(0x21, 0x6065, 4_u32.to_le_bytes()));

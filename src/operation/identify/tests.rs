@@ -6,6 +6,7 @@ use std::vec::Vec;
 use super::super::testing;
 use super::super::{Ends, LegEvent};
 use super::*;
+use crate::bus::identification::Results;
 use crate::leg::testing::{BASE, configuration};
 use crate::leg::{LogSample, Plan, Step, VALIDATION_MOTIONS};
 
@@ -174,6 +175,7 @@ fn a_result_counts_only_once_control_took_it() {
     let ticks: Vec<u32> = (1..=80).map(|sample| 8 * sample).collect();
     let judged = || {
         let mut bench = Bench::new();
+        assert_eq!(Results::verdict(&*bench.identification), None);
         bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
         bench.level.published();
         bench.hear(training(&ticks));
@@ -197,6 +199,7 @@ fn a_result_counts_only_once_control_took_it() {
         }
         let Finding::Judged { verdict, .. } = finding else { panic!("{finding:?}") };
         assert!(!verdict.is_accepted(), "hardly any rows");
+        assert_eq!(Results::verdict(&*bench.identification), Some(verdict));
         (bench, verdict)
     };
     let (mut bench, verdict) = judged();
