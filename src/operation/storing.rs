@@ -51,6 +51,12 @@ pub struct Storing {
     loose: bool,
 }
 
+impl Default for Storing {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Storing {
     /// Nothing changed yet. The watchdog may still have the start's time, until [`Self::look_after`] has asked it.
     #[must_use]
