@@ -23,6 +23,8 @@ def set_up(network, number, sheet):
     """A node by its sheet, with a statusword every 20 ms."""
     node = canopen.BaseNode402(number, sheet)
     network.add_node(node)
+    # On a busy machine `serve` drops a controlword that waited for more than 100 ms: it is sent again.
+    node.sdo.RESPONSE_TIMEOUT, node.sdo.MAX_RETRIES = 2.0, 3
     node.nmt.state = "PRE-OPERATIONAL"
     node.tpdo.read()
     node.rpdo.read()

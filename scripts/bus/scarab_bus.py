@@ -66,6 +66,8 @@ class Joint:
         self.network, self.number = network, number
         self.node = network.add_node(number, canopen.ObjectDictionary())
         self.node.sdo.RESPONSE_TIMEOUT = 5.0
+        # On a busy machine `serve` drops a controlword that waited for more than 100 ms: it is sent again.
+        self.node.sdo.MAX_RETRIES = 3
         self.sent = {}
         self.emergencies = []
         self.node.emcy.add_callback(lambda error: self.emergencies.append(error.code))
