@@ -423,8 +423,9 @@ fn a_joint_outside_its_range_is_led_back_by_every_command_that_leads_there() {
                 ticks += 1;
                 assert!(ticks < 4 * SECOND, "{place} {joint}: {most:?} {}", hosted.truth(joint));
             }
-            // Commanded are 0.1 rad/s, more while the knee's weight is taken over; a torque alone may reach the bound of 0.2 rad/s.
-            let fastest = if place == 3 { 0.21 } else { 0.16 };
+            // Commanded are 0.1 rad/s, more while the knee's weight is taken over. A torque alone may reach the bound of 0.2 rad/s, and
+            // what the weight adds while it is braked there.
+            let fastest = if place == 3 { 0.3 } else { 0.16 };
             assert!(most[0] < from + 0.002 && most[1] < fastest, "{place} {joint}: {from} {most:?}");
             if place < 3 {
                 let rest = watch(&mut hosted, joint, SECOND);

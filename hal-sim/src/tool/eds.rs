@@ -161,5 +161,5 @@ mod tests {
         assert_eq!(format!("{sum:?}"), SUM);
     }
 
-    const SUM: &str = "?";
+    const SUM: &str = "Checksum(2307409504)";
 }

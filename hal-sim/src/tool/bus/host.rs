@@ -451,6 +451,12 @@ mod tests {
             host.run(1 + dice.below(5 * SECOND / 4));
             let stop = if dice.coin() { 0 } else { 2 };
             NODES.into_iter().for_each(|node| host.command(node, stop));
+            host.run(SECOND);
+            if dice.coin() {
+                // Its wearer sits down: a joint is pushed against its lower end stop.
+                let (joint, torque) = (dice.below(2) as usize, dice.uniform(30.0, 90.0));
+                host.rig().world.push(joint, -torque, 0.6);
+            }
             host.run(2 * SECOND);
             assert!(!host.is_enabled());
         }

@@ -16,7 +16,7 @@ use crate::tool::tables::headed;
 const MOST_FAILURES: usize = 100;
 /// Rows with runs in which a false alarm can be told: something harmless or a mere push happens, or a host's own time is not over yet. All
 /// others only ask what follows a fault.
-const JUDGED: [&str; 6] = ["E2", "E4", "J1", "J2", "H1", "B1"];
+const JUDGED: [&str; 7] = ["E2", "E4", "J1", "J2", "H1", "B1", "B5"];
 
 /// One row of the catalogue as it was run. The names are an interface.
 #[derive(Clone, Debug, Serialize)]

@@ -1,6 +1,6 @@
 //! B5: a host that sends no heartbeat, sets no event timer, spoke in every cycle and falls silent.
 //!
-//! Each run draws the cycle (1 to 5 ms) and 6007 (1 or 3). First the host pauses three times, each for less than 95 ms: nothing may be raised. In a
+//! Each run draws the cycle (1 to 1.5 ms, four times that of its controlwords: ten periods of either are below 100 ms) and 6007 (1 or 3). First the host pauses three times, each for less than 95 ms: nothing may be raised. In a
 //! quarter of the runs it then gives up either SYNC and targets or its controlwords, and goes on with the other: nothing may be raised either, and
 //! the run counts as not to be seen. In the others it sends nothing any more. Its own time is over 100 ms after the last frame that a
 //! node heard; then as B1: damped, told within 10 ms, and not enabled by a host that comes back.
@@ -18,7 +18,7 @@ use crate::tool::error::ToolError;
 use crate::tool::leg_file::LegFile;
 
 const NODES: [u16; 2] = [1, 2];
-/// Of a cycle of less than 10 ms, ns.
+/// Of cycles of less than 10 ms, ns.
 const TIME_NS: u64 = 100_000_000;
 /// Longest pause, servo ticks: 95 ms.
 const PAUSE: u64 = 380;
@@ -50,7 +50,7 @@ fn one(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
         fork.host.write(node, 0x6007, 0, option, 2)?;
         fork.host.write(node, 0x2013, 0, u32::from(!blind), 1)?;
     }
-    fork.host.cycle = [4, 8, 20][fork.dice.below(3) as usize];
+    fork.host.cycle = 4 + fork.dice.below(3);
     let cycle_ms = fork.host.cycle as f64 * 0.25;
     let speaks = fork.host.speaks;
     for _ in 0..3 {
