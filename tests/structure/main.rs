@@ -267,8 +267,16 @@ fn text_files() -> Vec<File> {
     for folder in ["src", "hal-sim", "tests", "docs", "scripts", ".cargo"] {
         collect(&workspace().join(folder), &["rs", "md", "toml", "py", "sh", ""], &mut files);
     }
-    for name in ["README.md", "CHANGELOG.md", "Cargo.toml", "clippy.toml", "rust-toolchain.toml", "build.rs"]
-    {
+    for name in [
+        "README.md",
+        "CHANGELOG.md",
+        "CONTRIBUTING.md",
+        "CITATION.cff",
+        "Cargo.toml",
+        "clippy.toml",
+        "rust-toolchain.toml",
+        "build.rs",
+    ] {
         read(&workspace().join(name), &mut files);
     }
     files
