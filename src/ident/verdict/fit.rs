@@ -147,6 +147,35 @@ mod tests {
     use crate::ident::selection::Selection;
 
     #[test]
+    fn a_prediction_is_uncertain_by_its_share_of_the_torque() {
+        let mut factor = Factor::<f64, 2>::new();
+        factor.insert(&[3.0, 0.0], 0.0);
+        let record = Record::<f64, 1, 2> {
+            factors: [factor],
+            torque: [TorqueSize { mean_absolute: 3.0, root_mean_square: 4.0, speed: 1.0 }],
+            rows: [1],
+            rejected: 0,
+            row_information: 1.0,
+            noise: [0.0],
+            outliers: Outliers::none(),
+            stribeck: [None],
+            selection: Selection::all(),
+        };
+        let mut estimate = Estimate::<f64, 2>::nothing();
+        (estimate.covariance[0][0], estimate.determined) = (0.25, [true; 2]);
+        let mut shares = [0.0; 1];
+        let mut note = |evidence: &Evidence<f64>| {
+            if evidence.test == Test::PredictedUncertainty {
+                shares = [evidence.value];
+            }
+        };
+        let mut docket = Docket::new(&mut note);
+        Thresholds::default().judge_validation(&record, 0, &record, &estimate, &mut docket);
+        // Sigma 0.5 in a column of 3: 1.5 of 4 N m.
+        assert_eq!(shares, [0.375]);
+    }
+
+    #[test]
     fn the_error_allowed_is_that_of_noise_and_the_harmless_share_together() {
         let record = |row_information| Record::<f64, 1, 2> {
             factors: [Factor::new()],

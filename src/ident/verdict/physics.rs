@@ -175,7 +175,55 @@ fn energy_weights<T: Real, const N: usize, const B: usize>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::Evidence;
     use super::*;
+    use crate::ident::factor::Factor;
+    use crate::ident::outliers::Outliers;
+    use crate::ident::record::TorqueSize;
+    use crate::ident::selection::Selection;
+
+    /// Standard deviations by which joint 0's friction is negative, with these values and a sigma of 0.1 each.
+    fn negative(level: f32, half: f32, meaning: Constant) -> f32 {
+        const BASE: usize = crate::leg::testing::BASE;
+        let mut model = crate::leg::testing::configuration().model;
+        model.drive_choice[0].meaning = meaning;
+        let record = Record::<f32, 2, BASE> {
+            factors: [Factor::new(), Factor::new()],
+            torque: [TorqueSize { mean_absolute: 10.0, root_mean_square: 10.0, speed: 1.0 }; 2],
+            rows: [100; 2],
+            rejected: 0,
+            row_information: 1.0,
+            noise: [0.1; 2],
+            outliers: Outliers::none(),
+            stribeck: [None; 2],
+            selection: Selection::all(),
+        };
+        let mut estimate = Estimate::<f32, BASE>::nothing();
+        estimate.determined = [true; BASE];
+        (0..BASE).for_each(|base| estimate.covariance[base][base] = 0.01);
+        let index = |parameter| model.drive(0, parameter).expect("a base parameter");
+        estimate.values[index(Parameter::FC)] = level;
+        estimate.values[index(Parameter::OFF)] = half;
+        let mut seen = 0.0;
+        let mut note = |evidence: &Evidence<f32>| {
+            if (evidence.test, evidence.joint) == (Test::NegativeParameter, Some(0)) {
+                seen = evidence.value;
+            }
+        };
+        Thresholds::default().judge_physics(&model, &record, &estimate, &mut Docket::new(&mut note));
+        seen
+    }
+
+    #[test]
+    fn negative_friction_is_judged_in_its_sigma_and_in_each_direction() {
+        assert!((negative(-1.0, 0.0, Constant::Offset) - 10.0).abs() < 1e-3);
+        assert_eq!(negative(1.0, 1.5, Constant::Offset), 0.0);
+        // Half of the difference between both directions: the lower one is -0.5, its sigma 0.1 times root two.
+        for half in [1.5, -1.5] {
+            assert!((negative(1.0, half, Constant::Asymmetry) - 3.5355).abs() < 1e-3);
+        }
+        assert_eq!(negative(1.0, 0.5, Constant::Asymmetry), 0.0);
+    }
 
     #[test]
     fn a_negative_direction_has_the_energy_that_is_told_and_a_positive_matrix_has_none() {

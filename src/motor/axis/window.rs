@@ -35,3 +35,18 @@ impl Window {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_of_counts_is_right_although_their_sum_wraps() {
+        let mut window = Window::EMPTY;
+        for ticks in 0..4 {
+            window.push(1_600_000_000 + ticks, 2.0);
+        }
+        let mean = window.mean().expect("four ticks");
+        assert_eq!((mean.encoder_counts, mean.current), (1_600_000_001, Ampere(2.0)));
+    }
+}

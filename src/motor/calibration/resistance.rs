@@ -141,9 +141,7 @@ impl ResistanceStage {
 
     /// Saw tooth of the dither, symmetric about zero.
     fn dither(&self, reading: &Reading<'_>) -> Volt {
-        let height = reading.bus * (4.0 / 3.0 * reading.bench.modulator.duty_step());
-        let share = ((self.ticks % DITHER_TICKS) as f32 + 0.5) / DITHER_TICKS as f32 - 0.5;
-        height * share
+        reading.bus * (4.0 / 3.0 * reading.bench.modulator.duty_step()) * saw_tooth(self.ticks)
     }
 
     /// Returns the sums of a mean that agrees with the preceding one.
@@ -222,5 +220,25 @@ fn diagnosis(current: Stationary<Ampere>, phase: Phase) -> Refusal {
         [_, true, false] => Refusal::ShuntInverted(Phase::B),
         [_, false, true] => Refusal::ShuntInverted(Phase::C),
         [_, false, false] => Refusal::CurrentDirection,
+    }
+}
+
+/// Saw tooth between -0.5 and 0.5.
+fn saw_tooth(ticks: u32) -> f32 {
+    ((ticks % DITHER_TICKS) as f32 + 0.5) / DITHER_TICKS as f32 - 0.5
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_dither_takes_every_level_once_and_has_no_mean() {
+        let levels = (0..DITHER_TICKS).map(|tick| saw_tooth(tick + 7 * DITHER_TICKS));
+        let step = 1.0 / DITHER_TICKS as f32;
+        for (tick, level) in (0..DITHER_TICKS).zip(levels.clone()) {
+            assert!((level + 0.5 - (tick as f32 + 0.5) * step).abs() < 1e-6, "{tick}: {level}");
+        }
+        assert!(levels.sum::<f32>().abs() < 1e-5);
     }
 }

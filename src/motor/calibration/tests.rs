@@ -49,6 +49,35 @@ fn offset_error_deg(motor: &mut TestMotor, configuration: &AxisConfiguration, fo
 }
 
 #[test]
+fn a_scan_takes_22_field_turns_two_rests_and_a_fall() {
+    let mut motor = TestMotor::default();
+    let mut calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual");
+    let (mut sample, mut ticks) = (motor.sample(), 0_u32);
+    while let CalibrationStep::Running(command) = calibrator.tick(&sample) {
+        ticks += u32::from(matches!(calibrator.stage, Stage::Scan(_)));
+        sample = motor.period(command);
+    }
+    assert!(matches!(calibrator.stage, Stage::Finished(Ok(_))));
+    // 7 pole pairs at 8 turns of the field per second; 0.2 s of rest before each way, 50 ms of fall.
+    let seconds = 22.0 / 8.0 + 2.0 * 0.2 + 0.05;
+    assert!((f64::from(ticks) / 24_000.0 - seconds).abs() < 2e-3, "{ticks}");
+}
+
+#[test]
+fn a_counter_that_began_elsewhere_moves_the_position_of_every_count() {
+    let found = calibrate(&mut TestMotor::default(), &CONFIGURATION).expect("sound");
+    let scale = CONFIGURATION.scale().expect("usual");
+    let at =
+        |calibration: &Calibration, counter| calibration.place_of(&scale, CONFIGURATION.counter, counter);
+    for offset in [1, 5000, 65_535] {
+        let moved = found.with_counter_moved(offset);
+        for counter in [0_u16, 12_345, 65_000] {
+            assert_eq!(at(&moved, counter.wrapping_add(offset)), at(&found, counter), "{offset} {counter}");
+        }
+    }
+}
+
+#[test]
 fn a_sound_motor_is_measured_and_its_offset_found() {
     for (angle, direction) in [(0.3, 1.0), (2.0, -1.0), (-0.9, 1.0)] {
         let mut motor = TestMotor { angle, encoder_sign: direction, ..TestMotor::default() };

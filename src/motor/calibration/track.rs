@@ -207,4 +207,19 @@ mod tests {
         assert!((0..7).all(|missed| !travel(Some(missed)).is_even()));
         assert_eq!(travel(None).counts(), 8192);
     }
+
+    #[test]
+    fn turns_are_even_where_they_differ_by_at_most_half_of_their_mean() {
+        for (least, most, even) in [
+            (1000, 1000, true),
+            (1000, 1600, true),
+            (1000, 1700, false),
+            (-1700, -1000, false),
+            (0, 1000, false),
+            // A single turn.
+            (i32::MAX, i32::MIN, true),
+        ] {
+            assert_eq!(Travel { least, most, ..Travel::default() }.is_even(), even, "{least} {most}");
+        }
+    }
 }

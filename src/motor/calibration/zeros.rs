@@ -53,3 +53,33 @@ impl Zeros {
         Ok(Some(self.sums.map(|sum| sum as f32 / MEAN_TICKS as f32)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_are_the_mean_of_exactly_4096_samples() {
+        let mut zeros = Zeros::default();
+        for tick in 1..SETTLE_TICKS + MEAN_TICKS {
+            // Samples before the last of those to settle are in no mean and in no spread.
+            let code = if tick < SETTLE_TICKS { 3000 } else { 2050 };
+            let sample = AxisSample { shunt_codes: [code, 2040], ..AxisSample::default() };
+            assert_eq!(zeros.tick(&sample), Ok(None), "{tick}");
+        }
+        let sample = AxisSample { shunt_codes: [2050, 2040], ..AxisSample::default() };
+        assert_eq!(zeros.tick(&sample), Ok(Some([2050.0, 2040.0])));
+    }
+
+    #[test]
+    fn a_rotor_that_moves_by_more_than_three_counts_is_refused() {
+        for (travel, refused) in [(3_u16, false), (4, true), (5, true), (0_u16.wrapping_sub(4), true)] {
+            let mut zeros = Zeros::default();
+            let at =
+                |encoder_count| AxisSample { shunt_codes: [2048; 2], encoder_count, ..AxisSample::default() };
+            (0..SETTLE_TICKS).for_each(|_| assert_eq!(zeros.tick(&at(7)), Ok(None)));
+            let expected = if refused { Err(Refusal::Turning) } else { Ok(None) };
+            assert_eq!(zeros.tick(&at(travel.wrapping_add(7))), expected, "{travel}");
+        }
+    }
+}

@@ -349,3 +349,20 @@ fn absurd_joints_are_refused_by_name() {
     let limits = LimitsError { joint: 1, quantity: LimitQuantity::Inertia };
     assert_eq!(refused(|joint| joint.inertia.0 = f32::NAN), ServoError::Limits(limits));
 }
+
+#[test]
+fn every_number_that_can_be_upset_is_another_one() {
+    let sound = Bench::enabled(JOINTS, Plant::KNEE).servo;
+    let upset = |number| {
+        let mut servo = sound;
+        servo.upset(0, number, 3);
+        servo
+    };
+    let all: [_; Servo::<2>::NUMBERS as usize] = core::array::from_fn(|number| upset(number as u8));
+    for (number, one) in all.iter().enumerate() {
+        assert!(*one != sound && all.iter().filter(|other| *other == one).count() == 1, "{number}");
+        let mut twice = *one;
+        twice.upset(0, number as u8, 3);
+        assert!(twice == sound, "{number}");
+    }
+}
