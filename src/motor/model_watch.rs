@@ -382,6 +382,21 @@ mod tests {
     }
 
     #[test]
+    fn iron_that_saturates_is_no_fault_at_speed_and_would_be_one_at_rest() {
+        let limits = limits();
+        let current = Rotating { d: Ampere::ZERO, q: Ampere(50.0) };
+        // 2.2 V across the current, of which 50 A, 27 uH and 1,500 rad/s make 2.0.
+        let current_loop = CurrentLoop::holding(Rotating { d: Volt(2.2), q: Volt(0.05 * 50.0) });
+        for (speed_rad_per_s, expected) in [(1500.0, None), (0.0, Some(AxisFault::OpenPhase))] {
+            let now = Shown { speed_rad_per_s, ..shown(&current_loop, current, ElectricalAngle::default()) };
+            let mut watch = ModelWatch::EMPTY;
+            let seen = (0..3 * i32::from(PATIENCE))
+                .find_map(|period| watch.look(&limits, &Shown { place: 10 * period, ..now }));
+            assert_eq!(seen, expected, "{speed_rad_per_s}");
+        }
+    }
+
+    #[test]
     fn a_drifted_zero_is_seen_after_the_same_turns_in_either_direction() {
         let limits = limits();
         let size = 1.5 * sqrt(limits.mean_square);
