@@ -289,7 +289,10 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         for ((axis, status), inputs) in self.axes.iter_mut().zip(&told.joints).zip(inputs) {
             axis.update(&JointStatus { inputs, ..*status });
         }
-        let rises = self.axes.iter_mut().fold(false, |rises, axis| axis.take_rises() || rises);
+        let mut rises = false;
+        for axis in &mut self.axes {
+            rises |= axis.take_rises();
+        }
         (self.leg.activity, self.leg.change) = (told.activity, told.change);
         let commanded = self.axes.iter().any(Axis::is_commanded);
         self.hosted = commanded || self.hosted && drive.permission() != Permission::Released;
