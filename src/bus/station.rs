@@ -31,9 +31,8 @@ use super::node_id::NodeId;
 use crate::hal::{Controller, Frame};
 use crate::leg::{
     Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, NoticeCode, Permission, Plan,
-    PowerRequest, Refusal, RefusalReason,
+    PowerRequest, RETURN_SPEED, Refusal, RefusalReason,
 };
-use crate::safety::RETURN_SPEED;
 
 mod keeping;
 
@@ -289,8 +288,10 @@ impl<const N: usize, const LOG: usize> Station<N, LOG> {
         for ((axis, status), inputs) in self.axes.iter_mut().zip(&told.joints).zip(inputs) {
             axis.update(&JointStatus { inputs, ..*status });
         }
-        // Every axis is asked: the answer clears what it noted.
-        let rises = self.axes.each_mut().map(Axis::take_rises).contains(&true);
+        let mut rises = false;
+        for axis in &mut self.axes {
+            rises |= axis.take_rises();
+        }
         (self.leg.activity, self.leg.change) = (told.activity, told.change);
         let commanded = self.axes.iter().any(Axis::is_commanded);
         self.hosted = commanded || self.hosted && drive.permission() != Permission::Released;

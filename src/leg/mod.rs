@@ -61,7 +61,7 @@ pub use crate::motor::{
 };
 pub use crate::safety::{
     DeratingRamps, DriveState, Event as DriveEvent, Fault, FaultCode, LimitCode, LimitCodes, NO_ERROR,
-    NoticeCode, Permission, PowerRequest, Refusal, RefusalReason,
+    NoticeCode, Permission, PowerRequest, RETURN_SPEED, Refusal, RefusalReason,
 };
 pub use crate::servo::LogSample;
 

@@ -39,6 +39,9 @@ const GLITCHES_FOR_FAULT: u32 = 3;
 const OVERSPEED_FACTOR: f32 = 1.1;
 /// A joint is out of its range beyond this much (0.5 degrees).
 pub const RANGE_TOLERANCE: Radian = Radian(0.008_727);
+/// A joint farther out of its range than this (15 degrees) is not enabled to return: end stops hold it nearer, so its
+/// angle is wrong, as on a leg of the other side.
+const RETURN_REACH: Radian = Radian(0.262);
 /// A joint that returns is inside from this far on (0.1 degrees), where its usual bounds ask for no jump.
 const RETURNED: Radian = Radian(0.001_745);
 
@@ -301,17 +304,23 @@ impl<const N: usize> Monitor<N> {
         (0..N).find_map(|joint| {
             let is_inside = self.in_range(joint, observation.position[joint]);
             let speed = if is_inside { self.limits.joints()[joint].speed.0 } else { RETURN_SPEED };
-            let reason = if !is_inside && !self.may_return[joint] {
-                RefusalReason::OutOfRange
-            } else if observation.velocity[joint].abs().0 > speed {
-                RefusalReason::Moving
-            } else if observation.rejected[joint] {
-                RefusalReason::Encoder
-            } else {
-                return None;
-            };
+            let reason =
+                if !is_inside && !(self.may_return[joint] && self.is_within_reach(joint, observation)) {
+                    RefusalReason::OutOfRange
+                } else if observation.velocity[joint].abs().0 > speed {
+                    RefusalReason::Moving
+                } else if observation.rejected[joint] {
+                    RefusalReason::Encoder
+                } else {
+                    return None;
+                };
             Some(Refusal { joint: joint as u8, reason })
         })
+    }
+
+    fn is_within_reach(&self, joint: usize, observation: &Observation<N>) -> bool {
+        let (ends, position) = (&self.limits.joints()[joint], observation.position[joint]);
+        position >= ends.low - RETURN_REACH && position <= ends.high + RETURN_REACH
     }
 
     /// What the joints may do from here on that stand outside.

@@ -181,11 +181,18 @@ mod tests {
     use crate::ident::outliers::Outliers;
     use crate::ident::record::TorqueSize;
     use crate::ident::selection::Selection;
+    use crate::model::{BaseParameters, Chain, DenavitHartenberg};
 
     /// Standard deviations by which joint 0's friction is negative, with these values and a sigma of 0.1 each.
     fn negative(level: f32, half: f32, meaning: Constant) -> f32 {
-        const BASE: usize = crate::leg::testing::BASE;
-        let mut model = crate::leg::testing::configuration().model;
+        const BASE: usize = 13;
+        let length = |joint: usize| if joint == 0 { 0.0 } else { 0.45 };
+        let geometry =
+            core::array::from_fn(|joint| DenavitHartenberg { alpha: 0.0, a: length(joint), d: 0.0 });
+        let chain = Chain::<f64, 2>::new(&geometry).expect("two joints").convert();
+        let gravity = Vector3::new(9.81, 0.0, 0.0);
+        let base = BaseParameters::analyse(&chain, &gravity, &[[true; PARAMETERS_PER_JOINT]; 2]);
+        let mut model = RowModel::<f32, 2, BASE>::new(chain, gravity, base.expect("13 of them"));
         model.drive_choice[0].meaning = meaning;
         let record = Record::<f32, 2, BASE> {
             factors: [Factor::new(), Factor::new()],

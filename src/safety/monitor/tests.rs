@@ -247,6 +247,21 @@ fn a_joint_that_moves_farther_out_instead_of_returning_stops_the_leg() {
 }
 
 #[test]
+fn a_joint_farther_out_than_end_stops_allow_is_not_enabled() {
+    for (hip, knee, refused) in
+        [(0.25, 0.25, None), (0.27, 0.0, Some(0)), (0.0, 0.27, Some(1)), (1.5, 1.5, Some(0))]
+    {
+        let (mut monitor, observation) = outside(hip, knee);
+        let asked = monitor.decide(&observation, &ask(PowerRequest::EnableOperation));
+        let expected = refused.map(|joint| Refusal { joint, reason: RefusalReason::OutOfRange });
+        assert_eq!(
+            (asked.refused, monitor.state() == DriveState::OperationEnabled),
+            (expected, refused.is_none())
+        );
+    }
+}
+
+#[test]
 fn a_joint_that_still_falls_outside_its_range_is_not_enabled() {
     let (mut monitor, observation) = outside(0.1, 0.2);
     let _ = monitor.decide(&observation, &ask(PowerRequest::DisableOperation));

@@ -9,7 +9,7 @@
 //!
 //! Blind the firmware believes in ranges that are 2 rad wider.
 
-use scarab::safety::{DriveState, FaultCode};
+use scarab::safety::{DriveState, FaultCode, NoticeCode};
 use scarab::units::Radian;
 
 use super::super::catalogue::JOINTS;
@@ -33,7 +33,7 @@ const SHARE: f64 = 0.25;
 /// Greatest speed outside, rad/s: what 0.1 rad/s become while a weight is taken over, and more is none.
 const FASTEST: f64 = 0.3;
 /// Code of a refused step towards enabled.
-const REFUSED: u16 = 0xFF0E;
+const REFUSED: u16 = NoticeCode::NotEnabled.number();
 const NOTHING: Speaks = Speaks { targets: false, words: false, heartbeat: 0 };
 
 pub(super) const BENCH: Bench = Bench {
