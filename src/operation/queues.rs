@@ -66,7 +66,7 @@ pub struct Queues<const N: usize> {
     requests: Queue<ControlRequest<N>, 3>,
     findings: Queue<Finding<N>, 3>,
     drive: Queue<DriveState, 8>,
-    notes: Queue<Record<N>, 16>,
+    notes: Queue<Record<N>, 15>,
     calibrated: Queue<Calibrated, 4>,
 }
 
