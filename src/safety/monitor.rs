@@ -304,16 +304,16 @@ impl<const N: usize> Monitor<N> {
         (0..N).find_map(|joint| {
             let is_inside = self.in_range(joint, observation.position[joint]);
             let speed = if is_inside { self.limits.joints()[joint].speed.0 } else { RETURN_SPEED };
-            let reason =
-                if !is_inside && !(self.may_return[joint] && self.is_within_reach(joint, observation)) {
-                    RefusalReason::OutOfRange
-                } else if observation.velocity[joint].abs().0 > speed {
-                    RefusalReason::Moving
-                } else if observation.rejected[joint] {
-                    RefusalReason::Encoder
-                } else {
-                    return None;
-                };
+            let reason = if !(is_inside || self.may_return[joint] && self.is_within_reach(joint, observation))
+            {
+                RefusalReason::OutOfRange
+            } else if observation.velocity[joint].abs().0 > speed {
+                RefusalReason::Moving
+            } else if observation.rejected[joint] {
+                RefusalReason::Encoder
+            } else {
+                return None;
+            };
             Some(Refusal { joint: joint as u8, reason })
         })
     }
