@@ -300,3 +300,15 @@ fn duties_that_are_no_numbers_release() {
     assert_eq!(bench.tick(ask(5.0)), AxisCommand::RELEASED);
     assert_eq!(bench.axis.fault(), Some(AxisFault::NotANumber));
 }
+
+#[test]
+fn an_upset_flips_the_bit_that_is_named() {
+    let sound = Bench::settled(0.0, 0.0).axis;
+    let upset = |bit| {
+        let mut axis = sound;
+        axis.upset(0, bit);
+        axis
+    };
+    assert!(upset(3) != sound && upset(3) != upset(4));
+    assert!(upset(3) == upset(35), "32 bits");
+}
