@@ -1,4 +1,5 @@
-//! Says which leg an image is for, and links the flash image: memory layout, vector table, records. Programs of the host need nothing of it.
+//! Selects the leg of an image and links the flash image: memory layout, vector table, records. Host programs
+//! need none of this.
 
 use std::env;
 
@@ -16,7 +17,7 @@ fn main() {
         if board {
             println!("cargo::warning=SCARAB_LEG names no leg: the image is for the leg x2-wearer-75kg alone");
         }
-        concat!(env!("CARGO_MANIFEST_DIR"), "/hal-sim/legs/x2-wearer-75kg.rs").to_owned()
+        concat!(env!("CARGO_MANIFEST_DIR"), "/host/legs/x2-wearer-75kg.rs").to_owned()
     });
     println!("cargo::rerun-if-env-changed=SCARAB_LEG");
     println!("cargo::rerun-if-env-changed=SCARAB_TRACE_LOG");

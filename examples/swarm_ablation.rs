@@ -1,10 +1,11 @@
-//! What each part of the default beetle swarm is worth: one part left out at a time, the tables of `docs/bso.md`.
+//! Ablation study of the default beetle swarm: one part left out at a time (results in
+//! `docs/results/bso.md`).
 //!
 //! `cargo run --release --example swarm_ablation -- [runs] [first seed]`
 //!
-//! Cells are iterations to f - f* <= 0.1, median/95 % of all runs, failed ones endless ("-", with the share that
-//! succeeds), at most 1,000. The seeds are those of no test and of no figure of `docs/paper.md`, and nothing was chosen
-//! with them.
+//! A cell holds the iterations to f - f* <= 0.1: median and 95 % quantile of all runs, at most 1,000
+//! iterations. A failed run counts as infinite and is shown as "-" with the share of successes. No test and
+//! no table of `docs/results/paper.md` uses these seeds, and no setting was chosen with them.
 
 use std::sync::Mutex;
 use std::thread;
@@ -219,7 +220,8 @@ fn noise(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
     Ok(())
 }
 
-/// Rastrigin's function moved by up to half a unit, with coordinates multiplied, and reflected where `slanted`.
+/// Rastrigin's function, shifted by up to half a unit, with scaled coordinates, and reflected where
+/// `slanted`.
 struct Rugged {
     problem: TestProblem,
     scale: f64,

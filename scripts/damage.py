@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Damages recordings the way real loggers do, to ask what `scarab-sim replay` makes of it.
+"""Damages recordings as real loggers do, to test how `scarab replay` reacts.
 
-  scripts/damage.py --list                                    kinds, sizes, what replay should name
+  scripts/damage.py --list                                    kinds, sizes, and the cause that replay should name
   scripts/damage.py delay --size 0.02 --joint 1 in.csv out.csv
   scripts/damage.py gravity --size 30 --leg my-leg.toml turned.toml
 
-Sizes are in SI units (s, Hz, rad) or shares; angles of gravity in degrees. Without --joint every joint is damaged.
-`scripts/damage_table` applies all of them and judges the verdicts.
+Sizes are in SI units (s, Hz, rad) or shares; angles of gravity in degrees. Without --joint every joint is
+damaged. `scripts/damage_table` applies all of them and judges the verdicts.
 """
 
 import argparse
@@ -54,11 +54,11 @@ def columns(recording, joint):
     return range(recording.q.shape[1]) if joint is None else [joint - 1]
 
 
-# Each of these changes a list of recordings in place: the whole set of one logging chain.
+# Each function changes a list of recordings in place: the whole set of one logging chain.
 
 
 def delay(recordings, size, joint):
-    """Torque is stamped late by `size` seconds. Whole samples are moved where the delay is a multiple of the period."""
+    """Delays the torque by `size` seconds; by whole samples if the delay is a multiple of the period."""
     for r in recordings:
         even = np.max(abs(np.diff(r.t) - r.period)) < 1e-5
         shift = size / r.period
@@ -80,7 +80,7 @@ def largest(recordings, c):
 
 
 def clip(recordings, size, joint):
-    """Torque ends at `size` of its largest magnitude, on both sides."""
+    """Clips the torque at `size` of its largest magnitude, on both sides."""
     for c in columns(recordings[0], joint):
         limit = size * largest(recordings, c)
         for r in recordings:
@@ -88,7 +88,7 @@ def clip(recordings, size, joint):
 
 
 def clip_one_side(recordings, size, joint):
-    """Torque ends at `size` of its largest value above zero, or below where it is nearly always negative."""
+    """Clips one side at `size` of its largest value: the positive one, unless nearly all torque is negative."""
     for c in columns(recordings[0], joint):
         top, bottom = max(np.max(r.tau[:, c]) for r in recordings), min(np.min(r.tau[:, c]) for r in recordings)
         for r in recordings:
@@ -96,7 +96,7 @@ def clip_one_side(recordings, size, joint):
 
 
 def clip_filtered(recordings, size, joint):
-    """Clipped, then through a first-order low-pass of 50 Hz: no two samples are equal."""
+    """Clips, then applies a first-order low-pass of 50 Hz, so that no two samples are equal."""
     clip(recordings, size, joint)
     low_pass(recordings, 50.0, joint)
 
@@ -108,14 +108,14 @@ def gain(recordings, size, joint):
 
 
 def flip_midway(recordings, size, joint):
-    """The sign of the torque changes after the share `size` of each file."""
+    """Changes the sign of the torque after the share `size` of each file."""
     for r in recordings:
         for c in columns(r, joint):
             r.tau[round(size * len(r.t)):, c] *= -1.0
 
 
 def gain_midway(recordings, size, joint):
-    """The torque's gain changes by `size` in the middle of each file."""
+    """Changes the torque's gain by `size` in the middle of each file."""
     for r in recordings:
         for c in columns(r, joint):
             r.tau[len(r.t) // 2:, c] *= 1.0 + size
@@ -137,7 +137,7 @@ def swap_joints(recordings, size, joint):
 
 
 def jitter(recordings, size, joint):
-    """The stamps are wrong by a normal error of `size` seconds; sorted, since a logger's clock does not run backward."""
+    """Adds a normal error of `size` seconds to the time stamps, which stay sorted."""
     random = np.random.default_rng(11)
     for r in recordings:
         stamps = np.sort(r.t + size * random.standard_normal(len(r.t)))
@@ -145,7 +145,7 @@ def jitter(recordings, size, joint):
 
 
 def low_pass(recordings, size, joint):
-    """First-order low-pass of `size` Hz in the torque."""
+    """Applies a first-order low-pass of `size` Hz to the torque."""
     for r in recordings:
         steps = np.diff(r.t, prepend=r.t[0] - r.period)
         shares = 1.0 - np.exp(-2.0 * np.pi * size * steps)
@@ -163,7 +163,7 @@ def held_index(r, size):
 
 
 def hold_torque(recordings, size, joint):
-    """The torque is new every `size` seconds only, and repeated until then."""
+    """Updates the torque every `size` seconds only, and repeats it in between."""
     for r in recordings:
         for c in columns(r, joint):
             r.tau[:, c] = r.tau[held_index(r, size), c]
@@ -175,8 +175,16 @@ def hold_angle(recordings, size, joint):
             r.q[:, c] = r.q[held_index(r, size), c]
 
 
+def quantise(recordings, size, joint):
+    """Angles of an encoder at the joint with so many bits; a whole count stays one, whatever its last digit."""
+    step = 2.0 * np.pi / 2.0**size
+    for r in recordings:
+        for c in columns(r, joint):
+            r.q[:, c] = np.floor(r.q[:, c] / step + 1e-6) * step
+
+
 def freeze(recordings, size, joint):
-    """All values stand still for `size` seconds, three times in each file; the clock runs on."""
+    """Holds all values for `size` seconds, three times in each file; time continues."""
     for r in recordings:
         for share in (0.2, 0.45, 0.6):
             first = round(share * len(r.t))
@@ -204,7 +212,7 @@ def negate(recordings, size, joint):
 
 
 def reverse(recordings, size, joint):
-    """Angle and torque of a joint have the other sense of rotation."""
+    """Reverses the direction of a joint's angle and torque."""
     for r in recordings:
         for c in columns(r, joint):
             r.tau[:, c] *= -1.0
@@ -212,7 +220,7 @@ def reverse(recordings, size, joint):
 
 
 def push(recordings, size, joint):
-    """Somebody pushes for 0.6 s in the first file: a half sine of `size` of the largest torque, on every joint."""
+    """Adds a push of 0.6 s to the first file: a half sine of `size` of the largest torque, on every joint."""
     r = recordings[0]
     first = r.t[round(0.4 * len(r.t))]
     phase = (r.t - first) / 0.6
@@ -226,7 +234,7 @@ def nothing(recordings, size, joint):
 
 
 def turn_gravity(text, angle_deg):
-    """The leg file with gravity turned about the joints' axis."""
+    """Turns gravity in a leg file about the joints' axis."""
     x, y, z = (float(part) for part in GRAVITY.search(text)[1].split(","))
     cosine, sine = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))
     turned = f"gravity = [{cosine * x - sine * y:.9f}, {sine * x + cosine * y:.9f}, {z}]"
@@ -235,26 +243,26 @@ def turn_gravity(text, angle_deg):
 
 @dataclass
 class Kind:
-    """A kind of damage: what does it, its sizes, the causes that name it, and what a recording must have for it."""
+    """A kind of damage: function, sizes, causes that name it, and requirements on a recording."""
 
     apply: object
     sizes: list
     causes: set
-    # None: all joints; else one run for each.
+    # Whether one joint at a time is damaged, and whether all together.
     each_joint: bool = False
     all_joints: bool = True
     least_joints: int = 1
     least_training_s: float = 0.0
     show: str = "%g"
-    # Name of the direction of doubt that this is, and its size there as a function of the size.
+    # Name of the reported direction (`directions[]`), and its value as a function of the size.
     direction: str = ""
     injected: object = None
     changes_leg: bool = False
     # Words in the message of exit code 2 that name the fault.
     words: str = ""
-    # A disturbance that robust identification has to bear: a refusal is wrong.
+    # A disturbance that robust identification has to tolerate: a refusal is wrong.
     must_accept: bool = False
-    # False where torque does not tell which joint it is: the ratio of two torque scales, and the mirror image of a planar leg.
+    # False where torque does not identify the joint: ratio of two torque scales, mirrored planar leg.
     tells_joint: bool = True
 
 
@@ -279,6 +287,7 @@ KINDS = {
                         injected=lambda size: 0.5 * size),
     "hold_angle": Kind(hold_angle, [0.01, 0.02, 0.05], {"held_samples", "delay"}, show="%g s", direction="delay",
                        injected=lambda size: -0.5 * size),
+    "quantise": Kind(quantise, [14, 12, 10], {"encoder_steps"}, show="%g bits"),
     "freeze": Kind(freeze, [0.2, 0.5, 1.0], {"held_samples"}, show="%g s", least_training_s=8.0),
     "gravity": Kind(None, [5.0, 30.0, 180.0], {"gravity"}, least_joints=2, show="%g deg", changes_leg=True, direction="gravity", injected=SAME),
     "degrees": Kind(degrees, [0], {"angle_unit"}, True, show="-", words=r"degree|unit"),
@@ -303,17 +312,48 @@ class Damage:
         return "-" if self.kind.show == "-" else self.kind.show % self.size
 
     def injected(self, joints):
-        """The size in its direction of doubt: (name, joint) -> value; empty where it is none."""
+        """Injected size as reported directions: (name, joint) -> value; empty without a direction."""
         if not self.kind.direction:
             return {}
         touched = [None] if self.kind.changes_leg else range(1, joints + 1) if self.joint is None else [self.joint]
         return {(self.kind.direction, joint): self.kind.injected(self.size) for joint in touched}
 
 
-def rows(joints, training_s, names=None):
-    """All damages that a recording with so many joints and so much training data can have."""
+CHOICE = re.compile(r"(?P<name>\w+)(=(?P<size>[^@]+))?(@(?P<joint>\w+))?")
+
+
+@dataclass
+class Choice:
+    """A kind of damage, `KIND[=SIZE][@JOINT]`: one size or all, one joint, `all` joints together, or either."""
+
+    name: str
+    size: float | None
+    joint: str | None
+
+    @classmethod
+    def parse(cls, text):
+        parts = CHOICE.fullmatch(text)
+        if not parts or parts["name"] not in KINDS:
+            raise ValueError(f"`{text}` is not KIND[=SIZE][@JOINT] with a known kind")
+        choice = cls(parts["name"], float(parts["size"]) if parts["size"] else None, parts["joint"])
+        if choice.size is not None and choice.size not in KINDS[choice.name].sizes:
+            raise ValueError(f"`{text}`: sizes of {choice.name}: {', '.join(map(str, KINDS[choice.name].sizes))}")
+        return choice
+
+    def holds(self, row):
+        return self.name == row.name and self.size in (None, row.size) and self.joint in (None, str(row.joint or "all"))
+
+
+def rows(joints, training_s, choices=None):
+    """All damages possible for a recording with this number of joints and duration of training data."""
+    for row in every_row(joints, training_s):
+        if choices is None or any(choice.holds(row) for choice in choices):
+            yield row
+
+
+def every_row(joints, training_s):
     for name, kind in KINDS.items():
-        if (names and name not in names) or joints < kind.least_joints or training_s < kind.least_training_s:
+        if joints < kind.least_joints or training_s < kind.least_training_s:
             continue
         which = [None] if kind.all_joints else []
         if kind.each_joint and (joints > 1 or not which):

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Simulates two-link arms with stiction, independently of the firmware and of `hal-sim`, as a witness for `replay`.
+"""Simulates two-link arms with stiction, independent of firmware and `hal-sim`, as a reference for `replay`.
 
   scripts/independent_plant.py --out DIR              40 arms: recordings, leg files, truth
   scripts/independent_plant.py --self-check           energy balance and inverse dynamics only
   scripts/independent_plant.py --out DIR --rate 1000 --encoder-bits 14 --stribeck 0.4
 
-Each draw is one arm with its own lengths, masses, friction, encoders, noise, motion and wrong prior. All draws are
-simulated at once, as numpy vectors. DIR/draw-NN holds
+Each draw is one arm with its own lengths, masses, friction, encoders, noise, motion and wrong prior. All
+draws are simulated at once, as numpy vectors. DIR/draw-NN holds
 
   train.csv      recording to identify from (t_s, q1_rad, q2_rad, tau1_Nm, tau2_Nm)
   valid.csv      recording of another motion of the same arm
@@ -14,8 +14,8 @@ simulated at once, as numpy vectors. DIR/draw-NN holds
   leg.toml       geometry, encoders and a wrong prior; no truth
   truth.json     the true parameters in the joints' frames, the inertias, the friction, the noise
 
-Equations. With absolute link angles phi1 = q1, phi2 = q1 + q2, x axis along gravity, and the centres of mass as complex
-numbers c1, c2 in their links (real part along the link), the Lagrangian is
+Equations. With absolute link angles phi1 = q1, phi2 = q1 + q2, x axis along gravity, and the centres of mass
+as complex numbers c1, c2 in their links (real part along the link), the Lagrangian is
 
   T = (J1 phi1'^2 + J2 phi2'^2) / 2 + K phi1' phi2' + (R1 q1'^2 + R2 q2'^2) / 2
   U = -g Re((m1 c1 + m2 l1) exp(i phi1) + m2 c2 exp(i phi2))
@@ -26,10 +26,10 @@ so that, in joint coordinates,
   M11 = J1 + J2 + 2 K + R1,   M12 = J2 + K,   M22 = J2 + R2
   h1 = K' (phi2'^2 - phi1'^2) + dU/dphi1 + dU/dphi2,   h2 = -K' phi1'^2 + dU/dphi2
 
-Friction is a set-valued force, FC Sgn(q') + FV q', with real sticking. Steps of 0.25 ms follow Moreau's time-stepping
-scheme on staggered velocities: the friction impulses of both joints solve a complementarity problem, here in closed
-form (Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008). The self-check uses another
-derivation, Newton and Euler's laws for each link.
+Friction is a set-valued force, FC Sgn(q') + FV q', with real sticking. Steps of 0.25 ms follow Moreau's
+time-stepping scheme on staggered velocities: the friction impulses of both joints solve a complementarity
+problem, here in closed form (Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008).
+The self-check uses another derivation, Newton and Euler's laws for each link.
 """
 
 import argparse
@@ -122,8 +122,9 @@ class Arms:
 def friction_impulses(free, a11, a12, a22, limit1, limit2):
     """Friction forces f, |f| <= limit, such that v = free - A f sticks or slides against f.
 
-    Each velocity falls with its own friction force, also where the other joint's force follows it. So joint 1 slides
-    where the largest force cannot stop it; else it sticks, and joint 2 sees the inertia of a held joint 1.
+    Each velocity falls with its own friction force, also where the other joint's force follows it. So joint 1
+    slides where the largest force cannot stop it; else it sticks, and joint 2 sees the inertia of a held
+    joint 1.
     """
     def other(f1):
         return np.clip((free[1] - a12 * f1) / a22, -limit2, limit2)
@@ -139,10 +140,10 @@ def friction_impulses(free, a11, a12, a22, limit1, limit2):
 
 
 def simulate(arms, duration, torque, q0, v0=None, stribeck=(0.0, 0.1)):
-    """Integrates and returns q, mid-step speed, acceleration, torque and friction, each of shape (steps, 2, arms).
+    """Integrates; returns q, mid-step speed, acceleration, torque and friction, each (steps, 2, arms).
 
-    `torque(step, q)` gives the motors' torque at a step. `stribeck` is the surplus of friction at rest as a share of
-    FC, and the speed at which it has fallen to 1/e.
+    `torque(step, q)` gives the motors' torque at a step. `stribeck` is the surplus of friction at rest as a
+    share of FC, and the speed at which it has fallen to 1/e.
     """
     steps = round(duration / STEP)
     shape = (steps, 2, len(arms.l1))
@@ -153,7 +154,7 @@ def simulate(arms, duration, torque, q0, v0=None, stribeck=(0.0, 0.1)):
     for k in range(steps):
         tau = torque(k, q)
         m11, m12, m22, slope = arms.inertia(q[1])
-        # The products of speeds belong to the instant of q, half a step after v.
+        # The products of speeds belong to the time of q, half a step after v.
         w1 = v[0] + 0.5 * STEP * acceleration[0]
         w2 = w1 + v[1] + 0.5 * STEP * acceleration[1]
         u1, u2 = arms.gravity(q[0], q[1])
@@ -183,7 +184,7 @@ def simulate(arms, duration, torque, q0, v0=None, stribeck=(0.0, 0.1)):
 
 
 def reaching(random, times, low, high):
-    """Minimum-jerk moves between random targets, with pauses: s = 10 u^3 - 15 u^4 + 6 u^5 (Flash and Hogan, 1985)."""
+    """Minimum-jerk moves with pauses: s = 10 u^3 - 15 u^4 + 6 u^5 (Flash and Hogan, 1985), random targets."""
     middle, start = 0.5 * (low + high), 0.0
     here = middle
     path = np.full(len(times), middle)
@@ -212,7 +213,7 @@ def sweeping(random, times, low, high):
 
 
 class Controller:
-    """Position control at 1 kHz on counts: PD with a filtered difference, a slow integral, gravity of a wrong model."""
+    """Position control at 1 kHz on counts: PD with filtered difference, slow integral, gravity of a wrong model."""
 
     def __init__(self, arms, believed, counts, path, bandwidth_hz=5.0):
         self.believed, self.counts, self.path = believed, counts, path
@@ -262,7 +263,8 @@ def generate(count, seed, rate, encoder_bits, stribeck, noise):
     low = np.array([random.uniform(-1.2, -0.4, count), random.uniform(-0.3, 0.3, count)])
     high = low + np.array([random.uniform(1.2, 2.0, count), random.uniform(1.3, 2.0, count)])
 
-    # The first half of the batch is the training motion, the second half another kind of motion of the same arms.
+    # The first half of the batch is the training motion, the second half another kind of motion of the same
+    # arms.
     kinds = [reaching, sweeping]
     times = np.arange(0.0, TRAINING_S + 0.01, CONTROL_STEPS * STEP)
     path = np.empty((len(times), 2, 2 * count))
@@ -342,7 +344,7 @@ def truth(run, k):
         })
     return {
         "arm": own,
-        # About the joint's axis, in the joint's frame: what a torque equation of the arm is linear in.
+        # Inertia about the joint's axis, in the joint's frame: the arm's torque is linear in it.
         "standard_parameters": standard,
         "stribeck_share": run["stribeck"],
         "noise_nm": [float(x) for x in run["sigma"][:, k]],
@@ -375,7 +377,7 @@ def write(run, out):
 
 
 def self_check():
-    """Energy with and without friction, inverse dynamics, and sticking; stops with a message where one is wrong."""
+    """Checks energy with and without friction, inverse dynamics and sticking; exits with a message on error."""
     random = np.random.default_rng(7)
     arms = Arms.draw(random, 12)
     frictionless = Arms(**{name: 0.0 * getattr(arms, name) if name[0] == "f" else getattr(arms, name) for name in Arms.FIELDS})
@@ -390,7 +392,7 @@ def self_check():
     push = lambda step, q: weight * np.array([[0.6], [0.5]]) * np.sin(2.0 * np.pi * step * STEP * np.array([[0.7], [1.1]]))
     q, v, a, tau, friction = simulate(arms, 6.0, push, start)
     work = np.cumsum(np.sum((tau - friction) * v, axis=1), axis=0) * STEP
-    # Speeds and angles of a row belong to one instant; the work up to it counts half of that step's power.
+    # Speeds and angles of a row belong to one time; the work up to it includes half of that step's power.
     work -= 0.5 * STEP * np.sum((tau - friction) * v, axis=1)
     gained = np.array([arms.energy(q[k], v[k]) for k in range(len(q))])
     balance = np.max(abs(gained - gained[0] - (work - work[0])) / np.ptp(gained, axis=0))

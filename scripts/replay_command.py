@@ -1,4 +1,4 @@
-"""Runs `scarab-sim replay` and reads what it reports; shared by `plant_coverage` and `damage_table`."""
+"""Runs `scarab replay` and reads its report; shared by `plant_coverage` and `damage_table`."""
 
 import json
 import os
@@ -7,11 +7,11 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-CARGO = ["cargo", "run", "--quiet", "--package", "hal-sim", "--bin", "scarab-sim", "--"]
+CARGO = ["cargo", "run", "--quiet", "--package", "scarab-host", "--bin", "scarab", "--"]
 
 
 class Outcome:
-    """One identification: exit code, report (None where there is none), the printed errors."""
+    """One identification: exit code, report or None, printed errors."""
 
     def __init__(self, code, report, errors):
         self.code, self.report, self.errors = code, report, errors
@@ -30,18 +30,18 @@ class Outcome:
 
     @property
     def cause(self):
-        """`likely_cause` as (name, joint, value, sigma), or None where the report has none."""
+        """`likely_cause` as (name, joint, value, sigma), or None."""
         found = (self.report or {}).get("likely_cause")
         return (found["name"], found.get("joint"), found.get("value"), found.get("sigma")) if found else None
 
     def parameters(self):
-        """Base parameters that have a sigma: name -> (terms, value, sigma)."""
+        """Base parameters with a sigma: name -> (terms, value, sigma)."""
         rows = (self.report or {}).get("base_parameters", [])
         return {r["name"]: (r["terms"], r["value"], r["sigma"]) for r in rows if r["sigma"] is not None}
 
 
 def binary(path):
-    """The command that runs the tool: a binary, or `cargo sim`, which builds it first."""
+    """Command that runs the tool: a binary, or `cargo sim`, which builds it first."""
     return [str(Path(path).resolve())] if path else CARGO
 
 

@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_changed_bit_of_any_word_and_an_exchange_of_two_are_seen() {
+    fn a_changed_bit_and_two_exchanged_words_are_detected() {
         let words = [3.5_f32, -0.0, f32::NAN, 1e-40, 7.0, 0.0];
         let sum = Checksum::EMPTY.numbers(words);
         for place in 0..words.len() {

@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_built_in_its_place_is_the_value() {
+    fn a_value_built_in_place_equals_the_value() {
         let mut slot = MaybeUninit::uninit();
         let outer = Outer::place(&mut slot);
         assert_eq!(*outer, Outer { name: Some(3), none: [None; 3], inner: made(|slot| empty_slot(slot)) });
@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "lies elsewhere")]
-    fn what_was_built_elsewhere_is_not_taken() {
+    fn a_value_built_elsewhere_is_refused() {
         let mut slot: Slot<u32> = made(|slot| empty_slot(slot));
         slot.fill(|_| std::boxed::Box::leak(std::boxed::Box::new(0)));
     }

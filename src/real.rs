@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn sine_and_cosine_of_turns_stay_within_their_stated_error_over_the_whole_turn() {
+    fn sine_and_cosine_of_turns_stay_within_their_stated_error() {
         let mut worst = 0.0_f64;
         // An odd step, so that its multiples do not only hit quarters; the quarters' edges are added.
         let borders = (0..8_u32).flat_map(|eighth| [(eighth << 29).wrapping_sub(1), eighth << 29]);
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_number_never_leaves_a_clamp() {
+    fn nan_never_leaves_a_clamp() {
         assert_eq!(clamp(f32::NAN, -1.0, 1.0), -1.0);
         assert_eq!(min(f32::NAN, 2.0), 2.0);
         assert_eq!(max(2.0, f32::NAN), 2.0);
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_beyond_the_reduction_and_infinite_ones_are_no_numbers() {
+    fn angles_beyond_the_reduction_or_infinite_give_nan() {
         assert!(!sin_cos(-8192.0_f32).0.is_nan());
         for angle in [8192.1_f32, -1.0e30, f32::INFINITY, f32::NAN] {
             let (sine, cosine) = sin_cos(angle);

@@ -1,11 +1,12 @@
 //! A leg identified through its board's current loops, motors and converters, compared with ideal drives.
 
-use hal_sim::tool::identify::{identify_many, identify_one};
-use hal_sim::tool::leg_file::{DEFAULT_LEG, LegFile};
-use hal_sim::tool::pair::{Context, Pair};
-use hal_sim::tool::perturb::Perturbation;
-use hal_sim::tool::report::{Number, RunReport};
-use hal_sim::tool::simulate::{DriveModel, SimulationOptions};
+use scarab_host::base::number::Number;
+use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_host::report::RunReport;
+use scarab_host::rig::options::{DriveModel, SimulationOptions};
+use scarab_host::rig::pair::{Context, Pair};
+use scarab_host::rig::perturb::Perturbation;
+use scarab_host::run::identify::{identify_many, identify_one};
 
 fn leg() -> LegFile {
     LegFile::load(DEFAULT_LEG).expect("shipped")
@@ -35,7 +36,7 @@ fn largest(deviations: &[(String, f64)]) -> f64 {
 }
 
 #[test]
-fn parameters_found_through_complete_drives_are_those_of_ideal_ones_within_half_a_sigma() {
+fn complete_drives_agree_with_ideal_ones_within_half_a_sigma() {
     let (ideal, full) = (identified(&options(DriveModel::Ideal)), identified(&options(DriveModel::Full)));
     assert!(full.accepted(), "{:?}", full.reasons);
     assert_eq!((ideal.drive, full.drive), (Some("ideal"), Some("full")));
@@ -55,7 +56,7 @@ fn parameters_found_through_complete_drives_are_those_of_ideal_ones_within_half_
 /// Run: `cargo test --release --test complete_drive -- --ignored --nocapture twenty`, some two minutes.
 #[test]
 #[ignore = "forty runs, half of them through complete drives"]
-fn twenty_legs_through_complete_drives_are_those_of_ideal_ones_within_half_a_sigma() {
+fn twenty_complete_drives_agree_with_ideal_ones_within_half_a_sigma() {
     let runs = |drive, perturbations: &[Perturbation]| {
         let options: Vec<_> = (1..=20)
             .map(|seed| SimulationOptions {
@@ -84,7 +85,7 @@ fn twenty_legs_through_complete_drives_are_those_of_ideal_ones_within_half_a_sig
 }
 
 #[test]
-fn a_leg_with_its_board_is_one_value_that_repeats_to_the_bit() {
+fn a_leg_with_its_board_repeats_bit_for_bit() {
     let options = options(DriveModel::Full);
     let context = Context::<2, 13>::new(&leg(), &options).expect("the default leg");
     let mut pair = Pair::new(&leg(), &context, 3).expect("calibrated");

@@ -3,7 +3,9 @@
 use nalgebra::Vector3;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use scarab::ident::{Direction, Ends, HeldOut, Misalignment, Plan, Problem, Recorder, Residual, RowModel};
+use scarab::ident::{
+    Direction, Ends, HeldOut, Misalignment, Plan, Problem, Recorder, Residual, RowModel, Stretches,
+};
 use scarab::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, joint_torques};
 use scarab::real::sin_cos;
 
@@ -98,7 +100,7 @@ fn of(found: &Found, direction: Direction, joint: usize) -> Option<(f64, f64)> {
 }
 
 #[test]
-fn a_link_believed_too_long_is_found_with_its_sign_and_size() {
+fn a_wrong_link_length_is_found_with_sign_and_size() {
     for share in [-0.1, 0.1] {
         let found = look(LENGTH_M * (1.0 + share), [0.0; 2], NOISE_NM, 1, |_| 0.0);
         println!("{:?}", found.misalignments);
@@ -110,7 +112,7 @@ fn a_link_believed_too_long_is_found_with_its_sign_and_size() {
 }
 
 #[test]
-fn the_first_joints_zero_is_seen_and_the_last_ones_is_not() {
+fn the_first_joints_zero_is_detected_and_the_last_ones_is_not() {
     let found = look(LENGTH_M, [0.087, 0.0], NOISE_NM, 1, |_| 0.0);
     println!("{:?}", found.misalignments);
     let (delta, sigma) = of(&found, Direction::Zero, 0).expect("seen");
@@ -120,7 +122,7 @@ fn the_first_joints_zero_is_seen_and_the_last_ones_is_not() {
 }
 
 #[test]
-fn a_leg_as_believed_asks_for_nothing() {
+fn a_correct_leg_shows_no_misalignment() {
     let mut worst = 0.0_f64;
     for seed in 0..20 {
         let found = look(LENGTH_M, [0.0; 2], NOISE_NM, seed, |_| 0.0);
@@ -149,7 +151,7 @@ fn a_disturbance_of_both_joints_is_timed() {
 }
 
 #[test]
-fn noise_is_not_slow_and_a_forgotten_swing_is() {
+fn noise_is_not_slow_and_an_unmodelled_swing_is() {
     let by_chance = |joint: usize, found: &Found| {
         f64::from(found.residual.joints[joint].slow_by_chance(5.2, Some(NOISE_NM[joint] as f32)))
     };
@@ -169,5 +171,52 @@ fn noise_is_not_slow_and_a_forgotten_swing_is() {
         assert!(
             residual.pairs(true) > 10 && (slow - 1.35).abs() < 0.3 && slow > 3.0 * by_chance(joint, &swing)
         );
+    }
+}
+
+/// Longest common disturbance of a training motion of this duration with a push of 0.6 s on both joints: by
+/// its blocks and by its rows.
+fn pushed(duration_s: u32) -> (f64, f64) {
+    let model = believed(LENGTH_M);
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(3);
+    let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
+    let begin_s = 0.4 * f64::from(duration_s);
+    let samples: Vec<([f32; 2], [f32; 2])> = (0..500 * duration_s)
+        .map(|index| {
+            let time = f64::from(index) / 500.0;
+            let state = motion(time, 1.0, 0.0);
+            let torque = joint_torques(&chain(LENGTH_M), &TRUTH, &state, &GRAVITY);
+            let phase = ((time - begin_s) / 0.6).clamp(0.0, 1.0);
+            let push = sin_cos(std::f64::consts::PI * phase).0;
+            let torque = core::array::from_fn(|joint| {
+                torque[joint] + NOISE_NM[joint] * (20.0 * push + 1.7 * uniform())
+            });
+            (state.q.map(|angle| angle as f32), torque.map(|torque| torque as f32))
+        })
+        .collect();
+    let mut recorder = Recorder::<f32, 2, BASE, 256, 26>::new(8.0).expect("fits");
+    for (position, torque) in &samples {
+        recorder.push(&model, position, torque);
+    }
+    let record = recorder.finish();
+    let values = Problem::new(&record, &model).least_squares(Plan::OneTime).values;
+    let mut stretches = Stretches::new(&model, &record, &values);
+    recorder.clear(Ends::Whole);
+    for (position, torque) in &samples {
+        if let Some(rows) = recorder.push(&model, position, torque).and_then(|progress| progress.rows) {
+            stretches.take(&rows);
+        }
+    }
+    (f64::from(record.outliers.longest_common_s), f64::from(stretches.longest_common_s))
+}
+
+#[test]
+fn a_push_lasts_as_long_as_its_rows_in_any_duration() {
+    for duration_s in [30, 120, 600] {
+        let (blocks, rows) = pushed(duration_s);
+        println!("{duration_s} s: {blocks:.2} s by blocks, {rows:.2} s by rows");
+        assert!((0.48..=0.72).contains(&rows), "{duration_s} s: {rows} s");
+        // Why the second pass exists: blocks of ten minutes are longer than a second.
+        assert!(duration_s < 600 || blocks > 1.0, "{blocks} s");
     }
 }

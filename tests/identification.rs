@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::ident::{
-    Docket, Estimate, Evidence, Plan, Problem, Reason, Recorder, RowModel, Thresholds, Verdict,
+    Estimate, Evidence, Plan, Problem, Reason, Recorder, RowModel, Thresholds, Verdict, VerdictBuilder,
 };
 use scarab::model::{BaseParameters, Chain, DenavitHartenberg, JointState, LegParameters, joint_torques};
 
@@ -139,15 +139,15 @@ fn judge(recorder: &mut LegRecorder) -> Verdict {
     let problem = Problem::new(&record, &model);
     let found = problem.least_squares(Plan::OneTime);
     let mut unheard = |_: &Evidence<f32>| {};
-    let mut docket = Docket::new(&mut unheard);
-    thresholds.judge_input(&model, &record, &mut docket);
-    thresholds.judge_excitation(&problem.whole(), found.rank(), &mut docket);
-    thresholds.judge_physics(&model, &record, &found, &mut docket);
-    docket.verdict()
+    let mut builder = VerdictBuilder::new(&mut unheard);
+    thresholds.judge_input(&model, &record, &mut builder);
+    thresholds.judge_excitation(&problem.whole(), found.rank(), &mut builder);
+    thresholds.judge_physics(&model, &record, &found, &mut builder);
+    builder.verdict()
 }
 
 #[test]
-fn an_honest_motion_is_accepted() {
+fn a_consistent_motion_is_accepted() {
     let mut recorder = LegRecorder::new(8.0).expect("fits");
     record(&mut recorder, 21.0, 0.07, 3);
     assert_eq!(judge(&mut recorder), Verdict::ACCEPTED);
@@ -162,7 +162,7 @@ fn no_samples_and_a_short_log_are_refused_as_input() {
 }
 
 #[test]
-fn a_sample_that_is_not_a_number_is_refused_as_input_and_loses_only_its_window() {
+fn a_nan_sample_is_refused_as_input_and_loses_only_its_window() {
     let mut recorder = LegRecorder::new(8.0).expect("fits");
     record(&mut recorder, 12.0, 0.07, 3);
     recorder.break_off();
@@ -177,7 +177,7 @@ fn a_sample_that_is_not_a_number_is_refused_as_input_and_loses_only_its_window()
 }
 
 #[test]
-fn a_finite_but_absurd_angle_at_the_end_is_refused_as_input_and_leaves_no_nan() {
+fn an_implausible_last_angle_is_refused_and_leaves_no_nan() {
     let mut recorder = LegRecorder::new(8.0).expect("fits");
     record(&mut recorder, 12.0, 0.07, 3);
     for _ in 0..200 {
@@ -186,9 +186,9 @@ fn a_finite_but_absurd_angle_at_the_end_is_refused_as_input_and_leaves_no_nan() 
     let record = recorder.finish();
     assert!(record.rejected > 0 && record.factors.iter().all(|factor| factor.residual().is_finite()));
     let mut unheard = |_: &Evidence<f32>| {};
-    let mut docket = Docket::new(&mut unheard);
-    Thresholds::default().judge_input(&model(), &record, &mut docket);
-    assert!(docket.verdict().has(Reason::Input));
+    let mut builder = VerdictBuilder::new(&mut unheard);
+    Thresholds::default().judge_input(&model(), &record, &mut builder);
+    assert!(builder.verdict().has(Reason::Input));
 }
 
 #[test]

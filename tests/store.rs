@@ -97,7 +97,7 @@ fn keep<const BYTES: usize>(store: &mut Store<Flash<BYTES, 2>>, number: u32) -> 
 }
 
 #[test]
-fn what_is_kept_is_there_after_a_start() {
+fn stored_data_is_present_after_a_start() {
     let mut first = store(Small::new(1));
     for number in 0..5 {
         assert_eq!(keep(&mut first, number), Ok(Saved::Written), "{number}");
@@ -109,7 +109,7 @@ fn what_is_kept_is_there_after_a_start() {
 }
 
 #[test]
-fn nothing_is_there_in_an_empty_flash() {
+fn an_empty_flash_holds_no_data() {
     let (found, _) = content(Small::new(1)).unwrap();
     assert_eq!(found, Content { calibrations: [None; 2], model: None, objects: [None, None] });
 }
@@ -181,7 +181,7 @@ fn a_power_cut_at_any_byte_leaves_the_old_or_the_new() {
 
 /// A second cut during the repair after the first one.
 #[test]
-fn a_cut_during_the_repair_of_a_cut_leaves_the_old_or_the_new() {
+fn a_cut_during_a_repair_leaves_the_old_or_the_new() {
     let mut flash = Small::new(11);
     let mut state = 1_u64;
     let mut draw = |below: u64| {
@@ -215,7 +215,7 @@ fn a_cut_during_the_repair_of_a_cut_leaves_the_old_or_the_new() {
 
 /// Corrupt, foreign, older or newer data: refused by name or read correctly, never a mixture, never a panic.
 #[test]
-fn spoilt_flash_gives_what_was_kept_or_an_error() {
+fn corrupt_flash_gives_stored_data_or_an_error() {
     let mut kept = store(Small::new(3));
     for number in 0..5 {
         keep(&mut kept, number).unwrap();
@@ -224,9 +224,9 @@ fn spoilt_flash_gives_what_was_kept_or_an_error() {
     let (whole, _) = content(flash.clone()).unwrap();
     let (mut whole_count, mut partly, mut refused) = (0, 0, 0);
     for bit in 0..8 * 1200 {
-        let mut spoilt = flash.clone();
-        spoilt.bytes_mut()[bit / 8] ^= 1 << (bit % 8);
-        match content(spoilt) {
+        let mut corrupt = flash.clone();
+        corrupt.bytes_mut()[bit / 8] ^= 1 << (bit % 8);
+        match content(corrupt) {
             Ok((found, _)) if found == whole => whole_count += 1,
             Ok((found, _)) => {
                 // Remaining data equals data that was stored once.
@@ -267,7 +267,7 @@ fn a_foreign_flash_is_usable_once_it_was_erased() {
 }
 
 #[test]
-fn records_without_sense_are_neither_kept_nor_believed() {
+fn implausible_records_are_neither_stored_nor_read() {
     let mut store = store(Small::new(1));
     let mut wrong = calibration(1);
     wrong.0.resistance = Ohm(f32::NAN);
@@ -284,7 +284,7 @@ fn records_without_sense_are_neither_kept_nor_believed() {
 }
 
 #[test]
-fn a_value_that_is_there_is_not_written_again() {
+fn a_stored_value_is_not_written_again() {
     let mut store = store(Small::new(1));
     keep(&mut store, 2).unwrap();
     let before = store.into_flash();
@@ -313,7 +313,7 @@ fn a_flash_without_power_is_an_error_of_the_flash() {
 
 /// Stores 10,000 accepted models on the board's sectors.
 #[test]
-fn ten_thousand_models_wear_a_sector_little() {
+fn ten_thousand_models_need_few_erasures() {
     let mut store = store(*Box::new(Board::new(1)));
     for number in 0..10_000 {
         assert_eq!(block_on(store.save(&permit(), Key::Model, &model(number))), Ok(Saved::Written));
@@ -344,7 +344,7 @@ fn found(flash: Small) -> ([Option<StoredCalibration>; 2], Option<u32>, Vec<u8>,
 }
 
 #[test]
-fn a_host_that_saves_keeps_objects_calibrations_and_the_model() {
+fn a_save_stores_objects_calibrations_and_the_model() {
     let stored = [1, 2].map(|number| calibration(number).0);
     let mut first = keeper(Small::new(1));
     // Only one axis passed: its calibration waits for the other's.
@@ -364,7 +364,7 @@ fn a_host_that_saves_keeps_objects_calibrations_and_the_model() {
 }
 
 #[test]
-fn what_was_found_before_a_host_forgot_everything_is_not_kept_by_the_next_save() {
+fn erased_data_is_not_stored_again_by_the_next_save() {
     let mut keeper = keeper(Small::new(1));
     let find = |keeper: &mut Keeper<Small, 2>| {
         (0..2).for_each(|axis| keeper.calibrated(axis, Some(calibration(axis as u32).0)));
@@ -380,7 +380,7 @@ fn what_was_found_before_a_host_forgot_everything_is_not_kept_by_the_next_save()
 }
 
 #[test]
-fn a_flash_that_refuses_keeps_nothing_and_says_so() {
+fn a_failed_write_is_reported_and_stores_nothing() {
     let mut flash = Small::new(1);
     flash.fail_after(Some(0));
     let mut keeper = keeper(flash);

@@ -127,7 +127,7 @@ fn restarts_leave_local_minima() {
 }
 
 #[test]
-fn leaps_leave_the_ripples_that_scattering_anew_does_not() {
+fn leaps_leave_ripples_that_restarts_do_not() {
     // Known: 320 to 390 / 500 to 720 iterations, 97 to 100 %; without leaps 0 of 200 runs.
     let problem = TestProblem::new(TestFunction::Rastrigin, 10);
     let scattered =

@@ -1,10 +1,10 @@
-//! The beetle swarm on an objective of one's own: fits a damped oscillation to noisy samples, in single precision.
+//! The beetle swarm on your own objective: fits a damped oscillation to noisy samples, in single precision.
 //!
 //! `cargo run --release --example damped_oscillation -- [seed]`
 //!
-//! The search is advanced in slices of a few evaluations, as a task of low priority would do it, until its cost is that of
-//! the noise, its budget is spent or somebody cancels it. The objective (objective.rs) is the one that
-//! `scripts/count-instructions` runs on the emulated microcontroller.
+//! The search advances in slices of a few evaluations, as in a task of low priority. It ends when its cost
+//! has reached the noise, when its budget is spent, or when it is cancelled. `scripts/count-instructions`
+//! runs the same objective (objective.rs) on the emulated microcontroller.
 
 mod objective;
 

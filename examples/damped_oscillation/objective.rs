@@ -1,7 +1,7 @@
 //! A user's own objective: the five numbers of a damped oscillation, from samples of it.
 //!
-//! Why a file of its own: it is generic and needs neither `std` nor a heap, so that the example on the host, a test and
-//! the image that counts instructions on the emulated microcontroller are built from the same lines.
+//! Generic, without `std` and without a heap: the example on the host, a test and the image that counts
+//! instructions on the emulated microcontroller all use this file.
 //!
 //!   y(t) = amplitude exp(-decay t) cos(frequency t + phase) + offset,   cost = mean of (y - sample)^2
 

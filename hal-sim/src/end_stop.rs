@@ -1,15 +1,17 @@
 //! The mechanical end stops of a joint.
 //!
-//! Why: a leg whose drive is off falls, and what it falls against decides where it rests and whether it can be enabled there.
+//! Why: a leg whose drive is off falls. The end stop decides where it rests and whether it can be enabled
+//! there.
 //!
 //! ```text
-//! torque = -(STIFFNESS depth + DAMPING rate)        while the joint is beyond a stop; it pushes, it never pulls
+//! torque = -(STIFFNESS depth + DAMPING rate)   while the joint is beyond a stop; never a pull
 //! ```
 //!
-//! Each stop stands for a buffer of stiff rubber. The thigh with its shank (some 5 kg m^2) falls against it with 1 rad/s, which is 2.5 J:
-//! 10,000 N m/rad take them up within 1.3 degrees, and the drive's 85 N m press a joint 0.5 degrees into it. The damping is a quarter of
-//! the critical one of 4 kg m^2. Both are assumptions, not measurements. A step of a servo tick stays stable down to 0.03 kg m^2.
-//! N m, rad, rad/s, anatomical. Cost: two comparisons per joint and step away from the stops.
+//! Each stop stands for a buffer of stiff rubber. The thigh with its shank (some 5 kg m^2) falls against it
+//! at 1 rad/s, which is 2.5 J: 10,000 N m/rad absorb them within 1.3 degrees, and the drive's 85 N m press a
+//! joint 0.5 degrees into it. The damping is a quarter of the critical damping at 4 kg m^2. Both values are
+//! assumptions, not measurements. Integration in steps of a servo tick stays stable down to 0.03 kg m^2. N m,
+//! rad, rad/s, anatomical. Cost: two comparisons per joint and step away from the stops.
 
 /// N m/rad.
 const STIFFNESS: f64 = 10e3;

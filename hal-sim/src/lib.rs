@@ -19,8 +19,11 @@
 //! | [`gear`], [`sensors`], [`wearer`] | ratio; encoder and current sensor; pushes |
 //! | [`world`] | all of it as one seeded value that serves as the firmware's [`scarab::hal::LegDrives`] |
 //!
-//! The plant needs neither `std` nor a heap; the host tool and its crates are behind the feature `tool`.
-#![cfg_attr(not(feature = "tool"), no_std)]
+//! The plant needs neither `std` nor a heap.
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
 
 pub mod conventions;
 pub mod description;
@@ -36,7 +39,5 @@ pub mod leg;
 mod maths;
 pub mod mechanism;
 pub mod sensors;
-#[cfg(feature = "tool")]
-pub mod tool;
 pub mod wearer;
 pub mod world;

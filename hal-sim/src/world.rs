@@ -1,13 +1,13 @@
-//! A leg with drives, sensors and wearer as one seeded value.
+//! World: a leg with drives, sensors and wearer as one seeded value.
 //!
-//! Why one value: the firmware is tested by running it against a world, by cloning both anywhere and letting
-//! the copies go different ways, and by comparing copies bit for bit. A world holds no clock, no file and no
-//! shared state; the same seed and the same commands give the same bits.
+//! Why one value: a test runs the firmware against a world, clones both at any time, lets the copies continue
+//! differently, and compares copies bit for bit. A world holds no clock, no file and no shared state. The
+//! same seed and commands give the same bits.
 //!
-//! The exchange, once per servo tick of 250 us: read [`LegDrives::sample`] (sensors at this instant), hand
-//! over [`LegDrives::command`] (acts from this instant), [`World::advance`] to the next; or [`World::tick`],
-//! which does the last two and reads. With complete drives there is one exchange per PWM period instead,
-//! [`World::period`]. All public angles and torques are anatomical.
+//! One exchange per servo tick of 250 us: read [`LegDrives::sample`] (sensors now), set
+//! [`LegDrives::command`] (effective now), then [`World::advance`] to the next tick. [`World::tick`] does the
+//! last two and reads. With complete drives there is one exchange per PWM period instead, [`World::period`].
+//! All public angles and torques are anatomical.
 
 pub mod periods;
 
@@ -31,23 +31,23 @@ pub const TICK_RATE_HZ: f64 = 4000.0;
 /// Duration of a servo tick, s.
 pub const TICK_S: f64 = 1.0 / TICK_RATE_HZ;
 
-/// Servo ticks that are logged as one sample.
+/// Servo ticks per logged sample.
 const TICKS_PER_LOGGED: u64 = 8;
 
-/// What really happens in a world, without noise, at the present instant; anatomical, proximal joint first.
+/// True state of a world at the present instant, without noise; anatomical, proximal joint first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth<const N: usize> {
-    /// Since the world began, s.
+    /// Time since the start, s.
     pub time_s: f64,
     /// Joint angles, rad.
     pub position: [f64; N],
     /// Joint rates, rad/s; exactly 0 while a joint sticks.
     pub velocity: [f64; N],
-    /// Joint accelerations, rad/s^2, under the motor torque of this instant (pushes and floor left out).
+    /// Joint accelerations, rad/s^2, under the present motor torque; without pushes and floor.
     pub acceleration: [f64; N],
     /// Torque of the motors at the joints, N m.
     pub motor_torque: [f64; N],
-    /// Joints that friction holds.
+    /// Joints held by friction.
     pub sticking: [bool; N],
 }
 
@@ -59,11 +59,11 @@ pub struct World<const N: usize> {
     state: LegState<N>,
     anatomy: [Anatomy; N],
     drives: [Drive; N],
-    /// Instead of the ideal drives.
+    /// Complete drives, which replace the ideal ones.
     electric: Option<Electric<N>>,
     encoders: [Encoder; N],
     current_sensors: [CurrentSensor; N],
-    /// Sense of motors and encoders in the anatomical one, 1 or -1.
+    /// Direction of motors and encoders relative to the anatomical one, 1 or -1.
     mounting: f64,
     wearer: Wearer,
     blocked: [bool; N],
@@ -76,7 +76,7 @@ pub struct World<const N: usize> {
 }
 
 impl<const N: usize> World<N> {
-    /// A leg at rest at its anatomical zero, bridges released.
+    /// A leg at rest at its anatomical zero, bridges off.
     #[must_use]
     pub fn new(description: &LegDescription<N>, seed: u64) -> Self {
         let joints = &description.joints;
@@ -108,7 +108,7 @@ impl<const N: usize> World<N> {
         world
     }
 
-    /// Puts the leg at rest at anatomical angles, rad; the encoders' reference stays where it was.
+    /// Sets the leg at rest at anatomical angles, rad; the encoders' reference does not change.
     pub fn place(&mut self, position: &[f64; N]) {
         let anatomy = &self.anatomy;
         self.state = LegState {
@@ -121,8 +121,8 @@ impl<const N: usize> World<N> {
         self.read_sensors();
     }
 
-    /// Fixes a point mass (kg) to a link, at a place (m) in its joint's D-H frame, from this instant on; the motion goes
-    /// on at the same speed. Nothing happens where there is no such joint.
+    /// Attaches a point mass (kg) to a link, at a position (m) in its joint's D-H frame, from now on. The
+    /// motion continues at the same speed. An unknown joint is ignored.
     pub fn attach(&mut self, joint: usize, mass: f64, at: [f64; 3]) {
         if let Some(joint) = self.description.joints.get_mut(joint) {
             joint.body = joint.body.with_point_mass(mass, at);
@@ -130,7 +130,7 @@ impl<const N: usize> World<N> {
         }
     }
 
-    /// Blocks a joint where it stands, from this instant on. Nothing happens where there is no such joint.
+    /// Blocks a joint at its present angle from now on. An unknown joint is ignored.
     pub fn block(&mut self, joint: usize) {
         if let (Some(blocked), Some(rate)) = (self.blocked.get_mut(joint), self.state.rates.get_mut(joint)) {
             (*blocked, *rate) = (true, 0.0);
@@ -138,8 +138,8 @@ impl<const N: usize> World<N> {
         }
     }
 
-    /// The foot, at a place (m) of the last link in its D-H frame, stands on the floor ([`Floor`]) from `delay` s after
-    /// this instant, for `duration` s.
+    /// Lets the foot stand on the floor ([`Floor`]) from `delay` s after now, for `duration` s. `foot` is its
+    /// position (m) on the last link, in that link's D-H frame.
     pub fn touch(&mut self, foot: [f64; 3], delay: f64, duration: f64) {
         let mut joints = self.description.joints;
         if let Some(last) = joints.last_mut() {
@@ -149,7 +149,7 @@ impl<const N: usize> World<N> {
         self.floor = foot.map(|foot| Floor::new(foot, self.tick as f64 * TICK_S + delay, duration));
     }
 
-    /// Multiplies the Coulomb level (that at rest too) and the viscous coefficient of every joint from this instant on.
+    /// Multiplies every joint's Coulomb level, also at rest, and viscous coefficient from now on.
     pub fn scale_friction(&mut self, factor: f64) {
         for joint in &mut self.description.joints {
             joint.friction.coulomb *= factor;
@@ -161,23 +161,24 @@ impl<const N: usize> World<N> {
         self.leg = Leg::new(&self.description).with_blocked(self.blocked);
     }
 
-    /// Gives the wearer other habits from this instant on; none for a wearer who holds still.
+    /// Changes the wearer's pushes from now on; `None` for a wearer who holds still.
     pub fn set_pushes(&mut self, pushes: Option<PushDescription>) {
         self.description.pushes = pushes;
         self.wearer.change_habits(pushes, self.tick as f64 * TICK_S, N);
     }
 
-    /// The wearer pushes or kicks once, from this instant on: half a sine on one joint, its peak in N m, anatomical.
+    /// Lets the wearer push or kick once from now on: half a sine on one joint, peak in N m, anatomical.
     pub fn push(&mut self, joint: usize, peak: f64, duration: f64) {
         self.wearer.push(joint, peak, self.tick as f64 * TICK_S, duration);
     }
 
-    /// A hand holds a joint where it is ([`Grip`]), from this instant on for `duration` s, with `strength` N m at most.
+    /// Lets a hand hold a joint at its present angle ([`Grip`]) for `duration` s, with at most `strength` N
+    /// m.
     pub fn hold(&mut self, joint: usize, strength: f64, duration: f64) {
         self.grip = Some(Grip::new(joint, strength, self.tick as f64 * TICK_S, duration));
     }
 
-    /// What the hand gives at `time`, N m, anatomical.
+    /// Torque of the hand at `time`, N m, anatomical.
     fn gripped(&mut self, time: f64) -> [f64; N] {
         let (position, velocity) = (self.anatomical_position(), self.velocity());
         self.grip.as_mut().map_or([0.0; N], |grip| grip.torque(&position, &velocity, time))
@@ -190,14 +191,14 @@ impl<const N: usize> World<N> {
         }
     }
 
-    /// One servo tick: commands act, time passes, sensors are read.
+    /// Runs one servo tick: sets commands, advances, reads sensors.
     pub fn tick(&mut self, command: &DriveCommand<N>) -> Sample<N> {
         self.command(command);
         self.advance();
         self.newest
     }
 
-    /// To the next servo tick; complete drives coast.
+    /// Advances to the next servo tick; complete drives coast.
     pub fn advance(&mut self) {
         if self.electric.is_some() {
             for _ in 0..PERIODS_PER_TICK {
@@ -226,7 +227,7 @@ impl<const N: usize> World<N> {
         self.read_sensors();
     }
 
-    /// What the mechanical end stops give now, N m, joint sign.
+    /// Torque of the mechanical end stops now, N m, joint sign.
     fn stopped(&self) -> [f64; N] {
         let (position, velocity) = (self.anatomical_position(), self.velocity());
         core::array::from_fn(|joint| {
@@ -235,7 +236,7 @@ impl<const N: usize> World<N> {
         })
     }
 
-    /// Motors and pushes on the joints, N m, joint sign.
+    /// Torque of motors and pushes on the joints, N m, joint sign.
     fn joint_torque(&self, pushed: &[f64; N]) -> [f64; N] {
         let motor = self.motor_torque();
         core::array::from_fn(|joint| self.anatomy[joint].flip(motor[joint] + pushed[joint]))
@@ -263,7 +264,7 @@ impl<const N: usize> World<N> {
         }
     }
 
-    /// What really happens now. Costs about as much as a tick.
+    /// True state now. Costs about as much as a tick.
     #[must_use]
     pub fn truth(&self) -> Truth<N> {
         let (anatomy, state) = (&self.anatomy, &self.state);
@@ -278,8 +279,8 @@ impl<const N: usize> World<N> {
         }
     }
 
-    /// Torque of the motors at the joints now, N m, without noise; what [`Truth`] holds, at no cost. Of complete drives the
-    /// mean over the last servo tick.
+    /// Torque of the motors at the joints now, N m, without noise; as in [`Truth`], at no cost. For complete
+    /// drives the mean over the last servo tick.
     #[must_use]
     pub fn motor_torque(&self) -> [f64; N] {
         core::array::from_fn(|joint| {
@@ -288,26 +289,26 @@ impl<const N: usize> World<N> {
         })
     }
 
-    /// Joint angles now, rad, anatomical; what [`Truth`] holds, at no cost.
+    /// Joint angles now, rad, anatomical; as in [`Truth`], at no cost.
     #[must_use]
     pub fn anatomical_position(&self) -> [f64; N] {
         core::array::from_fn(|joint| self.anatomy[joint].to_anatomical_angle(self.state.angles[joint]))
     }
 
-    /// Joint rates now, rad/s, anatomical; what [`Truth`] holds, at no cost.
+    /// Joint rates now, rad/s, anatomical; as in [`Truth`], at no cost.
     #[must_use]
     pub fn velocity(&self) -> [f64; N] {
         core::array::from_fn(|joint| self.anatomy[joint].flip(self.state.rates[joint]))
     }
 
-    /// Joints that friction holds now; what [`Truth`] holds, at no cost.
+    /// Joints held by friction now; as in [`Truth`], at no cost.
     #[must_use]
     pub fn sticking(&self) -> [bool; N] {
         self.state.rates.map(|rate| rate == 0.0)
     }
 
-    /// Motor torque, N m, that makes a motion (rad, rad/s, rad/s^2), friction and offset included; of a joint
-    /// at rest dry friction is undetermined and left out.
+    /// Motor torque, N m, for a motion (rad, rad/s, rad/s^2), with friction and offset. Dry friction of a
+    /// joint at rest is undetermined and left out.
     #[must_use]
     pub fn inverse_dynamics(
         &self,
@@ -325,7 +326,7 @@ impl<const N: usize> World<N> {
 }
 
 impl<const N: usize> LegDrives<N> for World<N> {
-    /// Read at the last tick; reading again changes nothing.
+    /// Sample of the last tick; reading again changes nothing.
     fn sample(&mut self) -> Sample<N> {
         self.newest
     }

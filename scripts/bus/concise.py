@@ -1,7 +1,8 @@
-"""Writes concise device configuration files to live nodes: `concise.py HOST:PORT NODE=FILE...`, as a master does at a node's boot-up.
+"""Writes concise device configuration files to live nodes: `concise.py HOST:PORT NODE=FILE...`.
 
-The files are those of Lely's `dcfgen`: a count, then index, subindex, length and bytes of each object. Every write has to be accepted, and what
-a node reads afterwards is what was written last. The last line is `concise: ok`.
+A master writes such files at a node's boot-up.
+The files come from Lely's `dcfgen`: a count, then index, subindex, length and bytes of each object. Every
+write must be accepted, and a read must return the last written value. The last line is `concise: ok`.
 """
 
 import struct

@@ -1,9 +1,9 @@
 """Hostile frames through the port: `hostile.py HOST:PORT [--frames N] [--taken N] [--pid PID]`.
 
-Random frames of every identifier and length, broken lines and lines that never end, as fast as the port takes them: a million, or so many, and
-until so many were taken for the wire instead of being refused. Every line has to be answered, no more frames may be taken than the
-wire carries, the process with that number may not grow by more than 32 MB, and the nodes have to answer afterwards. The last line is
-`hostile: ok`.
+Sends random frames of every identifier and length, broken lines and endless lines, as fast as the port takes
+them. It sends at least `--frames` (a million), until `--taken` of them were accepted instead of refused.
+Every line must be answered, and no more frames may be accepted than the bus carries. The process `--pid` may
+grow by at most 32 MB, and the nodes must answer afterwards. The last line is `hostile: ok`.
 """
 
 import argparse
@@ -13,13 +13,13 @@ import socket
 import time
 
 CHUNK = 2000
-# The shortest frame that is sent, bits; the wire's, bits per second.
+# Shortest sent frame, bits; bit rate of the bus, bits per second.
 SHORTEST, WIRE = 47, 1_000_000
 MOST_GROWN_KB = 32_000
 
 
 def lines(dice):
-    """A chunk of lines, and how many answers it has."""
+    """Returns a chunk of random lines; each has one answer."""
     out = []
     for _ in range(CHUNK):
         kind = dice.random()
@@ -28,7 +28,7 @@ def lines(dice):
             identifier = dice.choice((dice.randint(0, 0x7FF), 0, 0x80, 0x201, 0x301, 0x601, 0x602))
             out.append(f"t{identifier:03X}{len(data)}{data.hex().upper()}")
         elif kind < 0.95:
-            # No command of an adapter, nor one that closes or opens the channel.
+            # Neither an adapter command nor one that closes or opens the channel.
             out.append("".join(dice.choice("tTrRx0123456789ABDE") for _ in range(dice.randint(1, 40))))
         else:
             out.append("t601" + "8" * dice.randint(1, 300))
@@ -36,13 +36,13 @@ def lines(dice):
 
 
 def memory_kb(pid):
-    """The process's memory now."""
+    """Present memory of the process."""
     with open(f"/proc/{pid}/status", encoding="ascii") as status:
         return next(int(line.split()[1]) for line in status if line.startswith("VmRSS:"))
 
 
 class Port:
-    """The port, and how its answers were."""
+    """The port and statistics of its answers."""
 
     def __init__(self, address):
         host, _, number = address.rpartition(":")
@@ -51,7 +51,7 @@ class Port:
         self.rest, self.taken, self.bells, self.frames = b"", 0, 0, []
 
     def read(self, wait_s):
-        """Counts the answers that are there."""
+        """Counts the available answers."""
         if not select.select([self.socket], [], [], wait_s)[0]:
             return
         received = self.socket.recv(1 << 18)
@@ -65,7 +65,7 @@ class Port:
                 self.frames = self.frames[-99:] + [line]
 
     def send(self, data):
-        """Sends while it reads: a port that waits for its answers to be read is not hung."""
+        """Reads while it sends, because the port may wait until its answers are read."""
         while data:
             _, writable, _ = select.select([], [self.socket], [], 0)
             if writable:
@@ -82,7 +82,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     dice = random.Random(arguments.seed)
-    # A few chunks, sent in random order: making a million lines takes longer than sending them.
+    # A few chunks in random order, because making a million lines takes longer than sending them.
     chunks = [lines(dice) for _ in range(40)]
     port = Port(arguments.address)
     port.send(b"C\rS8\rO\r")
@@ -103,7 +103,7 @@ def main():
     print(f"{sent} lines in {seconds:.1f} s: {port.taken} frames taken, {port.bells} refused; memory {before} KB, at most {most} KB")
     assert port.bells > 0 and port.taken <= carries + 0.02 * sent, f"{port.taken} taken, the wire carries {carries:.0f}"
     assert most - before < MOST_GROWN_KB, "the memory is not bounded"
-    # Whatever was written: all nodes begin anew, and say so.
+    # All nodes restart and report it, whatever was written before.
     port.frames.clear()
     boots, end = set(), time.monotonic() + 20
     while len(boots) < 2:

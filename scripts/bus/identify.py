@@ -1,9 +1,9 @@
 """An identification over the bus: `identify.py HOST:PORT [--json FILE] [--no-log] [--cancel]`.
 
-Sets plan and seed, enables the leg, starts the identification and reads the 500 Hz log in blocks while the leg
-moves. Then verdict, parameters with standard deviation and status, and fits are read. Lost samples end the script
-with exit code 1. `--no-log` does not read the log, for a wire or a host that cannot carry it. `--cancel` cancels
-while the leg moves.
+Sets plan and seed, enables the leg, starts the identification and reads the 500 Hz log in blocks while the
+leg moves. Then verdict, parameters with standard deviation and status, and fits are read. Lost samples end
+the script with exit code 1. `--no-log` does not read the log, for a wire or a host that cannot carry it.
+`--cancel` cancels while the leg moves.
 """
 
 import argparse
@@ -25,19 +25,19 @@ RATE_HZ, TICKS_PER_SAMPLE = 500, 8
 class Log:
     """The node's queue of samples: reads it in blocks and counts what was lost.
 
-    The queue drops new samples while it is full; object 2140:4 counts them. It holds 2,000 samples in `serve` (4 s)
-    and 192 on the board (0.38 s).
+    The queue drops new samples while it is full; object 2140:4 counts them. It holds 2,000 samples in `serve`
+    (4 s) and 192 on the board (0.38 s).
     """
 
     def __init__(self, joint):
         self.joint, self.samples, self.longest = joint, [], 0
-        # Old samples are discarded unread: while they are read the queue stays full, and new samples are lost.
+        # Discards old samples unread: reading them would keep the queue full and lose new samples.
         joint.write(0x2140, 1, 1)
         joint.write(0x2140, 1, 0)
         self.lost_before = joint.read(0x2140, 4)
 
     def take(self):
-        """Holds what waits, reads it as one block, releases it."""
+        """Locks the waiting samples, reads them as one block, releases them."""
         self.joint.write(0x2140, 1, 1)
         held = self.joint.read(0x2140, 1)
         self.longest = max(self.longest, held)
@@ -51,7 +51,7 @@ class Log:
         return self.joint.read(0x2140, 4) - self.lost_before
 
     def complaint(self, seconds):
-        """Says what is missing of a log that was read in this time: by the node's count, or by a gap of ticks."""
+        """Describes samples missing in a log of this time, by the node's count or by a gap in the ticks."""
         lost = self.lost()
         ticks = [sample[0] for sample in self.samples]
         gaps = [(one, other) for one, other in zip(ticks, ticks[1:]) if other - one != TICKS_PER_SAMPLE]
@@ -64,7 +64,7 @@ class Log:
 
 
 def parameters(joint):
-    """Fourteen of each joint."""
+    """Reads the fourteen parameters of each joint."""
     return {
         symbol: {
             "value": known(joint.read(0x2110, place, "<f")),
@@ -173,7 +173,7 @@ def main():
     until("off", lambda: hip.state() == 0x40)
     if complaint:
         raise SystemExit(f"identify: {complaint}")
-    # The model and everything that was set up, kept over the power.
+    # Stores the model and all settings permanently.
     hip.emergencies.clear()
     hip.write(0x1010, 1, int.from_bytes(b"save", "little"))
     until("how the store ended", lambda: hip.emergencies[-1:] in ([0x0000], [0x5530]))

@@ -1,5 +1,6 @@
-// npm's `canopen` against the simulated leg: `node node_canopen.js HOST:PORT`. The library knows no adapter; it is given frames as objects,
-// here over slcan on TCP. Objects by all three kinds of transfer, network management, PDOs, a motion. The last line is `node-canopen: ok`.
+// Runs npm's `canopen` against the simulated leg: `node node_canopen.js HOST:PORT`. The library has no
+// adapter; frames are exchanged as objects, here over slcan on TCP. Tests all three kinds of transfer,
+// network management, PDOs and a motion. The last line is `node-canopen: ok`.
 'use strict';
 const assert = require('node:assert');
 const net = require('node:net');
@@ -9,7 +10,7 @@ const NODES = [1, 2];
 const STATES = [[6, 0x21], [7, 0x23], [15, 0x27]];
 const SPEED = 100000;
 
-/** Sends and hears the device's frames as slcan lines. */
+/** Sends and receives the device's frames as slcan lines. */
 function connect(address, device) {
     const end = address.lastIndexOf(':');
     const socket = net.connect(Number(address.slice(end + 1)), address.slice(0, end));
@@ -69,7 +70,7 @@ async function main(address) {
         assert.equal(again, name);
         await assert.rejects(read(node, 0x5FFF, 0, DataType.UNSIGNED32));
         await write(node, 0x1017, 0, DataType.UNSIGNED16, 50);
-        // The statusword every 20 ms.
+        // Sends the statusword every 20 ms.
         await write(node, 0x1800, 2, DataType.UNSIGNED8, 255);
         await write(node, 0x1800, 5, DataType.UNSIGNED16, 20);
     }

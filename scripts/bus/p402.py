@@ -1,7 +1,7 @@
-"""The drive profile by `canopen.BaseNode402`, as its users have it: `p402.py HOST:PORT FOLDER`, with what `cargo sim eds --out FOLDER` wrote.
+"""Drive profile by `canopen.BaseNode402`: `p402.py HOST:PORT FOLDER`; `cargo sim eds --out FOLDER` first.
 
-Both joints up to OPERATION ENABLED, profile velocity, profile position, off. TPDO 1, which has the statusword, is sent every
-20 ms: the library waits for it before each step. The last line is `p402: ok`.
+Both joints go to OPERATION ENABLED, profile velocity, profile position, off. TPDO 1 contains the statusword
+and is sent every 20 ms, because the library waits for it before each step. The last line is `p402: ok`.
 """
 
 import os
@@ -20,10 +20,10 @@ ENABLED = 0x0F
 
 
 def set_up(network, number, sheet):
-    """A node by its sheet, with a statusword every 20 ms."""
+    """Creates a node from its sheet, with a statusword every 20 ms."""
     node = canopen.BaseNode402(number, sheet)
     network.add_node(node)
-    # On a busy machine `serve` drops a controlword that waited for more than 100 ms: it is sent again.
+    # On a busy machine `serve` drops a controlword that waited for more than 100 ms, so it is sent again.
     node.sdo.RESPONSE_TIMEOUT, node.sdo.MAX_RETRIES = 2.0, 3
     node.nmt.state = "PRE-OPERATIONAL"
     node.tpdo.read()
@@ -42,7 +42,7 @@ def position(node):
 
 
 def profile_velocity(node):
-    """0.1 rad/s until it is reached, then back to rest."""
+    """Commands 0.1 rad/s until it is reached, then rest."""
     node.op_mode = "PROFILED VELOCITY"
     assert node.op_mode == "PROFILED VELOCITY", node.op_mode
     begin = position(node)
@@ -55,7 +55,7 @@ def profile_velocity(node):
 
 
 def profile_position(node):
-    """A set-point of 0.1 rad less."""
+    """Commands a set-point of 0.1 rad less."""
     node.op_mode = "PROFILED POSITION"
     assert node.op_mode == "PROFILED POSITION", node.op_mode
     goal = position(node) - WAY
@@ -64,7 +64,7 @@ def profile_position(node):
     node.controlword = ENABLED | NEW_SET_POINT | AT_ONCE
     until("set-point taken", lambda: node.statusword & 1 << 12)
     node.controlword = ENABLED
-    # The target before, which was reached, is reported until the leg has taken this one.
+    # The previous target is reported as reached until the leg has taken this one.
     time.sleep(0.1)
     until("target reached", lambda: node.statusword & 1 << 10 and not node.statusword & 1 << 12)
     assert abs(position(node) - goal) < 0.02, f"{position(node)} instead of {goal}"
@@ -76,12 +76,12 @@ def main():
     network = connect(address)
     nodes = [set_up(network, number, os.path.join(folder, f"scarab-{joint}.eds")) for number, joint in JOINTS]
     for node in nodes:
-        # Before its first PDO the library takes the statusword for 0.
-        node.check_statusword()
-        assert node.state == "SWITCH ON DISABLED", node.state
+        # The library assumes a statusword of 0 until it has received a PDO. It knows that the PDO is periodic only
+        # after the second one; until then its `check_statusword` does not wait.
+        until("switch on disabled", lambda: node.state == "SWITCH ON DISABLED")
     for node in nodes:
         node.state = "OPERATION ENABLED"
-    # Bit 15: the other joint has not asked yet.
+    # Bit 15: the other joint has not requested enabling yet.
     until("the leg's drive", lambda: not any(node.statusword & 1 << 15 for node in nodes))
     print("enabled by the library's state machine:", ", ".join(node.state for node in nodes))
     profile_velocity(nodes[0])

@@ -1,8 +1,9 @@
 """Stop and enable from random poses: `poses.py HOST:PORT [--poses COUNT] [--seed SEED] [--leg FILE]`.
 
-Each time the leg goes to a random pose of its range and is stopped in one of five ways, each of which lets it fall. Then it is enabled again.
-Where it is not, the nodes have to say why (a bit of 60FD that was not set before, an emergency message, 603F), and a host that
-does no more than reset faults and ask again has to get it back. The last line is `poses: ok`.
+Each time the leg goes to a random pose within its range, is stopped in one of five ways that let it fall, and
+is enabled again. If enabling fails, the nodes must report the reason (a new bit of 60FD, an emergency
+message, 603F). A host that only resets faults and requests again must then succeed. The last line is
+`poses: ok`.
 """
 
 import argparse
@@ -18,12 +19,12 @@ NODES = (1, 2)
 DEFAULT_LEG = "x2-wearer-75kg.toml"
 WAYS = ("disable voltage", "quick stop", "reset of the nodes", "connection cut", "disable operation, then shut-down and off")
 STEPS = ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27))
-# A leg that fell is given some time to come to rest.
+# Time for a fallen leg to come to rest.
 ENABLE_WITHIN_S, BACK_WITHIN_S, FALL_S = 2.0, 60.0, 1.5
 
 
 class Leg:
-    """A connection and the joints behind it."""
+    """A connection and its joints."""
 
     def __init__(self, address):
         self.address = address
@@ -39,7 +40,7 @@ class Leg:
 
 
 def is_up(joints, longest_s):
-    """Whether 6, 7, F enable the leg."""
+    """Sends 6, 7, F and returns whether the leg is enabled."""
     end = time.monotonic() + longest_s
     for word, state in STEPS:
         for joint in joints:
@@ -51,7 +52,7 @@ def is_up(joints, longest_s):
 
 
 def off(joints):
-    """Faults reset, controlword 0."""
+    """Resets faults and sends controlword 0."""
     for joint in joints:
         joint.write(0x6040, 0, 0x00, "<H")
         joint.write(0x6040, 0, 0x80, "<H")
@@ -59,14 +60,14 @@ def off(joints):
 
 
 def ranges(path):
-    """The joints' ranges, rad, of a leg file."""
+    """Reads the joints' ranges of a leg file, rad."""
     with open(path, encoding="utf-8") as file:
         found = re.findall(r"^range_deg = \[(.+), (.+)\]", file.read(), re.MULTILINE)
     return [tuple(math.radians(float(end)) for end in pair) for pair in found]
 
 
 def pose(joints, limits, dice):
-    """A random pose of the range, reached as far as it is in 10 s."""
+    """Moves to a random pose within the range, for at most 10 s."""
     goals = []
     for joint, (low, high) in zip(joints, limits):
         goals.append(round(dice.uniform(low + 0.02 * (high - low), high - 0.02 * (high - low)) / MICRO))
@@ -108,7 +109,7 @@ def stop(leg, way):
 
 
 def reason(joints, inputs):
-    """Why the leg is not enabled, in the nodes' words."""
+    """Reasons reported by the nodes why the leg is not enabled."""
     found = []
     for joint, before in zip(joints, inputs):
         now = joint.read(0x60FD)
@@ -124,7 +125,7 @@ def main():
     parser.add_argument("address")
     parser.add_argument("--poses", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--leg", default=os.path.join(os.path.dirname(__file__), "../../hal-sim/legs", DEFAULT_LEG))
+    parser.add_argument("--leg", default=os.path.join(os.path.dirname(__file__), "../../host/legs", DEFAULT_LEG))
     arguments = parser.parse_args()
     count, dice, limits = arguments.poses, random.Random(arguments.seed), ranges(arguments.leg)
     leg = Leg(arguments.address)
@@ -156,7 +157,7 @@ def main():
         else:
             locked.append(where)
             print(f"{where}: LOCKED OUT", flush=True)
-            # Another one cannot be tried from here.
+            # No other pose can be tried from here.
             break
     off(leg.joints)
     leg.close()

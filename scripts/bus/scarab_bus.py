@@ -1,7 +1,7 @@
-"""A leg on the bus, for Python: what `session.py` and `identify.py` share.
+"""A leg on the bus, for Python: common code of `session.py` and `identify.py`.
 
-Needs the packages `canopen`, `python-can` and `pyserial`; any CAN adapter that python-can knows will do, here it is the one that
-`cargo sim serve` simulates.
+Requires the packages `canopen`, `python-can` and `pyserial`. Any CAN adapter of python-can works; here it is
+the one that `cargo sim serve` simulates.
 """
 
 import math
@@ -22,8 +22,9 @@ PDO_OFF = 0x80000000
 class Adapter(slcanBus):
     """python-can's slcan adapter on TCP, read in blocks.
 
-    python-can reads a socket byte by byte, with a `select` and a `recv` for each of the 22 bytes of a frame. That takes
-    three quarters of a core for the 500 Hz log. On a busy machine it falls behind and samples are lost.
+    python-can reads a socket byte by byte, with a `select` and a `recv` for each of the 22 bytes of a frame.
+    That takes three quarters of a core for the 500 Hz log. On a busy machine it falls behind and samples are
+    lost.
     """
 
     def _read(self, timeout):
@@ -41,14 +42,14 @@ class Adapter(slcanBus):
 
 
 def connect(address):
-    """The bus behind an slcan adapter on TCP, `host:port`."""
+    """Connects to the bus of an slcan adapter on TCP, `host:port`."""
     network = canopen.Network(Adapter(f"socket://{address}", bitrate=1_000_000, sleep_after_open=0))
     network.connect()
     return network
 
 
 def until(what, condition, longest_s=20.0):
-    """Waits for a condition; its value."""
+    """Waits for a condition and returns its value."""
     end = time.monotonic() + longest_s
     while True:
         value = condition()
@@ -66,22 +67,22 @@ class Joint:
         self.network, self.number = network, number
         self.node = network.add_node(number, canopen.ObjectDictionary())
         self.node.sdo.RESPONSE_TIMEOUT = 5.0
-        # On a busy machine `serve` drops a controlword that waited for more than 100 ms: it is sent again.
+        # On a busy machine `serve` drops a controlword that waited for more than 100 ms, so it is sent again.
         self.node.sdo.MAX_RETRIES = 3
         self.sent = {}
         self.emergencies = []
         self.node.emcy.add_callback(lambda error: self.emergencies.append(error.code))
 
     def read(self, index, sub=0, kind="<I"):
-        """A number of an object."""
+        """Reads an object as a number."""
         return struct.unpack(kind, self.node.sdo.upload(index, sub))[0]
 
     def write(self, index, sub, value, kind="<I"):
-        """Gives an object a number."""
+        """Writes a number to an object."""
         self.node.sdo.download(index, sub, struct.pack(kind, value))
 
     def set_up_pdo(self, communication, cob, kind, objects):
-        """As recorded host software does it: off, mapping, on; every write is acknowledged."""
+        """Maps a PDO like recorded host software: off, mapping, on; every write is acknowledged."""
         mapping = communication + 0x200
         self.write(communication, 1, PDO_OFF | cob)
         self.write(mapping, 0, 0, "<B")
@@ -94,7 +95,7 @@ class Joint:
             self.network.subscribe(cob, lambda _, data, when: self.sent.__setitem__(communication, (bytes(data), when)))
 
     def pdo(self, communication, kind):
-        """The values of the last PDO of that number that came, or nothing."""
+        """Values of the last received PDO of that number, or None."""
         data = self.sent.get(communication)
         return struct.unpack(kind, data[0]) if data else None
 
@@ -108,7 +109,7 @@ class Joint:
 
 
 class Heartbeat:
-    """The host's heartbeat, until it is stopped."""
+    """Sends the host's heartbeat until it is stopped."""
 
     def __init__(self, network, period_s=0.02):
         self.network, self.period_s, self.runs = network, period_s, True
@@ -126,16 +127,21 @@ class Heartbeat:
 
 
 def enable(joints):
-    """6, 7, F; a leg is enabled once all of its joints have asked."""
+    """Sends 6, 7, F; a leg is enabled once all of its joints have requested it.
+
+    A stop is awaited first, such as that of a lost host: a word sent while it lasts is not kept for later.
+    """
+    for joint in joints:
+        until(f"the end of the stop of node {joint.number}", lambda: joint.read(0x6041, 0, "<H") & 0x6F != 0x07)
     for word, state in ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27)):
         for joint in joints:
             joint.write(0x6040, 0, word, "<H")
         for joint in joints:
-            # Bit 15: the joint is enabled for itself, the leg is not yet.
+            # Bit 15: the joint is enabled, the leg is not yet.
             until(f"state {state:02X} of node {joint.number}",
                   lambda: joint.read(0x6041, 0, "<H") & 0x806F == state)
 
 
 def known(value):
-    """What is not a number is not known."""
+    """Converts NaN to None."""
     return None if math.isnan(value) else value

@@ -1,7 +1,7 @@
-"""A host's session with a leg, as recorded host software has it: `session.py HOST:PORT [NODE NODE]`.
+"""A host's session with a leg, like that of recorded host software: `session.py HOST:PORT [NODE NODE]`.
 
-Network start, PDOs set up while Operational, 6 7 F, motions by received PDOs of type 255 and of type 1 under SYNC, a host that is lost
-in two ways, and the way back. Every step is checked; the last line is `session: ok`.
+Network start, PDOs configured while Operational, 6 7 F, motions by received PDOs of type 255 and of type 1
+with SYNC, two kinds of a lost host, and recovery. Every step is checked; the last line is `session: ok`.
 """
 
 import math
@@ -13,7 +13,7 @@ from scarab_bus import HOST, Heartbeat, Joint, MICRO, connect, enable, until
 
 
 def set_up(joint):
-    """RPDO and TPDO as in the recorded session."""
+    """Configures RPDO and TPDO as in the recorded session."""
     node = joint.number
     joint.set_up_pdo(0x1800, 0x180 + node, 1, [0x60410010])
     joint.set_up_pdo(0x1801, 0x280 + node, 1, [0x60640020, 0x606C0020])
@@ -26,12 +26,12 @@ def set_up(joint):
 
 
 def sync(network, joints, position):
-    """SYNC, and the positions that came with it; the statusword has to be among what came."""
+    """Sends SYNC and returns the received positions; the statusword must be received too."""
     for joint in joints:
         joint.sent.clear()
 
     def is_answered():
-        # `serve` drops a SYNC with targets that waited for more than 100 ms on a busy machine.
+        # On a busy machine `serve` drops a SYNC with targets that waited for more than 100 ms.
         if time.monotonic() > is_answered.again:
             network.send_message(0x80, b"")
             is_answered.again = time.monotonic() + 1.0
@@ -45,7 +45,7 @@ def sync(network, joints, position):
 
 
 def profile_position(network, joints):
-    """A set-point by PDO of type 255: target, then bit 4."""
+    """Commands a set-point by PDO of type 255: target, then bit 4."""
     for joint in joints:
         joint.write(0x6060, 0, 1, "<b")
         until("mode 1", lambda: joint.read(0x6061, 0, "<b") == 1)
@@ -55,7 +55,7 @@ def profile_position(network, joints):
     for joint, goal in zip(joints, goals):
         network.send_message(0x300 + joint.number, struct.pack("<i", round(goal / MICRO)))
         network.send_message(0x200 + joint.number, struct.pack("<H", 0x3F))
-    # The target before, which was reached, is told until the leg has taken this one.
+    # The previous target is reported as reached until the leg has taken this one.
     time.sleep(0.05)
     for joint in joints:
         until("target reached", lambda: joint.read(0x6041, 0, "<H") & 1 << 10)
@@ -66,7 +66,7 @@ def profile_position(network, joints):
 
 
 def profile_velocity(network, joints):
-    """A velocity by PDO, then halt."""
+    """Commands a velocity by PDO, then halt."""
     joint = joints[0]
     joint.write(0x6060, 0, 3, "<b")
     network.send_message(0x400 + joint.number, struct.pack("<i", -200_000))
@@ -79,11 +79,11 @@ def profile_velocity(network, joints):
 
 
 def cyclic_position(network, joints, seconds=3.0, period_s=0.01):
-    """Positions by PDO of type 1, taken at SYNC; the SYNCs come every 10 ms as far as this machine keeps its time."""
+    """Commands positions by PDO of type 1, taken at SYNC, every 10 ms as far as this machine can."""
     for joint in joints:
         joint.set_up_pdo(0x1401, 0x300 + joint.number, 1, [0x607A0020])
         joint.write(0x60C2, 1, 10, "<B")
-        # Of a host that is no real-time machine.
+        # This host is not real-time.
         joint.write(0x6066, 0, 1000, "<H")
     begin = [joint.position() for joint in joints]
     for joint, place in zip(joints, begin):
@@ -99,13 +99,13 @@ def cyclic_position(network, joints, seconds=3.0, period_s=0.01):
         time.sleep(max(0.0, start + now + period_s - time.monotonic()))
     for word in sync(network, joints, False):
         assert word & 0x6F == 0x27, f"statusword {word:04X}"
-    # The joint is a period and the servo behind, and this machine may be later.
+    # The joint lags by a period and the servo, and this machine may be late.
     assert largest < 0.06, f"{largest} rad behind"
     print(f"cyclic position: {seconds:.0f} s under SYNC, at most {largest * 1e3:.1f} mrad from the newest target")
 
 
 def lose_the_host(network, joints):
-    """Without the host's heartbeat the leg stops as 6007 says, with an emergency message, and stays off."""
+    """Without the heartbeat the leg stops according to 6007, sends an emergency message and stays off."""
     for option, final in ((3, 0x40), (1, 0x08)):
         for joint in joints:
             joint.write(0x6060, 0, 0, "<b")
@@ -136,7 +136,7 @@ def lose_the_host(network, joints):
 def main(address, numbers):
     network = connect(address)
     joints = [Joint(network, number) for number in numbers]
-    # Started before it is set up: recorded host software does it in this order.
+    # Started before configuration, in the order of the recorded host software.
     network.nmt.state = "OPERATIONAL"
     for joint in joints:
         set_up(joint)

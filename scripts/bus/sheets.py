@@ -1,8 +1,11 @@
-"""The electronic data sheets against live nodes: `sheets.py HOST:PORT FOLDER`, with what `cargo sim eds --out FOLDER` wrote.
+"""Compares electronic data sheets with live nodes: `sheets.py HOST:PORT FOLDER`.
 
-`canopen` has to load both sheets without a complaint. Then object by object, through the library and what it knows from the sheet alone: what
-is there has the sheet's size and, where the sheet has one, its default; what the sheet calls read-only, and nothing else, refuses to be written for
-that reason; PDOs are as the sheet says; and nothing answers that is not in the sheet. The last line is `sheets: ok`.
+First write the sheets: `cargo sim eds --out FOLDER`.
+
+`canopen` must load both sheets without a warning. Then it reads each object with the information of the sheet
+alone. Each object has the sheet's size and default, where there is one. Exactly the read-only objects refuse
+a write for that reason. PDOs match the sheet, and no object answers that is not in it. The last line is
+`sheets: ok`.
 """
 
 import configparser
@@ -18,15 +21,15 @@ from canopen.sdo import SdoAbortedError
 
 from scarab_bus import connect
 
-# No data yet: the list of errors, and results before the first identification.
+# Objects without data yet: the list of errors, and results before the first identification.
 NO_DATA = 0x08000024
 READ_ONLY, NO_OBJECT, NO_SUBINDEX = 0x06010002, 0x06020000, 0x06090011
-# Beside the sheet's: neighbours of each object, and corners of the range.
+# Indices outside the sheet: neighbours of each object, and ends of the range.
 ELSEWHERE = [0x0001, 0x0FFF, 0x2000, 0x2141, 0x5FFF, 0x6000, 0x6003, 0x67FF, 0x9FFF, 0xFFFF]
 
 
 class Complaints(logging.Handler):
-    """Whatever the library has to say."""
+    """Collects the library's log messages."""
 
     def __init__(self):
         super().__init__(logging.WARNING)
@@ -37,13 +40,13 @@ class Complaints(logging.Handler):
 
 
 def load(folder, joint, number, complaints):
-    """The sheet as the library has it."""
+    """Loads a sheet with the library."""
     path = os.path.join(folder, f"scarab-{joint}.eds")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         dictionary = canopen.import_od(path, node_id=number)
     assert not complaints.told, complaints.told
-    # Nothing in the file that the library passed over.
+    # The library has read every object of the file.
     sheet = configparser.RawConfigParser()
     sheet.optionxform = str
     sheet.read(path)
@@ -61,7 +64,7 @@ def variables(dictionary):
 
 
 def aborts(ask):
-    """The code with which something is refused, if it is."""
+    """Abort code of a refused access, or None."""
     try:
         ask()
     except SdoAbortedError as error:
@@ -70,7 +73,7 @@ def aborts(ask):
 
 
 def check(node, variable):
-    """One variable of a live node; whether it had a value."""
+    """Checks one variable of a live node and returns whether it had a value."""
     where = f"{variable.index:04X}:{variable.subindex}"
     try:
         data = node.sdo.upload(variable.index, variable.subindex)
@@ -85,14 +88,14 @@ def check(node, variable):
     else:
         assert variable.data_type in (datatypes.VISIBLE_STRING, datatypes.DOMAIN), f"{where}: type {variable.data_type}"
     assert variable.access_type in ("ro", "rw", "const"), f"{where}: {variable.access_type}"
-    # What was read changes nothing, but who refuses it for another reason has not refused it for this one.
+    # Writes the value that was read. A refusal for another reason is not one for read-only.
     code = aborts(lambda: node.sdo.download(variable.index, variable.subindex, data or b"\0"))
     assert (code == READ_ONLY) == (not variable.writable), f"{where}, {variable.access_type} in the sheet: writing told {code}"
     return True
 
 
 def check_pdos(node):
-    """The library reads each PDO from the node by the sheet; mapped objects are those of the sheet."""
+    """Reads each PDO's mapping with the library and compares it with the sheet."""
     node.tpdo.read()
     node.rpdo.read()
     maps = [("received", node.rpdo), ("sent", node.tpdo)]
@@ -125,7 +128,7 @@ def main():
             code = aborts(lambda: node.sdo.upload(index, sub))
             expected = NO_SUBINDEX if any(index == other for other, _ in known) else NO_OBJECT
             assert code == expected, f"{index:04X}:{sub}, which the sheet does not have: {code}"
-        # By name, as a user of the sheet would.
+        # Access by name, as a user of the sheet does.
         assert node.sdo["Statusword"].raw & 0x6F == 0x40
         assert struct.unpack("<I", node.sdo["Device type"].data)[0] == 0x00020192
         assert not complaints.told, complaints.told

@@ -1,9 +1,9 @@
-"""A host at 500 Hz for a long time: `steady.py HOST:PORT SECONDS REPORTS`, with the file into which `serve` writes its reports.
+"""A host at 500 Hz for a long time: `steady.py HOST:PORT SECONDS REPORTS`; REPORTS holds the output of `serve`.
 
-Every 2 ms a SYNC and both joints' targets (compact mapping, mode 8); every SYNC is answered by both nodes. The round trip is measured,
-and so is the delay of this process itself. It fails where an answer is later than what `serve` reported and this process caused, where
-the leg is stopped for a lost host although no gap was as long as a watchdog's time, where it is stopped for anything else, or where the nodes stop to
-answer. The last line is `steady: ok`.
+Sends SYNC and both joints' targets every 2 ms (compact mapping, mode 8); both nodes answer every SYNC.
+Measures the round trip and the delay of this process itself. Fails if an answer is later than the delays of
+`serve` and this process explain, or if the nodes stop answering. Also fails if the leg is stopped for a lost
+host although no gap reached a timeout, or for any other reason. The last line is `steady: ok`.
 """
 
 import math
@@ -15,18 +15,18 @@ import time
 
 NODES = (1, 2)
 PERIOD_S = 0.002
-# `serve` reports what is later than 10 ms. The rest: the wire, and what is lost between two of its looks at the clock.
+# `serve` reports delays above 10 ms. The rest covers the bus and the time between two of its clock readings.
 UNREPORTED_S, MARGIN_S = 0.010, 0.005
-# The shortest time after which a silent host is missed.
+# Shortest timeout of a silent host.
 WATCHDOG_S = 0.1
 # Emergency codes of a lost host.
-LOST = {0x8110, 0x8120, 0x8130, 0x8140, 0x8250}
+LOST = {0x8110, 0x8120, 0x8130, 0x8140, 0x8250, 0xFF0F}
 WAY, RATE_HZ = 50_000, 0.2
 OFF = 1 << 31
 
 
 class Port:
-    """slcan, without a thread."""
+    """slcan without a thread."""
 
     def __init__(self, address):
         host, _, number = address.rpartition(":")
@@ -36,12 +36,12 @@ class Port:
         self.socket.sendall(b"C\rS8\rO\r")
 
     def send(self, *frames):
-        """Frames at once."""
+        """Sends frames at once."""
         lines = (f"t{identifier:03X}{len(data)}{data.hex().upper()}\r" for identifier, data in frames)
         self.socket.sendall("".join(lines).encode())
 
     def read(self, wait_s):
-        """Frames that have come, after at most so long; bells as nothing."""
+        """Returns received frames after at most this time, with None for each error (BEL)."""
         if not select.select([self.socket], [], [], wait_s)[0]:
             return []
         received = self.socket.recv(1 << 16)
@@ -63,18 +63,18 @@ class Port:
         raise SystemExit(f"node {node} does not answer")
 
     def write(self, node, index, sub, value, size):
-        """An object of at most four bytes."""
+        """Writes an object of at most four bytes."""
         request = struct.pack("<BHBI", 0x23 | (4 - size) << 2, index, sub, value & 0xFFFFFFFF)
         answer = self.ask(node, request)
         assert answer[0] == 0x60, f"node {node}, {index:04X}:{sub}: {answer.hex()}"
 
     def value(self, node, index, sub=0):
-        """A number."""
+        """Reads a number."""
         return struct.unpack("<i", self.ask(node, struct.pack("<BHBI", 0x40, index, sub, 0))[4:])[0]
 
 
 def set_up(port):
-    """The compact cycle."""
+    """Configures the compact cycle."""
     port.send((0, b"\x01\x00"))
     for node in NODES:
         for place in (1, 2, 3):
@@ -90,16 +90,21 @@ def set_up(port):
             port.write(node, base + 0x200, 0, len(objects), 1)
             port.write(node, base, 1, cob, 4)
         port.write(node, 0x60C2, 1, 2, 1)
-        # A leg is not stopped for a host that is no real-time machine.
+        # The following-error timeout tolerates a host that is not real-time.
         port.write(node, 0x6066, 0, 1000, 2)
 
 
 def enable(port):
-    """6, 7, F with the targets where the joints are; these."""
+    """Sends 6, 7, F with targets at the joints' positions, and returns these."""
     for node in NODES:
         port.write(node, 0x6060, 0, 0, 1)
         port.write(node, 0x6040, 0, 0x80, 2)
         port.write(node, 0x6040, 0, 0, 2)
+    for node in NODES:
+        # A word that is sent while a stop lasts is not kept for later.
+        end = time.monotonic() + 10
+        while port.value(node, 0x6041) & 0x6F == 0x07 and time.monotonic() < end:
+            time.sleep(0.02)
     for word, state in ((6, 0x21), (7, 0x23), (15, 0x27)):
         for node in NODES:
             port.write(node, 0x6040, 0, word, 2)
@@ -116,21 +121,21 @@ def enable(port):
 
 
 def emergency(frames):
-    """Node and code of the emergency messages among these, but of those that end an error."""
+    """Node and code of the emergency messages among these frames, except those that end an error."""
     told = [(frame[0] - 0x80, struct.unpack_from("<H", frame[1])[0]) for frame in frames
             if frame and 0x81 <= frame[0] < 0x100]
     return [(node, code) for node, code in told if code]
 
 
 class Second:
-    """What one second was like."""
+    """Statistics of one second."""
 
     def __init__(self):
         self.trip, self.own, self.gap, self.bells, self.missing = 0.0, 0.0, 0.0, 0, 0
 
 
 class Reports:
-    """What `serve` reported since it was asked last: whether anything, and how late it was."""
+    """Reads new reports of `serve`: whether there were any, and the largest delay."""
 
     def __init__(self, path):
         self.file = open(path, encoding="utf-8")
@@ -160,7 +165,7 @@ def main(address, seconds, path):
             now.gap = max(now.gap, clock - sent)
             offset = round(WAY * (1 - math.cos(2 * math.pi * RATE_HZ * (clock - begin))))
             port.send((0x80, b""), (0x301, struct.pack("<ii", *(place + offset for place in places))))
-            # A SYNC that was not answered before the next one: counted until it is.
+            # A SYNC that is unanswered at the next one counts until its answer.
             for node in NODES:
                 waiting.setdefault(node, clock)
             sent, due = clock, max(due + PERIOD_S, clock)
@@ -185,8 +190,9 @@ def main(address, seconds, path):
         emergencies += emergency(frames)
         for node, asked in list(waiting.items()):
             if clock - asked > 5:
-                raise SystemExit(f"node {node} has not answered for 5 s")
-        if word != 0x27:
+                raise SystemExit(f"node {node} has not answered for 5 s, without an emergency")
+        # After a lost host the nodes are pre-operational (object 1029) and send no statusword.
+        if word != 0x27 or emergencies:
             end = time.monotonic() + 0.3
             while time.monotonic() < end:
                 emergencies += emergency(port.read(0.02))
@@ -198,7 +204,7 @@ def main(address, seconds, path):
             emergencies = []
             port.send((0, b"\x01\x00"))
             places = enable(port)
-            # What was measured meanwhile is of the set-up.
+            # Discards the measurements of the set-up.
             now, begin_again = Second(), time.monotonic()
             waiting.clear()
             sent, last, due = begin_again, begin_again, begin_again + PERIOD_S
@@ -215,7 +221,7 @@ def main(address, seconds, path):
         port.write(node, 0x6040, 0, 0, 2)
     unexplained = []
     for place, (second, _) in enumerate(found):
-        # The seconds of `serve` and of this process do not begin together.
+        # The seconds of `serve` and of this process are not aligned.
         near = found[max(0, place - 1):place + 3]
         allowed = max([UNREPORTED_S] + [late for _, late in near if late is not None]) + 2 * max(s.own for s, _ in near) + MARGIN_S
         if second.trip > allowed:

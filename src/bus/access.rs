@@ -1,33 +1,33 @@
-//! One door to every object: the table's rules first, then whoever has the value.
+//! Access to every object: checks the table's rules, then reads or writes the value where it is held.
 
 use super::abort::Abort;
 use super::communication::Communication;
 use super::dictionary::{Access, Object, Row, Type, find};
 use super::objects::Objects;
 
-/// From here on the values are not the node's.
+/// First index of the objects that are not held by the node itself.
 pub(super) const PROFILE: u16 = 0x2000;
 
-/// Object 603F, which repeats what 1003 has.
+/// Object 603F; repeats the newest entry of 1003.
 const ERROR_CODE: u16 = 0x603F;
 
-/// What 1010 and 1011 want to be written: "save" and "load".
+/// Signatures expected by 1010 and 1011: "save" and "load".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 const LOAD: u32 = u32::from_le_bytes(*b"load");
 
-/// The node's objects and the others.
+/// All objects of a node, in two ranges.
 pub struct Dictionary<'a, O> {
-    /// 1000 to 1FFF.
+    /// Objects 1000 to 1FFF.
     pub communication: &'a mut Communication,
-    /// From 2000 on.
+    /// Objects from 2000 on.
     pub objects: &'a mut O,
 }
 
 impl<O: Objects> Dictionary<'_, O> {
-    /// A number and its bytes.
+    /// Reads a number, constants included.
     ///
     /// # Errors
-    /// Those of the object.
+    /// [`Abort`] of an unknown object, or of the object itself.
     pub fn read(&self, object: Object) -> Result<u32, Abort> {
         let row = find(object)?;
         match row.access {
@@ -36,32 +36,32 @@ impl<O: Objects> Dictionary<'_, O> {
         }
     }
 
-    /// A number of an object that is known to exist and not to be constant.
+    /// Reads a number. The object must exist and must not be constant.
     ///
     /// # Errors
-    /// Those of the object.
+    /// [`Abort`] of the object.
     pub fn value(&self, object: Object) -> Result<u32, Abort> {
         match object.index {
             ..PROFILE => self.communication.read(object),
-            // The newest entry of the list.
+            // Newest entry of the error list.
             ERROR_CODE => Ok(self.communication.emergency.newest()),
             _ => self.objects.read(object),
         }
     }
 
-    /// The row of an object that may be written.
+    /// Returns the row of a writable object.
     ///
     /// # Errors
-    /// [`Abort::ReadOnly`], or that there is none.
+    /// [`Abort::ReadOnly`], or the error of an unknown object.
     pub fn writable(&self, object: Object) -> Result<&'static Row, Abort> {
         let row = find(object)?;
         if row.access == Access::Both { Ok(row) } else { Err(Abort::ReadOnly) }
     }
 
-    /// Gives a writable object a number of the right size.
+    /// Writes a number. The object must be writable and the value of the right size.
     ///
     /// # Errors
-    /// Those of the object.
+    /// [`Abort`] of the object.
     pub fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
         match (object.index, value) {
             (0x1010, SAVE) => self.objects.store(false),
@@ -72,10 +72,10 @@ impl<O: Objects> Dictionary<'_, O> {
         }
     }
 
-    /// Bytes of any object from `offset` on, as many as fit; how many it has in all.
+    /// Copies the bytes of any object from `offset` on into `into`; returns the object's total size in bytes.
     ///
     /// # Errors
-    /// Those of the object.
+    /// [`Abort`] of an unknown object, or of the object itself.
     pub fn bytes(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
         let row = find(object)?;
         if matches!(row.kind, Type::Text | Type::Domain) {

@@ -1,4 +1,4 @@
-//! The objects 1000 to 1FFF: what the node itself knows.
+//! Communication objects 1000 to 1FFF, which the node holds itself.
 
 use super::abort::Abort;
 use super::dictionary::{Mapping, Object};
@@ -11,27 +11,27 @@ use super::pdo::transmit::Transmit;
 use super::pdo::{ABSENT, PDOS, Parameters, is_assignable};
 use super::silence::Silence;
 
-/// What is mapped after the start: as host software for exoskeletons has it.
+/// Default mapping, as host software for exoskeletons expects it.
 const RECEIVED: [u32; PDOS] = [0x6040_0010, 0x607A_0020, 0x60FF_0020, 0x6071_0010];
 const SENT: [&[u32]; PDOS] = [&[0x6041_0010], &[0x6064_0020, 0x606C_0020], &[0x6077_0010], &[0x60FD_0020]];
 
-/// Who this is (1018, 1008 to 100A).
+/// Identity of the device (1018, 1008 to 100A).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity {
-    /// Given out by CiA; 0 where there is none.
+    /// Vendor-ID assigned by CiA; 0 if there is none.
     pub vendor: u32,
-    /// The maker's number of the product.
+    /// Product code.
     pub product: u32,
-    /// Of the behaviour on the bus, major number in the upper half.
+    /// Revision of the bus behaviour; major number in the upper half.
     pub revision: u32,
-    /// Of the board.
+    /// Serial number of the board.
     pub serial: u32,
-    /// Name, version of the hardware, version of the software.
+    /// Device name, hardware version, software version.
     pub texts: [&'static str; 3],
 }
 
 impl Identity {
-    /// Of this firmware on a board; the vendor's number is 0: CiA has given out none.
+    /// Identity of this firmware. The vendor-ID is 0: CiA has assigned none.
     #[must_use]
     pub const fn scarab(serial: u32, hardware: &'static str) -> Self {
         Self {
@@ -44,7 +44,7 @@ impl Identity {
     }
 }
 
-/// All of them.
+/// State of the communication objects of one node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Communication {
     pub(super) node: NodeId,
@@ -52,23 +52,23 @@ pub struct Communication {
     pub(super) state: NmtState,
     pub(super) emergency: Emergency,
     pub(super) consumers: [Consumer; WATCHED],
-    /// Of a host without a heartbeat.
+    /// Detects the silence of a cyclic host that sends no heartbeat.
     pub(super) silence: Silence,
-    /// 1017, ms.
+    /// Object 1017, ms.
     pub(super) heartbeat_ms: u16,
     pub(super) heartbeat: Clock,
-    /// 1005.
+    /// Object 1005.
     pub(super) sync: u32,
-    /// 1019.
+    /// Object 1019.
     pub(super) sync_overflow: u8,
-    /// 1029:1.
+    /// Object 1029:1.
     pub(super) on_error: u8,
     pub(super) receive: [Receive; PDOS],
     pub(super) transmit: [Transmit; PDOS],
 }
 
 impl Communication {
-    /// As after the start.
+    /// Creates the state after the start.
     #[must_use]
     pub fn new(node: NodeId, identity: Identity) -> Self {
         let base = |first: u16, place: usize| node.on(first + 0x100 * place as u16);
@@ -98,10 +98,10 @@ impl Communication {
         }
     }
 
-    /// A number.
+    /// Reads a number.
     ///
     /// # Errors
-    /// Those of the object.
+    /// [`Abort`] of the object.
     pub fn read(&self, object: Object) -> Result<u32, Abort> {
         let Object { index, sub } = object;
         let pdo = usize::from(index & 0xFF);
@@ -109,7 +109,7 @@ impl Communication {
             (0x1001, _) => u32::from(self.emergency.register()),
             (0x1003, _) => return self.emergency.history(sub),
             (0x1005, _) => self.sync,
-            // Stored on command only.
+            // Capability: stores on command only.
             (0x1010 | 0x1011, _) => 1,
             (0x1014, _) => self.emergency.identifier,
             (0x1015, _) => u32::from(self.emergency.inhibit),
@@ -131,23 +131,23 @@ impl Communication {
         })
     }
 
-    /// Gives one a number.
+    /// Writes a number.
     ///
     /// # Errors
-    /// Those of the object.
+    /// [`Abort`] of the object.
     pub fn write(&mut self, object: Object, value: u32) -> Result<(), Abort> {
         let Object { index, sub } = object;
         let pdo = usize::from(index & 0xFF);
         match (index, sub) {
             (0x1003, _) => return self.emergency.forget(value),
-            // Bit 30 would make this node the one that sends it.
+            // A value with bit 30, which would make this node the SYNC producer, is not assignable.
             (0x1005, _) if self.may_be_sync(value) => self.sync = value,
             (0x1014, _) if self.may_be_emergency(value) => self.emergency.identifier = value,
             (0x1015, _) => self.emergency.inhibit = value as u16,
             (0x1016, 1..) => {
                 let place = sub - 1;
                 self.consumers.get_mut(usize::from(place)).ok_or(Abort::NoSubindex)?.set(value)?;
-                // Watched anew, nobody is missed.
+                // Monitoring restarts, so an earlier loss is no longer active.
                 self.emergency.set(Source::Heartbeat(place), None);
             }
             (0x1017, _) => (self.heartbeat_ms, self.heartbeat) = (value as u16, Clock::NEW),
@@ -183,7 +183,7 @@ impl Communication {
         Ok(())
     }
 
-    /// The bytes of a text; see [`Objects::bytes`](super::Objects::bytes).
+    /// Copies the bytes of a text; see [`Objects::bytes`](super::Objects::bytes).
     pub(super) fn text(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
         let place = usize::from(object.index.wrapping_sub(0x1008));
         let text = self.identity.texts.get(place).ok_or(Abort::NoObject)?.as_bytes();
@@ -193,26 +193,27 @@ impl Communication {
         Ok(text.len() as u32)
     }
 
-    /// 1005 takes it: the standard's, or one that is a host's to give and nothing else here has.
+    /// Whether 1005 accepts the value: the default, or an assignable COB-ID that no other message here uses.
     fn may_be_sync(&self, value: u32) -> bool {
         (value == 0x80 || is_assignable(value)) && value != self.emergency.identifier && !self.is_pdo(value)
     }
 
-    /// 1014 takes it; with bit 31 there are no messages.
+    /// Whether 1014 accepts the value. Bit 31 disables the messages.
     fn may_be_emergency(&self, value: u32) -> bool {
         let number = value & !ABSENT;
         let is_free = matches!(number, 0x81..=0xFF) || is_assignable(number);
         is_free && (value & ABSENT != 0 || number != self.sync && !self.is_pdo(number))
     }
 
-    /// A PDO that exists has this identifier.
+    /// Whether an existing PDO uses this COB-ID.
     fn is_pdo(&self, number: u32) -> bool {
         let received = self.receive.iter().map(|pdo| &pdo.parameters);
         let mut all = received.chain(self.transmit.iter().map(|pdo| &pdo.parameters));
         all.any(|pdo| pdo.identifier().is_some_and(|own| u32::from(own) == number))
     }
 
-    /// A PDO that has this identifier from now on, with or without bit 30, would be a SYNC, an emergency message, or another PDO that exists.
+    /// Whether a PDO with this identifier would collide with SYNC, emergency or another PDO. Bit 30 is
+    /// ignored.
     fn is_message(&self, object: Object, identifier: u32) -> bool {
         let number = identifier & 0x7FF;
         let own = self.read(object).is_ok_and(|own| own & ABSENT == 0 && own & 0x7FF == number);

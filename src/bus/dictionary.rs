@@ -1,13 +1,13 @@
-//! What the object dictionary's rows are made of, and how one is found.
+//! Row format of the object dictionary, and the search for a row.
 //!
-//! Why a table without values: every value already has its place, in the node or in the leg; a dictionary that kept
-//! copies would have to be kept true. A row says what an object is, the node and [`Objects`](super::Objects) say
-//! what its value is. The names are a table of their own, so that an image which never tells a name does not hold them.
+//! Why a table without values: every value already exists in the node or in the leg, and copies would have to
+//! be synchronised. A row describes an object; the node and [`Objects`](super::Objects) hold its value. The
+//! names are a separate table, so an image that never reads them does not contain them.
 
 use super::abort::Abort;
 use super::table::ROWS;
 
-/// Where an object's value is found.
+/// Address of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Object {
     /// Index.
@@ -17,14 +17,14 @@ pub struct Object {
 }
 
 impl Object {
-    /// One of them.
+    /// Creates an address.
     #[must_use]
     pub const fn at(index: u16, sub: u8) -> Self {
         Self { index, sub }
     }
 }
 
-/// The type of a value; the numbers are CiA 301's.
+/// Type of a value; the numbers are CiA 301's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Type {
@@ -49,7 +49,7 @@ pub enum Type {
 }
 
 impl Type {
-    /// Bytes of a number; `None` where the length is the value's own.
+    /// Size of a number in bytes; `None` if the length varies.
     #[must_use]
     pub const fn size(self) -> Option<u8> {
         match self {
@@ -61,55 +61,55 @@ impl Type {
     }
 }
 
-/// What a host may do with an object.
+/// Access rights of a host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Always reads as its default.
+    /// Constant; always reads as the default.
     Const,
-    /// Can be read.
+    /// Read-only.
     Read,
-    /// Can be read and written.
+    /// Read and write.
     Both,
 }
 
-/// Into which PDOs an object may be mapped.
+/// PDO directions into which an object may be mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mapping {
-    /// None.
+    /// Not mappable.
     No,
-    /// What the node receives.
+    /// PDOs that the node receives.
     Receive,
-    /// What the node sends.
+    /// PDOs that the node sends.
     Transmit,
-    /// Both.
+    /// Both directions.
     Any,
 }
 
 /// One or more objects that differ in index or subindex only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// The first index.
+    /// First index.
     pub index: u16,
-    /// How many indices follow each other.
+    /// Number of consecutive indices.
     pub indices: u8,
-    /// The first subindex.
+    /// First subindex.
     pub sub: u8,
-    /// How many subindices follow each other.
+    /// Number of consecutive subindices.
     pub subs: u8,
     /// Type of the value.
     pub kind: Type,
-    /// What a host may do.
+    /// Access rights of a host.
     pub access: Access,
-    /// Into which PDOs.
+    /// PDO directions into which the object may be mapped.
     pub mapping: Mapping,
-    /// The node's number is added to the default.
+    /// Whether the node-ID is added to the default.
     pub plus_node: bool,
-    /// The value after the start; of what is measured, 0.
+    /// Value after the start; 0 for measured values.
     pub default: u32,
 }
 
 impl Row {
-    /// Whether the object is one of the row's.
+    /// Returns whether the row contains the object.
     #[must_use]
     pub const fn holds(&self, object: Object) -> bool {
         object.index.wrapping_sub(self.index) < self.indices as u16
@@ -117,7 +117,7 @@ impl Row {
     }
 }
 
-/// The row of an object.
+/// Finds the row of an object.
 ///
 /// # Errors
 /// [`Abort::NoObject`], or [`Abort::NoSubindex`] where the index is known.
@@ -137,7 +137,7 @@ mod tests {
     use super::super::table::{GROUPS, NAMES};
     use super::*;
 
-    /// All objects of a row.
+    /// Objects of a row.
     fn objects(row: &Row) -> impl Iterator<Item = Object> + use<'_> {
         (0..u16::from(row.indices))
             .flat_map(move |index| (0..row.subs).map(move |sub| Object::at(row.index + index, row.sub + sub)))
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn subindex_0_of_what_has_more_is_a_number_of_entries_or_a_counted_array() {
+    fn subindex_0_holds_the_number_of_entries() {
         for row in ROWS.iter().filter(|row| row.sub > 0) {
             for index in row.index..row.index + u16::from(row.indices) {
                 let head = find(Object::at(index, 0)).expect("a number of entries");
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn every_index_with_several_parts_has_a_name_of_its_own() {
+    fn every_index_with_several_subindices_has_a_name() {
         for row in ROWS {
             for index in row.index..row.index + u16::from(row.indices) {
                 let groups =
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_is_told_from_what_has_no_such_part() {
+    fn an_unknown_index_and_an_unknown_subindex_give_different_errors() {
         assert_eq!(find(Object::at(0x5555, 0)), Err(Abort::NoObject));
         assert_eq!(find(Object::at(0x1018, 9)), Err(Abort::NoSubindex));
         assert_eq!(find(Object::at(0x1404, 1)), Err(Abort::NoObject));

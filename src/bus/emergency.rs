@@ -1,38 +1,39 @@
-//! Emergency messages, the error register (1001) and the history (1003).
+//! Emergency messages, error register (1001) and error history (1003).
 //!
-//! Why by source: an error that ends must be told to have ended without hiding one that goes on. Each source has at most
-//! one error; a message leaves when it begins, when it becomes another one, and when it ends (code 0, with the register of
-//! what is left). Codes: `safety::fault`.
+//! Why by source: the end of one error must not hide another that continues. Each source has at most one
+//! error. A message is sent when it begins, changes or ends; the end has code 0 and the remaining error
+//! register. Codes: `safety::fault`.
 //!
 //! ```text
 //! message = error code, 2 bytes | error register, 1 byte | information, 5 bytes          identifier: 1014
 //! ```
 //!
-//! Source: CiA 301, emergency object. Four messages wait at most; further ones are in the history only.
+//! Source: CiA 301, emergency object. Limits: at most four messages wait; further ones enter only the
+//! history.
 
 use super::abort::Abort;
 use super::pdo::PDOS;
 use crate::hal::Frame;
 use crate::leg::NO_ERROR;
 
-/// Entries of the history.
+/// Entries of the error history.
 pub const HISTORY: usize = 8;
 const WAITING: usize = 4;
 
-/// Who has an error.
+/// Source of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The drive, see [`ErrorReport`].
+    /// Drive of the joint, see [`ErrorReport`].
     Drive,
-    /// The first or second heartbeat that is watched.
+    /// Monitored heartbeat, 0 or 1.
     Heartbeat(u8),
-    /// What is received as a PDO.
+    /// Received PDO by number.
     Receive(u8),
-    /// The controller of the bus.
+    /// CAN controller.
     Controller,
-    /// What is kept over the power.
+    /// Store of the parameters.
     Store,
-    /// The host's cycle.
+    /// Silence of a cyclic host.
     Silence,
 }
 
@@ -52,24 +53,24 @@ impl Source {
     }
 }
 
-/// An error as it is told.
+/// Error as reported to hosts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ErrorReport {
-    /// CiA 301's and CiA 402's code.
+    /// Error code by CiA 301 or CiA 402.
     pub code: u16,
-    /// The maker's own.
+    /// Manufacturer-specific information.
     pub information: [u8; 5],
 }
 
 impl ErrorReport {
-    /// A code alone.
+    /// Creates a report without information.
     #[must_use]
     pub const fn code(code: u16) -> Self {
         Self { code, information: [0; 5] }
     }
 
-    /// Bits of the error register: bit 0 always; 1 current, 2 voltage, 3 temperature, 4 communication, 5 device
-    /// profile, 7 the maker's.
+    /// Error register: bit 0 always; 1 current, 2 voltage, 3 temperature, 4 communication, 5 device profile,
+    /// 7 manufacturer-specific.
     #[must_use]
     pub const fn register(&self) -> u8 {
         1 | match self.code >> 8 {
@@ -84,22 +85,22 @@ impl ErrorReport {
     }
 }
 
-/// What is wrong, what was, and what is still to be told.
+/// Active errors, waiting messages and history.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Emergency {
     active: [Option<ErrorReport>; SOURCES],
     waiting: [Option<[u8; 8]>; WAITING],
     history: [u32; HISTORY],
     recorded: u8,
-    /// 1014.
+    /// Object 1014.
     pub(super) identifier: u32,
-    /// 1015, 100 us.
+    /// Object 1015, in units of 100 us.
     pub(super) inhibit: u16,
     next_us: u64,
 }
 
 impl Emergency {
-    /// Nothing wrong; messages with this identifier.
+    /// Creates the state without errors; messages are sent with this COB-ID.
     #[must_use]
     pub const fn new(identifier: u32) -> Self {
         Self {
@@ -113,7 +114,7 @@ impl Emergency {
         }
     }
 
-    /// What a source has; a message follows where that is new.
+    /// Sets or clears the error of a source; a change queues a message.
     pub fn set(&mut self, source: Source, error: Option<ErrorReport>) {
         let Some(place) = self.active.get_mut(source.place()) else { return };
         if *place == error {
@@ -129,24 +130,24 @@ impl Emergency {
         }
         if error.is_some() {
             self.history.rotate_right(1);
-            // The upper half is the maker's: the first two bytes of the information.
+            // The upper half is manufacturer-specific: the first two bytes of the information.
             self.history[0] = u32::from_le_bytes([low, high, a, b]);
             self.recorded = (self.recorded + 1).min(HISTORY as u8);
         }
     }
 
-    /// Object 1001.
+    /// Returns object 1001.
     #[must_use]
     pub fn register(&self) -> u8 {
         self.active.iter().flatten().fold(0, |register, error| register | error.register())
     }
 
-    /// Object 603F: code of the newest error in the list, 0 where it is empty.
+    /// Returns object 603F: code of the newest error in the history, 0 if it is empty.
     pub(super) fn newest(&self) -> u32 {
         self.history(1).unwrap_or(0) & 0xFFFF
     }
 
-    /// Object 1003.
+    /// Reads object 1003.
     pub(super) fn history(&self, sub: u8) -> Result<u32, Abort> {
         match sub.checked_sub(1) {
             None => Ok(u32::from(self.recorded)),
@@ -157,7 +158,7 @@ impl Emergency {
         }
     }
 
-    /// Writing 0 to 1003:0.
+    /// Clears the history, by writing 0 to 1003:0.
     pub(super) fn forget(&mut self, value: u32) -> Result<(), Abort> {
         if value != 0 {
             return Err(Abort::Range);
@@ -166,7 +167,7 @@ impl Emergency {
         Ok(())
     }
 
-    /// The next message.
+    /// Returns the next message.
     pub(super) fn poll(&mut self, now_us: u64) -> Option<Frame> {
         if now_us < self.next_us {
             return None;
@@ -186,16 +187,16 @@ mod tests {
     const OVERCURRENT: ErrorReport = ErrorReport::code(0x2310);
 
     #[test]
-    fn an_error_is_told_once_when_it_begins_and_once_when_it_ends() {
+    fn an_error_is_reported_once_at_its_begin_and_once_at_its_end() {
         let mut emergency = Emergency::new(0x85);
         emergency.set(Source::Heartbeat(0), Some(HOST_LOST));
         emergency.set(Source::Heartbeat(0), Some(HOST_LOST));
         emergency.set(Source::Drive, Some(OVERCURRENT));
         emergency.set(Source::Heartbeat(0), None);
-        let told: [Option<Frame>; 4] = core::array::from_fn(|_| emergency.poll(0));
+        let sent: [Option<Frame>; 4] = core::array::from_fn(|_| emergency.poll(0));
         let frame = |data: [u8; 8]| Some(Frame::new(0x85, &data));
         assert_eq!(
-            told,
+            sent,
             [
                 frame([0x30, 0x81, 0b01_0001, 0, 0, 0, 0, 0]),
                 frame([0x10, 0x23, 0b01_0011, 0, 0, 0, 0, 0]),
@@ -233,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn the_inhibit_time_keeps_messages_apart_and_a_flood_ends_in_the_history() {
+    fn the_inhibit_time_limits_messages_and_the_history_keeps_the_rest() {
         let mut emergency = Emergency::new(0x81);
         emergency.inhibit = 10;
         for code in 1..=20 {

@@ -1,31 +1,32 @@
-//! Heartbeats: the node's own (1017), and those of others that it cannot do without (1016).
+//! Heartbeat producer (1017) and consumer (1016).
 //!
-//! Why consumed: a host application that dies leaves its last targets behind; the drive has to notice by itself. Watching
-//! begins with the first heartbeat that is seen, so a host that never sends one is not missed (CiA 301).
+//! Why a consumer: a host application that dies leaves its last targets active, so the drive must detect the
+//! loss itself. Monitoring begins with the first heartbeat received (CiA 301). A host that sends none is not
+//! monitored.
 //!
 //! ```text
-//! 1016:i = node << 16 | milliseconds       0 milliseconds or node 0: not watched
+//! 1016:i = node << 16 | milliseconds       0 milliseconds or node 0: not monitored
 //! ```
 
 use super::abort::Abort;
 
-/// Others that can be watched.
+/// Number of nodes that can be monitored.
 pub const WATCHED: usize = 2;
 
-/// What became of one that is watched.
+/// Change of a monitored node's state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Its time is over.
+    /// The heartbeat timed out.
     Lost,
-    /// It is there again.
+    /// The heartbeat is back.
     Back,
 }
 
-/// One other node.
+/// Consumer of one other node's heartbeat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Consumer {
     setting: u32,
-    /// When it will be missed; `None` before the first heartbeat and while it is lost.
+    /// Deadline; `None` before the first heartbeat and while the node is lost.
     due_us: Option<u64>,
     lost: bool,
 }
@@ -39,16 +40,16 @@ impl Consumer {
         (self.setting & 0xFFFF) as u64 * 1000
     }
 
-    /// Object 1016.
+    /// Returns object 1016.
     #[must_use]
     pub const fn setting(self) -> u32 {
         self.setting
     }
 
-    /// Writes 1016; watching begins anew.
+    /// Writes object 1016 and restarts the monitoring.
     ///
     /// # Errors
-    /// [`Abort::Range`] for a node beyond 127 or bits that are reserved.
+    /// [`Abort::Range`] if the node-ID exceeds 127 or a reserved bit is set.
     pub fn set(&mut self, setting: u32) -> Result<(), Abort> {
         if setting >> 16 > 127 {
             return Err(Abort::Range);
@@ -57,7 +58,7 @@ impl Consumer {
         Ok(())
     }
 
-    /// A heartbeat or a boot-up message of a node.
+    /// Handles a heartbeat or boot-up message of `node`.
     pub fn heard(&mut self, node: u8, now_us: u64) -> Option<Change> {
         if self.time_us() == 0 || node == 0 || node != self.node() {
             return None;
@@ -66,13 +67,13 @@ impl Consumer {
         core::mem::take(&mut self.lost).then_some(Change::Back)
     }
 
-    /// Nobody could be heard until now: it is not held against who was not.
+    /// Restarts the timeout after a time in which nothing could be received.
     pub fn wait(&mut self, now_us: u64) {
         let time_us = self.time_us();
         self.due_us = self.due_us.map(|_| now_us + time_us);
     }
 
-    /// Time goes on.
+    /// Checks the timeout.
     pub fn poll(&mut self, now_us: u64) -> Option<Change> {
         self.due_us.take_if(|due| now_us > *due).map(|_| {
             self.lost = true;
@@ -81,24 +82,24 @@ impl Consumer {
     }
 }
 
-/// A thing that is done every so many microseconds.
+/// Periodic timer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clock {
     next_us: Option<u64>,
 }
 
 impl Clock {
-    /// Not begun.
+    /// Not started.
     pub const NEW: Self = Self { next_us: None };
 
-    /// Whether it is time; a period of 0 never is. What was late is done once, not several times.
+    /// Whether the period has elapsed; never with a period of 0. Missed periods are not made up for.
     pub fn is_due(&mut self, period_us: u64, now_us: u64) -> bool {
         if period_us == 0 {
             self.next_us = None;
             return false;
         }
         let phase_us = match self.next_us {
-            // A period that was shortened does not wait for the longer one.
+            // A shortened period takes effect at once.
             Some(next) if now_us < next && next - now_us <= period_us => return false,
             Some(next) if now_us >= next && now_us - next < period_us => next,
             _ => now_us,
@@ -113,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_heartbeat_is_missed_after_its_time_and_not_before_the_first() {
+    fn a_heartbeat_times_out_but_never_before_the_first() {
         let mut consumer = Consumer::default();
         assert_eq!(consumer.set(80 << 16 | 100), Ok(()));
         assert_eq!(consumer.poll(10_000_000), None);
@@ -125,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_setting_is_read_as_it_was_written_and_a_refused_one_changes_nothing() {
+    fn a_refused_consumer_setting_changes_nothing() {
         let mut consumer = Consumer::default();
         assert_eq!((consumer.setting(), consumer.set(127 << 16 | 0xFFFF)), (0, Ok(())));
         assert_eq!(consumer.set(0x0080_0064), Err(Abort::Range));
@@ -133,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_keeps_its_period_and_does_not_make_up_for_what_it_missed() {
+    fn a_clock_keeps_its_phase_and_skips_missed_periods() {
         let mut clock = Clock::default();
         let times = [0, 400, 1000, 1001, 2100, 3000, 9500, 9600, 10_500].map(|now| clock.is_due(1000, now));
         assert_eq!(times, [true, false, true, false, true, true, true, false, true]);

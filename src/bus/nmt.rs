@@ -1,29 +1,29 @@
-//! Network management: the node's state, the commands that move it, and the message of its start.
+//! Network management (NMT): states, commands and the boot-up message of a node.
 //!
 //! ```text
-//! start -> boot-up message -> PreOperational <--> Operational      SDO in both, PDO in Operational only,
-//!                                   ^--> Stopped <--^              nothing but heartbeat and commands in Stopped
-//! reset node, reset communication: from everywhere back to the start
+//! start -> boot-up message -> PreOperational <--> Operational      SDO in both, PDO in Operational only
+//!                                   ^--> Stopped <--^              only heartbeat and commands in Stopped
+//! reset node, reset communication: from every state back to the start
 //! ```
 //!
 //! Source: CiA 301, network management.
 
-/// Identifier of commands.
+/// COB-ID of NMT commands.
 pub const COMMAND: u16 = 0x000;
-/// Identifier of boot-up and heartbeat, the node's number to be added.
+/// Function base of boot-up and heartbeat messages; the node-ID is added.
 pub const HEARTBEAT: u16 = 0x700;
 
-/// What the node takes part in; the number is the heartbeat's.
+/// NMT state; the number is sent in the heartbeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum NmtState {
-    /// Before the boot-up message.
+    /// Boot-up message not sent yet.
     Initialising = 0,
-    /// Heartbeat only.
+    /// Heartbeat and NMT commands only.
     Stopped = 4,
-    /// All.
+    /// All services.
     Operational = 5,
-    /// All but PDO.
+    /// All services but PDO.
     PreOperational = 127,
 }
 
@@ -35,25 +35,25 @@ impl NmtState {
     }
 }
 
-/// What a master commands.
+/// Command of the NMT master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// Go to a state.
+    /// Changes the state.
     Go(NmtState),
-    /// Begin anew.
+    /// Resets the node.
     Reset(Reset),
 }
 
-/// How much begins anew.
+/// Extent of a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Reset {
-    /// The objects up to 1FFF, and the node's number.
+    /// Objects up to 1FFF and the node-ID.
     Communication,
     /// All objects.
     Node,
 }
 
-/// The command in a frame's bytes, if it is one for this node.
+/// Decodes an NMT command; `None` if it is invalid or addressed to another node.
 #[must_use]
 pub fn command(data: &[u8], node: u8) -> Option<Command> {
     let &[command, target] = data else { return None };
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_command_counts_for_its_node_and_for_all() {
+    fn a_command_applies_to_the_addressed_node_or_to_all() {
         let start = Some(Command::Go(NmtState::Operational));
         assert_eq!(command(&[1, 5], 5), start);
         assert_eq!(command(&[1, 0], 5), start);

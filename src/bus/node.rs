@@ -1,16 +1,16 @@
-//! One node: frames and time in, frames out; no clock and no hardware.
+//! One CANopen node: frames and time in, frames out; no clock and no hardware.
 //!
 //! ```text
-//! on_frame(frame, now_us)  -> network management, SYNC, SDO, heartbeats of others, received PDOs; nothing leaves here
-//! poll(now_us)             -> the next frame to be sent, until there is none
-//!                             boot-up, emergency, heartbeat, PDO, SDO: the first that has one
+//! on_frame(frame, now_us)  handles NMT, SYNC, SDO, heartbeats of others, received PDOs; sends nothing
+//! poll(now_us)             returns the next frame to send, until there is none
+//!                          order: boot-up, emergency, heartbeat, PDO, SDO
 //! ```
 //!
-//! Two nodes stand on one board and share nothing but the frames. Cost of one call: one SDO request searches the table
-//! once; one received PDO writes at most eight objects; a poll reads at most those of the PDOs that are due. No loop
-//! depends on what a frame says. Memory: docs/bus.md.
+//! Two nodes run on one board and share only the frames. Cost of one call: an SDO request searches the table
+//! once. A received PDO writes at most eight objects. A poll reads the objects of the PDOs that are due. The
+//! number of iterations never depends on the content of a frame. Memory: docs/results/bus.md.
 //!
-//! Source: CiA 301 version 4.2. Not built: RTR, node guarding, TIME, LSS, the node as a master or SYNC producer.
+//! Source: CiA 301 version 4.2. Not implemented: RTR, node guarding, TIME, LSS, NMT master, SYNC producer.
 
 use super::access::Dictionary;
 use super::communication::{Communication, Identity};
@@ -38,14 +38,14 @@ impl Controller {
     }
 }
 
-/// What becomes of what is kept.
+/// State of storing parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Storing {
-    /// Nothing is being kept, and the last that was is.
+    /// Idle; the last store operation succeeded.
     Done,
-    /// The flash is about to be written: the node may be silent for seconds, heartbeats included.
+    /// The flash is about to be written. The node may be silent for seconds, heartbeats included.
     Busy,
-    /// What was to be kept was not.
+    /// The last store operation failed.
     Failed,
 }
 
@@ -60,41 +60,41 @@ impl Storing {
     }
 }
 
-/// What came of a frame.
+/// Result of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// It was none of this node's, or a heartbeat in time.
+    /// Not addressed to this node, or a heartbeat in time.
     Nothing,
-    /// There may be something to say or to do.
+    /// The node's state may have changed; poll it.
     Something,
-    /// So much begins anew: what was kept of that is to be recalled.
+    /// The node was reset; its stored parameters of that extent must be recalled.
     Reset(Reset),
 }
 
-/// A node of the bus.
+/// One CANopen node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
     communication: Communication,
     server: Server,
-    /// The PDO that is looked at next, so that none has to wait for ever.
+    /// Next PDO to check; round robin, so that no PDO starves.
     next_pdo: usize,
-    /// How much of it began anew since it spoke last.
-    anew: Option<Reset>,
+    /// Extent of the reset since the last boot-up message.
+    pending_reset: Option<Reset>,
 }
 
 impl Node {
-    /// Before its boot-up message.
+    /// Creates a node that has not sent its boot-up message.
     #[must_use]
     pub fn new(node: NodeId, identity: Identity) -> Self {
         Self {
             communication: Communication::new(node, identity),
             server: Server::IDLE,
             next_pdo: 0,
-            anew: None,
+            pending_reset: None,
         }
     }
 
-    /// Its number.
+    /// Returns the node-ID.
     #[must_use]
     pub const fn id(&self) -> NodeId {
         self.communication.node
@@ -104,21 +104,23 @@ impl Node {
         &mut self.communication
     }
 
-    /// What it takes part in.
+    /// Returns the NMT state.
     #[must_use]
     pub const fn state(&self) -> NmtState {
         self.communication.state
     }
 
-    /// A frame came.
+    /// Handles a received frame.
     pub fn on_frame<O: Objects>(&mut self, frame: &Frame, now_us: u64, objects: &mut O) -> Heard {
         let node = self.communication.node;
         match frame.id() {
             nmt::COMMAND => {
                 match nmt::command(frame.data(), node.number()) {
                     None => return Heard::Nothing,
-                    // One that has not spoken since is as new still.
-                    Some(Command::Reset(reset)) if self.anew >= Some(reset) => return Heard::Nothing,
+                    // A node that has not sent its boot-up message since is still reset.
+                    Some(Command::Reset(reset)) if self.pending_reset >= Some(reset) => {
+                        return Heard::Nothing;
+                    }
                     Some(Command::Reset(reset)) => {
                         self.obey(Command::Reset(reset), objects);
                         return Heard::Reset(reset);
@@ -153,18 +155,18 @@ impl Node {
         Heard::Something
     }
 
-    /// The next frame to be sent; again until there is none.
+    /// Returns the next frame to send. Call it until it returns `None`.
     pub fn poll<O: Objects>(&mut self, now_us: u64, objects: &mut O) -> Option<Frame> {
         let node = self.communication.node;
         if self.communication.state == NmtState::Initialising {
             self.communication.state = NmtState::PreOperational;
-            self.anew = None;
+            self.pending_reset = None;
             return Some(Frame::new(node.on(nmt::HEARTBEAT), &[0]));
         }
         self.look_around(now_us, objects);
         let communication = &mut self.communication;
         communication.emergency.set(Source::Drive, objects.error());
-        // A stopped node keeps its emergency messages until it may speak again.
+        // A stopped node holds its emergency messages back until it leaves the state.
         let emergency =
             if communication.state.serves() { communication.emergency.poll(now_us) } else { None };
         if emergency.is_some() {
@@ -182,30 +184,30 @@ impl Node {
         Some(Frame::new(node.on(0x580), &answer))
     }
 
-    /// Whether a frame is this node's emergency or boot-up message.
+    /// Whether a frame is this node's emergency or boot-up message, which is sent only once.
     pub(super) fn tells_once(&self, frame: &Frame) -> bool {
         let Communication { node, emergency, .. } = &self.communication;
         u32::from(frame.id()) == emergency.identifier
             || frame.id() == node.on(nmt::HEARTBEAT) && frame.data() == [0]
     }
 
-    /// What the controller tells: once on every change.
-    pub fn on_controller<O: Objects>(&mut self, told: Controller, objects: &mut O) {
-        match told {
+    /// Handles a change of the CAN controller's state.
+    pub fn on_controller<O: Objects>(&mut self, controller: Controller, objects: &mut O) {
+        match controller {
             Controller::Active => {}
             Controller::Passive => objects.lost(Lost::Bus(false)),
-            // A frame that was lost may have been the one that stops.
+            // The lost frame may have been a stop command.
             Controller::Off | Controller::Overrun => objects.lost(Lost::Bus(true)),
         }
-        self.communication.emergency.set(Source::Controller, told.error());
+        self.communication.emergency.set(Source::Controller, controller.error());
     }
 
-    /// What the store tells: once on every change.
+    /// Handles a change of the store's state.
     pub fn on_store(&mut self, storing: Storing) {
         self.communication.emergency.set(Source::Store, storing.error());
     }
 
-    /// After a reset: what the board has told goes on, and hosts are told again.
+    /// Restores the board's conditions after a reset, so that hosts receive their messages again.
     pub(super) fn goes_on(&mut self, controller: Controller, storing: Storing) {
         self.communication.emergency.set(Source::Controller, controller.error());
         self.on_store(storing);
@@ -236,15 +238,15 @@ impl Node {
                 if reset == Reset::Node {
                     objects.reset();
                 }
-                if self.anew.is_none() {
+                if self.pending_reset.is_none() {
                     *self = Self::new(node, identity);
                 }
-                self.anew = Some(reset);
+                self.pending_reset = Some(reset);
             }
         }
     }
 
-    /// A frame that a host may send in every cycle.
+    /// Notes a frame that a host may send in every cycle.
     fn hear_cycle(&mut self, kind: Kind, now_us: u64) {
         self.communication.silence.heard(kind, now_us);
         self.communication.emergency.set(Source::Silence, None);
@@ -266,7 +268,7 @@ impl Node {
             }
         }
         objects.synchronise();
-        // The statusword first.
+        // The statusword is sent first.
         self.next_pdo = 0;
         for transmit in &mut self.communication.transmit {
             transmit.at_sync(counter);
@@ -292,7 +294,7 @@ impl Node {
         Heard::Something
     }
 
-    /// Gives the objects of a received PDO their values; what is refused keeps the one it had.
+    /// Writes the objects of a received PDO. An object that rejects its value keeps the old one.
     fn write_received<O: Objects>(&mut self, place: usize, objects: &mut O) {
         let Some(receive) = self.communication.receive.get(place) else { return };
         let (parameters, data) = (receive.parameters, receive.data());
@@ -338,7 +340,7 @@ impl Node {
         None
     }
 
-    /// Whether somebody is missed; [`Node::poll`] asks as well.
+    /// Checks all timeouts; [`Node::poll`] does so too.
     pub fn look_around<O: Objects>(&mut self, now_us: u64, objects: &mut O) {
         for place in 0..self.communication.consumers.len() {
             let consumer = self.communication.consumers.get_mut(place);
@@ -363,8 +365,8 @@ impl Node {
         }
     }
 
-    /// The board stood still until now, as it does while its flash is written, and heard nobody: that is not a host's fault. Whoever is waited for has
-    /// his whole time again.
+    /// Restarts all timeouts after the board could not receive, as while it writes its flash. The hosts are
+    /// not at fault for that time.
     pub fn stood_still(&mut self, now_us: u64) {
         self.communication.consumers.iter_mut().for_each(|consumer| consumer.wait(now_us));
         self.communication.receive.iter_mut().for_each(|pdo| pdo.wait(now_us));
@@ -382,7 +384,7 @@ impl Node {
         }
     }
 
-    /// The drive stops as its option says, the node goes where 1029:1 says.
+    /// Stops the drive by its option code and changes the NMT state by 1029:1.
     fn fail<O: Objects>(&mut self, why: Lost, objects: &mut O) {
         objects.lost(why);
         match (self.communication.on_error, self.communication.state) {

@@ -1,23 +1,23 @@
-//! Number of a node and the identifiers that follow from it.
+//! Node-ID and the COB-IDs derived from it.
 
-/// A node's number on the bus, 1 to 127.
+/// Node-ID, 1 to 127.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeId(u8);
 
 impl NodeId {
-    /// The number, if it is one.
+    /// Creates a node-ID, or `None` outside 1 to 127.
     #[must_use]
     pub const fn new(number: u8) -> Option<Self> {
         if matches!(number, 1..=127) { Some(Self(number)) } else { None }
     }
 
-    /// The number.
+    /// Returns the number.
     #[must_use]
     pub const fn number(self) -> u8 {
         self.0
     }
 
-    /// An identifier of the predefined connection set: its function's base and the number.
+    /// Returns a COB-ID of the predefined connection set: function base plus node-ID.
     #[must_use]
     pub const fn on(self, base: u16) -> u16 {
         base + self.0 as u16

@@ -1,74 +1,75 @@
-//! What stands behind the dictionary: the values of the profile's and the maker's objects.
+//! Interface to the values of the profile-specific and manufacturer-specific objects.
 //!
-//! Numbers cross as 32 bits, the low bytes of which count: an INTEGER16 of -1 is `0xFFFF`, with the upper half ignored.
+//! Numbers are passed as 32 bits; only the low bytes of the object's size are valid. An INTEGER16 of -1 may
+//! be passed as `0xFFFF`.
 
 use super::abort::Abort;
 use super::dictionary::Object;
 use super::emergency::ErrorReport;
 
-/// Why the host can no longer be relied on.
+/// Event after which the host can no longer be relied on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lost {
-    /// Its heartbeat (1016).
+    /// The heartbeat of a monitored node (1016) timed out.
     Heartbeat,
-    /// A PDO that has an event timer.
+    /// A received PDO missed its event timer.
     ReceivedPdo,
-    /// It spoke in every cycle and no longer speaks.
+    /// A cyclic host stopped sending.
     Silent,
-    /// The controller left the bus, or frames were lost (`true`); or it is near leaving it.
+    /// `true`: the controller is bus-off, or frames were lost. `false`: the controller is error passive.
     Bus(bool),
-    /// The master took the node out of Operational.
+    /// The master commanded the node out of Operational.
     Stopped,
-    /// The master had the node, or its communication, begin anew.
+    /// The master reset the node or its communication.
     Reset,
 }
 
-/// The values from index 2000 on. The node asks only for objects of the table that may be accessed that way, with a
-/// value of the right size.
+/// Values of the objects from index 2000 on. The node calls these functions only for objects of the table,
+/// with permitted access and values of the right size.
 pub trait Objects {
-    /// The value of an object.
+    /// Reads an object.
     ///
     /// # Errors
-    /// [`Abort`] where there is none now.
+    /// [`Abort`] if there is no value now.
     fn read(&self, object: Object) -> Result<u32, Abort>;
 
-    /// Gives an object a value.
+    /// Writes an object.
     ///
     /// # Errors
-    /// [`Abort`] where it cannot take it.
+    /// [`Abort`] if the value is not accepted.
     fn write(&mut self, object: Object, value: u32) -> Result<(), Abort>;
 
-    /// The bytes of a text from `offset` on, as many as fit into `into`; how many bytes it has in all. It must not change
-    /// before it is read to its end.
+    /// Copies the bytes of a text or domain from `offset` on into `into`; returns its total size in bytes.
+    /// The content must not change until it has been read to the end.
     ///
     /// # Errors
-    /// [`Abort`] where there is none now.
+    /// [`Abort`] if there is no content now.
     fn bytes(&self, object: Object, offset: u32, into: &mut [u8]) -> Result<u32, Abort> {
         let _ = (object, offset, into);
         Err(Abort::NoObject)
     }
 
-    /// The error there is now, for an emergency message.
+    /// Returns the active error, for an emergency message.
     fn error(&self) -> Option<ErrorReport>;
 
-    /// The host is lost, the bus is, or the node is told to stop: what moves has to stop as its option codes say.
+    /// Handles a lost host, a lost bus or a stop command: the drive stops as its option codes say.
     fn lost(&mut self, why: Lost);
 
-    /// A host that falls silent is missed: the drive is on, by a host.
+    /// Whether a silent host is a fault: a host has enabled the drive.
     fn misses_host(&self) -> bool {
         false
     }
 
-    /// Everything that was written is as after the start again.
+    /// Restores the state after the start, for everything a host has written.
     fn reset(&mut self);
 
-    /// A SYNC has come; what it was to bring has been written.
+    /// Handles a SYNC. The values of synchronous PDOs have been written before.
     fn synchronise(&mut self) {}
 
-    /// Keeps all parameters (1010) or returns to the defaults at the next start (1011).
+    /// Stores all parameters (1010) or restores the defaults at the next start (1011).
     ///
     /// # Errors
-    /// [`Abort::Store`] where nothing can be kept, [`Abort::State`] while the drive is on.
+    /// [`Abort::Store`] if the board cannot store, [`Abort::State`] while the drive is enabled.
     fn store(&mut self, defaults: bool) -> Result<(), Abort> {
         let _ = defaults;
         Err(Abort::Store)

@@ -1,43 +1,44 @@
-//! A host that spoke in every cycle and no longer speaks, noticed without its heartbeat.
+//! Detects that a cyclic host has stopped sending, without its heartbeat.
 //!
-//! Why: much host software sets no consumer heartbeat (1016) and no event timer. When its process dies or its cable is cut, a joint in profile
-//! velocity goes on to the end of its range.
+//! Why: much host software sets neither a consumer heartbeat (1016) nor an event timer. If its process dies
+//! or its cable is cut, a joint in profile velocity mode moves on to the end of its range.
 //!
 //! ```text
-//! kind       SYNC, each received PDO, the controlword written by SDO: each has a cycle of its own
-//! armed      after 20 frames of one kind, each at most 4 mean periods and 50 ms after the one before, and none later than 250 ms
-//! mean       of the intervals; once armed over some 16 of them, so that a host may change its rate
-//! silent     once all armed kinds are over their time: 10 mean periods, at least 100 ms
+//! kind       SYNC, each received PDO, the controlword written by SDO; each has its own cycle
+//! armed      after 20 frames of one kind; each interval at most 250 ms, and at most max(4 means, 50 ms)
+//! mean       mean interval; once armed a moving mean over about 16, so that a host may change its rate
+//! silent     when all armed kinds have exceeded 10 mean periods, at least 100 ms
 //! ```
 //!
-//! A kind that is given up while another one goes on is not missed, nor is one that was never cyclic: single frames, set-points of an
-//! operator, a host that polls. Jitter that the bounds allow for: pauses below 100 ms, bursts after them. What it cannot know is whose SYNC it
-//! hears: where another device sends it, only 1016 tells that the host is lost.
+//! A kind that stops while another one continues is ignored. So is one that was never cyclic: single frames,
+//! set-points of an operator, a polling host. Tolerated jitter: pauses below 100 ms and bursts after them.
+//! Limits: the node cannot tell which device sends SYNC. If another device does, only 1016 detects a lost
+//! host.
 //!
-//! Cost: some 20 instructions per frame and a loop over six kinds per poll. Memory: 16 bytes per kind.
+//! Cost: about 20 instructions per frame and a loop over six kinds per poll. Memory: 16 bytes per kind.
 
 use super::pdo::PDOS;
 
-/// SYNC, the controlword by SDO, received PDOs.
+/// Number of kinds: SYNC, the controlword by SDO, received PDOs.
 const KINDS: usize = 2 + PDOS;
-/// Frames that arm.
+/// Number of frames that arm the detection.
 const ARMED: u8 = 20;
-/// Longest period of what is cyclic, us.
+/// Longest interval of a cyclic kind, us.
 const LONGEST_US: u32 = 250_000;
-/// Intervals below this are never irregular, us.
+/// Intervals below this are always regular, us.
 const SLACK_US: u32 = 50_000;
-/// Mean periods of silence, and at least so long, us.
+/// Timeout in mean periods, and its lower bound, us.
 const PERIODS: u64 = 10;
 const LEAST_US: u64 = 100_000;
 
-/// What a host sends cyclically.
+/// Kind of frame that a host may send cyclically.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// SYNC.
     Sync,
-    /// The controlword, written by SDO.
+    /// Controlword, written by SDO.
     Word,
-    /// A received PDO.
+    /// Received PDO by number.
     Receive(u8),
 }
 
@@ -51,12 +52,12 @@ impl Kind {
     }
 }
 
-/// The cycle of one kind.
+/// Cycle of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Cycle {
     last_us: u64,
     mean_us: u32,
-    /// Frames in a row, as far as they arm.
+    /// Consecutive regular frames, saturated at [`ARMED`].
     count: u8,
 }
 
@@ -66,12 +67,12 @@ impl Cycle {
         self.last_us = now_us;
         let is_regular = since_us <= LONGEST_US
             && (self.count == 1 || since_us <= self.mean_us.saturating_mul(4).max(SLACK_US));
-        // What is armed stays so until it is silent: a pause that is none does not open a gap.
+        // An armed cycle stays armed until it is silent; a pause does not disarm it.
         if self.count == 0 || self.count < ARMED && !is_regular {
             (self.count, self.mean_us) = (1, 0);
             return;
         }
-        // The mean so far, later one that forgets.
+        // Arithmetic mean at first, later an exponential one.
         let share = self.count.min(16);
         let change = (i64::from(since_us) - i64::from(self.mean_us)) / i64::from(share);
         self.mean_us = (i64::from(self.mean_us) + change) as u32;
@@ -84,21 +85,21 @@ impl Cycle {
     }
 }
 
-/// All kinds that one node hears.
+/// Cycles of all kinds received by one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Silence {
     cycles: [Cycle; KINDS],
 }
 
 impl Silence {
-    /// A frame of a kind came.
+    /// Handles a frame of a kind.
     pub fn heard(&mut self, kind: Kind, now_us: u64) {
         if let Some(cycle) = self.cycles.get_mut(kind.place()) {
             cycle.heard(now_us);
         }
     }
 
-    /// Whether a host that was cyclic has fallen silent: once, until it is cyclic again.
+    /// Whether the host has just fallen silent; reported once, until it is cyclic again.
     pub fn begins(&mut self, now_us: u64) -> bool {
         let due = self.cycles.iter().filter_map(Cycle::due_us).max();
         let begins = due.is_some_and(|due| now_us > due);
@@ -108,7 +109,7 @@ impl Silence {
         begins
     }
 
-    /// Nobody could be heard until now.
+    /// Restarts the timeout after a time in which nothing could be received.
     pub fn wait(&mut self, now_us: u64) {
         self.cycles.iter_mut().for_each(|cycle| cycle.last_us = cycle.last_us.max(now_us));
     }

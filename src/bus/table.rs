@@ -1,17 +1,18 @@
-//! The object dictionary: every object a node has, once.
+//! Object dictionary: all objects of a node, each listed once.
 //!
-//! The device reads the rows, the writer of electronic data sheets the rows and the names.
+//! The firmware reads the rows. The writer of the electronic data sheet (EDS) reads rows and names.
 //!
 //! ```text
 //! index [x indices], subindex [xN subindices], type, access, PDO, default [+ node], name
 //! ```
 //!
-//! The order of a PDO's subindices is CiA 301's, the drive's objects are CiA 402's; 219A is the one object of another
-//! maker that recorded host software maps, 2194 one that published host software does (docs/bus.md).
+//! PDO subindices follow CiA 301, drive objects CiA 402. Two objects exist for other makers' host software:
+//! 219A is mapped by recorded software, 2194 by published software (docs/bus.md).
 
 use super::dictionary::{Access, Mapping, Row, Type};
 
-/// What an index with several subindices is called, how many indices are called so, and whether its parts are all of one kind.
+/// Indices with several subindices: first index, number of indices, name, and whether all parts have one
+/// type.
 pub static GROUPS: &[(u16, u16, &str, bool)] = &[
     (0x1003, 1, "Pre-defined error field", true),
     (0x1010, 1, "Store parameters", true),
@@ -53,7 +54,7 @@ macro_rules! rows {
     (@node node) => { true };
     ($( $index:literal $(x $indices:literal)?, $sub:literal $(x $subs:literal)?, $kind:ident, $access:ident, $mapping:ident,
         $default:literal $(+ $node:ident)?, $name:literal; )*) => {
-        /// What each object is.
+        /// All objects, one row per range.
         pub static ROWS: &[Row] = &[$( Row {
             index: $index,
             indices: rows!(@count $($indices)?),
@@ -66,7 +67,7 @@ macro_rules! rows {
             default: $default,
         }, )*];
 
-        /// What each row is called, in the same order.
+        /// Name of each row, in the order of [`ROWS`].
         pub static NAMES: &[&str] = &[$($name),*];
     };
 }

@@ -32,7 +32,7 @@
 //! rows and a queue of row centres.
 
 use super::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE};
-use super::record::{LARGEST_STILL_SHARE, RowModel};
+use super::recorder::{LARGEST_STILL_SHARE, RowModel};
 use super::rows::{DECIMATION, FilteredRows};
 use super::smoothing::Smoothed;
 use crate::model::{Chain, JointState, LegParameters, PARAMETERS_PER_JOINT, rigid_body_torques};

@@ -12,7 +12,7 @@ use super::choice::{Choice, Estimator};
 use super::factor::Factor;
 use super::outliers::Outliers;
 use super::packed::{self, LARGEST_SIZE};
-use super::record::TorqueSize;
+use super::recorder::TorqueSize;
 use super::reweighting::{Weights, weigh, weighted};
 use super::row_model::RowModel;
 use super::stribeck::{
@@ -130,7 +130,7 @@ pub(super) struct Choices<const N: usize> {
 impl<const N: usize> Choices<N> {
     /// Takes the rank and the Stribeck choices from a model.
     pub(super) fn of<T: Real, const B: usize>(model: &RowModel<T, N, B>) -> Self {
-        Self { rank: model.base.rank(), stribeck: model.stribeck_choice }
+        Self { rank: model.base.rank(), stribeck: core::array::from_fn(|joint| model.stribeck_choice(joint)) }
     }
 
     /// Disables Stribeck friction for all joints.

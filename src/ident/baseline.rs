@@ -15,7 +15,7 @@
 //! Cost of a row: `B^2 + 2 B` multiplications. Memory: `B^2 + B + N + 1` numbers and `B` flags.
 
 use super::estimate::{Estimate, noise};
-use super::record::Record;
+use super::recorder::Record;
 use super::rows::FilteredRows;
 use crate::real::{self, Real};
 

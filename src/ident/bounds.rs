@@ -11,10 +11,12 @@
 //! Interval sums and products give the ranges about the joint's origin; the base parameters' terms turn them
 //! into the box of the base set. The box contains every leg that the ranges allow, and more. Two kinds of
 //! range are replaced by the most that the measured torque could need: those of zero width (a prior of zero)
-//! and all without a prior. That limit is ten times the torque over the size of its column.
+//! and all without a prior. That limit is ten times the torque over the size of its column, for the joint
+//! that allows least: one parameter alone must not exceed any joint's torque tenfold. The largest over the
+//! joints lets an inertia that hardly shows in one joint move 1e5 N m of another.
 
 use super::constrained::ParameterBox;
-use super::record::{Record, RowModel};
+use super::recorder::{Record, RowModel};
 use crate::model::{self, LegParameters, PARAMETERS_PER_JOINT, Parameter, RigidBody};
 use crate::real::{self, Real};
 
@@ -195,22 +197,23 @@ pub(super) fn segment_length<T: Real, const N: usize, const B: usize>(
     real::max(to_next, real::max(suggested, T::of(SHORTEST_SEGMENT_M)))
 }
 
-/// Box from the measured torque: each bound is the torque's size over the column's.
+/// Box from the measured torque: each bound is the torque's size over the column's, least of all joints.
 pub(super) fn measured_box<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     record: &Record<T, N, B>,
 ) -> ParameterBox<T, B> {
     let mut bounds = ParameterBox { low: [T::zero(); B], high: [T::zero(); B] };
     for base in 0..model.base.rank() {
-        let mut reach = T::zero();
+        let mut reach = None;
         for ((factor, size), &rows) in record.factors.iter().zip(&record.torque).zip(&record.rows) {
             let rows = real::sqrt(T::of(f64::from(rows)));
             let length = factor.column_length(base);
             if length > T::zero() {
-                reach = real::max(reach, size.root_mean_square * rows / length);
+                let here = size.root_mean_square * rows / length;
+                reach = Some(reach.map_or(here, |least| real::min(least, here)));
             }
         }
-        bounds.high[base] = T::of(TORQUE_SHARE) * reach;
+        bounds.high[base] = T::of(TORQUE_SHARE) * reach.unwrap_or(T::zero());
         let never_negative =
             model.base.independent(base).is_some_and(|(_, parameter)| parameter.is_never_negative());
         bounds.low[base] = if never_negative { T::zero() } else { -bounds.high[base] };

@@ -12,7 +12,7 @@
 
 use super::estimate::Estimate;
 use super::factor::Factor;
-use super::record::RowModel;
+use super::recorder::RowModel;
 use crate::model::{LegParameters, PARAMETERS_PER_JOINT, Parameter, Standing};
 use crate::real::{self, Real};
 
@@ -49,7 +49,7 @@ const WEAK_SHARE: f64 = 0.02;
 /// True if the data hardly separate base parameter `base` from the others.
 #[must_use]
 pub fn is_weak<T: Real, const N: usize, const B: usize>(
-    record: &super::record::Record<T, N, B>,
+    record: &super::recorder::Record<T, N, B>,
     estimate: &Estimate<T, B>,
     base: usize,
 ) -> bool {
@@ -64,7 +64,7 @@ pub fn is_weak<T: Real, const N: usize, const B: usize>(
 #[must_use]
 pub fn status<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
-    record: &super::record::Record<T, N, B>,
+    record: &super::recorder::Record<T, N, B>,
     estimate: &Estimate<T, B>,
     joint: usize,
     parameter: Parameter,

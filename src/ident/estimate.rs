@@ -20,7 +20,7 @@
 //! distal joint that moves alone cannot separate its rotor's inertia from its link's.
 
 use super::factor::Factor;
-use super::record::{Record, RowModel};
+use super::recorder::{Record, RowModel};
 use crate::real::{self, Real};
 
 /// Order in which the joints' rows give the parameters.

@@ -1,7 +1,7 @@
 //! The recorder's two filters.
 
 use super::kernel::{Kernel, KernelError, LowPass};
-use super::record::{SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
+use super::recorder::{SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
 use super::rows::RowFilter;
 use crate::real::Real;
 

@@ -4,7 +4,7 @@
 //! [`Alignment`] for the results.
 
 use super::alignment::Alignment;
-use super::record::{Progress, RowModel};
+use super::recorder::{Progress, RowModel};
 use super::residual::Residual;
 use crate::real::Real;
 

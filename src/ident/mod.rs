@@ -29,11 +29,11 @@ pub mod hampel;
 pub mod held_out;
 pub mod kernel;
 pub mod monitor;
-mod motion_record;
 pub mod noise;
 pub mod outliers;
 pub mod packed;
-pub mod record;
+mod record;
+pub mod recorder;
 pub mod residual;
 pub mod reweighting;
 pub mod row_model;
@@ -43,6 +43,7 @@ pub mod search;
 pub mod selection;
 pub mod smoothing;
 pub mod solver;
+pub mod stretch;
 pub mod stribeck;
 mod sum;
 pub mod update;
@@ -63,7 +64,7 @@ pub use held_out::HeldOut;
 pub use kernel::{Kernel, KernelError, LowPass};
 pub use monitor::{Change, Monitor, MonitorSettings, ROWS_PER_BLOCK};
 pub use outliers::Outliers;
-pub use record::{
+pub use recorder::{
     LARGEST_STILL_SHARE, MotionWindow, Progress, Record, Recorder, RowModel, SAMPLE_RATE_HZ,
     SMOOTHING_BANDWIDTHS, TorqueSize,
 };
@@ -75,7 +76,8 @@ pub use search::{SearchState, SwarmSearch};
 pub use selection::Selection;
 pub use smoothing::{Smoothed, Smoother};
 pub use solver::{Consistency, Solver};
+pub use stretch::Stretches;
 pub use stribeck::StribeckFit;
 pub use update::hypothesis::{DIRECTIONS, Hypothesis};
 pub use update::{Cause, PAYLOAD_PARAMETERS, Update};
-pub use verdict::{Docket, Evidence, Reason, Test, Thresholds, Unused, Verdict};
+pub use verdict::{Evidence, Reason, Test, Thresholds, Unused, Verdict, VerdictBuilder};

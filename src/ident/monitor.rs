@@ -41,7 +41,7 @@
 
 use super::baseline::Baseline;
 use super::kernel::LowPass;
-use super::record::{LARGEST_STILL_SHARE, SAMPLE_RATE_HZ};
+use super::recorder::{LARGEST_STILL_SHARE, SAMPLE_RATE_HZ};
 use super::rows::{DECIMATION, FilteredRows};
 use crate::real::{self, Real};
 

@@ -18,7 +18,7 @@
 //! Cost: B multiplications for each joint and row. Memory: 13 numbers for each joint. Known limits: a
 //! residual that changes sign within half a second, as friction's does at fast reversals, does not show.
 
-use super::record::LARGEST_STILL_SHARE;
+use super::recorder::LARGEST_STILL_SHARE;
 use super::rows::{DECIMATION, FilteredRows};
 use crate::real::{self, Real};
 

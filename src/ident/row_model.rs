@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 
 use super::choice::{Choice, Constant, DriveChoice};
-use super::record::STILL_SPEED;
+use super::recorder::{PULSE_COUNTS, STILL_PULSES, STILL_SPEED};
 use super::rows::FilteredRows;
 use super::smoothing::Smoothed;
-use super::stribeck::{BANK, bank_columns};
+use super::stribeck::{BANK, LARGEST_PULSE, bank_columns};
 use crate::model::{BaseParameters, Chain, JointState, Parameter, friction::Stribeck, regressor};
 use crate::real::{self, Real};
 
@@ -25,6 +25,10 @@ pub struct RowModel<T: Real, const N: usize, const B: usize> {
     pub drive_choice: [DriveChoice; N],
     /// Known Stribeck friction: a factor on the Coulomb column. Zero excess until one is found.
     pub stribeck: [Stribeck<T>; N],
+    /// Pulse of the smoothed speed at one count of a joint's encoder, rad/s.
+    pub pulse: [T; N],
+    /// Smoothed speed below which a joint may stick, rad/s.
+    pub still_speed: [T; N],
 }
 
 /// Zero Stribeck friction for all joints.
@@ -44,6 +48,24 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
             stribeck_choice: [Choice::Off; N],
             drive_choice: [DriveChoice::ALL; N],
             stribeck: no_stribeck(),
+            pulse: [T::zero(); N],
+            still_speed: [T::of(STILL_SPEED); N],
+        }
+    }
+
+    /// Sets the angles of the encoders' counts, rad, for rows of this bandwidth.
+    pub fn set_encoders(&mut self, step_rad: &[T; N], bandwidth_hz: T) {
+        self.pulse = step_rad.map(|step| T::of(PULSE_COUNTS) * step * bandwidth_hz);
+        self.still_speed = self.pulse.map(|pulse| real::max(T::of(STILL_SPEED), T::of(STILL_PULSES) * pulse));
+    }
+
+    /// Whether to search for Stribeck friction of a joint. With `auto` only where the encoder's pulses are
+    /// much smaller than the speed of the slowest curve, else the pulses look like one.
+    #[must_use]
+    pub fn stribeck_choice(&self, joint: usize) -> Choice {
+        match self.stribeck_choice[joint] {
+            Choice::Auto if self.pulse[joint] > T::of(LARGEST_PULSE) => Choice::Off,
+            choice => choice,
         }
     }
 
@@ -56,19 +78,20 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
             regressor: [[T::zero(); B]; N],
             stribeck: [[T::zero(); BANK]; N],
             torque: instant.torque,
-            still: instant
-                .velocity
-                .map(|velocity| if real::abs(velocity) < T::of(STILL_SPEED) { T::one() } else { T::zero() }),
+            still: [T::zero(); N],
         };
         for joint in 0..N {
             let speed = instant.velocity[joint];
+            if real::abs(speed) < self.still_speed[joint] {
+                rows.still[joint] = T::one();
+            }
             if self.stribeck[joint].excess > T::zero() {
                 full[joint][joint][Parameter::FC.index()] *= self.stribeck[joint].factor(speed);
             }
             if self.drive_choice[joint].meaning == Constant::Asymmetry {
                 full[joint][joint][Parameter::OFF.index()] = real::abs(real::sign(speed));
             }
-            if self.stribeck_choice[joint].is_possible() {
+            if self.stribeck_choice(joint).is_possible() {
                 rows.stribeck[joint] = bank_columns(speed);
             }
             self.base.select(&full[joint], &mut rows.regressor[joint]);

@@ -34,7 +34,7 @@
 
 use super::estimate::Estimate;
 use super::factor::Factor;
-use super::record::Record;
+use super::recorder::Record;
 use crate::real::{self, Real};
 
 /// Estimate of one joint's torque constant from two runs.

@@ -31,7 +31,7 @@
 
 use super::choice::Choice;
 use super::estimate::Problem;
-use super::record::{Record, RowModel};
+use super::recorder::{Record, RowModel};
 use crate::model::{Parameter, Standing};
 use crate::real::Real;
 

@@ -12,12 +12,13 @@ use super::bounds::{LinkPrior, search_box};
 use super::consistent::{Completion, Effort};
 use super::constrained::ParameterBox;
 use super::estimate::{Estimate, Plan, Problem, noise};
-use super::record::{Record, RowModel};
+use super::recorder::{Record, RowModel};
 use super::row_model::no_stribeck;
 use super::scale::widen;
 use super::search::{SearchState, SwarmSearch};
 use super::selection;
-use super::verdict::{Docket, Evidence, Reason, Test, Thresholds, Unused, Verdict};
+use super::stretch::Stretches;
+use super::verdict::{Evidence, Reason, Test, Thresholds, Unused, Verdict, VerdictBuilder};
 use crate::model::friction::Stribeck;
 use crate::model::{LegParameters, Parameter};
 use crate::place::{fill, made};
@@ -287,6 +288,16 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         self.completed.as_ref().map(|(_, consistency)| *consistency)
     }
 
+    /// Shortens the disturbed stretches of the motion identified from, counted in whole blocks, to what a
+    /// second pass over its rows found.
+    pub fn time_disturbances(&mut self, stretches: &Stretches<T, N, B>) {
+        let outliers = &mut self.record.outliers;
+        for (longest, &found) in outliers.longest_s.iter_mut().zip(&stretches.longest_s) {
+            *longest = real::min(*longest, found);
+        }
+        outliers.longest_common_s = real::min(outliers.longest_common_s, stretches.longest_common_s);
+    }
+
     /// Limit of a row's torque error by noise, N m: six standard deviations plus a twentieth of the torque.
     #[must_use]
     pub fn unexpected(&self) -> [T; N] {
@@ -314,44 +325,44 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         asked: &Misalignments<T>,
         hand_on: &mut dyn FnMut(&Evidence<T>),
     ) -> Verdict {
-        let docket = &mut Docket::new(hand_on);
+        let builder = &mut VerdictBuilder::new(hand_on);
         let problem = Problem::new(&self.record, model);
-        thresholds.judge_input(model, &self.record, docket);
-        thresholds.judge_excitation(&problem.whole(), self.least_squares.rank(), docket);
+        thresholds.judge_input(model, &self.record, builder);
+        thresholds.judge_excitation(&problem.whole(), self.least_squares.rank(), builder);
         let done = if self.completed.is_some() { T::one() } else { T::zero() };
-        docket.at_least(Reason::Input, Test::Search, None, done, T::one());
+        builder.at_least(Reason::Input, Test::Search, None, done, T::one());
         let found = self.found();
         let estimate = self.estimate();
-        if !docket.verdict().has(Reason::Unexcited) {
+        if !builder.verdict().has(Reason::Unexcited) {
             // Parameters that the motion did not excite cannot be judged.
-            thresholds.judge_physics(model, &self.record, &self.least_squares, docket);
-            thresholds.judge_physics(model, &self.record, &estimate, docket);
+            thresholds.judge_physics(model, &self.record, &self.least_squares, builder);
+            thresholds.judge_physics(model, &self.record, &estimate, builder);
             if let Some(consistency) = self.consistency() {
-                thresholds.judge_consistency(&consistency, docket);
+                thresholds.judge_consistency(&consistency, builder);
             }
         }
-        thresholds.judge_disturbance(&self.record.outliers, docket);
+        thresholds.judge_disturbance(&self.record.outliers, builder);
         // The values before the completion: a computed torque has no inertia or friction in them.
-        thresholds.judge_measurement(model, &self.record, &self.search.values(), docket);
-        thresholds.judge_residual(&self.record, &found, docket);
+        thresholds.judge_measurement(model, &self.record, &self.search.values(), builder);
+        thresholds.judge_residual(&self.record, &found, builder);
         let noise_is_known = self.record.noise.iter().all(|&noise| noise > T::zero());
         let mut predicted = false;
         for (motion, unused) in unused.enumerate() {
             predicted = true;
-            thresholds.judge_set_aside(&unused.record.outliers, Some(motion), docket);
-            thresholds.judge_validation(&self.record, motion, unused.record, &estimate, docket);
-            thresholds.judge_colour(motion, &unused, docket);
-            thresholds.judge_contact(motion, &unused, docket);
+            thresholds.judge_set_aside(&unused.record.outliers, Some(motion), builder);
+            thresholds.judge_validation(&self.record, motion, unused.record, &estimate, builder);
+            thresholds.judge_colour(motion, &unused, builder);
+            thresholds.judge_contact(motion, &unused, builder);
         }
         if !predicted {
-            thresholds.judge_whole(&self.record.outliers, docket);
+            thresholds.judge_whole(&self.record.outliers, builder);
         }
-        if !docket.verdict().has(Reason::Validation) {
+        if !builder.verdict().has(Reason::Validation) {
             // Pushes and a wrong mass ask for changes that are not geometry errors.
             for found in asked.iter().flatten() {
-                thresholds.judge_alignment(found, noise_is_known, docket);
+                thresholds.judge_alignment(found, noise_is_known, builder);
             }
         }
-        docket.verdict()
+        builder.verdict()
     }
 }

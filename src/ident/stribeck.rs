@@ -48,6 +48,9 @@ pub const BANK: usize = 3;
 pub const SLOWEST_RAD_S: f64 = 0.06;
 /// Range of the search, rad/s.
 pub const SPEEDS_RAD_S: (f64, f64) = (0.05, 0.3);
+/// Largest pulse of an encoder's count, rad/s, with which a search under `auto` makes sense: a quarter of the
+/// slowest vs.
+pub const LARGEST_PULSE: f64 = SPEEDS_RAD_S.0 / 4.0;
 /// Least chi-square of a surplus under `auto`. Without a surplus the gain stays below the chi-square of the
 /// bank's three columns, which exceeds 30 in 1.4 of a million motions. In 200 undisturbed runs of the default
 /// leg it was at most 8.7.

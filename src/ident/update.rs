@@ -37,8 +37,8 @@ pub mod hypothesis;
 use super::baseline::Baseline;
 use super::estimate::Estimate;
 use super::factor::Factor;
-use super::record::{Record, RowModel};
-use super::verdict::{Docket, Evidence, Reason, Thresholds, Verdict};
+use super::recorder::{Record, RowModel};
+use super::verdict::{Evidence, Reason, Thresholds, Verdict, VerdictBuilder};
 use crate::model::Parameter;
 use crate::real::{self, Real};
 use hypothesis::{Comparison, DIRECTIONS, Explanation, Hypothesis};
@@ -137,10 +137,10 @@ impl<T: Real, const N: usize, const B: usize> Update<T, N, B> {
             };
             let energy = energy(baseline, record, &explanation.estimate.values);
             let ignore = &mut |_: &Evidence<T>| {};
-            let mut docket = Docket::new(ignore);
-            thresholds.judge_physics(model, record, &explanation.estimate, &mut docket);
+            let mut builder = VerdictBuilder::new(ignore);
+            thresholds.judge_physics(model, record, &explanation.estimate, &mut builder);
             let possible = (cause == Cause::Friction || payload_can_exist(&explanation, thresholds))
-                && docket.verdict().is_accepted();
+                && builder.verdict().is_accepted();
             let explained =
                 hypothesis.explains(thresholds) && energy.iter().all(|&energy| energy <= silent_energy);
             if possible && explained && best.is_none_or(|least| hypothesis.score() < least) {

@@ -21,7 +21,7 @@
 //! than 32 columns is rejected.
 
 use super::packed::{self, LARGEST_COLUMNS, Row};
-use super::record::RowModel;
+use super::recorder::RowModel;
 use super::rows::FilteredRows;
 use super::stribeck::BANK;
 use crate::model::Parameter;
@@ -154,7 +154,7 @@ impl<T: Real, const N: usize, const B: usize, const ROOM: usize> Window<T, N, B,
                 seen.copied().position(|index| model.base.independent(index) == Some((joint, parameter)))
             };
             let friction = [place(Parameter::FC), place(Parameter::FV)];
-            let bank = if model.stribeck_choice[joint].is_possible() { BANK } else { 0 };
+            let bank = if model.stribeck_choice(joint).is_possible() { BANK } else { 0 };
             *columns = Columns { base, count, friction, bank, start: 0 };
         }
         self.arrange(all);

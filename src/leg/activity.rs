@@ -1,66 +1,67 @@
-//! What a leg is doing, above the power states of its drive.
+//! Activities of a leg, above the power states of its drive.
 
-/// Motions that are predicted and not identified from: two gaits and an unused Fourier motion.
+/// Number of validation motions: two gaits and an unused Fourier motion. They are predicted, not identified
+/// from.
 pub const VALIDATION_MOTIONS: usize = 3;
 
-/// What a leg is doing.
+/// Activity of a leg.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Activity {
-    /// Nothing; holds its pose where the drive is enabled.
+    /// None; the leg holds its pose while the drive is enabled.
     #[default]
     Idle,
-    /// Finding its own parameters.
+    /// Identifies its own parameters.
     Identify(IdentifyPhase),
-    /// Following a motion.
+    /// Tracks a motion.
     Track(Step),
-    /// Following what a host commands, tick by tick.
+    /// Follows the commands of a host, tick by tick.
     Follow,
 }
 
-/// How far an identification is.
+/// Phase of an identification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IdentifyPhase {
-    /// To where the excitation begins.
+    /// Moves to the start of the excitation.
     Approach,
-    /// The exciting motion; its samples are the training data.
+    /// Runs the exciting motion; its samples are the training data.
     Excite,
-    /// At rest until the last samples are in.
+    /// Rests until the last samples have arrived.
     Settle,
-    /// At rest while the solver works.
+    /// Rests while the solver works.
     Solve,
-    /// Motions that are only predicted.
+    /// Runs the validation motions.
     Validate {
-        /// Counted from 0.
+        /// Index of the motion, from 0.
         motion: u8,
-        /// On the way to it, or in it.
+        /// Approach or motion.
         step: Step,
     },
-    /// At rest until the verdict.
+    /// Rests until the verdict.
     Judge,
 }
 
-/// The two parts of every motion.
+/// The two steps of every motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// To where it begins.
+    /// Moves to its start.
     Approach,
-    /// The motion itself.
+    /// Runs the motion.
     Run,
 }
 
-/// What a logged sample is for.
+/// Use of a logged sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Segment {
-    /// Identified from.
+    /// Training data.
     Training,
-    /// Predicted; counted from 0.
+    /// Validation data of this motion, from 0.
     Validation(u8),
-    /// A motion that is followed: the accepted model is watched.
+    /// Tracked motion: the accepted model is monitored.
     Tracking,
 }
 
 impl Activity {
-    /// What samples taken now are for.
+    /// Use of the samples taken now.
     #[must_use]
     pub const fn segment(self) -> Option<Segment> {
         match self {

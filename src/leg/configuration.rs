@@ -1,4 +1,4 @@
-//! What does not change about a leg while it runs.
+//! Configuration of a leg: everything that is constant while it runs.
 
 use super::activity::VALIDATION_MOTIONS;
 use crate::ident::{Estimator, KernelError, LinkPrior, MonitorSettings, Plan, RowModel, Thresholds};
@@ -6,58 +6,58 @@ use crate::motion::{JointEnvelope, LimitViolation, Motion, MotionError, Periodic
 use crate::servo::{JointConfiguration, ServoError};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
-/// Share of the speed and acceleration limits at which a leg approaches a motion's start.
+/// Share of the speed and acceleration limits used on the approach to a motion's start.
 const APPROACH_SHARE: f32 = 0.25;
 
-/// Everything a leg is built from. Angles and torques have the model's (D-H) sign.
+/// Configuration of a leg. Angles and torques have the model's (D-H) sign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LegConfiguration<const N: usize, const B: usize> {
     /// Scales, limits and bandwidth of each joint.
     pub joints: [JointConfiguration; N],
-    /// Largest acceleration that is commanded.
+    /// Largest commanded acceleration.
     pub acceleration: [RadianPerSecondSquared; N],
     /// Geometry, gravity and base parameters.
     pub model: RowModel<f32, N, B>,
-    /// What is believed before measuring, if anything.
+    /// Prior knowledge of links and drives, if any.
     pub prior: Option<[LinkPrior<f32>; N]>,
-    /// One-time or sequential.
+    /// One-time or sequential identification.
     pub plan: Plan,
-    /// Of the swarm's random numbers.
+    /// Seed of the swarm's random numbers.
     pub swarm_seed: u64,
-    /// What a result must keep.
+    /// Acceptance limits of a result.
     pub thresholds: Thresholds<f32>,
-    /// When a tracked motion says that the model no longer fits.
+    /// Model monitor: when a tracked motion shows that the model no longer fits.
     pub monitor: MonitorSettings<f32>,
-    /// How disturbances of the motion identified from are met.
+    /// Robust or plain estimator for the training motion.
     pub estimator: Estimator,
-    /// Where the low-pass of the identification is 3 dB down, Hz.
+    /// 3 dB bandwidth of the identification's low-pass, Hz.
     pub bandwidth_hz: f32,
-    /// The motion identified from.
+    /// Training motion.
     pub excitation: Periodic<N>,
-    /// The motions predicted.
+    /// Validation motions.
     pub validation: [Periodic<N>; VALIDATION_MOTIONS],
 }
 
-/// A motion that was shown to stay within a leg's limits, so that the tick need not show it again.
+/// A motion proved to stay within a leg's limits, so that the tick need not check it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProvedMotion<const N: usize>(Periodic<N>);
 
 impl<const N: usize> ProvedMotion<N> {
-    /// The motion.
+    /// Returns the motion.
     #[must_use]
     pub fn motion(&self) -> &Periodic<N> {
         &self.0
     }
 }
 
-/// Why a leg cannot be built.
+/// Reason why a leg cannot be built.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LegError {
-    /// A joint's limits or scales make no sense.
+    /// A joint's limits or scales are invalid.
     Servo(ServoError),
-    /// A motion does not stay within the limits.
+    /// A motion exceeds the limits.
     Limit(LimitViolation),
-    /// A motion makes no sense.
+    /// A motion is invalid.
     Motion(MotionError),
     /// The filter cannot be built.
     Kernel(KernelError),
@@ -88,7 +88,7 @@ impl From<KernelError> for LegError {
 }
 
 impl<const N: usize, const B: usize> LegConfiguration<N, B> {
-    /// What every motion must keep.
+    /// Limits for every motion.
     #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         core::array::from_fn(|joint| JointEnvelope {
@@ -99,7 +99,7 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
         })
     }
 
-    /// Speed and acceleration at which a motion's start is approached.
+    /// Speed and acceleration limits of the approach to a motion's start.
     #[must_use]
     pub fn approach(&self) -> ([RadianPerSecond; N], [RadianPerSecondSquared; N]) {
         (
@@ -108,10 +108,10 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
         )
     }
 
-    /// Shows that a motion stays within the limits: 206,000 instructions, outside the tick.
+    /// Proves that a motion stays within the limits. Cost: 206,000 instructions, so not within a tick.
     ///
     /// # Errors
-    /// [`LegError::Limit`] names the first joint and quantity that do not.
+    /// [`LegError::Limit`] names the first joint and quantity that exceed the limits.
     pub fn prove(&self, motion: Periodic<N>) -> Result<ProvedMotion<N>, LegError> {
         Motion::Periodic(motion).prove(&self.envelope())?;
         Ok(ProvedMotion(motion))

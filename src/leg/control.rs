@@ -1,4 +1,4 @@
-//! The half of a leg that moves: activity, motions, servo, log. Ticked at 4 kHz.
+//! Control half of a leg: activity, motions, servo, log. Ticked at 4 kHz.
 
 mod host;
 mod surroundings;
@@ -9,7 +9,7 @@ use super::activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS
 use super::configuration::{LegConfiguration, LegError, ProvedMotion};
 use super::identification::Finding;
 use super::model::IdentifiedModel;
-use super::succession::Succession;
+use super::model_blend::ModelBlend;
 use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
@@ -18,50 +18,51 @@ use crate::safety::{DriveState, PowerRequest, RETURN_SPEED};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
-/// At rest this long after a motion before the next step: half a second.
+/// Rest after a motion before the next step: half a second.
 const SETTLE_TICKS: u32 = SERVO_RATE_HZ / 2;
 
-/// What an operator asks of a leg, at one tick. `Identify` and `Track` are refused unless the drive is enabled and the
-/// commanded motion is at rest; a leg in motion is stopped by a quick stop, or by waiting for the motion's end.
+/// Request of an operator, valid for one tick. `Identify` and `Track` are refused unless the drive is enabled
+/// and the commanded motion is at rest. To stop a moving leg, request a quick stop or wait for the end of the
+/// motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ControlRequest<const N: usize> {
     /// A step of the drive's power states.
     Power(PowerRequest),
-    /// Excite, solve, validate.
+    /// Start an identification: excite, solve, validate.
     Identify,
-    /// Follow a motion, with the identified model in the feedforward or with feedback alone.
+    /// Track a motion, with the identified model as feedforward or with feedback only.
     Track {
-        /// Proved against this leg's limits, see [`LegConfiguration::prove`].
+        /// Motion proved against this leg's limits, see [`LegConfiguration::prove`].
         motion: ProvedMotion<N>,
-        /// Whether the model is used, if there is one.
+        /// Whether the model is used as feedforward, if there is one.
         with_model: bool,
     },
-    /// Take the update that was offered after a change into use, in motion or at rest: its torque fades over from the old
-    /// model's in half a second. Refused where none is offered.
+    /// Use the offered update, in motion or at rest. Its torque replaces that of the old model within half a
+    /// second. Refused if no update is offered.
     TakeUpdate,
 }
 
-/// A 500 Hz sample and what it is for.
+/// A 500 Hz sample and its use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoggedSample<const N: usize> {
     /// Angles and torques.
     pub sample: LogSample<N>,
-    /// What the leg was doing.
+    /// Use of the sample.
     pub segment: Option<Segment>,
 }
 
-/// What came of one tick.
+/// Result of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControlOutput<const N: usize> {
-    /// What the servo made of it; its command is for the drives.
+    /// Output of the servo, with the command for the drives.
     pub servo: ServoOutput<N>,
-    /// Where the leg was told to be.
+    /// Commanded motion.
     pub motion: MotionState<N>,
-    /// Every eighth tick.
+    /// Logged sample, every eighth tick.
     pub logged: Option<LoggedSample<N>>,
-    /// The request of this tick was refused.
+    /// Whether the request of this tick was refused.
     pub refused: bool,
-    /// The update offered was taken into use at this tick.
+    /// Whether the offered update was taken into use in this tick.
     pub took_update: bool,
 }
 
@@ -72,7 +73,7 @@ pub struct Control<const N: usize> {
     averager: LogAverager<N>,
     tick: u32,
     activity: Activity,
-    /// What the last logged sample was for: a sample in whose ticks that changed belongs to neither.
+    /// Use of the last logged sample. A sample during whose ticks it changed belongs to neither.
     segment: Option<Segment>,
     motion: Motion<N>,
     motion_tick: u32,
@@ -81,18 +82,18 @@ pub struct Control<const N: usize> {
     validation: [Periodic<N>; VALIDATION_MOTIONS],
     approach_speed: [RadianPerSecond; N],
     approach_acceleration: [RadianPerSecondSquared; N],
-    models: Succession<N>,
+    models: ModelBlend<N>,
     change: Option<Change<f32, N>>,
-    /// What the rows since the alarm were last explained by.
+    /// Last explanation of the rows since the alarm.
     cause: Option<Cause>,
     verdict: Option<Verdict>,
 }
 
 impl<const N: usize> Control<N> {
-    /// At rest, drive off.
+    /// Creates the control half at rest with the drive off.
     ///
     /// # Errors
-    /// [`LegError`] when limits make no sense or a motion cannot be proved to stay within them.
+    /// [`LegError`] if limits are invalid or a motion cannot be proved to stay within them.
     pub fn new<const B: usize>(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
         configuration.prove(configuration.excitation)?;
         for motion in configuration.validation {
@@ -112,15 +113,15 @@ impl<const N: usize> Control<N> {
             validation: configuration.validation,
             approach_speed,
             approach_acceleration,
-            models: Succession::new(),
+            models: ModelBlend::new(),
             change: None,
             cause: None,
             verdict: None,
         })
     }
 
-    /// Drive off, nothing read, nothing under way, as after the start: for joints that were not ticked meanwhile, or whose
-    /// zeros are others now. The model in use is kept.
+    /// Resets to the state after the start: drive off, nothing measured, no activity. For joints that have
+    /// missed ticks, or whose zeros have changed. The model in use is kept.
     pub fn restart(&mut self) {
         self.servo.restart();
         self.averager = LogAverager::EMPTY;
@@ -131,7 +132,7 @@ impl<const N: usize> Control<N> {
         self.models.interrupt();
     }
 
-    /// One tick.
+    /// Runs one tick.
     pub fn tick(
         &mut self,
         sample: &Sample<N>,
@@ -141,7 +142,7 @@ impl<const N: usize> Control<N> {
         self.tick_with(sample, request, gravity, None)
     }
 
-    /// One tick of a leg that a host commands, where there is one.
+    /// Runs one tick, with the commands of a host if there is one.
     #[inline]
     pub fn tick_with(
         &mut self,
@@ -173,7 +174,7 @@ impl<const N: usize> Control<N> {
         self.conclude(sample, servo, motion, [refused, took_update])
     }
 
-    /// What follows the servo's tick.
+    /// Updates activity and log after the servo's tick.
     #[inline(always)]
     fn conclude(
         &mut self,
@@ -184,14 +185,14 @@ impl<const N: usize> Control<N> {
     ) -> ControlOutput<N> {
         self.motion_tick = self.motion_tick.saturating_add(1);
         if servo.decision.state != DriveState::OperationEnabled {
-            // A leg that is not held is where it is: enabling must not pull it anywhere.
+            // Without power the commanded pose follows the joints: enabling must not cause a motion.
             self.activity = Activity::Idle;
             self.models.interrupt();
             self.hold(servo.position.map(|angle| angle.0));
         } else {
             self.proceed();
         }
-        // A glitch that the servo did not believe must not enter the log either.
+        // A sample that the servo rejected as a glitch does not enter the log.
         let mut believed = *sample;
         for (joint, counts) in believed.joints.iter_mut().zip(servo.believed_counts) {
             joint.encoder_counts = counts;
@@ -205,7 +206,7 @@ impl<const N: usize> Control<N> {
         ControlOutput { servo, motion, logged, refused, took_update }
     }
 
-    /// Power requests always; a new activity only from rest, since the way to it starts at rest.
+    /// Whether the request is permitted. A new activity starts only from rest, because its approach does.
     fn may_begin(&self, request: &ControlRequest<N>, host: Option<&Host<'_, N>>) -> bool {
         let still = match host {
             Some(host) if self.activity == Activity::Follow => host.following.is_still(),
@@ -219,7 +220,7 @@ impl<const N: usize> Control<N> {
         }
     }
 
-    /// A new activity: what an earlier motion told no longer counts. A model that is fading does so to its end.
+    /// Discards the findings of an earlier motion. A fade in progress continues to its end.
     fn forget_change(&mut self) {
         (self.change, self.cause) = (None, None);
         self.models.withdraw();
@@ -248,7 +249,7 @@ impl<const N: usize> Control<N> {
         None
     }
 
-    /// The next step of the activity where the motion has ended.
+    /// Starts the next step of the activity if the motion has ended.
     fn proceed(&mut self) {
         let ended = match self.motion.duration_ticks() {
             Some(duration) => self.motion_tick >= duration,
@@ -264,7 +265,7 @@ impl<const N: usize> Control<N> {
                 self.activity = Activity::Identify(IdentifyPhase::Solve);
             }
             Activity::Identify(IdentifyPhase::Validate { motion, step }) => self.validate_after(motion, step),
-            // The model is wholly in use, or wholly out of it, before the motion begins.
+            // The fade of the model ends before the motion begins.
             Activity::Track(Step::Approach) if self.models.is_fading() => {}
             Activity::Track(Step::Approach) => match self.tracked {
                 Some(motion) => self.run(Activity::Track(Step::Run), motion),
@@ -291,8 +292,8 @@ impl<const N: usize> Control<N> {
         }
     }
 
-    /// Takes what the other half found. Returns whether the result of an identification was taken: one that was
-    /// cancelled while it was judged is dropped.
+    /// Processes a finding of the identification half. Returns whether a result was taken; the result of a
+    /// cancelled identification is dropped.
     #[must_use]
     pub fn receive(&mut self, finding: Finding<N>) -> bool {
         match finding {
@@ -306,10 +307,10 @@ impl<const N: usize> Control<N> {
             }
             Finding::Judged { verdict, model } => {
                 use IdentifyPhase::{Judge, Settle, Solve};
-                // In any other phase it is about an identification that was begun anew since.
+                // In any other phase the result belongs to an identification that was restarted since.
                 if let Activity::Identify(Settle | Solve | Judge) = self.activity {
                     self.verdict = Some(verdict);
-                    // A refused result leaves the model that was there before.
+                    // A refused result leaves the previous model in use.
                     if let Some(model) = model {
                         self.models.accept(model);
                     }
@@ -317,7 +318,7 @@ impl<const N: usize> Control<N> {
                     return true;
                 }
             }
-            // About a motion before the identification, and the model that this one may replace.
+            // Obsolete: these concern an earlier motion and a model that this identification may replace.
             Finding::Changed(_) | Finding::Updated { .. }
                 if matches!(self.activity, Activity::Identify(_)) => {}
             Finding::Changed(change) => (self.change, self.cause) = (Some(change), None),
@@ -335,8 +336,8 @@ impl<const N: usize> Control<N> {
         false
     }
 
-    /// Takes a restored model into use instead of the one that was there, from the next tick on; refused (`false`)
-    /// while the leg is doing anything or a model is still in the feedforward, where it would be a step of torque.
+    /// Replaces the model by a restored one, from the next tick on. Refused (`false`) during an activity or
+    /// while a model is in the feedforward, because the torque would step.
     #[must_use]
     pub fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
         self.activity == Activity::Idle && self.models.adopt(model)
@@ -347,7 +348,7 @@ impl<const N: usize> Control<N> {
         let here = self.motion.state_at(self.motion_tick).position_rad;
         let mut speed = self.approach_speed;
         for (speed, returns) in speed.iter_mut().zip(self.servo.returns()) {
-            // Outside its range the whole way is as slow as the way back.
+            // While a joint returns into its range, the whole approach is limited to the return speed.
             speed.0 = if returns { min(speed.0, RETURN_SPEED) } else { speed.0 };
         }
         let ramp = Ramp::between(here, start, speed, self.approach_acceleration, SERVO_RATE_HZ);

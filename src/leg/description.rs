@@ -1,10 +1,10 @@
-//! A leg as plain numbers: what an image holds as a constant, and the configuration that follows from it.
+//! A leg as plain numbers: constant data of an image, from which its configuration is made.
 //!
-//! Why apart from [`LegConfiguration`]: that one is made by code (base parameters are found by asking the chain, motions are
-//! rounded to ticks) and may refuse; a constant has to be plain data. The host writes this constant from a leg file, and a test holds that
-//! the configuration made from it is the one the simulation runs with.
+//! Why apart from [`LegConfiguration`]: that one is computed and can fail. Its base parameters come from an
+//! analysis of the chain, and its motions are rounded to ticks. A constant must be plain data. The host
+//! writes it from a leg file; a test checks that its configuration equals that of the simulation.
 //!
-//! Cost: the base parameters, some ten million instructions once at the start.
+//! Cost: the analysis of the base parameters, about ten million instructions once at the start.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -22,16 +22,16 @@ use crate::units::{
     RadianPerSecondSquared, Weber,
 };
 
-/// One joint; angles and limits are the model's (D-H).
+/// One joint. Angles and limits are the model's (D-H).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointDescription {
-    /// Geometry: m, rad.
+    /// Denavit-Hartenberg geometry in m and rad.
     pub geometry: DenavitHartenberg<f32>,
-    /// 1 or -1: how the model's angle runs with the anatomical one.
+    /// 1 or -1: direction of the model's angle relative to the anatomical one.
     pub direction: i32,
     /// The model's angle at the anatomical zero, rad.
     pub zero_offset: f32,
-    /// The drive is mounted mirrored.
+    /// Whether the drive is mounted mirrored.
     pub mirrored: bool,
     /// Joint angle per encoder count.
     pub radian_per_count: Radian,
@@ -49,86 +49,94 @@ pub struct JointDescription {
     pub current: Ampere,
     /// Largest inertia the joint moves.
     pub inertia: KilogramMetreSquared,
-    /// Of the position loop.
+    /// Bandwidth of the position loop.
     pub bandwidth: Hertz,
-    /// Which parts of the drive's model are estimated.
+    /// Parts of the drive's model that are estimated.
     pub drive: DriveChoice,
-    /// Whether Stribeck friction is looked for.
+    /// Whether Stribeck friction is estimated.
     pub stribeck: Choice,
     /// Motor, encoder and gear.
     pub motor: MotorDescription,
 }
 
-/// What drives a joint.
+/// Motor, encoder and gear of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorDescription {
-    /// Of the motor.
+    /// Pole pairs of the motor.
     pub pole_pairs: u8,
-    /// Flux linkage of its magnets.
+    /// Flux linkage of the magnets.
     pub flux: Weber,
-    /// Of the encoder at the motor.
+    /// Encoder counts per motor revolution.
     pub counts_per_turn: u32,
-    /// Motor turns per joint turn.
+    /// Motor revolutions per joint revolution.
     pub ratio: f32,
 }
 
-/// What is believed of one link and its drive.
+impl MotorDescription {
+    /// Joint angle of one count, rad.
+    #[must_use]
+    pub fn step_rad(&self) -> f32 {
+        core::f32::consts::TAU / (self.counts_per_turn as f32 * self.ratio)
+    }
+}
+
+/// Prior knowledge of one link and its drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkDescription {
-    /// kg.
+    /// Mass, kg.
     pub mass: f32,
-    /// In the joint's frame, m.
+    /// Centre of mass in the joint's frame, m.
     pub centre_of_mass: [f32; 3],
-    /// About the centre of mass, row by row, kg m^2.
+    /// Inertia about the centre of mass, row by row, kg m^2.
     pub inertia: [[f32; 3]; 3],
-    /// At the joint, kg m^2.
+    /// Rotor inertia at the joint, kg m^2.
     pub rotor_inertia: f32,
-    /// N m.
+    /// Coulomb friction, N m.
     pub coulomb_friction: f32,
-    /// N m s/rad.
+    /// Viscous friction, N m s/rad.
     pub viscous_friction: f32,
-    /// N m.
+    /// Torque offset, N m.
     pub offset: f32,
 }
 
-/// A leg; see the module.
+/// Description of a leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LegDescription<const N: usize> {
-    /// For the reader of a trace.
+    /// Name, shown in traces.
     pub name: &'static str,
     /// Acceleration of gravity in the base frame, m/s^2.
     pub gravity: [f32; 3],
-    /// Proximal first.
+    /// Joints, proximal first.
     pub joints: [JointDescription; N],
-    /// What is believed before measuring, if anything.
+    /// Prior knowledge of links and drives, if any.
     pub prior: Option<[LinkDescription; N]>,
-    /// One-time or sequential.
+    /// One-time or sequential identification.
     pub plan: Plan,
-    /// Of the swarm.
+    /// Seed of the swarm's random numbers.
     pub swarm_seed: u64,
-    /// Robust or plain.
+    /// Robust or plain estimator.
     pub estimator: Estimator,
-    /// Of the identification's low-pass, Hz.
+    /// Bandwidth of the identification's low-pass, Hz.
     pub bandwidth_hz: f32,
-    /// The motion identified from.
+    /// Training motion.
     pub excitation: ExcitationTable<N>,
-    /// The motions predicted.
+    /// Validation motions.
     pub validation: [ExcitationTable<N>; VALIDATION_MOTIONS],
 }
 
-/// Why a description makes no leg.
+/// Reason why a description is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DescriptionError {
     /// A D-H number is not finite.
     Geometry,
-    /// Direction or zero offset of this joint (from 0).
+    /// Direction or zero offset of this joint.
     Anatomy {
-        /// Counted from 0.
+        /// Index of the joint, from 0.
         joint: usize,
     },
-    /// The base parameters cannot be told apart, or are more than there is room for.
+    /// The base parameters cannot be separated, or exceed the capacity.
     Base,
-    /// A motion's numbers make no sense.
+    /// A motion is invalid.
     Motion(MotionError),
 }
 
@@ -184,10 +192,11 @@ impl LinkDescription {
 }
 
 impl<const N: usize> LegDescription<N> {
-    /// What the leg is built from.
+    /// Computes the leg's configuration.
     ///
     /// # Errors
-    /// The first part that makes no sense; limits and motions are judged when the leg is built.
+    /// [`DescriptionError`] names the first invalid part. Limits and motions are checked when the leg is
+    /// built.
     #[inline(never)]
     pub fn configuration<const B: usize>(&self) -> Result<LegConfiguration<N, B>, DescriptionError> {
         let geometry = self.joints.map(|joint| joint.geometry);
@@ -205,14 +214,16 @@ impl<const N: usize> LegDescription<N> {
         for (slot, table) in validation.iter_mut().zip(&self.validation) {
             *slot = table.motion(SERVO_RATE_HZ)?;
         }
+        let mut model = RowModel {
+            stribeck_choice: self.joints.map(|joint| joint.stribeck),
+            drive_choice: self.joints.map(|joint| joint.drive),
+            ..RowModel::new(chain, gravity, base)
+        };
+        model.set_encoders(&self.joints.map(|joint| joint.motor.step_rad()), self.bandwidth_hz);
         Ok(LegConfiguration {
             joints,
             acceleration: self.joints.map(|joint| joint.acceleration),
-            model: RowModel {
-                stribeck_choice: self.joints.map(|joint| joint.stribeck),
-                drive_choice: self.joints.map(|joint| joint.drive),
-                ..RowModel::new(chain, gravity, base)
-            },
+            model,
             prior: self.prior.map(|links| links.map(|link| link.prior())),
             plan: self.plan,
             swarm_seed: self.swarm_seed,

@@ -1,4 +1,4 @@
-//! The half of a leg that finds out: records logged motions, solves in slices, judges.
+//! Identification half of a leg: records logged motions, solves in slices, judges.
 
 use core::borrow::BorrowMut;
 use core::mem::MaybeUninit;
@@ -7,7 +7,7 @@ use super::activity::{Segment, VALIDATION_MOTIONS};
 use super::configuration::{LegConfiguration, LegError};
 use super::control::LoggedSample;
 use super::model::IdentifiedModel;
-use super::upkeep::Upkeep;
+use super::model_monitor::ModelMonitor;
 use crate::ident::{
     Baseline, Cause, Change, Ends, Evidence, Filters, HeldOut, LinkPrior, Misalignments, MotionWindow, Plan,
     Progress, Reason, Record, Recorder, Residual, RowModel, SearchState, Solver, Thresholds, Unused, Verdict,
@@ -16,44 +16,44 @@ use crate::ident::{
 use crate::model::friction::Stribeck;
 use crate::place::{Slot, each, empty_slot, fill, made};
 
-/// What identification tells control.
+/// Message from identification to control.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Finding<const N: usize> {
-    /// The solver is done: unused motions are wanted.
+    /// The solver is done; the validation motions can start.
     Solved,
-    /// The verdict, and the model if it was accepted.
+    /// Verdict, with the model if it was accepted.
     Judged {
         /// Accepted or not, and why.
         verdict: Verdict,
-        /// Only with an accepting verdict.
+        /// The model, only with an accepting verdict.
         model: Option<IdentifiedModel<N>>,
     },
-    /// The accepted model no longer fits the motion that is tracked.
+    /// The accepted model no longer fits the tracked motion.
     Changed(Change<f32, N>),
-    /// What changed was looked for.
+    /// Result of the search for the cause of a change.
     Updated {
-        /// What it was.
+        /// The cause.
         cause: Cause,
         /// Accepted or not, and why.
         verdict: Verdict,
-        /// Offered with an accepted change; the operator takes it into use. An earlier offer no longer stands.
+        /// The updated model, offered with an accepted change. An earlier offer is void.
         model: Option<IdentifiedModel<N>>,
     },
 }
 
-/// Where the identification stands.
+/// State of the identification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Work {
     /// Waiting for samples.
     Idle,
-    /// Samples of this segment come in.
+    /// Records samples of this segment.
     Recording(Segment),
     /// The solver works on the training record.
     Solving,
 }
 
-/// Recorder, solver and records of one identification. Its window is its own, or (`W` a reference) one that lies elsewhere in
-/// memory.
+/// Recorder, solver and records of one identification. The window is part of the value, or (`W` a reference)
+/// located elsewhere in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identification<
     const N: usize,
@@ -75,8 +75,9 @@ pub struct Identification<
     residuals: [Residual<f32, N>; VALIDATION_MOTIONS],
     verdict: Option<Verdict>,
     report_due: bool,
-    upkeep: Upkeep<N, B>,
-    /// Of the accepted model: what is watched has its curves, not those of an identification that was refused since.
+    model_monitor: ModelMonitor<N, B>,
+    /// Friction curves of the accepted model. Monitoring uses them even if a later identification was
+    /// refused.
     accepted_stribeck: [Stribeck<f32>; N],
     change_due: bool,
 }
@@ -84,10 +85,10 @@ pub struct Identification<
 impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize>
     Identification<N, B, TAPS, PENDING>
 {
-    /// Nothing recorded yet.
+    /// Creates an identification without records.
     ///
     /// # Errors
-    /// [`LegError::Kernel`] when the filter does not fit.
+    /// [`LegError::Kernel`] if the filter does not fit.
     pub fn new(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
         Self::with_window(configuration, MotionWindow::new())
     }
@@ -98,7 +99,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>
 where
     W: BorrowMut<MotionWindow<f32, N, B>>,
 {
-    /// The same with a window that is empty.
+    /// Creates an identification with the given empty window.
     ///
     /// # Errors
     /// See [`Identification::new`].
@@ -107,7 +108,8 @@ where
         Ok(made(|slot| Self::place(slot, configuration, &filters, window)))
     }
 
-    /// The same with filters that fit, built in its place: it is larger than the device's stack.
+    /// Creates an identification in place, because it is larger than the device's stack. The filters must
+    /// fit.
     pub fn place<'a>(
         slot: &'a mut MaybeUninit<Self>,
         configuration: &LegConfiguration<N, B>,
@@ -125,7 +127,7 @@ where
             residuals: [Residual::new(); VALIDATION_MOTIONS],
             verdict: None,
             report_due: false,
-            upkeep: Upkeep::new(filters.low_pass(), configuration.monitor),
+            model_monitor: ModelMonitor::new(filters.low_pass(), configuration.monitor),
             accepted_stribeck: no_stribeck(),
             change_due: false,
         }, {
@@ -135,18 +137,19 @@ where
         })
     }
 
-    /// With which plan and random numbers the next search is made.
+    /// Sets the plan and the random seed of the next search.
     pub fn prepare(&mut self, plan: Plan, swarm_seed: u64) {
         (self.plan, self.swarm_seed) = (plan, swarm_seed);
     }
 
-    /// Of the next search's random numbers.
+    /// Returns the seed of the next search's random numbers.
     #[must_use]
     pub const fn swarm_seed(&self) -> u64 {
         self.swarm_seed
     }
 
-    /// Takes a logged sample. The first one without a segment, or of another, ends the motion recorded so far.
+    /// Processes a logged sample. A sample without segment, or of another one, ends the motion recorded so
+    /// far.
     pub fn push(&mut self, logged: &LoggedSample<N>) {
         let recording = match self.work {
             Work::Recording(segment) => Some(segment),
@@ -170,10 +173,10 @@ where
     fn look_at(&mut self, segment: Option<Segment>, progress: Option<Progress<f32, N, B>>) {
         match (segment, progress) {
             (Some(Segment::Validation(_)), Some(progress)) => self.held_out.take(&self.model, &progress),
-            // The first samples, or one that was not finite: the windows start anew.
+            // At the first samples, or after one that was not finite, the windows restart.
             (Some(Segment::Validation(_)), None) => self.held_out.break_off(),
             (Some(Segment::Tracking), Some(Progress { rows: Some(rows), .. }))
-                if self.upkeep.watch(&rows).is_some() =>
+                if self.model_monitor.watch(&rows).is_some() =>
             {
                 self.recorder.clear(Ends::Whole);
                 self.change_due = true;
@@ -189,7 +192,7 @@ where
         });
         if segment == Segment::Tracking {
             self.model.stribeck = self.accepted_stribeck;
-            self.upkeep.begin();
+            self.model_monitor.begin();
             self.change_due = false;
         }
         self.work = Work::Recording(segment);
@@ -233,7 +236,7 @@ where
         }
     }
 
-    /// Apart from [`Self::close`], so that recorder and solver need the stack one after the other.
+    /// Separate from [`Self::close`], so that recorder and solver do not need the stack at the same time.
     #[inline(never)]
     fn begin_solving(&mut self, record: Record<f32, N, B>) {
         let (model, prior) = (&self.model, self.prior.as_ref());
@@ -241,7 +244,7 @@ where
         self.work = Work::Solving;
     }
 
-    /// Spends up to `evaluations` on the search; tells when something is found.
+    /// Spends up to `evaluations` on the search; returns a finding when there is one.
     pub fn advance(&mut self, evaluations: u32) -> Option<Finding<N>> {
         if self.report_due {
             self.report_due = false;
@@ -268,18 +271,18 @@ where
         }
     }
 
-    /// The alarm, and later what was found since.
+    /// Returns the alarm, and later the result of the quick pass.
     fn keep_up(&mut self) -> Option<Finding<N>> {
         if self.change_due {
             self.change_due = false;
-            return self.upkeep.change().map(|change| Finding::Changed(*change));
+            return self.model_monitor.change().map(|change| Finding::Changed(*change));
         }
-        if !self.upkeep.is_ready(&self.recorder.rows()) {
+        if !self.model_monitor.is_ready(&self.recorder.rows()) {
             return None;
         }
         let record = self.recorder.finish();
         self.recorder.clear(Ends::Whole);
-        let update = self.upkeep.solve(&self.model, &record, &self.thresholds)?;
+        let update = self.model_monitor.solve(&self.model, &record, &self.thresholds)?;
         let model = update.is_change();
         Some(Finding::Updated {
             cause: update.cause,
@@ -288,14 +291,14 @@ where
         })
     }
 
-    /// The model in use is another one, of which nothing is known here.
+    /// Discards the monitored model, because another one is in use.
     pub fn forget_model(&mut self) {
-        self.upkeep.forget();
+        self.model_monitor.forget();
     }
 
-    /// The operator takes the update that was offered into use.
+    /// Uses the offered update as the monitored model.
     pub fn take_update(&mut self) {
-        self.upkeep.take();
+        self.model_monitor.take();
     }
 
     fn judge(&mut self) -> Finding<N> {
@@ -306,21 +309,22 @@ where
         Finding::Judged { verdict, model }
     }
 
-    /// Control took the result: from now on tracked motions are compared with it. Returns the model if it was accepted.
+    /// Confirms that control took the result: tracked motions are compared with it from now on. Returns the
+    /// model if it was accepted.
     ///
-    /// Apart from the verdict, because the operator may stop the identification while it is judged; the model that is
-    /// in use then stays the one that is watched and stored.
+    /// This is separate from the verdict, because the operator may cancel the identification while it is
+    /// judged. The model in use then remains the one that is monitored and stored.
     pub fn took_result(&mut self) -> Option<IdentifiedModel<N>> {
         let solver = self.solver.as_ref().filter(|_| self.verdict.is_some_and(Verdict::is_accepted))?;
         let estimate = solver.estimate();
         let model = IdentifiedModel::new(&self.model, &estimate.values);
         let others = self.validation.iter().flatten();
-        self.upkeep.accept(Baseline::new(estimate, solver.record(), others));
+        self.model_monitor.accept(Baseline::new(estimate, solver.record(), others));
         self.accepted_stribeck = self.model.stribeck;
         Some(model)
     }
 
-    /// The verdict on what was recorded so far; every piece of evidence goes to `hand_on`.
+    /// Judges the records so far; every piece of evidence is passed to `hand_on`.
     #[inline(never)]
     pub fn judge_with(&self, hand_on: &mut dyn FnMut(&Evidence<f32>)) -> Verdict {
         self.solver.as_ref().map_or(Verdict::refused(Reason::Input), |solver| {
@@ -331,28 +335,29 @@ where
         })
     }
 
-    /// Which other lengths and zeros the motions that were predicted ask for.
+    /// Estimates errors of link lengths and joint zeros from the validation motions.
     #[must_use]
     pub fn misalignments(&self) -> Misalignments<f32> {
         self.held_out.alignment().misalignments()
     }
 
-    /// What the motions that were predicted left unexplained, in order of time.
+    /// Residuals of the validation motions, in order of time.
     #[must_use]
     pub fn residuals(&self) -> &[Residual<f32, N>; VALIDATION_MOTIONS] {
         &self.residuals
     }
 
-    /// Puts these base values in the place of those found, once the search is done: the motions that follow are held
-    /// against them. So a stored model is checked before it is used again.
+    /// Replaces the identified base values once the search is done, so that the following motions validate
+    /// the given ones. This checks a stored model before it is used again.
     pub fn examine(&mut self, values: &[f32; B]) {
         if let Some(solver) = self.solver.as_mut().filter(|_| self.work != Work::Solving) {
             solver.examine(values);
         }
     }
 
-    /// Stops an identification, also where another one is begun: a verdict that control no longer waits for must not change
-    /// what is watched. What was found before stays, and a motion that is tracked goes on.
+    /// Cancels an identification, also before another one starts: a verdict that control no longer expects
+    /// must not change the monitored model. Earlier results stay, and a tracked motion continues to be
+    /// recorded.
     pub fn cancel(&mut self) {
         self.report_due = false;
         if self.work != Work::Recording(Segment::Tracking) {
@@ -360,43 +365,43 @@ where
         }
     }
 
-    /// A search is under way; one that was cancelled is not.
+    /// Whether a search is running and was not cancelled.
     #[must_use]
     pub fn is_searching(&self) -> bool {
         self.work == Work::Solving
     }
 
-    /// The solver of the last training motion.
+    /// Returns the solver of the last training motion.
     #[must_use]
     pub fn solver(&self) -> Option<&Solver<f32, N, B>> {
         self.solver.as_ref()
     }
 
-    /// Records of the motions that were predicted.
+    /// Returns the records of the validation motions.
     #[must_use]
     pub fn validation(&self) -> &[Option<Record<f32, N, B>>; VALIDATION_MOTIONS] {
         &self.validation
     }
 
-    /// The last verdict.
+    /// Returns the last verdict.
     #[must_use]
     pub fn verdict(&self) -> Option<Verdict> {
         self.verdict
     }
 
-    /// What becomes of the accepted model.
+    /// Returns the monitoring of the accepted model.
     #[must_use]
-    pub fn upkeep(&self) -> &Upkeep<N, B> {
-        &self.upkeep
+    pub fn model_monitor(&self) -> &ModelMonitor<N, B> {
+        &self.model_monitor
     }
 
-    /// Something was believed before measuring.
+    /// Whether there is prior knowledge.
     #[must_use]
     pub fn has_prior(&self) -> bool {
         self.prior.is_some()
     }
 
-    /// What the rows are made with.
+    /// Returns the row model.
     #[must_use]
     pub fn model(&self) -> &RowModel<f32, N, B> {
         &self.model

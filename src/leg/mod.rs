@@ -1,22 +1,22 @@
-//! One leg: what it does, and two halves that exchange values only.
+//! One leg: its activities, in two halves that exchange values only.
 //!
 //! ```text
-//!   control (ticked at 4 kHz)                              identification (advanced when there is time)
-//!   motion -> servo -> drive command                       recorder -> solver -> verdict
-//!      |  LoggedSample, 500 Hz: angle, torque, segment  ----->
-//!      <-----  Finding: solved | judged, with the model if it was accepted | changed | updated, with the model offered
-//!      |  took_update: the operator takes what was offered into use  ----->
+//! control (ticked at 4 kHz)                  identification (advanced in idle time)
+//! motion -> servo -> drive command           recorder -> solver -> verdict
+//!     --- LoggedSample, 500 Hz: angle, torque, segment --->
+//!     <-- Finding: solved | judged (accepted model) | changed | updated (offered model) ---
+//!     --- took_update: the operator uses the offered model --->
 //! ```
 //!
-//! The board runs control in an interrupt and identification at the lowest priority and carries the values from one
-//! to the other; on the host [`Leg`] holds both in one value that can be cloned, compared and run on. Host tool,
-//! emulated image and board run the same code.
+//! The board runs control in an interrupt and identification at the lowest priority, and passes the values
+//! between them. On the host [`Leg`] holds both halves in one value that can be cloned, compared and resumed.
+//! Host tool, emulated image and board run the same code.
 //!
 //! ```text
-//!   Idle --identify--> Approach --> Excite --> Settle --> Solve --> Validate: Approach, Run (three times) --> Judge
-//!    ^ ^                                                                                                      |
-//!    | +--track--> Track        with commands of a host: Follow in the place of Idle while the drive is enabled
-//!    +---------------------- the drive is no longer enabled (quick stop, fault): from everywhere <-------------+
+//! Idle --identify--> Approach -> Excite -> Settle -> Solve -> Validate (Approach, Run; 3 times) -> Judge
+//!  ^ ^                                                                                              |
+//!  | +--track--> Track      while a host commands the enabled drive: Follow instead of Idle         |
+//!  +------------------------ drive no longer enabled (quick stop, fault): from every activity <-----+
 //! ```
 
 mod activity;
@@ -26,13 +26,13 @@ mod description;
 mod follow;
 mod identification;
 mod model;
+mod model_blend;
+mod model_monitor;
 mod permitted;
 mod results;
 mod stored;
-mod succession;
 #[cfg(test)]
 pub(crate) mod testing;
-mod upkeep;
 
 pub use activity::{Activity, IdentifyPhase, Segment, Step, VALIDATION_MOTIONS};
 pub use configuration::{LegConfiguration, LegError, ProvedMotion};
@@ -43,12 +43,12 @@ pub use description::{
 pub use follow::{Following, JointCommand, JointStatus, Mode, SetPoint, Target};
 pub use identification::{Finding, Identification};
 pub use model::IdentifiedModel;
+pub use model_monitor::{ModelMonitor, UPDATE_ROWS};
 pub use permitted::{axis_code, permitted};
 pub use results::{FoundBase, FoundFit, FoundParameter};
 pub use stored::{RestoreError, StoredModel};
-pub use upkeep::{UPDATE_ROWS, Upkeep};
 
-// What crosses the leg's border: rooms that tell or keep it look no deeper.
+// Interface of the leg: other modules that report or store these values import them from here only.
 pub use crate::ident::{
     Cause, Change, Constant, Estimate, Evidence, Filters, MotionWindow, Plan, Reason, SearchState, Status,
     StribeckFit, Test, Verdict,
@@ -80,11 +80,11 @@ pub struct Leg<const N: usize, const B: usize, const TAPS: usize, const PENDING:
 }
 
 impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Leg<N, B, TAPS, PENDING> {
-    /// A leg at rest, drive off.
+    /// Creates a leg at rest with the drive off.
     ///
     /// # Errors
-    /// [`LegError`] when limits make no sense, a motion cannot be proved to stay within them, or the filter does not
-    /// fit its memory.
+    /// [`LegError`] if limits are invalid, a motion cannot be proved to stay within them, or the filter does
+    /// not fit its memory.
     pub fn new(configuration: &LegConfiguration<N, B>) -> Result<Self, LegError> {
         Ok(Self {
             control: Control::new(configuration)?,
@@ -96,7 +96,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         })
     }
 
-    /// One servo tick, then up to `evaluations` of the search; `gravity` in the base frame, m/s^2.
+    /// Runs one servo tick, then up to `evaluations` of the search. `gravity` is in the base frame, m/s^2.
     pub fn tick(
         &mut self,
         sample: &Sample<N>,
@@ -126,22 +126,22 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         output
     }
 
-    /// As after the start, but for the model in use; see [`Control::restart`].
+    /// Resets to the state after the start, except for the model in use; see [`Control::restart`].
     pub fn restart(&mut self) {
         self.control.restart();
     }
 
-    /// What a host commands from the next tick on.
+    /// Sets the commands of a host, from the next tick on.
     pub fn command(&mut self, commands: &[JointCommand; N]) {
         self.commands = Some(*commands);
     }
 
-    /// No host commands any more, from the next tick on.
+    /// Ends host commands, from the next tick on.
     pub fn let_go(&mut self) {
         self.commands = None;
     }
 
-    /// What a host is told of a joint, given what came of the last tick.
+    /// Status of a joint for a host, after the tick that returned `output`.
     #[must_use]
     pub fn joint_status(&self, joint: usize, output: &ControlOutput<N>) -> Option<JointStatus> {
         let torque = self.control.torque(joint, self.sample.as_ref()?)?;
@@ -149,22 +149,23 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         self.following.status(joint, torque, follows, output)
     }
 
-    /// A host gives an identification up: from the next tick on the joints come to rest.
+    /// Cancels an identification for a host; from the next tick on the joints slow down to rest.
     pub fn cancel(&mut self) {
         self.cancel = true;
     }
 
-    /// With which plan and random numbers the next identification is made.
+    /// Sets the plan and the random seed of the next identification.
     pub fn prepare(&mut self, plan: Plan, swarm_seed: u64) {
         self.identification.prepare(plan, swarm_seed);
     }
 
-    /// Has these base values validated in the place of those found; see [`Identification::examine`].
+    /// Validates these base values instead of the identified ones; see [`Identification::examine`].
     pub fn examine(&mut self, values: &[f32; B]) {
         self.identification.examine(values);
     }
 
-    /// Takes a model that was kept into use, see [`Control::adopt`]. It comes without its uncertainty and is not watched.
+    /// Uses a stored model, see [`Control::adopt`]. Its uncertainty is unknown, so the monitor does not watch
+    /// it.
     #[must_use]
     pub fn adopt(&mut self, model: IdentifiedModel<N>) -> bool {
         let adopted = self.control.adopt(model);
@@ -174,34 +175,34 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
         adopted
     }
 
-    /// A fault that the board saw, see [`Control::report`].
+    /// Reports a fault detected by the board, see [`Control::report`].
     pub fn report(&mut self, fault: Fault) {
         self.control.report(fault);
     }
 
-    /// What temperature and bus voltage leave of the torque caps, see [`Control::derate`].
+    /// Sets the derating of the torque caps by temperature and bus voltage, see [`Control::derate`].
     pub fn derate(&mut self, derating: &Derating) {
         self.control.derate(derating);
     }
 
-    /// Flips a bit of the servo's numbers, see [`crate::servo::Servo::upset`]; on the host alone.
+    /// Flips a bit of the servo's state, see [`crate::servo::Servo::upset`]. Host only.
     #[cfg(not(target_os = "none"))]
     pub fn upset(&mut self, joint: usize, number: u8, bit: u8) {
         self.control.servo.upset(joint, number, bit);
     }
 
-    /// Both halves, for whoever runs them at levels of their own (`operation`).
+    /// Both halves, for callers that run them at separate priorities (`operation`).
     pub fn halves(&mut self) -> (&mut Control<N>, &mut Identification<N, B, TAPS, PENDING>) {
         (&mut self.control, &mut self.identification)
     }
 
-    /// The half that moves.
+    /// Returns the control half.
     #[must_use]
     pub fn control(&self) -> &Control<N> {
         &self.control
     }
 
-    /// The half that finds out.
+    /// Returns the identification half.
     #[must_use]
     pub fn identification(&self) -> &Identification<N, B, TAPS, PENDING> {
         &self.identification

@@ -1,4 +1,4 @@
-//! The model that an accepted identification leaves behind, as the servo's feedforward uses it.
+//! Model of an accepted identification, used as the servo's feedforward.
 
 use nalgebra::Vector3;
 
@@ -11,7 +11,8 @@ use crate::real::abs;
 use crate::servo::{TorqueModel, smoothed_sign};
 use crate::units::RadianPerSecond;
 
-/// Identified torque: each base value stands on its own column, which gives the same torque as all parameters would.
+/// Identified torque model. Each base value stands in its own column; the torque equals that of the full
+/// parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IdentifiedModel<const N: usize> {
     chain: Chain<f32, N>,
@@ -21,7 +22,7 @@ pub struct IdentifiedModel<const N: usize> {
 }
 
 impl<const N: usize> IdentifiedModel<N> {
-    /// The model with these base parameters.
+    /// Creates the model with these base parameters.
     #[must_use]
     pub fn new<const B: usize>(model: &RowModel<f32, N, B>, base_values: &[f32; B]) -> Self {
         let parameters = model.base.complete(base_values, &[[0.0; PARAMETERS_PER_JOINT]; N]);
@@ -29,7 +30,7 @@ impl<const N: usize> IdentifiedModel<N> {
         Self { chain: model.chain, parameters, stribeck: model.stribeck, constant }
     }
 
-    /// The model of the same leg carrying a known load; a negative mass takes one off. The load need not be identified.
+    /// Model of the leg with a known load; a negative mass removes one. The load need not be identified.
     #[must_use]
     pub fn with_load(&self, load: &Payload<f32>) -> Self {
         let mut loaded = *self;
@@ -37,7 +38,7 @@ impl<const N: usize> IdentifiedModel<N> {
         loaded
     }
 
-    /// The model with these equivalent parameters; whoever calls has checked that they are this chain's.
+    /// Creates the model from equivalent parameters. The caller has checked that they belong to this chain.
     pub(super) fn of_parameters(
         chain: Chain<f32, N>,
         parameters: LegParameters<f32, N>,
@@ -47,20 +48,21 @@ impl<const N: usize> IdentifiedModel<N> {
         Self { chain, parameters, stribeck, constant }
     }
 
-    /// Stribeck friction, a factor on the Coulomb friction of each joint.
+    /// Stribeck friction of each joint: a factor on its Coulomb friction.
     #[must_use]
     pub fn stribeck(&self) -> &[Stribeck<f32>; N] {
         &self.stribeck
     }
 
-    /// What the constant part of each joint's torque is taken for.
+    /// Meaning of the constant part of each joint's torque.
     #[must_use]
     pub fn constant(&self) -> &[Constant; N] {
         &self.constant
     }
 
-    /// The model that gives `share` (0..1) of the other's torque and the rest of this one's: torque is linear in the
-    /// parameters. Both are models of one leg with the same curves and constants, as a model and its update are.
+    /// Blend of two models: `share` (0..1) of the other's torque and the rest of this one's, since torque is
+    /// linear in the parameters. Both must be models of one leg with equal curves and constants, like a model
+    /// and its update.
     #[must_use]
     pub fn towards(&self, other: &Self, share: f32) -> Self {
         let mut mixed = *self;
@@ -70,7 +72,7 @@ impl<const N: usize> IdentifiedModel<N> {
         mixed
     }
 
-    /// Parameters with the same torque as the leg's; not those of its links.
+    /// Parameters that give the leg's torque. They are not those of its links.
     #[must_use]
     pub fn equivalent_parameters(&self) -> &LegParameters<f32, N> {
         &self.parameters
@@ -84,7 +86,7 @@ impl<const N: usize> TorqueModel<N> for IdentifiedModel<N> {
         for joint in 0..N {
             let of = |parameter: Parameter| self.parameters[joint][parameter.index()];
             let sign = smoothed_sign(RadianPerSecond(qd[joint]));
-            // Friction is there where the joint moves, an offset always.
+            // Friction acts only while the joint moves, an offset always.
             let constant = match self.constant[joint] {
                 Constant::Offset => 1.0,
                 Constant::Asymmetry => abs(sign),

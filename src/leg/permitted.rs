@@ -1,10 +1,12 @@
-//! What of a request may reach the leg while something forbids to enable.
+//! Filter for requests while an inhibit reason is active.
 
 use super::control::ControlRequest;
 use crate::motor::AxisFault;
 use crate::safety::{DriveState, FaultCode, PowerRequest};
 
-/// Everything while nothing forbids it; else only what switches off. A drive that is not off yet is switched off, asked or not.
+/// Passes every request if there is no inhibit reason, otherwise only those that switch off.
+///
+/// With an inhibit reason, a drive that is not off is switched off even without a request.
 #[must_use]
 pub fn permitted<const N: usize>(
     request: Option<ControlRequest<N>>,
@@ -28,7 +30,7 @@ pub fn permitted<const N: usize>(
     }
 }
 
-/// The fault for which an axis released itself.
+/// Fault code of an axis that switched its outputs off.
 #[must_use]
 pub const fn axis_code(fault: AxisFault) -> FaultCode {
     match fault {
@@ -50,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_enables_while_something_forbids_it() {
+    fn an_inhibit_reason_prevents_enabling() {
         let enabling = [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation]
             .map(ControlRequest::<2>::Power);
         let off = Some(ControlRequest::Power(PowerRequest::DisableVoltage));

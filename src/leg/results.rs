@@ -1,8 +1,8 @@
-//! What an identification found, as values to be told: the same numbers for every listener.
+//! Results of an identification as plain values, equal for every recipient.
 //!
-//! A parameter's value is the best there is: its own where it was measured alone, the completed leg's where a prior says how
-//! a group or an unseen one is to be split, nothing otherwise (such a value would be made up). What is not estimated is zero
-//! in the model, and so here.
+//! Value of a parameter: its own value if it was measured alone. If a prior says how to split a group or an
+//! unseen parameter, the value of the completed leg. Otherwise `None`, since any number would be invented. A
+//! parameter that is not estimated is zero in the model, and so here.
 
 use core::borrow::BorrowMut;
 
@@ -10,42 +10,42 @@ use super::identification::Identification;
 use crate::ident::{Estimate, MotionWindow, Record, Status, status};
 use crate::model::{Parameter, Standing};
 
-/// One of a joint's fourteen parameters.
+/// Result for one of a joint's fourteen parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundParameter {
-    /// SI; unknown where neither torque nor a prior tells.
+    /// Value in SI units; `None` if neither torque nor a prior determines it.
     pub value: Option<f32>,
-    /// Standard deviation; unknown unless it was measured alone.
+    /// Standard deviation; `None` unless the parameter was measured alone.
     pub sigma: Option<f32>,
-    /// Where the value comes from.
+    /// Origin of the value.
     pub status: Status,
 }
 
-/// One base parameter.
+/// Result for one base parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundBase {
-    /// Joint and parameter in whose column it stands, joint from 0.
+    /// Joint (from 0) and parameter of its column.
     pub carrier: (usize, Parameter),
-    /// Others are regrouped into it.
+    /// Whether other parameters are regrouped into it.
     pub grouped: bool,
-    /// It was held at zero, because the data do not tell it.
+    /// Whether it was held at zero because the data do not determine it.
     pub dropped: bool,
-    /// Of the result; unknown where the data do not determine it.
+    /// Identified value; `None` if the data do not determine it.
     pub value: Option<f32>,
     /// Standard deviation.
     pub sigma: Option<f32>,
-    /// Of the closed form.
+    /// Value of the closed-form least squares.
     pub least_squares: f32,
 }
 
-/// How well one joint's torque on one motion is explained.
+/// Quality of fit of one joint's torque for one motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundFit {
     /// Filtered rows in which the joint moved.
     pub rows: u32,
-    /// Root mean square of measured minus predicted, N m.
+    /// Root mean square of measured minus predicted torque, N m.
     pub rms_nm: Option<f32>,
-    /// Mean of the absolute torque, N m.
+    /// Mean absolute torque, N m.
     pub mean_absolute_nm: f32,
     /// Root mean square torque, N m.
     pub torque_rms_nm: f32,
@@ -53,9 +53,9 @@ pub struct FoundFit {
     pub speed_rms: f32,
     /// Share of the rows that lost more than half of their weight.
     pub disturbed_share: f32,
-    /// Longest stretch of them, s.
+    /// Longest stretch of such rows, s.
     pub disturbed_longest_s: f32,
-    /// Wild samples that were replaced.
+    /// Number of outliers that were replaced.
     pub replaced: u32,
 }
 
@@ -64,13 +64,13 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>
 where
     W: BorrowMut<MotionWindow<f32, N, B>>,
 {
-    /// The base parameters that are judged; `None` before there is a solver.
+    /// Base parameters to be judged; `None` before there is a solver.
     #[must_use]
     pub fn estimate(&self) -> Option<Estimate<f32, B>> {
         Some(self.solver()?.estimate())
     }
 
-    /// One parameter of a joint (from 0), given [`Self::estimate`].
+    /// Result for one parameter of a joint (from 0), given [`Self::estimate`].
     #[must_use]
     pub fn parameter(
         &self,
@@ -102,7 +102,7 @@ where
         Some(FoundParameter { value, sigma: base.and_then(|base| estimate.sigma(base)), status })
     }
 
-    /// One base parameter, given [`Self::estimate`]; `None` beyond the last.
+    /// Result for one base parameter, given [`Self::estimate`]; `None` beyond the last.
     #[must_use]
     pub fn base_parameter(&self, estimate: &Estimate<f32, B>, base: usize) -> Option<FoundBase> {
         let solver = self.solver()?;
@@ -120,8 +120,8 @@ where
         })
     }
 
-    /// One joint (from 0) on one motion: 0 the one identified from, then those that were predicted. `None` where it was
-    /// not recorded.
+    /// Fit of one joint (from 0) for one motion, given [`Self::estimate`]. Motion 0 is the training motion,
+    /// the others are the validation motions. `None` if the motion was not recorded.
     #[must_use]
     pub fn fit(&self, estimate: &Estimate<f32, B>, motion: usize, joint: usize) -> Option<FoundFit> {
         let record = self.motion(motion)?;
@@ -138,7 +138,7 @@ where
         })
     }
 
-    /// The record of a motion, counted as in [`Self::fit`].
+    /// Record of a motion, counted as in [`Self::fit`].
     #[must_use]
     pub fn motion(&self, motion: usize) -> Option<&Record<f32, N, B>> {
         match motion.checked_sub(1) {

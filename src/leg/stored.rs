@@ -1,17 +1,18 @@
-//! A model that was kept, and the leg it is offered to.
+//! Stored model, and the check that it belongs to this leg.
 //!
-//! Parameters identified on another leg, with other lengths or with another torque constant look like any others and
-//! push a person wrongly. A kept model therefore comes with the fingerprint of the leg it was found on, and becomes an
-//! [`IdentifiedModel`], the only thing the servo takes, by no other way than past that check.
+//! Parameters of another leg, other link lengths or another torque constant look plausible, but would push
+//! the wearer wrongly. A stored model therefore carries the fingerprint of the leg it was identified on. Only
+//! the check below turns it into an [`IdentifiedModel`], the type that the servo accepts.
 //!
 //! ```text
-//! IdentifiedModel --LegConfiguration::keep--> StoredModel --LegConfiguration::restore--> IdentifiedModel | RestoreError
-//!                                                                    Control::adopt, at rest <--+
+//! IdentifiedModel --LegConfiguration::keep----> StoredModel
+//! StoredModel     --LegConfiguration::restore-> IdentifiedModel | RestoreError
+//! IdentifiedModel --Control::adopt, at rest---> feedforward
 //! ```
 //!
-//! What the fingerprint covers stands in [`crate::model::fingerprint`]; gravity is not in it. The equivalent parameters
-//! put every sum on one of its members, so they hold for gravity in the plane they were found in, not for a leg laid on
-//! its side.
+//! Contents of the fingerprint: see [`crate::model::fingerprint`]. Limits: gravity is not included. The
+//! equivalent parameters put every sum on one of its members, so they hold for gravity in the plane of the
+//! identification, but not for a leg laid on its side.
 
 use super::configuration::LegConfiguration;
 use super::model::IdentifiedModel;
@@ -23,7 +24,7 @@ use crate::real::is_finite;
 /// An accepted model as plain data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StoredModel<const N: usize> {
-    /// Of the leg it was found on.
+    /// Fingerprint of the leg that was identified.
     pub fingerprint: Fingerprint,
     /// See [`IdentifiedModel::equivalent_parameters`].
     pub parameters: LegParameters<f32, N>,
@@ -33,30 +34,31 @@ pub struct StoredModel<const N: usize> {
     pub constant: [Constant; N],
 }
 
-/// Why a stored model is not taken.
+/// Reason why a stored model is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RestoreError {
-    /// It was found on another leg, with other lengths, another zero or another torque constant.
+    /// The model belongs to another leg: lengths, zero offset or torque constant differ.
     AnotherLeg {
-        /// Of the model.
+        /// Fingerprint of the model.
         stored: Fingerprint,
-        /// Of this leg.
+        /// Fingerprint of this leg.
         own: Fingerprint,
     },
-    /// A parameter of this joint (from 0) is NaN or infinite.
+    /// A parameter of this joint is NaN or infinite.
     NotFinite {
-        /// Counted from 0.
+        /// Index of the joint, from 0.
         joint: usize,
     },
-    /// The Stribeck curve of this joint has a negative excess, no speed, or a number that is not finite.
+    /// The Stribeck curve of this joint has a negative excess, no positive velocity, or a value that is not
+    /// finite.
     Stribeck {
-        /// Counted from 0.
+        /// Index of the joint, from 0.
         joint: usize,
     },
 }
 
 impl<const N: usize, const B: usize> LegConfiguration<N, B> {
-    /// What a model must have been identified with to be this leg's.
+    /// Fingerprint of this leg, which a model must carry.
     #[must_use]
     pub fn fingerprint(&self) -> Fingerprint {
         Fingerprint::of(
@@ -69,7 +71,7 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
         )
     }
 
-    /// A model identified with this configuration, as plain data.
+    /// Converts a model identified with this configuration to plain data.
     #[must_use]
     pub fn keep(&self, model: &IdentifiedModel<N>) -> StoredModel<N> {
         StoredModel {
@@ -80,7 +82,7 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
         }
     }
 
-    /// The model, if it is this leg's.
+    /// Converts a stored model back if it belongs to this leg.
     ///
     /// # Errors
     /// See [`RestoreError`].

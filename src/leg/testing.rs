@@ -1,18 +1,17 @@
-//! The leg of unit tests: the one that images are built for by default.
+//! Leg of the unit tests: the default leg of the images.
 
 use super::{IdentifiedModel, LegConfiguration};
 
-include!("../../hal-sim/legs/x2-wearer-75kg.rs");
+include!("../../host/legs/x2-wearer-75kg.rs");
 
-/// Base parameters of two parallel axes.
+/// Number of base parameters of two parallel axes.
 pub(crate) const BASE: usize = 13;
 
-/// Configuration of [`LEG`].
 pub(crate) fn configuration() -> LegConfiguration<2, BASE> {
     LEG.configuration().expect("a leg that is shipped")
 }
 
-/// A model of the leg without any torque.
+/// A model of the leg with zero torque.
 pub(crate) fn model() -> IdentifiedModel<2> {
     IdentifiedModel::new(&configuration().model, &[0.0; BASE])
 }

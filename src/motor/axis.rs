@@ -61,7 +61,7 @@ mod told;
 mod upset;
 mod window;
 
-pub use asked::{AxisFault, AxisRequest, Wish};
+pub use asked::{AxisFault, AxisRequest, BridgeRequest};
 use index::IndexWatch;
 use window::Window;
 
@@ -157,21 +157,21 @@ impl Axis {
 
     /// Runs one PWM period with the motor as a passive brake, below the overcurrent bound.
     pub fn brake(&mut self, sample: &AxisSample) -> AxisCommand {
-        self.act(sample, Wish::Brake)
+        self.act(sample, BridgeRequest::Brake)
     }
 
     /// Runs one PWM period of either kind. During a fault the outputs are off. With a frozen counter or a
     /// lost rotor position, however, the motor brakes unless the outputs are requested off.
     #[inline(always)]
-    pub fn act(&mut self, sample: &AxisSample, wish: Wish) -> AxisCommand {
-        let wish = match (wish, self.fault) {
-            (Wish::Released, _) => Wish::Released,
-            (wish, None) => wish,
-            (_, Some(AxisFault::EncoderFrozen | AxisFault::Encoder)) => Wish::Brake,
-            _ => Wish::Released,
+    pub fn act(&mut self, sample: &AxisSample, request: BridgeRequest) -> AxisCommand {
+        let request = match (request, self.fault) {
+            (BridgeRequest::Released, _) => BridgeRequest::Released,
+            (request, None) => request,
+            (_, Some(AxisFault::EncoderFrozen | AxisFault::Encoder)) => BridgeRequest::Brake,
+            _ => BridgeRequest::Released,
         };
         // Field by field: copying the whole struct would also carry the padding, byte by byte.
-        let AxisCommand { enabled, duty } = match self.step(sample, wish) {
+        let AxisCommand { enabled, duty } = match self.step(sample, request) {
             Ok(command) => command,
             Err(fault) => {
                 self.found(fault);
@@ -195,7 +195,7 @@ impl Axis {
     }
 
     #[inline(always)]
-    fn step(&mut self, sample: &AxisSample, wish: Wish) -> Result<AxisCommand, AxisFault> {
+    fn step(&mut self, sample: &AxisSample, request: BridgeRequest) -> Result<AxisCommand, AxisFault> {
         let constants = &self.constants;
         let step = i32::from(sample.encoder_count.wrapping_sub(self.counter).cast_signed());
         // A return from a wrong reading just small enough to be accepted is no jump.
@@ -218,7 +218,7 @@ impl Axis {
         let [rotor, acting] =
             [angle, self.speed.ahead(angle, DELAY_PERIODS)].map(|angle| angle.rotation(constants.sine));
         let currents = constants.sense.currents(sample.shunt_codes, constants.zeros);
-        let switching = wish != Wish::Released;
+        let switching = request != BridgeRequest::Released;
         self.measured = match currents {
             Some(currents) => currents.to_rotating(rotor),
             None if switching => self.measured,
@@ -228,11 +228,11 @@ impl Axis {
 
         let [low, high] = constants.bus_codes;
         // Braking needs neither rotor position nor bus voltage.
-        let doubt = if !plausible && wish != Wish::Brake {
+        let doubt = if !plausible && request != BridgeRequest::Brake {
             Some(AxisFault::Encoder)
         } else if switching && currents.is_none() {
             Some(AxisFault::CurrentSense)
-        } else if switching && wish != Wish::Brake && !(low..=high).contains(&sample.bus_code) {
+        } else if switching && request != BridgeRequest::Brake && !(low..=high).contains(&sample.bus_code) {
             Some(AxisFault::BusVoltage)
         } else {
             None
@@ -260,7 +260,7 @@ impl Axis {
         if d * d + q * q > constants.overcurrent_square {
             return Err(AxisFault::Overcurrent);
         }
-        let Wish::Follow(wanted) = wish else {
+        let BridgeRequest::Follow(wanted) = request else {
             if abs(self.speed.rad_per_s()) > constants.brake_speed {
                 return Err(AxisFault::Overcurrent);
             }

@@ -36,7 +36,7 @@ pub mod shunt_watch;
 pub mod transmission;
 
 pub use angle::{CountScale, ElectricalAngle, Rotation, Sine, SpeedTracker};
-pub use axis::{Axis, AxisFault, AxisRequest, Wish};
+pub use axis::{Axis, AxisFault, AxisRequest, BridgeRequest};
 pub use calibration::{
     Calibration, CalibrationSettings, CalibrationStep, Calibrator, EncoderSetting, Phase, Refusal,
     StoredCalibration,

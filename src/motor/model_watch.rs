@@ -11,8 +11,8 @@
 //! r = s - R i - (coupling and back-EMF, where they are not fed forward)          d and q, each servo period
 //! |r| > V + 0.35 R |i| + |w| (0.2 flux + 0.3 L |i|)       open or frozen: 32 more periods with than without
 //! |mean of r in the stator's frame over an electrical turn| > 0.4 V + 0.06 R I    drifted offset
-//! max q - min q > I / 2 while the counter moved by at most 2 counts,
-//!     without the first 12 periods there                             frozen, 64 periods later
+//! range of q, sustained extremes and now, > I / 2, while the counter moved by at most 2 counts,
+//!     without the first 12 periods there        frozen: 64 more periods with than without
 //! V = 2 * 4/3 t_d f V_bus                    twice the loss of dead time and switches; 0.44 V on the board
 //! ```
 //!
@@ -38,8 +38,10 @@
 //!
 //! Up to that change, and so up to a torque that is wrong by 42 N m, a frozen counter is not detected. A
 //! current that falls within the first 3 ms at rest does not count: a joint that comes to rest loses its
-//! braking current then. Otherwise a hard-damped leg would show a frozen counter. A rotor that is itself
-//! clamped, as on a test bench, is reported as a frozen counter.
+//! braking current then. Otherwise a hard-damped leg would show a frozen counter. A short pulse of current,
+//! as a late target makes it, moves a joint by less than 2 counts, and stiction holds it there. The extremes
+//! therefore follow the current by at most 1/64 of the limit per period. A rotor that is itself clamped, as
+//! on a test bench, is reported as a frozen counter.
 //!
 //! **Open phase** (P1): the open phase's target current cannot flow, so the integral grows past any limit.
 //! Without a target current nothing is detected. At rest the fault may be reported as a frozen counter: two
@@ -51,7 +53,7 @@
 //! without target currents dead time alone looks like that. Turns longer than 25 ms, shorter than 3 ms or
 //! with a reversal are not evaluated.
 //!
-//! False alarms: those of the simulated hours in docs/safety.md. The margin between a healthy motor's
+//! False alarms: those of the simulated hours in docs/results/faults.md. The margin between a healthy motor's
 //! residual and the limits has not been measured on a motor.
 //! Source: parity equation of a linear model, Isermann, Fault-Diagnosis Systems (2006), chapter 10.
 //! Cost: `scripts/count-instructions`, joint sample; 44 bytes.
@@ -75,6 +77,8 @@ const STANDSTILL: i32 = 2;
 /// Share of the greatest current whose change moves any rotor, and periods until it has moved: 16 ms.
 const SWING_SHARE: f32 = 0.5;
 const SWING_PATIENCE: u8 = 64;
+/// Periods in which the sustained extremes of the current follow a change by that share: 8 ms.
+const SWING_FOLLOWS: f32 = 32.0;
 /// Periods in which a joint that came to rest loses its braking current: 3 ms.
 const SETTLED: u8 = 12;
 /// Length of the vector that dead time makes (4/3), with a margin of two.
@@ -191,7 +195,7 @@ pub struct ModelWatch {
     square: f32,
 }
 
-/// A counter at rest, and the range of currents since then.
+/// A counter at rest, and the sustained range of currents since then.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Still {
     place: i32,
@@ -199,7 +203,7 @@ struct Still {
     periods: u8,
     least_a: f32,
     most_a: f32,
-    /// Periods since the current's range exceeded the limit.
+    /// Periods with a current far from an extreme, less those near both.
     overdue: u8,
 }
 
@@ -224,10 +228,15 @@ impl Still {
             (self.least_a, self.most_a) = (least_a, least_a);
             return false;
         }
-        self.least_a = min(self.least_a, current_a);
-        self.most_a = max(self.most_a, current_a);
-        if self.most_a - self.least_a > limits.swing_a {
+        let step = limits.swing_a / SWING_FOLLOWS;
+        self.least_a = min(self.least_a, max(current_a, self.least_a - step));
+        self.most_a = max(self.most_a, min(current_a, self.most_a + step));
+        // The largest of three distances: between the extremes, and from the current to either.
+        let range_a = max(self.most_a, current_a) - min(self.least_a, current_a);
+        if range_a > limits.swing_a {
             self.overdue += 1;
+        } else {
+            self.overdue = self.overdue.saturating_sub(1);
         }
         self.overdue >= SWING_PATIENCE
     }
@@ -379,6 +388,48 @@ mod tests {
                 .find_map(|period| watch.look(&limits, &Shown { place: 10 * period, ..now }));
             assert_eq!(seen, None, "{d} {q}");
         }
+    }
+
+    /// Servo period in which a counter at rest is reported as frozen, of 400, for the current in each.
+    fn frozen_after(current_a: impl Fn(u32) -> f32) -> Option<u32> {
+        let limits = limits();
+        let mut still = Still::at(0, current_a(0));
+        (0..400).find(|period| still.look(&limits, 0, current_a(*period)))
+    }
+
+    #[test]
+    fn a_sustained_change_of_the_current_at_a_standing_counter_is_a_frozen_one() {
+        let swing = limits().swing_a;
+        let begin = u32::from(SETTLED) + 8;
+        let step = |period: u32| if period < begin { 0.0 } else { -1.1 * swing };
+        assert_eq!(frozen_after(step), Some(begin + u32::from(SWING_PATIENCE) - 1));
+        // First to one side, then to the other: the range counts, not the distance from the first current.
+        let there_and_back = |period: u32| match period {
+            0..20 => 0.0,
+            20..100 => 0.7 * swing,
+            _ => -0.7 * swing,
+        };
+        assert_eq!(frozen_after(there_and_back), Some(100 + u32::from(SWING_PATIENCE) - 1));
+        // A slow swing that exceeds the limit at its peak only.
+        let slow = |period: u32| match period {
+            0..20 => 0.0,
+            20..160 => (period - 20) as f32 * 1.05 / 140.0 * swing,
+            _ => (300 - period.min(300)) as f32 * 1.05 / 140.0 * swing,
+        };
+        assert!(frozen_after(slow).is_some_and(|period| period < 160 + u32::from(SWING_PATIENCE)));
+        assert_eq!(frozen_after(|period| if period < begin { 0.0 } else { 0.9 * swing }), None);
+    }
+
+    #[test]
+    fn short_pulses_of_the_current_that_a_sticking_joint_survives_show_no_frozen_counter() {
+        let swing = limits().swing_a;
+        // Full current for 2 ms in each direction, every 50 ms: targets that were late.
+        let pulses = |period: u32| match period % 200 {
+            40..48 => 2.0 * swing,
+            48..56 => -2.0 * swing,
+            _ => 0.1 * swing,
+        };
+        assert_eq!(frozen_after(pulses), None);
     }
 
     #[test]

@@ -1,89 +1,91 @@
 //! Level 5: one round of the bus, in this order.
 //!
 //! ```text
-//! controller   active, passive, off, or a frame was lost: told once on every change
-//! frames       that came, at most as many as fit the queue
-//! log          all that waits
-//! time         whether a host is missed, however full the bus is
-//! store        what ended, what is asked for
-//! leg          what it told, then its next order; neither while it has not taken the one before, which would be overwritten and a request with it
-//! mailboxes    [`Speaker`]
+//! controller   active, passive, off, or a lost frame: reported on every change
+//! frames       received ones, at most as many as fit the queue
+//! log          all waiting samples
+//! time         timeouts of the host, however full the bus is
+//! store        results and new requests
+//! leg          its report, then its next order; both wait until the leg has taken the previous order, which
+//!             would be overwritten otherwise, and a request with it
+//! mailboxes    [`TxScheduler`]
 //! ```
 //!
-//! **How often.** Each frame raises a round, and a wire that is full of the shortest has 21 thousand a second. Frames that are no node's business end it at
-//! once; the others pay ([`Credit`]). Who is in debt hears nothing; what the leg told is taken all the same.
+//! **Rate.** Each frame triggers a round, and a bus full of the shortest frames has 21,000 a second. Frames
+//! for other nodes end the round at once; the others cost time ([`TokenBucket`]). With a negative balance no
+//! frames are read, but the leg's reports still are.
 
-use super::credit::Credit;
 use super::handover::Handover;
-use super::mailboxes::Speaker;
+use super::mailboxes::TxScheduler;
 use super::queues::{BusEnds, FRAMES};
 use super::signals::Signals;
+use super::token_bucket::TokenBucket;
+use crate::bus::device::{Device, Keeping};
 use crate::bus::identification::Results;
-use crate::bus::station::{Keeping, Station};
-use crate::bus::{KeptNode, Storing};
+use crate::bus::{StoredNode, Storing};
 use crate::hal::{Controller, Hardware};
 
-/// Frames that wait excuse who is missed for so long: longer than the deepest debt.
+/// Longest time for which waiting frames suspend the timeouts, longer than the deepest debt.
 const BEHIND_US: u64 = 20_000;
-/// Somebody may be missed, whoever says nothing.
+/// Longest time between two checks of the timeouts.
 const WATCH_US: u64 = 1000;
 
-/// What a host wants stored: on its way to the storage, and back with the result.
+/// Objects that a host wants stored: sent to the storage and returned with the result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keep<const N: usize> {
-    /// What a host asked for.
+    /// Kind of storage that the host requested.
     pub what: Keeping,
-    /// Of each node.
-    pub objects: [KeptNode; N],
-    /// Models kept so far.
+    /// Stored objects of each node.
+    pub objects: [StoredNode; N],
+    /// Models stored so far.
     pub generation: u32,
-    /// It was kept.
+    /// The objects were stored.
     pub done: bool,
 }
 
 impl<const N: usize> Keep<N> {
-    /// Not asked for anything yet.
+    /// No request.
     pub const NOTHING: Self =
-        Self { what: Keeping::All, objects: [KeptNode::NOTHING; N], generation: 0, done: true };
+        Self { what: Keeping::All, objects: [StoredNode::NOTHING; N], generation: 0, done: true };
 }
 
-/// What is known between two rounds.
+/// State between two rounds of the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BusRound {
     controller: Controller,
-    /// The same, but for a frame that was lost in it.
+    /// State of the controller without [`Controller::Overrun`], which lasts for one frame only.
     lasting: Controller,
-    /// The leg has not been told of what came since.
+    /// The leg has not received an order for the newest frames.
     due: bool,
-    speaker: Speaker,
-    credit: Credit,
-    /// In which mailboxes something waited after the last round that was none for nobody's frames, and when that was.
+    transmitter: TxScheduler,
+    tokens: TokenBucket,
+    /// Mailboxes in use after the last complete round, and the time of that round.
     waiting: u32,
     whole_us: u64,
-    /// When nobody waited to be heard.
+    /// Last time without waiting frames.
     watched_us: u64,
 }
 
 impl BusRound {
-    /// Nothing heard yet.
+    /// State before the first frame.
     #[must_use]
     pub const fn new() -> Self {
         Self {
             controller: Controller::Active,
             lasting: Controller::Active,
             due: false,
-            speaker: Speaker::new(),
-            credit: Credit::new(),
+            transmitter: TxScheduler::new(),
+            tokens: TokenBucket::new(),
             waiting: 0,
             whole_us: 0,
             watched_us: 0,
         }
     }
 
-    /// One round.
+    /// Runs one round.
     pub fn round<R: Results, const N: usize, const LOG: usize>(
         &mut self,
-        station: &mut Station<N, LOG>,
+        device: &mut Device<N, LOG>,
         ends: &mut BusEnds<'_, N>,
         storage: &Handover<Keep<N>>,
         signals: &Signals<N>,
@@ -91,16 +93,16 @@ impl BusRound {
         results: &R,
     ) {
         let now_us = hardware.now_us();
-        self.credit.earn(now_us);
-        let may_hear = self.credit.is_left();
-        if !may_hear && !ends.told.ready() {
+        self.tokens.refill(now_us);
+        let may_hear = self.tokens.may_start();
+        if !may_hear && !ends.status.ready() {
             return;
         }
         let status = hardware.controller();
         let mut is_whole = status != self.controller;
         if is_whole {
             self.controller = status;
-            station.on_controller(status, results);
+            device.on_controller(status, results);
         }
         if status != Controller::Overrun {
             self.lasting = status;
@@ -111,67 +113,67 @@ impl BusRound {
                 break;
             }
             let Some(frame) = ends.frames.dequeue() else { break };
-            if station.hear(&frame, now_us, None, results) {
+            if device.hear(&frame, now_us, None, results) {
                 is_whole = true;
-                self.credit.pay(hardware.now_us());
-                is_behind = !self.credit.goes_on();
+                self.tokens.spend(hardware.now_us());
+                is_behind = !self.tokens.may_continue();
             }
         }
-        // A host whose frames still wait is not missing yet, unless that lasts.
+        // Timeouts pause while frames wait, but not for long.
         if !is_behind {
             self.watched_us = now_us;
         }
         let is_watching = !is_behind || now_us.saturating_sub(self.watched_us) > BEHIND_US;
         self.due |= is_whole;
         let is_late = now_us.saturating_sub(self.whole_us) >= WATCH_US;
-        if is_whole || is_late || ends.told.ready() || hardware.mailboxes_waiting() != self.waiting {
+        if is_whole || is_late || ends.status.ready() || hardware.mailboxes_waiting() != self.waiting {
             self.whole_us = now_us;
             while let Some(logged) = ends.logged.dequeue() {
-                station.log(&logged);
+                device.log(&logged);
             }
             if is_watching {
-                station.watch(now_us, results);
+                device.watch(now_us, results);
             } else {
-                station.look_back(now_us);
+                device.look_back(now_us);
             }
-            Self::store(station, storage);
-            self.exchange(station, ends, signals);
-            self.speaker.speak(hardware, self.lasting, now_us, station, results);
+            Self::store(device, storage);
+            self.exchange(device, ends, signals);
+            self.transmitter.fill(hardware, self.lasting, now_us, device, results);
             self.waiting = hardware.mailboxes_waiting();
         }
-        self.credit.pay(hardware.now_us());
+        self.tokens.spend(hardware.now_us());
     }
 
     /// Takes the leg's report and gives its next order; neither while the leg has not taken the order before.
     fn exchange<const N: usize, const LOG: usize>(
         &mut self,
-        station: &mut Station<N, LOG>,
+        device: &mut Device<N, LOG>,
         ends: &mut BusEnds<'_, N>,
         signals: &Signals<N>,
     ) {
         if !ends.orders.ready() {
             return;
         }
-        if let Some(told) = ends.told.dequeue() {
-            station.told(&told);
-            signals.set_hosted(station.is_hosted());
+        if let Some(status) = ends.status.dequeue() {
+            device.update(&status);
+            signals.set_hosted(device.is_hosted());
             self.due = true;
         }
         if self.due {
-            let _ = ends.orders.enqueue(station.order());
+            let _ = ends.orders.enqueue(device.order());
             self.due = false;
         }
     }
 
-    fn store<const N: usize, const LOG: usize>(station: &mut Station<N, LOG>, storage: &Handover<Keep<N>>) {
+    fn store<const N: usize, const LOG: usize>(device: &mut Device<N, LOG>, storage: &Handover<Keep<N>>) {
         if let Some(stored) = storage.take_back() {
-            station.set_generation(stored.generation);
-            station.stored(stored.done, &stored.objects);
+            device.set_generation(stored.generation);
+            device.stored(stored.done, &stored.objects);
         }
         let Some(mut next) = storage.idle() else { return };
-        let Some(what) = station.take_store(&mut next.objects) else { return };
-        (next.what, next.generation) = (what, station.generation());
-        station.storing(Storing::Busy);
+        let Some(what) = device.take_store(&mut next.objects) else { return };
+        (next.what, next.generation) = (what, device.generation());
+        device.storing(Storing::Busy);
         drop(next);
         storage.give();
     }

@@ -1,22 +1,24 @@
-//! Two contacts in the operator's hand, and what they ask for: the board's whole operation as long as there is no bus.
+//! Operation by two contacts in the operator's hand; without a bus they are the board's only controls.
 //!
-//! The enabling switch is held to run, as on a robot's teach pendant: open, it takes the drive off, whatever it was doing. The start button
-//! says what comes next. Nothing begins by closing the switch alone but holding the pose.
+//! The enabling switch must be held, as on a robot's teach pendant: opening it turns the drive off in any
+//! state. The start button selects the next step. Closing the switch alone starts nothing but holding the
+//! pose.
 //!
 //! ```text
-//! both open once after the start               only then anything is accepted: a contact that is stuck enables nothing
+//! both open once after the start               required first: a stuck contact enables nothing
 //! held + start, not calibrated                 calibrate both axes, one after the other
-//! open + start, calibrated, no reference       the joints stand at their zero: take it
-//! held, calibrated and referenced              shutdown, switch on, enable; asked once for each closing
+//! open + start, calibrated, no reference       the joints stand at their zero: take the reference
+//! held, calibrated and referenced              shutdown, switch on, enable; once for each closing
 //! held + start, enabled                        identify
-//! let go                                       quick stop of an enabled drive, else voltage off; ends a calibration
+//! let go                                       quick stop of an enabled drive, else voltage off; ends a
+//!                                             calibration
 //! open + start for two seconds                 reset of a fault
 //! ```
 //!
-//! A contact counts once it has been steady for 20 ms; opening the enabling switch counts at once, bounce or not. With the switch open the
-//! button counts once it was seen open meanwhile: one that is welded closed neither resets nor takes a reference each time the operator
-//! lets go.
-//! Ticked at [`RATE_HZ`]; what is asked may be refused, and is asked again only by the hand.
+//! A contact counts after 20 ms without change; an opened enabling switch counts at once. With the switch
+//! open the button counts only after it was open too. So a button that is welded closed neither resets nor
+//! takes a reference each time the operator lets go. Ticked at [`RATE_HZ`]. A request may be refused and is
+//! repeated only by the operator.
 
 use crate::leg::{DriveState, PowerRequest};
 
@@ -25,44 +27,44 @@ pub const RATE_HZ: u32 = 500;
 const STEADY_TICKS: u32 = RATE_HZ / 50;
 const RESET_TICKS: u32 = 2 * RATE_HZ;
 
-/// What is known at one tick.
+/// Inputs of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Situation {
     /// The enabling switch is held.
     pub enabling: bool,
     /// The start button is pressed.
     pub start: bool,
-    /// Something forbids to enable.
+    /// An inhibit reason is active.
     pub blocked: bool,
     /// Both axes have a calibration.
     pub calibrated: bool,
     /// A calibration is under way.
     pub calibrating: bool,
-    /// The joints' zeros are known.
+    /// The joints have a reference.
     pub referenced: bool,
-    /// Where the drive stands; `None` before the servo runs.
+    /// State of the drive; `None` before the servo runs.
     pub drive: Option<DriveState>,
 }
 
-/// What the operator asks for.
+/// Request of the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ask {
     /// A step of the drive's power states.
     Power(PowerRequest),
-    /// Measure both axes: the motors turn.
+    /// Measure both axes; the motors turn.
     Calibrate,
-    /// Bridges off, no calibration.
+    /// Turn the bridges off and end the calibration.
     EndCalibration,
-    /// The joints stand at their zero.
+    /// Take the reference: the joints stand at their zero.
     Reference,
-    /// Find the leg's parameters.
+    /// Identify the leg's parameters.
     Identify,
-    /// Forget what blocks.
+    /// Clear faults and inhibit reasons.
     Reset,
 }
 
 impl Ask {
-    /// The word in records.
+    /// Word used in records.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -82,11 +84,11 @@ impl Ask {
     }
 }
 
-/// A contact with its bounce taken off.
+/// A debounced contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Contact {
     closed: bool,
-    /// Ticks for which it has differed from that.
+    /// Ticks for which the input has differed from `closed`.
     other: u32,
 }
 
@@ -99,41 +101,41 @@ impl Contact {
     }
 }
 
-/// What the contacts were; see the module.
+/// State of the contacts; see the module.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Operator {
     enabling: Contact,
     start: Contact,
-    /// Ticks for which both have been open; the start waits for some of them.
+    /// Ticks for which both have been open; nothing is accepted before [`STEADY_TICKS`].
     open: u32,
     trusted: bool,
-    /// The button was open since the switch is.
+    /// The button has been open since the switch opened.
     ready: bool,
     /// Ticks for which the button has been pressed since then.
     pressed: u32,
-    /// The way to enabled was begun by this closing of the switch, so many of its steps were asked.
+    /// Steps towards enabled requested during this closing of the switch.
     steps: u8,
 }
 
 impl Operator {
-    /// The switch is held, was closed since it was seen open, and does not bounce.
+    /// Returns whether the switch is held, debounced, and was open before.
     #[must_use]
     pub const fn holds(&self) -> bool {
         self.trusted && self.enabling.closed
     }
 
-    /// One tick.
+    /// Runs one tick.
     pub fn tick(&mut self, now: &Situation) -> Option<Ask> {
         let before = (self.enabling.closed, self.start.closed);
         self.enabling.tick(now.enabling);
         self.start.tick(now.start);
-        // Letting go counts at once.
+        // An opened switch counts at once.
         self.enabling.closed &= now.enabling;
         if !self.trusted {
             let open = !now.enabling && !now.start;
             self.open = if open { self.open + 1 } else { 0 };
             self.trusted = self.open >= STEADY_TICKS;
-            // To stop is no matter of trust.
+            // A stop is accepted at any time.
             return if now.enabling { None } else { stop(now) };
         }
         if !self.enabling.closed {
@@ -150,7 +152,7 @@ impl Operator {
             _ => {}
         }
         if now.blocked {
-            // What forbids may go by itself: this closing has been answered all the same.
+            // The inhibit reason may clear by itself; this closing must not enable then.
             self.steps = u8::MAX;
         }
         if now.blocked || !now.calibrated || !now.referenced {
@@ -159,7 +161,7 @@ impl Operator {
         self.next_step(now.drive?)
     }
 
-    /// Shutdown, switch on, enable: each once.
+    /// Next of the steps shutdown, switch on, enable; each once per closing.
     fn next_step(&mut self, drive: DriveState) -> Option<Ask> {
         let (place, request) = match drive {
             DriveState::SwitchOnDisabled => (0, PowerRequest::Shutdown),
@@ -188,7 +190,7 @@ impl Operator {
     }
 }
 
-/// What an open switch asks for.
+/// Stop request of an open switch.
 fn stop(now: &Situation) -> Option<Ask> {
     match now.drive {
         _ if now.calibrating => Some(Ask::EndCalibration),
@@ -216,7 +218,7 @@ mod tests {
     const READY: Situation =
         Situation { calibrated: true, referenced: true, drive: Some(DriveState::SwitchOnDisabled), ..REST };
 
-    /// What is asked within so many ticks of one situation.
+    /// Requests within some ticks of one situation.
     fn asked(operator: &mut Operator, now: Situation, ticks: u32) -> impl Iterator<Item = Ask> {
         let mut all = [None; 8];
         let mut count = 0;
@@ -229,7 +231,7 @@ mod tests {
         all.into_iter().flatten()
     }
 
-    /// Trusted, with the switch held.
+    /// An operator that has seen both contacts open and then the switch held.
     fn holding() -> Operator {
         let mut operator = trusted();
         assert_eq!(asked(&mut operator, Situation { enabling: true, ..REST }, RATE_HZ).count(), 0);
@@ -243,11 +245,11 @@ mod tests {
     }
 
     #[test]
-    fn a_contact_that_is_stuck_closed_at_the_start_asks_for_nothing() {
+    fn a_contact_stuck_closed_at_the_start_requests_nothing() {
         for stuck in [Situation { enabling: true, ..READY }, Situation { start: true, ..READY }] {
             let mut operator = Operator::default();
             assert_eq!(asked(&mut operator, stuck, 10 * RESET_TICKS).count(), 0);
-            // Once it has been open it counts.
+            // After it has been open it counts.
             assert_eq!(asked(&mut operator, READY, 2 * STEADY_TICKS).count(), 0);
             let ask = asked(&mut operator, Situation { enabling: true, ..READY }, RATE_HZ).next();
             assert_eq!(ask, Some(Ask::Power(PowerRequest::Shutdown)));
@@ -255,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_to_enabled_is_asked_step_by_step_and_once_for_each_closing() {
+    fn each_enabling_step_is_requested_once_per_closing() {
         let mut operator = trusted();
         let held = Situation { enabling: true, ..READY };
         let mut drive = DriveState::SwitchOnDisabled;
@@ -267,9 +269,9 @@ mod tests {
             }
         }
         assert_eq!((drive, steps), (DriveState::OperationEnabled, 3));
-        // A fault that is reset while the switch is held does not enable again.
+        // After a fault reset with the switch held, the drive is not enabled again.
         assert_eq!(asked(&mut operator, held, RATE_HZ).count(), 0);
-        // A drive that was refused is not asked again either, until the switch was open.
+        // A refused step is not repeated before the switch was open.
         let refused = Situation { drive: Some(DriveState::SwitchedOn), ..held };
         assert_eq!(asked(&mut operator, refused, RATE_HZ).count(), 0);
         let open = Situation { enabling: false, drive: Some(DriveState::SwitchOnDisabled), ..READY };
@@ -278,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn letting_go_stops_in_the_same_tick_whatever_the_drive_does() {
+    fn opening_the_switch_stops_in_the_same_tick_in_any_state() {
         let cases = [
             (Some(DriveState::OperationEnabled), false, Ask::Power(PowerRequest::QuickStop)),
             (Some(DriveState::SwitchedOn), false, Ask::Power(PowerRequest::DisableVoltage)),
@@ -293,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_not_trusted_yet_can_still_stop() {
+    fn a_stop_needs_no_previously_open_contacts() {
         let mut operator = Operator::default();
         let enabled =
             Situation { enabling: true, start: true, drive: Some(DriveState::OperationEnabled), ..READY };
@@ -304,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_closing_while_something_forbids_enables_nothing_once_it_is_gone() {
+    fn closing_while_inhibited_enables_nothing_later() {
         let mut operator = trusted();
         let held = Situation { enabling: true, ..READY };
         assert_eq!(asked(&mut operator, Situation { blocked: true, ..held }, RATE_HZ).count(), 0);
@@ -314,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_moves_that_is_blocked_uncalibrated_or_without_reference() {
+    fn a_blocked_uncalibrated_or_unreferenced_leg_is_not_enabled() {
         let held = Situation { enabling: true, ..READY };
         for now in [
             Situation { blocked: true, ..held },
@@ -327,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn the_button_asks_for_what_comes_next() {
+    fn the_button_requests_the_next_step() {
         let with = |now: Situation| asked(&mut holding(), Situation { start: true, ..now }, RATE_HZ).next();
         assert_eq!(with(Situation { enabling: true, ..REST }), Some(Ask::Calibrate));
         let enabled = Situation { enabling: true, drive: Some(DriveState::OperationEnabled), ..READY };
@@ -337,13 +339,13 @@ mod tests {
         let stands = Situation { calibrated: true, ..REST };
         assert_eq!(asked(&mut operator, Situation { start: true, ..stands }, RATE_HZ / 2).count(), 0);
         assert_eq!(asked(&mut operator, stands, RATE_HZ).next(), Some(Ask::Reference));
-        // Held for long it is a reset, and no reference when it is let go.
+        // A long press is a reset, without a reference when it is released.
         assert!(asked(&mut operator, Situation { start: true, ..stands }, 2 * RESET_TICKS).eq([Ask::Reset]));
         assert_eq!(asked(&mut operator, stands, RATE_HZ).count(), 0);
     }
 
     #[test]
-    fn a_button_that_is_welded_closed_asks_for_nothing_when_the_switch_opens() {
+    fn a_welded_button_requests_nothing_when_the_switch_opens() {
         let stands = Situation { calibrated: true, ..REST };
         for now in [REST, stands, READY, Situation { blocked: true, ..READY }] {
             let mut operator = holding();
@@ -353,7 +355,7 @@ mod tests {
                 assert_eq!(asked(&mut operator, held, RATE_HZ).count(), 0);
                 assert_eq!(asked(&mut operator, welded, 2 * RESET_TICKS).count(), 0, "{now:?}");
             }
-            // Let go it asks for nothing either, and once it was open it counts again.
+            // Releasing it requests nothing; after it was open it counts again.
             assert_eq!(asked(&mut operator, now, RATE_HZ).count(), 0, "{now:?}");
             assert!(asked(&mut operator, welded, 2 * RESET_TICKS).eq([Ask::Reset]), "{now:?}");
         }

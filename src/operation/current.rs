@@ -1,22 +1,24 @@
-//! Level 0: the current loops of all axes, one after the other, each when its converters are done.
+//! Level 0: the current loops of all axes, one after the other, each after its conversions.
 //!
-//! Order in every tick of either axis: inhibit causes, then the axis' stage, then its bridge. Nothing here waits or formats. From an
-//! emergency stop to both bridges off takes the stop's own interrupt or, if that were missing, the rest of the time to the next tick
-//! and this tick's way to its bridge.
+//! Order in every tick of either axis: inhibit reasons, then the axis state, then its bridge. Nothing here
+//! waits or formats. An emergency stop turns both bridges off in its own interrupt. Without that interrupt it
+//! takes the rest of the time to the next tick and this tick's path to its bridge.
 //!
-//! A bridge switches only for an axis with a calibration (or one that is being calibrated), with a target of the servo, while the
-//! inhibit word is clear, and while the servo goes on answering. The stop's interrupt may come between any two instructions of a tick,
-//! so the inhibit word is read again with interrupts masked in the moment in which the outputs are switched on ([`apply`]).
+//! A bridge switches only for an axis with a calibration (or under calibration), with a target of the servo,
+//! while the inhibit word is clear and the servo answers. The stop's interrupt may come between any two
+//! instructions of a tick. So the inhibit word is read again, with interrupts masked, at the moment of
+//! enabling the outputs ([`apply`]).
 //!
-//! While the flash is written ([`Cause::Storing`]) nothing switches, not even the brake resistor, and everything may stand still: how
-//! far a joint went during an erasure is unknown, so the joints' zeros are forgotten and the servo ends. A target is followed only
-//! where all axes run. An axis that loses its rotor position ends the servo's ticks at once.
+//! While the flash is written ([`Cause::Storing`]) nothing switches, not even the brake resistor, and the
+//! processor may stall. The joints' motion during an erasure is unknown, so their zeros are discarded and the
+//! servo ends. A target is followed only where all axes run. An axis that loses its rotor position ends the
+//! servo's ticks at once.
 
 use core::num::NonZeroU32;
 
+use super::axis_state::{AxisState, Outcome};
 use super::queues::CurrentEnds;
 use super::signals::Signals;
-use super::stage::{Outcome, Stage};
 use crate::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, Hardware};
 use crate::leg::axis_code;
 use crate::motor::{AxisRequest, BrakeBudget, Chopper};
@@ -24,24 +26,24 @@ use crate::safety::{BoardFault, Bridges, Cause, ServoWatch, TickState, TickWatch
 use crate::servo::SERVO_RATE_HZ;
 use crate::units::Volt;
 
-/// Current ticks for one of the servo.
+/// Current ticks per servo tick.
 const TICKS_PER_SERVO: u32 = CURRENT_RATE_HZ / SERVO_RATE_HZ;
 
-/// After so many periods without a tick an axis is seen to have stopped, by the ticks of the others.
+/// Periods without a tick after which the other axes' ticks detect that an axis has stopped.
 const LATE_PERIODS: u32 = 3;
 
-/// Periods without a tick after which nobody knows any more how far a joint went: a sector's erasure, and not the writing of a word
-/// (0.1 ms). In 2 ms no motor goes half of the counter's range.
+/// Periods without a tick after which the joint's motion is unknown: a sector's erasure, not the write of a
+/// word (0.1 ms). In 2 ms no motor moves by half of the counter's range.
 const CERTAIN_PERIODS: u32 = CURRENT_RATE_HZ / 500;
 
-/// So many periods in a row without a conversion of the bus voltage are too many.
+/// Periods in a row without a conversion of the bus voltage that are a fault.
 const UNCONVERTED: u8 = 2;
 
-/// Ticks after a time without any in which the index is not believed: its interrupt is late by as much, and so is the count it takes. It
-/// comes after the first of them.
+/// Ticks after a stall in which the index is ignored. Its interrupt was late by the stall, and so is its
+/// captured count. The interrupt comes after the first of them.
 const LATE_TICKS: u8 = 2;
 
-/// What a board shows at a tick of an axis.
+/// Board state at a tick of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
     /// Free-running clock.
@@ -52,49 +54,49 @@ pub struct Tick {
     pub gate_fault: bool,
     /// Both of the axis' shunts were converted.
     pub complete: bool,
-    /// Bus voltage and temperatures were, since the last tick of this axis; asked of the first axis alone.
+    /// Bus voltage and temperatures were converted since this axis' last tick; set for the first axis only.
     pub supply: bool,
-    /// Of the axis.
+    /// Sample of the axis.
     pub sample: AxisSample,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct AxisLoop {
-    stage: Stage,
-    /// Since the last sample for the servo.
+    stage: AxisState,
+    /// Ticks since the last sample for the servo.
     ticks: u32,
     /// Clock at the last tick.
     last: Option<u32>,
     watch: TickWatch,
-    /// Ticks that the index is not believed in.
+    /// Remaining ticks in which the index is ignored.
     late: u8,
 }
 
-/// What level 0 works on.
+/// State of level 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentLoops<const N: usize> {
     axes: [AxisLoop; N],
-    /// Ticks of the clock between two of one axis.
+    /// Clock ticks per period of an axis.
     period: NonZeroU32,
     servo: ServoWatch,
     /// Periods without a conversion of the bus voltage.
     unconverted: u8,
-    /// Of the brake resistor, if there is one.
+    /// Control of the brake resistor, if there is one.
     chopper: Option<Chopper>,
     budget: BrakeBudget,
     volt_per_code: Volt,
 }
 
 impl<const N: usize> CurrentLoops<N> {
-    /// Axes in these stages; `period` ticks of the board's clock are one of an axis.
+    /// Creates the loops with these axis states; `period` is the PWM period in ticks of the board's clock.
     #[must_use]
     pub fn new(
-        stages: [Stage; N],
+        states: [AxisState; N],
         period: NonZeroU32,
         chopper: Option<Chopper>,
         volt_per_code: Volt,
     ) -> Self {
-        let axes = stages.map(|stage| AxisLoop {
+        let axes = states.map(|stage| AxisLoop {
             stage,
             ticks: 0,
             last: None,
@@ -105,18 +107,18 @@ impl<const N: usize> CurrentLoops<N> {
         Self { axes, period, servo, unconverted: 0, chopper, budget: BrakeBudget::FULL, volt_per_code }
     }
 
-    /// What an axis does.
-    pub fn stage_mut(&mut self, axis: usize) -> Option<&mut Stage> {
+    /// State of an axis, mutable.
+    pub fn axis_state_mut(&mut self, axis: usize) -> Option<&mut AxisState> {
         self.axes.get_mut(axis).map(|axis| &mut axis.stage)
     }
 
-    /// The stage of an axis.
+    /// State of an axis.
     #[must_use]
-    pub fn stage(&self, axis: usize) -> Option<&Stage> {
+    pub fn axis_state(&self, axis: usize) -> Option<&AxisState> {
         self.axes.get(axis).map(|axis| &axis.stage)
     }
 
-    /// One tick of one axis.
+    /// Runs one tick of one axis.
     #[inline(always)]
     pub fn tick<H: Hardware<N>>(
         &mut self,
@@ -169,7 +171,7 @@ impl<const N: usize> CurrentLoops<N> {
             if let Some(running) = this.stage.axis_mut()
                 && let Some(samples) = ends.samples.get_mut(axis)
             {
-                // A servo that does not read its samples is noticed below.
+                // A servo that does not read its samples is detected below.
                 let _ = samples.enqueue(running.joint_sample());
             }
             if axis + 1 == N {
@@ -187,7 +189,8 @@ impl<const N: usize> CurrentLoops<N> {
         signals.statistics.see_bus(tick.sample.bus_code);
     }
 
-    /// Sets the brake resistor. Without a reading of the bus voltage it stays off; one reading may be missing, the first of all.
+    /// Sets the brake resistor, which stays off without a bus voltage. One missing reading is tolerated, as
+    /// at the start.
     #[inline(always)]
     fn brake<H: Hardware<N>>(&mut self, tick: &Tick, signals: &Signals<N>, hardware: &mut H) {
         let stands = signals.inhibit.is_storing();
@@ -198,7 +201,7 @@ impl<const N: usize> CurrentLoops<N> {
             signals.inhibit.raise(Cause::Conversion);
         }
         if let Some(chopper) = &self.chopper {
-            // While the flash stands still, no tick would switch the resistor off again.
+            // During a flash write no tick would turn the resistor off again.
             let wanted = match stands || unknown {
                 true => 0.0,
                 false => chopper.duty(self.volt_per_code * f32::from(tick.sample.bus_code)),
@@ -207,7 +210,8 @@ impl<const N: usize> CurrentLoops<N> {
         }
     }
 
-    /// An axis whose ticks stop cannot report it itself, and its bridge goes on with its last command.
+    /// Checks the other axes' ticks. A stopped axis cannot report itself, and its bridge repeats its last
+    /// command.
     #[inline(always)]
     fn look_at_the_others(&self, axis: usize, now: u32, signals: &Signals<N>) {
         let late = LATE_PERIODS.wrapping_mul(self.period.get());
@@ -220,8 +224,8 @@ impl<const N: usize> CurrentLoops<N> {
     }
 }
 
-/// Gives a command to a bridge. Its outputs are switched on only if the inhibit word still allows it: a stop that came since the
-/// word was read has already switched them off.
+/// Applies a command to a bridge. Its outputs are enabled only if the inhibit word still allows it: a stop
+/// since the word was read has already turned them off.
 #[inline(always)]
 fn apply<const N: usize, H: Hardware<N>>(
     axis: usize,
@@ -241,11 +245,11 @@ fn apply<const N: usize, H: Hardware<N>>(
 }
 
 impl AxisLoop {
-    /// Raises what forbids to enable: contacts, conversion, the time since the last tick. While the flash is written, missing ticks and
-    /// conversions are no fault; returns how many periods were missed then.
+    /// Sets inhibit reasons from contacts, conversion and the time since the last tick. During a flash write
+    /// missing ticks and conversions are no fault; returns the number of missed periods then.
     #[inline(always)]
     fn look<const N: usize>(&mut self, tick: &Tick, period: NonZeroU32, signals: &Signals<N>) -> Option<u32> {
-        // Half a period late is one missed; a gap of three periods two.
+        // Rounded: half a period late is one missed period, a gap of three periods two.
         let since = |last| tick.now.wrapping_sub(last).saturating_add(period.get() / 2) / period;
         let periods = self.last.map_or(1, since).saturating_sub(1);
         let stood = signals.inhibit.is_storing().then_some(periods);
@@ -269,7 +273,7 @@ impl AxisLoop {
     }
 }
 
-/// Reports what came of an axis and returns what its bridge does then. A fault takes the other axes along at once.
+/// Reports an outcome of an axis and returns its bridge's command. A fault applies to the other axes at once.
 #[inline(never)]
 fn react<const N: usize, H: Hardware<N>>(
     axis: usize,

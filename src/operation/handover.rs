@@ -4,7 +4,8 @@
 //! idle --give--> given --(worker fills it) return--> returned --take_back--> idle
 //! ```
 //!
-//! A turn is one atomic word. Only the side whose turn it is locks the value, so no side ever finds it locked.
+//! The turn is one atomic word. Only the side whose turn it is locks the value, so no side ever finds it
+//! locked.
 
 use super::signals::Word;
 
@@ -14,7 +15,7 @@ const IDLE: u32 = 0;
 const GIVEN: u32 = 1;
 const RETURNED: u32 = 2;
 
-/// A value and whose turn it is.
+/// A value and the side whose turn it is.
 #[derive(Debug)]
 pub struct Handover<T> {
     turn: Word,
@@ -22,7 +23,7 @@ pub struct Handover<T> {
 }
 
 impl<T> Handover<T> {
-    /// Idle.
+    /// Creates an idle handover.
     #[must_use]
     pub const fn new(value: T) -> Self {
         Self { turn: Word::new(IDLE), value: Mutex::new(value) }

@@ -1,10 +1,12 @@
-//! Level 1: the servo's side of the bus: newest commands in, at most one request, and what came of the tick out.
+//! Level 1: the servo's side of the bus. In: the newest commands and at most one request. Out: the tick's
+//! results.
 //!
-//! Orders are taken in every tick. The servo reports in every second one, as soon as the bus has taken the report before.
+//! Orders are taken in every tick. The servo reports in every second one, once the bus has taken the previous
+//! report.
 
 use super::queues::HostEnds;
 use super::signals::Signals;
-use crate::bus::station::{LegOrder, LegRequest, LegTold};
+use crate::bus::device::{LegOrder, LegRequest, LegStatus};
 use crate::hal::{Hardware, Sample};
 use crate::leg::{
     Activity, Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand,
@@ -14,13 +16,13 @@ use crate::units::{NewtonMetre, Volt};
 
 /// Ticks between two reports to the bus: 2 kHz, twice the fastest cycle that fits the wire.
 const TICKS: u32 = 2;
-/// Time constant of the torque that a host is told, ticks: 2 ms.
+/// Time constant of the reported torque, ticks: 2 ms.
 const LAG_TICKS: f32 = 8.0;
 
 /// A request and, where it begins an identification, its plan and seed.
 pub type HostRequest<const N: usize> = (ControlRequest<N>, Option<(Plan, u64)>);
 
-/// What the servo knows of the bus.
+/// State of the servo's side of the bus.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HostSide<const N: usize> {
     following: Following<N>,
@@ -28,22 +30,23 @@ pub struct HostSide<const N: usize> {
     request: Option<LegRequest>,
     cancel: bool,
     refused: Option<Refusal>,
-    /// The bus refused a step by itself, which no record tells of yet.
+    /// A refusal by the bus itself that is not recorded yet.
     noted: Option<Refusal>,
     may_return: [bool; N],
-    /// Of the measured currents, model's sign, smoothed; none of a released bridge, whose reading is noise.
+    /// Torque from the measured currents, model's sign, smoothed; zero while the bridge is off, where the
+    /// reading is noise.
     torque: [NewtonMetre; N],
     volt_per_code: Volt,
     tick: u32,
 }
 
-/// Whether the operator lets the leg be enabled; an open switch counts at once.
+/// Returns whether the operator permits enabling; an open switch counts at once.
 fn is_held<const N: usize>(signals: &Signals<N>, hardware: &impl Hardware<N>) -> bool {
     hardware.contacts().enabling && signals.permits()
 }
 
 impl<const N: usize> HostSide<N> {
-    /// Nothing received yet.
+    /// State before the first order.
     #[must_use]
     pub const fn new(following: Following<N>, volt_per_code: Volt) -> Self {
         Self {
@@ -60,12 +63,12 @@ impl<const N: usize> HostSide<N> {
         }
     }
 
-    /// The joints have other zeros than before.
+    /// Resets after a change of the joints' zeros.
     pub fn begin(&mut self) {
         self.following.forget_zeros();
     }
 
-    /// No tick of the leg: orders of this time are for a leg without zeros, and are dropped.
+    /// Runs instead of a tick while the leg has no zeros: orders are dropped.
     pub fn rest(
         &mut self,
         ends: &mut HostEnds<'_, N>,
@@ -81,7 +84,14 @@ impl<const N: usize> HostSide<N> {
             let (blocked, calibrated) = (causes != 0, signals.is_calibrated());
             let held = is_held(signals, hardware);
             let joints = [JointStatus { bus: self.bus(signals), ..JointStatus::NONE }; N];
-            let _ = ends.told.enqueue(LegTold { joints, blocked, causes, calibrated, held, ..LegTold::NONE });
+            let _ = ends.status.enqueue(LegStatus {
+                joints,
+                blocked,
+                causes,
+                calibrated,
+                held,
+                ..LegStatus::NONE
+            });
         }
     }
 
@@ -90,18 +100,19 @@ impl<const N: usize> HostSide<N> {
         self.noted = order.refused.or(self.noted);
     }
 
-    /// What the bus refused by itself, once.
+    /// Takes the refusal by the bus itself, once.
     pub fn take_noted(&mut self) -> Option<Refusal> {
         self.noted.take()
     }
 
-    /// Joints that a host lets return into their range.
+    /// Joints that a host permits to return into their range.
     #[must_use]
     pub const fn may_return(&self) -> [bool; N] {
         self.may_return
     }
 
-    /// Takes the newest order, unless a request still waits behind the operator's. Reports the faults that a lost host means.
+    /// Takes the newest order, unless a request still waits behind the operator's. Reports the faults of a
+    /// lost host.
     pub fn hear(&mut self, ends: &mut HostEnds<'_, N>, mut report: impl FnMut(Fault)) {
         while self.request.is_none()
             && let Some(order) = ends.orders.dequeue()
@@ -114,7 +125,8 @@ impl<const N: usize> HostSide<N> {
                 }
             }
             match order.request {
-                // Without the drive a host cannot bring joints to rest along its profile; it can still stop them.
+                // Without the drive a host cannot stop the joints along its profile, but it can request a
+                // quick stop.
                 Some(LegRequest::Cancel) if order.commands.is_none() => {
                     self.request = Some(LegRequest::Power(PowerRequest::QuickStop));
                 }
@@ -138,7 +150,8 @@ impl<const N: usize> HostSide<N> {
         })
     }
 
-    /// The request that remains while the operator's switch is open: nothing that enables, and a quick stop of an enabled leg.
+    /// Filters a request while the operator's switch is open: no request that enables passes, and an enabled
+    /// leg gets a quick stop.
     pub fn held(
         &self,
         request: Option<ControlRequest<N>>,
@@ -159,14 +172,14 @@ impl<const N: usize> HostSide<N> {
         }
     }
 
-    /// What a host commands at this tick while it has the drive.
+    /// Commands of a host for this tick, while it has the drive.
     pub fn commands(&mut self) -> Option<Host<'_, N>> {
         let cancel = core::mem::take(&mut self.cancel);
         let (following, commands) = (&mut self.following, self.commands.as_ref()?);
         Some(Host { following, commands, cancel })
     }
 
-    /// Reports what came of the tick, where a report is due.
+    /// Reports the tick's results when a report is due.
     pub fn report(
         &mut self,
         control: &Control<N>,
@@ -177,7 +190,7 @@ impl<const N: usize> HostSide<N> {
         hardware: &mut impl Hardware<N>,
     ) {
         if let Some(logged) = output.logged {
-            // The host sees by its tick that one is missing.
+            // The host detects a missing sample by its tick.
             let _ = ends.logged.enqueue(logged);
         }
         self.refused = output.servo.decision.refused.or(self.refused);
@@ -192,7 +205,7 @@ impl<const N: usize> HostSide<N> {
             let status = self.following.status(joint, torque, activity == Activity::Follow, output);
             *slot = JointStatus { bus: self.bus(signals), ..status.unwrap_or(JointStatus::NONE) };
         }
-        let told = LegTold {
+        let status = LegStatus {
             joints,
             activity,
             change: [control.change().is_some(), control.is_update_offered()],
@@ -203,10 +216,10 @@ impl<const N: usize> HostSide<N> {
             calibrated: true,
             rests: false,
         };
-        let _ = ends.told.enqueue(told);
+        let _ = ends.status.enqueue(status);
     }
 
-    /// A first-order lag of [`LAG_TICKS`], as long as the bridges switch.
+    /// Low-pass with time constant [`LAG_TICKS`] while the bridges switch.
     fn smooth(&mut self, control: &Control<N>, sample: &Sample<N>, output: &ControlOutput<N>) {
         let is_off = output.servo.decision.state.permission() == Permission::Released;
         for (joint, torque) in self.torque.iter_mut().enumerate() {
@@ -219,14 +232,15 @@ impl<const N: usize> HostSide<N> {
         self.volt_per_code * signals.statistics.bus[0].get() as f32
     }
 
-    /// The bus has to run, and has taken the report before.
+    /// Counts ticks, triggers the bus level every [`TICKS`], and returns whether it has taken the previous
+    /// report.
     fn is_due(&mut self, ends: &HostEnds<'_, N>, hardware: &mut impl Hardware<N>) -> bool {
         self.tick = self.tick.wrapping_add(1);
         if !self.tick.is_multiple_of(TICKS) {
             return false;
         }
         hardware.pend_bus();
-        ends.told.ready()
+        ends.status.ready()
     }
 }
 

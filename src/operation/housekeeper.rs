@@ -1,46 +1,48 @@
 //! Level 6: the operator's contacts, gate drivers, temperatures, calibration and reference, resets.
 //!
 //! ```text
-//! not calibrated --calibrate--> first axis --measured--> next axis --measured--> calibrated --reference--> begun
-//!        ^                          |refused, let go                                 |             |
-//!        +--------------------------+------------------------ a place or parameters lost ----------+
+//! not calibrated --calibrate--> first axis --measured-> next axis --measured-> calibrated -reference-> ready
+//!       ^                          | refused, let go                              |                      |
+//!       +--------------------------+----- rotor position or parameters lost ------+----------------------+
 //! ```
 //!
-//! An axis of which a calibration was kept is checked against it: everything is measured again, and resistance, inductances and offset have to be
-//! the kept ones. One that does not agree is refused, told, and measured anew the next time.
+//! An axis with a stored calibration is checked against it. Everything is measured again, and resistance,
+//! inductances and offset have to agree. If one does not, the axis is refused with a record, and its next
+//! calibration measures everything again.
 //!
-//! A reset takes 24 ms: gate drivers off and on again, configured anew, then faults are forgotten and what still holds comes back.
-//! Meanwhile nobody looks at their registers, and contacts do not count: afterwards both have to be open once.
+//! A reset takes 24 ms. Gate drivers are turned off and on and configured again; then faults are cleared, and
+//! those that still hold come back. Until then the registers are not checked and contacts are ignored;
+//! afterwards both contacts have to be open once.
 
+use super::axis_state::{Order, Outcome};
 use super::contacts::{Ask, Operator, RATE_HZ, Situation};
 use super::queues::HousekeepingEnds;
 use super::signals::Signals;
-use super::stage::{Order, Outcome};
 use crate::hal::{AxisSample, Contacts, Hardware, JointSample};
 use crate::leg::{AxisFault, Calibration, ControlRequest, DriveState, PowerRequest, StoredCalibration};
 use crate::motor::reference::{ReferenceStep, StatedPose};
 use crate::motor::{Axis, AxisConfiguration, CalibrationSettings, Calibrator};
 use crate::real::max;
-use crate::safety::{Cause, UpkeepClock, of_gate_driver, of_temperature};
+use crate::safety::{Cause, CheckClock, of_gate_driver, of_temperature};
 use crate::trace::{Record, words};
 use crate::units::Hertz;
 
-/// Rounds of a reset for which the gate drivers are off, and until they can be configured: 2 and 22 ms.
+/// Rounds of a reset with gate drivers off (2 ms), and until they can be configured (22 ms).
 const GATES_ON: u8 = 1;
 const GATES_READY: u8 = 12;
 
-/// What the housekeeping is built from.
+/// Settings of the housekeeping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HousekeepingSettings<const N: usize> {
     /// Configuration of each axis.
     pub axes: [AxisConfiguration; N],
     /// Limits of a calibration of each axis.
     pub calibration: [CalibrationSettings; N],
-    /// A bridge that is not cooler is too hot, degrees Celsius.
+    /// Temperature from which a bridge is too hot, degrees Celsius.
     pub hottest_c: f32,
 }
 
-/// What a round reads and writes.
+/// Access of a round to queues, signals and hardware.
 struct Level<'a, 'q, const N: usize, H> {
     ends: &'a mut HousekeepingEnds<'q, N>,
     signals: &'a Signals<N>,
@@ -54,7 +56,8 @@ impl<const N: usize, H> Level<'_, '_, N, H> {
         }
     }
 
-    /// Asks the servo; whether there was room. While a host has the drive, closing the enabling switch permits and does not ask.
+    /// Sends a request to the servo and returns whether the queue took it. While a host has the drive,
+    /// closing the enabling switch only permits and requests nothing.
     fn request(&mut self, request: ControlRequest<N>) -> bool {
         let enables = matches!(request, ControlRequest::Power(power) if power.enables());
         !(enables && self.signals.is_hosted()) && self.ends.requests.enqueue(request).is_ok()
@@ -67,35 +70,35 @@ impl<const N: usize, H> Level<'_, '_, N, H> {
     }
 }
 
-/// What is known between two rounds.
+/// State between two rounds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Housekeeper<const N: usize> {
     settings: HousekeepingSettings<N>,
-    clock: UpkeepClock,
+    clock: CheckClock,
     operator: Operator,
     calibrated: [bool; N],
-    /// Kept from before: checked at the motor where it is calibrated, instead of measured anew.
+    /// Stored calibrations, checked at the motor instead of measured again.
     stored: [Option<StoredCalibration>; N],
     /// The axis that is being calibrated.
     calibrating: Option<usize>,
-    /// Joints that are waited for to stand still, and which of them have.
+    /// Joints that must stand still for the reference, and which of them have.
     reference: Option<[(StatedPose, bool); N]>,
-    /// The zeros were set in the round before: the servo may begin.
+    /// The zeros were set in the previous round: the servo may begin.
     placed: bool,
-    /// Rounds since a reset was asked for.
+    /// Rounds since a reset was requested.
     resetting: Option<u8>,
     drive: Option<DriveState>,
     round: u32,
-    told: u32,
+    recorded: u32,
 }
 
 impl<const N: usize> Housekeeper<N> {
-    /// Nothing calibrated.
+    /// State without any calibration.
     #[must_use]
     pub fn new(settings: HousekeepingSettings<N>) -> Self {
         Self {
             settings,
-            clock: UpkeepClock::new(RATE_HZ),
+            clock: CheckClock::new(RATE_HZ),
             operator: Operator::default(),
             calibrated: [false; N],
             stored: [None; N],
@@ -105,23 +108,23 @@ impl<const N: usize> Housekeeper<N> {
             resetting: None,
             drive: None,
             round: 0,
-            told: 0,
+            recorded: 0,
         }
     }
 
-    /// Of axes that were calibrated and joints that were referenced elsewhere: they run, and the servo has begun.
+    /// State with all axes calibrated and referenced elsewhere: they run, and the servo has begun.
     #[must_use]
     pub fn ready(settings: HousekeepingSettings<N>) -> Self {
         Self { calibrated: [true; N], ..Self::new(settings) }
     }
 
-    /// With calibrations that were kept.
+    /// Adds stored calibrations.
     #[must_use]
     pub fn with_stored(self, stored: [Option<StoredCalibration>; N]) -> Self {
         Self { stored, ..self }
     }
 
-    /// One round, with the count of it that the watchdog waits for, and whether the operator lets the leg be enabled.
+    /// Runs one round, counts it for the watchdog, and sets whether the operator permits enabling.
     pub fn round<H: Hardware<N>>(
         &mut self,
         ends: &mut HousekeepingEnds<'_, N>,
@@ -147,7 +150,7 @@ impl<const N: usize> Housekeeper<N> {
         self.advance_reference(level);
     }
 
-    /// The operator lets the leg be enabled by whoever commands it; never while a reset is under way.
+    /// Returns whether the operator permits enabling, by contact or host; never during a reset.
     fn permits(&self) -> bool {
         self.resetting.is_none() && self.operator.holds()
     }
@@ -183,7 +186,7 @@ impl<const N: usize> Housekeeper<N> {
             }
         }
         if due.temperatures {
-            // All are damped by the servo, which gives less torque from 20 degrees below on.
+            // The servo damps these faults; derating starts 20 degrees below.
             let (mut hottest_c, most) = (f32::MIN, self.settings.hottest_c);
             for axis in 0..N {
                 let degrees = level.hardware.temperature(axis);
@@ -206,10 +209,10 @@ impl<const N: usize> Housekeeper<N> {
         self.tell_causes(level);
     }
 
-    /// Records every cause that came since the last round; those of the gate drivers with the status of each driver.
+    /// Records every new inhibit reason; those of the gate drivers with each driver's status.
     fn tell_causes(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         let causes = level.signals.inhibit.causes();
-        for cause in Cause::ALL.into_iter().filter(|cause| causes & !self.told & cause.bit() != 0) {
+        for cause in Cause::ALL.into_iter().filter(|cause| causes & !self.recorded & cause.bit() != 0) {
             let why = cause.name();
             level.record(Record::Refused { why, value: causes });
             if matches!(cause, Cause::GateFault | Cause::GateConfiguration) {
@@ -219,7 +222,7 @@ impl<const N: usize> Housekeeper<N> {
                 }
             }
         }
-        self.told = causes;
+        self.recorded = causes;
     }
 
     fn hear(&mut self, axis: usize, outcome: &Outcome, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
@@ -234,7 +237,7 @@ impl<const N: usize> Housekeeper<N> {
                 let (result, number) = words::calibration(*refusal);
                 level.record(refused(joint, result, number));
                 self.calibrating = None;
-                // Not the motor that was kept, not as it was mounted then, or whatever else that led to: the next one is measured anew.
+                // The stored calibration does not fit the motor or its mounting: measure again next time.
                 if let Some(stored) = self.stored.get_mut(axis) {
                     *stored = None;
                 }
@@ -243,7 +246,7 @@ impl<const N: usize> Housekeeper<N> {
                 level.record(refused(joint, "interrupted", 0));
                 self.calibrating = None;
             }
-            // The axis runs on, without a zero.
+            // The axis runs on without a zero.
             Outcome::StoodStill => {
                 level.record(Record::AxisFault { tick: self.round, joint, name: "zero_forgotten" });
                 self.forget_zeros(level);
@@ -255,7 +258,7 @@ impl<const N: usize> Housekeeper<N> {
                     if let Some(calibrated) = self.calibrated.get_mut(axis) {
                         *calibrated = false;
                     }
-                    // A motor that brakes does so until a reset.
+                    // A braking motor brakes until a reset.
                     if *fault == AxisFault::Parameters {
                         level.order(axis, Order::Off);
                     }
@@ -264,13 +267,13 @@ impl<const N: usize> Housekeeper<N> {
         }
     }
 
-    /// With a place goes the joint's zero, also one that is being looked for.
+    /// Discards the joints' zeros, also a reference in progress.
     fn forget_zeros(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         level.signals.end_servo();
         (self.drive, self.reference, self.placed) = (None, None, false);
     }
 
-    /// An axis that passed runs from now on, released; then the next one is measured.
+    /// Starts an axis that passed its calibration, with outputs off, and calibrates the next one.
     fn run_axis(
         &mut self,
         axis: usize,
@@ -286,7 +289,7 @@ impl<const N: usize> Housekeeper<N> {
             return level.signals.inhibit.raise(Cause::Configuration);
         };
         *calibrated = true;
-        // Its counts begin anew, without a zero.
+        // Counting restarts without a zero.
         level.signals.end_servo();
         level.order(axis, Order::Run(running));
         let next = (axis + 1..N).find(|&next| !self.calibrated.get(next).copied().unwrap_or(true));
@@ -300,7 +303,7 @@ impl<const N: usize> Housekeeper<N> {
         let settings = self.settings.axes.get(axis).zip(self.settings.calibration.get(axis));
         let stored = self.stored.get(axis).copied().flatten();
         let calibrator = settings.map(|(axis, settings)| match stored {
-            // One of another configuration is of no use.
+            // A calibration for another configuration is not used.
             Some(stored) => {
                 Calibrator::from_stored(axis, *settings, stored).or_else(|_| Calibrator::new(axis, *settings))
             }
@@ -318,7 +321,7 @@ impl<const N: usize> Housekeeper<N> {
     fn accept(&mut self, ask: Ask, level: &mut Level<'_, '_, N, impl Hardware<N>>) {
         let accepted = match ask {
             Ask::Power(request) => level.request(ControlRequest::Power(request)),
-            // The servo tells what became of it.
+            // The servo records the result.
             Ask::Identify => {
                 level.request(ControlRequest::Identify);
                 return;
@@ -331,7 +334,7 @@ impl<const N: usize> Housekeeper<N> {
                 first.is_some()
             }
             Ask::EndCalibration => {
-                // Asked in every round until it has ended.
+                // Requested in every round until the calibration has ended.
                 if let Some(axis) = self.calibrating {
                     level.order(axis, Order::Off);
                 }
@@ -343,7 +346,8 @@ impl<const N: usize> Housekeeper<N> {
                 self.reference.is_some()
             }
             Ask::Reset => {
-                // Motors that brake are released first: drivers that restart measure currents with another gain.
+                // Braking motors are released first, because restarting gate drivers measure currents with
+                // another gain.
                 level.signals.inhibit.raise(Cause::GateConfiguration);
                 level.hardware.release_all();
                 level.hardware.switch_gates(false);
@@ -354,7 +358,7 @@ impl<const N: usize> Housekeeper<N> {
         level.record(Record::Request { tick: self.round, name: ask.name(), accepted });
     }
 
-    /// Gate drivers off and on again, faults forgotten: what still holds comes back. Whether a reset is under way.
+    /// Continues a reset and returns whether one is under way: gate drivers off and on, then faults cleared.
     fn advance_reset(&mut self, level: &mut Level<'_, '_, N, impl Hardware<N>>) -> bool {
         let Some(rounds) = self.resetting else { return false };
         let rounds = rounds + 1;
@@ -366,7 +370,8 @@ impl<const N: usize> Housekeeper<N> {
             return true;
         }
         let configured = level.hardware.configure_gates();
-        // A switch that was closed meanwhile is not one that is closed after the reset: both contacts have to be open once.
+        // A switch closed during the reset must not count as closed after it: both contacts have to be open
+        // once.
         self.operator = Operator::default();
         level.signals.inhibit.reset();
         if !configured {

@@ -1,7 +1,7 @@
 //! Thread level: the identification, fed by the servo's events.
 //!
-//! **Gaps.** Samples come with their tick. One that is missing would bend every row that it belongs to, so the identification is
-//! cancelled, and control gets a verdict that refuses for its input.
+//! **Gaps.** A missing sample, detected by its tick, would distort every row that contains it. So the
+//! identification is cancelled, and control gets a refused verdict because of its input.
 
 use core::borrow::BorrowMut;
 
@@ -14,7 +14,7 @@ use crate::leg::{
 use crate::servo::TICKS_PER_LOG;
 use crate::trace::{Record, judged, words};
 
-/// What is known between two slices.
+/// State between two slices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IdentificationLevel {
     activity: Activity,
@@ -22,29 +22,29 @@ pub struct IdentificationLevel {
     last: Option<(u32, Segment)>,
     /// A sample was lost in this identification.
     gap: bool,
-    /// Seed of this identification's search.
+    /// Seed of the current search.
     seed: u64,
     /// Verdict that control has not taken yet.
     verdict: Option<Verdict>,
-    /// Control took the result.
+    /// Control has taken the result.
     taken: bool,
-    /// Results that changed and were not published yet; no verdict where an identification begins.
+    /// Changed results to be published; the verdict is `None` where an identification begins.
     publish: Option<Option<Verdict>>,
 }
 
-/// What came of a slice.
+/// Result of one slice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Slice<const N: usize> {
-    /// There is nothing to do.
+    /// No work left.
     Idle,
-    /// The search goes on.
+    /// The search continues.
     Busy,
-    /// Control took a result; with the model if it was accepted.
+    /// Control took a result; contains the model if it was accepted.
     Judged(Option<IdentifiedModel<N>>),
 }
 
 impl IdentificationLevel {
-    /// Nothing received yet; `seed` of the search if no host gives another.
+    /// State before the first event; `seed` is used unless a host gives another.
     #[must_use]
     pub const fn new(seed: u64) -> Self {
         Self {
@@ -58,7 +58,8 @@ impl IdentificationLevel {
         }
     }
 
-    /// Takes what the servo sent; whether there was anything. `sample` sees each sample of the log, `record` each record.
+    /// Takes the servo's events and returns whether there were any. `sample` is called for each logged
+    /// sample, `record` for each record.
     #[inline(never)]
     pub fn hear<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>(
         &mut self,
@@ -71,7 +72,7 @@ impl IdentificationLevel {
         W: BorrowMut<MotionWindow<f32, N, B>>,
     {
         let mut heard = false;
-        // No more than fits the queue at once, so that newer events do not starve the search.
+        // At most one queue's worth per call, so that new events do not starve the search.
         for _ in 0..EVENTS {
             let Some(event) = ends.events.dequeue() else { break };
             heard = true;
@@ -127,7 +128,7 @@ impl IdentificationLevel {
         }
     }
 
-    /// One slice of at most `evaluations` of the search.
+    /// Runs one slice of the search with at most `evaluations`.
     #[inline(never)]
     pub fn work<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize, W>(
         &mut self,
@@ -145,7 +146,7 @@ impl IdentificationLevel {
             && let Some(verdict) = self.verdict.take()
         {
             self.publish = Some(Some(verdict));
-            // The verdict on lost samples is this level's own: the identification was cancelled without one.
+            // A verdict on lost samples comes from this level: the identification was cancelled without one.
             let model = if verdict.is_accepted() { identification.took_result() } else { None };
             return Slice::Judged(model);
         }
@@ -186,23 +187,23 @@ impl IdentificationLevel {
                 record(&Record::Update { cause, link, verdict, offered: model.is_some() });
             }
         }
-        // Control takes one in every tick.
+        // Control takes one finding per tick.
         let _ = ends.findings.enqueue(finding);
         Slice::Busy
     }
 
-    /// Results that changed since they were published; see [`Self::published`].
+    /// Changed results to be published; see [`Self::published`].
     #[must_use]
     pub const fn unpublished(&self) -> Option<Option<Verdict>> {
         self.publish
     }
 
-    /// The results were published.
+    /// Marks the results as published.
     pub const fn published(&mut self) {
         self.publish = None;
     }
 
-    /// What the leg does, as far as its events have come.
+    /// Activity of the leg after the newest event.
     #[must_use]
     pub const fn activity(&self) -> Activity {
         self.activity
@@ -214,7 +215,7 @@ impl IdentificationLevel {
         self.last.map_or(0, |(tick, _)| tick)
     }
 
-    /// Seed of this identification's search.
+    /// Seed of the current search.
     #[must_use]
     pub const fn seed(&self) -> u64 {
         self.seed

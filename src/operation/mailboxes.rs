@@ -1,62 +1,62 @@
-//! Level 5: what waits in the mailboxes of the bus' controller, and how old it may become.
+//! Level 5: transmit scheduling for the CAN controller's mailboxes, with a limit on a frame's age.
 //!
-//! Why: a controller sends again what nobody acknowledges, for ever. One whose plug was pulled becomes passive and never goes off, so what
-//! waits in it would be the first to leave when the plug is put back, however old.
+//! Why: a controller repeats unacknowledged frames without end. With its plug pulled it becomes passive and
+//! never goes off. Its waiting frames would be the first to leave when the plug is put back, however old.
 //!
 //! ```text
-//! active    as many frames as there is room for, of each node in turn
-//! passive   one at a time; what waits for longer than 10 ms is given up and a newer one takes its place
-//! off       what waits is given up as long as it lasts, and no node has a frame (`Station::poll`)
+//! active    as many frames as mailboxes are free, from each node in turn
+//! passive   one at a time; a frame that waits for longer than 10 ms is aborted and replaced by a newer one
+//! off       waiting frames are aborted while it lasts, and no node has a frame (`Device::poll`)
 //! ```
 //!
-//! Emergency and boot-up messages are told once: those that were given up are the first to be given again, whoever gave them and when. One
-//! that leaves in the very moment in which it is given up is told twice.
+//! Emergency and boot-up messages are sent once; aborted ones are the first to be sent again. One that leaves
+//! at the very moment of its abortion is sent twice.
 
+use crate::bus::device::Device;
 use crate::bus::identification::Results;
-use crate::bus::station::Station;
 use crate::hal::{Controller, Frame, Hardware};
 
-/// The longest that a frame waits in a passive controller, microseconds: the longest frame takes 1.1 ms of the slowest bus, and whoever works on a
-/// cycle of 10 ms has newer ones by then.
+/// Longest wait of a frame in a passive controller, microseconds. The longest frame takes 1.1 ms on the
+/// slowest bus, and a device with a cycle of 10 ms has newer frames by then.
 const PATIENCE_US: u64 = 10_000;
 
-/// Of a controller.
+/// Mailboxes of a controller.
 const MAILBOXES: usize = 3;
 
-/// Who speaks next, and what was given to a passive controller.
+/// Scheduler of the transmit mailboxes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Speaker {
-    /// The node that is asked first.
+pub struct TxScheduler {
+    /// Node that is polled first.
     first: usize,
-    /// Passive; and since when what is in the mailboxes waits there.
+    /// Time since which frames have been waiting in a passive controller.
     since_us: Option<u64>,
-    /// Of each mailbox, what is told once, and how many of these were given before.
+    /// Frame in each mailbox that is sent once, with its sequence number.
     given: [Option<(u32, Frame)>; MAILBOXES],
     count: u32,
-    /// What was given up and is to be told all the same, the oldest first.
+    /// Aborted frames that must be sent again, oldest first.
     again: [Option<Frame>; MAILBOXES],
 }
 
-impl Speaker {
-    /// Nobody has spoken.
+impl TxScheduler {
+    /// State before the first frame.
     #[must_use]
     pub const fn new() -> Self {
         Self { first: 0, since_us: None, given: [None; MAILBOXES], count: 0, again: [None; MAILBOXES] }
     }
 
-    /// What leaves in this round, of a controller in a state that lasts.
-    pub fn speak<R: Results, const N: usize, const LOG: usize>(
+    /// Fills the mailboxes for this round, for a controller in a lasting state.
+    pub fn fill<R: Results, const N: usize, const LOG: usize>(
         &mut self,
         hardware: &mut impl Hardware<N>,
         controller: Controller,
         now_us: u64,
-        station: &mut Station<N, LOG>,
+        device: &mut Device<N, LOG>,
         results: &R,
     ) {
         let waiting = hardware.mailboxes_waiting();
         let waits = |place: usize| waiting & 1 << place != 0;
         for (place, given) in self.given.iter_mut().enumerate() {
-            // What has left.
+            // Drops frames that have left their mailbox.
             given.take_if(|_| !waits(place));
         }
         let is_passive = controller == Controller::Passive;
@@ -77,16 +77,16 @@ impl Speaker {
             _ => MAILBOXES,
         };
         for place in (0..places).filter(|place| !waits(*place)) {
-            let Some(frame) = self.next(now_us, station, results) else { break };
+            let Some(frame) = self.next(now_us, device, results) else { break };
             hardware.send(place as u32, &frame);
             if let Some(given) = self.given.get_mut(place) {
-                *given = station.tells_once(&frame).then_some((self.count, frame));
+                *given = device.tells_once(&frame).then_some((self.count, frame));
                 self.count = self.count.wrapping_add(1);
             }
         }
     }
 
-    /// What was given is to be given again, in its order, before what waits for that already.
+    /// Moves the frames of all mailboxes, in their order, before those that wait to be sent again.
     fn take_back(&mut self) {
         let mut back = [None; MAILBOXES];
         let mut places = back.iter_mut();
@@ -102,11 +102,12 @@ impl Speaker {
         self.again = back;
     }
 
-    /// The next frame, of each node in turn; the others hear it, since the controller does not hear itself.
+    /// Next frame, from each node in turn. The other nodes receive it here, since the controller does not
+    /// receive its own frames.
     fn next<R: Results, const N: usize, const LOG: usize>(
         &mut self,
         now_us: u64,
-        station: &mut Station<N, LOG>,
+        device: &mut Device<N, LOG>,
         results: &R,
     ) -> Option<Frame> {
         if let Some(again) = self.again.iter_mut().find_map(Option::take) {
@@ -115,8 +116,8 @@ impl Speaker {
         for _ in 0..N {
             let joint = self.first;
             self.first = (joint + 1) % N;
-            if let Some(frame) = station.poll(joint, now_us, results) {
-                station.hear(&frame, now_us, Some(joint), results);
+            if let Some(frame) = device.poll(joint, now_us, results) {
+                device.hear(&frame, now_us, Some(joint), results);
                 return Some(frame);
             }
         }

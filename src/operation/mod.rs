@@ -1,26 +1,30 @@
-//! What a board does at each of its levels, written once for board and simulation.
+//! The work of a board at each priority level, written once for board and simulation.
 //!
-//! The levels share three kinds of things. What only a board can do is [`Hardware`](crate::hal::Hardware): registers, no decisions.
-//! [`Signals`] are words that all levels may read and write, the inhibit word among them. [`Queues`] and [`BusQueues`] are plain
-//! values. `task` connects the levels to the interrupts of the microcontroller; the fault campaign and the simulated legs of
-//! `hal-sim` call the same functions in the same order. Nothing here waits.
+//! The levels share three kinds of things. [`Hardware`](crate::hal::Hardware) is the board's register access
+//! and makes no decisions. [`Signals`] are words that all levels read and write, the inhibit word among them.
+//! [`Queues`] and [`BusQueues`] are plain values. `task` connects the levels to the microcontroller's
+//! interrupts. The fault campaign and the simulated legs of `host` call the same functions in the same
+//! order. Nothing here waits.
 //!
 //! ```text
-//! level 0  CurrentLoops        one tick of one axis: the other axis, contacts, conversion -> inhibit word -> stage -> bridge
-//! level 1  ServoLevel          the leg's tick, with HostSide: the bus' orders behind the operator's
-//! level 5  BusRound            controller, frames, storage, leg, mailboxes; Credit: how often
-//! level 6  Housekeeper         500 rounds per second: contacts, calibration, reference, reset; registers and temperatures
-//! level 6  Watch               ticks that stop, watchdog
-//! thread   IdentificationLevel events of the servo -> identification -> findings
-//! thread   Storing             steps around a change of the flash
+//! level 0  CurrentLoops         tick of one axis: other axes, contacts, conversion -> inhibit word -> axis
+//!                               state -> bridge
+//! level 1  ServoLevel           the leg's tick, with HostSide: the operator's requests before the bus'
+//! level 5  BusRound             controller, frames, storage, leg, mailboxes; rate limited by TokenBucket
+//! level 6  Housekeeper          500 rounds per second: contacts, calibration, reference, reset; registers of
+//!                               the gate drivers and temperatures
+//! level 6  Watch                stopped ticks, watchdog
+//! thread   IdentificationLevel  events of the servo -> identification -> findings
+//! thread   Storing              steps around a flash write
 //! ```
 //!
-//! An axis switches only with a calibration (or while it is measured); a target is followed only where all axes run. An axis that
-//! loses its rotor position ends the servo's ticks in its own tick; the housekeeping then forgets calibration and reference.
+//! An axis switches only with a calibration, or while it is being measured. A target is followed only where
+//! all axes run. An axis that loses its rotor position ends the servo's ticks in its own tick; the
+//! housekeeping then discards calibration and reference.
 
+mod axis_state;
 mod bus_round;
 mod contacts;
-mod credit;
 mod current;
 mod handover;
 mod host_side;
@@ -30,27 +34,27 @@ mod mailboxes;
 mod queues;
 mod servo;
 mod signals;
-mod stage;
 mod storing;
 #[cfg(test)]
 mod testing;
+mod token_bucket;
 mod watch;
 
+pub use axis_state::{AxisState, Order, Outcome};
 pub use bus_round::{BusRound, Keep};
 pub use contacts::{Ask, Operator, RATE_HZ, Situation};
-pub use credit::Credit;
 pub use current::{CurrentLoops, Tick};
 pub use handover::Handover;
 pub use host_side::{HostRequest, HostSide};
 pub use housekeeper::{Housekeeper, HousekeepingSettings};
 pub use identify::{IdentificationLevel, Slice};
-pub use mailboxes::Speaker;
+pub use mailboxes::TxScheduler;
 pub use queues::{
     BusEnds, BusQueues, Calibrated, CurrentEnds, Ends, EventQueue, HostEnds, HousekeepingEnds,
     IdentificationEnds, LegEvent, Queues, ServoEnds,
 };
 pub use servo::ServoLevel;
 pub use signals::{Inhibit, Signals, Statistics, Word};
-pub use stage::{Order, Outcome, Stage};
 pub use storing::Storing;
+pub use token_bucket::TokenBucket;
 pub use watch::Watch;

@@ -1,63 +1,63 @@
 //! Queues between the levels, as plain values with one producer and one consumer each.
 //!
-//! The board splits them once, from statics; a simulation owns them, clones them, and splits them for each level that it runs. No
-//! level waits for another: a queue that is full takes nothing more.
+//! The board splits them once, from statics; a simulation owns, clones and splits them for each level that it
+//! runs. No level waits for another: a full queue takes nothing more.
 //!
-//! | from | to | what |
+//! | from | to | content |
 //! | --- | --- | --- |
 //! | housekeeping | current | [`Order`] |
 //! | current | housekeeping | [`Outcome`] |
 //! | current | servo | joint samples, one in six periods |
 //! | housekeeping | servo | requests of the operator |
 //! | servo | housekeeping | drive states |
-//! | servo | identification | [`LegEvent`], in their order |
+//! | servo | identification | [`LegEvent`], in order |
 //! | identification | servo | findings |
 //! | housekeeping | identification | records |
 //! | housekeeping | storage | calibrations that passed |
 //! | bus interrupt | bus | received frames |
 //! | bus | servo | [`LegOrder`] |
-//! | servo | bus | [`LegTold`], logged samples |
+//! | servo | bus | [`LegStatus`], logged samples |
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use super::stage::{Order, Outcome};
-use crate::bus::station::{LegOrder, LegTold};
+use super::axis_state::{Order, Outcome};
+use crate::bus::device::{LegOrder, LegStatus};
 use crate::hal::{Frame, JointSample};
 use crate::leg::{Activity, ControlRequest, DriveState, Finding, LoggedSample, Plan, StoredCalibration};
 use crate::trace::Record;
 
-/// An axis that passed its calibration, and what of it can be stored.
+/// Axis that passed its calibration, and the part of the calibration that can be stored.
 pub type Calibrated = (usize, Option<StoredCalibration>);
 
-/// What the servo sends to the identification, in its order.
+/// Event from the servo to the identification.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LegEvent<const N: usize> {
-    /// A sample of the log.
+    /// Sample of the log.
     Sample(LoggedSample<N>),
-    /// The leg does something else from now on.
+    /// The leg's activity has changed.
     Activity(Activity),
-    /// An identification begins; with this plan and seed if a host gave them.
+    /// An identification begins; with plan and seed if a host gave them.
     Begun(Option<(Plan, u64)>),
-    /// The update that was offered is in use now.
+    /// The offered update is now in use.
     TookUpdate,
-    /// The result of the identification was taken: an accepted model is in use now.
+    /// The result of the identification was taken; an accepted model is now in use.
     TookResult,
-    /// A record for the trace.
+    /// Record for the trace.
     Record(Record<N>),
 }
 
-/// Room for events, 190 ms of the log. Closing a motion takes 11 million instructions in one call, 89 ms of a processor that does
-/// nothing else.
+/// Length of the event queue: 190 ms of the log. Closing a motion takes 11 million instructions in one call,
+/// which is 89 ms of an otherwise idle processor.
 pub const EVENTS: usize = 104;
-/// Places of it that samples leave free for the other events.
+/// Entries of it that samples leave free for other events.
 pub const RESERVED: usize = 8;
-/// Room for received frames: 1.5 ms of the shortest at 1 Mbit/s.
+/// Length of the queue of received frames: 1.5 ms of the shortest at 1 Mbit/s.
 pub const FRAMES: usize = 33;
 
-/// Queue from the servo to the identification. Apart from [`Queues`], because of its size.
+/// Queue from the servo to the identification, separate from [`Queues`] because of its size.
 pub type EventQueue<const N: usize> = Queue<LegEvent<N>, EVENTS>;
 
-/// All queues of a board of `N` axes but the events' and the bus'.
+/// All queues of a board with `N` axes except the events' and the bus'.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Queues<const N: usize> {
     orders: [Queue<Order, 3>; N],
@@ -127,7 +127,7 @@ pub struct Ends<'a, const N: usize> {
     pub calibrated: Consumer<'a, Calibrated>,
 }
 
-/// Both halves of queues, each in an array of its own.
+/// Splits each queue and returns the ends in two arrays.
 fn split_all<'a, T, const L: usize, const N: usize>(
     queues: &'a mut [Queue<T, L>; N],
 ) -> ([Producer<'a, T>; N], [Consumer<'a, T>; N]) {
@@ -144,7 +144,7 @@ fn split_all<'a, T, const L: usize, const N: usize>(
 }
 
 impl<const N: usize> Queues<N> {
-    /// All empty.
+    /// Creates empty queues.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -159,7 +159,7 @@ impl<const N: usize> Queues<N> {
         }
     }
 
-    /// Splits every queue; the servo's ends towards the bus are set by whoever has a bus.
+    /// Splits every queue. A board with a bus then sets the servo's ends towards it.
     #[must_use]
     pub fn split<'a>(&'a mut self, events: &'a mut EventQueue<N>) -> Ends<'a, N> {
         let (give_orders, take_orders) = split_all(&mut self.orders);
@@ -209,7 +209,8 @@ impl<const N: usize> Queues<N> {
         }
     }
 
-    /// Replaces the samples that wait for the servo: what a simulation adds between the current loops and the servo.
+    /// Replaces the samples that wait for the servo, for faults injected between the current loops and the
+    /// servo.
     #[cfg(not(target_os = "none"))]
     pub fn set_samples(&mut self, samples: &[JointSample; N]) {
         for (queue, sample) in self.samples.iter_mut().zip(samples) {
@@ -249,7 +250,7 @@ impl<const N: usize> Default for Queues<N> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BusQueues<const N: usize> {
     frames: Queue<Frame, FRAMES>,
-    told: Queue<LegTold<N>, 2>,
+    status: Queue<LegStatus<N>, 2>,
     orders: Queue<LegOrder<N>, 2>,
     logged: Queue<LoggedSample<N>, 8>,
 }
@@ -259,7 +260,7 @@ pub struct HostEnds<'a, const N: usize> {
     /// Orders of the bus.
     pub orders: Consumer<'a, LegOrder<N>>,
     /// Reports of the leg.
-    pub told: Producer<'a, LegTold<N>>,
+    pub status: Producer<'a, LegStatus<N>>,
     pub(super) logged: Producer<'a, LoggedSample<N>>,
 }
 
@@ -267,26 +268,26 @@ pub struct HostEnds<'a, const N: usize> {
 pub struct BusEnds<'a, const N: usize> {
     pub(super) frames: Consumer<'a, Frame>,
     pub(super) orders: Producer<'a, LegOrder<N>>,
-    pub(super) told: Consumer<'a, LegTold<N>>,
+    pub(super) status: Consumer<'a, LegStatus<N>>,
     pub(super) logged: Consumer<'a, LoggedSample<N>>,
 }
 
 impl<const N: usize> BusQueues<N> {
-    /// All empty.
+    /// Creates empty queues.
     #[must_use]
     pub const fn new() -> Self {
-        Self { frames: Queue::new(), told: Queue::new(), orders: Queue::new(), logged: Queue::new() }
+        Self { frames: Queue::new(), status: Queue::new(), orders: Queue::new(), logged: Queue::new() }
     }
 
     /// Splits every queue; the end of received frames is level 4's.
     #[must_use]
     pub fn split(&mut self) -> (Producer<'_, Frame>, HostEnds<'_, N>, BusEnds<'_, N>) {
         let (frames_in, frames) = self.frames.split();
-        let (give_told, told) = self.told.split();
+        let (give_told, status) = self.status.split();
         let (orders, take_order) = self.orders.split();
         let (give_logged, logged) = self.logged.split();
-        let servo = HostEnds { orders: take_order, told: give_told, logged: give_logged };
-        (frames_in, servo, BusEnds { frames, orders, told, logged })
+        let servo = HostEnds { orders: take_order, status: give_told, logged: give_logged };
+        (frames_in, servo, BusEnds { frames, orders, status, logged })
     }
 }
 

@@ -1,13 +1,13 @@
-//! Level 1: the leg's tick and all that stands around it, 4 kHz, requested by the current loop of the last axis.
+//! Level 1: the leg's tick with inputs and reports, 4 kHz, triggered by the current loop of the last axis.
 //!
 //! ```text
 //! samples     newest of each joint
-//! gate        without a calibration and a zero of each joint nothing ticks: released, requests dropped
+//! gate        no tick without calibration and zero of each joint: outputs off, requests dropped
 //! findings    of the identification
 //! faults      reported by the board's other levels; gains and limits (every 64 ms); supply; derating
-//! request     of the operator, else of a host; only what the inhibit word and the enabling switch allow
+//! request     of the operator, else of a host; filtered by the inhibit word and the enabling switch
 //! leg         -> current targets, permission
-//! out         report to the bus; limits, requests, states, samples as events for the identification and the trace
+//! out         report to the bus; limits, requests, states, samples as events for identification and trace
 //! ```
 
 use super::host_side::HostSide;
@@ -27,32 +27,32 @@ use crate::units::Volt;
 /// Ticks between two checksums of gains and limits, less one: 64 ms.
 const CHECKSUM_MASK: u32 = 0xFF;
 
-/// What level 1 knows between two ticks, beside the leg's control.
+/// State of level 1 between two ticks, besides the leg's control.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServoLevel<const N: usize> {
     sample: [JointSample; N],
     /// State and activity at the last report.
     state: Option<DriveState>,
     activity: Activity,
-    /// Limits that were reported in this second.
+    /// Limits already reported in this second.
     limits: [LimitCodes; N],
     ticking: bool,
     tick: u32,
-    /// Checksum of gains and limits as they were made.
+    /// Checksum of gains and limits at creation.
     checksum: Checksum,
     supply: SupplyWatch,
     ramps: DeratingRamps,
     volt_per_code: Volt,
-    /// The bus, where there is one.
+    /// Side of the bus, where there is one.
     host: Option<HostSide<N>>,
     /// Plan and seed of a host's identification.
     prepared: Option<(Plan, u64)>,
-    /// Refused last in this state.
+    /// Last refusal in this drive state.
     refused: Option<Refusal>,
 }
 
 impl<const N: usize> ServoLevel<N> {
-    /// Nothing begun. `following` is what a host's commands need; `None` without a bus.
+    /// State before the first tick. `following` is required for a host's commands; `None` without a bus.
     #[must_use]
     pub fn new(
         control: &Control<N>,
@@ -77,7 +77,8 @@ impl<const N: usize> ServoLevel<N> {
         }
     }
 
-    /// One tick of the leg; `None` while the joints' samples are invalid. `gravity` in the base frame, m/s^2.
+    /// Runs one tick of the leg; `None` while the joints' samples are invalid. `gravity` in the base frame,
+    /// m/s^2.
     pub fn tick<H: Hardware<N>>(
         &mut self,
         control: &mut Control<N>,
@@ -129,13 +130,13 @@ impl<const N: usize> ServoLevel<N> {
         Some(output)
     }
 
-    /// Ticks since the start in which the joints' samples were valid.
+    /// Ticks with valid joint samples since the start.
     #[must_use]
     pub const fn ticks(&self) -> u32 {
         self.tick
     }
 
-    /// No tick: what is requested now is requested of a leg without zeros.
+    /// Runs instead of a tick while the leg has no zeros: requests are dropped.
     fn rest<H: Hardware<N>>(&mut self, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>, hardware: &mut H) {
         signals.release();
         signals.set_permission(Permission::Released);
@@ -146,7 +147,7 @@ impl<const N: usize> ServoLevel<N> {
         self.report_noted(ends, signals);
     }
 
-    /// The operator's request before the host's.
+    /// Next request: the operator's before the host's.
     fn next_request<H: Hardware<N>>(
         &mut self,
         control: &mut Control<N>,
@@ -167,7 +168,7 @@ impl<const N: usize> ServoLevel<N> {
         host.held(request, control.state(), signals, hardware)
     }
 
-    /// Reports what the rest of the board saw: faults, bus voltage, temperature.
+    /// Passes faults, bus voltage and temperature from the rest of the board to control.
     fn look_around(&mut self, control: &mut Control<N>, signals: &Signals<N>) {
         for joint in 0..N {
             for fault in signals.take_reported(joint) {
@@ -185,14 +186,14 @@ impl<const N: usize> ServoLevel<N> {
         control.derate(&self.ramps.at(signals.hottest_c(), bus));
     }
 
-    /// Reports what the bus refused.
+    /// Records a refusal by the bus.
     fn report_noted(&mut self, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>) {
         if let Some(refused) = self.host.as_mut().and_then(HostSide::take_noted) {
             send(LegEvent::Record(not_enabled(self.tick, refused)), ends, signals);
         }
     }
 
-    /// Reports limits that act and were not reported in this second, one in a tick.
+    /// Records active limits that were not reported in this second, one per tick.
     fn report_limits(
         &mut self,
         control: &Control<N>,
@@ -215,7 +216,7 @@ impl<const N: usize> ServoLevel<N> {
         }
     }
 
-    /// Reports what changed, and the sample of the log.
+    /// Records changes and sends the sample of the log.
     fn report(
         &mut self,
         control: &Control<N>,
@@ -243,12 +244,12 @@ impl<const N: usize> ServoLevel<N> {
         let mut record = |record| send(LegEvent::Record(record), ends, signals);
         let decision = &output.servo.decision;
         let activity = control.activity();
-        // Words are compared letter by letter, and mostly the state is the same.
+        // Comparing words is slow, and the state is mostly the same.
         let changed = self.state.is_none_or(|before| {
             before != decision.state && words::drive(before) != words::drive(decision.state)
         });
         if changed && let Some(fault) = decision.fault {
-            // A fault before the state that follows from it.
+            // The fault is recorded before the resulting state.
             let (code, name) = (fault.code.number(), words::fault(fault.code));
             record(Record::Fault { tick, code, name, joint: fault.joint.saturating_add(1) });
         }
@@ -269,7 +270,7 @@ impl<const N: usize> ServoLevel<N> {
         if output.took_update {
             send(LegEvent::TookUpdate, ends, signals);
         }
-        // A sample belongs to the ticks before it, so it goes before what begins now.
+        // A sample belongs to the ticks before it, so it precedes a new activity.
         if let Some(logged) = output.logged {
             let is_full = ends.events.len() + RESERVED >= ends.events.capacity();
             if is_full || ends.events.enqueue(LegEvent::Sample(logged)).is_err() {
@@ -287,7 +288,7 @@ fn not_enabled<const N: usize>(tick: u32, refused: Refusal) -> Record<N> {
     Record::NotEnabled { tick, joint: refused.number(), why: words::refusal(refused.reason) }
 }
 
-/// Sends an event; one that finds no room is counted.
+/// Sends an event; one that does not fit is counted.
 fn send<const N: usize>(event: LegEvent<N>, ends: &mut ServoEnds<'_, N>, signals: &Signals<N>) {
     if ends.events.enqueue(event).is_err() {
         signals.statistics.records_lost.add();

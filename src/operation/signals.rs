@@ -1,7 +1,7 @@
 //! Words that all levels share: the inhibit word, current targets, permission, counters.
 //!
-//! Each is one atomic word, so no level waits for another. The board keeps one [`Signals`] in a static; a simulation owns one as a
-//! plain value that it can clone and compare.
+//! Each is one atomic word, so no level waits for another. The board has one [`Signals`] in a static. A
+//! simulation owns one as a plain value that it clones and compares.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -16,19 +16,19 @@ use crate::units::Ampere;
 pub struct Word(AtomicU32);
 
 impl Word {
-    /// Starts with this value.
+    /// Creates a word with this value.
     #[must_use]
     pub const fn new(value: u32) -> Self {
         Self(AtomicU32::new(value))
     }
 
-    /// Reads it.
+    /// Returns the value.
     #[inline(always)]
     pub fn get(&self) -> u32 {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Overwrites it.
+    /// Sets the value.
     #[inline(always)]
     pub fn set(&self, value: u32) {
         self.0.store(value, Ordering::Relaxed);
@@ -46,7 +46,7 @@ impl Word {
         self.set(self.get().wrapping_add(1));
     }
 
-    /// Keeps the larger of this value and its own; for words that one level writes.
+    /// Sets the value if it is larger; for words that one level writes.
     #[inline(always)]
     pub fn raise(&self, value: u32) {
         if value > self.get() {
@@ -54,7 +54,7 @@ impl Word {
         }
     }
 
-    /// Keeps the smaller of this value and its own; for words that one level writes.
+    /// Sets the value if it is smaller; for words that one level writes.
     #[inline(always)]
     pub fn lower(&self, value: u32) {
         if value < self.get() {
@@ -62,7 +62,7 @@ impl Word {
         }
     }
 
-    /// Overwrites it and returns what it was.
+    /// Sets the value and returns the previous one.
     pub fn swap(&self, value: u32) -> u32 {
         self.0.swap(value, Ordering::Relaxed)
     }
@@ -88,20 +88,21 @@ impl PartialEq for Word {
     }
 }
 
-/// Why the drive must not be enabled: one bit per [`Cause`].
+/// Inhibit word: one bit per [`Cause`] for which the drive must not be enabled.
 ///
-/// While it is not zero the current loops release or brake both bridges in every tick, and the servo keeps its drive off. A cause
-/// stays until the operator resets it; one that still holds is raised again in the next tick.
+/// While any bit is set the current loops turn both bridges off or brake, in every tick, and the servo keeps
+/// its drive off. A bit stays set until the operator's reset; one that still holds is set again in the next
+/// tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inhibit {
     causes: Word,
-    /// Causes that a campaign hides, to see that it notices their absence.
+    /// Reasons that a fault campaign disables, to prove that it detects their absence.
     #[cfg(not(target_os = "none"))]
     hidden: u32,
 }
 
 impl Inhibit {
-    /// Nothing forbids to enable.
+    /// No inhibit reason is set.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -111,18 +112,18 @@ impl Inhibit {
         }
     }
 
-    /// Ignores these causes from now on; on the host alone.
+    /// Ignores these reasons from now on; host only.
     #[cfg(not(target_os = "none"))]
     pub fn hide(&mut self, bits: u32) {
         self.hidden = bits;
     }
 
-    /// Raises one cause.
+    /// Sets one reason.
     pub fn raise(&self, cause: Cause) {
         self.raise_bits(cause.bit());
     }
 
-    /// Raises all causes with these bits; none for 0.
+    /// Sets all reasons with these bits.
     #[inline(always)]
     pub fn raise_bits(&self, bits: u32) {
         #[cfg(not(target_os = "none"))]
@@ -132,33 +133,34 @@ impl Inhibit {
         }
     }
 
-    /// All causes.
+    /// All inhibit bits.
     #[inline(always)]
     #[must_use]
     pub fn causes(&self) -> u32 {
         self.causes.get()
     }
 
-    /// Nothing forbids to enable.
+    /// No inhibit reason is set.
     #[inline(always)]
     #[must_use]
     pub fn is_clear(&self) -> bool {
         self.causes() == 0
     }
 
-    /// The flash is being written: everything may stand still for seconds.
+    /// Returns whether the flash is being written, which may stall the processor for seconds.
     #[inline(always)]
     #[must_use]
     pub fn is_storing(&self) -> bool {
         self.causes() & Cause::Storing.bit() != 0
     }
 
-    /// Forgets what the operator's reset may forget: not what is permanent, nor a flash write under way.
+    /// Clears the reasons that the operator's reset may clear: neither permanent ones nor a flash write in
+    /// progress.
     pub fn reset(&self) {
         self.causes.keep_bits(Cause::for_ever() | Cause::Storing.bit());
     }
 
-    /// Ends [`Cause::Storing`].
+    /// Clears [`Cause::Storing`].
     pub fn end_storing(&self) {
         self.causes.keep_bits(!Cause::Storing.bit());
     }
@@ -179,7 +181,7 @@ pub struct Statistics<const N: usize> {
     pub current_missed: Word,
     /// Current ticks of each axis.
     pub current_ticks: [Word; N],
-    /// Longest servo tick, processor cycles, current ticks in it included.
+    /// Longest servo tick, processor cycles, including current ticks in it.
     pub servo_worst: Word,
     /// Servo ticks that came late.
     pub servo_missed: Word,
@@ -187,9 +189,9 @@ pub struct Statistics<const N: usize> {
     pub servo_ticks: Word,
     /// Rounds of the housekeeping.
     pub rounds: Word,
-    /// Samples that found no room on their way to the identification.
+    /// Samples lost because the queue to the identification was full.
     pub samples_lost: Word,
-    /// Records that found no room on their way to the trace.
+    /// Records lost because the queue to the trace was full.
     pub records_lost: Word,
     /// Code of the bus voltage: newest, lowest, highest.
     pub bus: [Word; 3],
@@ -217,7 +219,7 @@ impl<const N: usize> Statistics<N> {
         }
     }
 
-    /// Records the code of the bus voltage.
+    /// Updates the newest, lowest and highest code of the bus voltage.
     #[inline(always)]
     pub fn see_bus(&self, code: u16) {
         let [newest, lowest, highest] = &self.bus;
@@ -227,21 +229,21 @@ impl<const N: usize> Statistics<N> {
     }
 }
 
-/// Bits of a target that release an axis: a NaN pattern that no computation makes.
+/// Target bits that turn an axis off: a NaN pattern that no computation produces.
 const RELEASED: u32 = u32::MAX;
 
 /// All words that the levels of a board of `N` axes share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signals<const N: usize> {
-    /// Why the drive must not be enabled.
+    /// Inhibit word.
     pub inhibit: Inhibit,
-    /// What the levels count.
+    /// Counters of the levels.
     pub statistics: Statistics<N>,
     /// Current target of each axis as bits, or [`RELEASED`].
     targets: [Word; N],
     /// Each joint has a calibration and a zero.
     begun: Word,
-    /// Faults of each joint that the servo has not seen yet, one bit per [`BoardFault`].
+    /// Faults of each joint that the servo has not read yet, one bit per [`BoardFault`].
     reported: [Word; N],
     /// Temperature of the hottest bridge, degrees Celsius, as bits.
     hottest_c: Word,
@@ -253,7 +255,7 @@ pub struct Signals<const N: usize> {
 }
 
 impl<const N: usize> Signals<N> {
-    /// Everything released, nothing begun.
+    /// State after the start: all axes off, the servo not begun.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -288,36 +290,36 @@ impl<const N: usize> Signals<N> {
         }
     }
 
-    /// Releases all axes.
+    /// Turns all axes off.
     pub fn release(&self) {
         self.set_targets(&DriveCommand::RELEASED);
     }
 
-    /// The joints' samples are valid from now on.
+    /// Marks the joints' samples as valid.
     pub fn begin_servo(&self) {
         self.begun.set(1);
     }
 
-    /// The joints' samples are no longer valid: all axes are released.
+    /// Marks the joints' samples as invalid and turns all axes off.
     pub fn end_servo(&self) {
         self.begun.set(0);
         self.release();
     }
 
-    /// Whether the joints' samples are valid.
+    /// Returns whether the joints' samples are valid.
     #[must_use]
     pub fn has_begun(&self) -> bool {
         self.begun.get() != 0
     }
 
-    /// Reports a fault that the servo reacts to at its next tick.
+    /// Reports a fault to the servo's next tick.
     pub fn report(&self, fault: BoardFault, joint: usize) {
         if let Some(reported) = self.reported.get(joint) {
             reported.set_bits(fault.bit());
         }
     }
 
-    /// Takes the faults reported of a joint since the last call.
+    /// Takes the faults reported for a joint since the last call.
     pub fn take_reported(&self, joint: usize) -> impl Iterator<Item = BoardFault> + use<N> {
         let bits = self
             .reported
@@ -337,7 +339,7 @@ impl<const N: usize> Signals<N> {
         self.hottest_c.set(degrees_c.to_bits());
     }
 
-    /// What the drive may do since the servo's last tick; released before its first.
+    /// Permission of the drive since the servo's last tick; released before its first.
     #[must_use]
     pub fn permission(&self) -> Permission {
         match self.permission.get() {
@@ -347,7 +349,7 @@ impl<const N: usize> Signals<N> {
         }
     }
 
-    /// Sets what the drive may do.
+    /// Sets the permission of the drive.
     pub fn set_permission(&self, permission: Permission) {
         self.permission.set(match permission {
             Permission::Released => 0,
@@ -356,7 +358,7 @@ impl<const N: usize> Signals<N> {
         });
     }
 
-    /// A host has the drive: closing the enabling switch permits, and no longer asks.
+    /// Returns whether a host has the drive; then closing the enabling switch permits but requests nothing.
     #[must_use]
     pub fn is_hosted(&self) -> bool {
         self.hosted.get() != 0
@@ -367,18 +369,18 @@ impl<const N: usize> Signals<N> {
         self.hosted.set(hosted.into());
     }
 
-    /// The operator's switch as the housekeeping sees it, debounced, and not during a reset.
+    /// Returns the operator's permission: the debounced enabling switch, false during a reset.
     #[must_use]
     pub fn permits(&self) -> bool {
         self.permits.get() != 0
     }
 
-    /// Sets whether the operator lets the leg be enabled.
+    /// Sets the operator's permission.
     pub fn set_permits(&self, permits: bool) {
         self.permits.set(permits.into());
     }
 
-    /// Every axis has a calibration.
+    /// Returns whether every axis has a calibration.
     #[must_use]
     pub fn is_calibrated(&self) -> bool {
         self.calibrated.get() != 0
@@ -389,12 +391,12 @@ impl<const N: usize> Signals<N> {
         self.calibrated.set(calibrated.into());
     }
 
-    /// All stored parameters were erased.
+    /// Marks all stored parameters as erased.
     pub fn forget_stored(&self) {
         self.forgotten.set(1);
     }
 
-    /// Whether all stored parameters were erased since the last call.
+    /// Returns whether all stored parameters were erased since the last call.
     #[must_use]
     pub fn take_forgotten(&self) -> bool {
         self.forgotten.get() != 0 && self.forgotten.swap(0) != 0

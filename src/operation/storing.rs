@@ -1,53 +1,57 @@
-//! Thread: the flash is changed, in the only way in which the board stands it.
+//! Sequence of a flash write, at thread level.
 //!
-//! The flash's one bank stands still while it is written or erased, for up to two seconds a sector, and with it every level. So, in this order:
+//! The flash has one bank, so writing or erasing stalls every level, for up to two seconds per sector.
+//! Therefore this order:
 //!
 //! ```text
-//! refused         unless the drive is off and nothing forbids to enable
-//! interlock       `storing`: both bridges released by the next current tick, the servo keeps its drive off, a calibration ends
-//! hosts           told by an emergency message (FF0D): heartbeats may pause; 20 ms for it to leave
-//! refused         unless the drive is off still: it may have been enabled between the first look and the interlock
-//! watchdog        8 s instead of 16 ms, read back; refused where it does not take them
-//! flash           changed; it looks at the bridges' and the brake resistor's registers itself
-//! watchdog        16 ms, read back; where it does not take them nothing is enabled until it does
-//! interlock       let go a millisecond later, when both current loops have ticked again
+//! refused         unless the drive is off and no inhibit reason is set
+//! interlock       `storing`: the next current tick turns both bridges off, the servo keeps its drive off, a
+//!                calibration ends
+//! hosts           an emergency message (FF0D) announces a pause of the heartbeats; 20 ms to send it
+//! refused         unless the drive is still off: it may have been enabled between the first check and the
+//!                interlock
+//! watchdog        8 s instead of 16 ms, read back; refused if it does not take them
+//! flash           written; the write itself checks the bridges' and the brake resistor's registers
+//! watchdog        16 ms, read back; the drive stays off until the watchdog takes them
+//! interlock       cleared a millisecond later, when both current loops have ticked again
 //! ```
 //!
-//! Each wait is one of whole milliseconds: a step is taken in every one of them, and none waits itself.
+//! Each step takes one millisecond and returns at once; longer waits are several steps.
 //!
-//! Where motors brake themselves, or anything else forbids to enable, nothing is written: it would let them go.
+//! While motors brake or any other inhibit reason is set nothing is written: a write would release them.
 
 use super::signals::Inhibit;
 use crate::hal::Hardware;
 use crate::leg::Permission;
 use crate::safety::Cause;
 
-/// For the hosts to be told, ms: two messages of 135 bits at 125 kbit/s and what stands before them.
+/// Time for the announcement, ms: two messages of 135 bits at 125 kbit/s and the frames before them.
 const ANNOUNCED_MS: u32 = 20;
-/// For the watchdog to take another time, ms: six cycles of its oscillator (17 kHz at the slowest) behind a divider of 256 take 91.
+/// Time for the watchdog to take another period, ms: six cycles of its oscillator (17 kHz at the slowest)
+/// behind a divider of 256 take 91 ms.
 const PATIENCE_MS: u32 = 200;
 
-/// How far a change has come, and for how many milliseconds more that is waited for.
+/// Progress of a flash write; numbers are milliseconds left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Stage {
-    /// None is under way.
+    /// No write in progress.
     #[default]
     Idle,
-    /// Hosts are told.
+    /// The announcement is being sent.
     Announced(u32),
-    /// The watchdog is to have its longer time.
+    /// Waits for the watchdog to take its longer period.
     Stretches(u32),
-    /// It is to have its usual time; whether the flash was changed.
+    /// Waits for the watchdog to take its usual period; contains whether the flash was changed.
     Tightens(u32, bool),
-    /// The interlock is let go next.
+    /// The interlock is cleared next.
     Settles(bool),
 }
 
-/// What is known between two steps.
+/// State between two steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Storing {
     stage: Stage,
-    /// The watchdog has not taken its usual time again.
+    /// The watchdog has not taken its usual period again.
     loose: bool,
 }
 
@@ -58,14 +62,16 @@ impl Default for Storing {
 }
 
 impl Storing {
-    /// Nothing changed yet. The watchdog may still have the start's time, until [`Self::look_after`] has asked it.
+    /// State after the start. The watchdog may still have the start's period, until [`Self::look_after`] has
+    /// checked.
     #[must_use]
     pub const fn new() -> Self {
         Self { stage: Stage::Idle, loose: true }
     }
 
-    /// One step of a change, to be called every millisecond until it returns whether the change was made. `change` is called at most
-    /// once and returns whether it succeeded; `permission` is what the drive may do now.
+    /// Runs one step of a write. Call it every millisecond until it returns whether the write succeeded.
+    /// `change` is called at most once and returns whether it succeeded; `permission` is the drive's present
+    /// one.
     pub fn step<const N: usize>(
         &mut self,
         inhibit: &Inhibit,
@@ -81,7 +87,7 @@ impl Storing {
                 Stage::Announced(ANNOUNCED_MS - 1)
             }
             Stage::Announced(left @ 1..) => Stage::Announced(left - 1),
-            // A drive that was on when the inhibit word was raised is released by now, or still damps.
+            // A drive that was on when the inhibit word was set is off by now, or still damps.
             Stage::Announced(0) if !is_off(Cause::Storing.bit()) => Stage::Settles(false),
             Stage::Announced(0) => {
                 self.loose = true;
@@ -107,7 +113,7 @@ impl Storing {
         None
     }
 
-    /// To be called regularly while no change is under way: asks a watchdog that did not take its usual time once more.
+    /// Call regularly while no write is in progress: tries again to set the watchdog's usual period.
     pub fn look_after<const N: usize>(&mut self, inhibit: &Inhibit, hardware: &mut impl Hardware<N>) {
         self.loose = self.loose && !hardware.tighten_watchdog();
         self.forbid_while_loose(inhibit);

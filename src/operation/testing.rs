@@ -1,7 +1,7 @@
 //! The hardware of this module's unit tests: registers as public fields, no decisions.
 //!
-//! One value serves every level, so tests of single levels and of several together see the same board. An emergency stop can be
-//! placed before any access of a tick ([`Stop`]), as the interrupt of its contact may come.
+//! One value serves every level, so tests of single levels and of several together use the same board. An
+//! emergency stop can come before any access of a tick ([`Stop`]), like the interrupt of its contact.
 
 extern crate std;
 
@@ -14,24 +14,24 @@ use std::vec::Vec;
 use heapless::spsc::Producer;
 
 use super::{BusEnds, BusQueues, Ends, HostEnds, Queues, Signals};
+use crate::bus::device::{Device, LegStatus};
 use crate::bus::drive::{AxisConstants, Mode};
-use crate::bus::identification::Found;
-use crate::bus::station::{LegTold, Station};
+use crate::bus::identification::ResultsCopy;
 use crate::bus::{Identity, NodeId};
 use crate::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
 use crate::leg::{DriveState, JointCommand, JointStatus, Plan};
 use crate::safety::Cause;
 use crate::units::{Ampere, NewtonMetre};
 
-/// A watchdog whose new time counts after a while. A write while one is under way is ignored.
+/// A watchdog whose new period becomes effective after a while. A write during another write is ignored.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TestWatchdog {
     pub stretched: bool,
-    /// Milliseconds until what was written counts, and what that is.
+    /// Milliseconds until a written value is effective, and the value.
     pub under_way: Option<(u64, bool)>,
-    /// Duration of a write [ms]; `None` for ever.
+    /// Duration of a write, ms; `None` if it never ends.
     pub takes_ms: Option<u64>,
-    /// How often it was fed.
+    /// Number of feeds.
     pub fed: u32,
 }
 
@@ -54,33 +54,34 @@ impl TestWatchdog {
     }
 }
 
-/// Bus controller with three mailboxes. They leave in the order in which they were filled, at once where the plug is in.
+/// Bus controller with three mailboxes. Frames leave in the order of writing, at once while the plug is in.
 #[derive(Debug)]
 pub(super) struct TestCan {
     pub controller: Controller,
     /// A frame was lost since the state was read.
     pub overrun: bool,
-    /// Mailbox, frame, and time at which it was given [us].
+    /// Mailbox, frame, and time of writing, us.
     pub waiting: Vec<(u32, Frame, u64)>,
     pub unplugged: bool,
-    /// Frames that left, when they were given and when they left [us].
+    /// Frames that left, with times of writing and leaving, us.
     pub sent: Vec<(Frame, u64, u64)>,
-    /// How often transmission was aborted.
+    /// Number of aborted transmissions.
     pub aborted: u32,
-    /// Most mailboxes that were full at once.
+    /// Largest number of mailboxes in use at once.
     pub most: usize,
 }
 
-/// Interrupt of received frames: fills the queue whenever the clock is read, and lets hearing a frame take time.
+/// Interrupt of received frames: fills the queue whenever the clock is read, and adds processing time per
+/// frame.
 pub(super) struct Reception {
     queue: Producer<'static, Frame>,
     /// Frames on the wire.
     pub arriving: VecDeque<Frame>,
-    /// Time that hearing one frame takes [us].
+    /// Processing time of one frame, us.
     pub frame_us: u64,
-    /// Time that all frames so far took [us].
+    /// Processing time of all frames so far, us.
     spent_us: u64,
-    /// Frames in the queue at the last look.
+    /// Frames in the queue at the last call.
     queued: usize,
 }
 
@@ -89,7 +90,7 @@ impl Reception {
         Self { queue, arriving: VecDeque::new(), frame_us: 0, spent_us: 0, queued: 0 }
     }
 
-    /// Frames that nobody heard yet.
+    /// Frames that were not processed yet.
     pub fn unheard(&self) -> usize {
         self.queue.len() + self.arriving.len()
     }
@@ -106,16 +107,17 @@ impl Reception {
     }
 }
 
-/// An emergency stop whose interrupt comes before an access of the hardware: releases, then raises its cause.
+/// An emergency stop whose interrupt comes before an access of the hardware: turns the bridges off, then sets
+/// its inhibit reason.
 pub(super) struct Stop<const N: usize> {
     pub signals: Rc<Signals<N>>,
-    /// Accesses before it.
+    /// Accesses before the stop.
     pub after: u32,
     /// The stop waits for the end of a masked step.
     pub pending: bool,
     /// The stop was handled.
     pub handled: bool,
-    /// Bridges were switched on after that.
+    /// Bridges were enabled after that.
     pub enabled_since: bool,
 }
 
@@ -138,7 +140,7 @@ pub(super) struct TestHardware<const N: usize> {
     pub temperatures: [Option<f32>; N],
     pub gates_hold: [bool; N],
     pub gate_status: [u32; N],
-    /// The gate drivers take their configuration.
+    /// The gate drivers accept their configuration.
     pub gates_configure: bool,
     /// Each switching of the gate drivers' supply.
     pub gates_switched: Vec<bool>,
@@ -153,7 +155,7 @@ pub(super) struct TestHardware<const N: usize> {
 }
 
 impl<const N: usize> TestHardware<N> {
-    /// A sound board at rest, both contacts open, bridges at 30 degrees Celsius.
+    /// A healthy board at rest, both contacts open, bridges at 30 degrees Celsius.
     pub fn new() -> Self {
         let can = TestCan {
             controller: Controller::Active,
@@ -186,7 +188,7 @@ impl<const N: usize> TestHardware<N> {
         }
     }
 
-    /// Frames that are under way leave where the plug is in.
+    /// Waiting frames leave if the plug is in.
     pub fn empty_mailboxes(&mut self) {
         if !self.can.unplugged {
             let now_us = self.now_us();
@@ -205,7 +207,7 @@ impl<const N: usize> TestHardware<N> {
         self.bridges.iter().any(|bridge| bridge.enabled)
     }
 
-    /// Counts an access; the stop's interrupt comes before it where its turn is.
+    /// Counts an access; the stop's interrupt comes before the selected one.
     fn access(&mut self) {
         if let Some(stop) = &mut self.stop {
             stop.pending |= stop.after == self.accesses;
@@ -330,11 +332,11 @@ pub(super) fn ends() -> Ends<'static, 2> {
     Box::leak(Box::new(Queues::new())).split(Box::leak(Box::default()))
 }
 
-/// Results of an identification that was never made.
-pub(super) const NOTHING: Found<2, 1> = Found::nothing();
+/// Empty results of an identification.
+pub(super) const NOTHING: ResultsCopy<2, 1> = ResultsCopy::nothing();
 
 /// Two nodes with the numbers 1 and 2.
-pub(super) fn station() -> Station<2, 4> {
+pub(super) fn device() -> Device<2, 4> {
     let constants = AxisConstants {
         rated_torque: NewtonMetre(40.0),
         rated_current: Ampere(20.0),
@@ -342,17 +344,17 @@ pub(super) fn station() -> Station<2, 4> {
         ..AxisConstants::UNKNOWN
     };
     let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));
-    Station::new(own, Identity::scarab(1, "test"), [constants; 2], Plan::OneTime, 1)
+    Device::new(own, Identity::scarab(1, "test"), [constants; 2], Plan::OneTime, 1)
 }
 
-/// What a host commands that has the drive.
+/// Commands of a host that has the drive.
 pub(super) fn commanded() -> [JointCommand; 2] {
-    let mut station = station();
-    // Its boot-up message goes first.
-    assert!(station.poll(0, 0, &NOTHING).is_some());
-    station.hear(&Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 6, 0, 0, 0]), 0, None, &NOTHING);
-    assert!(station.poll(0, 0, &NOTHING).is_some());
+    let mut device = device();
+    // The boot-up message goes first.
+    assert!(device.poll(0, 0, &NOTHING).is_some());
+    device.hear(&Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 6, 0, 0, 0]), 0, None, &NOTHING);
+    assert!(device.poll(0, 0, &NOTHING).is_some());
     let joint = JointStatus { drive: DriveState::SwitchOnDisabled, ..JointStatus::NONE };
-    station.told(&LegTold { joints: [joint; 2], rests: false, ..LegTold::NONE });
-    station.order().commands.expect("a host")
+    device.update(&LegStatus { joints: [joint; 2], rests: false, ..LegStatus::NONE });
+    device.order().commands.expect("a host")
 }

@@ -1,15 +1,15 @@
-//! Level 6: releases bridges whose current ticks stop, and feeds the watchdog while every level runs.
+//! Level 6: turns bridges off when their current ticks stop, and feeds the watchdog while every level runs.
 //!
-//! A level that hangs ends in a reset, after which the drive is refused.
+//! A hanging level leads to a reset, after which the drive is refused.
 
 use super::signals::{Signals, Word};
 use crate::hal::Hardware;
 use crate::safety::{Cause, CheckIns, GUARD_RATE_HZ, TickGuard};
 
-/// Looks at the ticks for one look at who has checked in: 4 ms.
+/// Checks of the ticks per check of the counters: 4 ms.
 const LOOKS: u32 = GUARD_RATE_HZ / 250;
 
-/// What is known between two looks, [`GUARD_RATE_HZ`] a second.
+/// State between two checks, [`GUARD_RATE_HZ`] a second.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Watch<const N: usize> {
     guard: TickGuard<N>,
@@ -19,18 +19,19 @@ pub struct Watch<const N: usize> {
 }
 
 impl<const N: usize> Watch<N> {
-    /// Starts from the counts as they are.
+    /// Starts from the present counts.
     #[must_use]
     pub fn new(signals: &Signals<N>) -> Self {
         Self { guard: TickGuard::new(), check_ins: CheckIns::new(counts(signals)), looks: 0 }
     }
 
-    /// One look.
+    /// Runs one check.
     pub fn look(&mut self, signals: &Signals<N>, hardware: &mut impl Hardware<N>) {
         let counts = counts(signals);
         if self.guard.look(counts.0) {
             hardware.release_all();
-            // Masked, because the tick that was late would set the two sides of its half bridge in between.
+            // Interrupts are masked, because the late tick would otherwise set the two sides of the half
+            // bridge in between.
             hardware.masked(|hardware| hardware.set_brake(0.0));
             // During a flash write the ticks stand still.
             if !signals.inhibit.is_storing() {

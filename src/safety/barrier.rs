@@ -1,25 +1,27 @@
 //! Torque bounds that stop a joint before its range ends and keep it below its speed.
 //!
-//! The joint may approach an end of its range only as fast as it can still stop, and the torque towards that end is
-//! bounded by what brings it down to that speed:
+//! The joint may approach an end of its range only as fast as it can still stop. The torque towards that end
+//! is bounded by the value that brings it down to that speed:
 //!
 //! ```text
-//! v(d) = sqrt((a T)^2 + 2 a d) - a T      d >= 0, distance to the end; the speed from which a joint that begins to
-//!                                         brake after T with deceleration a stops at the end
+//! v(d) = sqrt((a T)^2 + 2 a d) - a T      d >= 0, distance to the end: speed from which a joint that brakes
+//!                                         after T with deceleration a stops at the end
 //! v(d) = d / T, at least -speed/4         d < 0: beyond the end, back inwards
 //! torque <= D (min(v(d_high), speed) - qd),    torque >= -D (min(v(d_low), speed) + qd),    |torque| <= cap
 //!
-//! returning   a joint that was enabled beyond an end: 0 towards that end, 0.2 rad/s back, a quarter of the cap
+//! returning   a joint that was enabled beyond an end: v = 0 towards that end, 0.2 rad/s back, a quarter of
+//!             the cap
 //! ```
 //!
-//! `a` the deceleration counted on, half of the torque cap over the inertia; `D` = 100/s times the inertia, N m s/rad;
-//! `T` = 40 ms, four time constants of D, so the end itself is approached without overshoot (double pole at 50/s).
-//! Gravity that pulls outwards with G presses a joint at rest G T / D beyond the end: 0.2 degrees for 50 N m on the
-//! default hip. The stop holds while the true inertia lies between half of the stated one and the stated one, and the
-//! sensed velocity is late by no more than some 5 ms.
+//! `a` is the assumed deceleration, half of the torque cap over the inertia. `D` is 100/s times the inertia,
+//! N m s/rad. `T` is 40 ms, four time constants of D, so the end itself is approached without overshoot
+//! (double pole at 50/s). Gravity that pulls outwards with G moves a joint at rest G T / D beyond the end:
+//! 0.2 degrees for 50 N m on the default hip. The stop holds while the true inertia is 0.5 to 1 times the
+//! stated one, and the velocity estimate is late by at most about 5 ms.
 //!
-//! A motion is not touched if its acceleration stays below a/2 and it ends a T^2 / 2 before the range does (0.4 degrees
-//! on the default hip). Cost: two square roots, some 20 multiplications and comparisons per joint.
+//! A motion is unaffected if its acceleration stays below a/2 and it ends a T^2 / 2 before the range does
+//! (0.4 degrees on the default hip). Cost: two square roots, about 20 multiplications and comparisons per
+//! joint.
 
 use super::limits::JointLimits;
 use crate::checksum::Checksum;
@@ -28,32 +30,33 @@ use crate::units::{NewtonMetre, Radian, RadianPerSecond};
 
 /// Damping per inertia, 1/s.
 const DAMPING_PER_INERTIA: f32 = 100.0;
-/// Time between needing to brake and braking, s.
+/// Time between the need to brake and braking, s.
 const REACTION_S: f32 = 0.04;
-/// Share of the greatest speed at which a joint beyond its range is brought back at most.
+/// Largest share of the speed limit at which a joint beyond its range is brought back.
 const RETURN_SHARE: f32 = 0.25;
-/// Speed at which a joint that was enabled outside its range is commanded back, rad/s.
+/// Commanded return speed of a joint that was enabled outside its range, rad/s.
 pub const RETURN_SPEED: f32 = 0.1;
-/// Share of the torque cap that such a joint has.
+/// Share of the torque cap available to a returning joint.
 pub const RETURN_TORQUE: f32 = 0.25;
-/// Speed above which its torque brakes, rad/s: twice what is commanded, so that torque is left at that speed.
+/// Speed above which the returning joint is braked, rad/s: twice the commanded speed, so that torque remains
+/// at that speed.
 const RETURN_BOUND: f32 = 2.0 * RETURN_SPEED;
 
-/// What was taken from a request, per joint.
+/// Limits that reduced the request for one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Limited {
     /// The joint would not have stopped within its range.
     pub range: bool,
-    /// The joint would have become too fast.
+    /// The joint would have exceeded its speed limit.
     pub speed: bool,
     /// The torque or its current was above the cap.
     pub torque: bool,
-    /// It was above what temperature and bus voltage leave of the cap.
+    /// The torque exceeded the derated cap.
     pub derated: bool,
 }
 
 impl Limited {
-    /// Whether anything was taken.
+    /// Returns whether any limit was active.
     #[must_use]
     pub const fn any(self) -> bool {
         self.range || self.speed || self.torque || self.derated
@@ -68,16 +71,16 @@ pub struct Barrier {
     speed_rad_per_s: f32,
     damping_nm_s_per_rad: f32,
     twice_braking_rad_per_s2: f32,
-    /// a T, and its square.
+    /// a T and its square.
     lead_rad_per_s: f32,
     lead_square: f32,
     cap_nm: f32,
-    /// What temperature and bus voltage leave of it: where it drives the joint, and where the joint drives it.
+    /// Derated cap: for a torque that drives the joint, and for one that the joint drives.
     left_nm: [f32; 2],
 }
 
 impl Barrier {
-    /// The bounds that follow from a joint's limits.
+    /// Derives the bounds from a joint's limits.
     #[must_use]
     pub fn new(limits: &JointLimits) -> Self {
         let (braking, cap) = (limits.braking_acceleration().0, limits.torque_cap().0);
@@ -95,13 +98,15 @@ impl Barrier {
         }
     }
 
-    /// Of what is wanted no more than these shares of the cap, where it drives the joint and where the joint drives it.
+    /// Sets the derating: shares of the cap for a torque that drives the joint and for one that the joint
+    /// drives.
     pub fn derate(&mut self, shares: [f32; 2]) {
         self.left_nm = shares.map(|share| share * self.cap_nm);
     }
 
-    /// The torque nearest to the wanted one that still lets the joint stop in its range, and what was taken. A joint that
-    /// `returns` stands outside: nothing drives it farther out, little drives it back.
+    /// Limits the requested torque so that the joint can still stop within its range, and returns the active
+    /// limits. A joint that `returns` is outside its range: no torque drives it farther out, and a reduced
+    /// one drives it back.
     #[must_use]
     pub fn bound(
         &self,
@@ -115,7 +120,7 @@ impl Barrier {
         let [driving, driven] = self.left_nm;
         let left = if wanted.0 * velocity.0 < 0.0 { driven } else { driving };
         let mut torque = wanted.0;
-        // Asked for too much, rather than braked too hard.
+        // Only the request is derated; the braking below keeps the whole cap.
         if wanted.abs().0 > min(left, cap) {
             torque = wanted.limited(NewtonMetre(min(left, cap))).0;
             limited.derated = left < cap;
@@ -140,7 +145,7 @@ impl Barrier {
         (NewtonMetre(torque).limited(NewtonMetre(cap)), limited)
     }
 
-    /// With everything of it but what temperature and bus voltage change.
+    /// Adds all values to a checksum, except those that derating changes.
     #[must_use]
     pub fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad, .. } = *self;
@@ -158,7 +163,7 @@ impl Barrier {
         NewtonMetre(-self.damping_nm_s_per_rad * velocity.0).limited(NewtonMetre(self.cap_nm))
     }
 
-    /// Greatest speed towards an end that is `distance` away, and whether the range, not the speed limit, rules.
+    /// Largest speed towards an end at `distance`, and whether the range, not the speed limit, determines it.
     fn approach_speed(&self, distance: f32) -> (f32, bool) {
         let stopping = if distance > 0.0 {
             sqrt(self.lead_square + self.twice_braking_rad_per_s2 * distance) - self.lead_rad_per_s
@@ -176,9 +181,10 @@ mod tests {
     use std::collections::VecDeque;
     extern crate std;
 
-    /// An inertia with gravity, pushed by a wanted torque through the barrier, whose velocity is sensed late and whose
-    /// drive is late as well; semi-implicit Euler at 16 kHz, double precision. Returns the farthest excursion beyond
-    /// either end (negative inside), the greatest speed, and the greatest speed in the last of four seconds.
+    /// An inertia with gravity, pushed by a requested torque through the barrier, with delayed velocity and
+    /// delayed drive torque. Semi-implicit Euler at 16 kHz, double precision. Returns the largest excursion
+    /// beyond either end (negative inside), the largest speed, and the largest speed in the last of four
+    /// seconds.
     fn push(
         limits: &JointLimits,
         inertia: f64,
@@ -186,7 +192,7 @@ mod tests {
         wanted_nm: f32,
         start: (f64, f64),
     ) -> (f64, f64, f64) {
-        // A joint that is pushed with all there is, or with what is left, stops all the same.
+        // The joint stops with the full cap and with the derated one.
         let shares = if wanted_nm == 30.0 { [0.5, 0.0] } else { [1.0; 2] };
         let mut barrier = Barrier::new(limits);
         barrier.derate(shares);
@@ -197,7 +203,7 @@ mod tests {
         let (mut excursion, mut fastest, mut late_fastest) = (f64::NEG_INFINITY, 0.0_f64, 0.0_f64);
         for tick in 0..16_000 {
             sensed.push_back(velocity);
-            let late = sensed.pop_front().expect("fourteen stay");
+            let late = sensed.pop_front().expect("fourteen values remain");
             let (torque, _) = barrier.bound(
                 Radian(position as f32),
                 RadianPerSecond(late as f32),
@@ -222,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_pushed_towards_its_limit_stops_within_half_a_degree_of_it() {
+    fn a_joint_pushed_beyond_its_range_stops_within_half_a_degree() {
         for limits in [HIP, KNEE] {
             let (low, high) = (f64::from(limits.low.0), f64::from(limits.high.0));
             let speed = f64::from(limits.speed.0);
@@ -233,7 +239,7 @@ mod tests {
                     for gravity in [-40.0, 0.0, 40.0] {
                         for initial_speed in [0.0, 0.3 * speed, 0.7 * speed, speed] {
                             for sign in [-1.0, 1.0] {
-                                // From where a joint at that speed can still stop, or from the other end.
+                                // Starts where a joint at that speed can just stop.
                                 let stopping = initial_speed * initial_speed / (2.0 * deceleration)
                                     + initial_speed * f64::from(REACTION_S);
                                 let start = if sign > 0.0 { high - stopping } else { low + stopping };
@@ -252,7 +258,8 @@ mod tests {
                                     "{} degrees beyond: {inertia} {wanted} {gravity} {initial_speed} {sign}",
                                     excursion.to_degrees()
                                 );
-                                // Below the fault at 1.1 times the limit, gravity against it or not.
+                                // The overspeed fault is at 1.1 times the limit, with gravity in either
+                                // direction.
                                 assert!(fastest < 1.1 * speed, "{fastest}");
                             }
                         }
@@ -269,7 +276,7 @@ mod tests {
                 let inertia = f64::from(limits.inertia.0) * inertia_share;
                 let middle = 0.5 * f64::from(limits.low.0 + limits.high.0);
                 let (excursion, _, late_fastest) = push(&limits, inertia, 0.0, 60.0, (middle, 0.0));
-                // Without gravity it stands at the end itself, and neither bounces nor hums.
+                // Without gravity the joint rests at the end itself, without bouncing or oscillation.
                 assert!(excursion.abs() < 0.05_f64.to_radians(), "{excursion}");
                 assert!(late_fastest < 1e-3, "{inertia_share}: {late_fastest} rad/s");
             }
@@ -277,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_that_keeps_its_distance_is_not_touched() {
+    fn a_motion_that_keeps_its_distance_is_not_limited() {
         let barrier = Barrier::new(&HIP);
         let braking = HIP.braking_acceleration().0;
         let margin = 0.5 * braking * REACTION_S * REACTION_S;
@@ -292,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_taken_is_told_apart() {
+    fn torque_range_and_speed_limits_are_distinguished() {
         let barrier = Barrier::new(&HIP);
         let (middle, still) = (Radian(0.45), RadianPerSecond::ZERO);
         let (torque, limited) = barrier.bound(middle, still, NewtonMetre(500.0), false);
@@ -306,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn a_torque_at_a_bound_is_not_limited_and_one_beyond_it_is() {
+    fn only_a_torque_beyond_its_bound_is_limited() {
         let wide = JointLimits { high: Radian(6.0), low: Radian(-6.0), ..HIP };
         let barrier = Barrier::new(&wide);
         for sign in [1.0, -1.0] {
@@ -318,7 +325,7 @@ mod tests {
             assert_eq!(at(bound), (NewtonMetre(bound), Limited::default()));
             let (torque, limited) = at(bound * 1.001);
             assert_eq!((torque.0, limited), (bound, Limited { speed: true, ..Limited::default() }));
-            // The cap itself may be asked for.
+            // A request equal to the cap is not limited.
             let cap = NewtonMetre(sign * barrier.cap_nm);
             let (torque, limited) = barrier.bound(Radian::ZERO, RadianPerSecond::ZERO, cap, false);
             assert_eq!((torque, limited), (cap, Limited::default()));
@@ -326,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_derated_is_what_is_asked_and_not_what_stops_a_joint() {
+    fn derating_reduces_the_request_and_not_the_braking() {
         let mut barrier = Barrier::new(&HIP);
         barrier.derate([0.5, 0.2]);
         let at = |velocity, wanted| {

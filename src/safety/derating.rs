@@ -1,7 +1,7 @@
-//! Less before nothing: what of an asked torque a drive may still make while it is hot or its bus is low or high.
+//! Derating: reduces the requested torque while a bridge is hot or the bus voltage is low or high.
 //!
-//! Why ramps and not switches: a drive that gives up at a border drops its leg there; one that gives less from well before it tells its
-//! wearer, and mostly never arrives.
+//! Why ramps and not switches: a drive that turns off at a threshold drops its leg. A drive that weakens well
+//! before it warns the wearer and mostly never reaches the threshold.
 //!
 //! ```text
 //! ramp(x) = clamp((x - none) / (all - none), 0, 1)
@@ -9,11 +9,12 @@
 //! |torque| <= cap * ramp(temperature) * ramp(bus, high)      where the joint drives it
 //! ```
 //!
-//! Taken from what is asked before the joint's range and speed are looked at ([`super::Barrier`]): what stops a joint at its
-//! end, and what damps, keeps the whole cap. A number that is none leaves nothing.
+//! Applied to the request before range and speed are checked ([`super::Barrier`]): stopping a joint at its
+//! end and damping keep the whole cap. NaN leaves no torque.
 //!
-//! What is limited is told by [`LimitCode`]s, which are no faults: nothing is latched, and nothing has to be reset.
-//! Cost: the ramps where temperature and bus are looked at; in the monitor a product, two comparisons and a choice per joint.
+//! Active limits are reported as [`LimitCode`]s. They are no faults: they do not latch and need no reset.
+//! Cost: the ramps where temperature and bus voltage are checked. The monitor adds a product, two comparisons
+//! and a choice per joint.
 
 use super::barrier::Limited;
 use super::limits::JointLimits;
@@ -22,7 +23,7 @@ use crate::units::Volt;
 
 macro_rules! limit_codes {
     ($( $(#[doc = $doc:literal])* $code:ident = $number:literal, $name:literal; )*) => {
-        /// Something takes from what is asked. Numbers never change.
+        /// A limit that reduces the request. Numbers never change.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         pub enum LimitCode {
@@ -30,10 +31,10 @@ macro_rules! limit_codes {
         }
 
         impl LimitCode {
-            /// All of them, in the table's order.
+            /// All codes, in the table's order.
             pub const ALL: [Self; [$( $number, )*].len()] = [$( Self::$code, )*];
 
-            /// The word in records.
+            /// Word used in records.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self { $( Self::$code => $name, )* }
@@ -43,59 +44,59 @@ macro_rules! limit_codes {
 }
 
 limit_codes! {
-    /// Greatest torque of the joint.
+    /// Torque limit of the joint.
     Torque = 1, "torque";
-    /// Greatest current of the motor, where it is reached before the torque.
+    /// Current limit of the motor, where it is reached before the torque limit.
     Current = 2, "current";
-    /// Greatest speed of the joint.
+    /// Speed limit of the joint.
     Speed = 3, "speed";
-    /// The joint could not stop within its range.
+    /// The joint could otherwise not stop within its range.
     Position = 4, "position";
     /// A bridge is hot.
     Temperature = 5, "temperature";
-    /// The bus is low.
+    /// The bus voltage is low.
     BusLow = 6, "bus_low";
-    /// The bus is high.
+    /// The bus voltage is high.
     BusHigh = 7, "bus_high";
 }
 
-/// Any number of codes: bit n for the code n.
+/// A set of codes: bit n for code n.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LimitCodes(u8);
 
 impl LimitCodes {
-    /// As bits.
+    /// Returns the bit set.
     #[must_use]
     pub const fn bits(self) -> u8 {
         self.0
     }
 
-    /// Whether a code is among them.
+    /// Returns whether the set contains a code.
     #[must_use]
     pub const fn contains(self, code: LimitCode) -> bool {
         self.0 & 1 << code as u8 != 0
     }
 
-    /// With a code where it holds.
+    /// Adds a code if `holds`.
     #[must_use]
     pub const fn with(self, holds: bool, code: LimitCode) -> Self {
         Self(self.0 | (holds as u8) << code as u8)
     }
 
-    /// Those that are not among others.
+    /// Removes the codes of another set.
     #[must_use]
     pub const fn without(self, others: Self) -> Self {
         Self(self.0 & !others.0)
     }
 
-    /// The one with the lowest number.
+    /// Returns the code with the lowest number.
     #[must_use]
     pub fn first(self) -> Option<LimitCode> {
-        // Codes begin with 1.
+        // Codes start at 1, so an empty set gives 31 or more, and no entry.
         LimitCode::ALL.get((self.0.trailing_zeros() as usize).wrapping_sub(1)).copied()
     }
 
-    /// What was taken from a joint.
+    /// Codes of the limits that reduced a joint's request.
     #[must_use]
     #[inline(never)]
     pub fn of(limited: &Limited, limits: &JointLimits, derating: &Derating) -> Self {
@@ -114,7 +115,7 @@ impl LimitCodes {
     }
 }
 
-/// Shares that are left, 0..=1.
+/// Remaining shares of the torque cap, 0..=1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derating {
     temperature: f32,
@@ -123,17 +124,17 @@ pub struct Derating {
 }
 
 impl Derating {
-    /// Nothing is taken.
+    /// No derating.
     pub const NONE: Self = Self { temperature: 1.0, low: 1.0, high: 1.0 };
 
-    /// Of a torque that drives a joint, and of one that the joint drives.
+    /// Shares for a torque that drives the joint and for one that the joint drives.
     #[must_use]
     pub fn shares(&self) -> [f32; 2] {
         [self.temperature * self.low, self.temperature * self.high]
     }
 }
 
-/// Where a ramp begins to take, and where it has taken all.
+/// Linear ramp from the full share to none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ramp {
     all: f32,
@@ -141,36 +142,36 @@ pub struct Ramp {
 }
 
 impl Ramp {
-    /// Everything at `all`, nothing at `none`, which are apart: not so is an error of the compiler in a constant.
+    /// A ramp with share 1 at `all` and 0 at `none`. Equal ends panic, in a constant at compile time.
     #[must_use]
     pub const fn new(all: f32, none: f32) -> Self {
         assert!(all < none || none < all, "a ramp has two ends");
         Self { all, per_unit: 1.0 / (none - all) }
     }
 
-    /// The share that is left; nothing of what is no number.
+    /// Remaining share at a value; 0 for NaN.
     #[must_use]
     #[inline(never)]
     pub fn share(&self, value: f32) -> f32 {
         let taken = (value - self.all) * self.per_unit;
-        // Not a number goes to the second: nothing is left.
+        // NaN fails the comparison and takes the second branch.
         if taken < 1.0 { 1.0 - max(taken, 0.0) } else { 0.0 }
     }
 }
 
-/// Ramps of a board.
+/// Derating ramps of a board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeratingRamps {
-    /// Of the hottest bridge, degrees Celsius.
+    /// Over the temperature of the hottest bridge, degrees Celsius.
     pub temperature_c: Ramp,
-    /// Of a falling bus, V.
+    /// Over a falling bus voltage, V.
     pub low: Ramp,
-    /// Of a rising bus, V.
+    /// Over a rising bus voltage, V.
     pub high: Ramp,
 }
 
 impl DeratingRamps {
-    /// From pairs of where everything is left and where nothing is; in a constant the compiler refuses ends that are not apart.
+    /// Creates the ramps from pairs of full share and none. Equal ends panic, in a constant at compile time.
     #[must_use]
     pub const fn new(temperature_c: [f32; 2], low: [Volt; 2], high: [Volt; 2]) -> Self {
         Self {
@@ -180,7 +181,7 @@ impl DeratingRamps {
         }
     }
 
-    /// What is left at a temperature (degrees Celsius) and a bus voltage.
+    /// Shares at a temperature (degrees Celsius) and a bus voltage.
     #[must_use]
     pub fn at(&self, temperature_c: f32, bus: Volt) -> Derating {
         Derating {
@@ -191,15 +192,16 @@ impl DeratingRamps {
     }
 }
 
-/// Sees a supply that dies: a bus that has lost a fifth of what it was.
+/// Detects a failing supply: the bus voltage fell by a fifth of its own average.
 ///
 /// ```text
 /// slow += (bus - slow) / 4096 each tick (1 s);      bus < 0.8 slow, four ticks in a row (1 ms)
 /// ```
 ///
-/// Why against what it was: a supply may have 22 V or 50 V. A load of 40 A takes 2 V from a sound one, so a fifth is none;
-/// what is left of the bus capacitor (0.6 of 1.7 J at 48 V and 1.5 mF, above the 20 V at which bridges are released) and what a
-/// moving leg gives back is enough to begin damping with. A bus that falls by less than a fifth in a second is left to the ramp.
+/// Why relative: a supply may deliver 22 V or 50 V. A load of 40 A takes 2 V from an intact one, much less
+/// than a fifth. At 48 V and 1.5 mF the capacitor still holds 0.6 of 1.7 J above the 20 V at which the
+/// bridges turn off. Together with what a moving leg returns, that suffices to start damping. A bus that
+/// falls by less than a fifth per second is left to the ramp.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SupplyWatch {
     slow_v: f32,
@@ -207,7 +209,7 @@ pub struct SupplyWatch {
 }
 
 impl SupplyWatch {
-    /// One servo tick: whether the supply is dying. Told once for each fall.
+    /// Runs one servo tick and returns whether the supply is failing; true once per drop.
     pub fn look(&mut self, bus: Volt) -> bool {
         const SHARE: f32 = 1.0 / 4096.0;
         const LOST: f32 = 0.8;
@@ -248,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_fall_along_their_ramps_and_what_is_no_number_leaves_nothing() {
+    fn shares_follow_their_ramps_and_nan_leaves_none() {
         let left = |temperature, bus| RAMPS.at(temperature, Volt(bus)).shares();
         assert_eq!(left(25.0, 48.0), [1.0; 2]);
         for (temperature, bus, expected) in [
@@ -270,7 +272,7 @@ mod tests {
         let none = Limited::default();
         let hot = RAMPS.at(90.0, Volt(48.0));
         let of = |limited: Limited, derating: &Derating| LimitCodes::of(&limited, &HIP, derating).bits();
-        assert_eq!(of(none, &hot), 0, "nothing was asked that was taken");
+        assert_eq!(of(none, &hot), 0, "nothing was limited");
         assert_eq!(of(Limited { torque: true, ..none }, &Derating::NONE), 1 << 1);
         let weak = JointLimits { current: crate::units::Ampere(40.0), ..HIP };
         let codes = LimitCodes::of(&Limited { torque: true, ..none }, &weak, &Derating::NONE);
@@ -282,10 +284,10 @@ mod tests {
     }
 
     #[test]
-    fn a_supply_that_dies_is_seen_a_millisecond_after_a_fifth_is_gone_and_a_load_is_not() {
+    fn a_failing_supply_is_detected_and_a_load_is_not() {
         let mut watch = SupplyWatch::default();
         assert!((0..8000).all(|_| !watch.look(Volt(48.0))));
-        // 40 A at 50 mOhm, and what comes back after a stop.
+        // 40 A at 50 mOhm, and the rise after a stop.
         assert!([46.0, 54.0, 48.0, 44.0].into_iter().all(|bus| (0..400).all(|_| !watch.look(Volt(bus)))));
         // 3 V per millisecond.
         let mut bus = 48.0;
@@ -296,6 +298,6 @@ mod tests {
             assert!(ticks < 40);
         }
         assert!((34.0..38.5).contains(&bus), "{bus} V");
-        assert!((0..400).all(|_| !watch.look(Volt(20.0))), "told once");
+        assert!((0..400).all(|_| !watch.look(Volt(20.0))), "reported once");
     }
 }

@@ -1,31 +1,31 @@
-//! What can go wrong: numbers that never change, the safe state of each, the catalogue's row it belongs to.
+//! Faults: permanent numbers, the safe state of each, and its row in the catalogue.
 //!
-//! Why one table: monitor, axes, interlock, bus and records speak of the same faults, and a campaign that injects them
-//! (docs/safety.md) asks here what has to follow. There is no second list. What a node reports on the bus without a fault of
-//! the leg ([`NoticeCode`]) has its numbers here as well, so that no code means two things.
+//! Why one table: monitor, axes, interlock, bus and records use the same faults. The campaign that injects
+//! them (docs/safety.md) reads the expected reaction here. There is no second list. Notices of a node that
+//! are no fault of the leg ([`NoticeCode`]) are numbered here as well, so that no code has two meanings.
 //!
-//! Numbers are the error codes of CiA 402 where it has one, else CiA 301's for manufacturers (FFxx), so a host that reads
-//! object 603F understands them. The safe state is chosen per fault: an exoskeleton that goes limp may drop its wearer, one
-//! that holds may hurt him. What only a working servo can do (Damp) is left to faults that leave encoder, currents and time
-//! to be trusted; all else is Off.
+//! Numbers are the error codes of CiA 402 where it defines one, else CiA 301's for manufacturers (FFxx), so a
+//! host that reads object 603F understands them. The safe state is chosen per fault: a limp exoskeleton may
+//! drop its wearer, a stiff one may hurt him. Damp needs a working servo, so it is used only where encoder,
+//! currents and timing remain trustworthy. All other faults lead to Off.
 
-/// The safe state a fault leads to.
+/// Safe state that a fault leads to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reaction {
-    /// Bridges released in the same tick. Needs nothing to work.
+    /// Outputs off in the same tick. Requires nothing.
     Off,
-    /// Velocity damped under the torque cap for at most 300 ms, then Off. Needs encoder and currents.
+    /// Velocity damped under the torque cap for at most 300 ms, then Off. Requires encoder and currents.
     Damp,
-    /// Low sides on, a passive brake. Needs a healthy gate driver.
+    /// Active short circuit by the low sides, a passive brake. Requires a healthy gate driver.
     Short,
-    /// Enabled with less than was asked for.
+    /// Enabled with less torque than requested.
     Limit,
-    /// Never becomes enabled, and says why.
+    /// Never enabled, with the reason reported.
     Refuse,
 }
 
 impl Reaction {
-    /// The word in tables and records.
+    /// Word used in tables and records.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -48,28 +48,28 @@ macro_rules! faults {
         }
 
         impl FaultCode {
-            /// All of them, in the table's order.
+            /// All faults, in the table's order.
             pub const ALL: [Self; [$( $number, )*].len()] = [$( Self::$code, )*];
 
-            /// Its row of the catalogue of docs/safety.md; `-` for what a board refuses to start with.
+            /// Row in the catalogue of docs/safety.md; `-` for faults that prevent the board's start.
             #[must_use]
             pub const fn catalogue(self) -> &'static str {
                 match self { $( Self::$code => $id, )* }
             }
 
-            /// The word in records.
+            /// Word used in records.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self { $( Self::$code => $name, )* }
             }
 
-            /// Where this fault leads.
+            /// Safe state that this fault leads to.
             #[must_use]
             pub const fn reaction(self) -> Reaction {
                 match self { $( Self::$code => Reaction::$reaction, )* }
             }
 
-            /// What happened, as the end of a sentence about a joint or the board.
+            /// Description of the fault, as the end of a sentence about a joint or the board.
             #[must_use]
             pub const fn words(self) -> &'static str {
                 match self { $( Self::$code => $words, )* }
@@ -81,17 +81,18 @@ macro_rules! faults {
 faults! {
     /// The encoder moved farther than the joint can, three times in 10 ms (7305: incremental sensor 1).
     EncoderStep = 0x7305, "E2", "encoder_step", Damp, "its encoder jumped";
-    /// Counts were lost, and with them the rotor's angle: only a new calibration helps.
+    /// Counts were lost, so the rotor angle is unknown until the next calibration.
     EncoderPlace = 0xFF02, "E4", "encoder_place", Short, "its counts jumped or the index came at another place";
-    /// The counter stands still while the motor's voltage says that it turns.
+    /// The counter stands still although the motor's voltage shows that it turns.
     EncoderFrozen = 0xFF09, "E1", "encoder_frozen", Short, "its encoder stopped while the motor turned";
-    /// A phase takes voltage and no current.
+    /// A phase with voltage carries no current.
     OpenPhase = 0xFF0A, "P1", "open_phase", Off, "a phase does not conduct";
-    /// A shunt shows a current that does not flow.
+    /// The offset of a current sensor drifted.
     CurrentZero = 0xFF0B, "C1", "current_zero", Off, "the zero of its current drifted";
-    /// A shunt's code stays while its phase is asked for another current.
+    /// A shunt's code stays constant although its phase's current target changes.
     StuckConversion = 0xFF0C, "C3", "stuck_conversion", Off, "a conversion is stuck";
-    /// A shunt amplifier at its rail, two ticks in a row or too many of a few (5210: measuring circuits).
+    /// A shunt amplifier at its rail, two ticks in a row or too often in a short time (5210: measuring
+    /// circuits).
     CurrentSense = 0x5210, "C2", "current_sense", Off, "a shunt amplifier stayed at its rail";
     /// One shunt's conversion ended without the other's.
     Conversion = 0xFF03, "C3", "conversion", Off, "a conversion is missing";
@@ -101,49 +102,51 @@ faults! {
     GateFault = 0x5410, "C4", "gate_fault", Off, "a gate driver reports a fault";
     /// A gate driver does not hold its configuration (5400: power section).
     GateConfiguration = 0x5400, "P2", "gate_configuration", Off, "a gate driver lost its configuration";
-    /// Bus voltage out of its range, as the amplifiers (3200: voltage inside the device).
+    /// Bus voltage out of range, two ticks in a row or too often in a short time (3200: voltage inside the
+    /// device).
     BusVoltage = 0x3200, "V1", "bus_voltage", Off, "the bus voltage left its range";
-    /// The supply dies while there is still energy (3220: DC link undervoltage).
+    /// The supply fails while energy is left (3220: DC link undervoltage).
     SupplyLost = 0x3220, "V2", "supply_lost", Damp, "its supply went away";
     /// A bridge is too hot (4210: excess temperature of the device).
     Temperature = 0x4210, "T1", "temperature", Damp, "a bridge is too hot";
     /// A thermistor is open or shorted.
     Thermistor = 0xFF04, "T1", "thermistor", Damp, "a thermistor is open or shorted";
-    /// Something measured or wanted is NaN or infinite.
+    /// A measured or requested value is NaN or infinite.
     NotFinite = 0xFF01, "N1", "not_finite", Off, "a signal was not a number";
     /// The emergency stop's contact is open (9000: external error).
     EmergencyStop = 0x9000, "X1", "emergency_stop", Off, "the emergency stop was pressed";
-    /// Current ticks were missed three times, at once or with none in time between.
+    /// Three current ticks were missed, at once or without one in time between them.
     CurrentTicks = 0xFF05, "K1", "current_ticks", Damp, "its current ticks came late";
     /// The servo did not answer three times in a row.
     ServoTicks = 0xFF06, "K1", "servo_ticks", Off, "the servo did not answer";
-    /// The watchdog bit (6010: software reset).
+    /// The watchdog reset the board (6010: software reset).
     Watchdog = 0x6010, "K3", "watchdog", Refuse, "the watchdog bit";
-    /// The image before this one crashed (6100: internal software).
+    /// The firmware crashed before this start (6100: internal software).
     Crash = 0x6100, "K4", "crash", Refuse, "the firmware crashed";
     /// Farther than 0.5 degrees beyond the range while enabled (8500: position controller).
     PositionLimit = 0x8500, "J1", "position_limit", Damp, "it left its range";
     /// Faster than 1.1 times the speed limit while enabled (8400: speed controller).
     Overspeed = 0x8400, "J2", "overspeed", Damp, "it was faster than 1.1 times its speed limit";
-    /// Gains or limits are not what they were (6310: loss of parameters). Nothing that reckons with them is to be trusted to damp.
+    /// Gains or limits changed in memory (6310: loss of parameters). Damping depends on them, so the drive
+    /// turns off.
     Parameters = 0x6310, "M2", "parameters", Off, "its gains or limits changed in memory";
-    /// Farther than the window from where the host commands it to be (8611: following error).
+    /// Position error larger than the following window (8611: following error).
     FollowingError = 0x8611, "B1", "following_error", Damp, "it did not follow where it was commanded";
     /// The host's heartbeat is missed.
     Heartbeat = 0x8130, "B1", "heartbeat", Damp, "the host's heartbeat is missed";
-    /// What the host sends in every cycle came late (8250: RPDO timeout).
+    /// The host's cyclic PDO came late (8250: RPDO timeout).
     LatePdo = 0x8250, "B1", "late_pdo", Damp, "what the host sends in every cycle came late";
-    /// A host that spoke in every cycle fell silent.
+    /// A host with cyclic commands fell silent.
     HostSilent = 0xFF0F, "B5", "host_silent", Damp, "its host fell silent";
-    /// The controller left the bus.
+    /// The CAN controller is bus-off.
     BusOff = 0x8140, "B2", "bus_off", Damp, "the controller left the bus";
-    /// The controller counts so many errors that it may no longer disturb others.
+    /// The CAN controller is error-passive.
     BusPassive = 0x8120, "B2", "bus_passive", Damp, "the controller sees too many errors on the bus";
     /// The bridges' timers are not in phase.
     Timers = 0xFF07, "-", "timers", Refuse, "the bridges' timers are not in phase";
-    /// The factory's version does not tell the divider of the bus voltage.
+    /// The board version read at the factory does not determine the divider of the bus voltage.
     BoardVersion = 0xFF08, "-", "board_version", Refuse, "the board's version is not known";
-    /// The constants of an axis or of the leg make no sense (6320: parameters).
+    /// The constants of an axis or of the leg are invalid (6320: parameters).
     Configuration = 0x6320, "-", "configuration", Refuse, "the configuration makes no sense";
 }
 
@@ -155,12 +158,12 @@ impl FaultCode {
     }
 }
 
-/// Code of an emergency message which reports that an error has ended.
+/// Code of an emergency message that reports the end of an error.
 pub const NO_ERROR: u16 = 0;
 
 macro_rules! notices {
     ($( $(#[doc = $doc:literal])* $code:ident = $number:literal; )*) => {
-        /// Emergency code of a node's own, without a fault of the leg. A number is never used again.
+        /// Emergency code of a node that is no fault of the leg. A number is never used again.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u16)]
         pub enum NoticeCode {
@@ -168,7 +171,7 @@ macro_rules! notices {
         }
 
         impl NoticeCode {
-            /// All of them, in the table's order.
+            /// All notices, in the table's order.
             pub const ALL: [Self; [$( $number, )*].len()] = [$( Self::$code, )*];
 
             /// The number on the bus.
@@ -185,20 +188,20 @@ notices! {
     Overrun = 0x8110;
     /// A received PDO was shorter than its mapping (8210: PDO not processed).
     ShortPdo = 0x8210;
-    /// Objects were not stored, or cannot be read back (5530: data storage).
+    /// Objects could not be stored or read back (5530: data storage).
     StoreFailed = 0x5530;
-    /// The flash is about to be written: the node may be silent for seconds, heartbeats included.
+    /// A flash write begins: the node may be silent for seconds, heartbeats included.
     Storing = 0xFF0D;
-    /// A step towards enabled was refused: joint (from 1; 0 the leg), reason (bit of 60FD), causes.
+    /// A step towards enabled was refused: joint (from 1; 0 the leg), reason (bit of 60FD), inhibit reasons.
     NotEnabled = 0xFF0E;
 }
 
-/// A fault and the joint it was seen at; it stops the whole leg.
+/// A fault and the joint where it was detected; it stops the whole leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// What went wrong.
+    /// Kind of fault.
     pub code: FaultCode,
-    /// Where, counted from 0.
+    /// Joint, counted from 0.
     pub joint: u8,
 }
 
@@ -206,7 +209,7 @@ pub struct Fault {
 mod tests {
     use super::*;
 
-    /// Written out a second time on purpose: who changes a number has to change it here as well, and must not.
+    /// Repeats the table on purpose: changing a number requires a change here too, and must not happen.
     #[test]
     fn fault_numbers_are_fixed() {
         let numbers = [
@@ -261,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn every_fault_has_a_word_of_its_own() {
+    fn every_fault_has_a_unique_word() {
         for (index, code) in FaultCode::ALL.iter().enumerate() {
             assert!(code.name().bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'_'), "{code:?}");
             assert!(FaultCode::ALL[..index].iter().all(|other| other.name() != code.name()), "{code:?}");

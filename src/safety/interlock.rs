@@ -1,46 +1,55 @@
-//! Why nothing may be enabled, and what every current tick looks at before an axis is asked.
+//! Interlock: inhibit reasons, and the checks of every current tick before an axis runs.
 //!
-//! Why here: a board holds the reasons in one word that every level raises into (`operation::Inhibit`), but what raises them is
-//! decided by values only, so the same code is tested against every fault on the host.
+//! Why here: a board stores the reasons in one word that every priority level can set (`operation::Inhibit`).
+//! The decision depends on values only, so the same code is tested against every fault on the host.
 //!
-//! A reason is raised once and stays until the operator resets; one that still holds is raised again in the next tick. While
-//! there is one, both bridges are released in every tick and the servo keeps its drive off.
+//! A reason stays set until the operator resets. One that still holds is set again in the next tick. While
+//! any reason is set, both bridges are off in every tick and the servo keeps its drive off.
 //!
-//! | seen by | reason | after |
+//! | detected by | reason | after |
 //! | --- | --- | --- |
-//! | [`TickWatch`] | emergency stop, gate driver's fault, a shunt without conversion | the tick itself |
-//! | [`TickWatch`] | current ticks missed, at once or with none in time between | three: the servo is told and damps; 24 (1 ms): Off |
-//! | [`ServoWatch`] | a servo that did not tick since it was last called | three calls in a row |
+//! | [`TickWatch`] | emergency stop, gate driver's fault, a shunt without conversion | same tick |
+//! | [`TickWatch`] | current ticks missed, without one in time between | 3: the servo damps; 24 (1 ms): Off |
+//! | [`ServoWatch`] | servo without a tick since its last request | three requests in a row |
 //!
-//! **How often a line is read.** Off drops the leg's hold, so a spike on a wire must not lead there. A line is believed where
-//! [`READS`] reads in a row agree, 1 us on the board ([`stays_active`]); a single read would believe any spike that it meets.
+//! **Number of reads.** Off drops the leg, so a spike on a wire must not lead there. A line counts as active
+//! where [`READS`] reads in a row agree, 1 us on the board ([`stays_active`]).
 //!
-//! | line | reads | why |
-//! | --- | --- | --- |
-//! | emergency stop | 16, 1 us | The input has no filter on the board, and the bridges' edges ring for less. A contact that opens stays open for milliseconds, so no stop is lost; each comes 1 us later. The poll and the interrupt (EXTI4) use this one rule. |
-//! | gate drivers' nFAULT | 16, 1 us | An open drain with a weak pull-up beside the gate lines. No fault is that short: overcurrent is latched until the enable pin is cycled, a lost supply holds the line for 8 ms, and the driver has shut its gates by then. Warnings are pulses on another pin (nOCTW), which no input of the board reads. Reads within one tick keep the deadline of one period. |
-//! | missing conversion | 1 | A flag of the converter, no wire. |
-//! | encoder's index | 2 pulses | One wrong pulse is noise: `motor::axis`. At rest the interrupt reads the pin again. |
+//! | line | reads |
+//! | --- | --- |
+//! | emergency stop | 16, 1 us |
+//! | gate drivers' nFAULT | 16, 1 us |
+//! | missing conversion | 1: a flag of the converter, no wire |
+//! | encoder's index | 2 pulses (`motor::axis`); at rest the interrupt reads the pin again |
 //!
-//! Cost: some 12 instructions per axis and tick, and the reads of an active line.
+//! Emergency stop: the board has no filter at this input, and ringing of the bridges' edges lasts less than 1
+//! us. An opened contact stays open for milliseconds, so no stop is lost; each is seen 1 us later. The poll
+//! and the interrupt (EXTI4) use this one rule.
+//!
+//! nFAULT: an open drain with a weak pull-up beside the gate lines. No fault is that short. Overcurrent is
+//! latched until the enable pin is cycled, and a lost supply holds the line for 8 ms. By then the driver has
+//! turned its gates off. Warnings are pulses on another pin (nOCTW), which no input of the board reads. Reads
+//! within one tick keep the deadline of one period.
+//!
+//! Cost: about 12 instructions per axis and tick, and the reads of an active line.
 
 use super::fault::FaultCode;
 
-/// Reads of a line that have to agree, of some 60 ns each on the board.
+/// Reads of a line that must agree, about 60 ns each on the board.
 pub const READS: u32 = 16;
 
-/// Whether a line is active in [`READS`] reads in a row; the first read that is not ends them.
+/// Returns whether a line is active in [`READS`] reads in a row; the first inactive read ends the check.
 #[inline(always)]
 pub fn stays_active(mut is_active: impl FnMut() -> bool) -> bool {
     (0..READS).all(|_| is_active())
 }
 
-/// Missed ticks, or unanswered ones of the servo, in a row that are too many.
+/// Missed ticks, or unanswered requests to the servo, in a row that are a fault.
 const PATIENCE: u8 = 3;
-/// Missed ticks after which there is no damping any more either: a millisecond.
+/// Missed ticks after which damping ends too: one millisecond.
 const HOPELESS: u8 = 24;
 
-/// Why the drive is kept off.
+/// Inhibit reason: keeps the drive off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Cause {
@@ -50,36 +59,36 @@ pub enum Cause {
     GateFault,
     /// A gate driver does not hold its configuration.
     GateConfiguration,
-    /// The first axis released itself.
+    /// The first axis turned its outputs off.
     Axis1,
-    /// The second axis did.
+    /// The second axis turned its outputs off.
     Axis2,
-    /// An axis found its counter frozen: both brake.
+    /// An axis detected a frozen counter: both axes brake.
     EncoderFrozen,
-    /// An axis that was switching lost its place, and with it the rotor's angle, without which nothing can be damped: both brake.
+    /// A switching axis lost its rotor angle, so damping is impossible: both axes brake.
     EncoderPlace,
-    /// Current ticks went on being missed: 24 with none in time between.
+    /// 24 current ticks were missed without one in time between them.
     CurrentTicks,
     /// The servo did not answer three times in a row.
     ServoTicks,
     /// One shunt's conversion ended without the other's.
     Conversion,
-    /// The image before this one crashed.
+    /// The firmware crashed before this start.
     Crash,
-    /// The watchdog bit.
+    /// The watchdog reset the board.
     Watchdog,
     /// The bridges' timers are not in phase.
     Timers,
-    /// The factory's version does not tell the divider of the bus voltage.
+    /// The board version does not determine the divider of the bus voltage.
     BoardVersion,
-    /// The constants of an axis or of the leg make no sense.
+    /// The constants of an axis or of the leg are invalid.
     Configuration,
-    /// The flash is being written, and everything may stand still meanwhile.
+    /// The flash is being written, which may stall the processor.
     Storing,
 }
 
 impl Cause {
-    /// All of them, in the order of their bits.
+    /// All reasons, in the order of their bits.
     pub const ALL: [Self; 16] = [
         Self::EmergencyStop,
         Self::GateFault,
@@ -99,7 +108,8 @@ impl Cause {
         Self::Storing,
     ];
 
-    /// The fault behind it; none of an axis, which tells its own, nor of what is no fault.
+    /// Fault that corresponds to the reason. `None` for an axis, which reports its own fault, and for
+    /// storing.
     #[must_use]
     pub const fn code(self) -> Option<FaultCode> {
         Some(match self {
@@ -120,7 +130,7 @@ impl Cause {
         })
     }
 
-    /// The word in records.
+    /// Word used in records.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match (self, self.code()) {
@@ -132,13 +142,13 @@ impl Cause {
         }
     }
 
-    /// Its bit.
+    /// Bit in the inhibit word.
     #[must_use]
     pub const fn bit(self) -> u32 {
         1 << self as u8
     }
 
-    /// What an axis (from 0) that found a fault of its own raises; only one that was switching leads to a brake.
+    /// Reason that an axis (from 0) sets for its own fault. Only a switching axis leads to braking.
     #[must_use]
     pub const fn of_axis(axis: usize, code: FaultCode, switching: bool) -> Self {
         match (code, axis) {
@@ -149,33 +159,33 @@ impl Cause {
         }
     }
 
-    /// Nothing the operator does makes this good: only another board, other constants or another start.
+    /// Returns whether no reset clears the reason: another board, other constants or a new start are needed.
     #[must_use]
     pub const fn is_for_ever(self) -> bool {
         matches!(self, Self::Timers | Self::BoardVersion | Self::Configuration)
     }
 
-    /// Bits of what a reset does not forget.
+    /// Bits of the reasons that no reset clears.
     #[must_use]
     pub const fn for_ever() -> u32 {
         Self::Timers.bit() | Self::BoardVersion.bit() | Self::Configuration.bit()
     }
 }
 
-/// What both bridges do.
+/// Operation of both bridges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bridges {
-    /// What the servo asks for.
+    /// Follow the servo's request.
     Follow,
-    /// Low sides on: the motors brake themselves. Needs a healthy gate driver, and an axis that keeps its currents below the
-    /// bound, or releases.
+    /// Active short circuit by the low sides: the motors brake. Requires a healthy gate driver, and an axis
+    /// that turns off when its current exceeds the bound.
     Brake,
-    /// Nothing.
+    /// Outputs off.
     Release,
 }
 
 impl Bridges {
-    /// What follows from the bits of all causes: to brake where nothing speaks against it but what led there.
+    /// Derives the operation from the inhibit word. The bridges brake only where no other reason is set.
     #[inline(always)]
     #[must_use]
     pub const fn of(causes: u32) -> Self {
@@ -188,7 +198,7 @@ impl Bridges {
     }
 }
 
-/// What the board shows at one tick of an axis, beside the axis' own sample.
+/// Board state at one tick of an axis, besides the axis' own sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TickState {
     /// The emergency stop's contact is open.
@@ -197,18 +207,19 @@ pub struct TickState {
     pub gate_fault: bool,
     /// Both of the axis' shunts were converted.
     pub complete: bool,
-    /// Ticks of the axis that were missed since its last one.
+    /// Ticks of the axis missed since its last one.
     pub missed: u8,
 }
 
-/// Looks before each tick of one axis.
+/// Checks the board before each tick of one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TickWatch {
     missed: u8,
 }
 
 impl TickWatch {
-    /// Bits of what forbids to enable from this tick on, and whether so many ticks are missing now that the servo has to damp.
+    /// Returns the inhibit bits from this tick on, and whether enough ticks are missing that the servo must
+    /// damp.
     #[inline(always)]
     pub fn look(&mut self, now: &TickState) -> (u32, bool) {
         if now.missed == 0 && now.complete && !now.emergency_stop && !now.gate_fault {
@@ -218,7 +229,7 @@ impl TickWatch {
         self.look_closer(*now)
     }
 
-    /// The tick of which something is wrong.
+    /// Handles a tick with a fault.
     #[cold]
     #[inline(never)]
     fn look_closer(&mut self, now: TickState) -> (u32, bool) {
@@ -236,14 +247,14 @@ impl TickWatch {
 /// Checks that the servo answers each request for a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ServoWatch {
-    /// Ticks of the servo at the last request; `None` before the first.
+    /// The servo's tick count at the last request; `None` before the first.
     ticks: Option<u32>,
     unanswered: u8,
 }
 
 impl ServoWatch {
-    /// Call before each request, with the ticks that the servo has done so far. Returns whether the last request was not answered, and
-    /// the bit of the cause that then forbids to enable.
+    /// Call before each request with the servo's tick count. Returns whether the last request was not
+    /// answered, and the inhibit bit that follows.
     pub fn look(&mut self, ticks: u32) -> (bool, u32) {
         let missed = self.ticks == Some(ticks);
         self.unanswered = if missed { self.unanswered.saturating_add(1) } else { 0 };
@@ -259,7 +270,7 @@ mod tests {
     const GOOD: TickState = TickState { emergency_stop: false, gate_fault: false, complete: true, missed: 0 };
 
     #[test]
-    fn every_contact_forbids_in_its_own_tick() {
+    fn every_contact_inhibits_in_its_own_tick() {
         let cases = [
             (TickState { emergency_stop: true, ..GOOD }, Cause::EmergencyStop),
             (TickState { gate_fault: true, ..GOOD }, Cause::GateFault),
@@ -272,8 +283,8 @@ mod tests {
     }
 
     #[test]
-    fn a_spike_is_no_stop_and_a_line_that_stays_active_is_one() {
-        // The line is active for so many reads from the first on.
+    fn only_a_line_that_stays_active_stops_the_drive() {
+        // The line is active in the first `active` reads.
         let read = |active: u32| {
             let mut reads = 0;
             let believed = stays_active(|| {
@@ -288,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn three_missed_ticks_are_too_many_and_sparser_ones_are_not() {
+    fn three_missed_ticks_are_a_fault_and_sparser_ones_are_not() {
         let mut watch = TickWatch::default();
         let late = TickState { missed: 1, ..GOOD };
         let seen = [late, late, GOOD, late, late, late].map(|state| watch.look(&state));
@@ -296,7 +307,7 @@ mod tests {
         assert!(seen.iter().all(|(forbids, _)| *forbids == 0));
         let gap = |missed| TickWatch::default().look(&TickState { missed, ..GOOD });
         assert_eq!([gap(2), gap(3)], [(0, false), (0, true)]);
-        // Told once, and given up where it goes on.
+        // Reported once, then off if the misses continue.
         assert_eq!(
             [1, 17, 1].map(|missed| watch.look(&TickState { missed, ..GOOD })).map(|(_, damp)| damp),
             [false; 3]
@@ -305,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_servo_that_does_not_answer_three_requests_is_given_up() {
+    fn a_servo_that_misses_three_requests_inhibits() {
         let mut watch = ServoWatch::default();
         let seen = [1, 2, 2, 2, 3, 3, 3, 3].map(|ticks| watch.look(ticks));
         let given_up = Cause::ServoTicks.bit();
@@ -315,13 +326,13 @@ mod tests {
     }
 
     #[test]
-    fn the_first_request_after_the_start_is_not_missed() {
+    fn the_first_request_after_the_start_is_not_a_miss() {
         let mut watch = ServoWatch::default();
         assert_eq!([0, 0].map(|ticks| watch.look(ticks).0), [false, true]);
     }
 
     #[test]
-    fn bridges_brake_only_while_nothing_else_speaks_against_it() {
+    fn bridges_brake_only_without_another_reason() {
         let (frozen, place) = (Cause::EncoderFrozen.bit(), Cause::EncoderPlace.bit());
         assert_eq!(Bridges::of(0), Bridges::Follow);
         assert_eq!([frozen, place, frozen | place].map(Bridges::of), [Bridges::Brake; 3]);
@@ -335,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn every_cause_has_a_bit_and_a_word_of_its_own() {
+    fn every_cause_has_a_unique_bit_and_a_word() {
         let all = Cause::ALL.iter().fold(0, |bits, cause| bits | cause.bit());
         assert_eq!(all.count_ones() as usize, Cause::ALL.len());
         assert!(Cause::ALL.iter().all(|cause| cause.name() != "-"));

@@ -1,4 +1,4 @@
-//! What each joint may do, and the refusal of limits that make no sense.
+//! Limits of each joint, and the refusal of implausible ones.
 
 use crate::checksum::Checksum;
 use crate::real::{abs, is_finite, min};
@@ -7,36 +7,36 @@ use crate::units::{
     RadianPerSecondSquared,
 };
 
-/// Share of the torque cap that braking may count on; the rest is left to gravity, which is largest where it pulls
-/// a raised leg (64 of 100 N m for the default leg held out level, 49 at its range's end).
+/// Share of the torque cap assumed for braking; the rest is left to gravity. Gravity is largest on a raised
+/// leg: 64 of 100 N m for the default leg held level, 49 at the end of its range.
 const BRAKING_SHARE: f32 = 0.5;
 
-/// What one joint may do, in the model's angle and sign.
+/// Limits of one joint, in the model's angle and sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointLimits {
     /// Smallest angle.
     pub low: Radian,
     /// Largest angle.
     pub high: Radian,
-    /// Largest speed that is commanded; 1.1 times as much is a fault.
+    /// Largest commanded speed; 1.1 times as much is a fault.
     pub speed: RadianPerSecond,
-    /// Largest torque that is commanded.
+    /// Largest commanded torque.
     pub torque: NewtonMetre,
-    /// Largest motor current that is commanded.
+    /// Largest commanded motor current.
     pub current: Ampere,
     /// Joint torque per motor current; negative where the model's sign is opposite to the drive's.
     pub torque_per_ampere: NewtonMetrePerAmpere,
-    /// Largest inertia the joint moves, rotor and the links beyond it included.
+    /// Largest inertia that the joint moves, with rotor and distal links.
     pub inertia: KilogramMetreSquared,
 }
 
-/// Limits of a whole leg that have been found to make sense.
+/// Validated limits of a whole leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits<const N: usize> {
     joints: [JointLimits; N],
 }
 
-/// A limit, by name.
+/// Names a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimitQuantity {
     /// The range: each end within -2 pi..=2 pi, and at least 2 degrees between them.
@@ -53,12 +53,12 @@ pub enum LimitQuantity {
     Inertia,
 }
 
-/// A limit that makes no sense.
+/// An implausible limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LimitsError {
     /// Counted from 0.
     pub joint: usize,
-    /// The limit in question.
+    /// The refused limit.
     pub quantity: LimitQuantity,
 }
 
@@ -69,14 +69,14 @@ impl JointLimits {
         NewtonMetre(min(self.torque.0, self.current.0 * abs(self.torque_per_ampere.0)))
     }
 
-    /// Deceleration the joint is counted on to reach. A motion whose acceleration stays below is never touched by the
-    /// stopping-distance clamp on its way to the end of the range.
+    /// Assumed deceleration of the joint. A motion with less acceleration is never limited on its way to the
+    /// end of the range.
     #[must_use]
     pub fn braking_acceleration(&self) -> RadianPerSecondSquared {
         RadianPerSecondSquared(BRAKING_SHARE * self.torque_cap().0 / self.inertia.0)
     }
 
-    /// With everything of it.
+    /// Adds all values to a checksum.
     #[must_use]
     pub fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { low, high, speed, torque, current, torque_per_ampere, inertia } = *self;
@@ -106,7 +106,7 @@ impl JointLimits {
 }
 
 impl<const N: usize> Limits<N> {
-    /// Limits that make sense, or the first joint and quantity that do not.
+    /// Validates the limits; the error names the first refused joint and quantity.
     pub fn new(joints: [JointLimits; N]) -> Result<Self, LimitsError> {
         for (joint, limits) in joints.iter().enumerate() {
             if let Some(quantity) = limits.absurd() {
@@ -138,7 +138,7 @@ pub(crate) mod tests {
         inertia: KilogramMetreSquared(5.5),
     };
 
-    /// The default leg's knee, turning against its drive.
+    /// The default leg's knee, with the opposite sign of its drive.
     pub(crate) const KNEE: JointLimits = JointLimits {
         low: Radian(-1.667),
         high: Radian(-0.12),
@@ -148,9 +148,9 @@ pub(crate) mod tests {
     };
 
     #[test]
-    fn absurd_limits_are_refused_and_joint_and_quantity_are_named() {
+    fn implausible_limits_are_refused_with_joint_and_quantity() {
         assert!(Limits::new([HIP, KNEE]).is_ok());
-        let absurd = [
+        let implausible = [
             (LimitQuantity::Range, JointLimits { low: Radian(1.0), ..HIP }),
             (LimitQuantity::Range, JointLimits { high: Radian(f32::NAN), ..HIP }),
             (LimitQuantity::Range, JointLimits { low: Radian(-100.0), ..HIP }),
@@ -166,7 +166,7 @@ pub(crate) mod tests {
             ),
             (LimitQuantity::Inertia, JointLimits { inertia: KilogramMetreSquared(0.0), ..HIP }),
         ];
-        for (quantity, limits) in absurd {
+        for (quantity, limits) in implausible {
             assert_eq!(Limits::new([HIP, limits]), Err(LimitsError { joint: 1, quantity }), "{limits:?}");
             assert_eq!(Limits::new([limits, HIP]), Err(LimitsError { joint: 0, quantity }), "{limits:?}");
         }

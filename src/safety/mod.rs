@@ -1,33 +1,34 @@
-//! What stands between a command and the bridge: limits, drive states and the monitor that decides last.
+//! Safety layer between controller and bridge: limits, drive states, and the monitor that decides last.
 //!
-//! Why a room of its own: it knows no controller, no model and no motion, so nothing that goes wrong there can talk
-//! it out of its limits. Once per servo tick it is shown what was measured and what is wanted; it answers what the
-//! drives are told. It is a pure function of its state and those two.
+//! Why a module of its own: it knows no controller, no model and no motion, so no error there can bypass the
+//! limits. Once per servo tick it receives the measurements and the request and returns the drive command.
+//! The result depends only on its state and these two inputs.
 //!
-//! | part | what it is |
+//! | part | purpose |
 //! | --- | --- |
-//! | [`Limits`] | what each joint may do; absurd ones are refused by name |
+//! | [`Limits`] | bounds of each joint; implausible values are refused by name |
 //! | [`DriveState`] | the states of CiA 402, one for the whole leg, and their transitions |
-//! | [`FaultCode`], [`Fault`], [`NoticeCode`] | what can go wrong, with fixed numbers and the safe state each leads to |
-//! | [`StepGate`] | encoder steps that no joint can make |
-//! | [`Barrier`] | torque bounds that stop a joint before its range and speed end |
-//! | [`DeratingRamps`], [`LimitCode`] | less before nothing, by temperature and bus voltage; codes that are no faults |
-//! | [`SupplyWatch`] | a supply that dies |
-//! | [`Monitor`] | all of it, once per tick |
-//! | [`RefusalReason`] | what stands against enabling |
-//! | [`Cause`], [`TickWatch`], [`ServoWatch`] | why nothing may be enabled, and what every current tick looks at |
-//! | [`CheckIns`], [`TickGuard`] | who has to have run before the watchdog is fed; current ticks that stop |
-//! | [`UpkeepClock`] | what is looked at every few milliseconds: gate drivers' registers, temperatures |
+//! | [`FaultCode`], [`Fault`], [`NoticeCode`] | faults with fixed numbers and the safe state of each |
+//! | [`StepGate`] | rejection of impossible encoder steps |
+//! | [`Barrier`] | torque bounds that stop a joint before its range or speed limit |
+//! | [`DeratingRamps`], [`LimitCode`] | derating by temperature and bus voltage; codes of active limits |
+//! | [`SupplyWatch`] | detection of a failing supply |
+//! | [`Monitor`] | all of the above, once per tick |
+//! | [`RefusalReason`] | reasons why enabling is refused |
+//! | [`Cause`], [`TickWatch`], [`ServoWatch`] | inhibit reasons, and the checks of every current tick |
+//! | [`CheckIns`], [`TickGuard`] | check-ins that the watchdog requires; stopped current ticks |
+//! | [`CheckClock`] | periodic checks: gate drivers' registers, temperatures |
 //!
-//! Safe states: *Off* releases the bridges in the same tick. *Damp* opposes every joint's velocity under its torque
-//! cap for at most 300 ms, then Off. *Limit* stays enabled with less than was asked for. An exoskeleton that goes limp
-//! may drop its wearer and one that holds may hurt him: the state is chosen per fault ([`FaultCode::reaction`]).
-//! Faults are latched until a reset is asked for, the drive is off and the cause is gone; the way back to a moving
-//! leg is shutdown, switch on, enable operation, each asked for by the operator.
+//! Safe states: *Off* turns the bridges' outputs off in the same tick. *Damp* opposes every joint's velocity
+//! under its torque cap for at most 300 ms, then goes to Off. *Limit* stays enabled with less torque than
+//! requested. A limp exoskeleton may drop its wearer and a stiff one may hurt him, so the state is chosen per
+//! fault ([`FaultCode::reaction`]). A fault stays latched until its cause is gone, the drive is off and a
+//! reset is requested. Then the operator enables in three steps: shutdown, switch on, enable operation.
 //!
-//! The monitor sees numbers that are not finite (N1), the range (J1), overspeed (J2), encoder steps (E2), and holds the torque
-//! and current caps; the axes see their own faults (`motor::Axis`), the interlock the board's. What is not built yet, and what
-//! was measured of the rest: docs/safety.md. No conformity with any safety standard is claimed.
+//! The monitor detects values that are not finite (N1), range (J1), overspeed (J2) and encoder steps (E2),
+//! and enforces the torque and current caps. The axes detect their own faults (`motor::Axis`), the interlock
+//! the board's. docs/safety.md lists what is not detected, docs/results/faults.md the measurements. No
+//! conformity with any safety standard is claimed.
 
 pub mod barrier;
 pub mod check_in;
@@ -36,10 +37,10 @@ pub mod fault;
 pub mod interlock;
 pub mod limits;
 pub mod monitor;
+pub mod periodic_checks;
 pub mod refusal;
 pub mod state;
 pub mod step_gate;
-pub mod upkeep;
 
 pub use barrier::{Barrier, Limited, RETURN_SPEED, RETURN_TORQUE};
 pub use check_in::{CheckIns, GUARD_RATE_HZ, TickGuard};
@@ -48,7 +49,7 @@ pub use fault::{Fault, FaultCode, NO_ERROR, NoticeCode, Reaction};
 pub use interlock::{Bridges, Cause, ServoWatch, TickState, TickWatch, stays_active};
 pub use limits::{JointLimits, LimitQuantity, Limits, LimitsError};
 pub use monitor::{Decision, Monitor, Observation, RANGE_TOLERANCE, Request};
+pub use periodic_checks::{BoardFault, CheckClock, of_gate_driver, of_temperature};
 pub use refusal::{Refusal, RefusalReason};
 pub use state::{DriveState, Event, Permission, PowerRequest};
 pub use step_gate::{Reading, StepGate};
-pub use upkeep::{BoardFault, UpkeepClock, of_gate_driver, of_temperature};

@@ -1,20 +1,22 @@
-//! The monitor: shown what was measured and what is wanted, it decides last in every tick.
+//! The monitor decides last in every tick, from the measurements and the request.
 //!
-//! Why last: whatever a controller, a model or a bus produces, only what leaves [`Monitor::decide`] reaches the
-//! bridge. One tick runs detectors, state, bounds, in this order:
+//! Why last: only the output of [`Monitor::decide`] reaches the bridge, whatever a controller, a model or a
+//! bus requests. One tick runs in this order:
 //!
-//! 1. Detect, or hear of ([`Monitor::report`]). Anything measured or wanted that is not finite; encoder readings rejected three times in 10 ms; while
-//!    the drive is on, more than 1.1 times the speed limit or 0.5 degrees beyond the range.
-//! 2. Move the state ([`DriveState::after`]): a fault, or the tick and then the operator's request. To enable, the
-//!    joints must stand within range and speed, or the request is refused with its reason ([`RefusalReason`]).
+//! 1. Detect faults, or take reported ones ([`Monitor::report`]): a measured or requested value that is not
+//!    finite; three encoder readings rejected in 10 ms. While the drive is on also 1.1 times the speed limit,
+//!    and 0.5 degrees beyond the range.
+//! 2. Update the state ([`DriveState::after`]): a fault, or the tick and then the operator's request.
+//!    Enabling requires the joints to be within range and speed; otherwise the request is refused with its
+//!    reason ([`RefusalReason`]).
+//! 3. Apply the state's permission: off, damp, or the requested torque within the bounds of [`Barrier`].
+//! 4. Convert torque to current. A current that is not finite turns the bridges off.
 //!
-//! **The way back.** A leg that is released falls, and may come to rest outside its range. Such a joint is enabled unless
-//! [`Monitor::permit_return`] forbids it, and returns: nothing drives it farther out, little drives it back ([`Barrier::bound`]). How far out it may
-//! stand follows it inwards, and half a degree beyond that is the same fault as leaving the range. From 0.1 degrees on it is
-//! inside and has its usual bounds.
-//!
-//! 3. Permission of the state: released, damp, or the wanted torque within the bounds of [`Barrier`].
-//! 4. Torque to current, and a last look: a current that is not finite releases the bridges.
+//! **Returning.** A leg without torque falls and may come to rest outside its range. Such a joint is enabled
+//! unless [`Monitor::permit_return`] forbids it, and then returns: no torque drives it farther out, and a
+//! reduced one drives it back ([`Barrier::bound`]). Its permitted end follows it inwards. Half a degree
+//! beyond that end is the fault of leaving the range. Within 0.1 degrees of its range a joint counts as
+//! inside again, with its usual bounds.
 //!
 //! Cost: about 60 operations and two square roots per joint.
 
@@ -29,23 +31,24 @@ use crate::hal::DriveCommand;
 use crate::real::{max, min};
 use crate::units::{Ampere, NewtonMetre, Radian, RadianPerSecond};
 
-/// Damping lasts this long at most.
+/// Longest damping.
 const DAMP_MS: u32 = 300;
-/// Rejected readings are counted over this time.
+/// Window in which rejected readings are counted.
 const GLITCH_WINDOW_MS: u32 = 10;
-/// So many rejected readings within the window are a fault.
+/// Rejected readings within the window that are a fault.
 const GLITCHES_FOR_FAULT: u32 = 3;
-/// A joint is too fast above this multiple of its speed limit.
+/// Multiple of the speed limit above which a joint is too fast.
 const OVERSPEED_FACTOR: f32 = 1.1;
-/// A joint is out of its range beyond this much (0.5 degrees).
+/// Distance beyond the range that is a fault (0.5 degrees).
 pub const RANGE_TOLERANCE: Radian = Radian(0.008_727);
-/// A joint farther out of its range than this (15 degrees) is not enabled to return: end stops hold it nearer, so its
-/// angle is wrong, as on a leg of the other side.
+/// Largest distance beyond the range from which a joint may return (15 degrees). End stops hold it nearer, so
+/// a larger angle is wrong, as on a leg of the other side.
 const RETURN_REACH: Radian = Radian(0.262);
-/// A joint that returns is inside from this far on (0.1 degrees), where its usual bounds ask for no jump.
+/// Distance from the range at which a returning joint counts as inside (0.1 degrees). From there its usual
+/// bounds cause no torque step.
 const RETURNED: Radian = Radian(0.001_745);
 
-/// What the sensors say about `N` joints, in the model's angle and sign.
+/// Measurements of `N` joints, in the model's angle and sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation<const N: usize> {
     /// Joint angles.
@@ -54,35 +57,35 @@ pub struct Observation<const N: usize> {
     pub velocity: [RadianPerSecond; N],
     /// Measured motor currents, in the drive's sign.
     pub current: [Ampere; N],
-    /// The encoder reading of this tick was impossible and not used.
+    /// Encoder readings of this tick that were impossible and not used.
     pub rejected: [bool; N],
 }
 
-/// What is wanted of the drives at one tick.
+/// Requested torques and state change of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request<const N: usize> {
     /// Joint torques in the model's sign.
     pub torque: [NewtonMetre; N],
-    /// What the operator asks for, at the one tick at which it is asked.
+    /// Request of the operator, given in one tick only.
     pub power: Option<PowerRequest>,
 }
 
-/// What the monitor decided at one tick.
+/// Decision of the monitor at one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision<const N: usize> {
-    /// For the drives, and final.
+    /// Final command to the drives.
     pub command: DriveCommand<N>,
-    /// The state that permitted it.
+    /// State that permitted the command.
     pub state: DriveState,
-    /// Torques behind the command, model's sign; zero where released.
+    /// Torques of the command in the model's sign; zero where off.
     pub torque: [NewtonMetre; N],
-    /// What was taken from the request.
+    /// Limits that reduced the request.
     pub limited: [Limited; N],
-    /// A fault that a detector saw at this very tick.
+    /// Fault detected at this tick.
     pub fault: Option<Fault>,
     /// Why a request to enable was refused at this tick.
     pub refused: Option<Refusal>,
-    /// Joints that return into their range.
+    /// Joints that are returning into their range.
     pub returns: [bool; N],
 }
 
@@ -93,23 +96,23 @@ pub struct Monitor<const N: usize> {
     barriers: [Barrier; N],
     ampere_per_nm: [f32; N],
     derating: Derating,
-    /// 1.1 times the speed limits, rad/s; ends of the ranges with their tolerance.
+    /// 1.1 times the speed limits, rad/s. Below: ends of the ranges with their tolerance.
     fault_speed: [f32; N],
     fault_range: [[Radian; 2]; N],
     damp_ticks: u32,
     glitch_window: u64,
     glitches: [u64; N],
-    /// Seen elsewhere, for the next tick.
+    /// Fault reported for the next tick.
     reported: Option<Fault>,
-    /// How far out a joint that returns may stand.
+    /// Permitted ends of a returning joint.
     returns: [Option<[Radian; 2]>; N],
     may_return: [bool; N],
     state: DriveState,
 }
 
 impl<const N: usize> Monitor<N> {
-    /// A monitor that decides `rate_hz` times per second (100..=6,400, so that 10 ms are 1 to 64 ticks; a rate
-    /// outside counts as the nearest).
+    /// A monitor for `rate_hz` decisions per second, 100..=6,400, so that 10 ms are 1 to 64 ticks. A rate
+    /// outside is replaced by the nearest.
     #[must_use]
     pub fn new(limits: Limits<N>, rate_hz: u32) -> Self {
         let rate_hz = rate_hz.clamp(100, 6400);
@@ -133,7 +136,7 @@ impl<const N: usize> Monitor<N> {
         }
     }
 
-    /// Over everything that does not change: limits, what follows from them, times.
+    /// Checksum over all constants: limits, values derived from them, times.
     #[must_use]
     pub fn checksum(&self) -> Checksum {
         let limits = self.limits.joints().iter().fold(Checksum::EMPTY, |sum, joint| joint.add_to(sum));
@@ -146,14 +149,15 @@ impl<const N: usize> Monitor<N> {
             .word(self.glitch_window as u32)
     }
 
-    /// Something else saw a fault: it is decided upon at the next tick, like those of the monitor's own detectors.
+    /// Reports a fault from outside; the next tick treats it like one of the monitor's own detectors. One
+    /// whose reaction is Off is not replaced.
     pub fn report(&mut self, fault: Fault) {
         if self.reported.is_none_or(|before| before.code.reaction() != Reaction::Off) {
             self.reported = Some(fault);
         }
     }
 
-    /// What temperature and bus voltage leave of the torque cap from the next tick on.
+    /// Sets the derating of the torque cap from the next tick on.
     pub fn derate(&mut self, derating: &Derating) {
         if self.derating != *derating {
             self.derating = *derating;
@@ -161,18 +165,18 @@ impl<const N: usize> Monitor<N> {
         }
     }
 
-    /// Joints that may be enabled outside their range; all of them unless this says otherwise.
+    /// Selects the joints that may be enabled outside their range; all by default.
     pub const fn permit_return(&mut self, joints: [bool; N]) {
         self.may_return = joints;
     }
 
-    /// Joints that return into their range.
+    /// Joints that are returning into their range.
     #[must_use]
     pub fn returns(&self) -> [bool; N] {
         self.returns.map(|ends| ends.is_some() && self.state == DriveState::OperationEnabled)
     }
 
-    /// Codes of what a decision took from each joint.
+    /// Codes of the limits that a decision applied to each joint.
     #[must_use]
     pub fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
         core::array::from_fn(|joint| {
@@ -180,19 +184,19 @@ impl<const N: usize> Monitor<N> {
         })
     }
 
-    /// Where the drive stands.
+    /// State of the drive.
     #[must_use]
     pub fn state(&self) -> DriveState {
         self.state
     }
 
-    /// What each joint may do.
+    /// Limits of each joint.
     #[must_use]
     pub fn limits(&self) -> &Limits<N> {
         &self.limits
     }
 
-    /// Drive off and no reading rejected, as after the start.
+    /// Resets to the state after start: drive off, no rejected reading.
     pub const fn restart(&mut self) {
         (self.state, self.glitches) = (DriveState::NotReadyToSwitchOn, [0; N]);
         self.returns = [None; N];
@@ -259,7 +263,7 @@ impl<const N: usize> Monitor<N> {
         decision
     }
 
-    /// The first fault of this tick; what is not finite comes before everything else.
+    /// First fault of this tick; values that are not finite come before everything else.
     fn detect(&mut self, observation: &Observation<N>, request: &Request<N>) -> Option<Fault> {
         let fault = |code, joint: usize| Some(Fault { code, joint: joint as u8 });
         for joint in 0..N {
@@ -288,7 +292,7 @@ impl<const N: usize> Monitor<N> {
                 let position = observation.position[joint];
                 let is_outside = match self.returns[joint] {
                     None => !self.in_range(joint, position),
-                    // A stop is under way already.
+                    // The leg is already stopping.
                     Some(_) if permission != Permission::Follow => false,
                     Some(ends) => self.goes_on_out(joint, position, ends),
                 };
@@ -323,7 +327,7 @@ impl<const N: usize> Monitor<N> {
         position >= ends.low - RETURN_REACH && position <= ends.high + RETURN_REACH
     }
 
-    /// What the joints may do from here on that stand outside.
+    /// Sets the permitted ends of the joints that are outside their range.
     fn begin_return(&mut self, observation: &Observation<N>) {
         for joint in 0..N {
             let position = observation.position[joint];
@@ -334,7 +338,7 @@ impl<const N: usize> Monitor<N> {
         }
     }
 
-    /// Whether a joint that returns moves out instead; what it came nearer by is not given back.
+    /// Returns whether a returning joint moves outwards instead. Its permitted end only ever moves inwards.
     fn goes_on_out(&mut self, joint: usize, position: Radian, [low, high]: [Radian; 2]) -> bool {
         let ends = &self.limits.joints()[joint];
         let is_back = position >= ends.low - RETURNED && position <= ends.high + RETURNED;

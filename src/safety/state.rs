@@ -15,35 +15,35 @@
 //!          |   +------------------------+   +-- operation --+
 //!          +------------ shutdown ---------------------------
 //!
-//!   any ---- fault, drive off or reaction Off ----------------------------> Fault --- reset ---> SwitchOnDisabled
+//!   any ---- fault, drive off or reaction Off -----------------------> Fault --- reset ---> SwitchOnDisabled
 //!   OperationEnabled, QuickStopActive --- fault ---> FaultReactionActive --- 300 ms over ---^
 //! ```
 //!
-//! Source: CiA 402-2 (IEC 61800-7-201), the state machine of the power drive system. Its optional way back from
-//! QuickStopActive to OperationEnabled is not offered: after a quick stop the operator starts over.
-//! A request that has no arrow from the present state changes nothing.
+//! Source: CiA 402-2 (IEC 61800-7-201), the state machine of the power drive system. Its optional transition
+//! from QuickStopActive back to OperationEnabled is not offered: after a quick stop the operator starts over.
+//! A request without an arrow from the present state changes nothing.
 
 use super::fault::{Fault, Reaction};
 
-/// Where the drive of a leg stands.
+/// State of a leg's drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveState {
     /// Before the first tick without a fault.
     NotReadyToSwitchOn,
-    /// Off; waits for a shutdown request, the first of the three that enable.
+    /// Off; waits for shutdown, the first of the three requests that enable.
     SwitchOnDisabled,
     /// Off; may be switched on.
     ReadyToSwitchOn,
     /// Still off; may be enabled.
     SwitchedOn,
-    /// The joints follow what they are told.
+    /// The joints follow their commands.
     OperationEnabled,
-    /// Damping on request, then off.
+    /// Damps on request, then turns off.
     QuickStopActive {
         /// Ticks of damping left, this one included.
         remaining_ticks: u32,
     },
-    /// Damping because of a fault, then off.
+    /// Damps because of a fault, then turns off.
     FaultReactionActive {
         /// The first fault.
         fault: Fault,
@@ -57,7 +57,7 @@ pub enum DriveState {
     },
 }
 
-/// What an operator asks of the drive, once, at one tick.
+/// Request of the operator, effective at one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PowerRequest {
     /// Control word 6.
@@ -77,37 +77,37 @@ pub enum PowerRequest {
 }
 
 impl PowerRequest {
-    /// A step towards enabled.
+    /// Returns whether the request is a step towards enabled.
     #[must_use]
     pub const fn enables(self) -> bool {
         matches!(self, Self::Shutdown | Self::SwitchOn | Self::EnableOperation)
     }
 }
 
-/// What moves the state.
+/// Event that may change the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A tick went by without a new fault.
+    /// A tick without a new fault.
     Tick,
-    /// The operator asked.
+    /// A request of the operator.
     Asked(PowerRequest),
-    /// A detector fired.
+    /// A detected fault.
     Failed(Fault),
 }
 
-/// What the drive may do in a state.
+/// Operation that a state permits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Permission {
-    /// Bridges released.
+    /// Outputs off.
     Released,
-    /// Follow the request within limits.
+    /// Follow the request within the limits.
     Follow,
-    /// Damp, whatever is requested.
+    /// Damp regardless of the request.
     Damp,
 }
 
 impl DriveState {
-    /// What the drive may do.
+    /// Operation that this state permits.
     #[must_use]
     #[inline]
     pub const fn permission(self) -> Permission {
@@ -118,7 +118,7 @@ impl DriveState {
         }
     }
 
-    /// The fault that is latched or being reacted to.
+    /// The latched fault, or the one being reacted to.
     #[must_use]
     pub const fn fault(self) -> Option<Fault> {
         match self {
@@ -169,8 +169,8 @@ impl DriveState {
         }
     }
 
-    /// The first fault stays the one that is told. Damping is never prolonged: a fault during a quick stop or during
-    /// another fault's reaction has the ticks that are left.
+    /// The first fault remains the reported one. Damping is never prolonged: a fault during a quick stop or
+    /// during another fault's reaction uses the remaining ticks.
     const fn after_fault(self, fault: Fault, damp_ticks: u32) -> Self {
         let first = match self.fault() {
             Some(first) => first,
@@ -219,8 +219,9 @@ mod tests {
     ];
 
     #[test]
-    fn every_request_in_every_state_does_what_cia_402_says() {
-        // Rows: the states above; columns: the requests above; entries: index of the next state, "." for none.
+    fn every_request_in_every_state_follows_cia_402() {
+        // Rows: the states above. Columns: the requests above. Entries: index of the next state, "." for no
+        // change.
         let table = [
             ". . . . . . .", //
             "2 . . . . . .",
@@ -244,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn operation_is_enabled_only_by_shutdown_switch_on_enable_in_this_order() {
+    fn only_shutdown_switch_on_enable_in_this_order_enables() {
         // Every sequence of three requests from switch-on disabled.
         let mut ways = 0;
         for first in REQUESTS {
@@ -269,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_damps_an_enabled_drive_for_its_time_and_leaves_a_disabled_one_off() {
+    fn a_fault_damps_an_enabled_drive_and_keeps_a_disabled_one_off() {
         for state in STATES {
             let failed = state.after(Event::Failed(OVERSPEED), DAMP_TICKS);
             let expected = match state {
@@ -288,7 +289,7 @@ mod tests {
         let mut damped = 0;
         while state.permission() == Permission::Damp {
             damped += 1;
-            // A second fault on the way neither prolongs the damping nor replaces the first.
+            // A second fault neither prolongs the damping nor replaces the first.
             let later = Fault { code: FaultCode::PositionLimit, joint: 0 };
             let event = if damped == 100 { Event::Failed(later) } else { Event::Tick };
             state = state.after(event, DAMP_TICKS);

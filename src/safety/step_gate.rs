@@ -1,19 +1,19 @@
-//! Encoder readings that no joint can have made.
+//! Rejection of encoder readings that no joint can have made.
 //!
-//! A joint below its greatest speed moves a known number of counts per tick. A reading farther from the last good one
-//! is rejected, and the observer runs on without it; the third in a row is believed after all, as the new place from
-//! which to measure, because a counter that has jumped for good must not blind the damping that follows. Three
-//! rejected readings within 10 ms are a fault ([`super::FaultCode::EncoderStep`]), so nobody moves on such a place
+//! A joint below its speed limit moves a known number of counts per tick. A reading farther from the last
+//! good one is rejected, and the observer runs on without it. The third in a row is accepted as the new
+//! reference, because a permanent jump must not disable the damping that follows. Three rejected readings
+//! within 10 ms are a fault ([`super::FaultCode::EncoderStep`]), so no motion continues on such a count
 //! without a reset. Counts wrap; differences are taken modulo 2^32.
 
-/// What to do with a reading.
+/// Verdict on a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
-    /// A step the joint can make.
+    /// The joint can make this step.
     Good,
-    /// Not possible; to be ignored.
+    /// Impossible step; ignore the reading.
     Rejected,
-    /// Not possible, but the third in a row: the count jumped, and is counted from here.
+    /// Impossible, but the third in a row: the counter jumped, and counting continues from here.
     Jumped,
 }
 
@@ -26,25 +26,25 @@ pub struct StepGate {
 }
 
 impl StepGate {
-    /// The greatest step between two ticks is `largest_step` counts.
+    /// A gate that accepts up to `largest_step` counts between two ticks.
     #[must_use]
     pub const fn new(largest_step: u32) -> Self {
         Self { largest_step, last: None, rejected: 0 }
     }
 
-    /// Nothing was read yet.
+    /// Forgets all readings.
     pub const fn restart(&mut self) {
         (self.last, self.rejected) = (None, 0);
     }
 
-    /// The same place has another count now.
+    /// Shifts the reference: the same position now has a count larger by `counts`.
     pub const fn shift(&mut self, counts: i32) {
         if let Some(last) = self.last {
             self.last = Some(last.wrapping_add(counts));
         }
     }
 
-    /// Judges one reading; the first is good.
+    /// Checks one reading; the first is always good.
     #[must_use]
     pub fn judge(&mut self, counts: i32) -> Reading {
         let step = counts.wrapping_sub(self.last.unwrap_or(counts)).unsigned_abs();
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_single_glitch_of_any_size_is_rejected_and_the_motion_goes_on() {
+    fn a_single_glitch_of_any_size_is_rejected_and_motion_continues() {
         for glitch in [101, 5000, i32::MAX, -101, i32::MIN] {
             let mut gate = StepGate::new(100);
             assert_eq!(gate.judge(0), Reading::Good);
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn wrapping_counts_are_no_glitch() {
+    fn wrapping_counts_are_not_rejected() {
         for offset in (i32::MAX - 500..=i32::MAX).step_by(7) {
             let mut gate = StepGate::new(100);
             for tick in 0..20 {
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_that_stays_is_taken_as_the_new_place_at_its_third_reading() {
+    fn a_lasting_jump_is_accepted_at_its_third_reading() {
         let mut gate = StepGate::new(100);
         let readings = [0, 9000, 9001, 9002, 9003].map(|counts| gate.judge(counts));
         use Reading::{Good, Jumped, Rejected};
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_zero_of_the_counts_is_no_step() {
+    fn a_shifted_zero_is_not_a_step() {
         for shift in [1_000_000, -1_000_000, i32::MIN] {
             let mut gate = StepGate::new(100);
             assert_eq!(gate.judge(50), Reading::Good);

@@ -22,7 +22,7 @@
 //!
 //! Reading may write as well. The first read that finds a write cut off by a power loss repairs it
 //! (`MapStorage::fetch_item`: a sector is erased, records are copied). A board therefore reads at its start,
-//! before any bridge may switch; its flash refuses all other accesses (docs/store.md).
+//! before any bridge may switch; its flash refuses all other accesses (docs/files.md).
 //!
 //! **Wear.** An unchanged value is not written again. A sector is erased once per some 120 KB of records;
 //! measured in `tests/store.rs`.

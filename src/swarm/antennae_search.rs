@@ -18,7 +18,7 @@ use crate::real::{Real, sign, sqrt};
 use super::objective::{Objective, SwarmError, not_negative, positive};
 use super::random::Random;
 use super::rows::{add_scaled, dot, live, live_mut, scale};
-use super::search::{Best, Ledger, Search};
+use super::search::{Best, Search, SearchProgress};
 
 /// Constants of the antennae search; the default is the paper's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +57,7 @@ enum Stage<T> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bas<T: Real, const D: usize> {
     settings: BasSettings<T>,
-    ledger: Ledger<T, D>,
+    progress: SearchProgress<T, D>,
     random: Random,
     /// Position in the objective's units, inside the box.
     position: [T; D],
@@ -77,16 +77,16 @@ impl<T: Real, const D: usize> Bas<T, D> {
         not_negative("step_decay", settings.step_decay)?;
         not_negative("step_offset", settings.step_offset)?;
         positive("step_per_whisker", settings.step_per_whisker)?;
-        let ledger = Ledger::<T, D>::open(objective)?;
+        let progress = SearchProgress::<T, D>::open(objective)?;
         let mut random = Random::new(seed);
         let mut point = [T::zero(); D];
-        for entry in live_mut(&mut point, ledger.dimension()) {
+        for entry in live_mut(&mut point, progress.dimension()) {
             *entry = random.uniform();
         }
-        let position = ledger.place(&point);
+        let position = progress.place(&point);
         Ok(Self {
             settings,
-            ledger,
+            progress,
             random,
             position,
             direction: [T::zero(); D],
@@ -97,7 +97,7 @@ impl<T: Real, const D: usize> Bas<T, D> {
 
     /// Draws a direction by Eq. (23). Should all entries be zero, the iteration has no effect.
     fn turn(&mut self) {
-        let direction = live_mut(&mut self.direction, self.ledger.dimension());
+        let direction = live_mut(&mut self.direction, self.progress.dimension());
         for entry in direction.iter_mut() {
             *entry = self.random.signed();
         }
@@ -110,31 +110,33 @@ impl<T: Real, const D: usize> Bas<T, D> {
     /// Position moved by a signed length along the direction, then to the nearest point of the box.
     fn shifted(&self, length: T) -> [T; D] {
         let mut position = self.position;
-        let dimension = self.ledger.dimension();
+        let dimension = self.progress.dimension();
         add_scaled(live_mut(&mut position, dimension), length, live(&self.direction, dimension));
-        self.ledger.nearest(position)
+        self.progress.nearest(position)
     }
 
     fn step(&mut self, objective: &impl Objective<T>) {
         let whisker = self.step_length / self.settings.step_per_whisker;
         self.stage = match self.stage {
             Stage::Place => {
-                self.ledger.evaluate_position(objective, self.position);
+                self.progress.evaluate_position(objective, self.position);
                 Stage::LeftWhisker
             }
             Stage::LeftWhisker => {
                 self.turn();
-                Stage::RightWhisker { left: self.ledger.evaluate_position(objective, self.shifted(whisker)) }
+                Stage::RightWhisker {
+                    left: self.progress.evaluate_position(objective, self.shifted(whisker)),
+                }
             }
             Stage::RightWhisker { left } => {
-                let right = self.ledger.evaluate_position(objective, self.shifted(-whisker));
+                let right = self.progress.evaluate_position(objective, self.shifted(-whisker));
                 Stage::Move { smell: sign(left - right) }
             }
             Stage::Move { smell } => {
                 self.position = self.shifted(-self.step_length * smell);
-                self.ledger.evaluate_position(objective, self.position);
+                self.progress.evaluate_position(objective, self.position);
                 self.step_length = self.settings.step_decay * self.step_length + self.settings.step_offset;
-                self.ledger.close_iteration();
+                self.progress.close_iteration();
                 Stage::LeftWhisker
             }
         };
@@ -143,7 +145,7 @@ impl<T: Real, const D: usize> Bas<T, D> {
 
 impl<T: Real, const D: usize> Search<T> for Bas<T, D> {
     fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32 {
-        if !self.ledger.accepts(objective) {
+        if !self.progress.accepts(objective) {
             return 0;
         }
         for _ in 0..evaluations {
@@ -152,13 +154,13 @@ impl<T: Real, const D: usize> Search<T> for Bas<T, D> {
         evaluations
     }
     fn best(&self) -> Option<Best<'_, T>> {
-        self.ledger.best()
+        self.progress.best()
     }
     fn iterations(&self) -> u32 {
-        self.ledger.iterations()
+        self.progress.iterations()
     }
     fn evaluations(&self) -> u32 {
-        self.ledger.evaluations()
+        self.progress.evaluations()
     }
 }
 

@@ -14,7 +14,7 @@ use super::objective::{Objective, SwarmError, not_negative};
 use super::particles::{InertiaWeight, Particles, VelocityRule};
 use super::random::Random;
 use super::rows::clip_to_box;
-use super::search::{Best, Ledger, Search};
+use super::search::{Best, Search, SearchProgress};
 
 /// Constants of the particle swarm; the default is the paper's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +44,7 @@ impl<T: Real> Default for PsoSettings<T> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pso<T: Real, const N: usize, const D: usize> {
     settings: PsoSettings<T>,
-    ledger: Ledger<T, D>,
+    progress: SearchProgress<T, D>,
     random: Random,
     particles: Particles<T, N, D>,
     /// Values found by the moves of the current iteration.
@@ -66,18 +66,18 @@ impl<T: Real, const N: usize, const D: usize> Pso<T, N, D> {
         not_negative("individual_learning", settings.individual_learning)?;
         not_negative("global_learning", settings.global_learning)?;
         not_negative("velocity_limit", settings.velocity_limit)?;
-        let ledger = Ledger::open(objective)?;
+        let progress = SearchProgress::open(objective)?;
         let mut random = Random::new(seed);
-        let mut particles = Particles::new(ledger.dimension());
+        let mut particles = Particles::new(progress.dimension());
         particles.scatter(&mut random);
-        Ok(Self { settings, ledger, random, particles, found: [T::zero(); N], next: 0, scattered: true })
+        Ok(Self { settings, progress, random, particles, found: [T::zero(); N], next: 0, scattered: true })
     }
 
     fn step(&mut self, objective: &impl Objective<T>) {
         let particle = self.next.min(N - 1);
         if !self.scattered {
             let rule = VelocityRule {
-                inertia_weight: self.settings.inertia_weight.at(self.ledger.iterations()),
+                inertia_weight: self.settings.inertia_weight.at(self.progress.iterations()),
                 individual_learning: self.settings.individual_learning,
                 global_learning: self.settings.global_learning,
                 limit: self.settings.velocity_limit,
@@ -88,7 +88,7 @@ impl<T: Real, const N: usize, const D: usize> Pso<T, N, D> {
                 *entry = clip_to_box(*entry + speed);
             }
         }
-        self.found[particle] = self.ledger.evaluate(objective, &self.particles.position[particle]);
+        self.found[particle] = self.progress.evaluate(objective, &self.particles.position[particle]);
         self.next = particle + 1;
         if self.next == N {
             self.close_iteration();
@@ -100,7 +100,7 @@ impl<T: Real, const N: usize, const D: usize> Pso<T, N, D> {
             self.particles.record(particle, self.found[particle]);
         }
         if !self.scattered {
-            self.ledger.close_iteration();
+            self.progress.close_iteration();
         }
         self.scattered = false;
         self.next = 0;
@@ -109,7 +109,7 @@ impl<T: Real, const N: usize, const D: usize> Pso<T, N, D> {
 
 impl<T: Real, const N: usize, const D: usize> Search<T> for Pso<T, N, D> {
     fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32 {
-        if !self.ledger.accepts(objective) {
+        if !self.progress.accepts(objective) {
             return 0;
         }
         for _ in 0..evaluations {
@@ -118,13 +118,13 @@ impl<T: Real, const N: usize, const D: usize> Search<T> for Pso<T, N, D> {
         evaluations
     }
     fn best(&self) -> Option<Best<'_, T>> {
-        self.ledger.best()
+        self.progress.best()
     }
     fn iterations(&self) -> u32 {
-        self.ledger.iterations()
+        self.progress.iterations()
     }
     fn evaluations(&self) -> u32 {
-        self.ledger.evaluations()
+        self.progress.evaluations()
     }
 }
 

@@ -1,7 +1,7 @@
-//! Common interface of the searches, and the ledger with their box, best value and counts.
+//! Common interface of the searches, and their progress: box, best value and counts.
 //!
-//! Why a ledger: three rules hold for every search, so they are written once. No evaluation leaves the box, a
-//! cost that is not finite is dropped, and the best so far is available whenever a run is cancelled.
+//! Why: three rules hold for every search, so they are written once. No evaluation leaves the box, a cost
+//! that is not finite is dropped, and the best so far is available whenever a run is cancelled.
 //!
 //! Vocabulary: searches walk in box coordinates u, 0..1 per coordinate; the objective sees
 //! x = low + (high - low) clip(u, 0, 1), limited to low..high once more against rounding.
@@ -59,7 +59,7 @@ pub trait Search<T: Real> {
 
 /// Box, best value and counts of one search.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Ledger<T, const D: usize> {
+pub(super) struct SearchProgress<T, const D: usize> {
     dimension: usize,
     low: [T; D],
     high: [T; D],
@@ -70,7 +70,7 @@ pub(super) struct Ledger<T, const D: usize> {
     iterations: u32,
 }
 
-impl<T: Real, const D: usize> Ledger<T, D> {
+impl<T: Real, const D: usize> SearchProgress<T, D> {
     /// Reads and checks the objective's box.
     pub fn open(objective: &impl Objective<T>) -> Result<Self, SwarmError> {
         let dimension = objective.dimension();
@@ -80,7 +80,7 @@ impl<T: Real, const D: usize> Ledger<T, D> {
         if dimension > D {
             return Err(SwarmError::DimensionAboveCapacity { dimension, capacity: D });
         }
-        let mut ledger = Self {
+        let mut progress = Self {
             dimension,
             low: [T::zero(); D],
             high: [T::zero(); D],
@@ -90,7 +90,7 @@ impl<T: Real, const D: usize> Ledger<T, D> {
             iterations: 0,
         };
         for (coordinate, (low, high)) in
-            ledger.low.iter_mut().zip(&mut ledger.high).take(dimension).enumerate()
+            progress.low.iter_mut().zip(&mut progress.high).take(dimension).enumerate()
         {
             (*low, *high) = objective.bounds(coordinate);
             let finite = is_finite(*low) && is_finite(*high) && is_finite(*high - *low);
@@ -98,7 +98,7 @@ impl<T: Real, const D: usize> Ledger<T, D> {
                 return Err(SwarmError::Bounds { coordinate });
             }
         }
-        Ok(ledger)
+        Ok(progress)
     }
 
     /// Number of coordinates, 1..=D.
@@ -167,7 +167,7 @@ impl<T: Real, const D: usize> Ledger<T, D> {
     }
 }
 
-/// True if a value returned by the ledger was finite.
+/// True if a value returned by the progress was finite.
 pub(super) fn is_usable<T: Real>(value: T) -> bool {
     value < T::LARGEST
 }

@@ -22,8 +22,8 @@ use heapless::spsc::{Consumer, Producer, Queue};
 
 use super::SIGNALS;
 use super::leg::{BASE, JOINTS};
-use crate::bus::identification::Found;
-use crate::bus::station::Station;
+use crate::bus::device::Device;
+use crate::bus::identification::ResultsCopy;
 use crate::hal::{Frame, Hardware};
 use crate::operation::{BusEnds, BusQueues, BusRound, Handover, HostEnds, Keep};
 use crate::place::{each, fill};
@@ -33,24 +33,24 @@ use crate::store::KeptModel;
 pub const LOG: usize = 192;
 
 /// Nodes and axes of this board.
-pub type BoardStation = Station<JOINTS, LOG>;
+pub type BoardDevice = Device<JOINTS, LOG>;
 /// Results of this board's leg.
-pub type BoardFound = Found<JOINTS, BASE>;
+pub type BoardResults = ResultsCopy<JOINTS, BASE>;
 
 /// Queues of the bus, and buffers that are lent.
 pub struct Memory {
     queues: BusQueues<JOINTS>,
-    found: Queue<&'static mut BoardFound, 2>,
-    spare: Queue<&'static mut BoardFound, 2>,
+    found: Queue<&'static mut BoardResults, 2>,
+    spare: Queue<&'static mut BoardResults, 2>,
     accepted: Queue<KeptModel<JOINTS>, 2>,
-    results: [BoardFound; 2],
+    results: [BoardResults; 2],
     storage: Handover<Keep<JOINTS>>,
 }
 
 /// The identification's end of the queues.
 pub struct ThreadEnd {
-    found: Producer<'static, &'static mut BoardFound>,
-    spare: Consumer<'static, &'static mut BoardFound>,
+    found: Producer<'static, &'static mut BoardResults>,
+    spare: Consumer<'static, &'static mut BoardResults>,
     accepted: Producer<'static, KeptModel<JOINTS>>,
 }
 
@@ -64,10 +64,10 @@ pub struct KeeperEnd {
 
 /// State of level 5.
 pub struct BusLoop {
-    station: &'static mut BoardStation,
-    fresh: Consumer<'static, &'static mut BoardFound>,
-    spare: Producer<'static, &'static mut BoardFound>,
-    found: &'static mut BoardFound,
+    device: &'static mut BoardDevice,
+    fresh: Consumer<'static, &'static mut BoardResults>,
+    spare: Producer<'static, &'static mut BoardResults>,
+    found: &'static mut BoardResults,
     round: BusRound,
     ends: BusEnds<'static, JOINTS>,
     storage: &'static Handover<Keep<JOINTS>>,
@@ -90,14 +90,14 @@ impl Memory {
                 accepted: Queue::new(),
                 storage: Handover::new(Keep::NOTHING),
             },
-            { results: |results| each(results, BoardFound::nothing) }
+            { results: |results| each(results, BoardResults::nothing) }
         )
     }
 
     /// Returns all ends; the frames' first.
     pub fn split(
         &'static mut self,
-        station: &'static mut BoardStation,
+        device: &'static mut BoardDevice,
     ) -> (Producer<'static, Frame>, HostEnds<'static, JOINTS>, ThreadEnd, KeeperEnd, BusLoop) {
         let (frames_in, servo, ends) = self.queues.split();
         let ((found_in, fresh), (mut spare, spare_out)) = (self.found.split(), self.spare.split());
@@ -105,7 +105,7 @@ impl Memory {
         let [found, other] = &mut self.results;
         let _ = spare.enqueue(other);
         let storage: &'static Handover<Keep<JOINTS>> = &self.storage;
-        let bus = BusLoop { station, fresh, spare, found, round: BusRound::new(), ends, storage };
+        let bus = BusLoop { device, fresh, spare, found, round: BusRound::new(), ends, storage };
         let thread = ThreadEnd { found: found_in, spare: spare_out, accepted: accepted_in };
         (frames_in, servo, thread, KeeperEnd { storage, accepted }, bus)
     }
@@ -113,7 +113,7 @@ impl Memory {
 
 impl ThreadEnd {
     /// Replaces the results that the bus answers with; returns whether a buffer was free.
-    pub fn publish(&mut self, fill: impl FnOnce(&mut BoardFound)) -> bool {
+    pub fn publish(&mut self, fill: impl FnOnce(&mut BoardResults)) -> bool {
         let Some(found) = self.spare.dequeue() else { return false };
         fill(found);
         self.found.enqueue(found).is_ok()
@@ -131,7 +131,7 @@ impl BusLoop {
             let _ = self.spare.enqueue(core::mem::replace(&mut self.found, fresh));
         }
         self.found.search = SIGNALS.statistics.search.each_ref().map(|count| count.get());
-        self.round.round(self.station, &mut self.ends, self.storage, &SIGNALS, hardware, &*self.found);
+        self.round.round(self.device, &mut self.ends, self.storage, &SIGNALS, hardware, &*self.found);
     }
 }
 

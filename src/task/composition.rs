@@ -155,7 +155,7 @@ fn join(
     let [low, middle, high] = identity.unique;
     let told = crate::bus::Identity::scarab(low ^ middle ^ high, "ODrive v3.6");
     let (plan, seed) = (configuration.plan, configuration.swarm_seed);
-    let station = memory::station(|| bus::BoardStation::new(NODES, told, constants, plan, seed));
+    let device = memory::device(|| bus::BoardDevice::new(NODES, told, constants, plan, seed));
     let mut keeper = memory::keeper();
     let mut calibrations = [None; JOINTS];
     // Reading may repair the effects of a power loss, which erases flash. Nothing may switch yet, and the
@@ -165,23 +165,23 @@ fn join(
         for joint in 0..JOINTS {
             let mut bytes = [0; LONGEST];
             match keeper.objects(joint, &mut bytes) {
-                Some(length) => station.recall(joint, bytes.get(..length).unwrap_or_default()),
+                Some(length) => device.recall(joint, bytes.get(..length).unwrap_or_default()),
                 // Reports to hosts that stored parameters are lost.
-                None => station.storing(Storing::Failed),
+                None => device.storing(Storing::Failed),
             }
         }
         match keeper.model(configuration) {
-            Some(Some((model, generation))) if control.adopt(model) => station.set_generation(generation),
+            Some(Some((model, generation))) if control.adopt(model) => device.set_generation(generation),
             Some(None) => {}
-            _ => station.storing(Storing::Failed),
+            _ => device.storing(Storing::Failed),
         }
     }
     // A controller that does not answer stays off (`can::status`): the operator keeps the leg, and a record
     // reports the fault.
-    if !can::start(station.bit_rate().unwrap_or(USUAL_KBIT)) {
+    if !can::start(device.bit_rate().unwrap_or(USUAL_KBIT)) {
         let _ = notes.enqueue(Record::AxisFault { tick: 0, joint: 0, name: "bus_controller" });
     }
-    let (frames, servo, thread, end, bus) = memory::bus().split(station);
+    let (frames, servo, thread, end, bus) = memory::bus().split(device);
     static BUS: StaticCell<bus::BusLoop> = StaticCell::new();
     place(&bus::BUS, BUS.init(bus));
     place(&bus::FRAMES_IN, frames);

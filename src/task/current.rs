@@ -11,7 +11,7 @@ use crate::board::odrive_v3_6::settings::{CLOCK_HZ, analog, drives};
 use crate::board::odrive_v3_6::{contacts, converter, encoder};
 use crate::hal::{AxisSample, CURRENT_RATE_HZ};
 use crate::motor::Chopper;
-use crate::operation::{CurrentEnds, CurrentLoops, Stage, Tick};
+use crate::operation::{AxisState, CurrentEnds, CurrentLoops, Tick};
 
 /// Whether a brake resistor is connected; set when the image is built.
 const HAS_BRAKE_RESISTOR: bool = option_env!("SCARAB_BRAKE_RESISTOR").is_some();
@@ -35,7 +35,7 @@ impl Current {
         let [begin, full] = drives::chopper(divider);
         let chopper = if HAS_BRAKE_RESISTOR { Chopper::new(begin, full) } else { None };
         let volt_per_code = analog::sense(divider).volt_per_code;
-        let loops = CurrentLoops::new([Stage::OFF; JOINTS], CYCLES, chopper, volt_per_code);
+        let loops = CurrentLoops::new([AxisState::OFF; JOINTS], CYCLES, chopper, volt_per_code);
         Self { loops, ends }
     }
 

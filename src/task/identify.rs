@@ -89,7 +89,7 @@ pub async fn run(mut thread: Thread) -> ! {
         let heard = state.level.hear(thread.identification, &mut thread.ends, tell, log);
         let working = thread.work(&mut state);
         thread.publish(&mut state);
-        thread.speak(&mut state);
+        thread.fill(&mut state);
         if heard || working {
             embassy_futures_yield().await;
         } else {
@@ -164,7 +164,7 @@ impl Thread {
 
     /// Sends at most one record that is not urgent.
     #[inline(never)]
-    fn speak(&mut self, state: &mut State) {
+    fn fill(&mut self, state: &mut State) {
         let now = Instant::now();
         if now < state.next_paced {
             return;

@@ -17,8 +17,8 @@ use super::bus::KeeperEnd;
 use super::leg::{JOINTS, Leg};
 use crate::board::odrive_v3_6::flash::Flash;
 use crate::board::odrive_v3_6::hardware::Odrive;
-use crate::bus::station::Keeping;
-use crate::bus::{KeptNode, LONGEST};
+use crate::bus::device::Keeping;
+use crate::bus::{LONGEST, StoredNode};
 use crate::leg::{IdentifiedModel, StoredCalibration};
 use crate::operation::{Calibrated, Keep, Storing};
 use crate::store::{self, Permit, Store};
@@ -88,7 +88,7 @@ fn change(keeper: &mut store::Keeper<Flash, JOINTS>, keep: &mut Keep<JOINTS>) ->
             generation
         }
         Keeping::All => {
-            let objects = keep.objects.each_ref().map(KeptNode::bytes);
+            let objects = keep.objects.each_ref().map(StoredNode::bytes);
             at_once(keeper.keep(&permit, objects, keep.generation))??
         }
     };

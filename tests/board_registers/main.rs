@@ -79,7 +79,7 @@ fn the_record_of_writes_is_what_the_start_does() {
 }
 
 #[test]
-fn both_bridges_switch_at_24_khz_with_119_ns_of_dead_time_and_no_output_on() {
+fn bridges_start_off_at_24_khz_with_119_ns_dead_time() {
     let registers = started();
     for base in [TIM1, TIM8] {
         let period = f64::from(registers.at(base + 0x2C)) * 2.0 * f64::from(registers.at(base + 0x28) + 1);
@@ -110,7 +110,7 @@ fn both_bridges_switch_at_24_khz_with_119_ns_of_dead_time_and_no_output_on() {
 }
 
 #[test]
-fn no_conversion_is_triggered_and_no_pin_connected_before_the_timers_hold_both_off() {
+fn timers_hold_outputs_off_before_any_pin_or_trigger() {
     let registers = started();
     let order: Vec<_> = registers.record.iter().map(|write| write.register).collect();
     let place = |name: &str| order.iter().rposition(|register| *register == name).expect(name);
@@ -335,7 +335,7 @@ fn clocks_and_caches_are_on_and_a_failed_crystal_is_noticed() {
 const CAN1: u32 = 0x4000_6400;
 
 #[test]
-fn the_bus_runs_at_the_rate_that_is_kept_and_hears_every_frame_of_eleven_bits() {
+fn the_bus_has_the_stored_rate_and_receives_every_11_bit_frame() {
     for (kbit, bits_per_s) in [(125, 125e3), (250, 250e3), (500, 500e3), (1000, 1e6), (800, 1e6), (0, 1e6)] {
         let mut registers = started();
         registers.apply(&can::CLOCK);
@@ -368,7 +368,7 @@ fn the_bus_runs_at_the_rate_that_is_kept_and_hears_every_frame_of_eleven_bits() 
 }
 
 #[test]
-fn the_image_ends_before_the_two_sectors_that_keep_what_outlives_the_power() {
+fn the_image_ends_before_the_two_sectors_of_the_store() {
     let layout = include_str!("../../src/board/odrive_v3_6/layout.x");
     let length = layout.split("FLASH : ORIGIN = 0x08000000, LENGTH = ").nth(1).expect("the flash");
     let kilobytes: u32 = length.split('K').next().expect("kilobytes").parse().expect("a number");

@@ -111,7 +111,7 @@ fn sampling() -> i64 {
 }
 
 #[test]
-fn converters_are_triggered_119_ns_after_the_middle_of_the_lower_zero_vector() {
+fn converters_start_119_ns_after_the_middle_of_the_lower_zero_vector() {
     let instants = instants(&[]);
     let clock = f64::from(FAST_TIMER_HZ);
     for axis in 0..2 {
@@ -252,7 +252,7 @@ impl Count {
 }
 
 #[test]
-fn edges_of_the_other_bridge_stay_away_from_the_sample_up_to_24_volts() {
+fn the_other_bridges_edges_miss_the_sample_up_to_24_volts() {
     let board = Count::of_the_board();
     let (quiet, most) = board.quiet_up_to();
     println!(
@@ -270,7 +270,7 @@ fn edges_of_the_other_bridge_stay_away_from_the_sample_up_to_24_volts() {
 }
 
 #[test]
-fn a_quarter_of_a_period_puts_the_other_bridge_s_edges_on_the_sample() {
+fn a_quarter_period_shift_puts_edges_on_the_sample() {
     let quarter = Count { shift: PERIOD / 4, ..Count::of_the_board() };
     let shares = [0.0, 1.0, 2.0, 3.0, 5.0, 10.0].map(|volt| (volt, quarter.share(volt)));
     println!("a quarter of a period: {shares:?}");

@@ -1,8 +1,8 @@
 //! Checks of the architecture: allowed dependencies between modules, and a few rules that no compiler checks.
 //!
-//! A module here is one at the top of `src/`. The table below is the design's; a change to it is a change of
-//! the architecture and belongs in a commit of its own. Comments do not count as a use, unit tests do. A test
-//! that needs more modules than its own may use lives in `tests/`.
+//! A module here is one at the top of `src/` or `host/src/`. The tables below are the design's; a change to
+//! them is a change of the architecture and belongs in a commit of its own. Comments do not count as a use,
+//! unit tests do. A test that needs more modules than its own may use lives in `tests/`.
 
 mod tokens;
 
@@ -12,8 +12,11 @@ use std::path::{Path, PathBuf};
 use scarab::safety::{FaultCode, NoticeCode};
 use tokens::{Token, tokens};
 
-/// Each module and its allowed dependencies, besides itself and the open ones.
-const HOUSE: [(&str, &[&str]); 19] = [
+/// Modules with their allowed dependencies, besides themselves.
+type Table = [(&'static str, &'static [&'static str])];
+
+/// Modules of the firmware; the open ones are allowed to all.
+const FIRMWARE: [(&str, &[&str]); 19] = [
     ("units", &[]),
     ("real", &[]),
     ("place", &[]),
@@ -35,10 +38,27 @@ const HOUSE: [(&str, &[&str]); 19] = [
     ("task", &["hal", "motor", "leg", "operation", "safety", "servo", "trace", "store", "bus", "board"]),
 ];
 
-/// Modules that every other module may use.
+/// Modules of the host tool: each uses only modules above it, so there is no cycle.
+const HOST: [(&str, &[&str]); 10] = [
+    ("base", &[]),
+    ("report", &["base"]),
+    ("formats", &["base", "report"]),
+    ("leg", &["base", "formats"]),
+    ("rig", &["base", "formats", "leg"]),
+    ("run", &["base", "report", "formats", "leg", "rig"]),
+    ("image", &["base", "report", "formats", "leg", "rig", "run"]),
+    ("faults", &["base", "report", "formats", "leg", "rig", "run", "image"]),
+    ("view", &["base", "report", "formats"]),
+    ("cli", &["base", "report", "formats", "leg", "rig", "run", "image", "faults", "view"]),
+];
+
+/// Firmware modules that every other firmware module may use.
 const OPEN: [&str; 4] = ["units", "real", "place", "checksum"];
 
-/// Firmware modules that the simulated hardware may use. The tool and the programs may use all.
+/// Source folders of all crates.
+const SOURCES: [&str; 5] = ["src", "hal-sim/src", "host/src", "paper/src", "emulated/src"];
+
+/// Firmware modules that the simulated hardware may use. The other crates may use all.
 const PLANT: [&str; 2] = ["hal", "units"];
 
 /// Files that may name the maths library, relative to the workspace.
@@ -50,8 +70,8 @@ const UNSAFE_ALLOWED: [&str; 5] = [
     "src/real.rs",
     "src/place.rs",
     "src/board/",
-    "hal-sim/src/bin/count-instructions/counter.rs",
-    "hal-sim/src/bin/emulated/",
+    "emulated/src/bin/count-instructions/counter.rs",
+    "emulated/src/bin/emulated/",
 ];
 
 /// Absolute folders that exist on one machine only; split, so that this file does not name one itself.
@@ -65,20 +85,24 @@ const CODE_LIST: &str = "src/safety/fault.rs";
 const LARGEST_LINE_COUNT: usize = 900;
 
 #[test]
-fn every_room_uses_only_the_rooms_the_design_allows() {
+fn every_module_uses_only_the_modules_that_the_design_allows() {
     let mut offences = Vec::new();
-    for file in source_files("src") {
-        let room = room_of(&file.path);
-        if room == "lib" || room == "main" {
-            continue;
-        }
-        let Some((_, allowed)) = HOUSE.iter().find(|(name, _)| *name == room) else {
-            offences.push(format!("{}: room `{room}` is not in the table", file.path));
-            continue;
-        };
-        for used in rooms_used(&file.text, module_depth(&file.path)) {
-            if used.text != room && !OPEN.contains(&used.text) && !allowed.contains(&used.text) {
-                offences.push(format!("{}:{}: `{room}` may not use `{}`", file.path, used.line, used.text));
+    for (folder, table, open) in [("src", &FIRMWARE[..], &OPEN[..]), ("host/src", &HOST, &[])] {
+        for file in source_files(folder) {
+            let inside = &file.path[folder.len() + 1..];
+            let module = module_of(inside);
+            if module == "lib" || module == "main" {
+                continue;
+            }
+            let Some((_, allowed)) = table.iter().find(|(name, _)| *name == module) else {
+                offences.push(format!("{}: module `{module}` is not in the table", file.path));
+                continue;
+            };
+            for used in modules_used(&file.text, module_depth(inside), table) {
+                if used.text != module && !open.contains(&used.text) && !allowed.contains(&used.text) {
+                    offences
+                        .push(format!("{}:{}: `{module}` may not use `{}`", file.path, used.line, used.text));
+                }
             }
         }
     }
@@ -86,10 +110,19 @@ fn every_room_uses_only_the_rooms_the_design_allows() {
 }
 
 #[test]
+fn every_module_of_the_host_tool_stands_below_those_that_it_uses() {
+    for (place, (module, allowed)) in HOST.iter().enumerate() {
+        for used in *allowed {
+            assert!(HOST[..place].iter().any(|(name, _)| name == used), "`{module}` uses `{used}` below it");
+        }
+    }
+}
+
+#[test]
 fn the_swarm_needs_the_maths_door_and_nothing_else_of_the_crate() {
     let mut offences = Vec::new();
     for file in source_files("src/swarm") {
-        for used in rooms_used(&file.text, module_depth(&file.path)) {
+        for used in modules_used(&file.text, module_depth(&file.path["src/".len()..]), &FIRMWARE) {
             if !["swarm", "real"].contains(&used.text) {
                 offences.push(format!("{}:{}: `swarm` may not use `{}`", file.path, used.line, used.text));
             }
@@ -102,17 +135,10 @@ fn the_swarm_needs_the_maths_door_and_nothing_else_of_the_crate() {
 fn the_plant_sees_only_the_ports_and_the_units_of_the_firmware() {
     let mut offences = Vec::new();
     for file in source_files("hal-sim/src") {
-        if ["tool/", "bin/", "lib.rs"].iter().any(|free| file.path["hal-sim/src/".len()..].starts_with(free))
-        {
-            continue;
-        }
         let all = tokens(&file.text);
         for used in named_below(&all, "scarab").into_iter().filter(|used| !PLANT.contains(&used.text)) {
             offences
                 .push(format!("{}:{}: the plant may not use `scarab::{}`", file.path, used.line, used.text));
-        }
-        for used in named_below(&all, "crate").into_iter().filter(|used| used.text == "tool") {
-            offences.push(format!("{}:{}: the plant may not use the tool", file.path, used.line));
         }
     }
     assert_none(&offences);
@@ -121,7 +147,7 @@ fn the_plant_sees_only_the_ports_and_the_units_of_the_firmware() {
 #[test]
 fn only_the_doors_name_the_maths_library_and_unsafe_code() {
     let mut offences = Vec::new();
-    for file in source_files("src").into_iter().chain(source_files("hal-sim/src")) {
+    for file in SOURCES.into_iter().flat_map(source_files) {
         for token in tokens(&file.text) {
             let doors: &[&str] = match token.text {
                 "libm" | "micromath" => &MATHS_DOORS,
@@ -150,9 +176,9 @@ fn only_one_module_of_the_tool_writes_files() {
         ["OpenOptions", "::", "new"],
     ];
     let mut offences = Vec::new();
-    for file in source_files("hal-sim/src") {
+    for file in source_files("host/src").into_iter().chain(source_files("paper/src")) {
         let all = tokens(&file.text);
-        for three in all.windows(3).filter(|_| !file.path.starts_with("hal-sim/src/tool/files/")) {
+        for three in all.windows(3).filter(|_| !file.path.starts_with("host/src/base/files/")) {
             let names = [three[0].text, three[1].text, three[2].text];
             if WRITERS.contains(&names) {
                 offences.push(format!("{}:{}: {} outside files/", file.path, three[0].line, names.concat()));
@@ -167,7 +193,7 @@ fn no_file_but_the_list_writes_a_fault_or_emergency_code() {
     let faults = FaultCode::ALL.map(FaultCode::number).into_iter();
     let codes: Vec<u16> = faults.chain(NoticeCode::ALL.map(NoticeCode::number)).collect();
     let mut offences = Vec::new();
-    for file in source_files("src").into_iter().chain(source_files("hal-sim/src")) {
+    for file in SOURCES.into_iter().flat_map(source_files) {
         if file.path == CODE_LIST || file.path.contains("/tests/") || file.path.ends_with("/tests.rs") {
             continue;
         }
@@ -198,14 +224,145 @@ fn a_hexadecimal_number_is_seen_with_its_line() {
 
 #[test]
 fn no_source_file_is_longer_than_nine_hundred_lines() {
-    let offences: Vec<String> = source_files("src")
+    let offences: Vec<String> = SOURCES
         .into_iter()
-        .chain(source_files("hal-sim/src"))
+        .flat_map(source_files)
         .map(|file| (file.text.lines().count(), file.path))
         .filter(|(lines, _)| *lines > LARGEST_LINE_COUNT)
         .map(|(lines, path)| format!("{path}: {lines} lines, split it by meaning"))
         .collect();
     assert_none(&offences);
+}
+
+/// First words of a comment that states no subject.
+const VAGUE_BEGINNINGS: [&str; 6] = ["Of", "It", "The same", "Who", "They", "What of"];
+
+/// Longest permitted comment line, columns.
+const LARGEST_COMMENT_WIDTH: usize = 110;
+
+#[test]
+fn comments_begin_with_their_subject_and_are_at_most_110_columns_wide() {
+    let mut offences = Vec::new();
+    for folder in ["src", "hal-sim", "host", "paper", "emulated", "tests", "examples"] {
+        for file in source_files(folder) {
+            for (number, line) in file.text.lines().enumerate() {
+                if let Some(why) = comment_offence(line) {
+                    offences.push(format!("{}:{}: {why}", file.path, number + 1));
+                }
+            }
+        }
+    }
+    assert_none(&offences);
+}
+
+/// Why a line is no good comment, if it is a comment.
+fn comment_offence(line: &str) -> Option<String> {
+    let text = line.trim_start().strip_prefix("//")?;
+    let width = line.chars().count();
+    if width > LARGEST_COMMENT_WIDTH {
+        return Some(format!("{width} columns, at most {LARGEST_COMMENT_WIDTH}"));
+    }
+    let text = text.strip_prefix(['/', '!']).unwrap_or(text);
+    let words = text.strip_prefix(' ')?.trim_start();
+    let begins_with = |beginning: &&str| {
+        words
+            .strip_prefix(*beginning)
+            .is_some_and(|rest| !rest.starts_with(|next: char| next.is_alphanumeric()))
+    };
+    let beginning = VAGUE_BEGINNINGS.into_iter().find(begins_with)?;
+    Some(format!("begins with `{beginning}`: name the subject"))
+}
+
+#[test]
+fn a_comment_with_a_vague_beginning_or_a_long_line_is_found() {
+    assert!(comment_offence("    /// Of its noise.").is_some());
+    assert!(comment_offence("//! It's fast.").is_some());
+    assert!(comment_offence("//   The same for the knee").is_some());
+    assert!(comment_offence(&format!("// {}", "x".repeat(108))).is_some());
+    assert_eq!(comment_offence(&format!("// {}", "x".repeat(107))), None);
+    assert_eq!(comment_offence("/// Offset, rad. Itself constant."), None);
+    assert_eq!(comment_offence("/// Iteration of the search."), None);
+    assert_eq!(comment_offence("let a = 1; // It is one."), None);
+}
+
+/// Longest permitted sentence in README and docs, words.
+const LARGEST_SENTENCE: usize = 35;
+
+/// Folder of measured results, which may have longer sentences.
+const LONG_SENTENCES_ALLOWED: &[&str] = &["docs/results/"];
+
+#[test]
+fn sentences_in_documents_have_at_most_35_words() {
+    let mut documents = Vec::new();
+    collect(&workspace().join("docs"), &["md"], &mut documents);
+    for name in ["README.md", "CONTRIBUTING.md"] {
+        read(&workspace().join(name), &mut documents);
+    }
+    assert!(documents.len() > 2, "no documents");
+    let mut offences = Vec::new();
+    for document in documents {
+        if LONG_SENTENCES_ALLOWED.iter().any(|allowed| document.path.starts_with(allowed)) {
+            continue;
+        }
+        for (line, words) in long_sentences(&document.text) {
+            offences.push(format!("{}:{line}: a sentence of {words} words", document.path));
+        }
+    }
+    assert_none(&offences);
+}
+
+/// First line of the paragraph and word count of each sentence that is too long. Tables, headings and code
+/// are skipped.
+fn long_sentences(text: &str) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let (mut begin, mut paragraph, mut in_code) = (1, String::new(), false);
+    for (number, line) in text.lines().chain([""]).enumerate() {
+        let line = line.trim();
+        let is_fence = line.starts_with("```");
+        in_code ^= is_fence;
+        let is_apart = in_code || is_fence || line.is_empty() || line.starts_with(['|', '#', '<']);
+        let item = line.split_once(' ').filter(|(mark, _)| {
+            matches!(*mark, "-" | "*")
+                || mark.strip_suffix('.').is_some_and(|number| number.parse::<u8>().is_ok())
+        });
+        if is_apart || item.is_some() {
+            let counts = sentences(&paragraph).into_iter().filter(|words| *words > LARGEST_SENTENCE);
+            found.extend(counts.map(|words| (begin, words)));
+            paragraph.clear();
+            begin = number + if is_apart { 2 } else { 1 };
+        }
+        if !is_apart {
+            paragraph.push_str(item.map_or(line, |(_, rest)| rest));
+            paragraph.push(' ');
+        }
+    }
+    found
+}
+
+/// Word counts of a paragraph's sentences. A code span is a word.
+fn sentences(paragraph: &str) -> Vec<usize> {
+    let mut counts = vec![0];
+    let spans = paragraph.split('`').enumerate();
+    let plain: String = spans.map(|(place, text)| if place % 2 == 0 { text } else { "code" }).collect();
+    for word in plain.split_whitespace().filter(|word| word.contains(char::is_alphanumeric)) {
+        *counts.last_mut().expect("never empty") += 1;
+        if word.trim_end_matches([')', '*', '_', '"']).ends_with(['.', '!', '?', ':', ';']) {
+            counts.push(0);
+        }
+    }
+    counts
+}
+
+#[test]
+fn a_long_sentence_is_found_across_lines_and_not_in_tables_or_code() {
+    let words = "word ".repeat(18);
+    assert_eq!(long_sentences(&format!("# Title\n\nFirst.\n{words}\n{words}end.\n")), [(3, 37)]);
+    assert_eq!(
+        long_sentences(&format!("{words}end.\n{words}end: {words}end.\n\n- {words}\n- {words}\n")),
+        []
+    );
+    assert_eq!(long_sentences(&format!("| {words} {words} |\n```text\n{words} {words}\n```\n")), []);
+    assert_eq!(long_sentences(&format!("{words} `{words} {words}` {words}\n")), [(1, 37)]);
 }
 
 #[test]
@@ -222,9 +379,9 @@ fn no_file_names_a_path_of_one_machine() {
 }
 
 #[test]
-fn a_use_is_seen_in_a_group_in_a_path_and_through_super() {
+fn a_use_is_found_in_groups_paths_and_through_super() {
     let used = |source: &str, depth| -> Vec<String> {
-        rooms_used(source, depth).iter().map(|token| token.text.to_owned()).collect()
+        modules_used(source, depth, &FIRMWARE).iter().map(|token| token.text.to_owned()).collect()
     };
     assert_eq!(
         used("use crate::{leg::Leg, model::{chain, servo as s}, swarm};", 1),
@@ -264,7 +421,7 @@ fn source_files(folder: &str) -> Vec<File> {
 /// Files that people read or run: sources, documents, settings and scripts.
 fn text_files() -> Vec<File> {
     let mut files = Vec::new();
-    for folder in ["src", "hal-sim", "tests", "docs", "scripts", ".cargo"] {
+    for folder in ["src", "hal-sim", "host", "paper", "emulated", "tests", "docs", "scripts", ".cargo"] {
         collect(&workspace().join(folder), &["rs", "md", "toml", "py", "sh", ""], &mut files);
     }
     for name in [
@@ -308,18 +465,18 @@ fn read(path: &Path, files: &mut Vec<File>) {
 }
 
 /// Module of a file: `src/model/chain.rs` and `src/model/mod.rs` belong to `model`, `src/hal.rs` to `hal`.
-fn room_of(path: &str) -> &str {
-    let inside = path.strip_prefix("src/").unwrap_or(path);
+fn module_of(inside: &str) -> &str {
     inside.split(['/', '.']).next().unwrap_or(inside)
 }
 
-/// Depth of a file's module below the crate's root: 1 for a top module, 2 for a file in it.
-fn module_depth(path: &str) -> usize {
-    path.split('/').count() - if path.ends_with("/mod.rs") { 2 } else { 1 }
+/// Depth of a file's module below the crate's root: 1 for a top module, 2 for a file in it. The path begins
+/// below the source folder.
+fn module_depth(inside: &str) -> usize {
+    inside.split('/').count() - usize::from(inside.ends_with("/mod.rs"))
 }
 
 /// Every module that a file at `depth` names from the crate's root, by `crate::` or by enough `super::`.
-fn rooms_used(source: &str, depth: usize) -> Vec<Token<'_>> {
+fn modules_used<'a>(source: &'a str, depth: usize, table: &Table) -> Vec<Token<'a>> {
     let all = tokens(source);
     let mut used = named_below(&all, "crate");
     for start in 0..all.len() {
@@ -334,7 +491,7 @@ fn rooms_used(source: &str, depth: usize) -> Vec<Token<'_>> {
     // The crate's own items (macros, constants) are not modules. In an inline module `super` may
     // mean the module itself, so there only a module's name counts. `crate::*` would allow
     // everything and always counts.
-    used.retain(|name| name.text == "*" || HOUSE.iter().any(|(room, _)| *room == name.text));
+    used.retain(|name| name.text == "*" || table.iter().any(|(module, _)| *module == name.text));
     used
 }
 

@@ -1,7 +1,7 @@
 //! An identification that was refused, aborted or overtaken leaves no trace.
 
-use hal_sim::tool::leg_file::StribeckFile;
 use scarab::safety::PowerRequest;
+use scarab_host::formats::leg_file::StribeckFile;
 
 use super::*;
 
@@ -9,7 +9,7 @@ use super::*;
 const DAMPING: u64 = 1200;
 
 #[test]
-fn after_a_stop_the_model_comes_back_into_use_without_a_step_of_torque() {
+fn after_a_stop_the_model_returns_without_a_torque_step() {
     let mut pair = identified();
     let gait = context().configuration.prove(context().motions.validation[1]).expect("proved at the start");
     tick(&mut pair, Some(ControlRequest::Track { motion: gait, with_model: true }));
@@ -40,12 +40,12 @@ fn after_a_stop_the_model_comes_back_into_use_without_a_step_of_torque() {
 }
 
 #[test]
-fn an_identification_begun_while_the_verdict_is_due_leaves_both_halves_of_one_mind() {
+fn an_identification_begun_before_the_verdict_keeps_both_halves_consistent() {
     let mut pair = identified();
     tick(&mut pair, Some(ControlRequest::Identify));
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(IdentifyPhase::Judge)));
     let model = pair.leg.control().model().copied();
-    let watched = pair.leg.identification().upkeep().clone();
+    let watched = pair.leg.identification().model_monitor().clone();
     let output = tick(&mut pair, Some(ControlRequest::Identify));
     assert!(!output.refused);
     assert_eq!(activity(&pair), Activity::Identify(IdentifyPhase::Approach));
@@ -55,7 +55,7 @@ fn an_identification_begun_while_the_verdict_is_due_leaves_both_halves_of_one_mi
     }
     assert_eq!(pair.leg.control().verdict(), None);
     assert_eq!(pair.leg.control().model().copied(), model);
-    assert_eq!(*pair.leg.identification().upkeep(), watched, "it watches what is not in use");
+    assert_eq!(*pair.leg.identification().model_monitor(), watched, "it watches what is not in use");
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Legs that differ from the firmware's assumptions, and wearers who move.
 
-use hal_sim::tool::leg_file::PushesFile;
-use hal_sim::tool::report::{Number, RunReport};
-use hal_sim::tool::simulate::simulate;
 use scarab::ident::Reason;
+use scarab_host::base::number::Number;
+use scarab_host::formats::leg_file::PushesFile;
+use scarab_host::report::RunReport;
+use scarab_host::run::simulate::simulate;
 
 use super::*;
 
@@ -39,7 +40,7 @@ fn a_seized_joint_is_refused_as_unexcited() {
 }
 
 #[test]
-fn a_joint_that_moves_a_third_less_than_its_current_tells_is_refused() {
+fn a_joint_with_a_third_of_its_torque_missing_is_refused() {
     for joint in 0..JOINTS {
         let mut leg = default_leg();
         leg.joints[joint].torque_per_ampere = 1.0;
@@ -77,15 +78,15 @@ fn a_wearer_who_pushes_hard_is_refused_with_every_number_known() {
 }
 
 #[test]
-fn a_wearer_who_overpowers_the_drive_ends_in_a_fault_that_is_told() {
+fn a_wearer_who_overpowers_the_drive_causes_a_reported_fault() {
     let report = pushed(200.0, 400.0).expect("it ends");
     assert_eq!(report.reasons, ["input"]);
-    let words = &report.findings.first().expect("the stop is told").words;
+    let words = &report.findings.first().expect("the stop is reported").words;
     assert!(words.contains("the drive stopped during identification with fault 0x8400: joint "), "{words}");
 }
 
 #[test]
-fn a_leg_that_no_prior_allows_is_refused_and_not_pinned_at_the_edge_of_the_box() {
+fn a_leg_outside_the_prior_is_refused_and_not_clamped() {
     let mut leg = default_leg();
     // The box reaches 5 times the prior's Coulomb friction of 4 N m.
     leg.joints[1].truth.as_mut().expect("simulated").offset = 25.0;

@@ -49,7 +49,7 @@ fn nothing_comes_of_it(pair: &mut Pair, ticks: u64) {
 }
 
 #[test]
-fn a_quick_stop_at_any_phase_damps_then_releases_and_a_later_identification_works() {
+fn a_quick_stop_in_any_phase_allows_a_later_identification() {
     let phases =
         [("excite", during_excitation()), ("solve", during_the_search()), ("validate", during_validation())];
     for (phase, mut pair) in phases {
@@ -74,7 +74,7 @@ fn a_quick_stop_at_any_phase_damps_then_releases_and_a_later_identification_work
 }
 
 #[test]
-fn a_current_that_is_not_a_number_releases_the_bridges_in_the_same_tick_and_keeps_the_old_model() {
+fn a_nan_current_turns_off_at_once_and_keeps_the_old_model() {
     for absurd in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for joint in 0..JOINTS {
             let mut pair = identifying_again();
@@ -92,7 +92,7 @@ fn a_current_that_is_not_a_number_releases_the_bridges_in_the_same_tick_and_keep
 }
 
 #[test]
-fn absurd_counts_end_the_identification_within_three_ticks_and_keep_the_old_model() {
+fn implausible_counts_end_the_identification_and_keep_the_old_model() {
     for absurd in [i32::MAX, i32::MIN, i32::MAX / 2] {
         for joint in 0..JOINTS {
             let mut pair = identifying_again();
@@ -169,7 +169,7 @@ fn a_refused_result_leaves_the_model_that_was_there() {
 }
 
 #[test]
-fn a_request_while_the_leg_moves_is_refused_and_the_command_stays_continuous() {
+fn a_request_during_motion_is_refused_without_a_command_step() {
     let mut pair = during_validation();
     let phase = IdentifyPhase::Validate { motion: 2, step: Step::Run };
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(phase)));
@@ -185,7 +185,7 @@ fn a_request_while_the_leg_moves_is_refused_and_the_command_stays_continuous() {
 }
 
 #[test]
-fn commanded_speed_and_torque_never_jump_from_power_up_to_tracking_with_the_model() {
+fn commanded_speed_and_torque_never_jump_from_start_to_tracking() {
     let mut pair = enabled(&default_leg(), 1);
     let mut before = pair.tick(None, context().gravity);
     let mut request = Some(ControlRequest::Identify);

@@ -96,7 +96,7 @@ impl Hosted {
 }
 
 #[test]
-fn a_profile_position_is_reached_in_the_time_of_its_trapezoid_by_both_senses_of_turning() {
+fn a_profile_position_is_reached_on_time_in_both_directions() {
     for joint in 0..JOINTS {
         let mut hosted = Hosted::new();
         let from = hosted.position(joint);
@@ -119,7 +119,7 @@ fn a_profile_position_is_reached_in_the_time_of_its_trapezoid_by_both_senses_of_
 }
 
 #[test]
-fn a_set_point_that_does_not_interrupt_waits_for_the_end_of_the_one_before() {
+fn a_queued_set_point_waits_for_the_previous_one() {
     let mut hosted = Hosted::new();
     let from = hosted.position(0);
     hosted.point(0, from + 0.2, false);
@@ -185,7 +185,7 @@ fn a_torque_follows_its_slope_and_is_held_to_the_largest_torque() {
 }
 
 #[test]
-fn the_largest_torque_holds_in_every_mode_and_nothing_winds_up_against_it() {
+fn the_torque_limit_holds_in_every_mode_without_windup() {
     let mut hosted = Hosted::new();
     hosted.run(2 * SECOND);
     let weight = hosted.status[0].torque_demand.0.abs();
@@ -327,7 +327,7 @@ fn what_was_asked_before_the_leg_was_enabled_is_not_done_afterwards() {
 }
 
 #[test]
-fn a_lost_host_is_damped_and_stays_a_fault_until_it_is_reset() {
+fn a_lost_host_is_damped_and_latched_until_reset() {
     let mut hosted = Hosted::new();
     hosted.commands[0].target = Target::ProfileVelocity(RadianPerSecond(0.3));
     hosted.run(SECOND / 2);
@@ -342,7 +342,7 @@ fn a_lost_host_is_damped_and_stays_a_fault_until_it_is_reset() {
 }
 
 #[test]
-fn an_identification_begins_from_rest_and_gives_the_leg_back_to_the_host() {
+fn an_identification_starts_at_rest_and_returns_the_leg_to_the_host() {
     let mut hosted = Hosted::new();
     hosted.commands[0].target = Target::ProfileVelocity(RadianPerSecond(0.2));
     hosted.run(400);
@@ -375,7 +375,8 @@ fn beyond(joint: usize, angle: f64) -> f64 {
     (low - angle).max(angle - high).max(0.0)
 }
 
-/// Poses outside: joint, its angle, and the sign of the way back. Gravity pulls the hip little at its lower end, and the bent knee inwards.
+/// Poses outside the range: joint, angles, and the sign of the return. Gravity pulls the hip little at its
+/// lower end, and the bent knee inwards.
 const OUTSIDE: [(usize, [f64; JOINTS], f32); 3] =
     [(0, [-0.04, 0.6], 1.0), (1, [0.3, 0.04], 1.0), (1, [0.3, 1.75], -1.0)];
 
@@ -396,7 +397,7 @@ fn watch(hosted: &mut Hosted, joint: usize, ticks: u64) -> [f64; 2] {
 }
 
 #[test]
-fn a_joint_outside_its_range_is_led_back_by_every_command_that_leads_there() {
+fn every_inward_command_returns_a_joint_into_its_range() {
     let targets: [fn(&mut Hosted, usize, f32); 4] = [
         |hosted, joint, _| hosted.point(joint, if joint == 0 { 0.4 } else { 0.8 }, true),
         |hosted, joint, sign| {
@@ -423,8 +424,8 @@ fn a_joint_outside_its_range_is_led_back_by_every_command_that_leads_there() {
                 ticks += 1;
                 assert!(ticks < 4 * SECOND, "{place} {joint}: {most:?} {}", hosted.truth(joint));
             }
-            // Commanded are 0.1 rad/s, more while the knee's weight is taken over. A torque alone may reach the bound of 0.2 rad/s, and
-            // what the weight adds while it is braked there.
+            // The commanded speed is 0.1 rad/s, more while the knee's weight is taken over. A commanded
+            // torque may reach the bound of 0.2 rad/s, plus the weight's share during braking.
             let fastest = if place == 3 { 0.3 } else { 0.16 };
             assert!(most[0] < from + 0.002 && most[1] < fastest, "{place} {joint}: {from} {most:?}");
             if place < 3 {
@@ -460,7 +461,7 @@ fn nothing_that_a_host_commands_leads_a_joint_farther_out() {
 }
 
 #[test]
-fn a_joint_that_is_pushed_farther_out_while_it_returns_stops_the_leg() {
+fn a_returning_joint_that_is_pushed_outwards_stops_the_leg() {
     let mut hosted = Hosted::enabled_at([0.3, 0.04]);
     hosted.commands[1].target = Target::ProfileVelocity(RadianPerSecond(0.1));
     hosted.run(SECOND / 4);
@@ -473,7 +474,7 @@ fn a_joint_that_is_pushed_farther_out_while_it_returns_stops_the_leg() {
 }
 
 #[test]
-fn a_way_back_that_is_forbidden_leaves_the_drive_off_with_its_reason() {
+fn a_forbidden_return_leaves_the_drive_off_with_its_reason() {
     let mut hosted = Hosted::resting_at([0.3, 0.04]);
     hosted.pair.leg.halves().0.permit_return([true, false]);
     assert!(!hosted.pair.enable(context().gravity));
@@ -483,7 +484,7 @@ fn a_way_back_that_is_forbidden_leaves_the_drive_off_with_its_reason() {
 }
 
 #[test]
-fn an_operator_who_identifies_outside_the_range_is_led_back_slowly_as_well() {
+fn an_identification_outside_the_range_returns_slowly_too() {
     for (joint, pose, _) in OUTSIDE {
         let mut hosted = Hosted::resting_at(pose);
         assert!(hosted.pair.enable(context().gravity));

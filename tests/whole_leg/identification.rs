@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use hal_sim::tool::identify::identify_one;
-use hal_sim::tool::leg_file::LegFile;
-use hal_sim::tool::replay::{ReplayOptions, replay};
-use hal_sim::tool::report::RunReport;
-use hal_sim::tool::simulate::{SimulationOptions, simulate};
+use scarab_host::formats::leg_file::LegFile;
+use scarab_host::report::RunReport;
+use scarab_host::rig::options::SimulationOptions;
+use scarab_host::run::identify::identify_one;
+use scarab_host::run::replay::{ReplayOptions, replay};
+use scarab_host::run::simulate::simulate;
 
-use hal_sim::tool::setup::PriorChoice;
 use scarab::ident::Plan;
+use scarab_host::leg::setup::PriorChoice;
 
 use super::*;
 
@@ -19,8 +20,9 @@ fn run(seed: u64) -> RunReport {
 
 /// Errors of the base parameters in reported standard deviations.
 fn errors_in_sigma(report: &RunReport) -> Vec<(String, f64)> {
-    let error = |base: &hal_sim::tool::report::BaseReport| {
-        let known = |number: hal_sim::tool::report::Number| number.known().expect("determined and simulated");
+    let error = |base: &scarab_host::report::BaseReport| {
+        let known =
+            |number: scarab_host::base::number::Number| number.known().expect("determined and simulated");
         (base.name.clone(), (known(base.value) - known(base.truth)) / known(base.sigma))
     };
     report.base_parameters.iter().map(error).collect()
@@ -58,7 +60,7 @@ fn text(mut report: RunReport) -> String {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_report_bit_for_bit_and_another_seed_another() {
+fn equal_seeds_give_equal_reports_and_others_do_not() {
     let first = text(run(7));
     assert_eq!(first, text(run(7)));
     assert_ne!(first, text(run(8)));
@@ -112,7 +114,7 @@ fn any_slicing_of_the_search_gives_the_same_base_values() {
 }
 
 #[test]
-fn noise_free_torque_leaves_a_bias_below_a_seventh_of_the_sigma_of_noisy_torque() {
+fn the_noise_free_bias_is_below_a_seventh_of_sigma() {
     let quiet = SimulationOptions { torque_noise_percent: Some(0.0), ..SimulationOptions::of_seed(1) };
     let quiet = simulate::<JOINTS, BASE>(&default_leg(), &quiet).expect("it runs").report;
     let noisy = run(1);
@@ -134,6 +136,9 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
     let (report, _) =
         identify_one::<JOINTS, BASE>(&leg, &SimulationOptions::of_seed(3), Some(&path)).expect("it runs");
     let options = ReplayOptions {
+        chooses_bandwidth: false,
+        even_stamps: false,
+        torque_delay_ms: Vec::new(),
         files: vec![path],
         validate: Vec::new(),
         split: None,
@@ -143,6 +148,9 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
         swarm_seed: 3,
         estimator: scarab::ident::Estimator::Robust,
         csv: None,
+        load: None,
+        payload: None,
+        with_payload: Vec::new(),
     };
     let replayed = replay::<JOINTS, BASE>(&leg, &options).expect("what the tool writes it reads");
     for (online, offline) in report.base_parameters.iter().zip(&replayed.run.base_parameters) {

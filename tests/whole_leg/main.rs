@@ -18,12 +18,12 @@ mod trace;
 
 use std::sync::OnceLock;
 
-use hal_sim::tool::leg_file::{DEFAULT_LEG, LegFile};
-use hal_sim::tool::pair;
-use hal_sim::tool::simulate::SimulationOptions;
 use scarab::ident::Verdict;
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase, Step};
 use scarab::safety::DriveState;
+use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_host::rig::options::SimulationOptions;
+use scarab_host::rig::pair;
 
 /// Joints and base parameters of the default leg.
 const JOINTS: usize = 2;

@@ -2,10 +2,10 @@
 
 use std::mem::size_of;
 
-use hal_sim::tool::pair::{PENDING, TAPS};
 use scarab::ident::window::{ROOM, Window};
 use scarab::ident::{Estimate, HeldOut, Record, Recorder, RowFilter, Solver, SwarmSearch};
-use scarab::leg::{Control, Identification, Leg, Upkeep};
+use scarab::leg::{Control, Identification, Leg, ModelMonitor};
+use scarab_host::rig::pair::{PENDING, TAPS};
 
 use super::*;
 
@@ -27,7 +27,7 @@ fn a_leg_fits_the_memory_set_aside_for_it() {
         ("Solver", size_of::<Solver<f32, JOINTS, BASE>>(), 17_000),
         ("Record", size_of::<Record<f32, JOINTS, BASE>>(), 2_000),
         ("HeldOut", size_of::<HeldOut<f32, JOINTS, BASE, PENDING>>(), 6_000),
-        ("Upkeep", size_of::<Upkeep<JOINTS, BASE>>(), 2_500),
+        ("ModelMonitor", size_of::<ModelMonitor<JOINTS, BASE>>(), 2_500),
         ("SwarmSearch", size_of::<SwarmSearch<f32, BASE>>(), 10_000),
     ];
     for (name, bytes, largest) in sizes {

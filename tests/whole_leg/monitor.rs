@@ -72,12 +72,12 @@ fn a_payload_is_noticed_in_seconds_and_found() {
     let collected = seconds_until(&mut pair, |pair| pair.leg.control().is_update_offered());
     println!("collected in {collected} s");
     assert!(collected * 50.0 >= f64::from(UPDATE_ROWS) && collected < 20.0, "{collected} s");
-    let update = pair.leg.identification().upkeep().update().expect("offered").clone();
+    let update = pair.leg.identification().model_monitor().update().expect("offered").clone();
     assert_eq!(update.cause, Cause::Payload { link: 1 });
     let found = &update.payload[1];
     // Mass and moment, the first two parameters of a payload; three standard deviations (1.7 % and 1.8 %).
     for (index, truth) in [(0, MASS), (1, MASS * PLACE)] {
-        let sigma = f64::from(found.sigma(index).expect("told"));
+        let sigma = f64::from(found.sigma(index).expect("determined"));
         assert!((f64::from(found.values[index]) - truth).abs() < 3.0 * sigma, "{found:?}");
         assert!(sigma < 0.01 * truth, "sigma {sigma} of {truth}");
     }
@@ -86,7 +86,7 @@ fn a_payload_is_noticed_in_seconds_and_found() {
 }
 
 #[test]
-fn an_update_is_taken_on_request_without_a_step_of_torque_and_is_what_is_watched_then() {
+fn an_update_is_taken_without_a_torque_step_and_then_watched() {
     let mut pair = offered();
     let old = *pair.leg.control().model().expect("accepted");
     let torque = |output: &ServoOutput<JOINTS>| output.wanted_torque.map(|torque| torque.0);
@@ -157,10 +157,10 @@ fn a_stop_while_rows_are_collected_forgets_them() {
 }
 
 #[test]
-fn a_model_that_was_kept_comes_without_its_uncertainty_and_is_not_watched() {
+fn a_stored_model_has_no_uncertainty_and_is_not_watched() {
     let mut pair = identified();
     let kept = *pair.leg.control().model().expect("accepted");
-    assert!(pair.leg.identification().upkeep().baseline().is_some());
+    assert!(pair.leg.identification().model_monitor().baseline().is_some());
     assert!(pair.leg.adopt(kept));
-    assert_eq!(pair.leg.identification().upkeep().baseline(), None);
+    assert_eq!(pair.leg.identification().model_monitor().baseline(), None);
 }

@@ -1,9 +1,10 @@
 //! Deliberate errors: each is refused for its reason, and honest runs are accepted.
 
-use hal_sim::tool::leg_file::PushesFile;
-use hal_sim::tool::perturb::Perturbation;
-use hal_sim::tool::report::{Number, RunReport};
-use hal_sim::tool::simulate::simulate;
+use scarab_host::base::number::Number;
+use scarab_host::formats::leg_file::PushesFile;
+use scarab_host::report::RunReport;
+use scarab_host::rig::perturb::Perturbation;
+use scarab_host::run::simulate::simulate;
 
 use super::*;
 
@@ -33,21 +34,21 @@ fn refused_with_one_of(perturbation: &str, reasons: &[&str]) {
 }
 
 #[test]
-fn tampered_inertia_and_centre_of_mass_and_an_added_mass_are_refused_by_validation_alone() {
+fn changed_inertia_com_or_mass_are_refused_by_validation_alone() {
     for perturbation in ["inertia=0.7", "com=0.8", "added-mass=2"] {
         refused(perturbation, &["validation"]);
     }
 }
 
 #[test]
-fn a_foot_on_the_floor_is_refused_as_contact_alone_and_a_touch_of_half_a_second_is_not() {
+fn floor_contact_is_refused_as_contact_and_a_short_touch_is_not() {
     refused("contact=2", &["contact"]);
     let report = perturbed("contact=0.5", 1);
     assert!(report.accepted(), "{:?}", report.reasons);
 }
 
 #[test]
-fn a_wearer_who_pushes_now_and_then_is_never_accepted_with_wrong_parameters() {
+fn wrong_parameters_are_never_accepted_with_a_pushing_wearer() {
     let pushes = PushesFile { per_minute: 30.0, torque_nm: 10.0, duration_s: 0.3 };
     let leg = LegFile { pushes: Some(pushes), ..default_leg() };
     for seed in 1..=5 {
@@ -102,7 +103,7 @@ fn a_wrong_length_or_zero_is_refused_as_residual_alone() {
 }
 
 #[test]
-fn a_blocked_joint_is_refused_as_unexcited_alone_and_a_small_motion_with_it() {
+fn a_blocked_joint_and_a_small_motion_are_refused_as_unexcited() {
     for perturbation in ["stuck=hip", "stuck=2"] {
         refused(perturbation, &["unexcited"]);
     }

@@ -1,13 +1,13 @@
 //! Torque constants that differ from the firmware's, known masses that reveal them, known loads.
 
-use hal_sim::tool::leg_file::BodySide;
-use hal_sim::tool::posture::on_side;
-use hal_sim::tool::scale::{Corrected, Scale};
 use hal_sim::world::World;
 use nalgebra::Vector3;
 use scarab::leg::{IdentifiedModel, LoggedSample};
 use scarab::model::Payload;
 use scarab::servo::TorqueModel;
+use scarab_host::formats::leg_file::BodySide;
+use scarab_host::leg::posture::on_side;
+use scarab_host::run::scale::{Corrected, Scale};
 
 use super::*;
 
@@ -73,10 +73,10 @@ fn worst_pull(run: &Corrected<JOINTS, BASE>) -> f64 {
 }
 
 #[test]
-fn a_wrong_torque_constant_is_not_seen_in_one_run_and_found_with_a_known_mass() {
+fn a_wrong_torque_constant_is_found_only_with_a_known_mass() {
     for seed in 1..=3 {
         let run = first_run([1.2; JOINTS], seed);
-        assert_eq!(run.verdict, Some(Verdict::ACCEPTED), "nothing in one run tells");
+        assert_eq!(run.verdict, Some(Verdict::ACCEPTED), "undetectable in one run");
         let relative = run.pair.leg.identification().solver().expect("solved").estimate().values;
         let rotor = BASE - 1;
         // Everything is too small by the factor; sigma of this rotor's inertia is 0.3 %.
@@ -112,7 +112,7 @@ fn constants_that_differ_from_joint_to_joint_are_found_each() {
 }
 
 #[test]
-fn a_mass_stated_wrongly_scales_the_result_and_a_place_stated_wrongly_is_noticed() {
+fn a_wrong_mass_scales_the_result_and_a_wrong_position_is_noticed() {
     let run = first_run([1.0; JOINTS], 5);
     let (heavy, _) = corrected(&run, &Payload { mass: 5.5, ..ON_THE_KNEE });
     for ratio in heavy.trusted().expect("nothing contradicts") {
@@ -124,7 +124,7 @@ fn a_mass_stated_wrongly_scales_the_result_and_a_place_stated_wrongly_is_noticed
 }
 
 #[test]
-fn a_mass_on_the_thigh_tells_the_hip_alone_and_nothing_is_corrected() {
+fn a_mass_on_the_thigh_measures_the_hip_alone_without_correction() {
     let run = first_run([1.2; JOINTS], 6);
     let thigh = Payload { joint: 0, mass: 5.0, place: Vector3::new(0.3, 0.0, 0.0) };
     let scale = second_run(&run.pair, &thigh, &thigh);
@@ -134,7 +134,7 @@ fn a_mass_on_the_thigh_tells_the_hip_alone_and_nothing_is_corrected() {
 }
 
 #[test]
-fn a_model_with_a_known_load_predicts_as_one_that_was_identified_with_it() {
+fn a_model_with_a_known_load_predicts_like_one_identified_with_it() {
     let load = Payload { joint: 1, mass: 3.0, place: Vector3::new(0.3, 0.02, 0.0) };
     let pair = identified();
     let model = pair.leg.control().model().expect("accepted");

@@ -52,7 +52,7 @@ fn amplitude_ratio(joint: usize, frequency_hz: f32) -> f64 {
 }
 
 #[test]
-fn feedback_alone_follows_a_sine_of_four_hertz_by_more_than_half_its_power() {
+fn feedback_alone_follows_four_hertz_by_more_than_half_the_power() {
     for joint in 0..JOINTS {
         let ratio = amplitude_ratio(joint, 4.0);
         println!("joint {joint}: {ratio:.3}");
@@ -63,7 +63,7 @@ fn feedback_alone_follows_a_sine_of_four_hertz_by_more_than_half_its_power() {
 
 /// A board stops ticking when a rotor position is lost, in any drive state, and restarts with other zeros.
 #[test]
-fn control_that_is_begun_anew_in_the_middle_of_a_motion_is_off_wherever_the_joints_are() {
+fn control_restarted_during_a_motion_is_off() {
     let mut pair = enabled(&default_leg(), 1);
     tick(&mut pair, Some(ControlRequest::Identify));
     assert!(run_until(&mut pair, |pair| activity(pair) == Activity::Identify(IdentifyPhase::Excite)));

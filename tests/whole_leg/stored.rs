@@ -12,7 +12,7 @@ fn kept() -> StoredModel<JOINTS> {
 }
 
 #[test]
-fn a_kept_model_comes_back_as_it_was_and_serves_the_next_start() {
+fn a_stored_model_is_restored_and_used_at_the_next_start() {
     let first = identified();
     let found = first.leg.control().model().expect("accepted");
     let restored = context().configuration.restore(&kept()).expect("the same leg");

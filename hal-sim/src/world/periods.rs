@@ -1,19 +1,19 @@
-//! A world whose drives are complete: one exchange per PWM period.
+//! World with complete drives: one exchange per PWM period.
 //!
 //! ```text
 //! servo tick  |  period 0  |  period 1  | ... |  period 5  |          6 periods of 1/24 ms
 //! ```
 //!
-//! In a period the rotors turn at the speed the leg has at its beginning, the drives make their torque, and then the leg moves by the
-//! period's mean torque (the wearer's push is that of the middle of the servo tick, the floor's that of the period's
-//! beginning). Joint accelerations stay below 100 rad/s^2, so the speed held is wrong by less than 4 mrad/s at the joint, and a
-//! rotor's electrical angle by less than 2e-5 rad. What is computed from the samples of one period is handed over with
-//! the next, and acts when each axis begins.
+//! In a period the rotors turn at the leg's initial speed and the drives produce their torque. Then the leg
+//! moves by the period's mean torque. The wearer's push is that of the middle of the servo tick, the floor's
+//! that of the period's start. Joint accelerations stay below 100 rad/s^2, so the speed error is below 4
+//! mrad/s at the joint, and that of a rotor's electrical angle below 2e-5 rad. A command computed from the
+//! samples of one period is set in the next and acts at the start of each axis' period.
 //!
-//! The noise that a leg file states per logged sample is added to the logged current ([`World::observe`]), where it is added to
-//! an ideal drive's. The shunts' own noise (0.04 A per sample, some 6 mA in the mean of a logged sample's 48) is there
-//! besides. Put into the codes, 7 % per logged sample would be some 9 A in each, which no current loop would follow and no
-//! board would show.
+//! A leg file states noise per logged sample. Therefore [`World::observe`] adds it to the logged current, as
+//! for ideal drives. The shunts' own noise (0.04 A per sample, about 6 mA in the mean of a logged sample's
+//! 48) comes in addition. In the codes, 7 % per logged sample would be about 9 A each, which no current loop
+//! would follow and no board would show.
 
 use super::{TICK_S, World};
 use crate::description::LegDescription;
@@ -25,39 +25,40 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::{AxisCommand, AxisSample, CURRENT_RATE_HZ, Sample};
 use scarab::units::Ampere;
 
-/// PWM periods of a servo tick.
+/// PWM periods per servo tick.
 pub const PERIODS_PER_TICK: u32 = CURRENT_RATE_HZ / super::TICK_RATE_HZ as u32;
 
-/// Complete drives and their place in the servo tick.
+/// Complete drives with their phase in the servo tick.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Electric<const N: usize> {
     drives: CompleteDrives<N>,
     /// Rotor turns per joint turn.
     ratio: [f64; N],
-    /// Periods of the servo tick that are over.
+    /// Completed periods of the servo tick.
     period: u32,
-    /// The wearer's, N m, anatomical.
+    /// Torque of the wearer, N m, anatomical.
     pushed: [f64; N],
-    /// At the joints in this servo tick so far, and in the last one, N m, sense of the motors.
+    /// Torque at the joints in this servo tick so far, and mean of the last one, N m, direction of the
+    /// motors.
     sum: [f64; N],
     torque: [f64; N],
 }
 
 impl<const N: usize> Electric<N> {
-    /// Mean torque of the last servo tick at the joints, N m, sense of the motors.
+    /// Mean torque of the last servo tick at the joints, N m, direction of the motors.
     pub(super) fn torque(&self) -> &[f64; N] {
         &self.torque
     }
 
-    /// Puts the rotors where the joints are (anatomical, sense of the motors), without current.
+    /// Sets the rotors to the joints' angles (anatomical, direction of the motors), without current.
     pub(super) fn place(&mut self, angles: &[f64; N]) {
         self.drives.place(&core::array::from_fn(|joint| self.ratio[joint] * angles[joint]));
     }
 }
 
 impl<const N: usize> World<N> {
-    /// A leg at rest at its anatomical zero, with complete drives and their bridges released. [`World::period`] moves it;
-    /// commands to ideal drives mean nothing to it.
+    /// A leg at rest at its anatomical zero, with complete drives and their bridges off. [`World::period`]
+    /// moves it; commands to ideal drives have no effect.
     #[must_use]
     pub fn with_complete_drives(
         description: &LegDescription<N>,
@@ -65,7 +66,7 @@ impl<const N: usize> World<N> {
         seed: u64,
     ) -> Self {
         let mut world = Self::new(description, seed);
-        // Apart from the other streams of the same seed.
+        // Independent of the other streams of the same seed.
         let mut noise: Xoshiro256PlusPlus = world.sensor_faults.clone();
         noise.jump();
         let ratio = drives.axes.map(|axis| axis.ratio);
@@ -82,8 +83,8 @@ impl<const N: usize> World<N> {
         world
     }
 
-    /// One PWM period: each axis takes its command and gives its sample where it begins. `brake` is the share of time for
-    /// which the brake resistor is on. A world with ideal drives stands still and says nothing.
+    /// Runs one PWM period: each axis takes its command and returns its sample at its start. `brake` is the
+    /// duty of the brake resistor. A world with ideal drives does not move and returns default samples.
     pub fn period(&mut self, commands: &[AxisCommand; N], brake: f64) -> [AxisSample; N] {
         let Some(period) = self.electric.as_ref().map(|electric| electric.period) else {
             return [AxisSample::default(); N];
@@ -122,19 +123,19 @@ impl<const N: usize> World<N> {
         samples
     }
 
-    /// The complete drives, if there are.
+    /// Complete drives, if present.
     #[must_use]
     pub fn complete_drives(&self) -> Option<&CompleteDrives<N>> {
         self.electric.as_ref().map(|electric| &electric.drives)
     }
 
-    /// The complete drives to be changed, if there are.
+    /// Complete drives, mutable, if present.
     pub fn complete_drives_mut(&mut self) -> Option<&mut CompleteDrives<N>> {
         self.electric.as_mut().map(|electric| &mut electric.drives)
     }
 
-    /// What the leg's current sensors add to currents measured by a board at this servo tick: noise, offset, conversion
-    /// steps and wild readings as described.
+    /// Adds the leg's current-sensor errors to the currents that a board measured at this servo tick: noise,
+    /// offset, conversion steps and outliers as described.
     pub fn observe(&mut self, measured: &Sample<N>) -> Sample<N> {
         let mut observed = *measured;
         self.begin_reading();

@@ -38,13 +38,13 @@ pub fn events() -> &'static mut EventQueue<JOINTS> {
     EVENTS.init_with(EventQueue::new)
 }
 
-#[unsafe(link_section = ".ccm.station")]
-static STATION: StaticCell<bus::BoardStation> = StaticCell::new();
+#[unsafe(link_section = ".ccm.device")]
+static DEVICE: StaticCell<bus::BoardDevice> = StaticCell::new();
 
 /// Nodes and axes of the bus, once.
 #[inline(never)]
-pub fn station(build: impl FnOnce() -> bus::BoardStation) -> &'static mut bus::BoardStation {
-    STATION.init_with(build)
+pub fn device(build: impl FnOnce() -> bus::BoardDevice) -> &'static mut bus::BoardDevice {
+    DEVICE.init_with(build)
 }
 
 #[unsafe(link_section = ".ccm.bus")]

@@ -1,14 +1,16 @@
-//! One joint as its node sees it: the controlword (6040) and what is made of it.
+//! Drive profile of one joint: the controlword (6040) and its effects.
 //!
-//! Why a state of its own beside the leg's: a host enables its nodes one after the other and waits for each, while a leg is
-//! enabled as a whole or not at all (`safety`). So each joint follows CiA 402's machine for itself, and
-//! [`Coupling`](super::Coupling) enables the leg once all have asked. Until then bit 15 of the statusword says that
-//! nothing is powered, and no target is taken.
+//! Why a state per joint besides the leg's: a host enables its nodes one after the other and waits for each.
+//! A leg is enabled as a whole or not at all (`safety`). So each joint follows its own CiA 402 state machine,
+//! and [`Coupling`](super::Coupling) enables the leg when all joints have requested it. Until then bit 15 of
+//! the statusword says that nothing is powered, and targets are ignored.
 //!
 //! ```text
-//! bits 7 3210   0 x110 shutdown   0 0111 switch on, disable operation   0 1111 (switch on and) enable operation
-//!               0 xx0x disable voltage   0 x01x quick stop   rising 7: reset
-//! bit 4 rising  profile position: new set-point, 5 immediately, 6 relative; homing: start          bit 8  halt
+//! bits 7, 3210  0 x110 shutdown        0 0111 switch on, disable operation
+//!               0 1111 enable operation (from ready to switch on: switch on first)
+//!               0 xx0x disable voltage  0 x01x quick stop        bit 7 rising: fault reset
+//! bit 4 rising  profile position: new set-point; bit 5 immediately, bit 6 relative; homing: start
+//! bit 8         halt
 //! ```
 //! Source: CiA 402, controlword.
 
@@ -28,27 +30,27 @@ const IMMEDIATELY: u16 = 1 << 5;
 const RELATIVE: u16 = 1 << 6;
 const HALT: u16 = 1 << 8;
 
-/// What does not change about a joint.
+/// Constants of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisConstants {
-    /// A thousand of the torque objects' units.
+    /// Rated torque of the joint; the torque objects are in thousandths of it.
     pub rated_torque: NewtonMetre,
-    /// Of the motor.
+    /// Rated current of the motor.
     pub rated_current: Ampere,
-    /// Modes the leg follows, bits of [`Mode::bit`].
+    /// Supported modes, bits of [`Mode::bit`].
     pub modes: u32,
     /// Joint torque per motor current.
     pub torque_per_ampere: NewtonMetrePerAmpere,
-    /// Greatest speed that is commanded.
+    /// Highest speed that is commanded.
     pub speed: RadianPerSecond,
-    /// Encoder counts per turn of the motor.
+    /// Encoder counts per motor revolution.
     pub counts_per_turn: u32,
-    /// Turns of the motor per turn of the joint.
+    /// Motor revolutions per joint revolution.
     pub ratio: f32,
 }
 
 impl AxisConstants {
-    /// A joint of which nothing is known.
+    /// Placeholder of a joint whose constants are unknown.
     pub const UNKNOWN: Self = Self {
         rated_torque: NewtonMetre(1.0),
         rated_current: Ampere(1.0),
@@ -60,10 +62,10 @@ impl AxisConstants {
     };
 }
 
-/// No method of homing was written: none is begun.
+/// No homing method was written; homing then fails.
 const NO_METHOD: i8 = -1;
 
-/// What a host writes and reads again; the numbers are the objects'.
+/// Objects that a host writes and reads back, in the objects' units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Settings {
     pub connection_option: i16,
@@ -97,11 +99,11 @@ pub(super) struct Settings {
     pub bit_rate: u16,
 }
 
-/// Bit rate of a board of which nothing else is kept, kbit/s.
+/// Default bit rate, kbit/s.
 pub(in crate::bus) const USUAL_KBIT: u16 = 1000;
 
 impl Settings {
-    /// As after the start.
+    /// Settings after the start.
     pub const NEW: Self = Self {
         connection_option: 3,
         quick_stop_option: 2,
@@ -135,33 +137,33 @@ impl Settings {
     };
 }
 
-/// See the module.
+/// CiA 402 state machine and settings of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
     pub(super) constants: AxisConstants,
     pub(super) settings: Settings,
     pub(super) status: JointStatus,
     pub(super) controlword: u16,
-    /// Where this joint stands for itself.
+    /// State of this joint's own state machine.
     pub(super) own: DriveState,
-    /// A reset was asked for and not passed on yet.
+    /// A fault reset was requested and not passed on yet.
     pub(super) resets: bool,
     set_point: SetPoint,
-    /// The set-point or start of the present bit 4 was taken.
+    /// Bit 4 of the present controlword was accepted: set-point acknowledge or start of homing.
     taken: bool,
-    /// Set-points and starts of homing.
+    /// Counts accepted set-points and starts of homing.
     asked: u8,
-    /// What the leg has to react to.
+    /// Fault that the leg must react to.
     fault: Option<FaultCode>,
-    /// A host has sent a controlword that says something.
+    /// A host has sent a controlword other than 0.
     pub(super) commanded: bool,
-    /// A step towards enabled was asked for and not looked at yet.
+    /// A step towards enabled was requested and not processed yet.
     rises: bool,
-    /// Why such a step is refused, as long as that lasts.
+    /// Reason why such a step is refused, while it lasts.
     pub(in crate::bus) refused: Option<ErrorReport>,
 }
 
-/// The fault of a lost host.
+/// Fault code of a lost host.
 const fn code(why: Lost) -> Option<FaultCode> {
     match why {
         Lost::Heartbeat => Some(FaultCode::Heartbeat),
@@ -182,7 +184,7 @@ const fn radian_per_second(micro: i32) -> RadianPerSecond {
 }
 
 impl Axis {
-    /// As after the start.
+    /// Creates the state after the start.
     #[must_use]
     pub const fn new(constants: AxisConstants) -> Self {
         Self {
@@ -202,56 +204,56 @@ impl Axis {
         }
     }
 
-    /// What the leg tells; then [`Coupling::power`](super::Coupling::power).
+    /// Takes over the leg's status. Call [`Coupling::power`](super::Coupling::power) afterwards.
     pub fn update(&mut self, status: &JointStatus) {
         self.status = *status;
     }
 
-    /// Object 2002.
+    /// Returns object 2002.
     #[must_use]
     pub const fn bit_rate(&self) -> u16 {
         self.settings.bit_rate
     }
 
-    /// The same, as set at another node of the board.
+    /// Sets object 2002, when it was written at another node of the board.
     pub const fn set_bit_rate(&mut self, kbit_per_s: u16) {
         self.settings.bit_rate = kbit_per_s;
     }
 
-    /// Object 2012.
+    /// Returns object 2012.
     #[must_use]
     pub const fn may_return(&self) -> bool {
         self.settings.returns
     }
 
-    /// A step towards enabled was asked for since this was asked last.
+    /// Whether a step towards enabled was requested since the last call.
     pub(in crate::bus) fn take_rises(&mut self) -> bool {
         core::mem::take(&mut self.rises)
     }
 
-    /// Where the leg's drive stands.
+    /// Returns the state of the leg's drive.
     #[must_use]
     pub const fn drive(&self) -> DriveState {
         self.status.drive
     }
 
-    /// A host has sent a controlword other than 0 since the start, or since the node was reset.
+    /// Whether a host has sent a controlword other than 0 since the start or the last node reset.
     #[must_use]
     pub const fn is_commanded(&self) -> bool {
         self.commanded
     }
 
-    /// Something forbids to enable.
+    /// Whether an inhibit reason is active.
     pub(in crate::bus) const fn is_blocked(&self) -> bool {
         self.status.inputs & RefusalReason::Blocked.bit() != 0
     }
 
-    /// This joint is enabled, and so is the leg.
+    /// Whether both this joint and the leg are enabled.
     pub(super) fn is_powered(&self) -> bool {
         self.own == DriveState::OperationEnabled && self.status.drive == DriveState::OperationEnabled
     }
 
-    /// A controlword came.
+    /// Handles a controlword.
     pub(super) fn control(&mut self, word: u16) {
         let rising = word & !self.controlword;
         self.controlword = word;
@@ -306,17 +308,17 @@ impl Axis {
         }
     }
 
-    /// Quick stop as its option says.
+    /// Quick stop by option code 605A.
     fn stop(&mut self) {
         use PowerRequest::{DisableVoltage, QuickStop};
         let request = if self.settings.quick_stop_option == 0 { DisableVoltage } else { QuickStop };
         self.own = self.own.after(DriveEvent::Asked(request), 1);
     }
 
-    /// The host is lost: as 6007 says.
+    /// Reacts to a lost host by option code 6007.
     pub(super) fn lose(&mut self, why: Lost) {
         match self.settings.connection_option {
-            // Told to stop or to begin anew the host is not lost: it stops as by quick stop.
+            // A stop or reset command is not a lost host; the leg stops as by quick stop.
             1 => match code(why).filter(|_| self.is_powered()) {
                 Some(code) => self.fault = Some(code),
                 None => self.stop(),
@@ -325,22 +327,22 @@ impl Axis {
             3 => self.stop(),
             _ => {}
         }
-        // What was held down is let go: the next word is a new one.
+        // Bits held down are released, so that the next controlword has rising edges.
         self.controlword = 0;
         self.taken = false;
     }
 
-    /// A fault that the leg has to react to, once: the host is lost and 6007 is 1.
+    /// Takes the fault of a lost host if 6007 is 1; returned once.
     pub fn take_fault(&mut self) -> Option<FaultCode> {
         self.fault.take()
     }
 
-    /// Object 6061: the leg's once it follows, and before that the one it will follow.
+    /// Object 6061: the leg's mode once it follows, before that the requested one.
     pub(super) fn mode(&self) -> i8 {
         if self.is_powered() && self.status.mode != 0 { self.status.mode } else { self.settings.mode }
     }
 
-    /// Object 6041.
+    /// Returns object 6041.
     #[must_use]
     pub fn statusword(&self) -> u16 {
         let status = &self.status;
@@ -368,7 +370,7 @@ impl Axis {
         self.constants.rated_torque * (thousandths as f32 * 1e-3)
     }
 
-    /// What the leg is told.
+    /// Returns the command for the leg.
     #[must_use]
     pub fn command(&self) -> JointCommand {
         let settings = &self.settings;
@@ -381,7 +383,7 @@ impl Axis {
             Some(Mode::ProfilePosition) => Target::ProfilePosition(self.set_point),
             Some(Mode::ProfileVelocity) => Target::ProfileVelocity(velocity),
             Some(Mode::ProfileTorque) => Target::ProfileTorque(target_torque),
-            // Nowhere in the range: a homing error.
+            // An infinite offset is out of range: homing error.
             Some(Mode::Homing) if settings.homing_method == NO_METHOD => {
                 Target::Homing { offset: Radian(f32::INFINITY) }
             }
@@ -416,7 +418,7 @@ impl Axis {
         }
     }
 
-    /// 60C2: a number of 10^index seconds.
+    /// Period of 60C2: a multiple of 10^index seconds.
     fn period(&self) -> Second {
         let mut unit = 1.0;
         for _ in self.settings.period_index..0 {

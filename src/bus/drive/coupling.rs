@@ -1,18 +1,18 @@
-//! One leg, several joints: which step of the leg's power states the joints together ask for.
+//! Coupling of the joints of one leg: the power request that follows from their states.
 //!
 //! ```text
-//! the leg goes up a step    where every joint stands above it
-//! the leg goes down         where any joint stands below it, or stops
-//! the leg has gone down     no joint stays above it: whoever wants to go on asks again
+//! the leg steps up        if every joint's state is higher
+//! the leg steps down      if any joint's state is lower, or a joint stops
+//! the leg has stepped down: joints above it follow and must be enabled again
 //! ```
 //!
-//! Why the lowest: a joint whose host has not asked must not be powered because its neighbour was enabled. Why nobody stays
-//! above: a leg that was stopped, by the other joint or by itself, must not start again with a word that was sent before.
+//! Why the lowest: a joint whose host has not requested it must not be powered because its neighbour is
+//! enabled. Why no joint stays above: a leg that was stopped must not restart with a controlword sent before.
 
 use super::control::Axis;
 use crate::leg::{DriveState, PowerRequest};
 
-/// How far a state is towards enabled.
+/// Rank of a state on the way to enabled.
 pub(super) const fn level(state: DriveState) -> u8 {
     match state {
         DriveState::ReadyToSwitchOn => 1,
@@ -22,14 +22,14 @@ pub(super) const fn level(state: DriveState) -> u8 {
     }
 }
 
-/// What is remembered of the leg.
+/// Rank of the leg's state at the last call.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Coupling {
     before: u8,
 }
 
 impl Coupling {
-    /// No host has the leg: every joint stands where it stands, and nothing that was asked is asked later.
+    /// Without a host: every joint takes the leg's state, and pending requests are discarded.
     pub fn look_on<const N: usize>(&mut self, axes: [&mut Axis; N], drive: DriveState) {
         self.before = level(drive);
         for axis in axes {
@@ -37,8 +37,8 @@ impl Coupling {
         }
     }
 
-    /// The request for the leg's next tick, given where its drive stands and whether it refused the last one. To be called
-    /// after [`Axis::update`] of every joint.
+    /// Returns the power request for the leg's next tick. `drive` is the state of the leg's drive; `refused`
+    /// says whether it refused the last request. Call [`Axis::update`] of every joint before.
     pub fn power<const N: usize>(
         &mut self,
         axes: [&mut Axis; N],
@@ -62,7 +62,7 @@ impl Coupling {
                 || axis.own.fault().is_some()
                 || is_stopping
                 || has_gone_down && is_above
-                // A stop with nothing to stop is off.
+                // A quick stop without power ends at once.
                 || wants_stop && drive != DriveState::OperationEnabled;
             if follows {
                 axis.own = drive;

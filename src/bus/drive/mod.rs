@@ -1,7 +1,8 @@
-//! The drive profile (CiA 402) of one joint, and the seam to the leg.
+//! Drive profile (CiA 402) of one joint, and its interface to the leg.
 //!
-//! Why values only: the node runs with the bus, the leg in an interrupt. What crosses is one status and one command per
-//! joint and at most one power request per leg, copied once per tick in each direction; neither side calls the other.
+//! Why values only: the node runs at the priority of the bus, the leg in an interrupt. One status and one
+//! command per joint, and at most one power request per leg, are copied once per tick. Neither side calls the
+//! other.
 //!
 //! ```text
 //!   host -- 6040, 6060, 607A, ... --> Axis --command(): JointCommand--> leg
@@ -10,8 +11,8 @@
 //!              6007 is 1, host lost: Axis --take_fault()--> Fault ----> leg
 //! ```
 //!
-//! What the leg makes of it: `leg::Following`. Units of the objects: micro-radian, micro-radian per second, thousandths
-//! of the rated torque (6076, mN m); flexion is positive.
+//! Execution of the commands: `leg::Following`. Units of the objects: micro-radian, micro-radian per second,
+//! thousandths of the rated torque (6076, mN m). Flexion is positive.
 
 mod control;
 mod coupling;

@@ -1,4 +1,4 @@
-//! The objects of the drive profile, each at its one place.
+//! Reads and writes the objects of the drive profile.
 
 use super::Mode;
 use super::control::{Axis, Settings};
@@ -8,14 +8,14 @@ use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::{Lost, Objects};
 use crate::leg::DriveState;
 
-/// The low bytes of a signed number.
+/// Low bytes of a signed number.
 macro_rules! bits {
     ($value:expr) => {
         i32::from($value) as u32
     };
 }
 
-/// In millionths, held to what fits.
+/// Value in millionths; saturates.
 fn micro(value: f32) -> u32 {
     ((value * 1e6) as i32) as u32
 }
@@ -25,14 +25,14 @@ impl Objects for Axis {
         let (settings, status, constants) = (&self.settings, &self.status, &self.constants);
         let thousandths = |torque: f32| bits!((torque / self.constants.rated_torque.0 * 1e3) as i16);
         Ok(match (object.index, object.sub) {
-            // A hundredth of a degree per second and more fits: 0.001 rad/s up to 32 rad/s.
+            // Unit 0.001 rad/s, range +-32 rad/s.
             (0x2010, _) => bits!((status.velocity.0 * 1e3) as i16),
             (0x2001, _) => u32::from(settings.node_id),
             (0x2002, _) => u32::from(settings.bit_rate),
             (0x2011, _) => u32::from(settings.feedforward),
             (0x2012, _) => u32::from(settings.returns),
             (0x2013, _) => u32::from(settings.watches),
-            // The leg's, which is not asked here.
+            // Objects of the leg; they are not held here.
             (0x2120, 0) => 13,
             (0x2100..=0x2193, _) => return Err(Abort::NoData),
             (0x219A | 0x60FD, _) => status.inputs,
@@ -67,7 +67,7 @@ impl Objects for Axis {
             (0x607D, 1) => settings.range[0] as u32,
             (0x607D, 2) => settings.range[1] as u32,
             (0x607F, _) => micro(constants.speed.0),
-            // Turns per minute of the motor.
+            // Motor speed in revolutions per minute.
             (0x6080, _) => (constants.speed.0 * constants.ratio * (30.0 / core::f32::consts::PI)) as u32,
             (0x6081, _) => settings.profile_velocity,
             (0x6083, _) => settings.profile_acceleration,
@@ -75,7 +75,7 @@ impl Objects for Axis {
             (0x6086, _) => 0,
             (0x6087, _) => settings.torque_slope,
             (0x608F, _) => constants.counts_per_turn,
-            // Over 1000 turns of the joint.
+            // Per 1000 revolutions of the joint.
             (0x6091, _) => (constants.ratio * 1e3 + 0.5) as u32,
             (0x6098, _) => bits!(settings.homing_method.max(0)),
             (0x60B1, _) => settings.velocity_offset as u32,
@@ -97,7 +97,7 @@ impl Objects for Axis {
         match (object.index, object.sub) {
             (0x2120, 0) => {}
             (0x2100..=0x2193, _) => return Err(Abort::State),
-            // 0: as the board has it.
+            // 0: the default node-ID of the board.
             (0x2001, _) if value <= 127 => settings.node_id = value as u8,
             (0x2002, _) if matches!(value, 125 | 250 | 500 | 1000) => settings.bit_rate = value as u16,
             (0x2011, _) if value <= 1 => settings.feedforward = value == 1,
@@ -105,7 +105,7 @@ impl Objects for Axis {
             (0x2013, _) if value <= 1 => settings.watches = value == 1,
             (0x6007, _) if is(&[0, 1, 2, 3]) => settings.connection_option = value as i16,
             (0x6040, _) => self.control(value as u16),
-            // What a fault does is chosen per fault, and a halt slows down along the profile.
+            // Fault reactions are chosen per fault; a halt always slows down along the profile.
             (0x605A, _) if is(&[0, 2]) => settings.quick_stop_option = value as i16,
             (0x605D, _) if is(&[1]) => {}
             (0x605E, _) if is(&[2]) => {}
@@ -132,7 +132,7 @@ impl Objects for Axis {
             (0x6084, _) if value > 0 => settings.profile_deceleration = value,
             (0x6086, _) if value as i16 == 0 => {}
             (0x6087, _) => settings.torque_slope = value,
-            // Where it stands is the place for 607C.
+            // Methods that take the present position as home.
             (0x6098, _) if matches!(value as i8, 0 | 35 | 37) => settings.homing_method = value as i8,
             (0x60B1, _) => settings.velocity_offset = value as i32,
             (0x60B2, _) => settings.torque_offset = value as i16,

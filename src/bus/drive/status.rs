@@ -1,16 +1,16 @@
-//! The statusword (6041).
+//! Statusword (6041).
 //!
 //! ```text
-//! bits 0-3, 5, 6  state          4 voltage, 9 remote       10 target reached   11 a limit acts
-//! bit 12   profile position: set-point taken; homing: attained; cyclic: the command is followed
+//! bits 0-3, 5, 6  state          4 voltage, 9 remote       10 target reached   11 internal limit active
+//! bit 12   profile position: set-point acknowledge; homing: attained; cyclic: the command is followed
 //! bit 13   positions: following error; homing: error
-//! bit 15   enabled as far as this joint is concerned, but the leg's bridges are off: the other joint is not enabled (yet)
+//! bit 15   this joint is enabled, but the leg's bridges are off because another joint is not enabled
 //! ```
-//! Source: CiA 402, statusword; bit 15 is Scarab's.
+//! Source: CiA 402, statusword; bit 15 is manufacturer-specific.
 
 use crate::leg::DriveState;
 
-/// The bits of a state.
+/// Statusword bits of a state.
 pub(super) const fn state_bits(state: DriveState) -> u16 {
     match state {
         DriveState::NotReadyToSwitchOn => 0x00,

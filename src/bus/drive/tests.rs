@@ -9,7 +9,7 @@ use crate::units::{NewtonMetre, Radian, RadianPerSecond};
 const CONTROLWORD: Object = Object::at(0x6040, 0);
 
 impl Board {
-    /// Both controlwords at one tick.
+    /// Writes both controlwords in one tick.
     fn control(&mut self, words: [u16; 2]) -> [u16; 2] {
         for (axis, word) in self.axes.iter_mut().zip(words) {
             assert_eq!(axis.write(CONTROLWORD, u32::from(word)), Ok(()));
@@ -51,7 +51,7 @@ fn six_seven_fifteen_enable_and_fifteen_goes_through_switched_on() {
 }
 
 #[test]
-fn nothing_is_powered_until_both_joints_have_asked_and_no_target_is_taken() {
+fn nothing_is_powered_and_no_target_taken_until_both_joints_are_enabled() {
     let mut board = Board::started(1);
     board.axes[0].write(Object::at(0x6060, 0), 8).expect("a mode");
     board.axes[0].write(Object::at(0x607A, 0), 500_000).expect("a target");
@@ -69,18 +69,18 @@ fn nothing_is_powered_until_both_joints_have_asked_and_no_target_is_taken() {
 }
 
 #[test]
-fn one_joint_stops_both_and_neither_comes_back_by_the_word_that_was_there() {
+fn one_joint_stops_both_and_an_old_controlword_restarts_neither() {
     for word in [0, 6, 7] {
         let mut board = Board::enabled();
         board.control([15, word]);
         assert_ne!(board.drive, DriveState::OperationEnabled);
-        // The host goes on sending what it sent to the other one.
+        // The host continues to send what it sent to the other joint.
         board.axes[1].write(CONTROLWORD, 15).expect("a word");
         let drive = board.drive;
         board.run(4);
         let may_go_on = word != 0;
         assert_eq!(board.drive, drive);
-        // Both have to ask again.
+        // Both joints must be enabled again.
         assert_eq!(board.control([15, 15])[1] == 0x27, may_go_on, "{word}");
     }
     let mut board = Board::enabled();
@@ -108,20 +108,20 @@ fn the_quick_stop_option_chooses_between_damping_and_off() {
 }
 
 #[test]
-fn a_fault_of_the_leg_is_told_by_both_nodes_and_reset_by_a_rising_edge() {
+fn both_nodes_report_a_fault_and_a_rising_edge_resets_it() {
     let mut board = Board::enabled();
     let fault = Fault { code: FaultCode::Overspeed, joint: 1 };
     board.drive = board.drive.after(DriveEvent::Failed(fault), 2);
     let frames = board.run(2);
-    let told: std::vec::Vec<_> = frames.iter().map(|frame| (frame.id(), frame.data().to_vec())).collect();
+    let sent: std::vec::Vec<_> = frames.iter().map(|frame| (frame.id(), frame.data().to_vec())).collect();
     let data = [0x00, 0x84, 0b10_0001, 2, 0, 0, 0, 0].to_vec();
-    assert_eq!(told, [(0x81, data.clone()), (0x82, data)]);
+    assert_eq!(sent, [(0x81, data.clone()), (0x82, data)]);
     assert_eq!(board.read(0x603F, 0), Ok(0x8400));
     board.run(5);
     assert_eq!(board.states(), [0x08; 2]);
     assert_eq!(board.control([15, 15]), [0x08; 2]);
     assert_eq!(board.control([0x80, 15]), [0x40; 2]);
-    // Held down it resets nothing else.
+    // A bit that stays set does not reset the next fault.
     let later = Fault { code: FaultCode::PositionLimit, joint: 0 };
     board.drive = board.drive.after(DriveEvent::Failed(later), 2);
     assert_eq!(board.control([0x80, 15]), [0x08; 2]);
@@ -131,7 +131,7 @@ fn a_fault_of_the_leg_is_told_by_both_nodes_and_reset_by_a_rising_edge() {
 }
 
 #[test]
-fn a_leg_that_refuses_is_not_said_to_be_enabled() {
+fn a_refused_enable_is_not_shown_as_enabled() {
     let mut board = Board::started(1);
     board.control([6; 2]);
     board.refuses = true;
@@ -139,7 +139,7 @@ fn a_leg_that_refuses_is_not_said_to_be_enabled() {
 }
 
 #[test]
-fn a_lost_host_stops_as_its_option_says() {
+fn a_lost_host_stops_the_drive_by_its_option() {
     let cases = [
         (0, 0x27, NmtState::PreOperational),
         (2, 0x40, NmtState::PreOperational),
@@ -158,7 +158,7 @@ fn a_lost_host_stops_as_its_option_says() {
         let emergency = frames.iter().find(|frame| frame.id() == 0x81).expect("an emergency");
         assert_eq!(emergency.data(), [0x30, 0x81, 0b1_0001, 0, 0, 0, 0, 0]);
         assert_eq!((board.states()[0], board.nodes[0].state()), (state, nmt), "{option}");
-        // The host is back: told, and nothing starts by itself.
+        // The host is back: the end of the error is reported, and nothing restarts.
         board.run(10);
         board.hear(0x750, &[5]);
         let frames = board.run(2);
@@ -169,7 +169,7 @@ fn a_lost_host_stops_as_its_option_says() {
 }
 
 #[test]
-fn a_lost_host_is_a_fault_of_the_leg_where_its_option_says_so() {
+fn a_lost_host_is_a_fault_with_option_1() {
     type Loss = fn(&mut Board);
     let lose: [(Loss, FaultCode); 3] = [
         (|board| board.axes[0].lost(Lost::Heartbeat), FaultCode::Heartbeat),
@@ -181,7 +181,7 @@ fn a_lost_host_is_a_fault_of_the_leg_where_its_option_says_so() {
         assert_eq!(board.write(0x6007, 0, 1, 2), Ok(()));
         lose(&mut board);
         assert_eq!((board.axes[0].take_fault(), board.axes[0].take_fault()), (Some(code), None));
-        // The fault is the leg's to react to; nothing else stops it.
+        // Only the leg reacts to the fault.
         assert_eq!(board.axes[0].own, DriveState::OperationEnabled);
     }
     let mut board = Board::enabled();
@@ -200,7 +200,7 @@ fn a_mode_is_displayed_before_the_leg_is_enabled() {
 }
 
 #[test]
-fn a_bus_that_is_lost_and_a_master_that_takes_its_node_back_stop_a_drive_that_stays_off() {
+fn a_lost_bus_or_an_nmt_command_stops_the_drive_for_good() {
     use super::super::Controller;
     let lose: [fn(&mut Board); 6] = [
         |board| board.hear(0, &[2, 1]),
@@ -225,7 +225,7 @@ fn a_bus_that_is_lost_and_a_master_that_takes_its_node_back_stop_a_drive_that_st
 }
 
 #[test]
-fn a_set_point_is_taken_once_for_each_rising_edge() {
+fn each_rising_edge_takes_one_set_point() {
     let mut board = Board::enabled();
     let mode = JointStatus { mode: 1, drive: board.drive, ..JointStatus::NONE };
     let axis = &mut board.axes[0];
@@ -243,7 +243,7 @@ fn a_set_point_is_taken_once_for_each_rising_edge() {
         let point = number(axis);
         assert_eq!((axis.command().asked, point.immediately, point.relative), (count, true, false));
         assert!((point.position.0 - position as f32 * 1e-6).abs() < 1e-7);
-        // A target alone moves nothing.
+        // A new target without a rising edge moves nothing.
         axis.write(Object::at(0x607A, 0), 900_000).expect("a target");
         assert_eq!((number(axis), axis.command().asked), (point, count));
         axis.write(CONTROLWORD, 0x2F).expect("a word");
@@ -254,7 +254,7 @@ fn a_set_point_is_taken_once_for_each_rising_edge() {
 }
 
 #[test]
-fn a_set_point_before_the_leg_is_powered_is_not_taken_afterwards() {
+fn a_set_point_before_power_is_discarded() {
     let mut board = Board::started(1);
     board.axes[0].write(Object::at(0x6060, 0), 1).expect("a mode");
     board.axes[0].write(Object::at(0x607A, 0), 500_000).expect("a target");
@@ -271,7 +271,7 @@ fn a_set_point_before_the_leg_is_powered_is_not_taken_afterwards() {
 }
 
 #[test]
-fn a_reset_that_was_asked_before_the_fault_does_not_reset_it() {
+fn a_reset_bit_set_before_the_fault_does_not_reset_it() {
     let mut board = Board::enabled();
     board.axes[0].write(CONTROLWORD, 0x8F).expect("a word");
     let fault = Fault { code: FaultCode::NotFinite, joint: 0 };
@@ -300,7 +300,7 @@ fn units_are_micro_radians_and_thousandths_of_the_rated_torque() {
 }
 
 #[test]
-fn a_mode_that_the_leg_does_not_follow_is_refused() {
+fn an_unsupported_mode_is_refused() {
     let constants = AxisConstants { modes: Mode::CyclicPosition.bit(), ..axis().constants };
     let mut axis = Axis::new(constants);
     for mode in -128..=127_i8 {
@@ -313,7 +313,7 @@ fn a_mode_that_the_leg_does_not_follow_is_refused() {
 }
 
 #[test]
-fn homing_is_done_by_the_methods_that_were_written_and_by_no_other() {
+fn homing_needs_a_written_method() {
     let offset = |method: Option<u32>| {
         let mut board = Board::enabled();
         board.axes[0].write(Object::at(0x607C, 0), 500_000).expect("an offset");
@@ -326,15 +326,15 @@ fn homing_is_done_by_the_methods_that_were_written_and_by_no_other() {
             other => panic!("{other:?}"),
         }
     };
-    // 0 that was written: here is home, as 35 and 37.
+    // Methods 0 (written), 35 and 37: the present position is home.
     assert_eq!([0, 35, 37].map(|method| offset(Some(method))), [500; 3]);
-    // None written: nowhere, which the leg answers by a homing error.
+    // No method written: the leg answers with a homing error.
     assert_eq!(offset(None), u32::MAX);
     assert_eq!(Board::enabled().axes[0].read(Object::at(0x6098, 0)), Ok(0));
 }
 
 #[test]
-fn a_ramp_without_slope_and_a_switch_beyond_one_are_refused() {
+fn zero_ramps_and_switch_values_above_one_are_refused() {
     let mut board = Board::started(1);
     for (index, value, accepted) in [
         (0x2011, 1, true),
@@ -346,7 +346,7 @@ fn a_ramp_without_slope_and_a_switch_beyond_one_are_refused() {
     ] {
         let object = Object::at(index, 0);
         assert_eq!(board.axes[0].write(object, value).is_ok(), accepted, "{index:x} {value}");
-        // What was refused changed nothing.
+        // A refused write changes nothing.
         assert_eq!(board.axes[0].read(object), Ok(1), "{index:x}");
     }
 }

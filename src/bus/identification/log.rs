@@ -1,19 +1,21 @@
-//! The 500 Hz log as a host takes it away: a queue, of which a host holds a part, reads it as one block and lets it go.
+//! Queue of the 500 Hz log. A host holds a part of it, reads that part as one block, and releases it.
 //!
-//! Why a queue and not a memory of the last minute: a board has no room for that, and a host that reads while the leg moves gets
-//! every sample once. What does not fit is counted, not overwritten, so that a hole is seen.
+//! Why a queue and not the last minute: a board has not enough memory for a minute. From a queue, a host that
+//! reads during a motion receives every sample once. A sample that does not fit is counted and discarded, so
+//! gaps are visible.
 //!
 //! ```text
-//! hold   from now on the block is what waits, whatever comes meanwhile
-//! block  of each sample: tick (u32), segment (u32), angles (N f32, rad), torques (N f32, N m); little-endian, model's signs
-//! let go what was held is gone
+//! hold     freezes the block: the samples waiting now, whatever arrives later
+//! block    per sample: tick (u32), segment (u32), angles (N f32, rad), torques (N f32, N m)
+//!          little-endian, signs of the model
+//! release  discards the held samples
 //! ```
 //!
 //! Memory: 8 + 8 N bytes a sample.
 
 use crate::leg::{LoggedSample, Segment};
 
-/// One sample as it is kept.
+/// One stored sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Kept<const N: usize> {
     tick: u32,
@@ -32,7 +34,7 @@ pub struct Log<const N: usize, const L: usize> {
     lost: u32,
 }
 
-/// 0 none, 1 identified from, 2 tracked, 3 and on the motions that are predicted.
+/// Number of a segment: 0 none, 1 training, 2 tracking, 3 and above the validation motions.
 const fn number(segment: Option<Segment>) -> u32 {
     match segment {
         None => 0,
@@ -43,7 +45,7 @@ const fn number(segment: Option<Segment>) -> u32 {
 }
 
 impl<const N: usize, const L: usize> Log<N, L> {
-    /// Nothing waits.
+    /// Empty queue.
     pub const EMPTY: Self = Self {
         samples: [Kept { tick: 0, segment: 0, position_rad: [0.0; N], torque_nm: [0.0; N] }; L],
         first: 0,
@@ -52,10 +54,10 @@ impl<const N: usize, const L: usize> Log<N, L> {
         lost: 0,
     };
 
-    /// Bytes of a sample.
+    /// Bytes per sample.
     pub const BYTES: usize = 8 + 8 * N;
 
-    /// A sample of the log; one that does not fit is lost.
+    /// Appends a sample; counts it as lost if the queue is full.
     pub fn push(&mut self, logged: &LoggedSample<N>) {
         let place = (self.first + self.length) % L.max(1);
         match self.samples.get_mut(place) {
@@ -72,7 +74,7 @@ impl<const N: usize, const L: usize> Log<N, L> {
         }
     }
 
-    /// What waits is held, or (`false`) what was held is let go.
+    /// Holds the waiting samples, or (`false`) releases the held ones.
     pub fn hold(&mut self, hold: bool) {
         if hold {
             self.held = self.length;
@@ -83,25 +85,25 @@ impl<const N: usize, const L: usize> Log<N, L> {
         }
     }
 
-    /// Samples that are held.
+    /// Returns the number of held samples.
     #[must_use]
     pub const fn held(&self) -> u32 {
         self.held as u32
     }
 
-    /// Samples that wait.
+    /// Returns the number of waiting samples, held ones included.
     #[must_use]
     pub const fn waiting(&self) -> u32 {
         self.length as u32
     }
 
-    /// Samples that found no room.
+    /// Returns the number of lost samples.
     #[must_use]
     pub const fn lost(&self) -> u32 {
         self.lost
     }
 
-    /// The block's bytes from `offset` on, as many as fit; how many it has.
+    /// Copies bytes of the held block from `offset` on into `into`; returns the block's size in bytes.
     pub fn bytes(&self, offset: u32, into: &mut [u8]) -> u32 {
         for (place, byte) in (offset as usize..).zip(into) {
             let sample = place / Self::BYTES;

@@ -1,23 +1,23 @@
-//! The objects from 2100 on: a leg's identification, told by each of its nodes.
+//! Objects from 2100 on: the identification of a leg, available at each of its nodes.
 //!
 //! ```text
-//! 2100   start, cancel, where it stands, plan, seed, verdict      the leg's, the same at each node
+//! 2100   command, state, plan, seed, verdict                      of the leg, equal at each node
 //! 2110   fourteen parameters of the node's joint                  value, sigma, status
-//! 2120   base parameters                                          the leg's: value, sigma, carrier, what became of it
-//! 2130   fit of the joint's torque, by motion
-//! 2140   the 500 Hz log ([`Log`])
+//! 2120   base parameters                                          of the leg: value, sigma, carrier, flags
+//! 2130   fit of the joint's torque, per motion
+//! 2140   500 Hz log ([`Log`])
 //! ```
 //!
-//! What is asked here is asked of the leg at its next tick, as by the operator's contacts. Numbers are those of the trace;
-//! what is unknown is NaN, and everything is before the first identification.
+//! A command is passed to the leg at its next tick, like those of the operator's contacts. Numbers are those
+//! of the trace. Unknown values are NaN; before the first identification all are.
 
-mod found;
 mod log;
 mod results;
+mod results_copy;
 
-pub use found::Found;
 pub use log::Log;
 pub use results::Results;
+pub use results_copy::ResultsCopy;
 
 use super::abort::Abort;
 use super::dictionary::Object;
@@ -26,41 +26,41 @@ use super::emergency::ErrorReport;
 use super::objects::{Lost, Objects};
 use crate::leg::{Activity, IdentifyPhase, Parameter, Permission, Plan, Reason, Status, Step};
 
-/// What a host asks of a leg beside power and targets.
+/// Request of a host to the leg, besides power and targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ask {
-    /// Excite, solve, validate.
+    /// Start an identification: excite, solve, validate.
     Identify,
-    /// Give an identification up.
+    /// Cancel the identification.
     Cancel,
-    /// Take the update that is offered into use.
+    /// Use the offered model update.
     TakeUpdate,
 }
 
-/// What belongs to the leg and not to a joint.
+/// Objects of the leg, shared by its nodes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LegObjects<const N: usize, const L: usize> {
     /// The 500 Hz log.
     pub log: Log<N, L>,
-    /// What the leg is doing; to be told after each tick.
+    /// Activity of the leg; to be updated after each tick.
     pub activity: Activity,
-    /// The model no longer fits; an update is offered. To be told after each tick.
+    /// Model monitor: the model no longer fits; an update is offered. To be updated after each tick.
     pub change: [bool; 2],
-    /// One-time or sequential; of the next identification.
+    /// Plan of the next identification: one-time or sequential.
     pub plan: Plan,
-    /// Of the swarm's random numbers; of the next identification.
+    /// Seed of the next identification's random numbers.
     pub seed: u64,
-    /// Counts the models that were accepted on this board.
+    /// Number of models accepted on this board.
     pub generation: u32,
-    /// The command that was written last.
+    /// Last command written.
     command: u8,
     asked: Option<Ask>,
-    /// To be kept, or (`true`) forgotten.
+    /// Pending store request; `true` restores the defaults.
     store: Option<bool>,
 }
 
 impl<const N: usize, const L: usize> LegObjects<N, L> {
-    /// Nothing asked.
+    /// Creates the objects without a request.
     #[must_use]
     pub const fn new(plan: Plan, seed: u64, generation: u32) -> Self {
         Self {
@@ -76,23 +76,23 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
         }
     }
 
-    /// This is what the leg is asked next.
+    /// Whether this request is pending.
     #[must_use]
     pub fn has_asked(&self, ask: Ask) -> bool {
         self.asked == Some(ask)
     }
 
-    /// What the leg is asked, once.
+    /// Takes the pending request.
     pub fn take_asked(&mut self) -> Option<Ask> {
         self.asked.take()
     }
 
-    /// Whether everything is to be kept, or (`true`) forgotten; once.
+    /// Takes the pending store request; `true` restores the defaults.
     pub fn take_store(&mut self) -> Option<bool> {
         self.store.take()
     }
 
-    /// Of 2100.
+    /// Reads 2100.
     fn read(&self, sub: u8, results: &impl Results) -> Result<u32, Abort> {
         let verdict = results.verdict();
         Ok(match sub {
@@ -130,7 +130,7 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
                 };
                 self.command = value as u8;
             }
-            // What an identification was begun with stays until it ends.
+            // Plan and seed are locked during an identification.
             (4..=6, _) if is_identifying => return Err(Abort::State),
             (4, 0) => self.plan = Plan::OneTime,
             (4, 1) => self.plan = Plan::Sequential,
@@ -142,7 +142,7 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
     }
 }
 
-/// The number of 2100:2, and the motion of the validation from 1.
+/// State number of 2100:2, and the validation motion, counted from 1.
 const fn state(activity: Activity) -> (u8, u8) {
     match activity {
         Activity::Idle => (0, 0),
@@ -162,15 +162,15 @@ const fn state(activity: Activity) -> (u8, u8) {
     }
 }
 
-/// Everything a node asks for: its joint, its leg, and what was found.
+/// All objects of one node from 2000 on: joint, leg and results.
 pub struct JointObjects<'a, R, const N: usize, const L: usize> {
-    /// The joint.
+    /// Axis of the joint.
     pub axis: &'a mut Axis,
-    /// Which of the leg's, from 0.
+    /// Index of the joint, from 0.
     pub joint: usize,
-    /// The leg.
+    /// Objects of the leg.
     pub leg: &'a mut LegObjects<N, L>,
-    /// What was found.
+    /// Identification results.
     pub results: &'a R,
 }
 
@@ -262,7 +262,7 @@ impl<R: Results, const N: usize, const L: usize> Objects for JointObjects<'_, R,
     }
 
     fn store(&mut self, defaults: bool) -> Result<(), Abort> {
-        // What forbids to enable forbids this as well: motors may be braking.
+        // Not with an active inhibit reason either: the motors may be braking.
         if self.axis.drive().permission() != Permission::Released || self.axis.is_blocked() {
             return Err(Abort::State);
         }

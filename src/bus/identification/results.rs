@@ -1,20 +1,21 @@
-//! What an identification found, as the objects tell it: whoever has the results answers, without knowing of objects.
+//! Identification results as the objects present them. The provider of the results does not depend on the
+//! objects.
 
 use core::borrow::BorrowMut;
 
 use crate::leg::{FoundBase, FoundFit, FoundParameter, Identification, MotionWindow, Parameter, Verdict};
 
-/// Joints and parameters from 0, motions as `Identification::fit` counts them.
+/// Identification results. Joints and parameters count from 0; motions as in `Identification::fit`.
 pub trait Results {
-    /// One of a joint's fourteen parameters; nothing before anything was identified.
+    /// Returns one of a joint's fourteen parameters; `None` before the first result.
     fn parameter(&self, joint: usize, parameter: Parameter) -> Option<FoundParameter>;
-    /// A base parameter.
+    /// Returns a base parameter.
     fn base_parameter(&self, base: usize) -> Option<FoundBase>;
-    /// How well a joint's torque on a motion is explained.
+    /// Returns the quality of fit of a joint's torque for a motion.
     fn fit(&self, motion: usize, joint: usize) -> Option<FoundFit>;
-    /// The last verdict.
+    /// Returns the last verdict.
     fn verdict(&self) -> Option<Verdict>;
-    /// Iterations and evaluations of the search so far.
+    /// Returns the iterations and evaluations of the search so far.
     fn search(&self) -> [u32; 2];
 }
 

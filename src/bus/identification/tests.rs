@@ -5,7 +5,7 @@ use super::super::table::ROWS;
 use super::*;
 use crate::leg::{FoundBase, FoundFit, FoundParameter, LoggedSample, Segment, Verdict};
 
-/// An identification of two joints that gave numbers one can tell apart.
+/// Results of two joints in which every number differs.
 struct Numbers(Option<Verdict>);
 
 impl Results for Numbers {
@@ -82,7 +82,7 @@ fn every_object_of_the_table_is_answered_with_and_without_a_result() {
 }
 
 #[test]
-fn numbers_are_the_identification_s_and_what_is_unknown_is_no_number() {
+fn objects_hold_the_results_and_unknown_values_are_nan() {
     let read = |results: &Numbers, index, sub| {
         with(&mut leg(), results, |objects| objects.read(Object::at(index, sub))).expect("a value")
     };
@@ -100,12 +100,12 @@ fn numbers_are_the_identification_s_and_what_is_unknown_is_no_number() {
 }
 
 #[test]
-fn a_copy_answers_every_object_as_the_original_does() {
-    let mut found = Found::<2, 13>::nothing();
+fn a_copy_answers_every_object_like_the_original() {
+    let mut found = ResultsCopy::<2, 13>::nothing();
     found.take(&ACCEPTED, ACCEPTED.0);
     let mut forgotten = found.clone();
     forgotten.forget();
-    assert_eq!(forgotten, Found::nothing());
+    assert_eq!(forgotten, ResultsCopy::nothing());
     let mut compared = 0;
     for row in ROWS.iter().filter(|row| (0x2100..0x2140).contains(&row.index)) {
         for object in (row.sub..row.sub + row.subs).map(|sub| Object::at(row.index, sub)) {
@@ -125,7 +125,7 @@ fn a_copy_answers_every_object_as_the_original_does() {
 }
 
 #[test]
-fn commands_are_asked_once_and_what_an_identification_began_with_stays() {
+fn a_command_is_passed_once_and_settings_are_locked_meanwhile() {
     let mut leg = leg();
     let write = |leg: &mut LegObjects<2, 8>, sub, value| {
         with(leg, &ACCEPTED, |objects| objects.write(Object::at(0x2100, sub), value))
@@ -144,7 +144,7 @@ fn commands_are_asked_once_and_what_an_identification_began_with_stays() {
 }
 
 #[test]
-fn the_log_is_taken_away_sample_by_sample_and_what_found_no_room_is_counted() {
+fn the_log_delivers_each_sample_once_and_counts_lost_ones() {
     let mut log = Log::<2, 8>::EMPTY;
     let sample = |tick: u32| LoggedSample {
         sample: crate::leg::LogSample {
@@ -162,7 +162,7 @@ fn the_log_is_taken_away_sample_by_sample_and_what_found_no_room_is_counted() {
             pushed += 1;
         }
         log.hold(true);
-        // Whatever comes meanwhile.
+        // A sample that arrives while the block is held.
         log.push(&sample(pushed));
         pushed += 1;
         let size = log.bytes(0, &mut []);

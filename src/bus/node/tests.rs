@@ -23,17 +23,17 @@ fn a_node_boots_once_and_again_after_each_reset() {
         assert_eq!(board.write(0x1005, 0, 0x1FF, 4), Ok(()));
         board.hear(0, &[reset, 3]);
         assert_eq!(board.frames(), [boot[0]]);
-        // The reset of the communication leaves what is not the communication's.
-        let kept = if reset == 130 { 5 } else { 87_266 };
-        assert_eq!((board.read(0x6065, 0), board.read(0x1005, 0)), (Ok(kept), Ok(0x80)));
+        // A communication reset leaves the drive's objects unchanged.
+        let window = if reset == 130 { 5 } else { 87_266 };
+        assert_eq!((board.read(0x6065, 0), board.read(0x1005, 0)), (Ok(window), Ok(0x80)));
     }
 }
 
 #[test]
-fn sync_and_emergency_take_no_identifier_that_would_lock_somebody_out() {
+fn sync_and_emergency_refuse_cob_ids_of_other_messages() {
     let mut board = started();
     let range = Err(Abort::Range as u32);
-    // CiA 301's restricted identifiers, beyond eleven bits, SYNC producer, and what other messages have.
+    // CiA 301's restricted COB-IDs, more than eleven bits, SYNC producer, and COB-IDs of other messages.
     let restricted =
         [0, 1, 0x7F, 0x101, 0x180, 0x580, 0x581, 0x5FF, 0x601, 0x67F, 0x6E0, 0x701, 0x77F, 0x7FF, 0x800];
     let extended = [0x2000_0300, 0x4000_0300];
@@ -43,20 +43,20 @@ fn sync_and_emergency_take_no_identifier_that_would_lock_somebody_out() {
     }
     assert_eq!((board.write(0x1005, 0, 0x81, 4), board.write(0x1014, 0, 0x80, 4)), (range, range));
     assert_eq!(board.write(0x1014, 0, 1 << 31 | 0x601, 4), range);
-    // Neither of the two takes the other's, nor a PDO one of theirs.
+    // SYNC, emergency and PDOs must not share a COB-ID.
     assert_eq!((board.write(0x1005, 0, 0x300, 4), board.write(0x1014, 0, 0x300, 4)), (Ok(()), range));
     assert_eq!((board.write(0x1014, 0, 0x310, 4), board.write(0x1005, 0, 0x310, 4)), (Ok(()), range));
     for pdo in [0x1400, 0x1800] {
         assert_eq!(board.write(pdo, 1, 1 << 31, 4), Ok(()));
         assert_eq!((board.write(pdo, 1, 0x300, 4), board.write(pdo, 1, 0x310, 4)), (range, range));
     }
-    // With bit 30 (no RTR) it is the same identifier, and another PDO's is taken as well.
+    // Bit 30 (no RTR) does not change the COB-ID. The COB-ID of another PDO is refused too.
     assert_eq!(board.write(0x1401, 1, 1 << 31, 4), Ok(()));
     for taken in [0x4000_0300, 0x4000_0310, 0x401, 0x4000_0401, 0x281] {
         assert_eq!(board.write(0x1401, 1, taken, 4), range, "{taken:x}");
     }
     assert_eq!((board.write(0x1401, 1, 0x4000_0301, 4), board.write(0x1401, 1, 0x301, 4)), (Ok(()), Ok(())));
-    // A PDO that is switched off gives its own back, and so does a message that is not.
+    // A disabled PDO or emergency message frees its COB-ID.
     assert_eq!(
         (board.write(0x1005, 0, 0x201, 4), board.write(0x1014, 0, 1 << 31 | 0x310, 4)),
         (Ok(()), Ok(()))
@@ -66,7 +66,7 @@ fn sync_and_emergency_take_no_identifier_that_would_lock_somebody_out() {
 }
 
 #[test]
-fn a_stopped_node_tells_its_heartbeat_and_nothing_else() {
+fn a_stopped_node_sends_its_heartbeat_and_nothing_else() {
     let mut board = started();
     assert_eq!(board.write(0x1017, 0, 1, 2), Ok(()));
     board.frames();
@@ -81,7 +81,7 @@ fn a_stopped_node_tells_its_heartbeat_and_nothing_else() {
 }
 
 #[test]
-fn the_heartbeat_tells_the_state_at_its_period() {
+fn the_heartbeat_carries_the_state_at_its_period() {
     let mut board = Board::started(1);
     assert_eq!(board.write(0x1017, 0, 5, 2), Ok(()));
     board.hear(0, &[1, 1]);
@@ -91,7 +91,7 @@ fn the_heartbeat_tells_the_state_at_its_period() {
 }
 
 #[test]
-fn received_values_wait_for_the_sync_where_the_type_says_so() {
+fn synchronous_pdos_are_written_at_the_sync() {
     let mut board = started();
     assert_eq!(board.write(0x1401, 2, 1, 1), Ok(()));
     board.hear(0x301, &[1, 2, 3, 0]);
@@ -102,14 +102,14 @@ fn received_values_wait_for_the_sync_where_the_type_says_so() {
     assert_eq!(board.write(0x1401, 2, 255, 1), Ok(()));
     board.hear(0x301, &[4, 0, 0, 0]);
     assert_eq!(board.read(0x607A, 0), Ok(4));
-    // Pre-operational nothing is received.
+    // PDOs are ignored in Pre-operational.
     board.hear(0, &[128, 0]);
     board.hear(0x301, &[5, 0, 0, 0]);
     assert_eq!(board.read(0x607A, 0), Ok(4));
 }
 
 #[test]
-fn a_pdo_is_set_up_anew_while_operational_as_host_software_does_it() {
+fn a_pdo_can_be_remapped_while_operational() {
     let mut board = started();
     for (index, sub, value, size) in [
         (0x1801, 1, 0x8000_0281, 4),
@@ -136,24 +136,24 @@ fn a_pdo_is_set_up_anew_while_operational_as_host_software_does_it() {
 }
 
 #[test]
-fn a_pdo_too_short_is_told_and_not_taken_and_one_too_late_stops_the_drive() {
+fn a_short_pdo_is_reported_and_ignored_and_a_late_one_stops_the_drive() {
     let mut board = started();
     board.hear(0x301, &[1, 2, 3]);
-    let told = board.tick();
-    assert_eq!(told[0], Frame::new(0x81, &[0x10, 0x82, 0b1_0001, 0, 0, 0, 0, 0]));
+    let sent = board.tick();
+    assert_eq!(sent[0], Frame::new(0x81, &[0x10, 0x82, 0b1_0001, 0, 0, 0, 0, 0]));
     assert_eq!(board.read(0x607A, 0), Ok(0));
     board.hear(0x301, &[1, 0, 0, 0]);
     assert_eq!(board.tick()[0], Frame::new(0x81, &[0; 8]));
     assert_eq!(board.write(0x1401, 5, 10, 2), Ok(()));
     board.hear(0x301, &[1, 0, 0, 0]);
     assert_eq!(board.run(40), []);
-    let told = board.run(2);
-    assert_eq!(told[0], Frame::new(0x81, &[0x50, 0x82, 0b1_0001, 0, 0, 0, 0, 0]));
+    let sent = board.run(2);
+    assert_eq!(sent[0], Frame::new(0x81, &[0x50, 0x82, 0b1_0001, 0, 0, 0, 0, 0]));
     assert_eq!(board.nodes[0].state(), NmtState::PreOperational);
 }
 
 #[test]
-fn a_counted_sync_has_its_counter_or_is_not_one() {
+fn a_counted_sync_without_valid_counter_is_ignored() {
     let mut board = started();
     assert_eq!(board.write(0x1019, 0, 4, 1), Ok(()));
     let sent = |board: &mut Board, data: &[u8]| {
@@ -165,30 +165,30 @@ fn a_counted_sync_has_its_counter_or_is_not_one() {
 }
 
 #[test]
-fn what_the_controller_tells_becomes_an_emergency_message() {
+fn a_controller_state_becomes_an_emergency_message() {
     let mut node = Node::new(NodeId::new(9).expect("a number"), super::super::tests::IDENTITY);
     let mut axis = axis();
     node.poll(0, &mut axis);
-    for (told, code) in [
+    for (state, code) in [
         (Controller::Overrun, 0x8110_u16),
         (Controller::Passive, 0x8120),
         (Controller::Off, 0x8140),
         (Controller::Active, 0),
     ] {
-        node.on_controller(told, &mut axis);
+        node.on_controller(state, &mut axis);
         let frame = node.poll(0, &mut axis).expect("a message");
-        assert_eq!((frame.id(), &frame.data()[..2]), (0x89, &code.to_le_bytes()[..]), "{told:?}");
+        assert_eq!((frame.id(), &frame.data()[..2]), (0x89, &code.to_le_bytes()[..]), "{state:?}");
     }
 }
 
-/// Codes of the first node's emergency messages among these.
+/// Emergency codes of the first node among these frames.
 fn codes(frames: &[Frame]) -> std::vec::Vec<u16> {
-    let told = frames.iter().filter(|frame| frame.id() == 0x81);
-    told.map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect()
+    let sent = frames.iter().filter(|frame| frame.id() == 0x81);
+    sent.map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect()
 }
 
 #[test]
-fn an_error_of_a_heartbeat_that_is_watched_anew_is_over_and_the_next_is_told() {
+fn reconfiguring_a_heartbeat_ends_its_error_and_the_next_is_reported() {
     let mut board = started();
     assert_eq!(board.write(0x1029, 1, 1, 1), Ok(()));
     for _ in 0..3 {
@@ -204,7 +204,7 @@ fn an_error_of_a_heartbeat_that_is_watched_anew_is_over_and_the_next_is_told() {
 }
 
 #[test]
-fn an_error_of_one_pdo_is_not_over_with_another_that_comes() {
+fn another_pdo_does_not_end_the_error_of_a_late_one() {
     let mut board = started();
     for (object, value) in [(0x1400, 100), (0x1401, 0)] {
         assert_eq!(board.write(object, 5, value, 2), Ok(()));

@@ -1,18 +1,19 @@
-//! Process data: what a PDO is set to (1400.., 1600.., 1800.., 1A00..), the same for both directions.
+//! Process data objects: communication (1400, 1800) and mapping parameters (1600, 1A00) of both directions.
 //!
-//! Why remappable while Operational: CiA 301 lets a device refuse that, but the host software for exoskeletons starts the node
-//! first and sets its PDOs up afterwards. A PDO is changed in the order that software and standard share:
+//! Why remappable while Operational: CiA 301 lets a device refuse that, but host software for exoskeletons
+//! starts the node first and configures its PDOs afterwards. The standard's sequence is required:
 //!
 //! ```text
-//! comm:1 = 0x80000000 | COB    the PDO does not exist
-//! map:0 = 0                    its mapping may be written
+//! comm:1 = 0x80000000 | COB    disable the PDO
+//! map:0 = 0                    open the mapping for writing
 //! map:i = index << 16 | sub << 8 | bits
 //! map:0 = n
-//! comm:1 = COB                 it exists again
+//! comm:1 = COB                 enable the PDO
 //! ```
 //!
-//! Transmission types: 0 at the next SYNC where something changed, 1 to 240 every so many SYNC, 254 and 255 at once on a change.
-//! Received ones of types 0 to 240 wait for the SYNC. Source: CiA 301, PDO. Limits: whole bytes; no RTR (252, 253).
+//! Transmission types: 0 at the next SYNC if a value changed, 1 to 240 every nth SYNC, 254 and 255 on a
+//! change. Received PDOs of types 0 to 240 take effect at the next SYNC. Source: CiA 301, PDO. Limits: whole
+//! bytes; no RTR (252, 253).
 
 pub(super) mod receive;
 pub(super) mod transmit;
@@ -20,29 +21,29 @@ pub(super) mod transmit;
 use super::abort::Abort;
 use super::dictionary::{Mapping, Object, Type, find};
 
-/// PDOs of each direction.
+/// Number of PDOs per direction.
 pub const PDOS: usize = 4;
-/// Objects in one PDO.
+/// Largest number of objects in one PDO.
 pub const MAPPED: usize = 8;
 
-/// Of an identifier: there is no such message.
+/// Bit of a COB-ID: the message does not exist.
 pub(super) const ABSENT: u32 = 1 << 31;
 const EXTENDED: u32 = 1 << 29;
-/// Bits of an identifier that only extended ones have.
+/// Bits used only by extended identifiers.
 const BEYOND: u32 = 0x1FFF_F800;
 
-/// Whether a host may give this identifier to a message: the ones that network management, SYNC, emergency messages, SDO and heartbeat
-/// have by CiA 301 are nobody's.
+/// Whether a host may assign this COB-ID. Excluded are those that CiA 301 reserves for NMT, SYNC, emergency,
+/// SDO and heartbeat.
 pub(super) const fn is_assignable(number: u32) -> bool {
     matches!(number, 0x181..=0x57F | 0x681..=0x6DF)
 }
 
-/// One object in a PDO, and its bytes.
+/// One mapped object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mapped {
-    /// Which.
+    /// Address of the object.
     pub object: Object,
-    /// Bytes.
+    /// Size in bytes.
     pub size: u8,
 }
 
@@ -51,14 +52,14 @@ impl Mapped {
         Self { object: Object::at((entry >> 16) as u16, (entry >> 8) as u8), size: entry as u8 / 8 }
     }
 
-    /// Stands for bytes that mean nothing here: index 2 to 7, the standard's types.
+    /// Whether the entry is a dummy: index 2 to 7, the standard's types. Its bytes are ignored.
     #[must_use]
     pub const fn is_dummy(self) -> bool {
         self.object.index <= Type::U32 as u16
     }
 }
 
-/// What a PDO is set to.
+/// Communication and mapping parameters of one PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parameters {
     direction: Mapping,
@@ -72,7 +73,7 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// With an identifier, a type, and what is mapped.
+    /// Creates parameters with COB-ID, transmission type, inhibit time (units of 100 us) and mapped objects.
     #[must_use]
     pub fn new(direction: Mapping, identifier: u16, kind: u8, inhibit: u16, mapped: &[u32]) -> Self {
         let mut map = [0; MAPPED];
@@ -84,30 +85,30 @@ impl Parameters {
         Self { direction, identifier, kind, inhibit, event_ms: 0, sync_start: 0, count, map }
     }
 
-    /// The identifier, of a PDO that exists.
+    /// Returns the COB-ID, or `None` if the PDO does not exist.
     #[must_use]
     pub fn identifier(&self) -> Option<u16> {
         (self.identifier & ABSENT == 0).then_some((self.identifier & 0x7FF) as u16)
     }
 
-    /// It waits for a SYNC.
+    /// Whether the PDO waits for a SYNC.
     #[must_use]
     pub const fn is_synchronous(&self) -> bool {
         self.kind <= 240
     }
 
-    /// What is in it, in order.
+    /// Mapped objects in the order of their bytes.
     pub fn mapped(&self) -> impl Iterator<Item = Mapped> + use<> {
         self.map.into_iter().take(usize::from(self.count)).map(Mapped::of)
     }
 
-    /// Bytes of its frame.
+    /// Length of the frame in bytes.
     #[must_use]
     pub fn length(&self) -> usize {
         self.mapped().map(|mapped| usize::from(mapped.size)).sum()
     }
 
-    /// Reads 1400 and 1800.
+    /// Reads an object of 1400 or 1800.
     pub(super) fn communication(&self, sub: u8) -> Result<u32, Abort> {
         match sub {
             1 => Ok(self.identifier),
@@ -120,7 +121,7 @@ impl Parameters {
         }
     }
 
-    /// Writes 1400 and 1800.
+    /// Writes an object of 1400 or 1800.
     pub(super) fn set_communication(&mut self, sub: u8, value: u32) -> Result<(), Abort> {
         match sub {
             1 => return self.set_identifier(value),
@@ -135,7 +136,7 @@ impl Parameters {
         Ok(())
     }
 
-    /// A PDO that exists keeps its identifier.
+    /// Sets the COB-ID. An existing PDO can only be disabled.
     fn set_identifier(&mut self, value: u32) -> Result<(), Abort> {
         let number = value & 0x7FF;
         let exists = value & ABSENT == 0;
@@ -147,7 +148,7 @@ impl Parameters {
         Ok(())
     }
 
-    /// Reads 1600 and 1A00.
+    /// Reads an object of 1600 or 1A00.
     pub(super) fn mapping(&self, sub: u8) -> Result<u32, Abort> {
         match usize::from(sub).checked_sub(1) {
             None => Ok(u32::from(self.count)),
@@ -155,7 +156,7 @@ impl Parameters {
         }
     }
 
-    /// Writes 1600 and 1A00.
+    /// Writes an object of 1600 or 1A00.
     pub(super) fn set_mapping(&mut self, sub: u8, value: u32) -> Result<(), Abort> {
         if self.identifier().is_some() {
             return Err(Abort::Access);

@@ -1,37 +1,37 @@
-//! What the node receives as PDO.
+//! Received PDOs.
 
 use super::Parameters;
 use crate::hal::Frame;
 
-/// What came of a frame, or of the time since.
+/// Result of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
-    /// Its values count now.
+    /// Its values are valid now.
     Now,
-    /// Its values count from the next SYNC on.
+    /// Its values become valid at the next SYNC.
     AtSync,
-    /// Fewer bytes than are mapped.
+    /// The frame has fewer bytes than are mapped.
     TooShort,
 }
 
-/// One PDO that is received.
+/// One received PDO.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Receive {
-    /// What it is set to.
+    /// Communication and mapping parameters.
     pub parameters: Parameters,
     data: [u8; 8],
     waits: bool,
-    /// When it will be missed, where its event timer is set and it has been seen.
+    /// Deadline of the event timer, once a frame was received.
     due_us: Option<u64>,
 }
 
 impl Receive {
-    /// Nothing received yet.
+    /// Creates a PDO that has received nothing.
     pub const fn new(parameters: Parameters) -> Self {
         Self { parameters, data: [0; 8], waits: false, due_us: None }
     }
 
-    /// A frame with its identifier. More bytes than are mapped are not looked at.
+    /// Takes over a frame with this PDO's COB-ID. Bytes beyond the mapped ones are ignored.
     pub fn take(&mut self, frame: &Frame, now_us: u64) -> Received {
         if frame.data().len() < self.parameters.length() {
             return Received::TooShort;
@@ -45,17 +45,17 @@ impl Receive {
         if self.waits { Received::AtSync } else { Received::Now }
     }
 
-    /// Whether it has waited for this SYNC.
+    /// Whether values were waiting for this SYNC.
     pub fn at_sync(&mut self) -> bool {
         core::mem::take(&mut self.waits)
     }
 
-    /// Whether it is missed from now on.
+    /// Whether the event timer has just expired; reported once.
     pub fn is_missed(&mut self, now_us: u64) -> bool {
         self.due_us.take_if(|due| now_us > *due).is_some()
     }
 
-    /// Nobody could be heard until now.
+    /// Restarts the timeout after a time in which nothing could be received.
     pub fn wait(&mut self, now_us: u64) {
         let event_us = self.event_us();
         self.due_us = self.due_us.map(|_| now_us + event_us);
@@ -65,12 +65,12 @@ impl Receive {
         1000 * u64::from(self.parameters.event_ms)
     }
 
-    /// What waited or was watched is forgotten.
+    /// Discards waiting values and stops the event timer.
     pub fn stop(&mut self) {
         (self.waits, self.due_us) = (false, None);
     }
 
-    /// The frame's bytes.
+    /// Returns the bytes of the last frame.
     pub const fn data(&self) -> [u8; 8] {
         self.data
     }

@@ -4,7 +4,7 @@ fn transmitted() -> Parameters {
     Parameters::new(Mapping::Transmit, 0x181, 1, 0, &[0x6041_0010])
 }
 
-/// Not existing, mapping empty.
+/// A disabled PDO with an empty mapping.
 fn open(direction: Mapping) -> Parameters {
     let mut parameters = Parameters::new(direction, 0x181, 1, 0, &[0x6041_0010]);
     assert_eq!(parameters.set_communication(1, 0x8000_0181), Ok(()));
@@ -13,14 +13,14 @@ fn open(direction: Mapping) -> Parameters {
 }
 
 #[test]
-fn a_pdo_that_exists_keeps_its_mapping_and_its_identifier() {
+fn an_existing_pdo_keeps_its_mapping_and_cob_id() {
     let mut parameters = transmitted();
     assert_eq!(parameters.set_mapping(0, 0), Err(Abort::Access));
     assert_eq!(parameters.set_mapping(1, 0x6064_0020), Err(Abort::Access));
     assert_eq!(parameters.set_communication(1, 0x182), Err(Abort::Range));
     assert_eq!(parameters.set_communication(1, 0x8000_0182), Ok(()));
     assert_eq!(parameters.identifier(), None);
-    // Its entries only while none counts.
+    // Entries can be written only while the count is 0.
     assert_eq!(parameters.set_mapping(1, 0x6064_0020), Err(Abort::Access));
     assert_eq!(parameters.set_mapping(0, 0), Ok(()));
     assert_eq!(parameters.set_mapping(1, 0x6064_0020), Ok(()));
@@ -30,7 +30,7 @@ fn a_pdo_that_exists_keeps_its_mapping_and_its_identifier() {
 }
 
 #[test]
-fn only_what_exists_and_fits_is_mapped() {
+fn only_mappable_objects_of_the_right_size_are_mapped() {
     let mut parameters = open(Mapping::Transmit);
     let refused = [
         (0x5555_0020, Abort::NoObject),
@@ -39,7 +39,7 @@ fn only_what_exists_and_fits_is_mapped() {
         (0x6064_0021, Abort::NotMappable),
         (0x6076_0020, Abort::NotMappable),
         (0x1008_0008, Abort::NotMappable),
-        // A place holder only where the bytes come from somebody else.
+        // Dummy entries are allowed only in received PDOs.
         (0x0005_0008, Abort::NotMappable),
     ];
     for (entry, abort) in refused {
@@ -65,7 +65,7 @@ fn a_pdo_holds_eight_bytes() {
 }
 
 #[test]
-fn identifiers_that_others_need_are_refused() {
+fn restricted_cob_ids_are_refused() {
     let mut parameters = open(Mapping::Transmit);
     for taken in [0, 0x80, 0x85, 0x180, 0x581, 0x601, 0x701, 0x7E5] {
         assert_eq!(parameters.set_communication(1, taken), Err(Abort::Range), "{taken:x}");
@@ -75,7 +75,7 @@ fn identifiers_that_others_need_are_refused() {
 }
 
 #[test]
-fn types_that_ask_for_a_remote_frame_are_refused() {
+fn transmission_types_with_remote_frames_are_refused() {
     let mut parameters = transmitted();
     for kind in 0..=255 {
         let expected = if (241..=253).contains(&kind) { Err(Abort::Range) } else { Ok(()) };
@@ -83,7 +83,7 @@ fn types_that_ask_for_a_remote_frame_are_refused() {
     }
 }
 
-/// Sent at which of so many SYNC, with their counters.
+/// Bit mask of the SYNCs at which the PDO was sent; `counters` are the SYNC counters.
 fn sent(kind: u32, start: u32, counters: impl Iterator<Item = Option<u8>>) -> u64 {
     let mut parameters = transmitted();
     assert_eq!(parameters.set_communication(2, kind), Ok(()));
@@ -100,7 +100,7 @@ fn sent(kind: u32, start: u32, counters: impl Iterator<Item = Option<u8>>) -> u6
 }
 
 #[test]
-fn a_synchronous_pdo_leaves_at_every_so_many_syncs_from_its_start_value_on() {
+fn a_synchronous_pdo_is_sent_every_nth_sync_from_its_start_value() {
     let uncounted = || core::iter::repeat_n(None, 8);
     assert_eq!(sent(1, 0, uncounted()), 0b1111_1111);
     assert_eq!(sent(3, 0, uncounted()), 0b0010_0100);
@@ -112,14 +112,14 @@ fn a_synchronous_pdo_leaves_at_every_so_many_syncs_from_its_start_value_on() {
 }
 
 #[test]
-fn an_event_is_told_once_per_inhibit_time_and_repeated_by_the_event_timer() {
+fn an_event_is_sent_once_per_inhibit_time_and_by_the_event_timer() {
     let mut parameters = Parameters::new(Mapping::Transmit, 0x181, 255, 10, &[0x6041_0010]);
     assert_eq!(parameters.set_communication(5, 20), Ok(()));
     let mut transmit = transmit::Transmit::new(parameters);
     let mut times = [0; 8];
     let mut count = 0;
     for now_us in (0..60_000).step_by(500) {
-        // Changes for 3 ms, then rests.
+        // The value changes for 3 ms, then stays.
         let value = now_us.min(3000) as u16;
         let [low, high] = value.to_le_bytes();
         let data = [low, high, 0, 0, 0, 0, 0, 0];
@@ -132,7 +132,7 @@ fn an_event_is_told_once_per_inhibit_time_and_repeated_by_the_event_timer() {
 }
 
 #[test]
-fn a_received_pdo_waits_for_the_sync_or_counts_at_once_and_is_missed() {
+fn a_received_pdo_takes_effect_by_its_type_and_can_time_out() {
     use crate::hal::Frame;
     use receive::{Receive, Received};
     let mut parameters = Parameters::new(Mapping::Receive, 0x201, 1, 0, &[0x6040_0010]);

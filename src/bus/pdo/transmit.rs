@@ -1,15 +1,15 @@
-//! What the node sends as PDO.
+//! Transmitted PDOs.
 
 use super::super::heartbeat::Clock;
 use super::Parameters;
 use crate::hal::Frame;
 
-/// One PDO that is sent.
+/// One transmitted PDO.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transmit {
-    /// What it is set to.
+    /// Communication and mapping parameters.
     pub parameters: Parameters,
-    /// SYNC since the last one; `None` until the one it begins with.
+    /// SYNCs since the last frame; `None` until the SYNC with the start value.
     syncs: Option<u8>,
     due: bool,
     event: Clock,
@@ -18,17 +18,17 @@ pub struct Transmit {
 }
 
 impl Transmit {
-    /// Nothing sent yet.
+    /// Creates a PDO that has sent nothing.
     pub const fn new(parameters: Parameters) -> Self {
         Self { parameters, syncs: None, due: false, event: Clock::NEW, sent: None, free_us: 0 }
     }
 
-    /// As if nothing had been sent: it was changed, or the node begins to take part.
+    /// Forgets what was sent, after a change of the PDO or of the NMT state.
     pub fn restart(&mut self) {
         *self = Self::new(self.parameters);
     }
 
-    /// A SYNC with its counter, where it has one.
+    /// Handles a SYNC with its counter, if it has one.
     pub fn at_sync(&mut self, counter: Option<u8>) {
         let start = self.parameters.sync_start;
         let counts = match (self.syncs, counter) {
@@ -45,7 +45,8 @@ impl Transmit {
         self.syncs = Some(if is_due { 0 } else { counts });
     }
 
-    /// Whether the values are to be looked at: it is due, or a change would send it. At most once per inhibit time.
+    /// Whether the values must be read: the PDO is due, or a change would send it. At most once per inhibit
+    /// time.
     pub fn is_wanted(&mut self, now_us: u64) -> bool {
         if self.parameters.identifier().is_none() || self.parameters.count == 0 {
             return false;
@@ -57,7 +58,7 @@ impl Transmit {
         now_us >= self.free_us
     }
 
-    /// The frame, unless it waits for a change and there is none.
+    /// Returns the frame, or `None` if the PDO is sent on change only and nothing changed.
     pub fn frame(&mut self, data: [u8; 8], now_us: u64) -> Option<Frame> {
         let changed = self.sent != Some(data);
         let by_change = self.parameters.kind == 0 || !self.parameters.is_synchronous() && !self.due;

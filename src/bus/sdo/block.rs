@@ -1,17 +1,19 @@
-//! Transfers in blocks of up to 127 segments with one answer each, and a check sum over all of them.
+//! SDO block transfer: up to 127 segments per acknowledgement, and a check sum over all of them.
 //!
 //! ```text
-//! upload    10100c00 object, block size, threshold   answer 11000c1s object, size
-//!           10100011                                 then c0nnnnnn and 7 bytes, numbered from 1, the last marked c
-//!           10100010 last number taken, next block size            from there on again
-//!           10100001                                 after      110nnn01 check sum: n bytes of the last are not used
-//! download  11000cs0 object, size                    answer 10100c00 object, block size
-//!           c0nnnnnn and 7 bytes                     10100010 last number in order, block size
-//!           110nnn01 check sum                       10100001
+//! upload    10100c00 object, block size, threshold        reply  11000c1s object, size
+//!           10100011                                      then   c0nnnnnn and 7 bytes, numbered from 1
+//!           10100010 last number accepted, block size     then   the segments after that number
+//!           10100001                                      after  110nnn01 check sum
+//! download  11000cs0 object, size                         reply  10100c00 object, block size
+//!           c0nnnnnn and 7 bytes                          reply  10100010 last number in order, block size
+//!           110nnn01 check sum                            reply  10100001
 //! ```
+//! In a segment, c marks the last and nnnnnn is its number. In 110nnn01, nnn bytes of the last are unused.
 //!
-//! Check sum: x^16 + x^12 + x^5 + 1 from 0 (the catalogue's CRC-16/XMODEM), by the crate `crc` without its table.
-//! Cost: 7 bytes of it per segment; where the client lost segments, up to 889 bytes are read and summed again at once.
+//! Check sum: x^16 + x^12 + x^5 + 1 from 0 (CRC-16/XMODEM of the catalogue), by the crate `crc` without a
+//! table. Cost: 7 bytes of CRC per segment. If the client lost segments, up to 889 bytes are read and summed
+//! again at once.
 
 use crc::{CRC_16_XMODEM, Crc, NoTable};
 
@@ -22,7 +24,7 @@ use super::super::objects::Objects;
 use super::{Gathered, SEGMENT, Step, Transfer, answer, named, segment, upload};
 
 const CODE: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_XMODEM);
-/// Segments of a block that is downloaded.
+/// Block size of downloads, in segments.
 const BLOCK: u8 = 127;
 const WITH_CHECKSUM: u8 = 1 << 2;
 const WITH_SIZE: u8 = 1 << 1;
@@ -35,28 +37,28 @@ fn sum(before: u16, bytes: &[u8]) -> u16 {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
-    /// The client has not said that it is ready.
+    /// Waits for the client's start command.
     Begin,
-    /// Segments leave.
+    /// Sends the segments of a block.
     Sending,
-    /// The block has left.
+    /// Waits for the acknowledgement of the block.
     Sent,
-    /// The end has been told.
+    /// Waits for the client's confirmation of the end.
     Ended,
 }
 
-/// From the object to the client.
+/// Transfer from the object to the client.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BlockUpload {
     phase: Phase,
     size: u32,
-    /// Where the block begins: all before has been taken.
+    /// Offset of the block; everything before it is acknowledged.
     start: u32,
-    /// Segments of the block that have left.
+    /// Segments of the block sent so far.
     sent: u8,
     block: u8,
     checked: bool,
-    /// Of what lies before the block, and before the next segment.
+    /// Check sums of the bytes before the block and before the next segment.
     sums: [u16; 2],
 }
 
@@ -74,7 +76,7 @@ impl BlockUpload {
         if !(1..=BLOCK).contains(&block) {
             return Err(Abort::BlockSize);
         }
-        // The client would rather have it in segments.
+        // The client prefers an expedited or segmented transfer for this size.
         if size <= u32::from(threshold) {
             return upload(object, dictionary);
         }
@@ -115,7 +117,7 @@ impl BlockUpload {
         Ok(Step::Stay(None))
     }
 
-    /// So many segments of the block were taken; the others leave again.
+    /// Continues after `taken` acknowledged segments of the block; the others are sent again.
     fn go_on_after<O: Objects>(
         &mut self,
         taken: u8,
@@ -137,7 +139,7 @@ impl BlockUpload {
         Ok(())
     }
 
-    /// The next segment of the block.
+    /// Returns the next segment of the block.
     pub(super) fn poll<O: Objects>(
         &mut self,
         object: Object,
@@ -158,13 +160,13 @@ impl BlockUpload {
     }
 }
 
-/// From the client to the object.
+/// Transfer from the client to the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BlockDownload {
     gathered: Gathered,
-    /// The last number in order.
+    /// Number of the last segment received in order.
     taken: u8,
-    /// Of the newest segment it is known at the end only how many bytes count.
+    /// Newest segment. Only the end message says how many of its bytes are valid.
     held: Option<[u8; 7]>,
     is_last: bool,
     checked: bool,
@@ -209,7 +211,7 @@ impl BlockDownload {
         Ok(Step::Stay(Some(reply)))
     }
 
-    /// So many bytes of the held segment count.
+    /// Takes over the first `count` bytes of the held segment.
     fn let_go(&mut self, count: usize) -> Result<(), Abort> {
         let Some(bytes) = self.held.take() else { return Ok(()) };
         self.sum = sum(self.sum, bytes.get(..count).unwrap_or(&bytes));

@@ -1,11 +1,11 @@
-//! SDO server: any object read or written by a client, expedited, in segments or in blocks.
+//! SDO server: a client reads or writes any object by expedited, segmented or block transfer.
 //!
-//! Why three ways: four bytes fit into one exchange; more need segments, each of them answered; a log of hundreds of
-//! kilobytes needs blocks of up to 127 segments with one answer each. Nothing is buffered: an upload asks the object for
-//! seven bytes at a time, a download gathers one number.
+//! Why three ways: four bytes fit into one exchange. Longer values need segments, each of them acknowledged.
+//! A log of hundreds of kilobytes needs blocks of up to 127 segments with one acknowledgement. Nothing is
+//! buffered: an upload reads the object seven bytes at a time, a download collects one number.
 //!
-//! One transfer at a time; a new request ends an old one. A client that does not go on for a second is told so
-//! (0504 0000). Answers wait for [`Server::poll`]. Source: CiA 301, SDO.
+//! One transfer at a time; a new request ends the old one. If the client is silent for a second, the server
+//! aborts with 0504 0000. [`Server::poll`] returns the answers. Source: CiA 301, SDO.
 
 mod block;
 mod segment;
@@ -17,7 +17,7 @@ use super::objects::Objects;
 use block::{BlockDownload, BlockUpload};
 use segment::{SegmentDownload, SegmentUpload};
 
-/// A client that waits longer than this has gone.
+/// Timeout of a client, us.
 pub const TIMEOUT_US: u64 = 1_000_000;
 
 /// Bytes of a segment.
@@ -31,18 +31,18 @@ enum Transfer {
     BlockDownload(BlockDownload),
 }
 
-/// What happens after a frame.
+/// Result of a request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Step {
-    /// A transfer begins.
+    /// Starts a transfer, with its first answer.
     Begin(Transfer, [u8; 8]),
-    /// The one that is under way goes on, with an answer where there is one.
+    /// Continues the active transfer, with an answer if one is due.
     Stay(Option<[u8; 8]>),
-    /// Nothing is under way any more; the last answer, where the client waits for one.
+    /// Ends the transfer, with the last answer if the client expects one.
     End(Option<[u8; 8]>),
 }
 
-/// The server of one node.
+/// SDO server of one node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Server {
     object: Object,
@@ -51,13 +51,13 @@ pub struct Server {
     answer: Option<[u8; 8]>,
 }
 
-/// The first four bytes of most answers.
+/// First four bytes of most answers.
 const fn head(command: u8, object: Object) -> [u8; 4] {
     let [low, high] = object.index.to_le_bytes();
     [command, low, high, object.sub]
 }
 
-/// A whole answer from its halves.
+/// Complete answer with a 32-bit value.
 const fn answer(command: u8, object: Object, value: u32) -> [u8; 8] {
     let [a, b, c, d] = head(command, object);
     let [e, f, g, h] = value.to_le_bytes();
@@ -68,13 +68,16 @@ const fn aborted(object: Object, abort: Abort) -> [u8; 8] {
     answer(0x80, object, abort.code())
 }
 
-/// The object that a request names, and its last four bytes.
+/// Object named by a request, and the request's last four bytes.
 const fn named(request: [u8; 8]) -> (Object, [u8; 4]) {
     let [_, low, high, sub, a, b, c, d] = request;
     (Object::at(u16::from_le_bytes([low, high]), sub), [a, b, c, d])
 }
 
-/// Seven bytes of an object, and whether there are more; `None` beyond the end.
+/// Seven bytes of an object from `offset` on, the number of valid ones, and whether they are the last.
+///
+/// # Errors
+/// [`Abort::State`] if the size has changed since the transfer began, or `offset` is beyond the end.
 fn segment<O: Objects>(
     object: Object,
     offset: u32,
@@ -83,7 +86,7 @@ fn segment<O: Objects>(
 ) -> Result<([u8; 7], u32, bool), Abort> {
     let mut bytes = [0; 7];
     let now = dictionary.bytes(object, offset, &mut bytes)?;
-    // Somebody else has written it meanwhile.
+    // The object was changed during the transfer.
     if now != size || offset >= size {
         return Err(Abort::State);
     }
@@ -91,7 +94,7 @@ fn segment<O: Objects>(
     Ok((bytes, count, offset + count == size))
 }
 
-/// A number as it comes in, piece by piece.
+/// A number received piece by piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Gathered {
     bytes: [u8; 4],
@@ -100,11 +103,11 @@ struct Gathered {
 }
 
 impl Gathered {
-    /// Room for the number of a row; `declared` is what the client says it has.
+    /// Prepares for the number of a row; `declared` is the size stated by the client.
     fn new(row: &Row, declared: Option<u32>) -> Result<Self, Abort> {
         let size = row.kind.size().ok_or(Abort::ReadOnly)?;
         match declared {
-            // Host software writes another maker's INTEGER32 there, which has no effect.
+            // Host software writes another maker's INTEGER32 to 2120:0. The write has no effect.
             _ if (row.index, row.sub) == (0x2120, 0) => Ok(Self { bytes: [0; 4], count: 0, size }),
             Some(declared) if declared > u32::from(size) => Err(Abort::TooLong),
             Some(declared) if declared < u32::from(size) => Err(Abort::TooShort),
@@ -129,13 +132,13 @@ impl Gathered {
 }
 
 impl Server {
-    /// Nothing under way.
+    /// No transfer active.
     pub const IDLE: Self = Self { object: Object::at(0, 0), transfer: None, due_us: 0, answer: None };
 
-    /// A request of the client.
+    /// Handles a request of the client.
     pub fn request<O: Objects>(&mut self, request: [u8; 8], now_us: u64, dictionary: &mut Dictionary<'_, O>) {
         self.due_us = now_us + TIMEOUT_US;
-        // In a block that is downloaded every first byte is a number, but for 0x80.
+        // In a block download the first byte is a segment number, except for 0x80 (abort).
         if request[0] == 0x80 {
             (self.transfer, self.answer) = (None, None);
             return;
@@ -155,7 +158,7 @@ impl Server {
                     5 => request[0] & 3 == 0,
                     _ => false,
                 };
-                // Anything else does not name an object: what is told is the one before.
+                // Other commands do not name an object; an abort then refers to the previous one.
                 if begins {
                     self.object = named(request).0;
                 }
@@ -185,12 +188,12 @@ impl Server {
         };
     }
 
-    /// Nobody could be heard until now: it is not held against a client.
+    /// Restarts the timeout after a time in which nothing could be received.
     pub fn wait(&mut self, now_us: u64) {
         self.due_us = now_us + TIMEOUT_US;
     }
 
-    /// The next answer: one that waits, the next segment of a block, or that the client has gone.
+    /// Returns the next answer, the next segment of a block, or the abort after a timeout.
     pub fn poll<O: Objects>(&mut self, now_us: u64, dictionary: &mut Dictionary<'_, O>) -> Option<[u8; 8]> {
         let waiting = self.answer.take();
         if waiting.is_some() {
@@ -218,7 +221,7 @@ impl Server {
     }
 }
 
-/// A download: done where it is expedited.
+/// Starts a download. An expedited one is complete at once.
 fn download<O: Objects>(
     object: Object,
     request: [u8; 8],
@@ -239,7 +242,7 @@ fn download<O: Objects>(
     Ok(Step::End(Some(answer(0x60, object, 0))))
 }
 
-/// Begins an upload: expedited where it fits.
+/// Starts an upload; expedited if the value fits.
 fn upload<O: Objects>(object: Object, dictionary: &Dictionary<'_, O>) -> Result<Step, Abort> {
     let mut bytes = [0; 4];
     match dictionary.bytes(object, 0, &mut bytes)? {

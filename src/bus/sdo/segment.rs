@@ -1,10 +1,10 @@
-//! Transfers in segments of seven bytes, each of them answered.
+//! SDO segmented transfer: seven bytes per segment, each of them acknowledged.
 //!
 //! ```text
-//! upload    request 011t----                      answer 000tnnnc, 7 bytes
-//! download  request 000tnnnc, 7 bytes             answer 001t----
+//! upload    request 011t----                      reply  000tnnnc, 7 bytes
+//! download  request 000tnnnc, 7 bytes             reply  001t----
 //! ```
-//! t alternates from 0 on, n bytes of the seven are not used, c marks the last.
+//! t alternates, starting with 0; n bytes of the seven are unused; c marks the last segment.
 
 use super::super::abort::Abort;
 use super::super::access::Dictionary;
@@ -14,7 +14,7 @@ use super::{Gathered, SEGMENT, Step, segment};
 
 const TOGGLE: u8 = 1 << 4;
 
-/// From the object to the client.
+/// Transfer from the object to the client.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SegmentUpload {
     size: u32,
@@ -46,7 +46,7 @@ impl SegmentUpload {
     }
 }
 
-/// From the client to the object.
+/// Transfer from the client to the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SegmentDownload {
     gathered: Gathered,

@@ -1,4 +1,4 @@
-//! A client of its own, as CiA 301 has it, against the server; and one that loses what it hears.
+//! Tests of the server against an independent client by CiA 301, which may also lose segments.
 
 extern crate std;
 
@@ -20,7 +20,7 @@ fn code(answer: Option<[u8; 8]>) -> Option<u32> {
 }
 
 #[test]
-fn a_text_comes_in_segments_whole() {
+fn a_segmented_upload_is_complete() {
     let mut board = Board::started(1);
     let begin = board.ask(request(0x40, 0x100A, [0; 4])).expect("an answer");
     assert_eq!(begin, request(0x41, 0x100A, (LONG as u32).to_le_bytes()));
@@ -36,7 +36,7 @@ fn a_text_comes_in_segments_whole() {
         }
     }
     assert_eq!(bytes, LONG_TEXT.as_bytes());
-    // After the last there is no further one.
+    // A request after the last segment is refused.
     assert_eq!(code(board.ask([0x60 | toggle, 0, 0, 0, 0, 0, 0, 0])), Some(0x0504_0001));
 }
 
@@ -48,7 +48,7 @@ fn a_segment_with_the_wrong_toggle_ends_the_transfer() {
     assert_eq!(code(board.ask([0x60, 0, 0, 0, 0, 0, 0, 0])), Some(0x0504_0001));
 }
 
-/// Uploads by blocks; `hears(n)` is whether the client hears the nth segment of all.
+/// Uploads by blocks; `hears(n)` says whether the client receives the nth segment.
 fn block_upload(board: &mut Board, block: u8, mut hears: impl FnMut(usize) -> bool) -> (Vec<u8>, u16, usize) {
     let begin = board.ask(request(0xA4, 0x100A, [block, 0, 0, 0])).expect("an answer");
     assert_eq!(begin, request(0xC6, 0x100A, (LONG as u32).to_le_bytes()));
@@ -85,7 +85,7 @@ fn block_upload(board: &mut Board, block: u8, mut hears: impl FnMut(usize) -> bo
 }
 
 #[test]
-fn a_text_comes_in_blocks_whole_with_its_check_sum_whatever_gets_lost() {
+fn a_block_upload_is_complete_despite_lost_segments() {
     let expected = crc::Crc::<u16>::new(&crc::CRC_16_XMODEM).checksum(LONG_TEXT.as_bytes());
     for block in [1, 2, 50, 126, 127] {
         let (bytes, sum, segments) = block_upload(&mut Board::started(1), block, |_| true);
@@ -95,7 +95,7 @@ fn a_text_comes_in_blocks_whole_with_its_check_sum_whatever_gets_lost() {
             "{block}"
         );
     }
-    // Every fifth, every 64th and, once, the last are not heard; in the end the bus is good.
+    // The client loses every fifth, every 64th or the last segment; after 2000 segments it loses none.
     for lost in [5, 64, LONG.div_ceil(7)] {
         let (bytes, sum, segments) =
             block_upload(&mut Board::started(1), 127, |segment| segment > 2000 || segment % lost != 0);
@@ -105,8 +105,8 @@ fn a_text_comes_in_blocks_whole_with_its_check_sum_whatever_gets_lost() {
 }
 
 #[test]
-fn a_short_object_comes_as_the_client_would_rather_have_it() {
-    // Threshold 4: device type in one answer. Threshold 0: as a block of one segment.
+fn the_threshold_selects_expedited_or_block_upload() {
+    // Threshold 4: expedited. Threshold 0: a block of one segment.
     let mut board = Board::started(1);
     let whole = board.ask(request(0xA4, 0x1000, [127, 4, 0, 0]));
     assert_eq!(whole, Some(request(0x43, 0x1000, 0x0002_0192_u32.to_le_bytes())));
@@ -120,7 +120,7 @@ fn a_short_object_comes_as_the_client_would_rather_have_it() {
 }
 
 #[test]
-fn block_sizes_and_numbers_that_cannot_be_are_refused() {
+fn invalid_block_sizes_and_segment_numbers_are_refused() {
     let mut board = Board::started(1);
     for block in [0, 128, 255] {
         assert_eq!(code(board.ask(request(0xA4, 0x100A, [block, 0, 0, 0]))), Some(0x0504_0002));
@@ -131,7 +131,7 @@ fn block_sizes_and_numbers_that_cannot_be_are_refused() {
     assert_eq!(code(board.ask([0xA2, 4, 3, 0, 0, 0, 0, 0])), Some(0x0504_0003));
 }
 
-/// Writes the heartbeat time by blocks; `n` and `sum` are what the end says.
+/// Writes the heartbeat time by blocks; `n` and `sum` are sent in the end message.
 fn block_download(board: &mut Board, size: u32, bytes: [u8; 7], n: u8, sum: u16) -> Option<u32> {
     let begun = board.ask(request(0xC6, 0x1017, size.to_le_bytes()));
     if code(begun).is_some() {
@@ -139,7 +139,7 @@ fn block_download(board: &mut Board, size: u32, bytes: [u8; 7], n: u8, sum: u16)
     }
     assert_eq!(begun, Some(request(0xA4, 0x1017, [127, 0, 0, 0])));
     let [a, b, c, d, e, f, g] = bytes;
-    // Out of order first: it does not count and the last one asked for again.
+    // A segment out of order is ignored and requested again.
     assert_eq!(board.ask([0x82, 9, 9, 9, 9, 9, 9, 9]), Some([0xA2, 0, 127, 0, 0, 0, 0, 0]));
     assert_eq!(board.ask([0x81, a, b, c, d, e, f, g]), Some([0xA2, 1, 127, 0, 0, 0, 0, 0]));
     let [low, high] = sum.to_le_bytes();
@@ -151,7 +151,7 @@ fn block_download(board: &mut Board, size: u32, bytes: [u8; 7], n: u8, sum: u16)
 }
 
 #[test]
-fn a_number_goes_down_in_blocks_only_whole_and_with_its_check_sum() {
+fn a_block_download_needs_the_right_size_and_check_sum() {
     let bytes = [0xE8, 0x03, 0, 0, 0, 0, 0];
     let sum = crc::Crc::<u16>::new(&crc::CRC_16_XMODEM).checksum(&bytes[..2]);
     let mut board = Board::started(1);
@@ -166,7 +166,7 @@ fn a_number_goes_down_in_blocks_only_whole_and_with_its_check_sum() {
 }
 
 #[test]
-fn a_block_without_check_sum_is_taken_whatever_its_end_says() {
+fn a_block_download_without_check_sum_ignores_the_sum() {
     let mut board = Board::started(1);
     assert_eq!(board.ask(request(0xC2, 0x1017, [2, 0, 0, 0])), Some(request(0xA4, 0x1017, [127, 0, 0, 0])));
     assert_eq!(board.ask([0x81, 0xE8, 0x03, 0, 0, 0, 0, 0]), Some([0xA2, 1, 127, 0, 0, 0, 0, 0]));
@@ -176,7 +176,7 @@ fn a_block_without_check_sum_is_taken_whatever_its_end_says() {
 }
 
 #[test]
-fn a_number_goes_down_in_segments_only_whole() {
+fn a_segmented_download_needs_the_right_size() {
     let mut board = Board::started(1);
     let begun = board.ask(request(0x21, 0x6065, 4_u32.to_le_bytes()));
     assert_eq!(begun, Some(request(0x60, 0x6065, [0; 4])));
@@ -190,14 +190,14 @@ fn a_number_goes_down_in_segments_only_whole() {
 }
 
 #[test]
-fn a_client_that_goes_silent_is_told_once_and_an_abort_is_not_answered() {
+fn a_timeout_is_reported_once_and_an_abort_is_not_answered() {
     let mut board = Board::started(1);
     board.ask(request(0x40, 0x100A, [0; 4]));
     board.now_us += TIMEOUT_US - 1;
     assert_eq!(board.frames(), []);
     board.now_us += 1;
-    let told = [0x80, 0x0A, 0x10, 0, 0x00, 0x00, 0x04, 0x05];
-    assert_eq!(board.frames(), [Frame::new(0x581, &told)]);
+    let timeout = [0x80, 0x0A, 0x10, 0, 0x00, 0x00, 0x04, 0x05];
+    assert_eq!(board.frames(), [Frame::new(0x581, &timeout)]);
     board.now_us += TIMEOUT_US;
     assert_eq!(board.frames(), []);
     board.ask(request(0x40, 0x100A, [0; 4]));
@@ -206,7 +206,7 @@ fn a_client_that_goes_silent_is_told_once_and_an_abort_is_not_answered() {
 }
 
 #[test]
-fn a_client_has_its_whole_time_again_after_the_board_stood_still() {
+fn the_client_timeout_restarts_after_the_board_stood_still() {
     let mut board = Board::started(1);
     board.ask(request(0x40, 0x100A, [0; 4]));
     board.now_us += 10 * TIMEOUT_US;
@@ -214,5 +214,5 @@ fn a_client_has_its_whole_time_again_after_the_board_stood_still() {
     board.now_us += TIMEOUT_US - 1;
     assert_eq!(board.frames(), []);
     board.now_us += 1;
-    assert_eq!(board.frames().len(), 1, "and no more than that");
+    assert_eq!(board.frames().len(), 1, "the timeout is not longer than before");
 }

@@ -8,7 +8,7 @@ use crate::leg::DriveState;
 
 const MS: u64 = 1000;
 
-/// When silence begins after frames of these kinds at these times, looked at every half millisecond.
+/// Time at which silence is detected after these frames, checked every half millisecond.
 fn begins(frames: &[(Kind, u64)], until_us: u64) -> Option<u64> {
     let mut silence = Silence::default();
     let mut frames = frames.iter().peekable();
@@ -34,10 +34,10 @@ fn sorted(parts: &[Vec<(Kind, u64)>]) -> Vec<(Kind, u64)> {
 fn twenty_frames_of_one_kind_arm_it_and_nineteen_do_not() {
     for kind in [Kind::Sync, Kind::Word, Kind::Receive(0), Kind::Receive(3)] {
         assert_eq!(begins(&cyclic(kind, MS, 2 * MS, 19), 2000 * MS), None, "{kind:?}");
-        // The last of 20 came at 39 ms.
+        // The last of 20 frames comes at 39 ms.
         assert_eq!(begins(&cyclic(kind, MS, 2 * MS, 20), 2000 * MS), Some(139 * MS + 500));
     }
-    // Nineteen of each of two kinds are no cycle either.
+    // Nineteen frames of each of two kinds do not arm either.
     let two = sorted(&[cyclic(Kind::Sync, MS, 2 * MS, 19), cyclic(Kind::Word, 2 * MS, 2 * MS, 19)]);
     assert_eq!(begins(&two, 2000 * MS), None);
 }
@@ -52,23 +52,23 @@ fn the_time_is_ten_mean_periods() {
 }
 
 #[test]
-fn frames_that_are_no_cycle_never_arm() {
-    // Slower than four per second: an operator, or software that polls.
+fn irregular_or_slow_frames_never_arm() {
+    // Fewer than four frames per second: an operator, or polling software.
     assert_eq!(begins(&cyclic(Kind::Word, 0, 300 * MS, 200), 120_000 * MS), None);
-    // Bursts of twelve a second.
+    // Twelve frames in a burst, once a second.
     let bursts: Vec<_> =
         (0..60).flat_map(|second| cyclic(Kind::Word, second * 1000 * MS, 5 * MS, 12)).collect();
     assert_eq!(begins(&bursts, 70_000 * MS), None);
 }
 
 #[test]
-fn jitter_pauses_and_another_rate_are_no_silence() {
+fn jitter_pauses_and_a_new_rate_are_not_silence() {
     let mut random = 1_u64;
     let mut below = |bound: u64| {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (random >> 33) % bound
     };
-    // A minute at 2 ms with everything between 0 and 4 ms, and a pause of up to 95 ms in every hundredth cycle.
+    // One minute at 2 ms with intervals of 0 to 4 ms; one of 100 intervals is a pause of up to 95 ms.
     let mut now = 0;
     let host: Vec<_> = (0..30_000)
         .map(|_| {
@@ -77,14 +77,14 @@ fn jitter_pauses_and_another_rate_are_no_silence() {
         })
         .collect();
     assert_eq!(begins(&host, now), None);
-    // From 2 ms to 60 ms and back.
+    // From 2 ms to 60 ms and back to 1 ms.
     let slow = cyclic(Kind::Sync, 100 * MS, 60 * MS, 100);
     let fast = cyclic(Kind::Sync, 6100 * MS, MS, 1000);
     assert_eq!(begins(&sorted(&[cyclic(Kind::Sync, 0, 2 * MS, 50), slow, fast]), 7100 * MS), None);
 }
 
 #[test]
-fn a_kind_that_is_given_up_while_another_goes_on_is_not_missed() {
+fn a_kind_that_stops_while_another_continues_is_ignored() {
     let parts = [cyclic(Kind::Receive(2), 0, 2 * MS, 500), cyclic(Kind::Sync, 0, 10 * MS, 500)];
     assert_eq!(begins(&sorted(&parts), 5000 * MS), None);
     let last = 4990 * MS;
@@ -92,7 +92,7 @@ fn a_kind_that_is_given_up_while_another_goes_on_is_not_missed() {
 }
 
 impl Board {
-    /// A host's cycle of 2 ms, so many times: SYNC, or a frame of the first node's with the controlword.
+    /// Sends `count` host cycles of 2 ms: SYNC, or a frame to the first node with the controlword.
     fn cycles(&mut self, id: u16, data: &[u8], count: u32) {
         for _ in 0..count {
             self.hear(id, data);
@@ -115,7 +115,7 @@ impl Board {
 }
 
 #[test]
-fn a_silent_host_stops_the_leg_as_its_option_says_and_is_told() {
+fn a_silent_host_is_reported_and_stops_the_leg_by_its_option() {
     for (option, enabled) in [(0, true), (2, false), (3, false)] {
         let mut board = Board::moving();
         for axis in 0..2 {
@@ -127,10 +127,10 @@ fn a_silent_host_stops_the_leg_as_its_option_says_and_is_told() {
         assert_eq!(board.drive, DriveState::OperationEnabled, "98 ms");
         let frames = board.run(40);
         assert_eq!(board.drive == DriveState::OperationEnabled, enabled, "{option}");
-        let told: Vec<_> = frames.iter().filter(|frame| frame.data().starts_with(&[0x0F, 0xFF])).collect();
-        assert_eq!(told.iter().map(|frame| frame.id()).collect::<Vec<_>>(), [0x81, 0x82]);
+        let reports: Vec<_> = frames.iter().filter(|frame| frame.data().starts_with(&[0x0F, 0xFF])).collect();
+        assert_eq!(reports.iter().map(|frame| frame.id()).collect::<Vec<_>>(), [0x81, 0x82]);
         assert_eq!(board.read(0x603F, 0), Ok(0xFF0F));
-        // The host is back.
+        // The host sends again.
         board.hear(0, &[1, 0]);
         board.hear(0x80, &[]);
         let frames = board.run(4);
@@ -143,24 +143,24 @@ fn a_silent_host_stops_the_leg_as_its_option_says_and_is_told() {
     board.cycles(0x201, &[15, 0], 50);
     board.run(440);
     assert_eq!(board.axes[0].take_fault(), Some(crate::leg::FaultCode::HostSilent));
-    assert_eq!(board.axes[1].take_fault(), None, "it has not heard anything cyclic");
+    assert_eq!(board.axes[1].take_fault(), None, "the second node received no cyclic frames");
 }
 
 #[test]
-fn a_controlword_by_sdo_is_a_kind_of_its_own() {
+fn a_cyclic_controlword_by_sdo_arms_the_detection() {
     let mut board = Board::moving();
     board.cycles(0x601, &[0x2B, 0x40, 0x60, 0, 15, 0, 0, 0], 50);
     board.run(440);
     assert_ne!(board.drive, DriveState::OperationEnabled);
     let mut board = Board::moving();
-    // Other requests are not.
+    // Other SDO requests do not arm.
     board.cycles(0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0], 50);
     board.run(4000);
     assert_eq!(board.drive, DriveState::OperationEnabled);
 }
 
 #[test]
-fn a_host_that_stops_on_purpose_is_not_missed() {
+fn a_host_that_stops_on_purpose_is_not_reported() {
     let quiet = |board: &mut Board| {
         let frames = board.run(4000);
         assert!(!frames.iter().any(|frame| frame.data().starts_with(&[0x0F, 0xFF])), "{frames:?}");
@@ -171,12 +171,12 @@ fn a_host_that_stops_on_purpose_is_not_missed() {
     board.cycles(0x80, &[], 50);
     [0x201, 0x202].into_iter().for_each(|id| board.hear(id, &[0, 0]));
     assert_eq!(quiet(&mut board), crate::bus::NmtState::Operational);
-    // Network management: that stops by itself, without an error.
+    // An NMT command stops the drive without an error.
     let mut board = Board::moving();
     board.cycles(0x80, &[], 50);
     board.hear(0, &[2, 0]);
     quiet(&mut board);
-    // Switched off.
+    // The detection is switched off (2013).
     let mut board = Board::moving();
     for node in 0..2 {
         let object = crate::bus::dictionary::Object::at(0x2013, 0);
@@ -185,7 +185,7 @@ fn a_host_that_stops_on_purpose_is_not_missed() {
     board.cycles(0x80, &[], 50);
     quiet(&mut board);
     assert_eq!(board.drive, DriveState::OperationEnabled);
-    // The board stood still.
+    // The board could not receive for 3 s.
     let mut board = Board::moving();
     board.cycles(0x80, &[], 50);
     board.now_us += 3000 * MS;

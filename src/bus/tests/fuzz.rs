@@ -1,23 +1,23 @@
-//! Random frames: every identifier, every length, cut transfers, two clients at once.
+//! Random frames: all identifiers and lengths, interrupted transfers, two clients at once.
 
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
 
-/// Legal steps of the drive as a host sees it: what a statusword may become after one frame and one tick.
+/// Whether the state bits of the statusword are a CiA 402 state.
 fn is_state(word: u16) -> bool {
     matches!(word & 0x6F, 0x00 | 0x40 | 0x21 | 0x23 | 0x27 | 0x07 | 0x0F | 0x08)
 }
 
-/// A frame that is likely to mean something.
+/// A random frame, mostly a valid one.
 fn frame(random: &mut impl Rng) -> (u16, Vec<u8>) {
     let [kind, a, b, c] = random.next_u32().to_le_bytes();
-    // Of their own, or one choice would decide another.
+    // Separate random bytes, so that the choices are independent.
     let [cut, short, command, _] = random.next_u32().to_le_bytes();
     let mut data = [random.next_u32().to_le_bytes(), random.next_u32().to_le_bytes()].concat();
     let id = match kind % 8 {
-        // Requests with an object that exists, in a command that exists.
+        // Requests with an existing command and object.
         0..=3 => {
             let row = table::ROWS[usize::from(a) % table::ROWS.len()];
             let is_named = c & 0xC0 != 0;
@@ -58,7 +58,7 @@ fn play(seed: u64, frames: u32) -> (u32, [u32; 4]) {
         if random.next_u32() % 64 == 0 {
             board.now_us += 2_000_000;
         }
-        // A host that knows what it does, now and then.
+        // A correct sequence that enables the leg, now and then.
         if random.next_u32() % 512 == 0 {
             for (id, data) in [
                 (0, [130, 0]),
@@ -76,19 +76,19 @@ fn play(seed: u64, frames: u32) -> (u32, [u32; 4]) {
             let fault = crate::leg::Fault { code: crate::leg::FaultCode::Overspeed, joint: 1 };
             board.drive = board.drive.after(DriveEvent::Failed(fault), 4);
         }
-        // What a node says of the leg is what it was told at the beginning of the tick.
+        // The nodes report the leg's state at the beginning of the tick.
         let drive = board.drive;
         let answers = board.tick();
         most = most.max(answers.len() as u32);
         for answer in &answers {
-            // Of what was configured, and of the right length.
+            // At most eight bytes, and not an NMT command.
             assert!(answer.data().len() <= 8 && answer.id() != 0, "{number}: {answer:x?}");
         }
         for axis in &board.axes {
             let word = axis.statusword();
             assert!(is_state(word), "{number}: {word:x}");
             assert!(word & 0x806F != 0x27 || drive == DriveState::OperationEnabled, "{number}: {word:x}");
-            // The leg is not where a joint has not asked.
+            // The leg is never enabled if a joint is not.
             assert!(board.drive != DriveState::OperationEnabled || word & 0x6F == 0x27, "{number}: {word:x}");
         }
         seen[0] += u32::from(board.drive == DriveState::OperationEnabled);
@@ -102,14 +102,14 @@ fn play(seed: u64, frames: u32) -> (u32, [u32; 4]) {
 }
 
 #[test]
-fn no_frame_makes_a_node_panic_answer_without_end_or_power_one_joint_alone() {
+fn random_frames_cause_no_panic_no_endless_answers_and_no_lone_joint() {
     let frames = std::env::var("SCARAB_FRAMES").ok().and_then(|text| text.parse().ok()).unwrap_or(50_000);
     let (most, seen) = play(1, frames);
     std::println!(
         "{frames} frames: at most {most} frames in one tick, enabled/operational/aborts/answers {seen:?}"
     );
-    // A block is 127 segments, of two nodes at once; with it all else that a tick may bring.
+    // Two nodes may send a block of 127 segments each, and the other frames of one tick.
     assert!(most < 2 * (127 + 16), "{most}");
-    // It was not all refused at the door.
+    // Each outcome must occur often enough.
     assert!(seen.iter().all(|&count| count > frames / 200), "{seen:?}");
 }

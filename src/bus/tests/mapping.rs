@@ -1,8 +1,8 @@
-//! The two ways to map a cycle (docs/bus.md), and what they load the bus with.
+//! The two PDO mappings of docs/bus.md, and their bus load.
 
 use super::*;
 
-/// Writes to the node with this place on the board.
+/// Writes to the node at this position on the board.
 fn set(board: &mut Board, place: usize, index: u16, sub: u8, value: u32, size: u8) {
     board.nodes.rotate_left(place);
     board.axes.rotate_left(place);
@@ -23,20 +23,20 @@ fn map(board: &mut Board, place: usize, communication: u16, cob: u32, kind: u32,
     set(board, place, communication, 1, cob, 4);
 }
 
-/// Nodes 1 and 2, as docs/bus.md has it.
+/// Compact mapping of nodes 1 and 2 (docs/bus.md).
 fn compact() -> Board {
     let mut board = Board::started(1);
     board.hear(0, &[1, 0]);
     board.frames();
     for place in 0..2 {
         let node = 1 + place as u32;
-        // Statusword, position and short velocity at every SYNC; what else was there is not sent.
+        // Statusword, position and short velocity at every SYNC; the other PDOs are disabled.
         map(&mut board, place, 0x1800, 0x180 + node, 1, &[0x6041_0010, 0x6064_0020, 0x2010_0010]);
         for communication in 0x1801..=0x1803 {
             let default = 0x180 + 0x100 * (u32::from(communication) - 0x1800) + node;
             set(&mut board, place, communication, 1, 0x8000_0000 | default, 4);
         }
-        // Both joints' targets in one frame: the other's bytes stand for nothing.
+        // Both joints' targets in one frame; each node skips the other's bytes.
         let targets = [[0x607A_0020, 0x0007_0020], [0x0007_0020, 0x607A_0020]][place];
         map(&mut board, place, 0x1401, 0x301, 1, &targets);
     }
@@ -55,7 +55,7 @@ fn the_compact_mapping_moves_two_joints_with_one_frame_and_answers_with_two() {
     assert_eq!(board.axes.map(|axis| axis.read(target)), [Ok(0x0003_0201), Ok(0x0006_0504)]);
 }
 
-/// Bits of a cycle of two legs, fewest and most: one SYNC, and so many frames of each length.
+/// Bits per cycle, fewest and most: one SYNC and the listed numbers of frames by length.
 fn cycle(frames: &[(u32, usize)]) -> [u32; 2] {
     let mut sum = Frame::new(0x80, &[]).bits();
     for (count, length) in frames {
@@ -67,11 +67,11 @@ fn cycle(frames: &[(u32, usize)]) -> [u32; 2] {
 
 #[test]
 fn two_legs_fit_on_the_bus_at_500_hz_as_recorded_and_at_1_khz_compact() {
-    // Per node: statusword, position and velocity, torque, inputs; controlword and one target.
+    // Per node: statusword; position and velocity; torque; inputs; controlword; one target.
     let recorded = cycle(&[(4, 2), (4, 8), (4, 2), (4, 4), (4, 2), (4, 4)]);
-    // Per node one of 8 bytes, per leg one of 8 bytes.
+    // One frame of 8 bytes per node and one of 8 bytes per leg.
     let compact = cycle(&[(4, 8), (2, 8)]);
-    // 2000 bits of 1 Mbit/s at 500 Hz, 1000 at 1 kHz.
+    // At 1 Mbit/s: 2000 bits per cycle at 500 Hz, 1000 at 1 kHz.
     assert_eq!((recorded, compact), ([1879, 2255], [713, 865]));
     assert!(recorded[0] < 2000 && compact[1] < 1000);
 }

@@ -1,4 +1,4 @@
-//! A board of two nodes with a leg behind them that does what it is told, and what has to hold for all of it.
+//! Test board: two nodes and a leg that follows every request. Tests of the whole bus are in the submodules.
 
 extern crate std;
 
@@ -14,7 +14,7 @@ use super::*;
 use crate::leg::{DriveEvent, DriveState, PowerRequest};
 use crate::units::{Ampere, NewtonMetre};
 
-/// Five thousand bytes, into which no block and no segment fits a whole number of times.
+/// 5003 bytes: not a multiple of the segment or block size.
 pub const LONG: usize = 5003;
 const BYTES: [u8; LONG] = {
     let mut bytes = [0; LONG];
@@ -49,7 +49,7 @@ pub struct Board {
     pub drive: DriveState,
     pub now_us: u64,
     coupling: Coupling,
-    /// The leg refuses whatever enables.
+    /// Whether the leg refuses requests that enable it.
     pub refuses: bool,
 }
 
@@ -66,21 +66,21 @@ impl Board {
         }
     }
 
-    /// Both nodes have told that they are there, the leg has ticked.
+    /// Board after the boot-up messages and one tick of the leg.
     pub fn started(first: u8) -> Self {
         let mut board = Self::new(first);
         assert_eq!(board.tick().len(), 2);
         board
     }
 
-    /// A frame on the bus.
+    /// Puts a frame on the bus.
     pub fn hear(&mut self, id: u16, data: &[u8]) {
         for (node, axis) in self.nodes.iter_mut().zip(&mut self.axes) {
             node.on_frame(&Frame::new(id, data), self.now_us, axis);
         }
     }
 
-    /// 250 us: one tick of the leg, everything that the nodes have to say.
+    /// Advances 250 us: one tick of the leg, then all frames of the nodes.
     pub fn tick(&mut self) -> Vec<Frame> {
         self.now_us += 250;
         self.drive = self.drive.after(DriveEvent::Tick, 4);
@@ -106,7 +106,7 @@ impl Board {
         for (node, axis) in self.nodes.iter_mut().zip(&mut self.axes) {
             while let Some(frame) = node.poll(self.now_us, axis) {
                 frames.push(frame);
-                assert!(frames.len() < 1000, "a node that never ends");
+                assert!(frames.len() < 1000, "a node sends without end");
             }
         }
         frames
@@ -116,12 +116,12 @@ impl Board {
         (0..ticks).flat_map(|_| self.tick()).collect()
     }
 
-    /// One SDO request to the first node and its answer.
+    /// Sends an SDO request to the first node and returns its answer.
     pub fn ask(&mut self, request: [u8; 8]) -> Option<[u8; 8]> {
         let id = self.nodes[0].id();
         self.hear(id.on(0x600), &request);
         let [node, _] = &mut self.nodes;
-        // What else it has to say is not asked for here.
+        // Other frames are discarded.
         while let Some(frame) = node.poll(self.now_us, &mut self.axes[0]) {
             if frame.id() == id.on(0x580) {
                 return frame.full();
@@ -138,7 +138,7 @@ impl Board {
         if answer[0] == 0x80 { Err(value) } else { Ok(value) }
     }
 
-    /// Writes with the size that is given.
+    /// Writes a value with the given size.
     pub fn write(&mut self, index: u16, sub: u8, value: u32, size: u8) -> Result<(), u32> {
         let [low, high] = index.to_le_bytes();
         let [a, b, c, d] = value.to_le_bytes();

@@ -1,10 +1,10 @@
-//! The session of real host software with four nodes, recorded, played to ours frame by frame.
+//! Replays the recorded session of real host software with four nodes to this implementation.
 
 use super::*;
 
 const SESSION: &str = include_str!("../../../tests/data/corc_x2_session.candump");
 
-/// Time in microseconds, identifier, bytes.
+/// Time in microseconds, identifier and data.
 fn recorded() -> impl Iterator<Item = (u64, u16, Vec<u8>)> {
     SESSION.lines().map(|line| {
         let mut words = line.split_whitespace();
@@ -17,7 +17,7 @@ fn recorded() -> impl Iterator<Item = (u64, u16, Vec<u8>)> {
     })
 }
 
-/// What differed: the node, and the answer that was recorded without one of ours.
+/// Differences to the recording: answers without a counterpart here, and emergencies.
 struct Replay {
     boards: [Board; 2],
     answered: usize,
@@ -33,7 +33,7 @@ fn replay() -> Replay {
     let begin = recorded().next().expect("a session").0;
     for (time_us, id, data) in recorded() {
         for board in &mut boards {
-            // A leg ticks at least once between two frames; what it does in long silence is nothing new.
+            // The leg ticks at least once between two frames; long pauses are shortened to one tick.
             board.now_us = board.now_us.max(time_us - begin);
             ours.extend(board.tick());
         }
@@ -46,7 +46,7 @@ fn replay() -> Replay {
                 None => result.unasked.push((id, data)),
             }
         } else {
-            assert!(!ours.iter().any(|frame| frame.id() == id + 0x580 - 0x600), "an answer was left: {id:x}");
+            assert!(!ours.iter().any(|frame| frame.id() == id + 0x580 - 0x600), "unused answer: {id:x}");
             for board in &mut boards {
                 board.hear(id, &data);
                 ours.extend(board.frames());
@@ -62,14 +62,14 @@ fn replay() -> Replay {
 #[test]
 fn every_request_of_the_recorded_session_is_answered_as_recorded() {
     let Replay { answered, unasked, emergencies, .. } = replay();
-    // 211 answers were recorded. The capture lost the request of one of them (node 1, modes of operation) and both frames
-    // of another exchange, so one answer has nothing that asks for it.
+    // 211 answers were recorded. The capture lost the request of one of them (node 1, modes of operation) and
+    // both frames of another exchange, so one answer has no request.
     assert_eq!((answered, emergencies), (210, 0));
     assert_eq!(unasked, [(0x581, [0x60, 0x60, 0x60, 0, 0, 0, 0, 0].to_vec())]);
 }
 
 #[test]
-fn the_recorded_session_sets_the_pdos_up_while_operational() {
+fn the_recorded_session_configures_pdos_while_operational() {
     let Replay { mut boards, .. } = replay();
     for board in &mut boards {
         let node = u32::from(board.nodes[0].id().number());
@@ -89,7 +89,7 @@ fn the_recorded_session_sets_the_pdos_up_while_operational() {
         for (index, sub, value) in expected {
             assert_eq!(board.read(index, sub), Ok(value), "{index:x}");
         }
-        // Without SYNC in the recording, the next one brings the four of each node.
+        // The recording contains no SYNC; the next one triggers four PDOs per node.
         board.hear(0x80, &[]);
         let frames: Vec<(u16, usize)> =
             board.frames().iter().map(|frame| (frame.id(), frame.data().len())).collect();
@@ -101,10 +101,10 @@ fn the_recorded_session_sets_the_pdos_up_while_operational() {
 }
 
 #[test]
-fn the_recorded_session_enables_what_it_asks_for_and_the_leg_waits_for_both_joints() {
+fn the_recorded_session_enables_one_joint_and_the_leg_waits_for_both() {
     let Replay { mut boards, .. } = replay();
     for board in &mut boards {
-        // Shut down (6) before it was enabled is recorded for nodes 1 and 3 only.
+        // Shutdown (6) before enabling is recorded for nodes 1 and 3 only.
         let words = board.axes.map(|axis| axis.statusword());
         assert_eq!(words, [0x8000 | 0x237, 0x250], "{words:x?}");
         assert_eq!(board.drive, DriveState::SwitchOnDisabled);

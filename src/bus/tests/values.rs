@@ -1,4 +1,4 @@
-//! The table against the live node: what it says that is there is there, and begins as it says.
+//! The table against a live node: every listed object exists and has its default.
 
 use super::*;
 use crate::bus::dictionary::{Access, Object, Type};
@@ -11,22 +11,22 @@ fn objects() -> impl Iterator<Item = (Object, &'static dictionary::Row)> {
     })
 }
 
-/// Given by identity, constants, or the leg, and no default of the table's.
+/// Value from the identity, the constants or the leg, instead of the table's default.
 fn is_live(object: Object) -> bool {
     matches!(object.index, 0x1008..=0x100A | 0x1018 | 0x6075 | 0x6076 | 0x607F | 0x6080 | 0x608F | 0x6091 | 0x6502)
         || is_of_the_leg(object)
-        // Where a drive stands before anything.
+        // Initial state of the drive.
         || matches!(object.index, 0x6041)
         || object.index == 0x1003 && object.sub > 0
 }
 
-/// Told by the leg, which a joint alone does not have: `identification::tests`.
+/// Object of the leg, which a joint alone does not have; see `identification::tests`.
 fn is_of_the_leg(object: Object) -> bool {
     (0x2100..0x219A).contains(&object.index) && object.sub > 0
 }
 
 #[test]
-fn every_object_begins_as_the_table_says() {
+fn every_object_has_the_default_of_the_table() {
     for (object, row) in objects().filter(|(object, _)| !is_live(*object)) {
         let mut board = Board::started(5);
         let expected = row.default + if row.plus_node { 5 } else { 0 };
@@ -35,7 +35,7 @@ fn every_object_begins_as_the_table_says() {
 }
 
 #[test]
-fn every_object_is_read_and_written_as_its_access_says() {
+fn every_object_follows_its_access_rights() {
     for (object, row) in objects().filter(|(object, _)| !is_of_the_leg(*object)) {
         let Object { index, sub } = object;
         let mut board = Board::started(5);
@@ -47,13 +47,13 @@ fn every_object_is_read_and_written_as_its_access_says() {
         let written = board.write(index, sub, before.unwrap_or(0), size);
         let expected = match (row.access, index) {
             (Access::Both, 0x1010 | 0x1011) => Err(0x0800_0020),
-            // A PDO that exists does not have its mapping written.
+            // The mapping of an existing PDO is read-only.
             (Access::Both, 0x1600..=0x16FF | 0x1A00..=0x1AFF) => Err(0x0601_0000),
             (Access::Both, _) => Ok(()),
             _ => Err(0x0601_0002),
         };
         assert_eq!(written, expected, "{object:x?}");
-        // Of 2120 any size is taken, for what it means elsewhere.
+        // Object 2120:0 accepts any size.
         if row.access == Access::Both && index != 0x2120 {
             let other = if size == 4 { 2 } else { 4 };
             let wrong = if other < size { Err(0x0607_0013) } else { Err(0x0607_0012) };
@@ -63,13 +63,13 @@ fn every_object_is_read_and_written_as_its_access_says() {
 }
 
 #[test]
-fn what_host_software_of_another_maker_writes_is_taken_without_effect() {
+fn objects_of_another_maker_are_accepted() {
     let mut board = Board::started(1);
     // Recorded software writes its tracking window there, an INTEGER32.
     assert_eq!(board.write(0x2120, 0, 50_000, 4), Ok(()));
     assert_eq!(board.read(0x2120, 0), Ok(13));
     assert_eq!(board.write(0x2121, 0, 13, 1), Err(0x0601_0002));
-    // Mapped beside the controlword, as versions of 2022 to 2025 have it.
+    // Mapped with the controlword by versions of 2022 to 2025.
     let (set, off) = (0x1400, 0x8000_0201);
     for (index, sub, value, size) in [
         (set, 1, off, 4),
@@ -91,7 +91,7 @@ fn what_host_software_of_another_maker_writes_is_taken_without_effect() {
 }
 
 #[test]
-fn what_hosts_of_the_profile_read_has_its_unit() {
+fn profile_objects_have_the_units_of_cia_402() {
     use crate::units::{NewtonMetrePerAmpere, RadianPerSecond, Volt};
     let constants = AxisConstants {
         rated_torque: NewtonMetre(85.0),
@@ -107,7 +107,7 @@ fn what_hosts_of_the_profile_read_has_its_unit() {
     let read = |index, sub| axis.read(Object::at(index, sub)).expect("a value");
     assert_eq!(read(0x6078, 0) as i16, -400, "20 of 50 A");
     assert!((47_899..=47_900).contains(&read(0x6079, 0)), "mV");
-    // 4.5 rad/s times 50 are 2,148.6 turns per minute.
+    // 4.5 rad/s times 50 is 2148.6 revolutions per minute.
     assert_eq!((read(0x6080, 0), read(0x607F, 0)), (2148, 4_500_000));
     assert_eq!((read(0x608F, 1), read(0x6091, 1)), (8192, 50_000));
 }

@@ -16,7 +16,7 @@
 use super::super::bounds::LinkPrior;
 use super::super::completion::complete_within;
 use super::super::estimate::Stage;
-use super::super::record::{Record, RowModel};
+use super::super::recorder::{Record, RowModel};
 use super::super::selection::Selection;
 use super::cost::LegCost;
 use super::interior;

@@ -14,7 +14,7 @@
 //! evaluation 400. Memory: `14 N (14 N + 3)` scalars.
 
 use super::super::estimate::Stage;
-use super::super::record::RowModel;
+use super::super::recorder::RowModel;
 use super::limits::Limits;
 use crate::model::{INERTIAL_PARAMETERS, LegParameters, PARAMETERS_PER_JOINT, Parameter, row_torque};
 use crate::real::{self, Real};

@@ -20,7 +20,7 @@
 
 use super::super::bounds::{LinkPrior, measured_box, segment_length};
 use super::super::completion::prior_deviations;
-use super::super::record::{Record, RowModel};
+use super::super::recorder::{Record, RowModel};
 use super::super::selection::Selection;
 use crate::model::{
     INERTIAL_PARAMETERS, JointParameters, LegParameters, LogCholesky, PARAMETERS_PER_JOINT, Parameter,

@@ -1,5 +1,5 @@
 use super::super::estimate::{Plan, Problem};
-use super::super::record::{RowModel, TorqueSize};
+use super::super::recorder::{RowModel, TorqueSize};
 use super::super::smoothing::Smoothed;
 use super::*;
 use crate::model::{BaseParameters, Chain, DenavitHartenberg, LegParameters, Payload};

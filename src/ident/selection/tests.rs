@@ -183,9 +183,9 @@ fn a_rotor_inertia_that_is_negative_beyond_noise_is_kept_and_refused() {
     let solver = solved(&model, record(&model, &leg(-0.3, [0.0; 2]), 2), 20);
     assert_eq!(dropped(&model, solver.record()), [false, true, true]);
     let mut unheard = |_: &crate::ident::Evidence<f64>| {};
-    let mut docket = crate::ident::Docket::new(&mut unheard);
-    Thresholds::default().judge_physics(&model, solver.record(), solver.least_squares(), &mut docket);
-    assert!(docket.verdict().has(crate::ident::Reason::Unphysical));
+    let mut builder = crate::ident::VerdictBuilder::new(&mut unheard);
+    Thresholds::default().judge_physics(&model, solver.record(), solver.least_squares(), &mut builder);
+    assert!(builder.verdict().has(crate::ident::Reason::Unphysical));
 }
 
 #[test]

@@ -23,7 +23,7 @@
 
 use super::super::estimate::Estimate;
 use super::super::factor::Factor;
-use super::super::record::RowModel;
+use super::super::recorder::RowModel;
 use super::super::verdict::Thresholds;
 use crate::model::{PARAMETERS_PER_JOINT, Parameter};
 use crate::real::{self, Real};

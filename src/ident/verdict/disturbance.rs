@@ -3,7 +3,7 @@
 //! Rows that robust identification excluded ([`Outliers`]) do not corrupt the result. But data with many
 //! exclusions are not trusted, and a leg that stood on the floor was not an open chain.
 
-use super::{Docket, Evidence, Reason, Test, Thresholds};
+use super::{Evidence, Reason, Test, Thresholds, VerdictBuilder};
 use crate::ident::outliers::Outliers;
 use crate::real::{self, Real};
 
@@ -11,9 +11,13 @@ impl<T: Real> Thresholds<T> {
     /// Judges the parameters from the weighted rows on all rows of the motion. Used only without any held-out
     /// motion. A push is rightly excluded. But a machine that was pushed for most of its motion leaves a few
     /// calm rows, and a model that fits nothing else.
-    pub fn judge_whole<const N: usize>(&self, outliers: &Outliers<T, N>, docket: &mut Docket<'_, T>) {
+    pub fn judge_whole<const N: usize>(
+        &self,
+        outliers: &Outliers<T, N>,
+        builder: &mut VerdictBuilder<'_, T>,
+    ) {
         for (joint, &share) in outliers.whole_error_share.iter().enumerate() {
-            docket.at_most(
+            builder.at_most(
                 Reason::Residual,
                 Test::WholeError,
                 Some(joint),
@@ -26,9 +30,13 @@ impl<T: Real> Thresholds<T> {
 
     /// Judges contact with the floor: a single long stretch with large errors in all joints. If more than
     /// half of the rows have large errors, the model is wrong, not the leg held; other tests cover that.
-    pub fn judge_disturbance<const N: usize>(&self, outliers: &Outliers<T, N>, docket: &mut Docket<'_, T>) {
+    pub fn judge_disturbance<const N: usize>(
+        &self,
+        outliers: &Outliers<T, N>,
+        builder: &mut VerdictBuilder<'_, T>,
+    ) {
         let mostly = outliers.disturbed_share.iter().any(|&share| share > T::of(0.5));
-        docket.note(Evidence {
+        builder.note(Evidence {
             reason: Reason::Contact,
             test: Test::CommonDisturbance,
             joint: None,
@@ -37,7 +45,7 @@ impl<T: Real> Thresholds<T> {
             limit: self.longest_disturbance_s,
             passed: outliers.longest_common_s <= self.longest_disturbance_s || mostly,
         });
-        self.judge_set_aside(outliers, None, docket);
+        self.judge_set_aside(outliers, None, builder);
     }
 
     /// Judges the shares of replaced samples and disturbed rows, on the motion
@@ -46,15 +54,15 @@ impl<T: Real> Thresholds<T> {
         &self,
         outliers: &Outliers<T, N>,
         motion: Option<usize>,
-        docket: &mut Docket<'_, T>,
+        builder: &mut VerdictBuilder<'_, T>,
     ) {
         let samples = real::max(T::of(f64::from(outliers.samples)), T::one());
         for joint in 0..N {
             let replaced = T::of(f64::from(outliers.replaced[joint])) / samples;
             let limit = self.largest_replaced_share;
-            docket.at_most(Reason::Outliers, Test::ReplacedShare, Some(joint), motion, replaced, limit);
+            builder.at_most(Reason::Outliers, Test::ReplacedShare, Some(joint), motion, replaced, limit);
             let (share, limit) = (outliers.disturbed_share[joint], self.largest_disturbed_share);
-            docket.at_most(Reason::Outliers, Test::DisturbedShare, Some(joint), motion, share, limit);
+            builder.at_most(Reason::Outliers, Test::DisturbedShare, Some(joint), motion, share, limit);
         }
     }
 }

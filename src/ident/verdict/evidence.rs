@@ -52,11 +52,13 @@ pub enum Test {
     ReplacedShare,
     /// Share of a joint's rows that lost more than half of their weight.
     DisturbedShare,
+    /// Pulse of a joint's smoothed speed at one count of its encoder, rad/s.
+    EncoderPulse,
 }
 
 impl Test {
     /// All tests, in the order of the enum.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 24] = [
         Self::Rows,
         Self::NotFinite,
         Self::Torque,
@@ -80,6 +82,7 @@ impl Test {
         Self::CommonDisturbance,
         Self::ReplacedShare,
         Self::DisturbedShare,
+        Self::EncoderPulse,
     ];
 
     /// Word used in reports.
@@ -109,6 +112,7 @@ impl Test {
             Self::CommonDisturbance => "common_disturbance",
             Self::ReplacedShare => "replaced_share",
             Self::DisturbedShare => "disturbed_share",
+            Self::EncoderPulse => "encoder_pulse",
         }
     }
 }
@@ -133,13 +137,13 @@ pub struct Evidence<T> {
 }
 
 /// Collects evidence into a verdict, and forwards each piece.
-pub struct Docket<'a, T> {
+pub struct VerdictBuilder<'a, T> {
     verdict: Verdict,
     hand_on: &'a mut dyn FnMut(&Evidence<T>),
 }
 
-impl<'a, T: Real> Docket<'a, T> {
-    /// Empty docket; every piece of evidence goes to `hand_on` as well.
+impl<'a, T: Real> VerdictBuilder<'a, T> {
+    /// Empty builder; every piece of evidence goes to `hand_on` as well.
     pub fn new(hand_on: &'a mut dyn FnMut(&Evidence<T>)) -> Self {
         Self { verdict: Verdict::ACCEPTED, hand_on }
     }

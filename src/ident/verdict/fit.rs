@@ -10,9 +10,9 @@
 //! side uses the training's residual, so a bad training widens no limit. Only where v is unknown (samples
 //! from another grid) the training's residual takes its place, times `largest_error_ratio`.
 
-use super::{Docket, Evidence, Reason, Test, Thresholds};
+use super::{Evidence, Reason, Test, Thresholds, VerdictBuilder};
 use crate::ident::estimate::Estimate;
-use crate::ident::record::{Record, RowModel};
+use crate::ident::recorder::{Record, RowModel};
 use crate::ident::residual::Residual;
 use crate::model::Parameter;
 use crate::real::{self, Real};
@@ -32,7 +32,7 @@ impl<T: Real> Thresholds<T> {
         &self,
         training: &Record<T, N, B>,
         values: &[T; B],
-        docket: &mut Docket<'_, T>,
+        builder: &mut VerdictBuilder<'_, T>,
     ) {
         for (joint, size) in training.torque.iter().enumerate() {
             let Some(error) = training.torque_error(joint, values) else { continue }; // the joint never moved: unexcited
@@ -41,7 +41,7 @@ impl<T: Real> Thresholds<T> {
                 let allowed = self.allowed(training, joint, noise * noise, self.largest_misfit_share);
                 limit = real::min(limit, allowed);
             }
-            docket.at_most(Reason::Residual, Test::TrainingError, Some(joint), None, error, limit);
+            builder.at_most(Reason::Residual, Test::TrainingError, Some(joint), None, error, limit);
         }
     }
 
@@ -65,10 +65,10 @@ impl<T: Real> Thresholds<T> {
         motion: usize,
         record: &Record<T, N, B>,
         estimate: &Estimate<T, B>,
-        docket: &mut Docket<'_, T>,
+        builder: &mut VerdictBuilder<'_, T>,
     ) {
         let (values, at) = (&estimate.values, Some(motion));
-        docket.at_most(
+        builder.at_most(
             Reason::Input,
             Test::NotFinite,
             None,
@@ -84,7 +84,7 @@ impl<T: Real> Thresholds<T> {
             let uncertain = record.uncertainty(joint, estimate);
             let share = if size > T::zero() { uncertain / size } else { T::zero() };
             let limit = self.largest_uncertainty_share;
-            docket.at_most(Reason::Unexcited, Test::PredictedUncertainty, Some(joint), at, share, limit);
+            builder.at_most(Reason::Unexcited, Test::PredictedUncertainty, Some(joint), at, share, limit);
             let error = record.torque_error(joint, values).unwrap_or(T::LARGEST);
             let limit = match record.filtered_noise(joint) {
                 Some(noise) => {
@@ -96,7 +96,7 @@ impl<T: Real> Thresholds<T> {
                 }),
             };
             let limit = real::min(limit, self.largest_error_share * size);
-            docket.at_most(Reason::Validation, Test::ValidationError, Some(joint), at, error, limit);
+            builder.at_most(Reason::Validation, Test::ValidationError, Some(joint), at, error, limit);
         }
     }
 
@@ -107,7 +107,7 @@ impl<T: Real> Thresholds<T> {
         model: &RowModel<T, N, B>,
         training: &Record<T, N, B>,
         values: &[T; B],
-        docket: &mut Docket<'_, T>,
+        builder: &mut VerdictBuilder<'_, T>,
     ) {
         let mut dynamic = *values;
         for (base, value) in dynamic.iter_mut().enumerate() {
@@ -125,7 +125,7 @@ impl<T: Real> Thresholds<T> {
             let limit = self.smallest_dynamic_share;
             // A joint at rest already failed a test with the right reason.
             let moved = size.speed >= self.smallest_speed && training.rows[joint] > 0;
-            docket.note(Evidence {
+            builder.note(Evidence {
                 reason: Reason::NotAMeasurement,
                 test: Test::DynamicShare,
                 joint: Some(joint),
@@ -143,7 +143,7 @@ mod tests {
     use super::*;
     use crate::ident::factor::Factor;
     use crate::ident::outliers::Outliers;
-    use crate::ident::record::TorqueSize;
+    use crate::ident::recorder::TorqueSize;
     use crate::ident::selection::Selection;
 
     #[test]
@@ -169,8 +169,8 @@ mod tests {
                 shares = [evidence.value];
             }
         };
-        let mut docket = Docket::new(&mut note);
-        Thresholds::default().judge_validation(&record, 0, &record, &estimate, &mut docket);
+        let mut builder = VerdictBuilder::new(&mut note);
+        Thresholds::default().judge_validation(&record, 0, &record, &estimate, &mut builder);
         // Sigma 0.5 in a column of 3: 1.5 of 4 N m.
         assert_eq!(shares, [0.375]);
     }

@@ -1,6 +1,6 @@
 //! Tests of the held-out residual: its course in time and the geometry errors it shows.
 
-use super::{Docket, Evidence, Reason, Test, Thresholds, Unused};
+use super::{Evidence, Reason, Test, Thresholds, Unused, VerdictBuilder};
 use crate::ident::alignment::{Direction, Misalignment};
 use crate::real::{self, Real};
 
@@ -11,7 +11,7 @@ impl<T: Real> Thresholds<T> {
         &self,
         motion: usize,
         unused: &Unused<'_, T, N, B>,
-        docket: &mut Docket<'_, T>,
+        builder: &mut VerdictBuilder<'_, T>,
     ) {
         for (joint, residual) in unused.residual.joints.iter().enumerate() {
             let noise = Some(unused.record.noise[joint]).filter(|&noise| noise > T::zero());
@@ -19,7 +19,7 @@ impl<T: Real> Thresholds<T> {
             let harmless = share * unused.record.torque[joint].root_mean_square;
             let limit = real::max(harmless, residual.slow_by_chance(self.noise_quantile, noise));
             let at = (Some(joint), Some(motion));
-            docket.at_most(
+            builder.at_most(
                 Reason::Validation,
                 Test::SlowResidual,
                 at.0,
@@ -36,7 +36,7 @@ impl<T: Real> Thresholds<T> {
         &self,
         motion: usize,
         unused: &Unused<'_, T, N, B>,
-        docket: &mut Docket<'_, T>,
+        builder: &mut VerdictBuilder<'_, T>,
     ) {
         let residual = unused.residual;
         let (wild, rows) = residual
@@ -47,7 +47,7 @@ impl<T: Real> Thresholds<T> {
         let elsewhere = T::of(f64::from(rows)) * T::of(0.5) < T::of(f64::from(wild));
         let value = residual.longest_common_s;
         let limit = self.longest_disturbance_s;
-        docket.note(Evidence {
+        builder.note(Evidence {
             reason: Reason::Contact,
             test: Test::CommonDisturbance,
             joint: None,
@@ -64,7 +64,12 @@ impl<T: Real> Thresholds<T> {
     ///
     /// With unknown noise, sigma comes from the model's own errors, which are not white; the tolerance is
     /// then three times as wide.
-    pub fn judge_alignment(&self, found: &Misalignment<T>, noise_is_known: bool, docket: &mut Docket<'_, T>) {
+    pub fn judge_alignment(
+        &self,
+        found: &Misalignment<T>,
+        noise_is_known: bool,
+        builder: &mut VerdictBuilder<'_, T>,
+    ) {
         let (test, tolerance) = match found.direction {
             Direction::Length => (Test::LinkLength, self.largest_length_error),
             Direction::Zero => (Test::EncoderZero, self.largest_zero_error),
@@ -77,7 +82,7 @@ impl<T: Real> Thresholds<T> {
         {
             (value, allowed) = (delta, limit(sigma));
         }
-        docket.note(Evidence {
+        builder.note(Evidence {
             reason: Reason::Residual,
             test,
             joint: Some(found.joint),
@@ -107,7 +112,7 @@ mod tests {
         };
         let mut seen = None;
         let mut note = |evidence: &Evidence<f64>| seen = Some(*evidence);
-        thresholds.judge_alignment(&found, noise_is_known, &mut Docket::new(&mut note));
+        thresholds.judge_alignment(&found, noise_is_known, &mut VerdictBuilder::new(&mut note));
         let evidence = seen.expect("one piece of evidence");
         assert_eq!((evidence.test, evidence.joint), (Test::LinkLength, Some(1)));
         (evidence.value, evidence.limit, evidence.passed)

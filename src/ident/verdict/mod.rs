@@ -23,7 +23,7 @@ mod input;
 mod physics;
 mod thresholds;
 
-pub use evidence::{Docket, Evidence, Test};
+pub use evidence::{Evidence, Test, VerdictBuilder};
 pub use fit::Unused;
 pub use thresholds::Thresholds;
 

@@ -3,11 +3,11 @@
 use nalgebra::{SMatrix, Vector3};
 
 use super::super::solver::Consistency;
-use super::{Docket, Reason, Test, Thresholds};
+use super::{Reason, Test, Thresholds, VerdictBuilder};
 use crate::ident::choice::Constant;
 use crate::ident::completion::is_weak;
 use crate::ident::estimate::Estimate;
-use crate::ident::record::{Record, RowModel};
+use crate::ident::recorder::{Record, RowModel};
 use crate::model::{JointState, PARAMETERS_PER_JOINT, Parameter, mass_matrix, regressor};
 use crate::real::{self, Real};
 
@@ -19,14 +19,14 @@ impl<T: Real> Thresholds<T> {
         model: &RowModel<T, N, B>,
         record: &Record<T, N, B>,
         estimate: &Estimate<T, B>,
-        docket: &mut Docket<'_, T>,
+        builder: &mut VerdictBuilder<'_, T>,
     ) {
         let mut worst = [T::zero(); N];
         for base in 0..model.base.rank() {
             let Some((joint, parameter)) = model.base.independent(base) else { continue };
             let (value, sigma) = (estimate.values[base], estimate.sigma(base).unwrap_or(T::zero()));
             if !real::is_finite(value) {
-                docket.at_most(
+                builder.at_most(
                     Reason::Unphysical,
                     Test::Finite,
                     Some(joint),
@@ -48,10 +48,10 @@ impl<T: Real> Thresholds<T> {
         }
         let limit = self.largest_negative_sigmas;
         for (joint, &sigmas) in worst.iter().enumerate() {
-            docket.at_most(Reason::Unphysical, Test::NegativeParameter, Some(joint), None, sigmas, limit);
+            builder.at_most(Reason::Unphysical, Test::NegativeParameter, Some(joint), None, sigmas, limit);
         }
         let energy = self.negative_energy(model, estimate);
-        docket.at_most(
+        builder.at_most(
             Reason::Unphysical,
             Test::NegativeEnergy,
             None,
@@ -63,9 +63,9 @@ impl<T: Real> Thresholds<T> {
 
     /// Judges the loss of fit of the physically consistent leg against least squares. Beyond the noise of its
     /// degrees of freedom, the data contradict every leg that the prior allows.
-    pub fn judge_consistency(&self, consistency: &Consistency<T>, docket: &mut Docket<'_, T>) {
+    pub fn judge_consistency(&self, consistency: &Consistency<T>, builder: &mut VerdictBuilder<'_, T>) {
         let limit = self.chance(T::of(consistency.degrees_of_freedom as f64));
-        docket.at_most(Reason::Unphysical, Test::PriorBox, None, None, consistency.excess, limit);
+        builder.at_most(Reason::Unphysical, Test::PriorBox, None, None, consistency.excess, limit);
     }
 
     /// Largest negative kinetic energy `v' M(q) v / 2` over postures all over the circle, in standard
@@ -179,11 +179,11 @@ mod tests {
     use super::*;
     use crate::ident::factor::Factor;
     use crate::ident::outliers::Outliers;
-    use crate::ident::record::TorqueSize;
+    use crate::ident::recorder::TorqueSize;
     use crate::ident::selection::Selection;
     use crate::model::{BaseParameters, Chain, DenavitHartenberg};
 
-    /// Standard deviations by which joint 0's friction is negative, with these values and a sigma of 0.1 each.
+    /// Number of sigma by which joint 0's friction is negative, with these values and a sigma of 0.1 each.
     fn negative(level: f32, half: f32, meaning: Constant) -> f32 {
         const BASE: usize = 13;
         let length = |joint: usize| if joint == 0 { 0.0 } else { 0.45 };
@@ -217,7 +217,7 @@ mod tests {
                 seen = evidence.value;
             }
         };
-        Thresholds::default().judge_physics(&model, &record, &estimate, &mut Docket::new(&mut note));
+        Thresholds::default().judge_physics(&model, &record, &estimate, &mut VerdictBuilder::new(&mut note));
         seen
     }
 
@@ -225,7 +225,7 @@ mod tests {
     fn negative_friction_is_judged_in_its_sigma_and_in_each_direction() {
         assert!((negative(-1.0, 0.0, Constant::Offset) - 10.0).abs() < 1e-3);
         assert_eq!(negative(1.0, 1.5, Constant::Offset), 0.0);
-        // Half of the difference between both directions: the lower one is -0.5, its sigma 0.1 times root two.
+        // Half the difference between both directions: the lower one is -0.5, with sigma 0.1 sqrt(2).
         for half in [1.5, -1.5] {
             assert!((negative(1.0, half, Constant::Asymmetry) - 3.5355).abs() < 1e-3);
         }

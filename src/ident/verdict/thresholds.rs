@@ -11,6 +11,10 @@ pub struct Thresholds<T> {
     /// Least root mean square speed of every joint, rad/s. Below, the encoder's noise determines the sign of
     /// the speed, and Coulomb friction looks like an offset.
     pub smallest_speed: T,
+    /// Largest pulse of a joint's speed at one count of its encoder, as a share of its root mean square
+    /// speed. On simulated legs and arms with 10 to 14 bits sigma holds up to 0.19, the torque of arms is 3 %
+    /// off at 0.23, and inertias are 14 % too small at 0.38.
+    pub largest_pulse_share: T,
     /// Largest condition number of the scaled problem. Above, an error of 0.1 % in the rows
     /// moves the result by its size.
     pub largest_condition: T,
@@ -57,6 +61,7 @@ impl<T: Real> Default for Thresholds<T> {
         Self {
             rows_per_parameter: 5,
             smallest_speed: T::of(0.05),
+            largest_pulse_share: T::of(0.2),
             largest_condition: T::of(1000.0),
             largest_negative_sigmas: T::of(3.0),
             largest_excess_spreads: T::of(5.0),

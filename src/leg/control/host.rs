@@ -1,22 +1,23 @@
-//! A leg that a host commands: what follows takes the place of being idle.
+//! Control by a host: while the drive is enabled, `Follow` replaces `Idle`.
 
 use super::{Activity, Control, DriveState};
 use crate::leg::follow::{Commanded, Following, JointCommand};
 use crate::motion::{Motion, MotionState};
 
-/// What a host commands at one tick, and what is made of it.
+/// Commands of a host for one tick, and the state of following them.
 #[derive(Debug)]
 pub struct Host<'a, const N: usize> {
-    /// Remembers from tick to tick.
+    /// State from tick to tick.
     pub following: &'a mut Following<N>,
-    /// Of this tick.
+    /// Commands of this tick.
     pub commands: &'a [JointCommand; N],
-    /// An identification is given up, or a motion that is tracked: the joints come to rest along their profiles.
+    /// Whether an identification or a tracked motion is cancelled: the joints slow down to rest along their
+    /// profiles.
     pub cancel: bool,
 }
 
 impl<const N: usize> Control<N> {
-    /// What the host commands, where the leg is enabled and does nothing else.
+    /// Follows the host's commands if the drive is enabled and no other activity runs.
     pub(super) fn obey(&mut self, host: Option<&mut Host<'_, N>>) -> Option<Commanded<N>> {
         let Host { following, commands, cancel } = host?;
         if self.servo.state() != DriveState::OperationEnabled {
@@ -41,7 +42,7 @@ impl<const N: usize> Control<N> {
         if let Some(shifts) = &commanded.shifts {
             self.servo.shift(shifts);
         }
-        // Where another activity would begin.
+        // Start of a possible next activity.
         (self.motion, self.motion_tick) = (Motion::Hold(commanded.motion.position_rad), 0);
         Some(commanded)
     }

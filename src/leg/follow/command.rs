@@ -1,32 +1,32 @@
-//! What a host tells each joint, and what it is told about it: values only, anatomical, flexion positive.
+//! Commands of a host to each joint, and the joint's status: plain values, anatomical, flexion positive.
 //!
-//! The numbers of the modes and what they mean are CiA 402's; its units stay with the bus.
+//! Modes and their numbers follow CiA 402; the units of the objects are converted in `bus`.
 
 use crate::safety::DriveState;
 use crate::units::{NewtonMetre, Radian, RadianPerSecond, RadianPerSecondSquared, Second, Volt};
 
-/// How a joint is told to move (6060).
+/// Mode of operation (6060).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i8)]
 pub enum Mode {
-    /// To a position, along a profile.
+    /// Moves to a position along a profile.
     ProfilePosition = 1,
-    /// At a velocity, along a profile.
+    /// Moves at a velocity along a profile.
     ProfileVelocity = 3,
-    /// With a torque, along a slope.
+    /// Applies a torque along a slope.
     ProfileTorque = 4,
-    /// Find the zero.
+    /// Sets the zero.
     Homing = 6,
-    /// A position per cycle.
+    /// Follows a position per cycle.
     CyclicPosition = 8,
-    /// A velocity per cycle.
+    /// Follows a velocity per cycle.
     CyclicVelocity = 9,
-    /// A torque per cycle.
+    /// Applies a torque per cycle.
     CyclicTorque = 10,
 }
 
 impl Mode {
-    /// All of them.
+    /// All modes.
     pub const ALL: [Self; 7] = [
         Self::ProfilePosition,
         Self::ProfileVelocity,
@@ -37,68 +37,68 @@ impl Mode {
         Self::CyclicTorque,
     ];
 
-    /// Its bit in 6502.
+    /// Bit of the mode in 6502.
     #[must_use]
     pub const fn bit(self) -> u32 {
         1 << (self as i8 - 1)
     }
 
-    /// The mode of this number.
+    /// Returns the mode with this number.
     #[must_use]
     pub fn of(number: i8) -> Option<Self> {
         Self::ALL.into_iter().find(|mode| *mode as i8 == number)
     }
 }
 
-/// A position that was asked for in [`Mode::ProfilePosition`].
+/// Set-point of [`Mode::ProfilePosition`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SetPoint {
-    /// Where to.
+    /// Target position, absolute or relative.
     pub position: Radian,
-    /// From where it is commanded to be.
+    /// Whether the position is relative to the commanded one.
     pub relative: bool,
-    /// Does not wait for the end of the one before.
+    /// Whether it replaces the active set-point at once.
     pub immediately: bool,
 }
 
-/// What a joint is to do; angles and torques with the anatomical sign.
+/// Target of a joint; angles and torques with the anatomical sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target {
-    /// No mode: stays where it is.
+    /// No mode: the joint holds its position.
     Hold,
-    /// Along a profile to the newest set-point, if there is one.
+    /// Moves along a profile to the newest set-point, if there is one.
     ProfilePosition(SetPoint),
-    /// Along a profile to a velocity.
+    /// Moves along a profile to a velocity.
     ProfileVelocity(RadianPerSecond),
-    /// Along a slope to a torque.
+    /// Follows a slope to a torque.
     ProfileTorque(NewtonMetre),
-    /// Take the place where it stands for its zero, once for each that is asked for.
+    /// Sets the present position to an offset, once per start of homing.
     Homing {
-        /// What that place is from then on.
+        /// Angle assigned to the present position.
         offset: Radian,
     },
-    /// Interpolated over the period.
+    /// Position, interpolated over the period.
     CyclicPosition {
-        /// Where to be at the period's end.
+        /// Position at the end of the period.
         position: Radian,
         /// Added to the commanded velocity.
         velocity_offset: RadianPerSecond,
         /// Added to the commanded torque.
         torque_offset: NewtonMetre,
     },
-    /// Interpolated over the period.
+    /// Velocity, interpolated over the period.
     CyclicVelocity {
-        /// How fast to be at the period's end.
+        /// Velocity at the end of the period.
         velocity: RadianPerSecond,
         /// Added to the commanded torque.
         torque_offset: NewtonMetre,
     },
-    /// As it is.
+    /// Torque, without interpolation.
     CyclicTorque(NewtonMetre),
 }
 
 impl Target {
-    /// The mode it belongs to.
+    /// Mode of the target; `None` for [`Target::Hold`].
     #[must_use]
     pub const fn mode(&self) -> Option<Mode> {
         Some(match self {
@@ -114,77 +114,78 @@ impl Target {
     }
 }
 
-/// What the leg is told about one joint.
+/// Command for one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointCommand {
-    /// What to do.
+    /// Target of the joint.
     pub target: Target,
-    /// Grows with every set-point and every start of homing, wrapping: another number than before is a new one, but none that
-    /// was asked before the leg was enabled.
+    /// Counter of set-points and homing starts, wrapping. A changed value is a new request, unless it was
+    /// made before the leg was enabled.
     pub asked: u8,
-    /// An accepted model feeds forward, where all joints ask for it.
+    /// Uses an accepted model as feedforward, if all joints request it.
     pub feedforward: bool,
-    /// Slow down along the profile and hold (bit 8).
+    /// Slows down along the profile and holds (bit 8).
     pub halt: bool,
-    /// Of profiles.
+    /// Profile velocity.
     pub velocity: RadianPerSecond,
-    /// Of profiles.
+    /// Profile acceleration.
     pub acceleration: RadianPerSecondSquared,
-    /// Of profiles.
+    /// Profile deceleration.
     pub deceleration: RadianPerSecondSquared,
-    /// Of [`Target::ProfileTorque`], N m per second.
+    /// Slope of [`Target::ProfileTorque`], N m/s.
     pub torque_slope_nm_per_s: f32,
-    /// Software limits, lowest and highest; the leg's own are kept besides.
+    /// Software limits, lowest and highest, in addition to the leg's own.
     pub range: [Radian; 2],
-    /// On top of the leg's own.
+    /// Torque limit, in addition to the leg's own.
     pub largest_torque: NewtonMetre,
-    /// Farther from where it is commanded to be for longer than [`Self::following_time`] is a fault (8611).
+    /// A larger distance to the commanded position for longer than [`Self::following_time`] is a fault
+    /// (8611).
     pub following_window: Radian,
-    /// See there.
+    /// Time limit of the following error.
     pub following_time: Second,
-    /// Nearer to the target than this for [`Self::position_time`] is reached.
+    /// The target is reached after [`Self::position_time`] within this distance.
     pub position_window: Radian,
-    /// See there.
+    /// Time within the position window.
     pub position_time: Second,
-    /// Between two targets of the cyclic modes.
+    /// Period of the targets in the cyclic modes.
     pub period: Second,
 }
 
-/// One joint at one tick; angles and torques with the anatomical sign.
+/// Status of one joint at one tick; angles and torques with the anatomical sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointStatus {
-    /// Where the leg's drive stands.
+    /// State of the leg's drive.
     pub drive: DriveState,
-    /// Measured.
+    /// Measured position.
     pub position: Radian,
-    /// Measured.
+    /// Measured velocity.
     pub velocity: RadianPerSecond,
-    /// Measured: of the motor's current.
+    /// Torque by the measured motor current.
     pub torque: NewtonMetre,
-    /// Commanded after profile and interpolation.
+    /// Commanded position, after profile and interpolation.
     pub position_demand: Radian,
-    /// Commanded after profile and interpolation.
+    /// Commanded velocity, after profile and interpolation.
     pub velocity_demand: RadianPerSecond,
-    /// Commanded, as it was let through.
+    /// Commanded torque, after the limits.
     pub torque_demand: NewtonMetre,
-    /// The mode the leg is in (6061); 0 is none.
+    /// Active mode (6061); 0 for none.
     pub mode: i8,
-    /// The target of that mode is reached, or the joint stands after a halt.
+    /// Whether the target is reached, or the joint is at rest after a halt.
     pub reached: bool,
-    /// Less is commanded than was asked for.
+    /// Whether a limit reduces the command.
     pub limited: bool,
-    /// Homing has been done.
+    /// Whether homing has succeeded.
     pub homed: bool,
-    /// The following error is too large, or the target is out of reach; of homing: it failed.
+    /// Whether the following error is too large or the target unreachable; in homing, whether it failed.
     pub deviates: bool,
-    /// Digital inputs, CiA 402's bits.
+    /// Digital inputs, bits of CiA 402.
     pub inputs: u32,
-    /// Of the supply.
+    /// Supply voltage.
     pub bus: Volt,
 }
 
 impl JointStatus {
-    /// Before the leg's first tick.
+    /// Status before the first tick.
     pub const NONE: Self = Self {
         drive: DriveState::NotReadyToSwitchOn,
         position: Radian::ZERO,

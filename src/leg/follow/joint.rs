@@ -1,21 +1,21 @@
-//! One joint that follows what a host tells it, tick by tick.
+//! Follower of one joint: turns the commands of a host into a trajectory, tick by tick.
 //!
 //! ```text
-//! profile position     course to the newest set-point; one that does not interrupt waits for the end of the one before
-//! profile velocity     course to a velocity
-//! profile torque       torque along its slope, no position held; halt leads it to zero
-//! homing               stands still and takes the place for the offset that is asked for
-//! cyclic               position or velocity interpolated over the period, or the torque as it is
-//! none, halt           comes to rest along the profile and holds
+//! profile position     trajectory to the newest set-point; unless immediate, after the previous one
+//! profile velocity     trajectory to a velocity
+//! profile torque       torque along its slope, no position control; halt ramps it to zero
+//! homing               comes to rest and sets the position to the requested offset
+//! cyclic               position or velocity interpolated over the period, or the torque directly
+//! no mode, halt        comes to rest along the profile and holds
 //! ```
 //!
-//! Nothing jumps: a change of mode begins where the joint is and with the torque it has; a course never leads farther than the
-//! range, nor faster than the speed limit. Too far for too long from a commanded position, or a cyclic position that is too far
-//! when the mode begins, is a fault (8611). A joint that is told a velocity is no fault while something holds it: it is then
-//! commanded to be no farther away than the window.
+//! Nothing jumps: a new mode starts from the joint's present position and torque. A trajectory never leaves
+//! the range or exceeds the speed limit. Fault 8611: the distance to the commanded position exceeds the
+//! window for too long, or a cyclic target is too far away when the mode begins. In velocity modes a blocked
+//! joint is not a fault: the commanded position stays within the window around the measured one.
 //!
-//! A joint that returns into its range (`safety::Monitor`) is led there slowly by whatever commands a way: targets are those of the
-//! range, and where it is commanded to be is never farther out than the joint.
+//! While a joint returns into its range (`safety::Monitor`), every position or velocity mode moves it slowly.
+//! Targets are limited to the range, and the commanded position is never farther out than the joint.
 
 use super::command::{JointCommand, Mode, SetPoint, Target};
 use crate::motion::{Course, Rates};
@@ -24,79 +24,79 @@ use crate::safety::{RETURN_SPEED, RETURN_TORQUE};
 use crate::servo::{SERVO_RATE_HZ, TICK_S};
 use crate::units::{NewtonMetre, Radian, RadianPerSecond, Second};
 
-/// Slower than this a joint stands: 0.3 degrees per second, ten times what the observer makes of the steps of the default leg's
-/// encoder.
+/// Speed below which a joint is at rest, rad/s: 0.3 degrees per second, ten times the observer's ripple from
+/// the encoder steps of the default leg.
 const STANDING: f32 = 0.005;
-/// The longest period that is interpolated: a quarter of a second.
+/// Longest period that is interpolated: a quarter of a second.
 const LONGEST_PERIOD: u32 = SERVO_RATE_HZ / 4;
 
-/// What a joint may do at most, anatomical.
+/// Limits of a joint, anatomical.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Lowest and highest angle, rad.
     pub range: [f32; 2],
-    /// rad/s.
+    /// Largest speed, rad/s.
     pub speed: f32,
-    /// rad/s^2.
+    /// Largest acceleration, rad/s^2.
     pub acceleration: f32,
-    /// N m.
+    /// Largest torque, N m.
     pub torque: f32,
 }
 
-/// What was measured at the tick before, anatomical.
+/// Measured values of the previous tick, anatomical.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
     /// Joint angle.
     pub position: Radian,
     /// Joint velocity.
     pub velocity: RadianPerSecond,
-    /// What was applied.
+    /// Torque applied.
     pub torque: NewtonMetre,
-    /// It returns into its range.
+    /// Whether the joint returns into its range.
     pub returns: bool,
 }
 
-/// What a joint is told at one tick, anatomical.
+/// Demand on the servo at one tick, anatomical.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
-    /// Where to be and how to move there.
+    /// Trajectory: position, velocity, acceleration.
     pub course: Course,
-    /// On top of the course's velocity, rad/s.
+    /// Added to the trajectory's velocity, rad/s.
     pub velocity_offset: f32,
-    /// On top of what holds the course, or alone; N m.
+    /// Added to the controller's torque, or the whole torque if the trajectory is not held, N m.
     pub torque: f32,
-    /// The course is held, not only the torque given.
+    /// Whether the trajectory is held; otherwise only the torque is applied.
     pub held: bool,
-    /// The most that is asked for, N m.
+    /// Torque limit, N m.
     pub largest: f32,
-    /// Too far from where it is commanded to be.
+    /// Whether the following error is a fault.
     pub failed: bool,
-    /// The joint's zero is moved by so much, rad.
+    /// Shift of the joint's zero, rad.
     pub shift: Option<f32>,
 }
 
-/// What is remembered of one joint.
+/// State of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Follower {
     mode: Option<Mode>,
     course: Course,
-    /// N m; of the torque modes.
+    /// Torque of the torque modes, N m.
     torque: f32,
-    /// [`JointCommand::asked`] of the tick before.
+    /// [`JointCommand::asked`] of the previous tick.
     seen: u8,
-    /// Of profile position: on the way to it.
+    /// Profile position: the active set-point.
     goal: Option<f32>,
-    /// The set-point that follows.
+    /// The next set-point.
     next: Option<SetPoint>,
-    /// Of cyclic modes: the last target, and the ticks of its period that are left.
+    /// Cyclic modes: the last target, and the remaining ticks of its period.
     target: f32,
     left: u32,
-    /// Of cyclic positions: what lay between joint and target when the mode began, on its way to zero.
+    /// Cyclic position: distance from target to joint at the start of the mode, reduced to zero over time.
     gap: Course,
     halted: bool,
-    /// It returned at the tick before.
+    /// Whether the joint returned in the previous tick.
     returned: bool,
-    /// Ticks for which the joint has been too far away, or near enough.
+    /// Ticks for which the joint has been outside the following window, or inside the position window.
     outside: u32,
     inside: u32,
     pub(super) reached: bool,
@@ -110,7 +110,7 @@ fn ticks(time: Second) -> u32 {
 }
 
 impl Follower {
-    /// Nothing told yet.
+    /// Initial state, without a command.
     pub const NEW: Self = Self {
         mode: None,
         course: Course::at_rest(0.0),
@@ -131,23 +131,23 @@ impl Follower {
         deviates: false,
     };
 
-    /// Where the joint is commanded to be.
+    /// Commanded trajectory.
     #[must_use]
     pub fn course(&self) -> Course {
         self.course.plus(&self.gap)
     }
 
-    /// The mode it is in.
+    /// Active mode.
     pub const fn mode(&self) -> Option<Mode> {
         self.mode
     }
 
-    /// Follows from here on: what was asked until now is not done later.
+    /// Starts following from `course`. Requests made before are discarded.
     pub fn start(&mut self, command: &JointCommand, course: Course) {
         *self = Self { seen: command.asked, course, homed: self.homed, ..Self::NEW };
     }
 
-    /// One tick.
+    /// Runs one tick.
     pub fn follow(&mut self, command: &JointCommand, measured: &Measured, bounds: &Bounds) -> Demand {
         let begins = command.target.mode() != self.mode;
         if begins {
@@ -225,7 +225,7 @@ impl Follower {
             }
             Target::CyclicPosition { position, velocity_offset, torque_offset } => {
                 let target = self.bounded(position.0, range[0], range[1]);
-                // Of a joint outside, the end of the range that it returns to.
+                // For a joint outside its range: the end of the range that it returns to.
                 let place = if returns { clamp(measured.position.0, low, high) } else { measured.position.0 };
                 let is_far = abs(target - place) > command.following_window.0;
                 if begins || resumes || ends {
@@ -273,38 +273,38 @@ impl Follower {
         demand
     }
 
-    /// Another mode: from where the joint is, with the torque it has.
+    /// Starts a new mode from the present position and torque.
     fn begin(&mut self, command: &JointCommand, measured: &Measured) {
         self.mode = command.target.mode();
         self.close_gap();
         self.torque = measured.torque.0;
         (self.goal, self.next, self.left) = (None, None, 0);
         (self.outside, self.inside, self.reached, self.deviates) = (0, 0, false, false);
-        // What a cyclic mode finds is new.
+        // NaN: the first target of a cyclic mode always starts a period.
         self.target = f32::NAN;
     }
 
-    /// One course of both.
+    /// Merges the gap into the course.
     fn close_gap(&mut self) {
         self.course = self.course();
         self.gap = Course::at_rest(0.0);
     }
 
-    /// Only the torque.
+    /// Torque only, without position control.
     fn give(&mut self, demand: Demand, measured: &Measured) -> Demand {
         self.deviates = false;
         self.course = Course::moving(measured.position.0, measured.velocity.0);
         Demand { course: self.course, torque: self.torque, held: false, ..demand }
     }
 
-    /// To rest along the profile.
+    /// Slows down to rest along the profile.
     fn stop(&mut self, rates: &Rates, bounds: &Bounds, measured: &Measured) {
         let rates = Rates { speed: bounds.speed, ..*rates };
         self.course.accelerate(0.0, &rates, bounds.range, TICK_S);
         self.reached = self.course.velocity() == 0.0 && abs(measured.velocity.0) < STANDING;
     }
 
-    /// Held to bounds; told where it was beyond.
+    /// Clamps a value to bounds and notes if it was outside.
     fn bounded(&mut self, value: f32, low: f32, high: f32) -> f32 {
         let held = min(max(value, low), high);
         self.limited |= held != value;
@@ -347,7 +347,7 @@ impl Follower {
         self.reached = near && self.inside >= ticks(time);
     }
 
-    /// Of a cyclic mode: a new target begins a new period.
+    /// Cyclic modes: a new target starts a new period.
     fn count(&mut self, target: f32, period: u32) {
         if self.target != target {
             (self.target, self.left) = (target, period);
@@ -361,7 +361,7 @@ impl Follower {
         self.homed.then_some(offset.0 - measured.position.0)
     }
 
-    /// Too far from where it is commanded to be for too long.
+    /// Whether the following error has lasted too long.
     fn deviated(&mut self, command: &JointCommand, measured: &Measured) -> bool {
         let place = match self.mode {
             Some(Mode::CyclicPosition) if !measured.returns => self.target,

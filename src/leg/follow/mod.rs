@@ -1,15 +1,16 @@
-//! What a host commands tick by tick, carried out by every joint of a leg.
+//! Follows the commands of a host, tick by tick, with every joint of a leg.
 //!
-//! Why beside the other activities: identifying and tracking follow motions that were proved beforehand; here nobody knows the
-//! next target. Each joint has a [`Follower`](joint::Follower) that makes a course of what it is told; the servo and the monitor
-//! behind it are the same as ever, and the monitor decides last.
+//! Why a separate activity: identification and tracking use motions that were proved beforehand; here the
+//! next target is unknown. Each joint has a [`Follower`](joint::Follower) that turns the commands into a
+//! trajectory. The servo and the safety monitor behind it are unchanged; the monitor has the last word.
 //!
 //! ```text
-//! JointCommand (anatomical) --Follower--> Demand --anatomy--> MotionState + Effort (model) --> servo --> monitor
+//! JointCommand (anatomical) --Follower--> Demand --anatomy--> MotionState, Effort (model)
+//! MotionState, Effort --> servo --> safety monitor
 //! ```
 //!
-//! The joints are told anatomical angles and the model's are commanded; both are converted here and nowhere else. What a
-//! joint's zero was moved by homing is kept in counts and added to every reading.
+//! The commands use anatomical angles, the servo those of the model; both are converted only here. Homing
+//! moves a joint's zero. The shift is stored in counts and added to every reading.
 //!
 //! Cost: `scripts/count-instructions`.
 
@@ -29,20 +30,20 @@ use crate::safety::{Fault, FaultCode, RANGE_TOLERANCE, RefusalReason};
 use crate::servo::{Effort, JointScale, ServoOutput};
 use crate::units::{NewtonMetre, Radian, RadianPerSecond, Volt};
 
-/// What the servo is told at one tick, in the model's angles and signs.
+/// Command for the servo at one tick, in the model's angles and signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Commanded<const N: usize> {
-    /// Where to be.
+    /// Commanded motion.
     pub motion: MotionState<N>,
-    /// Torques beside it.
+    /// Additional torques.
     pub efforts: [Effort; N],
-    /// A joint is too far from where it is commanded to be.
+    /// Following error of a joint.
     pub fault: Option<Fault>,
-    /// Counts by which homing moves the joints' zeros at this tick.
+    /// Counts by which homing shifts the joints' zeros in this tick.
     pub shifts: Option<[i32; N]>,
 }
 
-/// All joints of a leg; see the module.
+/// Followers of all joints of a leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Following<const N: usize> {
     joints: [Follower; N],
@@ -55,7 +56,7 @@ pub struct Following<const N: usize> {
 }
 
 impl<const N: usize> Following<N> {
-    /// Nothing told yet.
+    /// Creates the followers without a command.
     #[must_use]
     pub fn new<const B: usize>(configuration: &LegConfiguration<N, B>) -> Self {
         let anatomy = configuration.joints.map(|joint| joint.scale.anatomy);
@@ -82,7 +83,7 @@ impl<const N: usize> Following<N> {
         }
     }
 
-    /// A sample with the zeros that homing found.
+    /// Returns the sample with the zeros set by homing.
     #[must_use]
     pub fn placed(&self, sample: &Sample<N>) -> Sample<N> {
         let mut placed = *sample;
@@ -92,13 +93,13 @@ impl<const N: usize> Following<N> {
         placed
     }
 
-    /// Other zeros than homing found: those that the board knows.
+    /// Discards the zeros set by homing; the board's own apply again.
     pub fn forget_zeros(&mut self) {
         self.zeros = [0; N];
         self.joints = [Follower::NEW; N];
     }
 
-    /// The leg follows from here on, where it is commanded to be; what was asked before is not done later.
+    /// Starts following from the commanded motion. Requests made before are discarded.
     pub fn begin(&mut self, commands: &[JointCommand; N], motion: &MotionState<N>) {
         for joint in 0..N {
             let anatomy = &self.anatomy[joint];
@@ -108,20 +109,20 @@ impl<const N: usize> Following<N> {
         }
     }
 
-    /// All joints are commanded to stand still.
+    /// Whether all joints are commanded to be at rest.
     #[must_use]
     pub fn is_still(&self) -> bool {
         self.joints.iter().all(|joint| joint.course().velocity() == 0.0)
     }
 
-    /// What came of the servo's tick.
+    /// Takes over the servo's output of the last tick.
     pub fn measure(&mut self, output: &ServoOutput<N>) {
         for joint in 0..N {
             self.measured[joint] = self.measured(joint, output).unwrap_or_default();
         }
     }
 
-    /// A joint as the servo has it, whoever commands.
+    /// Measured values of a joint, from the servo's output.
     fn measured(&self, joint: usize, output: &ServoOutput<N>) -> Option<Measured> {
         let anatomy = self.anatomy.get(joint)?;
         Some(Measured {
@@ -132,7 +133,7 @@ impl<const N: usize> Following<N> {
         })
     }
 
-    /// One tick of all joints.
+    /// Runs one tick of all joints.
     pub fn follow(&mut self, commands: &[JointCommand; N]) -> Commanded<N> {
         let mut commanded = Commanded {
             motion: MotionState::at_rest([0.0; N]),
@@ -165,7 +166,8 @@ impl<const N: usize> Following<N> {
         commanded
     }
 
-    /// What a host is told of a joint whose motor gives this torque of the model's sign; further inputs and the bus voltage are the board's.
+    /// Status of a joint for a host. `torque` is the motor's, with the model's sign. The board adds inputs
+    /// and voltage.
     #[must_use]
     pub fn status(
         &self,

@@ -45,7 +45,7 @@ pub enum AxisFault {
 
 /// Requested state of the bridge for one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Wish {
+pub enum BridgeRequest {
     /// Outputs off.
     Released,
     /// Follow a quadrature current in the joint's sense.
@@ -54,7 +54,7 @@ pub enum Wish {
     Brake,
 }
 
-impl From<AxisRequest> for Wish {
+impl From<AxisRequest> for BridgeRequest {
     fn from(request: AxisRequest) -> Self {
         if request.enabled { Self::Follow(request.current) } else { Self::Released }
     }

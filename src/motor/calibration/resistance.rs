@@ -241,4 +241,18 @@ mod tests {
         }
         assert!(levels.sum::<f32>().abs() < 1e-5);
     }
+
+    #[test]
+    fn the_dither_spans_one_step_of_the_duty() {
+        use crate::motor::{CalibrationSettings, testing::CONFIGURATION};
+        let settings = CalibrationSettings { current: Ampere(20.0), voltage: Volt(4.0), turns_per_s: 8.0 };
+        let calibrator = super::super::Calibrator::new(&CONFIGURATION, settings).expect("usual");
+        let sample = crate::motor::testing::TestMotor::default().sample();
+        let (bench, bus) = (&calibrator.bench, Volt(48.0));
+        let reading = Reading { bench, sample: &sample, current: Stationary::default(), bus };
+        let at = |ticks| ResistanceStage { ticks, ..ResistanceStage::default() }.dither(&reading).0;
+        // 4/3 of one step of the duty: 48 V in 3,500 steps.
+        let span = (at(DITHER_TICKS - 1) - at(0)) * DITHER_TICKS as f32 / (DITHER_TICKS - 1) as f32;
+        assert!((span / (48.0 / 3500.0) - 4.0 / 3.0).abs() < 1e-4, "{span}");
+    }
 }

@@ -2,17 +2,17 @@ extern crate std;
 
 use std::vec::Vec;
 
-use super::super::testing::{NOTHING, TestHardware, on_a_bus, station};
+use super::super::testing::{NOTHING, TestHardware, device, on_a_bus};
 use super::super::{HostEnds, Signals};
 use super::*;
-use crate::bus::station::{LegOrder, LegRequest, LegTold};
+use crate::bus::device::{LegOrder, LegRequest, LegStatus};
 use crate::hal::Frame;
 use crate::leg::{DriveEvent, DriveState, JointStatus, PowerRequest};
 
 mod flood;
 
 struct Bench {
-    station: Station<2, 4>,
+    device: Device<2, 4>,
     round: BusRound,
     hardware: TestHardware<2>,
     signals: Signals<2>,
@@ -32,7 +32,7 @@ impl Bench {
     fn new() -> Self {
         let (hardware, host, bus) = on_a_bus();
         let mut bench = Self {
-            station: station(),
+            device: device(),
             round: BusRound::new(),
             hardware,
             signals: Signals::new(),
@@ -49,13 +49,13 @@ impl Bench {
         bench
     }
 
-    /// A round and nothing else.
+    /// Runs one round only.
     fn round(&mut self) {
-        let Self { station, bus, storage, signals, hardware, .. } = self;
-        self.round.round(station, bus, storage, signals, hardware, &NOTHING);
+        let Self { device, bus, storage, signals, hardware, .. } = self;
+        self.round.round(device, bus, storage, signals, hardware, &NOTHING);
     }
 
-    /// A leg's tick, a round, and what is in the mailboxes leaves.
+    /// Runs a tick of the leg and a round; then the mailboxes are sent.
     fn run(&mut self, rounds: u32) {
         for _ in 0..rounds {
             if self.takes
@@ -68,22 +68,22 @@ impl Bench {
             }
             self.drive = self.drive.after(DriveEvent::Tick, 4);
             let joint = JointStatus { drive: self.drive, ..JointStatus::NONE };
-            let told = LegTold {
+            let status = LegStatus {
                 joints: [joint; 2],
                 held: self.held,
                 blocked: false,
                 rests: false,
-                ..LegTold::NONE
+                ..LegStatus::NONE
             };
-            // The report before may still wait.
-            let _ = self.host.told.enqueue(told);
+            // The previous report may still wait.
+            let _ = self.host.status.enqueue(status);
             self.hardware.now_us += 500;
             self.round();
             self.hardware.empty_mailboxes();
         }
     }
 
-    /// Frames come with the next round.
+    /// Frames arrive with the next round.
     fn arrive(&mut self, frames: &[Frame]) {
         self.hardware.reception().arriving.extend(frames);
     }
@@ -105,7 +105,7 @@ impl Bench {
         [6, 7, 15].into_iter().for_each(|word| self.word(word));
     }
 
-    /// Codes of both nodes' emergency messages since this was asked, the first node's first.
+    /// Codes of both nodes' emergency messages since the last call, the first node's first.
     fn told(&mut self) -> Vec<(u16, u16)> {
         let sent = core::mem::take(&mut self.hardware.can.sent).into_iter().map(|(frame, _, _)| frame);
         let emergencies = sent.filter(|frame| matches!(frame.id(), 0x81..=0xFF));
@@ -119,14 +119,14 @@ impl Bench {
 const CANCEL: [u8; 8] = [0x2F, 0x00, 0x21, 1, 2, 0, 0, 0];
 
 #[test]
-fn an_order_that_was_not_taken_is_not_overwritten_and_no_request_is_lost() {
+fn a_waiting_order_is_not_overwritten_and_no_request_is_lost() {
     let mut bench = Bench::new();
     bench.enable();
     assert_eq!((bench.drive, bench.signals.is_hosted()), (DriveState::OperationEnabled, true));
     bench.requests.clear();
     bench.run(2);
     bench.takes = false;
-    // A step down, while the leg has no time; then something else.
+    // A disabling step while the leg takes no order; then another command.
     bench.word(7);
     bench.send(0x601, &CANCEL);
     bench.run(20);
@@ -134,7 +134,7 @@ fn an_order_that_was_not_taken_is_not_overwritten_and_no_request_is_lost() {
     bench.takes = true;
     bench.run(20);
     assert_eq!(bench.requests, [LegRequest::Power(PowerRequest::DisableOperation), LegRequest::Cancel]);
-    // Alone, behind an order that asks for nothing.
+    // Again, behind an order without a request.
     bench.requests.clear();
     bench.takes = false;
     bench.run(4);
@@ -145,7 +145,7 @@ fn an_order_that_was_not_taken_is_not_overwritten_and_no_request_is_lost() {
 }
 
 #[test]
-fn a_leg_that_tells_nothing_is_ordered_what_frames_say_and_otherwise_nothing() {
+fn a_leg_without_reports_is_ordered_only_by_frames() {
     let mut bench = Bench::new();
     bench.enable();
     let quiet = |bench: &mut Bench| {
@@ -156,7 +156,7 @@ fn a_leg_that_tells_nothing_is_ordered_what_frames_say_and_otherwise_nothing() {
     };
     quiet(&mut bench);
     assert_eq!(quiet(&mut bench), None);
-    // A torque that the controlword of node 1 halts.
+    // A torque that node 1's controlword halts.
     bench.arrive(&[Frame::new(0x201, &[0x0F, 0x01])]);
     let order = quiet(&mut bench).expect("an order");
     assert_eq!(order.commands.expect("a host has the drive").map(|command| command.halt), [true, false]);
@@ -164,7 +164,7 @@ fn a_leg_that_tells_nothing_is_ordered_what_frames_say_and_otherwise_nothing() {
 }
 
 #[test]
-fn an_overrun_is_told_and_stops_a_hosted_leg() {
+fn an_overrun_is_reported_and_stops_a_hosted_leg() {
     let mut bench = Bench::new();
     bench.enable();
     bench.told();
@@ -176,7 +176,7 @@ fn an_overrun_is_told_and_stops_a_hosted_leg() {
 }
 
 #[test]
-fn a_frame_that_is_lost_while_the_controller_is_passive_fills_no_mailboxes() {
+fn an_overrun_of_a_passive_controller_fills_no_mailboxes() {
     let mut bench = Bench::new();
     bench.enable();
     bench.hardware.can.controller = Controller::Passive;
@@ -190,7 +190,7 @@ fn a_frame_that_is_lost_while_the_controller_is_passive_fills_no_mailboxes() {
 }
 
 #[test]
-fn a_controller_that_is_off_is_told_once_and_has_nothing_to_send() {
+fn bus_off_is_reported_once_and_nothing_is_sent() {
     let mut bench = Bench::new();
     bench.enable();
     bench.told();
@@ -205,7 +205,7 @@ fn a_controller_that_is_off_is_told_once_and_has_nothing_to_send() {
 }
 
 #[test]
-fn an_open_switch_lets_no_step_towards_enabled_reach_the_leg() {
+fn with_an_open_switch_no_enabling_step_reaches_the_leg() {
     let mut bench = Bench::new();
     bench.held = false;
     bench.enable();
@@ -216,7 +216,7 @@ fn an_open_switch_lets_no_step_towards_enabled_reach_the_leg() {
 }
 
 #[test]
-fn of_many_frames_so_many_are_heard_in_a_round() {
+fn a_round_takes_a_limited_number_of_frames() {
     let mut bench = Bench::new();
     bench.arrive(&[Frame::new(0x80, &[]); 40]);
     bench.run(1);
@@ -224,7 +224,7 @@ fn of_many_frames_so_many_are_heard_in_a_round() {
 }
 
 #[test]
-fn one_store_is_under_way_and_how_it_ended_is_told() {
+fn one_store_runs_at_a_time_and_its_result_is_reported() {
     let save = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
     let window = |bench: &mut Bench, value: u8| {
         bench.send(0x601, &[0x23, 0x65, 0x60, 0, value, 0, 0, 0]);
@@ -242,19 +242,19 @@ fn one_store_is_under_way_and_how_it_ended_is_told() {
     window(&mut bench, 11);
     let first = given(&bench);
     assert_eq!(first.what, Keeping::All);
-    // Another one waits until the first is over.
+    // A second request waits until the first ends.
     window(&mut bench, 22);
     assert_eq!(given(&bench).objects, first.objects);
     end(&bench, true);
     bench.run(1);
     assert_ne!(given(&bench).objects, first.objects);
-    assert_eq!((bench.station.generation(), given(&bench).generation), (5, 5));
+    assert_eq!((bench.device.generation(), given(&bench).generation), (5, 5));
     end(&bench, false);
     bench.run(8);
     let codes: Vec<u16> = bench.told().iter().filter(|(id, _)| *id == 0x81).map(|(_, code)| *code).collect();
     assert_eq!((codes.first(), codes.last()), (Some(&0xFF0D), Some(&0x5530)), "{codes:x?}");
     assert!(bench.storage.given().is_none() && bench.storage.idle().is_some());
-    // The second was refused by the flash: a reset brings back the first.
+    // The flash refused the second: a reset restores the first.
     bench.send(0, &[129, 0]);
     bench.hardware.can.sent.clear();
     bench.send(0x601, &[0x40, 0x65, 0x60, 0, 0, 0, 0, 0]);

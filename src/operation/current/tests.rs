@@ -14,14 +14,14 @@ use crate::motor::{Axis, AxisConfiguration, SenseScale};
 mod requests;
 mod stop;
 
-/// Ticks of the clock in a period, as on the board.
+/// Clock ticks per period, as on the board.
 const PERIOD: NonZeroU32 = NonZeroU32::new(7000).expect("more than none");
-/// 1.5 s.
+/// Periods of a sector's erasure: 1.5 s.
 const ERASED: u32 = 36_000;
-/// 0.1 ms and what was missed before.
+/// Periods of a word's write: 0.1 ms, rounded up.
 const WRITTEN: u32 = 3;
 
-/// Two axes on motors that somebody turns, with the servo begun.
+/// Two axes on externally driven motors, with the servo begun.
 struct Bench {
     loops: CurrentLoops<2>,
     motors: [TestMotor; 2],
@@ -30,11 +30,11 @@ struct Bench {
     queues: Queues<2>,
     events: Box<EventQueue<2>>,
     now: u32,
-    /// An index pulse came, and its interrupt only now: the count it takes is that of now.
+    /// An index pulse whose interrupt comes late and captures the present count.
     late_index: bool,
-    /// Outcomes that were sent to the housekeeping.
+    /// Outcomes sent to the housekeeping.
     outcomes: Vec<(usize, Outcome)>,
-    /// The servo was asked to damp.
+    /// The servo was requested to damp.
     damped: bool,
 }
 
@@ -42,14 +42,14 @@ impl Bench {
     fn new(configuration: &AxisConfiguration) -> Self {
         let counts_per_turn = f64::from(configuration.counts_per_turn);
         let mut motors = [0.3, 2.0].map(|angle| TestMotor { angle, counts_per_turn, ..TestMotor::default() });
-        let stages = motors.each_mut().map(|motor| {
+        let states = motors.each_mut().map(|motor| {
             let calibration = calibrate(motor, configuration).expect("sound");
             (motor.speed, motor.driven) = (0.0, true);
-            Stage::running(Axis::new(configuration, &calibration, &motor.sample()).expect("usual"))
+            AxisState::running(Axis::new(configuration, &calibration, &motor.sample()).expect("usual"))
         });
         let chopper = Chopper::new(Volt(50.0), Volt(54.0));
         let mut bench = Self {
-            loops: CurrentLoops::new(stages, PERIOD, chopper, SenseScale::ODRIVE_3_6.volt_per_code),
+            loops: CurrentLoops::new(states, PERIOD, chopper, SenseScale::ODRIVE_3_6.volt_per_code),
             motors,
             hardware: TestHardware::new(),
             signals: Signals::new(),
@@ -69,12 +69,12 @@ impl Bench {
         self.signals.inhibit.causes()
     }
 
-    /// One tick of an axis, and the servo's where it is requested.
+    /// Runs one tick of an axis, and the servo's where it is requested.
     fn tick_axis(&mut self, axis: usize, tick: &Tick) {
         let Ends { mut current, mut housekeeping, mut servo, .. } = self.queues.split(&mut self.events);
         let requested = self.hardware.servo_pended;
         self.loops.tick(axis, tick, &mut current, &self.signals, &mut self.hardware);
-        assert!(!self.hardware.is_enabled(), "nothing is asked for");
+        assert!(!self.hardware.is_enabled(), "no current is requested");
         if self.hardware.servo_pended != requested {
             self.signals.statistics.servo_ticks.add();
         }
@@ -85,7 +85,7 @@ impl Bench {
         self.damped |= self.signals.take_reported(0).any(|fault| fault == BoardFault::CurrentTicks);
     }
 
-    /// Periods in which every axis ticks; where `torn`, one shunt's conversion is not there.
+    /// Runs one period with a tick of every axis; if `torn`, one shunt's conversion is missing.
     fn tick(&mut self, torn: bool) {
         self.now = self.now.wrapping_add(PERIOD.get());
         for axis in 0..2 {
@@ -101,7 +101,7 @@ impl Bench {
         (0..periods).for_each(|_| self.tick(false));
     }
 
-    /// Nothing runs for so many periods, and both rotors go so many turns meanwhile.
+    /// Stalls for some periods while both rotors turn by some turns.
     fn stand(&mut self, periods: u32, turns: f64) {
         self.now = self.now.wrapping_add(periods * PERIOD.get());
         for motor in &mut self.motors {
@@ -120,7 +120,8 @@ impl Bench {
         self.run(240);
     }
 
-    /// Both rotors through a whole turn, past their index: whether no axis finds it where it does not belong.
+    /// Turns both rotors through a whole turn past their index. Returns whether no axis finds it at a wrong
+    /// position.
     fn is_at_its_place(&mut self) -> bool {
         for motor in &mut self.motors {
             motor.speed = 60.0;
@@ -131,7 +132,7 @@ impl Bench {
     }
 }
 
-/// A tick of a sound board.
+/// Tick of a healthy board.
 fn tick_at(now: u32, sample: AxisSample) -> Tick {
     Tick { now, emergency_stop: false, gate_fault: false, complete: true, supply: true, sample }
 }
@@ -153,14 +154,14 @@ fn the_brake_resistor_has_no_duty_while_the_flash_is_written() {
 }
 
 #[test]
-fn an_erasure_forgets_the_zeros_and_nothing_else() {
-    // At rest, an eighth of a turn, half of the counter's range, once round it, far.
+fn an_erasure_discards_only_the_zeros() {
+    // At rest, an eighth of a turn, half of the counter's range, one full range, far.
     for turns in [0.0, 0.125, -0.4, 4.0, 8.0, -8.0, 123.456] {
         let mut bench = Bench::new(&CONFIGURATION);
         bench.store();
         assert!(bench.signals.has_begun());
         bench.stand(ERASED, turns);
-        // The first conversions after it may be torn, and the index's interrupt comes when the index is elsewhere.
+        // The first conversions afterwards may be torn, and the index's interrupt comes at another position.
         bench.late_index = true;
         bench.tick(true);
         bench.tick(false);
@@ -171,18 +172,18 @@ fn an_erasure_forgets_the_zeros_and_nothing_else() {
         let expected = [0, 1, 0, 1].map(|axis| (axis, Outcome::StoodStill));
         assert_eq!(bench.outcomes, expected, "{turns}");
         assert_eq!(bench.causes(), 0);
-        // The rotor's angle is still known: the index is found at its place.
+        // The rotor angle is still known: the index is at its position.
         assert!(bench.is_at_its_place(), "{turns}");
         assert_eq!(bench.outcomes.len(), 4);
     }
 }
 
 #[test]
-fn words_that_are_written_cost_nothing() {
+fn writing_words_discards_nothing() {
     let mut bench = Bench::new(&CONFIGURATION);
     bench.store();
     for _ in 0..100 {
-        // Of a joint that falls: 60 rad/s of its motor.
+        // Motion of a falling joint: 60 rad/s of its motor.
         bench.stand(WRITTEN, 60.0 / core::f64::consts::TAU * f64::from(WRITTEN) / 24_000.0);
         bench.tick(false);
     }
@@ -192,7 +193,7 @@ fn words_that_are_written_cost_nothing() {
 }
 
 #[test]
-fn a_counter_whose_range_is_no_multiple_of_a_turn_is_not_believed_after_an_erasure() {
+fn an_erasure_loses_the_position_of_an_uneven_counter_range() {
     let configuration = AxisConfiguration { counts_per_turn: 10_000, ..CONFIGURATION };
     let lost = Outcome::Fault { fault: AxisFault::Encoder, lost: true };
     for (periods, is_lost) in [(WRITTEN, false), (ERASED, true)] {
@@ -206,7 +207,7 @@ fn a_counter_whose_range_is_no_multiple_of_a_turn_is_not_believed_after_an_erasu
 }
 
 #[test]
-fn the_same_gap_is_a_fault_while_nothing_is_written() {
+fn the_same_gap_without_a_flash_write_is_a_fault() {
     let mut bench = Bench::new(&CONFIGURATION);
     bench.stand(ERASED, 0.4);
     bench.run(3);
@@ -218,7 +219,7 @@ fn the_same_gap_is_a_fault_while_nothing_is_written() {
 }
 
 #[test]
-fn the_emergency_stop_counts_while_the_flash_is_written() {
+fn the_emergency_stop_works_during_a_flash_write() {
     let mut bench = Bench::new(&CONFIGURATION);
     bench.store();
     let tick = Tick { emergency_stop: true, ..tick_at(bench.now, bench.motors[0].sample()) };
@@ -227,9 +228,9 @@ fn the_emergency_stop_counts_while_the_flash_is_written() {
 }
 
 #[test]
-fn a_bus_voltage_that_is_no_longer_converted_releases_at_the_second_period() {
+fn a_missing_bus_voltage_inhibits_at_the_second_period() {
     let mut bench = Bench::new(&CONFIGURATION);
-    // A code above where the brake resistor begins, which nobody measured any more.
+    // A code above the threshold of the brake resistor, which is no longer measured.
     bench.motors[0].bus = 53.0;
     let mut causes = Vec::new();
     for supply in [false, true, false, false] {
@@ -239,13 +240,13 @@ fn a_bus_voltage_that_is_no_longer_converted_releases_at_the_second_period() {
         bench.now += PERIOD.get();
         causes.push(bench.causes());
     }
-    // The first of all is not missed.
+    // The first missing reading is tolerated.
     assert_eq!(causes, [0, 0, 0, Cause::Conversion.bit()]);
     assert_eq!(bench.hardware.brake, 0.0);
 }
 
 #[test]
-fn a_stand_of_2_ms_keeps_the_joint_zeros_and_a_longer_one_does_not() {
+fn only_a_stall_of_more_than_2_ms_discards_the_zeros() {
     for (stood, forgets) in [(CERTAIN_PERIODS, false), (CERTAIN_PERIODS + 1, true)] {
         let mut bench = Bench::new(&CONFIGURATION);
         bench.store();

@@ -6,7 +6,7 @@ use std::vec::Vec;
 use super::super::BusEnds;
 use super::super::testing::{TestHardware, commanded, on_a_bus};
 use super::*;
-use crate::bus::station::LegOrder;
+use crate::bus::device::LegOrder;
 use crate::hal::{Contacts, JointSample};
 use crate::leg::testing::{LEG, configuration, model};
 use crate::leg::{Cause, Change, FaultCode, Finding, Verdict};
@@ -18,10 +18,10 @@ struct Bench {
     bus: BusEnds<'static, 2>,
     hardware: TestHardware<2>,
     signals: Signals<2>,
-    /// Orders that the bus has not given yet.
+    /// Orders that the bus has not sent yet.
     orders: VecDeque<LegOrder<2>>,
     /// Reports that the bus took.
-    told: Vec<LegTold<2>>,
+    status: Vec<LegStatus<2>>,
     /// The bus takes no report.
     busy: bool,
 }
@@ -37,7 +37,7 @@ impl Bench {
             hardware,
             signals: Signals::new(),
             orders: orders.iter().copied().collect(),
-            told: Vec::new(),
+            status: Vec::new(),
             busy: false,
         };
         bench.hold([true; 2]);
@@ -50,7 +50,7 @@ impl Bench {
         self.signals.set_permits(permits);
     }
 
-    /// The bus gives its next order where there is room, as its round does.
+    /// The bus sends its next order when the queue is free, as its round does.
     fn give(&mut self) {
         if self.bus.orders.ready()
             && let Some(order) = self.orders.pop_front()
@@ -73,7 +73,7 @@ impl Bench {
         self.side.held(request, state, &self.signals, &self.hardware)
     }
 
-    /// What is commanded, and whether an identification is given up.
+    /// Commands, and whether the identification is cancelled.
     fn commands(&mut self) -> Option<([JointCommand; 2], bool)> {
         self.side.commands().map(|host| (*host.commands, host.cancel))
     }
@@ -91,9 +91,9 @@ impl Bench {
 
     fn take_report(&mut self) {
         if !self.busy
-            && let Some(told) = self.bus.told.dequeue()
+            && let Some(status) = self.bus.status.dequeue()
         {
-            self.told.push(told);
+            self.status.push(status);
         }
     }
 }
@@ -115,14 +115,14 @@ fn unreported(_: Fault) {
 }
 
 #[test]
-fn a_request_waits_for_the_operators_hand_and_none_after_it_is_lost() {
+fn a_request_waits_behind_the_operators_and_none_is_lost() {
     let identify = LegRequest::Identify { plan: Plan::Sequential, seed: 7 };
     let mut bench =
         Bench::new(&[order(Some(ENABLE)), order(Some(identify)), order(Some(LegRequest::TakeUpdate))]);
     let stop = ControlRequest::Power(PowerRequest::QuickStop);
     for _ in 0..3 {
         bench.hear(unreported);
-        // The hand goes first, and what it asks for begins with no host's plan.
+        // The operator's request comes first and begins without a host's plan.
         assert_eq!(bench.side.request(Some(stop)), Some((stop, None)));
         assert_eq!(bench.waiting(), 2);
     }
@@ -139,7 +139,7 @@ fn a_request_waits_for_the_operators_hand_and_none_after_it_is_lost() {
 }
 
 #[test]
-fn the_newest_commands_count_a_cancel_is_passed_on_once_and_faults_are_reported() {
+fn the_newest_commands_count_and_a_cancel_passes_once() {
     let fault = LegOrder { faults: [None, Some(FaultCode::Heartbeat)], ..order(None) };
     let mut bench = Bench::new(&[order(Some(LegRequest::Cancel)), fault]);
     assert!(bench.commands().is_none());
@@ -149,14 +149,14 @@ fn the_newest_commands_count_a_cancel_is_passed_on_once_and_faults_are_reported(
     let commands = commanded();
     assert_eq!(bench.commands(), Some((commands, true)));
     assert_eq!(bench.commands(), Some((commands, false)));
-    // A host that has the drive no longer commands nothing.
+    // A host that no longer has the drive commands nothing.
     bench.orders.push_back(LegOrder { commands: None, ..order(None) });
     bench.hear(unreported);
     assert_eq!(bench.commands(), None);
 }
 
 #[test]
-fn an_open_switch_turns_requests_to_enable_away_and_stops_a_leg_that_is_enabled() {
+fn an_open_switch_blocks_enabling_and_stops_an_enabled_leg() {
     let mut bench = Bench::new(&[]);
     let (up, stop, off) =
         [UP, PowerRequest::QuickStop, PowerRequest::DisableVoltage].map(ControlRequest::Power).into();
@@ -166,7 +166,7 @@ fn an_open_switch_turns_requests_to_enable_away_and_stops_a_leg_that_is_enabled(
             assert_eq!(bench.held(request, state), request);
         }
     }
-    // The contact counts at once; the housekeeping's permission waits for its bounce.
+    // The contact counts at once; the housekeeping's permission is debounced.
     for open in [[false, true], [true, false], [false; 2]] {
         bench.hold(open);
         for state in states {
@@ -175,44 +175,44 @@ fn an_open_switch_turns_requests_to_enable_away_and_stops_a_leg_that_is_enabled(
             for turned_away in [None].into_iter().chain(enabling) {
                 assert_eq!(bench.held(turned_away, state), enabled.then_some(stop), "{state:?}");
             }
-            // What leads down is passed on.
+            // A step that disables passes.
             assert_eq!(bench.held(Some(off), state), Some(off));
         }
     }
 }
 
 #[test]
-fn the_bus_runs_after_every_second_tick_and_is_told_once_it_has_taken_what_it_had() {
+fn the_bus_gets_a_report_every_second_tick_once_it_is_free() {
     let mut bench = Bench::new(&[]);
     let mut control = Control::new(&configuration()).expect("a leg");
     let plain = control.tick(&SAMPLE, None, LEG.gravity);
     let mut refused = plain;
     refused.servo.decision.refused = Some(Refusal { joint: 0, reason: RefusalReason::Moving });
-    // The bus has no time for what it was told before.
+    // The bus has not read the previous report.
     bench.busy = true;
     (0..2).for_each(|_| bench.report(&control, &plain));
-    // A request for power was refused meanwhile.
+    // A power request was refused in between.
     (0..4).for_each(|tick| bench.report(&control, if tick == 1 { &refused } else { &plain }));
-    assert_eq!((bench.hardware.bus_pended, bench.told.len()), (3, 0));
+    assert_eq!((bench.hardware.bus_pended, bench.status.len()), (3, 0));
     bench.busy = false;
     bench.take_report();
-    bench.told.clear();
+    bench.status.clear();
     let change = Change { since_s: 1.0, joints: [true; 2], statistic: [1.0; 2], limit: 0.5 };
     assert!(!control.receive(Finding::Changed(change)));
     let (cause, verdict) = (Cause::Friction, Verdict::ACCEPTED);
     assert!(!control.receive(Finding::Updated { cause, verdict, model: Some(model()) }));
     (0..4).for_each(|_| bench.report(&control, &plain));
-    let told: Vec<(bool, bool, bool, [bool; 2])> = bench
-        .told
+    let status: Vec<(bool, bool, bool, [bool; 2])> = bench
+        .status
         .iter()
-        .map(|told| (told.refused.is_some(), told.blocked, told.held, told.change))
+        .map(|status| (status.refused.is_some(), status.blocked, status.held, status.change))
         .collect();
     let expected = [(true, false, true, [true; 2]), (false, false, true, [true; 2])];
-    assert_eq!((bench.hardware.bus_pended, &told[..]), (5, &expected[..]));
+    assert_eq!((bench.hardware.bus_pended, &status[..]), (5, &expected[..]));
 }
 
 #[test]
-fn a_report_says_whether_the_switch_is_held_and_what_forbids_to_enable() {
+fn a_report_contains_the_switch_and_the_inhibit_reasons() {
     let mut control = Control::new(&configuration()).expect("a leg");
     let output = control.tick(&SAMPLE, None, LEG.gravity);
     for (switch, blocked) in [([true; 2], false), ([false, true], false), ([true; 2], true)] {
@@ -222,17 +222,17 @@ fn a_report_says_whether_the_switch_is_held_and_what_forbids_to_enable() {
             bench.signals.inhibit.raise(crate::safety::Cause::GateFault);
         }
         (0..2).for_each(|_| bench.report(&control, &output));
-        let told = bench.told[0];
-        assert_eq!((told.held, told.blocked, told.rests), (switch == [true; 2], blocked, false));
+        let status = bench.status[0];
+        assert_eq!((status.held, status.blocked, status.rests), (switch == [true; 2], blocked, false));
         (0..2).for_each(|_| bench.rest());
         let causes = if blocked { crate::safety::Cause::GateFault.bit() } else { 0 };
-        let held = told.held;
-        assert_eq!(bench.told[1], LegTold { held, blocked, causes, ..LegTold::NONE });
+        let held = status.held;
+        assert_eq!(bench.status[1], LegStatus { held, blocked, causes, ..LegStatus::NONE });
     }
 }
 
 #[test]
-fn what_is_asked_of_a_leg_without_zeros_is_forgotten() {
+fn requests_to_a_leg_without_zeros_are_dropped() {
     let mut bench = Bench::new(&[order(Some(ENABLE))]);
     bench.hear(unreported);
     bench.orders.extend([order(Some(ENABLE)), order(Some(LegRequest::Cancel))]);
@@ -242,9 +242,9 @@ fn what_is_asked_of_a_leg_without_zeros_is_forgotten() {
         bench.give();
         bench.rest();
     }
-    assert_eq!((bench.waiting(), bench.told.len()), (0, 1));
+    assert_eq!((bench.waiting(), bench.status.len()), (0, 1));
     let causes = crate::safety::Cause::EmergencyStop.bit();
-    assert_eq!(bench.told[0], LegTold { causes, ..LegTold::NONE });
+    assert_eq!(bench.status[0], LegStatus { causes, ..LegStatus::NONE });
     bench.hear(unreported);
     assert_eq!((bench.side.request(None), bench.commands()), (None, None));
 }
@@ -259,12 +259,12 @@ fn a_host_without_the_drive_cancels_by_a_quick_stop() {
 }
 
 #[test]
-fn a_released_bridge_has_no_torque_and_one_that_switches_a_smoothed_one() {
+fn a_bridge_reports_torque_smoothed_and_only_while_switching() {
     let mut control = Control::new(&configuration()).expect("a leg");
     let mut output = control.tick(&SAMPLE, None, LEG.gravity);
     let mut bench = Bench::new(&[]);
     bench.signals.statistics.see_bus(2400);
-    let mut told = |state: DriveState, ticks: u32| {
+    let mut status = |state: DriveState, ticks: u32| {
         output.servo.decision.state = state;
         let mut random = 1_u32;
         let mut most = 0.0_f32;
@@ -275,18 +275,18 @@ fn a_released_bridge_has_no_torque_and_one_that_switches_a_smoothed_one() {
             let joint = JointSample { current: crate::units::Ampere(current), ..SAMPLE.joints[0] };
             let Bench { side, host, hardware, signals, .. } = &mut bench;
             side.report(&control, &Sample { joints: [joint; 2] }, &output, host, signals, hardware);
-            if let Some(told) = bench.bus.told.dequeue()
+            if let Some(status) = bench.bus.status.dequeue()
                 && tick + 100 > ticks
             {
-                assert_eq!(told.joints[1].bus, Volt(24.0));
-                most = most.max((told.joints[0].torque.0 - 15.0).abs());
+                assert_eq!(status.joints[1].bus, Volt(24.0));
+                most = most.max((status.joints[0].torque.0 - 15.0).abs());
             }
         }
         most
     };
     // 1.5 N m/A.
-    assert_eq!(told(DriveState::SwitchOnDisabled, 200), 15.0);
-    let noise = told(DriveState::OperationEnabled, 400);
+    assert_eq!(status(DriveState::SwitchOnDisabled, 200), 15.0);
+    let noise = status(DriveState::OperationEnabled, 400);
     assert!(noise < 2.3, "{noise}, of 4.5 N m");
-    assert_eq!(told(DriveState::SwitchedOn, 200), 15.0);
+    assert_eq!(status(DriveState::SwitchedOn, 200), 15.0);
 }

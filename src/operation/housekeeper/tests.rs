@@ -10,12 +10,12 @@ use crate::hal::AxisCommand;
 use crate::leg::CalibrationRefusal;
 use crate::motor::calibration::tests::{SETTINGS, calibrate};
 use crate::motor::testing::{CONFIGURATION, TestMotor};
-use crate::operation::Stage;
+use crate::operation::AxisState;
 use crate::safety::Bridges;
 
 mod reports;
 
-const HOUSE: HousekeepingSettings<2> =
+const HOUSEKEEPING: HousekeepingSettings<2> =
     HousekeepingSettings { axes: [CONFIGURATION; 2], calibration: [SETTINGS; 2], hottest_c: 100.0 };
 
 struct Bench {
@@ -45,7 +45,7 @@ impl Bench {
         bench
     }
 
-    /// A round, and what it sent.
+    /// Runs one round and collects its output.
     fn round(&mut self) {
         let Ends { mut current, mut servo, mut housekeeping, mut identification, mut calibrated } =
             self.queues.split(&mut self.events);
@@ -64,7 +64,7 @@ impl Bench {
         while servo.requests.dequeue().is_some() {}
     }
 
-    /// A tenth of a second, and what was ordered in it.
+    /// Holds the contacts for a tenth of a second and returns the orders.
     fn hold(&mut self, enabling: bool, start: bool) -> Vec<(usize, Order)> {
         self.hardware.contacts = Contacts { enabling, start };
         for _ in 0..RATE_HZ / 10 {
@@ -82,7 +82,7 @@ impl Bench {
 
     fn ends(&mut self, axis: usize, outcome: Outcome) -> Vec<(usize, Order)> {
         let mut ends = self.queues.split(&mut self.events);
-        ends.current.outcomes[axis].enqueue(outcome).expect("room");
+        ends.current.outcomes[axis].enqueue(outcome).expect("not full");
         self.hold(true, false)
     }
 }
@@ -100,83 +100,83 @@ fn checked(stored: StoredCalibration) -> Order {
 }
 
 #[test]
-fn what_was_kept_is_checked_and_what_was_not_is_measured() {
+fn a_stored_calibration_is_checked_and_a_missing_one_measured() {
     let calibration = measured();
     let stored = calibration.stored().expect("an index");
-    let mut bench = Bench::new(Housekeeper::new(HOUSE));
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
     assert_eq!(bench.press(), [(0, anew())]);
-    let mut bench = Bench::new(Housekeeper::new(HOUSE).with_stored([Some(stored), None]));
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored), None]));
     assert_eq!(bench.press(), [(0, checked(stored))]);
-    // The axis takes its rotor's position from where the counter stands now.
+    // The axis takes its rotor position from the present counter.
     bench.hardware.encoder_counts = [4321, 0];
     let sample = AxisSample { encoder_count: 4321, ..AxisSample::default() };
     let running = Axis::new(&CONFIGURATION, &calibration, &sample).expect("usual");
     let orders = bench.ends(0, Outcome::Calibrated(calibration));
     assert!(matches!(orders[..], [(0, Order::Run(axis)), (1, Order::Calibrate(_))] if axis == running));
     assert_eq!(orders[1].1, anew());
-    // Either is told to whoever keeps it.
+    // Both calibrations are sent to the storage.
     bench.ends(1, Outcome::Calibrated(calibration));
     assert_eq!(bench.calibrated, [(0, Some(stored)), (1, Some(stored))]);
     assert!(bench.keeper.is_calibrated());
 }
 
 #[test]
-fn what_was_kept_and_is_not_found_again_is_refused_once_and_then_measured() {
+fn a_wrong_stored_calibration_is_refused_once_and_then_measured() {
     let stored = measured().stored().expect("an index");
     for refusal in [
         CalibrationRefusal::OtherMotor,
         CalibrationRefusal::StoredOffset,
-        // Whatever a wrong constant led to.
+        // A wrong constant may lead to any refusal.
         CalibrationRefusal::TimeOut,
     ] {
-        let mut bench = Bench::new(Housekeeper::new(HOUSE).with_stored([Some(stored); 2]));
+        let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
         assert_eq!(bench.press(), [(0, checked(stored))]);
         assert_eq!(bench.ends(0, Outcome::Refused(refusal)), []);
-        let told = bench.records.iter().any(|record| {
+        let recorded = bench.records.iter().any(|record| {
             matches!(record, Record::Calibration { joint: 1, result, .. } if *result == words::calibration(refusal).0)
         });
-        assert!(told && !bench.keeper.is_calibrated(), "{refusal:?}");
+        assert!(recorded && !bench.keeper.is_calibrated(), "{refusal:?}");
         assert_eq!(bench.press(), [(0, anew())], "{refusal:?}");
     }
 }
 
 #[test]
-fn what_was_forgotten_or_is_of_another_configuration_is_not_used() {
+fn an_erased_or_foreign_calibration_is_not_used() {
     let stored = measured().stored().expect("an index");
-    let mut bench = Bench::new(Housekeeper::new(HOUSE).with_stored([Some(stored); 2]));
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
     bench.signals.forget_stored();
     assert_eq!(bench.press(), [(0, anew())]);
     let mut other = stored;
     other.encoder.pole_pairs += 1;
-    let mut bench = Bench::new(Housekeeper::new(HOUSE).with_stored([Some(other); 2]));
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(other); 2]));
     assert_eq!(bench.press(), [(0, anew())]);
 }
 
-/// The order that the housekeeper gives, on a motor whose power was off meanwhile; what comes of it.
+/// Executes the housekeeper's order on a motor whose power was off, and returns the outcome.
 fn carried_out(motor: &mut TestMotor, order: Order) -> Outcome {
-    let mut stage = Stage::OFF;
+    let mut stage = AxisState::OFF;
     stage.obey(order);
     let mut sample = motor.sample();
     for _ in 0..240_000 {
-        let (command, told) = stage.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::RELEASED);
-        if let Some((outcome, _)) = told {
+        let (command, event) = stage.tick(&sample, Bridges::Follow, crate::motor::AxisRequest::RELEASED);
+        if let Some((outcome, _)) = event {
             motor.period(AxisCommand::RELEASED);
             return outcome;
         }
         sample = motor.period(command);
     }
-    panic!("no end");
+    panic!("the calibration does not end");
 }
 
 #[test]
-fn a_motor_whose_encoder_was_turned_while_the_power_was_off_is_refused_and_then_measured() {
+fn an_encoder_moved_without_power_is_refused_and_then_measured() {
     let mut motor = TestMotor::default();
     let stored = calibrate(&mut motor, &CONFIGURATION).expect("sound").stored().expect("an index");
-    // The rotor was moved; one encoder is 20 electrical degrees off on its shaft.
+    // The rotor was moved; in the second case the encoder is 20 electrical degrees off on its shaft.
     for (shaft_deg, fits) in [(0.0, true), (20.0, false)] {
         let mut motor = TestMotor { angle: motor.angle + 11.0, seed: 9, ..TestMotor::default() };
         motor.encoder_zero += shaft_deg / 360.0 / 7.0;
-        let mut bench = Bench::new(Housekeeper::new(HOUSE).with_stored([Some(stored); 2]));
+        let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING).with_stored([Some(stored); 2]));
         let (_, order) = bench.press().remove(0);
         let outcome = carried_out(&mut motor, order);
         assert_eq!(matches!(outcome, Outcome::Calibrated(_)), fits, "{outcome:?}");
@@ -192,12 +192,12 @@ fn a_motor_whose_encoder_was_turned_while_the_power_was_off_is_refused_and_then_
 
 #[test]
 fn after_an_erasure_a_reference_has_to_be_taken_again() {
-    let mut bench = Bench::new(Housekeeper::ready(HOUSE));
+    let mut bench = Bench::new(Housekeeper::ready(HOUSEKEEPING));
     bench.signals.begin_servo();
     bench.ends(0, Outcome::StoodStill);
     bench.ends(1, Outcome::StoodStill);
-    let told = |joint| Record::AxisFault { tick: 0, joint, name: "zero_forgotten" };
-    let said: Vec<Record<2>> = bench
+    let forgotten = |joint| Record::AxisFault { tick: 0, joint, name: "zero_forgotten" };
+    let recorded: Vec<Record<2>> = bench
         .records
         .iter()
         .filter_map(|record| match record {
@@ -205,8 +205,8 @@ fn after_an_erasure_a_reference_has_to_be_taken_again() {
             _ => None,
         })
         .collect();
-    assert_eq!(said, [told(1), told(2)]);
-    // No new calibration: the axes run on.
+    assert_eq!(recorded, [forgotten(1), forgotten(2)]);
+    // No new calibration is needed: the axes run on.
     assert!(!bench.signals.has_begun() && bench.keeper.is_calibrated());
     bench.hold(false, false);
     bench.hold(false, true);
@@ -219,9 +219,9 @@ fn after_an_erasure_a_reference_has_to_be_taken_again() {
 }
 
 #[test]
-fn a_reset_releases_motors_that_brake_until_the_gate_drivers_are_configured() {
+fn a_reset_releases_braking_motors_until_gates_are_configured() {
     for gates_configure in [true, false] {
-        let mut bench = Bench::new(Housekeeper::ready(HOUSE));
+        let mut bench = Bench::new(Housekeeper::ready(HOUSEKEEPING));
         bench.hardware.gates_configure = gates_configure;
         bench.signals.inhibit.raise(Cause::EncoderFrozen);
         bench.hardware.bridges = [AxisCommand::BRAKE; 2];
@@ -233,7 +233,7 @@ fn a_reset_releases_motors_that_brake_until_the_gate_drivers_are_configured() {
         while bench.hardware.gates_switched.is_empty() {
             bench.round();
         }
-        // The drivers' supply is off, and a current tick would release as well.
+        // The drivers' supply is off, and a current tick would turn the outputs off as well.
         assert!(!bench.hardware.is_enabled());
         while bench.orders.is_empty() {
             assert_eq!(Bridges::of(bench.signals.inhibit.causes()), Bridges::Release);

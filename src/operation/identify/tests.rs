@@ -16,7 +16,7 @@ struct Bench {
     ends: Ends<'static, 2>,
     signals: Signals<2>,
     records: Vec<Record<2>>,
-    /// Ticks of the samples that were seen.
+    /// Ticks of the received samples.
     samples: Vec<u32>,
 }
 
@@ -33,7 +33,7 @@ impl Bench {
         }
     }
 
-    /// Sends events and lets the level take them; whether there were any.
+    /// Sends events, lets the level take them, and returns whether there were any.
     fn hear(&mut self, events: impl IntoIterator<Item = LegEvent<2>>) -> bool {
         for event in events {
             assert!(self.ends.servo.events.enqueue(event).is_ok(), "full");
@@ -80,20 +80,20 @@ fn a_missing_sample_ends_the_identification_with_refused_input() {
         let mut bench = Bench::new();
         bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
         bench.level.published();
-        // The one at 24 found no room.
+        // The sample at 24 was lost.
         bench.signals.statistics.samples_lost.add();
         bench.hear(training(&[8, 16, 32, 40]));
-        // While the leg moves there is nothing that waits for a verdict.
+        // While the leg moves no verdict is expected.
         assert_eq!((bench.work(), bench.finding(), bench.lost()), (Slice::Idle, None, 0));
         bench.hear([logged(48, None), phase(waits)]);
         assert_eq!(bench.work(), Slice::Idle);
         let verdict = Verdict::refused(Reason::Input);
         assert_eq!(bench.finding(), Some(Finding::Judged { verdict, model: None }), "{waits:?}");
         assert_eq!(bench.records, [Record::Refused { why: "samples_lost", value: 1 }]);
-        assert_eq!(bench.level.unpublished(), None, "control did not take it yet");
+        assert_eq!(bench.level.unpublished(), None, "control has not taken it yet");
         bench.hear([LegEvent::TookResult]);
         assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Judged(None), Some(Some(verdict))));
-        // Cancelled: nothing more comes of the motion that was recorded.
+        // Cancelled: the recorded motion has no further result.
         bench.hear([logged(56, None)]);
         assert_eq!((bench.work(), bench.finding(), bench.lost()), (Slice::Idle, None, 1));
         assert!(bench.identification.solver().is_none());
@@ -104,7 +104,7 @@ fn a_missing_sample_ends_the_identification_with_refused_input() {
 fn samples_of_several_motions_one_after_the_other_have_no_gap() {
     let mut bench = Bench::new();
     bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
-    // Across the wrap of the tick.
+    // The tick wraps.
     bench.hear(training(&[u32::MAX - 11, u32::MAX - 3, 4, 12]));
     let (first, second) = (Some(Segment::Validation(0)), Some(Segment::Validation(1)));
     bench.hear([logged(20, None), logged(800, first), logged(808, first), logged(1600, second)]);
@@ -116,7 +116,7 @@ fn samples_of_several_motions_one_after_the_other_have_no_gap() {
 }
 
 #[test]
-fn a_new_identification_forgets_the_gap_of_the_one_before() {
+fn a_new_identification_starts_without_the_previous_gap() {
     let mut bench = Bench::new();
     bench.hear([LegEvent::Begun(None), phase(IdentifyPhase::Excite)]);
     bench.hear(training(&[8, 24]));
@@ -140,7 +140,7 @@ fn a_hosts_identification_begins_with_its_plan_and_seed() {
         bench.hear([LegEvent::Begun(Some((plan, seed + 7)))]);
         assert!(*bench.identification == *expected, "{plan:?}");
         assert_eq!((bench.level.seed(), bench.identification.swarm_seed()), (seed + 7, seed + 7));
-        // There are no results of it yet.
+        // The new identification has no results yet.
         assert_eq!(bench.level.unpublished(), Some(None));
     }
 }
@@ -161,7 +161,7 @@ fn a_leg_that_stops_identifying_cancels_the_search() {
 }
 
 #[test]
-fn records_pass_in_their_order_and_activity_is_known() {
+fn records_pass_in_order_and_the_activity_is_known() {
     let mut bench = Bench::new();
     assert!(!bench.hear([]));
     let records = [1, 2].map(|tick| Record::Request { tick, name: "identify", accepted: true });
@@ -171,7 +171,7 @@ fn records_pass_in_their_order_and_activity_is_known() {
 }
 
 #[test]
-fn a_result_counts_only_once_control_took_it() {
+fn a_result_counts_only_after_control_has_taken_it() {
     let ticks: Vec<u32> = (1..=80).map(|sample| 8 * sample).collect();
     let judged = || {
         let mut bench = Bench::new();
@@ -198,18 +198,18 @@ fn a_result_counts_only_once_control_took_it() {
             finding = find(&mut bench);
         }
         let Finding::Judged { verdict, .. } = finding else { panic!("{finding:?}") };
-        assert!(!verdict.is_accepted(), "hardly any rows");
+        assert!(!verdict.is_accepted(), "too few rows");
         assert_eq!(Results::verdict(&*bench.identification), Some(verdict));
         (bench, verdict)
     };
     let (mut bench, verdict) = judged();
     assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Idle, None));
-    // Taken, and the leg goes on to something else, before the thread looks again.
+    // The result is taken and the leg does something else before the thread runs again.
     bench.hear([LegEvent::TookResult, LegEvent::Activity(Activity::Idle)]);
     assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Judged(None), Some(Some(verdict))));
     bench.hear([]);
     assert_eq!(bench.work(), Slice::Idle, "once");
-    // The operator let go while the verdict was made: control never takes it.
+    // The operator stopped while the verdict was computed: control never takes it.
     let (mut bench, _) = judged();
     bench.hear([LegEvent::Activity(Activity::Idle)]);
     assert_eq!((bench.work(), bench.level.unpublished()), (Slice::Idle, None));

@@ -2,12 +2,12 @@ extern crate std;
 
 use std::vec::Vec;
 
-use super::super::testing::{NOTHING, TestHardware, station};
+use super::super::testing::{NOTHING, TestHardware, device};
 use super::*;
 
 struct Bench {
-    station: Station<2, 4>,
-    speaker: Speaker,
+    device: Device<2, 4>,
+    transmitter: TxScheduler,
     hardware: TestHardware<2>,
     controller: Controller,
 }
@@ -16,8 +16,8 @@ const ROUND_US: u64 = 500;
 
 impl Bench {
     fn at_the_start(controller: Controller) -> Self {
-        let (speaker, hardware) = (Speaker::default(), TestHardware::new());
-        Self { station: station(), speaker, hardware, controller }
+        let (transmitter, hardware) = (TxScheduler::default(), TestHardware::new());
+        Self { device: device(), transmitter, hardware, controller }
     }
 
     /// Both nodes operational, their first PDO sent every 2 ms.
@@ -40,18 +40,18 @@ impl Bench {
     }
 
     fn hear(&mut self, frame: &Frame) {
-        self.station.hear(frame, self.hardware.now_us, None, &NOTHING);
+        self.device.hear(frame, self.hardware.now_us, None, &NOTHING);
     }
 
     fn set(&mut self, controller: Controller, unplugged: bool) {
         (self.controller, self.hardware.can.unplugged) = (controller, unplugged);
-        self.station.on_controller(controller, &NOTHING);
+        self.device.on_controller(controller, &NOTHING);
     }
 
     fn round(&mut self) {
         self.hardware.now_us += ROUND_US;
         let now_us = self.hardware.now_us;
-        self.speaker.speak(&mut self.hardware, self.controller, now_us, &mut self.station, &NOTHING);
+        self.transmitter.fill(&mut self.hardware, self.controller, now_us, &mut self.device, &NOTHING);
         self.hardware.empty_mailboxes();
     }
 
@@ -72,8 +72,8 @@ impl Bench {
 }
 
 #[test]
-fn what_waits_where_a_plug_was_pulled_is_new_when_it_is_put_back_and_no_emergency_is_lost() {
-    // For how long it is out, in rounds of half a millisecond; the controller is passive after 3 ms.
+fn after_a_pulled_plug_frames_are_new_and_emergencies_complete() {
+    // Duration without plug in rounds of half a millisecond; the controller is passive after 3 ms.
     for rounds in (1..200).step_by(7) {
         let mut bench = Bench::new();
         bench.hardware.can.unplugged = true;
@@ -88,13 +88,13 @@ fn what_waits_where_a_plug_was_pulled_is_new_when_it_is_put_back_and_no_emergenc
         bench.run(20);
         for (frame, given_us, left_us) in &bench.hardware.can.sent {
             let age_us = left_us - given_us;
-            // Before it was passive nothing is given up: 3 ms more.
+            // Nothing is aborted before the controller is passive: 3 ms more.
             let patience_us = PATIENCE_US + ROUND_US + 6 * ROUND_US;
             assert!(age_us <= patience_us, "{rounds}: {frame:?} after {age_us} us");
             assert!(*left_us > back_us);
         }
         assert_eq!([1, 2].map(|node| bench.told(node)), [[0x8120, 0]; 2].map(Vec::from), "{rounds}");
-        // Both speak again as before.
+        // Both nodes send again as before.
         assert!(bench.leaving(0x181).count() > 3 && bench.leaving(0x182).count() > 3, "{rounds}");
     }
 }
@@ -108,12 +108,12 @@ fn a_passive_controller_that_still_sends_loses_nothing() {
         (bench.hardware.can.aborted, bench.told(1), bench.told(2)),
         (0, [0x8120].into(), [0x8120].into())
     );
-    // 200 ms, one every 2 ms of each.
+    // 200 ms, one frame every 2 ms from each node.
     assert!(bench.leaving(0x181).count() > 95 && bench.leaving(0x182).count() > 95);
 }
 
 #[test]
-fn a_boot_up_message_that_could_not_leave_leaves_when_the_plug_is_in() {
+fn a_delayed_boot_up_message_leaves_when_the_plug_is_in() {
     let mut bench = Bench::at_the_start(Controller::Passive);
     bench.hardware.can.unplugged = true;
     bench.run(300);
@@ -142,9 +142,9 @@ fn nothing_waits_in_a_controller_that_is_off() {
 }
 
 #[test]
-fn nodes_speak_in_turn_and_whichever_was_first_is_second_next() {
+fn nodes_send_in_turn() {
     let mut bench = Bench::new();
-    // Both have something to say in every round, and there is room for one frame.
+    // Both have a frame to send in every round, and one mailbox is free.
     bench.hardware.can.unplugged = true;
     bench.run(40);
     let mut order = Vec::new();
@@ -159,14 +159,14 @@ fn nodes_speak_in_turn_and_whichever_was_first_is_second_next() {
 }
 
 #[test]
-fn an_emergency_that_waited_in_a_mailbox_is_told_whatever_the_controller_becomes() {
+fn a_waiting_emergency_is_sent_in_any_controller_state() {
     for controller in [Controller::Passive, Controller::Off] {
         let mut bench = Bench::new();
-        // PDOs wait in two mailboxes, the store's message of one node in the third.
+        // PDOs wait in two mailboxes, one node's storage message in the third.
         bench.hardware.can.unplugged = true;
         bench.run(1);
         bench.hardware.can.waiting.truncate(2);
-        bench.station.storing(crate::bus::Storing::Busy);
+        bench.device.storing(crate::bus::Storing::Busy);
         bench.run(1);
         assert!(bench.hardware.can.waiting.iter().any(|(_, frame, _)| frame.id() & 0x780 == 0x80));
         bench.set(controller, true);
@@ -182,7 +182,7 @@ fn an_emergency_that_waited_in_a_mailbox_is_told_whatever_the_controller_becomes
 }
 
 #[test]
-fn an_emergency_message_with_another_identifier_is_told_as_well() {
+fn an_emergency_with_another_identifier_is_sent_again_too() {
     let mut bench = Bench::new();
     bench.hear(&Frame::new(0x601, &[0x23, 0x14, 0x10, 0, 0x10, 0x03, 0, 0]));
     bench.run(4);
@@ -195,19 +195,19 @@ fn an_emergency_message_with_another_identifier_is_told_as_well() {
 }
 
 #[test]
-fn what_is_told_again_is_told_in_its_order_whatever_mailboxes_it_was_in() {
+fn repeated_emergencies_are_in_order_from_any_mailbox() {
     let mut bench = Bench::new();
     bench.hardware.can.unplugged = true;
     bench.run(1);
     bench.hardware.can.waiting.truncate(2);
-    // An error in the last mailbox; its end in the first, which is free by then.
-    bench.station.storing(crate::bus::Storing::Busy);
+    // The error is in the last mailbox; its end in the first, which is free by then.
+    bench.device.storing(crate::bus::Storing::Busy);
     bench.run(1);
     assert_eq!(bench.hardware.can.waiting.last().map(|(mailbox, _, _)| *mailbox), Some(2));
     bench.hardware.can.waiting.remove(0);
     bench.run(1);
     bench.hardware.can.waiting.remove(0);
-    bench.station.storing(crate::bus::Storing::Done);
+    bench.device.storing(crate::bus::Storing::Done);
     bench.run(1);
     bench.set(Controller::Passive, true);
     bench.run(60);
@@ -221,13 +221,13 @@ fn what_is_told_again_is_told_in_its_order_whatever_mailboxes_it_was_in() {
 }
 
 #[test]
-fn a_frame_waits_10_ms_in_a_passive_controller_and_no_longer() {
+fn a_frame_waits_at_most_10_ms_in_a_passive_controller() {
     let mut bench = Bench::new();
     bench.set(Controller::Passive, true);
     while bench.hardware.can.waiting.is_empty() {
         bench.round();
     }
-    // The round that gave it did not see it wait yet.
+    // The round that wrote the frame did not count as waiting yet.
     bench.run(1 + (PATIENCE_US / ROUND_US) as u32);
     assert_eq!(bench.hardware.can.aborted, 0);
     bench.round();

@@ -1,4 +1,4 @@
-//! The servo's level around the control of the default leg, whose joints stand where they are.
+//! Tests of the servo's level with the control of the default leg, whose joints stand still.
 
 extern crate std;
 
@@ -7,7 +7,7 @@ use std::vec::Vec;
 use super::super::testing::{TestHardware, commanded, ends, on_a_bus};
 use super::super::{BusEnds, Ends};
 use super::*;
-use crate::bus::station::{LegOrder, LegRequest, LegTold};
+use crate::bus::device::{LegOrder, LegRequest, LegStatus};
 use crate::hal::{Contacts, DriveCommand};
 use crate::leg::testing::{LEG, configuration};
 use crate::leg::{Finding, JointCommand, PowerRequest};
@@ -37,7 +37,7 @@ struct Bench {
     events: Vec<LegEvent<2>>,
     states: Vec<DriveState>,
     /// Newest report to the bus.
-    told: Option<LegTold<2>>,
+    status: Option<LegStatus<2>>,
 }
 
 impl Bench {
@@ -64,7 +64,7 @@ impl Bench {
             is_heard: true,
             events: Vec::new(),
             states: Vec::new(),
-            told: None,
+            status: None,
         };
         bench.set_bus(Volt(48.0));
         bench
@@ -97,7 +97,7 @@ impl Bench {
         self.signals.statistics.see_bus((volt.0 / VOLT_PER_CODE.0) as u16);
     }
 
-    /// The operator asks.
+    /// The operator requests.
     fn ask(&mut self, request: ControlRequest<2>) {
         assert!(self.ends.housekeeping.requests.enqueue(request).is_ok(), "full");
     }
@@ -123,7 +123,7 @@ impl Bench {
         while let Some(state) = self.ends.housekeeping.drive.dequeue() {
             self.states.push(state);
         }
-        self.told = self.bus.told.dequeue().or(self.told);
+        self.status = self.bus.status.dequeue().or(self.status);
         output
     }
 
@@ -138,7 +138,7 @@ impl Bench {
         self.states.clear();
     }
 
-    /// Kinds of the events so far but samples: records by their kind and name.
+    /// Kinds of the events so far except samples; records by their kind and name.
     fn names(&self) -> Vec<&'static str> {
         let name = |event: &LegEvent<2>| {
             Some(match event {
@@ -160,7 +160,7 @@ impl Bench {
 }
 
 #[test]
-fn nothing_is_done_before_every_joint_has_a_zero() {
+fn the_leg_does_not_tick_before_every_joint_has_a_zero() {
     let mut bench = Bench::resting();
     bench.signals.set_targets(&DriveCommand { enabled: true, currents: [Ampere(1.0); 2] });
     bench.signals.set_permission(Permission::Follow);
@@ -171,10 +171,10 @@ fn nothing_is_done_before_every_joint_has_a_zero() {
     }
     assert_eq!((bench.signals.target(0).enabled, bench.signals.target(1).enabled), (false, false));
     assert_eq!((bench.signals.permission(), bench.level.ticks()), (Permission::Released, 0));
-    // The bus is told that the leg rests; what was asked is dropped.
-    let joints = bench.told.expect("a report").joints;
+    // The bus is informed that the leg rests; the request is dropped.
+    let joints = bench.status.expect("a report").joints;
     assert!(joints.iter().all(|joint| joint.bus.0 > 40.0));
-    assert_eq!(bench.told, Some(LegTold { joints, held: true, blocked: false, ..LegTold::NONE }));
+    assert_eq!(bench.status, Some(LegStatus { joints, held: true, blocked: false, ..LegStatus::NONE }));
     assert!(bench.bus.orders.ready());
     bench.signals.begin_servo();
     assert!(bench.tick().is_some());
@@ -183,7 +183,7 @@ fn nothing_is_done_before_every_joint_has_a_zero() {
 }
 
 #[test]
-fn a_leg_that_begins_anew_is_off_and_targets_follow_only_an_enabled_one() {
+fn a_restarted_leg_is_off_and_has_no_targets() {
     let mut bench = Bench::enabled();
     assert_eq!(bench.signals.permission(), Permission::Follow);
     assert!(bench.signals.target(0).enabled && bench.signals.target(1).enabled);
@@ -198,9 +198,9 @@ fn a_leg_that_begins_anew_is_off_and_targets_follow_only_an_enabled_one() {
 }
 
 #[test]
-fn a_leg_that_begins_anew_forgets_the_zeros_of_homing() {
+fn a_restarted_leg_discards_the_zeros_of_homing() {
     let mut bench = Bench::enabled();
-    let position = |bench: &Bench| bench.told.expect("a report").joints.map(|joint| joint.position.0);
+    let position = |bench: &Bench| bench.status.expect("a report").joints.map(|joint| joint.position.0);
     let hold = commanded();
     bench.order(Some(hold), None);
     bench.run(10);
@@ -224,7 +224,7 @@ fn a_leg_that_begins_anew_forgets_the_zeros_of_homing() {
 }
 
 #[test]
-fn findings_reach_the_control_one_in_a_tick() {
+fn findings_reach_control_one_per_tick() {
     let mut bench = Bench::begun();
     let change = |since_s| {
         let change = crate::leg::Change { since_s, joints: [true; 2], statistic: [1.0; 2], limit: 0.5 };
@@ -241,7 +241,7 @@ fn findings_reach_the_control_one_in_a_tick() {
 }
 
 #[test]
-fn the_operators_request_goes_before_the_hosts() {
+fn the_operators_request_precedes_the_hosts() {
     let mut bench = Bench::begun();
     bench.tick();
     bench.ask(ControlRequest::Power(PowerRequest::Shutdown));
@@ -267,7 +267,7 @@ fn an_open_enabling_switch_stops_an_enabled_leg() {
 }
 
 #[test]
-fn only_what_switches_off_is_asked_while_something_forbids_to_enable() {
+fn only_requests_that_turn_off_pass_while_inhibited() {
     let mut bench = Bench::enabled();
     bench.signals.inhibit.raise(crate::safety::Cause::EmergencyStop);
     bench.tick();

@@ -2,7 +2,7 @@ use super::*;
 use crate::safety::FaultCode;
 
 #[test]
-fn a_reported_fault_keeps_its_code_and_joint() {
+fn a_reported_fault_has_its_code_and_joint() {
     let signals = Signals::<2>::new();
     for fault in BoardFault::ALL {
         signals.report(fault, 1);
@@ -26,7 +26,7 @@ fn a_target_is_followed_only_while_the_drive_is_enabled() {
 }
 
 #[test]
-fn a_reset_forgets_neither_permanent_causes_nor_a_flash_write() {
+fn a_reset_clears_neither_permanent_reasons_nor_a_flash_write() {
     let inhibit = Inhibit::new();
     Cause::ALL.into_iter().for_each(|cause| inhibit.raise(cause));
     inhibit.reset();

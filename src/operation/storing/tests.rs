@@ -5,15 +5,15 @@ use std::vec::Vec;
 use super::super::testing::{TestHardware, TestWatchdog};
 use super::*;
 
-/// A board around a change of the flash, with its clock in milliseconds.
+/// A board during a flash write, with its clock in milliseconds.
 struct Bench {
     hardware: TestHardware<2>,
     inhibit: Inhibit,
     permission: Permission,
     now_ms: u64,
-    /// Becomes so at this time.
+    /// Time at which the permission changes and these inhibit bits are set.
     later: Option<(u64, Permission, u32)>,
-    /// When `storing` was raised and let go.
+    /// Times at which `storing` was set and cleared.
     storing: Vec<(u64, bool)>,
 }
 
@@ -29,7 +29,7 @@ impl Bench {
         }
     }
 
-    /// A board whose watchdog takes so long for a write.
+    /// A board whose watchdog needs some time for a write, or never finishes.
     fn with_watchdog(takes_ms: Option<u64>) -> Self {
         let mut bench = Self::off();
         bench.hardware.watchdog.takes_ms = takes_ms;
@@ -63,7 +63,7 @@ impl Bench {
     }
 }
 
-/// Whether it was done, and how often the flash was touched.
+/// Returns whether the write succeeded, and the number of flash accesses.
 fn change(storing: &mut Storing, bench: &mut Bench) -> (bool, u32) {
     change_with(storing, bench, true)
 }
@@ -80,10 +80,10 @@ fn change_with(storing: &mut Storing, bench: &mut Bench, says: bool) -> (bool, u
         }
         bench.pass();
     }
-    panic!("it does not end");
+    panic!("the write does not end");
 }
 
-/// The watchdog took its usual time at the start.
+/// State in which the watchdog has taken its usual period at the start.
 fn settled() -> Storing {
     let mut storing = Storing::new();
     Bench::off().look_after(&mut storing);
@@ -91,7 +91,7 @@ fn settled() -> Storing {
 }
 
 #[test]
-fn a_watchdog_with_the_starts_time_keeps_the_drive_off_after_a_reset_as_well() {
+fn a_watchdog_with_the_starts_period_keeps_the_drive_off() {
     let (mut storing, mut bench) = (Storing::new(), Bench::with_watchdog(None));
     bench.hardware.watchdog.stretched = true;
     for _ in 0..3 {
@@ -107,26 +107,27 @@ fn a_watchdog_with_the_starts_time_keeps_the_drive_off_after_a_reset_as_well() {
 }
 
 #[test]
-fn the_flash_is_changed_between_a_watchdog_that_is_stretched_and_one_that_is_tight_again() {
+fn the_watchdog_is_stretched_during_a_flash_write() {
     let (mut storing, mut bench) = (settled(), Bench::off());
     assert_eq!(change(&mut storing, &mut bench), (true, 1));
     assert_eq!(
         (bench.hardware.watchdog.stretched, bench.hardware.watchdog.under_way, bench.causes()),
         (false, None, 0)
     );
-    // 20 ms of announcement, twice 48 ms of the watchdog's, some to step on, one of them for the current loops.
+    // 20 ms for the announcement, twice 48 ms for the watchdog, three steps, of which one is for the current
+    // loops.
     assert_eq!(bench.storing, [(0, true), (119, false)]);
 }
 
 #[test]
-fn what_is_not_done_is_said() {
+fn a_failed_write_is_reported() {
     let (mut storing, mut bench) = (settled(), Bench::off());
     assert_eq!(change_with(&mut storing, &mut bench, false), (false, 1));
     assert_eq!((bench.causes(), bench.hardware.watchdog.stretched), (0, false));
 }
 
 #[test]
-fn nothing_is_touched_while_the_drive_is_on_or_something_forbids_to_enable() {
+fn nothing_is_written_while_the_drive_is_on_or_inhibited() {
     let brakes = Cause::EncoderFrozen.bit();
     for (permission, causes) in [
         (Permission::Follow, 0),
@@ -137,13 +138,13 @@ fn nothing_is_touched_while_the_drive_is_on_or_something_forbids_to_enable() {
         let mut bench = Bench { permission, ..Bench::off() };
         bench.inhibit.raise_bits(causes);
         assert_eq!(change(&mut settled(), &mut bench), (false, 0), "{permission:?} {causes:#x}");
-        // Nobody is released for it either.
+        // The bridges stay as they are.
         assert_eq!((bench.causes(), bench.storing), (causes, Vec::new()));
     }
 }
 
 #[test]
-fn a_drive_that_was_enabled_in_the_last_moment_is_seen_after_the_announcement() {
+fn a_drive_enabled_during_the_announcement_prevents_the_write() {
     for later in [(1, Permission::Damp, 0), (20, Permission::Follow, 0), (7, Permission::Released, 1)] {
         let mut bench = Bench { later: Some(later), ..Bench::off() };
         assert_eq!(change(&mut settled(), &mut bench), (false, 0), "{later:?}");
@@ -153,11 +154,11 @@ fn a_drive_that_was_enabled_in_the_last_moment_is_seen_after_the_announcement() 
 }
 
 #[test]
-fn a_watchdog_that_does_not_take_its_time_keeps_the_flash_as_it_is_and_the_drive_off() {
+fn a_watchdog_that_keeps_its_period_prevents_the_write() {
     let (mut storing, mut bench) = (settled(), Bench::off());
     bench.hardware.watchdog.takes_ms = None;
     assert_eq!(change(&mut storing, &mut bench), (false, 0));
-    // Nobody knows which time it has: enabled again only once that is known.
+    // The watchdog's period is unknown: the drive stays off until it is known.
     assert_eq!(bench.causes(), Cause::Watchdog.bit());
     bench.inhibit = Inhibit::new();
     bench.look_after(&mut storing);
@@ -171,14 +172,14 @@ fn a_watchdog_that_does_not_take_its_time_keeps_the_flash_as_it_is_and_the_drive
 }
 
 #[test]
-fn a_watchdog_that_was_stretched_and_does_not_come_back_keeps_the_drive_off_until_it_does() {
+fn the_drive_stays_off_until_the_watchdog_is_tight_again() {
     let (mut storing, mut bench) = (settled(), Bench::off());
     bench.hardware.watchdog.takes_ms = Some(150);
     assert_eq!(change(&mut storing, &mut bench), (true, 1));
     bench.hardware.watchdog.takes_ms = Some(190);
     let mut slow = Bench::with_watchdog(Some(190));
     assert_eq!((change(&mut storing, &mut slow), slow.causes()), ((true, 1), 0));
-    // Asked in every round of the keeper from then on.
+    // The watchdog is checked regularly from then on.
     let mut stuck = Bench::with_watchdog(None);
     stuck.hardware.watchdog.stretched = true;
     let mut storing = Storing::new();

@@ -8,7 +8,7 @@ fn counters(signals: &Signals<2>) -> [&Word; 4] {
     [first, second, &statistics.servo_ticks, &statistics.rounds]
 }
 
-/// Looks so often while all levels run but one.
+/// Runs some checks while all levels run except one.
 fn look(
     watch: &mut Watch<2>,
     signals: &Signals<2>,
@@ -33,14 +33,14 @@ fn the_watchdog_is_fed_only_while_axes_servo_and_housekeeping_run() {
         let mut watch = Watch::new(&signals);
         look(&mut watch, &signals, &mut hardware, 10 * LOOKS, hung);
         assert_eq!(hardware.watchdog.fed, if hung.is_some() { 0 } else { 10 }, "{hung:?}");
-        // A level that runs again is forgiven.
+        // A level that runs again no longer prevents feeding.
         look(&mut watch, &signals, &mut hardware, LOOKS, None);
         assert_eq!(hardware.watchdog.fed, if hung.is_some() { 1 } else { 11 }, "{hung:?}");
     }
 }
 
 #[test]
-fn bridges_whose_current_ticks_stop_are_released() {
+fn bridges_without_current_ticks_are_turned_off() {
     for hung in [None, Some(0), Some(1), Some(2), Some(3)] {
         let (signals, mut hardware) = (Signals::new(), TestHardware::new());
         let mut watch = Watch::new(&signals);
@@ -54,14 +54,14 @@ fn bridges_whose_current_ticks_stop_are_released() {
 }
 
 #[test]
-fn ticks_that_stand_still_during_a_flash_write_are_no_fault() {
+fn stalled_ticks_during_a_flash_write_are_no_fault() {
     let (signals, mut hardware) = (Signals::new(), TestHardware::new());
     let mut watch = Watch::new(&signals);
     look(&mut watch, &signals, &mut hardware, 2, None);
     signals.inhibit.raise(Cause::Storing);
     hardware.enable(0);
     watch.look(&signals, &mut hardware);
-    // Released all the same.
+    // The bridges are turned off nevertheless.
     assert_eq!((hardware.is_enabled(), signals.inhibit.causes()), (false, Cause::Storing.bit()));
     signals.inhibit.end_storing();
     watch.look(&signals, &mut hardware);
@@ -69,7 +69,7 @@ fn ticks_that_stand_still_during_a_flash_write_are_no_fault() {
 }
 
 #[test]
-fn the_brake_resistor_is_off_where_current_ticks_stop() {
+fn the_brake_resistor_is_off_without_current_ticks() {
     for hung in [None, Some(0), Some(1), Some(2)] {
         let (signals, mut hardware) = (Signals::new(), TestHardware::new());
         let mut watch = Watch::new(&signals);

@@ -1,4 +1,4 @@
-//! What the monitor promises.
+//! Properties of the monitor.
 
 use super::*;
 use crate::safety::limits::tests::{HIP, KNEE};
@@ -30,7 +30,7 @@ fn enabled() -> Monitor<2> {
 }
 
 #[test]
-fn nothing_that_is_not_finite_reaches_the_bridge() {
+fn no_value_that_is_not_finite_reaches_the_bridge() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for joint in 0..2 {
             for field in 0..4 {
@@ -46,7 +46,7 @@ fn nothing_that_is_not_finite_reaches_the_bridge() {
                 let fault = Fault { code: FaultCode::NotFinite, joint: joint as u8 };
                 assert_eq!(decision.command, DriveCommand::RELEASED, "field {field}");
                 assert_eq!((decision.fault, decision.state), (Some(fault), DriveState::Fault { fault }));
-                // And it stays off when the number is fine again.
+                // The drive stays off when the value is finite again.
                 let decision = monitor.decide(&STANDING, &request(5.0));
                 assert_eq!(decision.command, DriveCommand::RELEASED);
             }
@@ -83,13 +83,13 @@ fn torque_and_current_never_exceed_their_caps() {
 fn currents_have_the_drives_sign() {
     let mut monitor = enabled();
     let decision = monitor.decide(&STANDING, &request(15.0));
-    // 1.5 N m/A; the knee turns against its drive. One rounding of the reciprocal.
+    // 1.5 N m/A; the knee has the opposite sign of its drive. Tolerance: one rounding of the reciprocal.
     assert!((decision.command.currents[0].0 - 10.0).abs() < 1e-5);
     assert!((decision.command.currents[1].0 + 10.0).abs() < 1e-5);
 }
 
 #[test]
-fn overspeed_damps_in_the_same_tick_for_300_ms_and_then_releases() {
+fn overspeed_damps_in_the_same_tick_for_300_ms_then_turns_off() {
     let mut monitor = enabled();
     let fast = Observation { velocity: [RadianPerSecond::ZERO, RadianPerSecond(3.5)], ..STANDING };
     let decision = monitor.decide(&fast, &request(30.0));
@@ -106,7 +106,7 @@ fn overspeed_damps_in_the_same_tick_for_300_ms_and_then_releases() {
 }
 
 #[test]
-fn leaving_the_range_by_half_a_degree_is_a_fault_and_less_is_not() {
+fn only_half_a_degree_beyond_the_range_is_a_fault() {
     for (position, faulty) in [
         (HIP.high + Radian(0.0085), false),
         (HIP.low - Radian(0.0085), false),
@@ -128,7 +128,7 @@ fn a_fault_is_latched_until_reset_and_enabling_starts_over() {
     for power in [PowerRequest::Shutdown, PowerRequest::SwitchOn, PowerRequest::EnableOperation] {
         assert!(!monitor.decide(&STANDING, &ask(power)).command.enabled);
     }
-    // Reset is not heard while the cause lasts.
+    // Reset has no effect while the cause lasts.
     let _ = monitor.decide(&broken, &ask(PowerRequest::ResetFault));
     assert!(monitor.state().fault().is_some());
     let _ = monitor.decide(&STANDING, &ask(PowerRequest::ResetFault));
@@ -140,7 +140,7 @@ fn a_fault_is_latched_until_reset_and_enabling_starts_over() {
 }
 
 #[test]
-fn three_rejected_readings_in_ten_milliseconds_are_a_fault_and_sparser_ones_are_not() {
+fn three_rejected_readings_in_ten_milliseconds_are_a_fault() {
     let glitch = Observation { rejected: [true, false], ..STANDING };
     for (gap, faulty) in [(0, true), (18, true), (19, false), (100, false)] {
         let mut monitor = enabled();
@@ -151,13 +151,13 @@ fn three_rejected_readings_in_ten_milliseconds_are_a_fault_and_sparser_ones_are_
             }
             fault = fault.or(monitor.decide(&glitch, &request(0.0)).fault);
         }
-        // Three readings with 18 good ones between span 39 of the 40 ticks.
+        // Three readings with 18 good ones between them span 39 of the 40 ticks.
         assert_eq!(fault.map(|fault| fault.code), faulty.then_some(FaultCode::EncoderStep), "gap {gap}");
     }
 }
 
 #[test]
-fn a_leg_out_of_range_or_moving_too_fast_is_not_enabled_and_told_why() {
+fn a_refused_enabling_names_joint_and_reason() {
     let cases = [
         (Observation { position: [MIDDLE[0], Radian(0.1)], ..STANDING }, RefusalReason::OutOfRange),
         (
@@ -177,7 +177,7 @@ fn a_leg_out_of_range_or_moving_too_fast_is_not_enabled_and_told_why() {
     }
 }
 
-/// Joints so far beyond the upper and the lower end, rad; the drive is asked to be enabled there.
+/// Places the hip beyond its upper end and the knee beyond its lower end, rad, and requests enabling there.
 fn outside(hip: f32, knee: f32) -> (Monitor<2>, Observation<2>) {
     let mut monitor = Monitor::new(Limits::new([HIP, KNEE]).expect("sensible"), RATE_HZ);
     let position = [HIP.high + Radian(hip), KNEE.low - Radian(knee)];
@@ -189,10 +189,10 @@ fn outside(hip: f32, knee: f32) -> (Monitor<2>, Observation<2>) {
 }
 
 #[test]
-fn a_joint_outside_its_range_is_enabled_and_only_led_back_slowly() {
+fn a_joint_outside_its_range_only_returns_slowly() {
     let (mut monitor, observation) = outside(0.1, 0.2);
     assert_eq!((monitor.state(), monitor.returns()), (DriveState::OperationEnabled, [true; 2]));
-    // Outwards: hip up, knee down. Nothing is given; inwards a quarter of 100 N m.
+    // Outwards is hip up, knee down: no torque. Inwards: a quarter of 100 N m.
     let decide = |monitor: &mut Monitor<2>, torque: [f32; 2], speed: f32| {
         let velocity = [RadianPerSecond(-speed), RadianPerSecond(speed)];
         let request = Request { torque: torque.map(NewtonMetre), power: None };
@@ -204,22 +204,22 @@ fn a_joint_outside_its_range_is_enabled_and_only_led_back_slowly() {
     assert_eq!((torque, limited.map(|limited| limited.range)), ([0.0; 2], [true; 2]));
     let (torque, limited) = decide(&mut monitor, [-50.0, 50.0], 0.0);
     assert_eq!((torque, limited.map(|limited| limited.torque)), ([-25.0, 25.0], [true; 2]));
-    // Faster than twice 0.1 rad/s it is braked, by a quarter as well.
+    // Above twice 0.1 rad/s the joint is braked, also with a quarter.
     assert_eq!(decide(&mut monitor, [-50.0, 50.0], 0.4).0, [25.0, -25.0]);
-    // Inside they are as ever.
+    // Inside the range the usual bounds apply.
     let decision = monitor.decide(&STANDING, &request(90.0));
     assert_eq!((decision.fault, monitor.returns()), (None, [false; 2]));
     assert_eq!(monitor.decide(&STANDING, &request(90.0)).torque, [NewtonMetre(90.0); 2]);
     let fault = monitor.decide(&observation, &request(0.0)).fault;
-    assert_eq!(fault.map(|fault| fault.code), Some(FaultCode::PositionLimit), "it left its range again");
+    assert_eq!(fault.map(|fault| fault.code), Some(FaultCode::PositionLimit), "left its range again");
 }
 
 #[test]
-fn a_joint_that_moves_farther_out_instead_of_returning_stops_the_leg() {
+fn a_returning_joint_that_moves_outwards_stops_the_leg() {
     for (first, then, faulty) in
         [(0.1, 0.1085, false), (0.1, 0.1089, true), (0.05, 0.0585, false), (0.05, 0.0589, true)]
     {
-        // It came nearer before it went out again.
+        // The joint comes nearer before it moves out again.
         let (mut monitor, observation) = outside(0.1, 0.0);
         let at = |beyond: f32| Observation {
             position: [HIP.high + Radian(beyond), observation.position[1]],
@@ -232,7 +232,7 @@ fn a_joint_that_moves_farther_out_instead_of_returning_stops_the_leg() {
             faulty.then_some(FaultCode::PositionLimit),
             "{first} {then}"
         );
-        // A stop that is asked for is no fault, though the leg falls in it.
+        // A requested stop is no fault, although the leg falls during it.
         let (mut monitor, _) = outside(0.1, 0.0);
         let _ = monitor.decide(&at(first), &ask(PowerRequest::QuickStop));
         assert_eq!(monitor.decide(&at(then + 0.1), &request(0.0)).fault, None);
@@ -247,7 +247,7 @@ fn a_joint_that_moves_farther_out_instead_of_returning_stops_the_leg() {
 }
 
 #[test]
-fn a_joint_farther_out_than_end_stops_allow_is_not_enabled() {
+fn a_joint_beyond_its_end_stops_is_not_enabled() {
     for (hip, knee, refused) in
         [(0.25, 0.25, None), (0.27, 0.0, Some(0)), (0.0, 0.27, Some(1)), (1.5, 1.5, Some(0))]
     {
@@ -262,7 +262,7 @@ fn a_joint_farther_out_than_end_stops_allow_is_not_enabled() {
 }
 
 #[test]
-fn a_joint_that_still_falls_outside_its_range_is_not_enabled() {
+fn a_falling_joint_outside_its_range_is_not_enabled() {
     let (mut monitor, observation) = outside(0.1, 0.2);
     let _ = monitor.decide(&observation, &ask(PowerRequest::DisableOperation));
     let falling = Observation { velocity: [RadianPerSecond(0.12), RadianPerSecond::ZERO], ..observation };
@@ -272,7 +272,7 @@ fn a_joint_that_still_falls_outside_its_range_is_not_enabled() {
 }
 
 #[test]
-fn a_quick_stop_damps_and_does_not_come_back_by_itself() {
+fn a_quick_stop_damps_and_does_not_end_enabled() {
     let mut monitor = enabled();
     let turning = Observation { velocity: [RadianPerSecond(0.01); 2], ..STANDING };
     let decision =
@@ -285,7 +285,7 @@ fn a_quick_stop_damps_and_does_not_come_back_by_itself() {
 }
 
 #[test]
-fn what_releases_is_not_forgotten_for_what_damps_in_the_same_tick() {
+fn off_takes_precedence_over_damp_in_the_same_tick() {
     let fault = |code| Fault { code, joint: 0 };
     let (off, damp) = (fault(FaultCode::Parameters), fault(FaultCode::SupplyLost));
     for [first, second] in [[off, damp], [damp, off]] {

@@ -1,9 +1,10 @@
-//! Numbers that a bit flips in, on the host alone (row M2 of docs/safety.md). No image has it.
+//! Access for bit flips in the monitor's values, on the host only (row M2 of docs/safety.md). No image has
+//! it.
 
 use super::Monitor;
 
 impl<const N: usize> Monitor<N> {
-    /// Of a joint: current per torque, overspeed bound, lower and upper end of the range with its tolerance.
+    /// A joint's current per torque, overspeed bound, or lower or upper end of its range with tolerance.
     pub(crate) fn number_mut(&mut self, joint: usize, number: u8) -> Option<&mut f32> {
         match number {
             0 => self.ampere_per_nm.get_mut(joint),

@@ -1,6 +1,6 @@
 //! Beetle swarm search: particles with two whiskers each, in the adaptive (default) or the paper's mode.
 //!
-//! Why one type for both: swarm, whiskers, moves, budget and ledger are shared. A mode decides only the
+//! Why one type for both: swarm, whiskers, moves, budget and progress are shared. A mode decides only the
 //! whiskers' directions and the use of their readings. Evaluations are requested one at a time, so a run can
 //! be sliced or cancelled anywhere, even inside an iteration:
 //!
@@ -36,7 +36,7 @@ use crate::real::Real;
 use super::objective::{Objective, SwarmError};
 use super::particles::Particles;
 use super::random::Random;
-use super::search::{Best, Ledger, Search};
+use super::search::{Best, Search, SearchProgress};
 use adaptive::AdaptiveRules;
 use paper::PaperRules;
 use rules::{Opening, Rules, Side};
@@ -89,10 +89,10 @@ impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
         settings: BsoSettings<T>,
         seed: u64,
     ) -> Result<Self, SwarmError> {
-        let ledger = Ledger::open(objective)?;
+        let progress = SearchProgress::open(objective)?;
         settings.check()?;
-        let mode = Mode::new(settings, ledger.dimension());
-        Ok(Self { swarm: Swarm::new(ledger, seed), mode })
+        let mode = Mode::new(settings, progress.dimension());
+        Ok(Self { swarm: Swarm::new(progress, seed), mode })
     }
 
     /// Restarts in place. The swarm then equals a [`new`](Self::new) one; on an error it is unchanged.
@@ -102,22 +102,22 @@ impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
         settings: BsoSettings<T>,
         seed: u64,
     ) -> Result<(), SwarmError> {
-        let ledger = Ledger::open(objective)?;
+        let progress = SearchProgress::open(objective)?;
         settings.check()?;
         match (&mut self.mode, settings) {
             (Mode::Adaptive(rules), BsoSettings::Adaptive(settings)) => {
-                rules.restart(settings, ledger.dimension());
+                rules.restart(settings, progress.dimension());
             }
-            (mode, settings) => mode.replace(settings, ledger.dimension()),
+            (mode, settings) => mode.replace(settings, progress.dimension()),
         }
-        self.swarm.restart(ledger, seed);
+        self.swarm.restart(progress, seed);
         Ok(())
     }
 
     /// Spends `evaluations` of the objective and returns how many were spent. That is all of them, or none if
     /// the objective's dimension has changed. Slicing never changes the result.
     pub fn advance(&mut self, objective: &impl Objective<T>, evaluations: u32) -> u32 {
-        if !self.swarm.ledger.accepts(objective) {
+        if !self.swarm.progress.accepts(objective) {
             return 0;
         }
         match &mut self.mode {
@@ -130,19 +130,19 @@ impl<T: Real, const N: usize, const D: usize> Bso<T, N, D> {
     /// Best of all evaluations so far, across restarts; `None` until a finite cost was found.
     #[must_use]
     pub fn best(&self) -> Option<Best<'_, T>> {
-        self.swarm.ledger.best()
+        self.swarm.progress.best()
     }
 
     /// Completed iterations; the evaluation of the scattered swarm is iteration 0.
     #[must_use]
     pub fn iterations(&self) -> u32 {
-        self.swarm.ledger.iterations()
+        self.swarm.progress.iterations()
     }
 
     /// Evaluations so far, including whiskers and restarts.
     #[must_use]
     pub fn evaluations(&self) -> u32 {
-        self.swarm.ledger.evaluations()
+        self.swarm.progress.evaluations()
     }
 }
 
@@ -173,7 +173,7 @@ enum Stage<T> {
 /// State and order of evaluations shared by both modes.
 #[derive(Clone, Debug, PartialEq)]
 struct Swarm<T, const N: usize, const D: usize> {
-    ledger: Ledger<T, D>,
+    progress: SearchProgress<T, D>,
     random: Random,
     beetles: Particles<T, N, D>,
     /// Values found by the moves of the current round.
@@ -182,18 +182,18 @@ struct Swarm<T, const N: usize, const D: usize> {
 }
 
 impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
-    fn new(ledger: Ledger<T, D>, seed: u64) -> Self {
+    fn new(progress: SearchProgress<T, D>, seed: u64) -> Self {
         let mut random = Random::new(seed);
-        let mut beetles = Particles::new(ledger.dimension());
+        let mut beetles = Particles::new(progress.dimension());
         beetles.scatter(&mut random);
-        Self { ledger, random, beetles, found: [T::zero(); N], stage: Stage::Place { beetle: 0 } }
+        Self { progress, random, beetles, found: [T::zero(); N], stage: Stage::Place { beetle: 0 } }
     }
 
-    fn restart(&mut self, ledger: Ledger<T, D>, seed: u64) {
+    fn restart(&mut self, progress: SearchProgress<T, D>, seed: u64) {
         self.random = Random::new(seed);
-        self.beetles.restart(ledger.dimension());
+        self.beetles.restart(progress.dimension());
         self.beetles.scatter(&mut self.random);
-        self.ledger = ledger;
+        self.progress = progress;
         self.found = [T::zero(); N];
         self.stage = Stage::Place { beetle: 0 };
     }
@@ -209,18 +209,18 @@ impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
         self.stage = match self.stage {
             Stage::Place { beetle } => {
                 let beetle = beetle.min(N - 1);
-                let value = self.ledger.evaluate(objective, &self.beetles.position[beetle]);
+                let value = self.progress.evaluate(objective, &self.beetles.position[beetle]);
                 self.beetles.record(beetle, value);
                 if beetle + 1 < N { Stage::Place { beetle: beetle + 1 } } else { self.open(rules) }
             }
             Stage::Right { beetle } => {
                 rules.aim(beetle, &self.beetles, &mut self.random);
                 let tip = rules.tip(beetle, Side::Right, &self.beetles);
-                Stage::Left { beetle, right: self.ledger.evaluate(objective, &tip) }
+                Stage::Left { beetle, right: self.progress.evaluate(objective, &tip) }
             }
             Stage::Left { beetle, right } => {
                 let tip = rules.tip(beetle, Side::Left, &self.beetles);
-                let left = self.ledger.evaluate(objective, &tip);
+                let left = self.progress.evaluate(objective, &tip);
                 rules.smell(beetle, &self.beetles, right, left);
                 if beetle + 1 < rules.whiskered() {
                     Stage::Right { beetle: beetle + 1 }
@@ -231,14 +231,14 @@ impl<T: Real, const N: usize, const D: usize> Swarm<T, N, D> {
             Stage::Move { beetle } => {
                 let beetle = beetle.min(N - 1);
                 rules.displace(beetle, &mut self.beetles, &mut self.random);
-                self.found[beetle] = self.ledger.evaluate(objective, &self.beetles.position[beetle]);
+                self.found[beetle] = self.progress.evaluate(objective, &self.beetles.position[beetle]);
                 let moved = rules.moved().min(N);
                 if beetle + 1 < moved {
                     Stage::Move { beetle: beetle + 1 }
                 } else {
                     rules.close(&mut self.beetles, &self.found[..moved]);
                     if rules.closes_iteration() {
-                        self.ledger.close_iteration();
+                        self.progress.close_iteration();
                     }
                     self.open(rules)
                 }

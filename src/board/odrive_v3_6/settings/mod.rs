@@ -81,8 +81,8 @@ pub const CLOCKS: [Write; 3] = [
 ];
 
 /// While a debugger holds the processor, the bridges' timers stand with their outputs off (RM0090 38.16:
-/// DBG_TIM1_STOP, DBG_TIM8_STOP). The watchdog runs on and ends the halt after 16 ms (DBG_IWDG_STOP = 0): the brake
-/// resistor's timer would hold its last duty for as long as the halt lasts.
+/// DBG_TIM1_STOP, DBG_TIM8_STOP). The watchdog runs on and ends the halt after 16 ms (DBG_IWDG_STOP = 0),
+/// since the brake resistor's timer would hold its last duty for the whole halt.
 pub const DEBUG_FREEZE: [Write; 2] = [
     Write::bits("DBGMCU_APB1_FZ", DEBUG + 0x08, 1 << 12, 0),
     Write::bits("DBGMCU_APB2_FZ", DEBUG + 0x0C, 0b11, 0b11),

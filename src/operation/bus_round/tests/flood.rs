@@ -1,18 +1,18 @@
-//! Many frames, and dear ones: who is heard, and who is missed.
+//! Many and expensive frames: processing shares and timeouts.
 
 use super::*;
 
-/// A round that nothing but frames raised.
+/// Runs a round triggered by frames only.
 fn frames_alone(bench: &mut Bench, frames: &[Frame]) -> Option<LegOrder<2>> {
     bench.arrive(frames);
-    bench.bus.told.dequeue();
+    bench.bus.status.dequeue();
     bench.host.orders.dequeue();
     bench.round();
     bench.host.orders.dequeue()
 }
 
 #[test]
-fn a_frame_that_concerns_nobody_here_is_taken_and_nothing_else_is_done() {
+fn a_frame_for_no_own_node_costs_nothing_else() {
     let mut bench = Bench::new();
     bench.enable();
     for frame in [Frame::new(0x7F0, &[1]), Frame::new(0x205, &[15, 0]), Frame::new(0x605, &[0x40; 8])] {
@@ -25,7 +25,7 @@ fn a_frame_that_concerns_nobody_here_is_taken_and_nothing_else_is_done() {
         let concerns = frame.data() != [1, 5];
         assert_eq!(frames_alone(&mut bench, &[frame]).is_some(), concerns, "{frame:?}");
     }
-    // Somebody may be missed all the same.
+    // Timeouts are checked nevertheless.
     bench.hardware.now_us += 1000;
     bench.send(0x601, &[0x23, 0x16, 0x10, 1, 2, 0, 0x70, 0]);
     bench.arrive(&[Frame::new(0x770, &[5])]);
@@ -40,7 +40,7 @@ fn a_frame_that_concerns_nobody_here_is_taken_and_nothing_else_is_done() {
 }
 
 #[test]
-fn frames_that_are_dear_get_half_of_the_time_and_the_leg_is_heard_all_the_same() {
+fn expensive_frames_get_half_of_the_time_and_the_leg_its_reports() {
     let mut bench = Bench::new();
     bench.enable();
     bench.hardware.reception().frame_us = 700;
@@ -52,12 +52,12 @@ fn frames_that_are_dear_get_half_of_the_time_and_the_leg_is_heard_all_the_same()
         bench.run(1);
         heard += before - bench.unheard();
         rounds += 1;
-        // Whoever hears nothing is still told and ordered, at every tick.
-        assert!(bench.host.orders.ready() && bench.host.told.ready());
+        // Without a balance the leg's reports and orders still pass, at every tick.
+        assert!(bench.host.orders.ready() && bench.host.status.ready());
     }
     let share = heard as f64 * 700.0 / 100_000.0;
     assert!((0.4..0.6).contains(&share), "{share}, {rounds} rounds");
-    // All that came at once are heard, one after the other.
+    // All frames of the burst are processed one after the other.
     bench.hardware.reception().frame_us = 0;
     bench.run(40);
     assert_eq!(bench.unheard(), 0);
@@ -70,14 +70,14 @@ fn frames_that_are_dear_get_half_of_the_time_and_the_leg_is_heard_all_the_same()
 }
 
 #[test]
-fn a_host_whose_frames_wait_is_not_missed_and_one_that_is_gone_is() {
+fn waiting_frames_prevent_a_timeout_and_a_lost_host_causes_one() {
     let mut bench = Bench::new();
-    // Its controlword is watched: 3 ms.
+    // The host's controlword has a timeout of 3 ms.
     bench.send(0x601, &[0x2B, 0x00, 0x14, 5, 3, 0, 0, 0]);
     bench.arrive(&[Frame::new(0x201, &[0, 0])]);
     bench.run(4);
     bench.told();
-    // Something dear, and behind it what was sent in time.
+    // An expensive frame, and behind it one that was sent in time.
     bench.hardware.reception().frame_us = 2_500;
     bench.arrive(&[Frame::new(0x80, &[])]);
     bench.run(1);
@@ -89,7 +89,7 @@ fn a_host_whose_frames_wait_is_not_missed_and_one_that_is_gone_is() {
     assert_eq!(bench.told(), []);
     bench.run(10);
     assert_eq!(bench.told(), [(0x81, 0x8250)]);
-    // However dear all the rest is.
+    // The timeout acts, however expensive the other frames are.
     bench.send(0, &[1, 0]);
     bench.arrive(&[Frame::new(0x201, &[0, 0])]);
     bench.run(2);

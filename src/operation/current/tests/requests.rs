@@ -1,13 +1,13 @@
-//! Requests for the servo's tick, and what the levels above see of an axis.
+//! Requests for the servo's tick, and the axis state as the levels above see it.
 
 use super::*;
 use crate::hal::DriveCommand;
 use crate::units::Ampere;
 
-/// Ticks both axes until the servo was requested so often; where `answers`, it ticks after each request.
+/// Ticks both axes until the servo was requested `requests` times; if `answers`, it ticks after each request.
 fn request(signals: &Signals<2>, requests: u32, answers: bool) -> u32 {
     let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
-    let mut loops = CurrentLoops::new([Stage::OFF; 2], PERIOD, None, volt_per_code);
+    let mut loops = CurrentLoops::new([AxisState::OFF; 2], PERIOD, None, volt_per_code);
     let (mut hardware, mut queues) = (TestHardware::new(), Queues::new());
     let mut periods = 0;
     while hardware.servo_pended < requests {
@@ -33,7 +33,7 @@ fn no_request_after_the_start_counts_as_missed() {
 }
 
 #[test]
-fn a_servo_that_never_answers_is_counted_and_given_up() {
+fn a_servo_that_never_answers_is_counted_and_inhibits() {
     let signals = Signals::new();
     request(&signals, 3, false);
     assert_eq!((signals.statistics.servo_missed.get(), signals.inhibit.causes()), (2, 0));
@@ -46,23 +46,23 @@ fn a_servo_that_never_answers_is_counted_and_given_up() {
 #[test]
 fn the_state_of_each_axis_can_be_replaced() {
     let mut bench = Bench::new(&CONFIGURATION);
-    assert!(bench.loops.stage_mut(2).is_none());
+    assert!(bench.loops.axis_state_mut(2).is_none());
     let is_running =
-        |bench: &Bench| [0, 1].map(|axis| bench.loops.stage(axis).is_some_and(Stage::is_running));
-    *bench.loops.stage_mut(1).expect("two axes") = Stage::OFF;
+        |bench: &Bench| [0, 1].map(|axis| bench.loops.axis_state(axis).is_some_and(AxisState::is_running));
+    *bench.loops.axis_state_mut(1).expect("two axes") = AxisState::OFF;
     assert_eq!(is_running(&bench), [true, false]);
-    // A target is followed only where all axes run: no tick switches a bridge on.
+    // A target is followed only where all axes run, so no tick enables a bridge.
     bench.signals.set_targets(&DriveCommand { enabled: true, currents: [Ampere(1.0); 2] });
     bench.run(12);
     bench.signals.release();
-    *bench.loops.stage_mut(0).expect("two axes") = Stage::OFF;
+    *bench.loops.axis_state_mut(0).expect("two axes") = AxisState::OFF;
     assert_eq!(is_running(&bench), [false; 2]);
 }
 
 #[test]
-fn one_sample_of_each_running_axis_goes_to_the_servo_in_six_periods() {
+fn each_running_axis_sends_one_sample_in_six_periods() {
     let mut bench = Bench::new(&CONFIGURATION);
-    *bench.loops.stage_mut(1).expect("two axes") = Stage::OFF;
+    *bench.loops.axis_state_mut(1).expect("two axes") = AxisState::OFF;
     let mut samples = [0; 2];
     for period in 1..=12 {
         let now = bench.now.wrapping_add(period * PERIOD.get());

@@ -1,4 +1,5 @@
-//! The emergency stop's interrupt may come between any two accesses of a current tick: no bridge is on afterwards.
+//! The emergency stop's interrupt may come between any two accesses of a current tick; no bridge is on
+//! afterwards.
 
 use std::rc::Rc;
 
@@ -13,7 +14,7 @@ use crate::units::Ampere;
 /// Ticks of both axes after the stop: 10 ms.
 const AFTERWARDS: u32 = 240;
 
-/// A board in the middle of its operation.
+/// A board in operation.
 struct Scene {
     loops: CurrentLoops<2>,
     motors: [TestMotor; 2],
@@ -46,7 +47,7 @@ impl Scene {
         scene
     }
 
-    /// Both axes brake, since the counter of one froze.
+    /// Both axes brake because one counter froze.
     fn braking() -> Self {
         let mut scene = Self::following();
         scene.signals.inhibit.raise(Cause::EncoderFrozen);
@@ -55,15 +56,15 @@ impl Scene {
         scene
     }
 
-    /// One axis is being calibrated, its bridge on; the other does nothing.
+    /// One axis is being calibrated with its bridge on; the other is off.
     fn calibrating(axis: usize) -> Self {
         let mut scene = Self::released();
         scene.motors[axis] = TestMotor::default();
         for other in 0..2 {
-            *scene.loops.stage_mut(other).expect("two axes") = Stage::OFF;
+            *scene.loops.axis_state_mut(other).expect("two axes") = AxisState::OFF;
         }
         let calibrator = Calibrator::new(&CONFIGURATION, SETTINGS).expect("usual");
-        let stage = scene.loops.stage_mut(axis).expect("two axes");
+        let stage = scene.loops.axis_state_mut(axis).expect("two axes");
         assert_eq!(stage.obey(Order::Calibrate(calibrator)), None);
         for _ in 0..24_000 {
             scene.run(1);
@@ -71,10 +72,10 @@ impl Scene {
                 return scene;
             }
         }
-        panic!("the calibration does not switch its bridge on")
+        panic!("the calibration does not enable its bridge")
     }
 
-    /// The counts of an axis jumped: its next tick finds that its position is lost, and both axes brake.
+    /// An axis' counts jumped: its next tick detects the lost position, and both axes brake.
     fn losing_its_position(axis: usize) -> Self {
         let mut scene = Self::following();
         scene.motors[axis].encoder_zero += 0.25;
@@ -82,7 +83,7 @@ impl Scene {
         scene
     }
 
-    /// A copy of the board; `stop` is placed so many accesses from now.
+    /// Copies the board and sets the stop `after` accesses from now.
     fn with_stop(&self, after: u32) -> Self {
         let signals = Rc::new(Signals::clone(&self.signals));
         let mut hardware = TestHardware::new();
@@ -109,12 +110,12 @@ impl Scene {
         (0..periods).for_each(|_| (0..2).for_each(|axis| self.tick(axis)));
     }
 
-    /// Places the stop before every access of the next tick of `axis` in turn.
+    /// Repeats the next tick of `axis` with the stop before each of its accesses.
     fn stop_everywhere(mut self, name: &str, axis: usize) {
         (0..axis).for_each(|before| self.tick(before));
         let mut undisturbed = self.with_stop(u32::MAX);
         undisturbed.tick(axis);
-        assert!(undisturbed.hardware.bridges[axis].enabled, "{name}: nothing to switch off");
+        assert!(undisturbed.hardware.bridges[axis].enabled, "{name}: no bridge is on");
         let accesses = undisturbed.hardware.accesses;
         assert!(accesses >= 3, "{name}: {accesses} accesses");
         for after in 0..accesses {
@@ -152,7 +153,7 @@ fn a_stop_during_a_tick_of_a_calibration_leaves_no_bridge_on() {
 }
 
 #[test]
-fn a_stop_during_a_tick_of_axes_that_brake_leaves_no_bridge_on() {
+fn a_stop_during_a_tick_of_braking_axes_leaves_no_bridge_on() {
     for axis in 0..2 {
         Scene::braking().stop_everywhere("braking", axis);
     }

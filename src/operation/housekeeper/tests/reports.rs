@@ -1,4 +1,4 @@
-//! What the housekeeping reports of each joint, up to the servo that reacts to it.
+//! Reports of the housekeeping for each joint, up to the servo that reacts to them.
 
 use super::super::super::{ServoLevel, testing};
 use super::*;
@@ -10,7 +10,7 @@ use crate::units::Volt;
 const RAMPS: DeratingRamps =
     DeratingRamps::new([80.0, 100.0], [Volt(24.0), Volt(21.0)], [Volt(55.0), Volt(57.5)]);
 
-/// The fault that ends the servo's tick after a tenth of a second of housekeeping.
+/// The fault of the servo's tick after a tenth of a second of housekeeping.
 fn fault_of(bench: &mut Bench) -> Option<Fault> {
     let mut control = Control::new(&configuration()).expect("a leg");
     let volt_per_code = SenseScale::ODRIVE_3_6.volt_per_code;
@@ -31,11 +31,11 @@ fn fault_of(bench: &mut Bench) -> Option<Fault> {
 }
 
 #[test]
-fn a_hot_bridge_or_an_open_thermistor_is_the_fault_of_its_own_joint() {
-    assert_eq!(fault_of(&mut Bench::new(Housekeeper::new(HOUSE))), None);
+fn heat_or_an_open_thermistor_is_the_fault_of_its_joint() {
+    assert_eq!(fault_of(&mut Bench::new(Housekeeper::new(HOUSEKEEPING))), None);
     for joint in 0..2 {
         for (degrees, code) in [(Some(100.0), FaultCode::Temperature), (None, FaultCode::Thermistor)] {
-            let mut bench = Bench::new(Housekeeper::new(HOUSE));
+            let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
             bench.hardware.temperatures[joint] = degrees;
             assert_eq!(fault_of(&mut bench), Some(Fault { code, joint: joint as u8 }));
         }
@@ -43,13 +43,13 @@ fn a_hot_bridge_or_an_open_thermistor_is_the_fault_of_its_own_joint() {
 }
 
 #[test]
-fn the_hottest_bridge_derates_and_an_open_thermistor_leaves_nothing() {
+fn the_hottest_bridge_derates_and_an_open_thermistor_leaves_no_torque() {
     for (temperatures, hottest_c) in [
         ([Some(40.0), Some(85.0)], 85.0),
         ([Some(90.0), Some(30.0)], 90.0),
-        ([Some(30.0), None], HOUSE.hottest_c),
+        ([Some(30.0), None], HOUSEKEEPING.hottest_c),
     ] {
-        let mut bench = Bench::new(Housekeeper::new(HOUSE));
+        let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
         bench.hardware.temperatures = temperatures;
         bench.hold(false, false);
         assert_eq!(bench.signals.hottest_c(), hottest_c);
@@ -65,14 +65,14 @@ fn each_gate_driver_is_recorded_with_its_own_status() {
         };
         bench.records.iter().filter_map(status).collect()
     };
-    let mut bench = Bench::new(Housekeeper::new(HOUSE));
+    let mut bench = Bench::new(Housekeeper::new(HOUSEKEEPING));
     bench.hardware.gate_status = [0x0481_0300, 0x0402_0301];
     bench.signals.inhibit.raise(Cause::GateFault);
     bench.hold(false, false);
     let expected = [(1, 0x0481_0300), (2, 0x0402_0301)];
     assert_eq!(statuses(&bench, Cause::GateFault), expected, "once");
     assert_eq!(statuses(&bench, Cause::GateConfiguration), []);
-    // The second driver loses its registers, and no longer answers.
+    // The second driver loses its registers and no longer answers.
     bench.hardware.gates_hold[1] = false;
     bench.hardware.gate_status[1] = u32::MAX;
     bench.hold(false, false);
@@ -83,7 +83,7 @@ fn each_gate_driver_is_recorded_with_its_own_status() {
 #[test]
 fn a_reference_is_refused_while_a_joint_moves() {
     for moving in [None, Some(0), Some(1)] {
-        let mut bench = Bench::new(Housekeeper::ready(HOUSE));
+        let mut bench = Bench::new(Housekeeper::ready(HOUSEKEEPING));
         bench.hold(false, true);
         bench.hardware.contacts = Contacts::default();
         for round in 0..RATE_HZ {
@@ -111,9 +111,9 @@ fn a_reference_is_refused_while_a_joint_moves() {
 }
 
 #[test]
-fn a_reset_switches_the_gate_drivers_off_and_on_and_forgets_what_is_gone() {
+fn a_reset_restarts_the_gate_drivers_and_clears_old_reasons() {
     for (configures, causes) in [(true, 0), (false, Cause::GateConfiguration.bit())] {
-        let mut bench = Bench::new(Housekeeper::ready(HOUSE));
+        let mut bench = Bench::new(Housekeeper::ready(HOUSEKEEPING));
         bench.hardware.gates_configure = configures;
         bench.signals.inhibit.raise(Cause::GateFault);
         for _ in 0..25 {

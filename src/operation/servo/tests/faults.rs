@@ -1,4 +1,4 @@
-//! Faults that other levels saw, of numbers in memory, and of the supply.
+//! Faults reported by other levels, in memory, and of the supply.
 
 use super::*;
 
@@ -11,7 +11,7 @@ fn fault(bench: &Bench) -> Option<Fault> {
 }
 
 #[test]
-fn a_fault_of_another_level_reaches_the_leg_with_its_joint() {
+fn a_fault_from_another_level_reaches_the_leg_with_its_joint() {
     for joint in 0..2 {
         for seen in BoardFault::ALL {
             let mut bench = Bench::enabled();
@@ -24,11 +24,11 @@ fn a_fault_of_another_level_reaches_the_leg_with_its_joint() {
 }
 
 #[test]
-fn gains_or_limits_that_changed_in_memory_are_a_fault_within_64_ms() {
+fn changed_gains_or_limits_are_a_fault_within_64_ms() {
     let mut bench = Bench::enabled();
     bench.run(600);
     assert_eq!(fault(&bench), None);
-    // The level knows the checksum of another limit: the limit in memory is not the one that was made.
+    // The level has the checksum of another limit, as if the limit in memory had changed.
     let mut other = configuration();
     other.joints[1].torque.0 += 1e-5;
     let other = Control::new(&other).expect("a leg");
@@ -44,7 +44,7 @@ fn gains_or_limits_that_changed_in_memory_are_a_fault_within_64_ms() {
 }
 
 #[test]
-fn a_supply_that_dies_is_a_fault_after_four_ticks() {
+fn a_failing_supply_is_a_fault_after_four_ticks() {
     let mut bench = Bench::enabled();
     bench.run(40);
     bench.set_bus(Volt(0.75 * 48.0));

@@ -1,10 +1,10 @@
-//! What leaves the servo as events, and in which order.
+//! Events of the servo and their order.
 
 use super::super::super::queues::RESERVED;
 use super::*;
 use crate::leg::LimitCode;
 
-/// Tick and joint of every limit that was reported.
+/// Tick and joint of every reported limit.
 fn limits(bench: &Bench) -> Vec<(u32, u8)> {
     let limit = |event: &LegEvent<2>| match event {
         LegEvent::Record(Record::Limit { tick, code, joint, .. }) => {
@@ -17,9 +17,9 @@ fn limits(bench: &Bench) -> Vec<(u32, u8)> {
 }
 
 #[test]
-fn limits_are_reported_once_a_second_and_one_in_a_tick() {
+fn limits_are_reported_once_a_second_and_one_per_tick() {
     let mut bench = Bench::enabled();
-    // Nothing is left of the torque that draws the joints back to where they were.
+    // Derating leaves no torque to draw the joints back to their start.
     bench.signals.set_hottest_c(100.0);
     for _ in 0..60 {
         bench.counts = bench.counts.map(|counts| counts + 1);
@@ -32,7 +32,7 @@ fn limits_are_reported_once_a_second_and_one_in_a_tick() {
     let [(first, _), (second, _), later @ ..] = &limits[..] else { panic!("{limits:?}") };
     assert!(first < second && *second < 100, "{limits:?}");
     assert_eq!(later, [(4000, 1), (4001, 2), (8000, 1), (8001, 2)]);
-    // A cool leg has none.
+    // A cool leg reports no limit.
     let mut bench = Bench::enabled();
     bench.counts = bench.counts.map(|counts| counts + 10);
     bench.run(100);
@@ -56,7 +56,25 @@ fn a_fault_is_recorded_before_the_state_that_follows() {
 }
 
 #[test]
-fn samples_leave_room_for_other_events() {
+fn a_refusal_by_the_bus_is_recorded_once_with_and_without_zeros_of_the_joints() {
+    use crate::safety::{Refusal, RefusalReason};
+    for mut bench in [Bench::resting(), Bench::begun()] {
+        bench.tick();
+        bench.clear();
+        let refused = Some(Refusal { joint: Refusal::LEG, reason: RefusalReason::NoReference });
+        let order =
+            LegOrder { commands: None, request: None, faults: [None; 2], may_return: [true; 2], refused };
+        assert!(bench.bus.orders.enqueue(order).is_ok(), "full");
+        bench.run(3);
+        assert_eq!(bench.names(), ["not enabled"]);
+        let record =
+            |event: &LegEvent<2>| matches!(event, LegEvent::Record(Record::NotEnabled { joint: 0, .. }));
+        assert!(bench.events.iter().any(record));
+    }
+}
+
+#[test]
+fn samples_leave_space_for_other_events() {
     let mut bench = Bench::enabled();
     bench.is_heard = false;
     bench.run(2000);
@@ -67,7 +85,7 @@ fn samples_leave_room_for_other_events() {
     bench.signals.report(BoardFault::Temperature, 0);
     bench.tick();
     assert_eq!(bench.ends.servo.events.len(), room + 2);
-    // Records that find no room are counted as well.
+    // Lost records are counted as well.
     for _ in 0..RESERVED {
         bench.ask(ControlRequest::Identify);
         bench.tick();
@@ -77,7 +95,7 @@ fn samples_leave_room_for_other_events() {
 }
 
 #[test]
-fn an_identification_begins_with_the_plan_and_seed_of_who_asked() {
+fn an_identification_begins_with_the_requested_plan_and_seed() {
     let mut bench = Bench::enabled();
     bench.ask(ControlRequest::Identify);
     bench.tick();

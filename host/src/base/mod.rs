@@ -1,0 +1,12 @@
+//! Means that every module uses: errors, numbers and their formatting, files that are written.
+
+pub mod error;
+pub mod files;
+pub mod names;
+pub mod number;
+pub mod output;
+pub mod precision;
+pub mod random;
+pub mod stats;
+pub mod text_table;
+pub mod toml_fault;

@@ -1,0 +1,22 @@
+//! Standard output.
+
+use std::io::{ErrorKind, Write};
+
+use super::error::ToolError;
+
+/// Writes to standard output; a pipe closed by its reader is not an error.
+pub fn print(text: &str) -> Result<(), ToolError> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(ToolError::input(format!("standard output cannot be written: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// `println!` through [`print`]: returns from the function if standard output cannot be written.
+macro_rules! say {
+    ($($text:tt)*) => { $crate::base::output::print(&format!("{}\n", format_args!($($text)*)))? };
+}
+pub(crate) use say;

@@ -1,0 +1,18 @@
+//! Files on the command line.
+//!
+//! Why one place: a command that overwrites its own recording destroys data for good. The files of every
+//! command are therefore checked before any computation.
+//!
+//! | part | contents |
+//! | --- | --- |
+//! | [`role`] | types of arguments that define the use of a file |
+//! | [`mod@check`] | detects files that a command would overwrite or cannot write |
+//!
+//! Known limits: names that differ in case only count as different files, also on file systems that
+//! ignore case. Redirections of the shell are not checked.
+
+pub mod check;
+pub mod role;
+
+pub use check::check;
+pub use role::{Input, LegName, Output, OutputFolder, Updated};

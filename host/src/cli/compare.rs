@@ -1,0 +1,39 @@
+//! `compare`: the difference of two stored models.
+
+use clap::Args;
+
+use crate::base::error::{EXIT_ACCEPTED, ToolError};
+use crate::base::output;
+use crate::cli::arguments::{Input, Output};
+use crate::cli::common::write_json;
+use crate::formats::model_file::ModelFile;
+use crate::leg::matching::refuse_another_leg;
+use crate::run::compare_model as comparison;
+use crate::view::tables;
+
+/// Two models of one leg.
+#[derive(Args, Debug)]
+pub struct CompareArguments {
+    /// Model written by --save-model.
+    before: Input,
+    /// Later model of the same leg.
+    after: Input,
+    /// Write the comparison as JSON.
+    #[arg(long)]
+    json: Option<Output>,
+}
+
+/// Compares and reports; returns the exit code.
+pub fn run(arguments: &CompareArguments) -> Result<u8, ToolError> {
+    let (before, after) = (ModelFile::load(&arguments.before)?, ModelFile::load(&arguments.after)?);
+    refuse_another_leg(&before, &arguments.before.display().to_string(), &after.leg.to_leg_file())?;
+    let file = arguments.before.display().to_string();
+    let temperature = after.conditions.temperature_c;
+    let compared = comparison::compare(&before, &file, &after.base_set, temperature)
+        .ok_or_else(|| ToolError::input(format!("{file}: no base parameter is in both models")))?;
+    if let Some(path) = &arguments.json {
+        write_json(path, &compared)?;
+    }
+    output::print(&(tables::comparison_lines(&compared).join("\n") + "\n"))?;
+    Ok(EXIT_ACCEPTED)
+}

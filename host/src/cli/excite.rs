@@ -1,0 +1,100 @@
+//! `excite`: designs an exciting motion and predicts its result before anything moves.
+
+use clap::Args;
+
+use crate::base::error::{EXIT_ACCEPTED, ToolError};
+use crate::base::{files, output};
+use crate::cli::arguments::{Input, Output};
+use crate::cli::common::write_json;
+use crate::cli::leg_options::LegOptions;
+use crate::cli::noise::NoiseOptions;
+use crate::formats::excitation::{Excitation, LONGEST_S};
+use crate::formats::excitation_constant as constant;
+use crate::leg::setup::DEFAULT_SEED;
+use crate::run::excite::assumption::Assumption;
+use crate::run::excite::bench::ExciteOptions;
+use crate::run::excite::design::DesignOptions;
+use crate::run::excite::run::excite;
+use crate::view::excite as text;
+use crate::with_leg_size;
+
+/// Leg to be excited, and outputs of the design.
+#[derive(Args, Debug)]
+pub struct ExciteArguments {
+    #[command(flatten)]
+    leg: LegOptions,
+    /// Write the motion here, as TOML that identify takes.
+    #[arg(long)]
+    out: Option<Output>,
+    /// Write the motion here, as Rust source with a constant for an image.
+    #[arg(long = "const")]
+    constant: Option<Output>,
+    /// Seconds of motion, blends included.
+    #[arg(long, default_value_t = 22.0, allow_negative_numbers = true)]
+    duration: f64,
+    #[command(flatten)]
+    noise: NoiseOptions,
+    /// Assumed error of each base parameter in the bound on torque, percent.
+    #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
+    torque_margin: f64,
+    /// Assume the truth of the leg file, not its prior.
+    #[arg(long)]
+    assume_truth: bool,
+    /// Check this motion instead of designing one.
+    #[arg(long)]
+    excitation: Option<Input>,
+    /// Seed of the swarm's random numbers.
+    #[arg(long, default_value_t = DEFAULT_SEED)]
+    seed: u64,
+    /// Curves the swarm may evaluate.
+    #[arg(long, default_value_t = EVALUATIONS, value_parser = clap::value_parser!(u32).range(600..=10_000_000))]
+    evaluations: u32,
+    /// Write the report here.
+    #[arg(long)]
+    json: Option<Output>,
+}
+
+/// Evaluations by default: about five seconds of one core for two joints.
+const EVALUATIONS: u32 = 48_000;
+
+/// Designs, reports and writes; returns the exit code.
+pub fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
+    let leg = &arguments.noise.on(arguments.leg.load()?)?;
+    let torque_noise_percent = arguments.noise.percent()?;
+    let percentage = |option: &str, value: f64, most: f64| {
+        let fits = (0.0..=most).contains(&value);
+        if fits { Ok(()) } else { Err(ToolError::input(format!("{option}: a percentage from 0 to {most}"))) }
+    };
+    percentage("--torque-margin", arguments.torque_margin, 200.0)?;
+    if !(arguments.duration > 0.0 && arguments.duration <= LONGEST_S) {
+        return Err(ToolError::input(format!("--duration: above 0 and at most {LONGEST_S} s")));
+    }
+    let given = match &arguments.excitation {
+        Some(file) => Some((file.to_path_buf(), Excitation::load(file)?)),
+        None => None,
+    };
+    let options = &ExciteOptions {
+        design: DesignOptions {
+            duration_s: arguments.duration,
+            seed: arguments.seed,
+            evaluations: arguments.evaluations,
+        },
+        given,
+        carried: Vec::new(),
+        torque_noise_percent,
+        margin_percent: arguments.torque_margin,
+        assumption: if arguments.assume_truth { Assumption::Truth } else { Assumption::Best },
+    };
+    let excited = with_leg_size!(leg, excite(leg, options))?;
+    if let Some(path) = &arguments.out {
+        files::write(path, excited.motion.to_toml())?;
+    }
+    if let Some(path) = &arguments.constant {
+        files::write(path, constant::source(&excited.motion))?;
+    }
+    if let Some(path) = &arguments.json {
+        write_json(path, &excited.report)?;
+    }
+    output::print(&text::report(&excited.report))?;
+    Ok(EXIT_ACCEPTED)
+}

@@ -1,0 +1,151 @@
+//! `identify`: a simulated leg from excitation to verdict.
+
+use clap::{Args, ValueEnum};
+use scarab::model::Payload;
+
+use crate::base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::cli::arguments::{Input, Output};
+use crate::cli::common::{Common, draw, draw_runs, finish, write_json};
+use crate::cli::model::ModelArguments;
+use crate::cli::noise::NoiseOptions;
+use crate::formats::excitation::Excitation;
+use crate::leg::placed_mass::PlacedMass;
+use crate::leg::setup::DEFAULT_SEED;
+use crate::report::RunReport;
+use crate::rig::options::{DriveModel, SimulationOptions};
+use crate::rig::perturb::Perturbation;
+use crate::run::excite::run::check;
+use crate::run::identify::{identify_many, identify_one};
+use crate::view::runs::print_runs;
+use crate::with_leg_size;
+
+/// Leg to be identified, and outputs.
+#[derive(Args, Debug)]
+pub struct IdentifyArguments {
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    model: ModelArguments,
+    /// Seed of noise, pushes and a wrong prior.
+    #[arg(long, conflicts_with = "seeds")]
+    seed: Option<u64>,
+    /// A run for each seed, A..B with both ends.
+    #[arg(long, value_parser = parse_seeds, conflicts_with_all = ["log", "save_model", "compare_model"], help_heading = "Simulation")]
+    seeds: Option<(u64, u64)>,
+    #[command(flatten)]
+    noise: NoiseOptions,
+    /// Ideal currents, or motors, bridges and sensors under the board's current loops.
+    #[arg(long, value_enum, default_value = "ideal", help_heading = "Simulation")]
+    drive: DriveArgument,
+    /// Identify again with a known mass, KG@JOINT:X_M[:Y_M] (JOINT: name or number; X along the
+    /// link): determines the torque constants.
+    #[arg(long, help_heading = "Simulation")]
+    payload: Option<PlacedMass>,
+    /// Known mass that the leg carries all the time, in the same format; the parameters are those
+    /// of the leg without it.
+    #[arg(long, help_heading = "Simulation")]
+    load: Option<PlacedMass>,
+    /// Inject a deliberate error to test the verdict: NAME or NAME=VALUE, repeatable.
+    #[arg(long, value_name = "NAME[=VALUE]", help_heading = "Simulation")]
+    perturb: Vec<Perturbation>,
+    /// Excite with this motion (from `excite`) instead of the default one.
+    #[arg(long, help_heading = "Simulation")]
+    excitation: Option<Input>,
+    /// Write the training motion here, in the format that replay reads.
+    #[arg(long, help_heading = "Output")]
+    log: Option<Output>,
+}
+
+/// Kind of simulated drives.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DriveArgument {
+    /// A current that follows its target with a lag.
+    Ideal,
+    /// Motor, inverter, current and angle sensors, supply; needs `[joint.motor]` in the leg file.
+    Full,
+}
+
+impl From<DriveArgument> for DriveModel {
+    fn from(drive: DriveArgument) -> Self {
+        match drive {
+            DriveArgument::Ideal => Self::Ideal,
+            DriveArgument::Full => Self::Full,
+        }
+    }
+}
+
+pub(super) fn parse_seeds(text: &str) -> Result<(u64, u64), String> {
+    let ends = text
+        .split_once("..")
+        .map(|(first, last)| (first.parse::<u64>(), last.trim_start_matches('=').parse::<u64>()));
+    match ends {
+        Some((Ok(first), Ok(last))) if first <= last && last - first < LARGEST_SEED_COUNT => {
+            Ok((first, last))
+        }
+        Some((Ok(first), Ok(last))) if first <= last => Err(format!("at most {LARGEST_SEED_COUNT} runs")),
+        _ => Err(format!("`{text}` is not A..B with A at most B")),
+    }
+}
+
+/// Limit of the runs at once.
+const LARGEST_SEED_COUNT: u64 = 100_000;
+
+/// Identifies and reports; returns the exit code.
+pub fn run(arguments: &IdentifyArguments) -> Result<u8, ToolError> {
+    let leg = &arguments.noise.on(arguments.common.leg()?)?;
+    let torque_noise_percent = arguments.noise.percent()?;
+    let on_leg = |mass: &Option<PlacedMass>, option: &str| -> Result<Option<Payload<f64>>, ToolError> {
+        mass.as_ref().map(|mass| mass.on(leg, option)).transpose()
+    };
+    let payload = on_leg(&arguments.payload, "--payload")?;
+    let load = on_leg(&arguments.load, "--load")?;
+    if (payload.is_some() || load.is_some()) && arguments.perturb.iter().any(Perturbation::tampers) {
+        return Err(ToolError::input(
+            "--perturb inertia and com tamper with the values that are validated; --payload and --load put others in their \
+             place: one of the two",
+        ));
+    }
+    let excitation = arguments.excitation.as_deref().map(Excitation::load).transpose()?;
+    if let (Some(motion), Some(file)) = (&excitation, &arguments.excitation) {
+        // Checked without and with the mass of the second run.
+        let carried: &Vec<_> = &load.into_iter().collect();
+        with_leg_size!(leg, check(leg, file, motion, carried))?;
+        if let Some(payload) = payload {
+            let carried = &load.into_iter().chain([payload]).collect::<Vec<_>>();
+            with_leg_size!(leg, check(leg, file, motion, carried))?;
+        }
+    }
+    let options = |seed: u64| SimulationOptions {
+        seed,
+        swarm_seed: arguments.common.swarm_seed.unwrap_or(seed),
+        torque_noise_percent,
+        drive: arguments.drive.into(),
+        plan: arguments.common.plan.into(),
+        prior: arguments.common.prior.unwrap_or_default(),
+        payload,
+        load,
+        estimator: arguments.common.estimator.into(),
+        with_series: arguments.common.is_drawn() && arguments.seeds.is_none(),
+        perturbations: arguments.perturb.clone(),
+        excitation: excitation.clone(),
+    };
+    let Some((first, last)) = arguments.seeds else {
+        let options = &options(arguments.seed.unwrap_or(DEFAULT_SEED));
+        let log = arguments.log.as_deref();
+        let kept = arguments.model.kept(leg)?;
+        let (mut run, series) = with_leg_size!(leg, identify_one(leg, options, log))?;
+        arguments.model.compare(kept.as_ref(), &mut run);
+        let code = finish(&run, &arguments.common, "")?;
+        draw(leg, &arguments.common, &run, &series, &[])?;
+        arguments.model.save(leg, &run, leg.bandwidth_hz)?;
+        return Ok(code);
+    };
+    let options: &Vec<_> = &(first..=last).map(options).collect();
+    let runs = with_leg_size!(leg, identify_many(leg, options))?;
+    if let Some(path) = &arguments.common.json {
+        write_json(path, &runs)?;
+    }
+    print_runs(&runs)?;
+    draw_runs(leg, &arguments.common, &runs.runs)?;
+    Ok(if runs.runs.iter().all(RunReport::accepted) { EXIT_ACCEPTED } else { EXIT_REFUSED })
+}

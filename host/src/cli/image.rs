@@ -1,0 +1,110 @@
+//! `fw` and `flash-leg`: builds the flash image, prints its size, and writes it to a board.
+
+use clap::Args;
+
+use crate::base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::base::{files, output};
+use crate::cli::arguments::Output;
+use crate::cli::common::write_json;
+use crate::cli::leg_options::LegOptions;
+use crate::image::build::{Options, build, flash};
+use crate::image::leg_source::{describe, source};
+use crate::image::panics::Panics;
+use crate::image::size::ImageSize;
+use crate::leg::setup::DEFAULT_SEED;
+
+/// Options of an image.
+#[derive(Args, Debug)]
+pub struct ImageOptions {
+    #[command(flatten)]
+    leg: LegOptions,
+    /// The image sends every sample of the 500 Hz log.
+    #[arg(long)]
+    log: bool,
+    /// A brake resistor is connected: the image uses it.
+    #[arg(long)]
+    brake_resistor: bool,
+    /// 24 or 56: voltage of a board without a factory version; a board with one keeps its own.
+    #[arg(long, value_name = "V", value_parser = board_volts)]
+    board_volts: Option<u8>,
+}
+
+fn board_volts(text: &str) -> Result<u8, String> {
+    match text {
+        "24" => Ok(24),
+        "56" => Ok(56),
+        _ => Err(format!("`{text}` is neither 24 nor 56")),
+    }
+}
+
+impl ImageOptions {
+    fn load(&self) -> Result<Options, ToolError> {
+        Ok(Options {
+            leg: self.leg.load_for_image()?,
+            log: self.log,
+            brake_resistor: self.brake_resistor,
+            board_volts: self.board_volts,
+        })
+    }
+}
+
+/// Image and outputs of its size.
+#[derive(Args, Debug)]
+pub struct FirmwareArguments {
+    #[command(flatten)]
+    image: ImageOptions,
+    /// Write the sizes here.
+    #[arg(long)]
+    json: Option<Output>,
+    /// Only write the leg as the constant that an image holds, here.
+    #[arg(long, value_name = "FILE.rs")]
+    source: Option<Output>,
+}
+
+/// Image and options of the probe.
+#[derive(Args, Debug)]
+pub struct FlashArguments {
+    #[command(flatten)]
+    image: ImageOptions,
+    /// Passed on to `probe-rs run`.
+    #[arg(last = true)]
+    probe: Vec<String>,
+}
+
+/// Builds and prints the sizes; exit code 3 if a goal is missed or an interrupt can panic.
+pub fn firmware(arguments: &FirmwareArguments) -> Result<u8, ToolError> {
+    let options = arguments.image.load()?;
+    if let Some(path) = &arguments.source {
+        let (description, _) = describe(&options.leg, DEFAULT_SEED)?;
+        files::write(path, source(&description))?;
+        return Ok(EXIT_ACCEPTED);
+    }
+    let image = build(&options)?;
+    let size = ImageSize::of(&image)?;
+    let panics = Panics::of(&image)?;
+    output::print(&format!("{}\n\n{}\n{}", image.display(), size.text(), panics.text()))?;
+    if let Some(path) = &arguments.json {
+        write_json(path, &size)?;
+    }
+    let missed = size.missed();
+    for goal in &missed {
+        eprintln!("too large: {goal}");
+    }
+    for place in panics.missed() {
+        eprintln!("{place}");
+    }
+    let kept = missed.is_empty() && panics.missed().is_empty();
+    Ok(if kept { EXIT_ACCEPTED } else { EXIT_REFUSED })
+}
+
+/// Builds, checks the size, writes the image to the board and prints its records.
+pub fn flash_leg(arguments: &FlashArguments) -> Result<u8, ToolError> {
+    arguments.image.leg.require("cargo flash-leg --leg my-leg.toml")?;
+    let image = build(&arguments.image.load()?)?;
+    let missed = ImageSize::of(&image)?.missed();
+    if !missed.is_empty() {
+        return Err(ToolError::Refused(format!("the image is too large: {}", missed.join("; "))));
+    }
+    flash(&image, &arguments.probe)?;
+    Ok(EXIT_ACCEPTED)
+}

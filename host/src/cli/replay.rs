@@ -1,0 +1,122 @@
+//! `replay`: identifies a leg from recordings.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use clap::Args;
+
+use crate::base::error::ToolError;
+use crate::cli::arguments::{Input, Output};
+use crate::cli::common::{Common, draw, finish};
+use crate::cli::model::ModelArguments;
+use crate::leg::placed_mass::PlacedMass;
+use crate::leg::setup::DEFAULT_SEED;
+use crate::run::replay::{ReplayOptions, replay};
+use crate::view::tables;
+use crate::with_leg_size;
+
+/// Recordings, and outputs.
+#[derive(Args, Debug)]
+pub struct ReplayArguments {
+    /// Recordings: t_s, q1_rad[, q2_rad..], tau1_Nm[, tau2_Nm..]; several are one training set.
+    #[arg(required = true)]
+    files: Vec<Input>,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    model: ModelArguments,
+    /// Held-out recordings.
+    #[arg(long, num_args = 1.., conflicts_with = "split", help_heading = "Recordings")]
+    validate: Vec<Input>,
+    /// The first fraction of each file trains, the rest validates.
+    #[arg(long, allow_negative_numbers = true, help_heading = "Recordings")]
+    split: Option<f64>,
+    /// -3 dB frequency of the filter chain's low-pass, Hz; the leg file's (8 by default) unless given. `auto`
+    /// takes the largest up to 16 Hz at which the encoders' steps do not matter.
+    #[arg(long, value_name = "HZ|auto", allow_negative_numbers = true, help_heading = "Identification")]
+    bandwidth: Option<Bandwidth>,
+    /// Take this delay of the torque against the angle out, ms: one value, or one for each joint by comma.
+    #[arg(
+        long,
+        value_name = "MS",
+        value_delimiter = ',',
+        allow_negative_numbers = true,
+        help_heading = "Identification"
+    )]
+    torque_delay: Vec<f64>,
+    /// Replace the stamps by an even clock from the first to the last.
+    #[arg(long, help_heading = "Identification")]
+    even_stamps: bool,
+    /// Known mass that the leg carries in every recording, KG@JOINT:X_M[:Y_M]; the parameters are those of
+    /// the leg without it.
+    #[arg(long, help_heading = "Recordings")]
+    load: Option<PlacedMass>,
+    /// Known mass that the leg also carries in the recordings of --with-payload, in the same format:
+    /// determines the scale of the torques.
+    #[arg(long, requires = "with_payload", help_heading = "Recordings")]
+    payload: Option<PlacedMass>,
+    /// Recordings with the mass of --payload.
+    #[arg(long, num_args = 1.., requires = "payload", help_heading = "Recordings")]
+    with_payload: Vec<Input>,
+    /// Write measured and predicted torque of the validation part here.
+    #[arg(long, help_heading = "Output")]
+    csv: Option<Output>,
+}
+
+/// Bandwidth as asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Bandwidth {
+    Auto,
+    Hertz(f64),
+}
+
+impl FromStr for Bandwidth {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        text.parse().map(Self::Hertz).map_err(|_| "a number of Hz, or `auto`".into())
+    }
+}
+
+fn paths(files: &[Input]) -> Vec<PathBuf> {
+    files.iter().map(|file| file.to_path_buf()).collect()
+}
+
+/// Identifies and reports; returns the exit code.
+pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
+    arguments.common.leg.require("cargo sim replay run.csv --leg my-leg.toml")?;
+    let leg = &arguments.common.leg()?;
+    if arguments.split.is_some_and(|fraction| !(fraction > 0.0 && fraction < 1.0)) {
+        return Err(ToolError::input("--split: a fraction above 0 and below 1"));
+    }
+    let options = &ReplayOptions {
+        files: paths(&arguments.files),
+        validate: paths(&arguments.validate),
+        split: arguments.split,
+        bandwidth_hz: match arguments.bandwidth {
+            Some(Bandwidth::Hertz(hz)) => hz,
+            _ => leg.bandwidth_hz,
+        },
+        chooses_bandwidth: arguments.bandwidth == Some(Bandwidth::Auto),
+        plan: arguments.common.plan.into(),
+        prior: arguments.common.prior.unwrap_or_default(),
+        estimator: arguments.common.estimator.into(),
+        swarm_seed: arguments.common.swarm_seed.unwrap_or(DEFAULT_SEED),
+        csv: arguments.csv.as_deref().map(Path::to_owned),
+        torque_delay_ms: arguments.torque_delay.clone(),
+        even_stamps: arguments.even_stamps,
+        load: arguments.load.as_ref().map(|mass| mass.on(leg, "--load")).transpose()?,
+        payload: arguments.payload.as_ref().map(|mass| mass.on(leg, "--payload")).transpose()?,
+        with_payload: paths(&arguments.with_payload),
+    };
+    let kept = arguments.model.kept(leg)?;
+    let mut replayed = with_leg_size!(leg, replay(leg, options))?;
+    arguments.model.compare(kept.as_ref(), &mut replayed.run);
+    let code = finish(&replayed.run, &arguments.common, &tables::sources(&replayed.sources))?;
+    draw(leg, &arguments.common, &replayed.run, &replayed.series, &replayed.sources)?;
+    arguments.model.save(leg, &replayed.run, replayed.bandwidth_hz)?;
+    Ok(code)
+}

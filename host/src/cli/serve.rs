@@ -1,0 +1,70 @@
+//! `serve`: legs on a CANopen bus, reached by host software through a TCP port.
+
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::path::Path;
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+use crate::base::error::{EXIT_ACCEPTED, ToolError};
+use crate::cli::arguments::Updated;
+use crate::cli::leg_options::LegOptions;
+use crate::leg::setup::DEFAULT_SEED;
+use crate::rig::bus::serve::{ServeOptions, serve};
+use crate::with_leg_size;
+
+/// Legs, address and speed.
+#[derive(Args, Debug)]
+pub struct ServeArguments {
+    #[command(flatten)]
+    leg: LegOptions,
+    /// Address and port of the simulated CAN adapter (slcan over TCP); port 0 selects a free one.
+    #[arg(long, value_name = "HOST:PORT", value_parser = address)]
+    slcan: SocketAddr,
+    /// Boards on the bus, each with this leg.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=4))]
+    legs: u8,
+    /// Simulated seconds per second.
+    #[arg(long, value_name = "K", default_value_t = 1.0)]
+    speed: f64,
+    /// Bit rate of the bus, kbit/s.
+    #[arg(long, value_name = "KBIT", default_value = "1000", value_parser = bit_rates())]
+    bit_rate: u64,
+    /// File of the boards' flash; created if missing.
+    #[arg(long, value_name = "FILE")]
+    flash: Option<Updated>,
+    /// Seed of the noise.
+    #[arg(long, default_value_t = DEFAULT_SEED)]
+    seed: u64,
+}
+
+/// Resolves a host name or number; of several addresses the first of version 4.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let mut found: Vec<SocketAddr> = text.to_socket_addrs().map_err(|error| error.to_string())?.collect();
+    found.sort_by_key(SocketAddr::is_ipv6);
+    found.first().copied().ok_or_else(|| "no address".into())
+}
+
+/// Bit rates of the board's controller, kbit/s (object 2002).
+fn bit_rates() -> impl TypedValueParser<Value = u64> {
+    PossibleValuesParser::new(["125", "250", "500", "1000"]).try_map(|rate| rate.parse::<u64>())
+}
+
+/// Serves until SIGTERM; returns the exit code.
+pub fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
+    let leg = arguments.leg.load()?;
+    if !(arguments.speed > 0.0 && arguments.speed <= 100.0) {
+        return Err(ToolError::input(format!("--speed: {} is not from above 0 to 100", arguments.speed)));
+    }
+    let options = ServeOptions {
+        address: arguments.slcan,
+        legs: arguments.legs.into(),
+        speed: arguments.speed,
+        flash: arguments.flash.as_deref().map(Path::to_owned),
+        seed: arguments.seed,
+        bits_per_s: 1000 * arguments.bit_rate,
+    };
+    let (leg, options) = (&leg, &options);
+    with_leg_size!(leg, serve(leg, options))?;
+    Ok(EXIT_ACCEPTED)
+}

@@ -1,0 +1,25 @@
+//! States of motion and the convention of their angles.
+
+use clap::Args;
+
+use crate::cli::arguments::Input;
+use crate::leg::states::Angles;
+
+/// States for `predict` and `regressor`.
+#[derive(Args, Debug)]
+pub struct StatesOptions {
+    /// States of motion, CSV: columns q1.. (or q1_rad..), qd1.., qdd1.. in rad and s, anatomical as
+    /// in recordings; predict copies t_s.
+    #[arg(long)]
+    pub states: Input,
+    /// Angles in and torques out are those of the D-H frames instead of anatomical ones.
+    #[arg(long)]
+    dh: bool,
+}
+
+impl StatesOptions {
+    /// Convention of angles and torques.
+    pub fn angles(&self) -> Angles {
+        if self.dh { Angles::DenavitHartenberg } else { Angles::Anatomical }
+    }
+}

@@ -1,0 +1,121 @@
+//! Test of each detector: a fault's runs with one code of the firmware disabled, compared with all codes
+//! enabled.
+//!
+//! Why in addition to the rows: a fault with several detectors is still detected when one of them breaks.
+//! Here each code must be the one that reports in some run, and the result of these runs without it is
+//! listed.
+
+use scarab::safety::FaultCode;
+use serde::Serialize;
+
+use crate::faults::campaign::Campaign;
+use crate::faults::catalogue::Row;
+use crate::faults::entry::Entry;
+use crate::faults::run::{Blind, Outcome};
+
+/// One fault code of the firmware. Field names are part of the JSON interface.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct DetectorReport {
+    /// Word used in records.
+    pub code: &'static str,
+    /// Rows in whose runs the code was reported.
+    pub faults: Vec<&'static str>,
+    /// Runs in which the code was reported in time.
+    pub seen: usize,
+    /// Those of them that are missed without the code.
+    pub missed_without: usize,
+    /// Those of them in which another code reports in time without it.
+    pub seen_by_others: usize,
+    /// Those of them that cannot be judged without it: the fault did not last, or the joint no longer moved.
+    pub unjudged_without: usize,
+}
+
+fn forked(rows: &[Entry]) -> impl Iterator<Item = &'static Row> {
+    rows.iter().filter_map(|entry| match entry {
+        Entry::Forked(row) if row.id != crate::faults::campaign::CAPPED => Some(*row),
+        _ => None,
+    })
+}
+
+/// Codes whose own row of the catalogue is among the forked ones.
+fn codes(rows: &[Entry]) -> impl Iterator<Item = FaultCode> {
+    let has =
+        |code: &FaultCode| forked(rows).any(|row| row.id == code.catalogue() && row.codes.contains(code));
+    FaultCode::ALL.into_iter().filter(has)
+}
+
+/// Additional views of a row's runs: all detectors enabled, and each of several codes disabled alone. All of
+/// the row's detectors are disabled in the main run, which equals that of its only code where it has one.
+pub(super) fn views(row: &'static Row, rows: &[Entry]) -> Vec<Blind> {
+    if row.id == crate::faults::campaign::CAPPED {
+        return Vec::new();
+    }
+    let alone = row.codes.len() == 1;
+    let codes = codes(rows).filter(|code| !alone && row.codes.contains(code)).map(Blind::Code);
+    [Blind::Nobody].into_iter().chain(codes).collect()
+}
+
+/// Detector reports of a blind campaign; empty for another.
+#[must_use]
+pub fn detectors(rows: &[Entry], campaign: &Campaign) -> Vec<DetectorReport> {
+    if campaign.singly.is_empty() {
+        return Vec::new();
+    }
+    codes(rows).map(|code| detector(code, rows, campaign)).collect()
+}
+
+fn detector(code: FaultCode, rows: &[Entry], campaign: &Campaign) -> DetectorReport {
+    let mut report = DetectorReport {
+        code: code.name(),
+        faults: Vec::new(),
+        seen: 0,
+        missed_without: 0,
+        seen_by_others: 0,
+        unjudged_without: 0,
+    };
+    for row in forked(rows).filter(|row| row.codes.contains(&code)) {
+        let of = |blind: Blind| {
+            let singly = campaign.singly.iter().filter(move |(how, _)| *how == blind);
+            singly.map(|(_, outcome)| outcome).filter(|outcome| outcome.fault == row.id)
+        };
+        let told = |outcome: &&Outcome| outcome.detected && outcome.alarm == Some(code.name());
+        for seen in of(Blind::Nobody).filter(told) {
+            let same = |outcome: &&Outcome| outcome.fault == row.id && outcome.seed == seen.seed;
+            let without = if row.codes.len() == 1 {
+                campaign.outcomes.iter().find(same)
+            } else {
+                of(Blind::Code(code)).find(same)
+            };
+            let Some(without) = without else { continue };
+            if !report.faults.contains(&row.id) {
+                report.faults.push(row.id);
+            }
+            report.seen += 1;
+            match (without.detected, without.undetectable) {
+                (true, _) => report.seen_by_others += 1,
+                (_, true) => report.unjudged_without += 1,
+                _ => report.missed_without += 1,
+            }
+        }
+    }
+    report
+}
+
+impl DetectorReport {
+    /// Returns whether a campaign would change if the code broke: without it, some runs are missed or
+    /// reported by another code.
+    #[must_use]
+    pub const fn is_noticed(&self) -> bool {
+        self.missed_without + self.seen_by_others > 0
+    }
+
+    /// Summary in one line.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let Self { code, seen, missed_without, seen_by_others, unjudged_without, .. } = self;
+        format!(
+            "{code} ({}): told in {seen} runs; without it {missed_without} missed, {seen_by_others} seen by others, {unjudged_without} not to be judged\n",
+            self.faults.join(", ")
+        )
+    }
+}

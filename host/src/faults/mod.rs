@@ -1,0 +1,36 @@
+//! `cargo sim faults`: injects every fault of the catalogue into the whole firmware while it identifies a
+//! leg.
+//!
+//! | part | content |
+//! | --- | --- |
+//! | [`catalogue`], [`draw`], [`bounds`] | injected faults and required reactions; rows by group |
+//! | [`run`], [`outcome`], [`invariants`] | one run, its outcome, and conditions that hold in every period |
+//! | [`aftermath`] | allowed safe states of each code; an operator who resets and enables again |
+//! | [`campaign`] | many runs, forked from identifications |
+//! | [`detectors`] | each fault code of the firmware disabled separately |
+//! | [`mod@bench`] | rows that are no forks: components, calibrations, identifications with ideal drives |
+//! | [`emulated`] | rows that require a processor, run on the emulated one |
+//! | [`trial`] | every channel faulted in every form, and two faults at once: no invariant may break |
+//! | [`hours`] | normal motion, in which no fault may be reported |
+//! | [`recording`] | a run's curves |
+//! | [`report`] | table, JSON, document |
+//!
+//! All random choices follow from seeds: row and seed repeat a run bit for bit.
+
+pub mod aftermath;
+pub mod bench;
+pub mod bounds;
+pub mod campaign;
+pub mod catalogue;
+pub mod detectors;
+pub mod draw;
+pub mod emulated;
+pub mod entry;
+pub mod event;
+pub mod hours;
+pub mod invariants;
+pub mod outcome;
+pub mod recording;
+pub mod report;
+pub mod run;
+pub mod trial;

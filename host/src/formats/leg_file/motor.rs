@@ -1,0 +1,240 @@
+//! Keys `[joint.motor]` and `supply` of a complete drive.
+//!
+//! The magnets' flux is not a key. It follows from the torque constant:
+//! `torque_per_ampere = 1.5 pole_pairs flux ratio`. Both drives of a leg thus make the same torque
+//! from the same current. Bridge, shunts and converter are those of the board
+//! ([`hal_sim::drive::description`]).
+
+use hal_sim::drive::description::{
+    AxisDescription, BridgeDescription, CompleteDescription, CounterDescription, MotorDescription,
+    ShuntDescription, SupplyDescription, Wiring,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::formats::leg_file::check::{Fault, Place};
+use crate::formats::leg_file::{JointFile, LegFile, LegFileError, Side};
+
+/// Least time constant of a winding, s; below it the board cannot measure an inductance within its
+/// PWM periods.
+const LEAST_TIME_CONSTANT_S: f64 = 80e-6;
+/// Range of the supply voltage without load, V. The board's bridges switch from 20 V on, and its
+/// brake resistor begins to conduct at 50 V.
+const SUPPLY_V: [f64; 2] = [22.0, 50.0];
+/// Range of a 16-bit counter.
+const MOST_COUNTS: u32 = 1 << 16;
+
+/// Motor of a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MotorFile {
+    /// Electrical turns per turn of the rotor.
+    pub pole_pairs: u32,
+    /// Resistance of one phase, ohm.
+    pub resistance_ohm: f64,
+    /// Inductance along the magnets' axis, microhenry.
+    pub inductance_d_uh: f64,
+    /// Inductance across the magnets' axis, microhenry.
+    pub inductance_q_uh: f64,
+    /// Peak of the cogging torque at the rotor, N m.
+    #[serde(default)]
+    pub cogging_nm: f64,
+    /// Periods of the cogging torque per turn.
+    #[serde(default = "default_cogging_periods")]
+    pub cogging_periods: u32,
+    /// Electrical angle at the joint's anatomical zero, degrees.
+    #[serde(default)]
+    pub electrical_zero_deg: f64,
+    /// Rotor angle of the encoder's index pulse, degrees.
+    #[serde(default)]
+    pub index_deg: f64,
+    /// Thermal resistance from winding to ambient, K/W.
+    #[serde(default = "default_thermal_resistance")]
+    pub thermal_resistance_k_w: f64,
+    /// Thermal time constant of the winding, s.
+    #[serde(default = "default_thermal_time")]
+    pub thermal_time_s: f64,
+}
+
+fn default_cogging_periods() -> u32 {
+    84
+}
+
+fn default_thermal_resistance() -> f64 {
+    1.0
+}
+
+fn default_thermal_time() -> f64 {
+    300.0
+}
+
+/// Supply of the board.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupplyFile {
+    /// Voltage without load, V.
+    pub voltage_v: f64,
+    /// Resistance of source and cable, ohm.
+    pub resistance_ohm: f64,
+    /// Capacitance of the bus, microfarad.
+    pub capacitance_uf: f64,
+    /// Brake resistor, ohm.
+    pub brake_ohm: f64,
+}
+
+impl Default for SupplyFile {
+    fn default() -> Self {
+        let board = SupplyDescription::default();
+        Self {
+            voltage_v: board.voltage,
+            resistance_ohm: board.resistance,
+            capacitance_uf: 1e6 * board.capacitance,
+            brake_ohm: board.brake_resistance,
+        }
+    }
+}
+
+impl SupplyFile {
+    /// Whether the supply equals the default.
+    #[must_use]
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Description of the simulated supply.
+    #[must_use]
+    pub fn description(&self) -> SupplyDescription {
+        SupplyDescription {
+            voltage: self.voltage_v,
+            resistance: self.resistance_ohm,
+            capacitance: 1e-6 * self.capacitance_uf,
+            brake_resistance: self.brake_ohm,
+            ..SupplyDescription::default()
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<(), Fault> {
+        let place = Place { joint: None, table: Some("supply") };
+        let [low, high] = SUPPLY_V;
+        if !(low..=high).contains(&self.voltage_v) {
+            let complaint = format!(
+                "is {}, outside {low}..{high}: the board's bridges switch from 20 V on, and from 50 V on its brake resistor would burn what the supply gives",
+                self.voltage_v
+            );
+            return Err(place.fault("voltage_v", &complaint));
+        }
+        place.within("resistance_ohm", self.resistance_ohm, 0.001, 10.0)?;
+        place.within("capacitance_uf", self.capacitance_uf, 50.0, 1e6)?;
+        place.within("brake_ohm", self.brake_ohm, 0.1, 1000.0)
+    }
+}
+
+impl MotorFile {
+    /// Motor of the class of ODrive's D5065 with 270 rpm/V: 8.27/270 = 0.0306 N m/A, 7 pole pairs and 12
+    /// slots, at most 65 A. Resistance and inductance are typical of such outrunners (15..40 mohm, 9..35
+    /// uH). Cogging (1 % of the greatest torque), saliency and thermal values are our assumptions.
+    pub const D5065_CLASS: Self = Self {
+        pole_pairs: 7,
+        resistance_ohm: 0.039,
+        inductance_d_uh: 15.0,
+        inductance_q_uh: 17.0,
+        cogging_nm: 0.017,
+        cogging_periods: 84,
+        electrical_zero_deg: 40.0,
+        index_deg: 0.0,
+        thermal_resistance_k_w: 1.0,
+        thermal_time_s: 300.0,
+    };
+
+    pub(super) fn check(&self, number: usize, joint: &JointFile) -> Result<(), Fault> {
+        let place = Place { joint: Some((number, &joint.name)), table: Some("motor") };
+        place.within("pole_pairs", f64::from(self.pole_pairs), 1.0, 64.0)?;
+        place.within("resistance_ohm", self.resistance_ohm, 0.001, 10.0)?;
+        let millisecond = 1e3 * LEAST_TIME_CONSTANT_S;
+        for (key, inductance) in
+            [("inductance_d_uh", self.inductance_d_uh), ("inductance_q_uh", self.inductance_q_uh)]
+        {
+            place.within(key, inductance, 1.0, 1e5)?;
+            if inductance * 1e-6 / self.resistance_ohm < LEAST_TIME_CONSTANT_S {
+                let complaint = format!(
+                    "is {inductance}: with {} ohm its time constant is below {millisecond} ms, in which the board cannot measure it",
+                    self.resistance_ohm
+                );
+                return Err(place.fault(key, &complaint));
+            }
+        }
+        place.within("cogging_nm", self.cogging_nm, 0.0, 10.0)?;
+        place.within("cogging_periods", f64::from(self.cogging_periods), 1.0, 10_000.0)?;
+        place.within("electrical_zero_deg", self.electrical_zero_deg, -360.0, 360.0)?;
+        place.within("index_deg", self.index_deg, -360.0, 360.0)?;
+        place.within("thermal_resistance_k_w", self.thermal_resistance_k_w, 0.01, 100.0)?;
+        place.within("thermal_time_s", self.thermal_time_s, 1.0, 1e5)?;
+        let whole = Place { joint: place.joint, table: None };
+        if joint.encoder.side != Side::Motor || joint.encoder.counts > MOST_COUNTS {
+            let complaint = format!("needs an encoder at the motor with at most {MOST_COUNTS} counts");
+            return Err(whole.fault("motor", &complaint));
+        }
+        let flux = self.flux(joint);
+        if !(1e-4..=1.0).contains(&flux) {
+            let complaint = format!(
+                "has a flux of {flux:.6} V s by torque_per_ampere, pole_pairs and encoder.ratio, outside 0.0001..1"
+            );
+            return Err(whole.fault("motor", &complaint));
+        }
+        Ok(())
+    }
+
+    /// Flux linkage of the magnets, V s.
+    #[must_use]
+    pub fn flux(&self, joint: &JointFile) -> f64 {
+        joint.torque_per_ampere / (1.5 * f64::from(self.pole_pairs) * joint.encoder.ratio)
+    }
+
+    /// Description of the simulated axis.
+    #[must_use]
+    pub fn axis(&self, joint: &JointFile) -> AxisDescription {
+        AxisDescription {
+            motor: MotorDescription {
+                resistance: self.resistance_ohm,
+                inductance_d: 1e-6 * self.inductance_d_uh,
+                inductance_q: 1e-6 * self.inductance_q_uh,
+                flux: self.flux(joint),
+                pole_pairs: self.pole_pairs,
+                electrical_zero: self.electrical_zero_deg.to_radians(),
+                cogging: self.cogging_nm,
+                cogging_periods: self.cogging_periods,
+                thermal_resistance: self.thermal_resistance_k_w,
+                thermal_time: self.thermal_time_s,
+            },
+            bridge: BridgeDescription::default(),
+            shunts: ShuntDescription::default(),
+            counter: CounterDescription {
+                counts: f64::from(joint.encoder.counts),
+                start: 0,
+                index: self.index_deg.to_radians(),
+            },
+            wiring: Wiring::default(),
+            ratio: joint.encoder.ratio,
+        }
+    }
+}
+
+impl LegFile {
+    /// Complete drives of the simulated leg. Fails if the leg does not have `N` joints or a joint
+    /// has no motor.
+    pub fn complete_description<const N: usize>(&self) -> Result<CompleteDescription<N>, LegFileError> {
+        let refused = |reason: String| LegFileError::of_file(&self.name, reason);
+        let mut axes = Vec::with_capacity(N);
+        for joint in &self.joints {
+            let motor = joint.motor.as_ref().ok_or_else(|| {
+                refused(format!(
+                    "joint `{}` has no `[joint.motor]`: its complete drive cannot be simulated",
+                    joint.name
+                ))
+            })?;
+            axes.push(motor.axis(joint));
+        }
+        let count = axes.len();
+        let axes = axes.try_into().map_err(|_| refused(format!("has {count} joints, not {N}")))?;
+        Ok(CompleteDescription::new(axes, self.supply.description()))
+    }
+}

@@ -1,0 +1,229 @@
+//! Recordings of a leg's motion: time, angle and torque of each joint, read from CSV and checked.
+//!
+//! An identification is only as good as its input, and the recording machine is unknown. Nothing is
+//! repaired silently. Invalid data are rejected with file, line and reason; plausible data pass
+//! unchanged ([`resample`](crate::run::resample) makes them uniform).
+//!
+//! Format: a header, then one row per sample. Columns are found by name, in any order; others are ignored.
+//!
+//! | column | unit | range |
+//! | --- | --- | --- |
+//! | `t_s` | s, strictly increasing, within +-1e10 s | see below |
+//! | `q1_rad`, `q2_rad`, .. | rad, proximal joint first | within +-1000 rad |
+//! | `tau1_Nm`, `tau2_Nm`, .. | N m at the joint | within +-100 kN m |
+//!
+//! The median time step corresponds to at least 10 Hz. No step exceeds 0.1 s or 20 median steps,
+//! whichever is longer.
+//!
+//! Limits: swapped columns, or a command recorded as a measurement, look like any other numbers
+//! here; only the fit can detect them. Cost: 16 bytes per joint and sample and 16 per sample.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use csv::StringRecord;
+
+pub mod columns;
+mod fault;
+
+use columns::{Column, for_each_row, line_at, read_text, refuse};
+pub use fault::{Fault, RecordingError};
+
+/// Least number of samples of a recording.
+pub const MINIMUM_SAMPLES: usize = 50;
+/// Least duration of a recording, s.
+pub const MINIMUM_DURATION_S: f64 = 1.0;
+/// Least median rate, Hz.
+pub const MINIMUM_RATE_HZ: f64 = 10.0;
+/// Tolerance on the rate for rounded time stamps.
+const RATE_TOLERANCE: f64 = 1.001;
+/// Time step up to which there is no gap, s.
+pub const LARGEST_STEP_S: f64 = 0.1;
+/// Median steps up to which there is no gap either.
+pub const LARGEST_STEP_IN_MEDIANS: f64 = 20.0;
+/// Largest plausible time stamp, s: seconds since 1970 are 2e9, and a microsecond is still resolved there.
+pub const LARGEST_TIME_S: f64 = 1.0e10;
+/// Largest plausible angle, rad; larger ones are in another unit.
+pub const LARGEST_POSITION_RAD: f64 = 1.0e3;
+/// Largest plausible torque, N m; larger ones are in another unit.
+pub const LARGEST_TORQUE_NM: f64 = 1.0e5;
+
+/// Recorded signals of one joint: one entry per sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointSeries {
+    /// Angle, rad.
+    pub position_rad: Vec<f64>,
+    /// Torque at the joint, N m.
+    pub torque_nm: Vec<f64>,
+}
+
+/// Recorded motion: every list is as long as `time_s`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Source file.
+    pub file: PathBuf,
+    /// Time stamps, s, strictly increasing, with the recorder's jitter and offset.
+    pub time_s: Vec<f64>,
+    /// Joints, proximal first.
+    pub joints: Vec<JointSeries>,
+    /// Number of joints in the file; more than `joints` if fewer were requested.
+    pub joints_in_file: usize,
+}
+
+impl Recording {
+    /// Reads the first `joints` joints of a CSV file.
+    pub fn read(file: &Path, joints: usize) -> Result<Self, RecordingError> {
+        Self::parse(file, &read_text(file)?, joints)
+    }
+
+    /// Reads the first `joints` joints of a CSV text; `file` is used only in error messages.
+    pub fn parse(file: &Path, text: &str, joints: usize) -> Result<Self, RecordingError> {
+        let mut recording = Self {
+            file: file.to_owned(),
+            time_s: Vec::new(),
+            joints: vec![JointSeries::default(); joints],
+            joints_in_file: 0,
+        };
+        let mut joints_in_file = 0;
+        let offsets = for_each_row(
+            file,
+            text,
+            |header| {
+                let found = Columns::find(header, joints)?;
+                joints_in_file = found.joints_in_file;
+                Ok(found)
+            },
+            |columns, row| recording.push(columns, row),
+        )?;
+        recording.joints_in_file = joints_in_file;
+        recording.check_rate()?;
+        recording.check_gaps().map_err(|(sample, fault)| {
+            let line = offsets.get(sample).map(|&offset| line_at(text, offset));
+            refuse(file, line, fault)
+        })?;
+        recording.check_length()?;
+        Ok(recording)
+    }
+
+    /// Time from the first sample to the last, s.
+    pub fn duration_s(&self) -> f64 {
+        match (self.time_s.first(), self.time_s.last()) {
+            (Some(first), Some(last)) => last - first,
+            _ => 0.0,
+        }
+    }
+
+    /// Median time between two samples, s; zero for fewer than two samples.
+    pub fn median_step_s(&self) -> f64 {
+        let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// Splits at a fraction (0 to 1) of the duration; fails if a part is too short for a recording.
+    pub fn split(&self, fraction: f64) -> Result<(Self, Self), RecordingError> {
+        let border = self.time_s.first().copied().unwrap_or(0.0) + fraction * self.duration_s();
+        let at = self.time_s.partition_point(|&time| time < border);
+        let part = |range: std::ops::Range<usize>| Self {
+            file: self.file.clone(),
+            time_s: self.time_s[range.clone()].to_vec(),
+            joints: self
+                .joints
+                .iter()
+                .map(|joint| JointSeries {
+                    position_rad: joint.position_rad[range.clone()].to_vec(),
+                    torque_nm: joint.torque_nm[range.clone()].to_vec(),
+                })
+                .collect(),
+            joints_in_file: self.joints_in_file,
+        };
+        let (first, second) = (part(0..at), part(at..self.time_s.len()));
+        first.check_length()?;
+        second.check_length()?;
+        Ok((first, second))
+    }
+
+    /// Writes the format of [`Recording::parse`] with the digits that restore every number exactly.
+    pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        write!(out, "t_s")?;
+        (1..=self.joints.len()).try_for_each(|joint| write!(out, ",q{joint}_rad"))?;
+        (1..=self.joints.len()).try_for_each(|joint| write!(out, ",tau{joint}_Nm"))?;
+        writeln!(out)?;
+        for (sample, time) in self.time_s.iter().enumerate() {
+            write!(out, "{time}")?;
+            self.joints.iter().try_for_each(|joint| write!(out, ",{}", joint.position_rad[sample]))?;
+            self.joints.iter().try_for_each(|joint| write!(out, ",{}", joint.torque_nm[sample]))?;
+            writeln!(out)?;
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, columns: &Columns, row: &StringRecord) -> Result<(), Fault> {
+        let time = columns.time.number(row, LARGEST_TIME_S)?;
+        if let Some(&previous) = self.time_s.last()
+            && time <= previous
+        {
+            return Err(Fault::TimeNotIncreasing { previous, time });
+        }
+        self.time_s.push(time);
+        for (joint, (position, torque)) in self.joints.iter_mut().zip(&columns.joints) {
+            joint.position_rad.push(position.number(row, LARGEST_POSITION_RAD)?);
+            joint.torque_nm.push(torque.number(row, LARGEST_TORQUE_NM)?);
+        }
+        Ok(())
+    }
+
+    /// Rejects stamps in another unit before they are put on a grid of seconds, which would take gigabytes.
+    fn check_rate(&self) -> Result<(), RecordingError> {
+        let step_s = self.median_step_s();
+        if step_s * MINIMUM_RATE_HZ <= RATE_TOLERANCE {
+            return Ok(());
+        }
+        let counts = self.time_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
+        Err(refuse(&self.file, None, Fault::TooSlow { step_s, counts }))
+    }
+
+    /// First gap, with the number of the sample after it.
+    fn check_gaps(&self) -> Result<(), (usize, Fault)> {
+        let limit = LARGEST_STEP_S.max(LARGEST_STEP_IN_MEDIANS * self.median_step_s());
+        let step = |sample: usize| self.time_s[sample] - self.time_s[sample - 1];
+        match (1..self.time_s.len()).find(|&sample| step(sample) > limit) {
+            Some(sample) => Err((sample, Fault::Gap { gap: step(sample), limit })),
+            None => Ok(()),
+        }
+    }
+
+    fn check_length(&self) -> Result<(), RecordingError> {
+        let (samples, duration) = (self.time_s.len(), self.duration_s());
+        if samples < MINIMUM_SAMPLES || duration < MINIMUM_DURATION_S {
+            return Err(refuse(&self.file, None, Fault::TooShort { samples, duration }));
+        }
+        Ok(())
+    }
+}
+
+/// Column positions of all signals.
+struct Columns {
+    time: Column,
+    /// Columns of angle and torque of each joint.
+    joints: Vec<(Column, Column)>,
+    joints_in_file: usize,
+}
+
+impl Columns {
+    fn find(header: &StringRecord, joints: usize) -> Result<Self, Fault> {
+        let names = |joint: usize| [format!("q{joint}_rad"), format!("tau{joint}_Nm")];
+        let needed: Vec<String> =
+            std::iter::once("t_s".to_owned()).chain((1..=joints).flat_map(names)).collect();
+        let pair = |joint: usize| -> Result<(Column, Column), Fault> {
+            let [position, torque] = names(joint);
+            let position = Column::find(header, position, &needed)?;
+            Ok((position, Column::find(header, torque, &needed)?))
+        };
+        Ok(Self {
+            time: Column::find(header, "t_s".to_owned(), &needed)?,
+            joints: (1..=joints).map(pair).collect::<Result<_, _>>()?,
+            joints_in_file: (1..=header.len()).take_while(|&joint| pair(joint).is_ok()).count(),
+        })
+    }
+}

@@ -1,0 +1,204 @@
+//! Errors of recordings: every rejection in plain words, with its position.
+
+use std::path::PathBuf;
+use std::{fmt, io};
+
+use crate::base::error::ToolError;
+use crate::formats::recording::{MINIMUM_DURATION_S, MINIMUM_RATE_HZ, MINIMUM_SAMPLES};
+
+/// Reason why a file is not a recording, with its position. Displays as `file:line: reason`.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{}: {fault}", .file.display(), LineSuffix(*.line))]
+pub struct RecordingError {
+    /// File as named.
+    pub file: PathBuf,
+    /// Line, from 1, header included; `None` for the whole file.
+    pub line: Option<usize>,
+    /// The reason.
+    pub fault: Fault,
+}
+
+/// Fault of a recording, in plain words.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault {
+    /// The file cannot be opened or read.
+    #[error("cannot be read ({0})")]
+    Unreadable(io::Error),
+    /// The bytes are not UTF-8.
+    #[error("not a text file")]
+    NotText,
+    /// The file is empty or has blank lines only.
+    #[error("the file is empty")]
+    Empty,
+    /// Invalid CSV, for example an unclosed quotation mark.
+    #[error("not a CSV file ({0})")]
+    NotCsv(csv::Error),
+    /// The header lacks a column that the leg needs.
+    #[error("the header has no column `{column}`; its columns are: {}{}; needed are: {needed}",
+        Excerpt(.present), Separator(.present))]
+    MissingColumn {
+        /// Requested name.
+        column: String,
+        /// Names in the header.
+        present: String,
+        /// All names that are needed.
+        needed: String,
+    },
+    /// Two columns have the same name, which is ambiguous.
+    #[error("the header has the column `{0}` twice")]
+    RepeatedColumn(String),
+    /// A truncated line, decimal commas, or a line of another file.
+    #[error("{found} fields, but the header has {expected}: {}",
+        if .found < .expected { "is the line truncated?" } else { "are these decimal commas?" })]
+    FieldCount {
+        /// Fields in this line.
+        found: usize,
+        /// Fields in the header.
+        expected: usize,
+    },
+    /// The field is empty or not a number.
+    #[error("`{}` in column `{column}` is not a number", Excerpt(.text))]
+    NotANumber {
+        /// Column name.
+        column: String,
+        /// Field as written in the file.
+        text: String,
+    },
+    /// The number is `NaN` or infinite.
+    #[error("`{}` in column `{column}` is not finite", Excerpt(.text))]
+    NotFinite {
+        /// Column name.
+        column: String,
+        /// Field as written in the file.
+        text: String,
+    },
+    /// The number is beyond any leg's range.
+    #[error("{} in column `{column}` is beyond {}: is it in another unit?", Short(*.value), Short(*.limit))]
+    Absurd {
+        /// Column name.
+        column: String,
+        /// The number.
+        value: f64,
+        /// Largest magnitude accepted.
+        limit: f64,
+    },
+    /// The numbers are finite, but their torque is not.
+    #[error("the torque of this state is beyond the range of the numbers computed with")]
+    OutOfRange,
+    /// Time does not increase.
+    #[error("time {} from {} s to {} s",
+        if *.time < *.previous { "goes back" } else { "stands still" }, Short(*.previous), Short(*.time))]
+    TimeNotIncreasing {
+        /// Previous stamp.
+        previous: f64,
+        /// Stamp of this line.
+        time: f64,
+    },
+    /// Samples are missing.
+    #[error("{gap:.3} s without a sample before this line; at most {limit:.3} s are bridged")]
+    Gap {
+        /// Duration of the gap, s.
+        gap: f64,
+        /// Longest accepted gap in this recording, s.
+        limit: f64,
+    },
+    /// Most samples are too far apart.
+    #[error(
+        "the median step of `t_s` is {} s, which is {} Hz; at least {MINIMUM_RATE_HZ} Hz are needed. `t_s` is in seconds{}",
+        Short(*.step_s), rounded(1.0 / .step_s), OtherUnit(*.step_s, *.counts)
+    )]
+    TooSlow {
+        /// Median time between two samples, s.
+        step_s: f64,
+        /// Whether each stamp is one more than the previous one.
+        counts: bool,
+    },
+    /// The recording is too short for an identification.
+    #[error(
+        "too short: {samples} samples over {duration:.3} s, but at least {MINIMUM_SAMPLES} over {MINIMUM_DURATION_S} s are needed"
+    )]
+    TooShort {
+        /// Number of samples.
+        samples: usize,
+        /// Time from first to last sample, s.
+        duration: f64,
+    },
+}
+
+/// Suffix `:12` of the file's name, or nothing.
+struct LineSuffix(Option<usize>);
+
+impl fmt::Display for LineSuffix {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.map_or(Ok(()), |line| write!(formatter, ":{line}"))
+    }
+}
+
+/// Limit of characters of a file in a message: the file may be of any kind and size.
+const EXCERPT: usize = 200;
+
+/// Excerpt of a file on one line.
+struct Excerpt<'a>(&'a str);
+
+impl fmt::Display for Excerpt<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for character in self.0.chars().take(EXCERPT) {
+            if character.is_control() {
+                write!(formatter, "{}", character.escape_default())?;
+            } else {
+                write!(formatter, "{character}")?;
+            }
+        }
+        if self.0.chars().nth(EXCERPT).is_some() { formatter.write_str(" ..") } else { Ok(()) }
+    }
+}
+
+/// Hint for a header of a single column with another separator in it.
+struct Separator<'a>(&'a str);
+
+impl fmt::Display for Separator<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.0.contains(',') && self.0.contains([';', '\t']) {
+            formatter.write_str(" (columns are separated by commas, numbers written with points)")
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// Units of time that recorders use, in seconds.
+const UNITS: [(&str, f64); 3] = [("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)];
+
+/// Unit in which these stamps would be a valid recording, if any.
+struct OtherUnit(f64, bool);
+
+impl fmt::Display for OtherUnit {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rates = UNITS.map(|(unit, second)| (unit, 1.0 / (self.0 * second)));
+        let Some((unit, rate)) = rates.into_iter().find(|(_, rate)| *rate >= MINIMUM_RATE_HZ) else {
+            return Ok(());
+        };
+        let or_numbers = if self.1 { " or sample numbers" } else { "" };
+        write!(formatter, ": are these {unit}{or_numbers}? In {unit} it would be {} Hz", rounded(rate))
+    }
+}
+
+/// Rounds to four digits.
+fn rounded(rate: f64) -> f64 {
+    format!("{rate:.3e}").parse().unwrap_or(rate)
+}
+
+/// Short form of a number without hundreds of digits.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.abs() < 1e7 { write!(formatter, "{}", self.0) } else { write!(formatter, "{:e}", self.0) }
+    }
+}
+
+impl From<RecordingError> for ToolError {
+    fn from(error: RecordingError) -> Self {
+        Self::Input(error.to_string())
+    }
+}

@@ -1,0 +1,234 @@
+//! Evaluates a crash of the emulated board (`cargo emulate --crash`).
+//!
+//! Two sources: the records of three starts (before the crash, after it, after one more reset), and
+//! the emulator's log. The log contains every exception, reset, and write to a timer that the
+//! emulator does not model (the bridges' timers), in order.
+//!
+//! Requirements:
+//!
+//! - Before the crash the drive was enabled and the leg identifying.
+//! - Between the first write that switches a bridge off and the reset no exception was taken, so no current
+//!   loop could switch it on again.
+//! - The bridges were off within 10 us of emulated time.
+//! - The next start reports this crash and refuses to enable until the operator resets.
+//! - The start after that no longer reports it.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use object::{Object, ObjectSymbol};
+use scarab::trace::Line;
+
+use crate::base::error::ToolError;
+
+/// Kind of crash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum CrashKind {
+    /// Index out of range at thread level.
+    Panic,
+    /// Read of unmapped memory in the servo's interrupt.
+    HardFault,
+    /// Endless recursion at thread level.
+    StackOverflow,
+    /// Interrupt without a handler.
+    Interrupt,
+}
+
+impl CrashKind {
+    /// Word on the command line and in records.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Panic => "panic",
+            Self::HardFault => "hard_fault",
+            Self::StackOverflow => "stack_overflow",
+            Self::Interrupt => "interrupt",
+        }
+    }
+}
+
+/// Registers of the main outputs, as named in the emulator's log.
+const RELEASES: [&str; 2] = ["timer[1]: unimplemented device write", "timer[8]: unimplemented device write"];
+const RESET: &str = "CPU Reset";
+const EXCEPTION: &str = "Taking exception";
+/// Limit between exception and outputs off, as a fraction of a second.
+const LIMIT_PER_S: u32 = 100_000;
+
+/// Crash as seen by the emulator.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Witness {
+    /// Whether both bridges were switched off.
+    pub released: bool,
+    /// Exceptions between the first switch-off and the reset.
+    pub exceptions: u32,
+    /// Resets after that, including the crash's own.
+    pub resets: u32,
+}
+
+impl Witness {
+    /// Reads the emulator's log.
+    #[must_use]
+    pub fn of(log: &str) -> Self {
+        let mut seen = [false; 2];
+        let mut witness = Self::default();
+        for line in log.lines() {
+            for (seen, release) in seen.iter_mut().zip(RELEASES) {
+                *seen |= line.starts_with(release);
+            }
+            witness.resets += u32::from(seen[0] && line.starts_with(RESET));
+            witness.exceptions += u32::from(seen[0] && witness.resets == 0 && line.starts_with(EXCEPTION));
+        }
+        witness.released = seen == [true; 2];
+        witness
+    }
+}
+
+/// Result of a crash.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CrashReport {
+    /// Reported cause.
+    pub cause: String,
+    /// File and line, function, or number of the interrupt.
+    pub place: String,
+    /// Instructions from just before the crash until both bridges are off.
+    pub released_after: u32,
+    /// Instructions until the record is complete.
+    pub kept_after: u32,
+    /// Violated requirements.
+    pub complaints: Vec<String>,
+}
+
+impl CrashReport {
+    /// Evaluates the records as lines, the emulator's log, and the clock at the start of the crash.
+    pub fn new(
+        kind: CrashKind,
+        records: &str,
+        log: &str,
+        begun: u32,
+        image: &Path,
+    ) -> Result<Self, ToolError> {
+        let starts = starts(records);
+        let [before, after, again] = starts.as_slice() else {
+            return Err(ToolError::input(format!(
+                "the image started {} times: before the crash, after it and once more were expected",
+                starts.len()
+            )));
+        };
+        let [crash] = all(after, "crash")[..] else {
+            return Err(ToolError::input("the start after the crash tells none, or more than one"));
+        };
+        let lacks = |key: &str| ToolError::input(format!("the record of the crash lacks `{key}`"));
+        let clock = |key: &'static str| crash.value::<u32>(key).map_err(|_| lacks(key));
+        let (released, kept) = (clock("released")?, clock("kept")?);
+        let cause = crash.text("cause").map_err(|_| lacks("cause"))?.to_owned();
+        let mut report = Self {
+            cause,
+            place: place(kind, &crash, image)?,
+            released_after: released.wrapping_sub(begun),
+            kept_after: kept.wrapping_sub(begun),
+            complaints: Vec::new(),
+        };
+        let clock_hz =
+            all(after, "board").first().and_then(|board| board.value("clock_hz").ok()).unwrap_or(0);
+        let witness = Witness::of(log);
+        let expected = [
+            (report.cause == kind.name(), "the cause that is told is another"),
+            (is_identifying(before), "the leg was not identifying when it crashed"),
+            (all(before, "crash").is_empty(), "a crash is told before there was one"),
+            (witness.released, "the emulator saw no release of both bridges"),
+            (witness.exceptions == 0, "the emulator saw exceptions between release and reset"),
+            (witness.resets == 2, "the emulator saw another number of resets than two"),
+            (report.released_after < clock_hz / LIMIT_PER_S, "the release took longer than 10 us"),
+            (released < kept, "the release came after the record"),
+            (is_refused(after), "the drive was not refused before the fault was reset"),
+            (is_identifying(after), "the drive was not enabled after the fault was reset"),
+            (all(again, "crash").is_empty(), "the crash is told a second time"),
+            (is_identifying(again) && !is_refused(again), "the drive is refused without a crash"),
+        ];
+        let missed = expected.iter().filter(|(held, _)| !held);
+        report.complaints = missed.map(|(_, complaint)| (*complaint).to_owned()).collect();
+        Ok(report)
+    }
+
+    /// Summary in a few lines.
+    #[must_use]
+    pub fn lines(&self) -> String {
+        let Self { cause, place, released_after, kept_after, complaints } = self;
+        let mut text = format!(
+            "\n{cause}: {place}\nbridges off {released_after} instructions after it was begun, record complete {kept_after}; no \
+             exception was taken between release and reset\n"
+        );
+        if complaints.is_empty() {
+            text += "the next start reported it and refused to enable until the fault was reset; the start after that had no record of it\n";
+        } else {
+            text.truncate(text.find("; no exception").unwrap_or(text.len()));
+            text.push('\n');
+        }
+        for complaint in complaints {
+            let _ = writeln!(text, "NOT AS IT HAS TO BE: {complaint}");
+        }
+        text
+    }
+}
+
+/// Records of each start.
+fn starts(records: &str) -> Vec<Vec<Line<'_>>> {
+    let mut starts: Vec<Vec<Line<'_>>> = Vec::new();
+    for line in records.lines().filter_map(|line| Line::parse(line).ok()) {
+        if line.kind() == "boot" {
+            starts.push(Vec::new());
+        }
+        if let Some(start) = starts.last_mut() {
+            start.push(line);
+        }
+    }
+    starts
+}
+
+fn all<'a>(start: &[Line<'a>], kind: &str) -> Vec<Line<'a>> {
+    start.iter().filter(|line| line.kind() == kind).copied().collect()
+}
+
+/// Whether the drive was enabled and identifying at the end.
+fn is_identifying(start: &[Line<'_>]) -> bool {
+    all(start, "state").last().is_some_and(|state| {
+        state.text("drive") == Ok("operation_enabled") && state.text("activity") == Ok("identify")
+    })
+}
+
+/// Whether the inhibit reason was reported before any enabling, and the request refused.
+fn is_refused(start: &[Line<'_>]) -> bool {
+    let told = all(start, "refused").iter().any(|refused| refused.text("why") == Ok("crash"));
+    let mut until = start.iter().take_while(|line| line.text("drive") != Ok("operation_enabled"));
+    told && until.any(|line| line.kind() == "request" && line.text("accepted") == Ok("false"))
+}
+
+/// Location of the crash.
+fn place(kind: CrashKind, crash: &Line<'_>, image: &Path) -> Result<String, ToolError> {
+    let text = |key: &'static str| crash.text(key).unwrap_or("?").to_owned();
+    let function = |key: &'static str| function(crash.hex(key).unwrap_or(0), image);
+    Ok(match kind {
+        CrashKind::Panic => format!("{} line {}", text("file"), text("line")),
+        CrashKind::HardFault => format!("in {}, address {}", function("pc")?, text("address")),
+        CrashKind::StackOverflow => format!("called from {}, address {}", function("lr")?, text("address")),
+        CrashKind::Interrupt => format!("number {}", crash.hex("status").unwrap_or(0)),
+    })
+}
+
+/// Function that contains an address.
+fn function(address: u32, image: &Path) -> Result<String, ToolError> {
+    let wrong = |error: &dyn std::fmt::Display| ToolError::input(format!("{}: {error}", image.display()));
+    let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
+    let file = object::File::parse(&*bytes).map_err(|error| wrong(&error))?;
+    // The lowest bit is set in addresses of Thumb functions and in return addresses.
+    let address = u64::from(address & !1);
+    let found = file.symbols().find(|symbol| {
+        symbol.kind() == object::SymbolKind::Text
+            && (symbol.address() & !1..(symbol.address() & !1) + symbol.size()).contains(&address)
+    });
+    Ok(found.map_or_else(
+        || format!("no function ({address:#010x})"),
+        |symbol| format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or("?"))),
+    ))
+}

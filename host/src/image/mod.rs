@@ -1,0 +1,14 @@
+//! Flash image on the host: its leg, build and size, and flashing.
+//!
+//! | module | contents |
+//! | --- | --- |
+//! | [`leg_source`] | a leg file as the constant of an image |
+//! | [`build`] | the build, by `scripts/firmware-build`; flashing by `probe-rs` |
+//! | [`size`] | sections, memory, largest symbols, and the goals |
+//! | [`panics`] | locations at which an image can panic, and those within its interrupts |
+
+pub mod build;
+pub mod emulate;
+pub mod leg_source;
+pub mod panics;
+pub mod size;

@@ -1,0 +1,194 @@
+//! Size of an image in flash and memory, and its largest parts.
+
+use std::path::Path;
+
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SymbolKind};
+use serde::Serialize;
+
+use crate::base::error::ToolError;
+use crate::base::text_table::headed;
+
+/// Flash limit of an image, bytes: a quarter of the chip's. Speed has priority over size
+/// (docs/board.md, section 1).
+pub const FLASH_GOAL: u64 = 256 * 1024;
+/// Memory limit of its variables, bytes, without the stack and the core-coupled memory.
+pub const MEMORY_GOAL: u64 = 48 * 1024;
+/// Size of the core-coupled memory, bytes.
+pub const CORE_COUPLED: u64 = 64 * 1024;
+/// Number of listed symbols.
+const LARGEST: usize = 20;
+
+/// Base addresses of flash and core-coupled memory.
+const FLASH_BASE: u64 = 0x0800_0000;
+const CORE_COUPLED_BASE: u64 = 0x1000_0000;
+const MEMORY_BASE: u64 = 0x2000_0000;
+/// Flag of a section that is loaded or cleared (ELF, SHF_ALLOC).
+const ALLOCATED: u64 = 2;
+
+/// One section.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Section {
+    /// Name, for example `.text`.
+    pub name: String,
+    /// Bytes.
+    pub bytes: u64,
+    /// Bytes in flash.
+    pub flash: u64,
+    /// Bytes in memory.
+    pub memory: u64,
+    /// Bytes in core-coupled memory.
+    pub core_coupled: u64,
+}
+
+/// One symbol.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Symbol {
+    /// Name as in the source.
+    pub name: String,
+    /// Bytes.
+    pub bytes: u64,
+}
+
+/// Size of an image.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ImageSize {
+    /// Sections in the order of their addresses.
+    pub sections: Vec<Section>,
+    /// Largest functions and constants.
+    pub code: Vec<Symbol>,
+    /// Largest variables.
+    pub variables: Vec<Symbol>,
+    /// Stack reserved by the image, bytes.
+    pub stack: u64,
+}
+
+impl ImageSize {
+    /// Reads the size of an image.
+    pub fn of(image: &Path) -> Result<Self, ToolError> {
+        let wrong = |error: &dyn std::fmt::Display| ToolError::input(format!("{}: {error}", image.display()));
+        let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
+        let file = object::File::parse(&*bytes).map_err(|error| wrong(&error))?;
+        let mut sections: Vec<(u64, Section)> = file.sections().filter_map(|found| section(&found)).collect();
+        sections.sort_by_key(|(address, _)| *address);
+        let mut code = Vec::new();
+        let mut variables = Vec::new();
+        for symbol in file.symbols().filter(|symbol| symbol.size() > 0) {
+            let name = format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or("?")));
+            let entry = Symbol { name, bytes: symbol.size() };
+            match (symbol.kind(), symbol.address()) {
+                (SymbolKind::Text, _) => code.push(entry),
+                (SymbolKind::Data, FLASH_BASE..CORE_COUPLED_BASE) => code.push(entry),
+                (SymbolKind::Data, _) => variables.push(entry),
+                _ => {}
+            }
+        }
+        for list in [&mut code, &mut variables] {
+            list.sort_by(|one, other| other.bytes.cmp(&one.bytes).then_with(|| one.name.cmp(&other.name)));
+            list.truncate(LARGEST);
+        }
+        let address =
+            |name: &str| file.symbols().find(|symbol| symbol.name() == Ok(name)).map(|s| s.address());
+        let stack = match (address("_stack_start"), address("_stack_end")) {
+            (Some(top), Some(bottom)) => top.saturating_sub(bottom),
+            _ => 0,
+        };
+        Ok(Self {
+            sections: sections.into_iter().map(|(_, section)| section).collect(),
+            code,
+            variables,
+            stack,
+        })
+    }
+
+    /// Bytes in flash.
+    #[must_use]
+    pub fn flash(&self) -> u64 {
+        self.sections.iter().map(|section| section.flash).sum()
+    }
+
+    /// Bytes in memory without the stack.
+    #[must_use]
+    pub fn memory(&self) -> u64 {
+        self.sections.iter().map(|section| section.memory).sum()
+    }
+
+    /// Bytes in core-coupled memory.
+    #[must_use]
+    pub fn core_coupled(&self) -> u64 {
+        self.sections.iter().map(|section| section.core_coupled).sum()
+    }
+
+    /// Missed goals, in words.
+    #[must_use]
+    pub fn missed(&self) -> Vec<String> {
+        let goals = [
+            ("flash", self.flash(), FLASH_GOAL),
+            ("memory", self.memory(), MEMORY_GOAL),
+            ("core-coupled memory", self.core_coupled(), CORE_COUPLED),
+        ];
+        let missed = goals.into_iter().filter(|(_, bytes, goal)| bytes > goal);
+        missed.map(|(name, bytes, goal)| format!("{name}: {bytes} bytes, at most {goal} may be")).collect()
+    }
+
+    /// Formats the size as tables.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut sections = headed(&["section", "flash", "memory", "core-coupled"]);
+        let cell = |bytes: u64| if bytes == 0 { String::new() } else { bytes.to_string() };
+        for section in &self.sections {
+            sections.add_row(vec![
+                section.name.clone(),
+                cell(section.flash),
+                cell(section.memory),
+                cell(section.core_coupled),
+            ]);
+        }
+        sections.add_row(vec![
+            "in all".to_owned(),
+            self.flash().to_string(),
+            self.memory().to_string(),
+            self.core_coupled().to_string(),
+        ]);
+        sections.add_row(vec![
+            "at most".to_owned(),
+            FLASH_GOAL.to_string(),
+            MEMORY_GOAL.to_string(),
+            CORE_COUPLED.to_string(),
+        ]);
+        let list = |title: &str, symbols: &[Symbol]| {
+            let mut table = headed(&["bytes", title]);
+            for symbol in symbols {
+                table.add_row(vec![symbol.bytes.to_string(), symbol.name.clone()]);
+            }
+            table.trim_fmt()
+        };
+        format!(
+            "{}\n\nstack set aside: {} bytes\n\n{}\n\n{}\n",
+            sections.trim_fmt(),
+            self.stack,
+            list("largest functions and constants", &self.code),
+            list("largest variables", &self.variables)
+        )
+    }
+}
+
+/// Section that occupies the device; data loaded into memory also occupy flash.
+fn section<'data>(found: &impl ObjectSection<'data>) -> Option<(u64, Section)> {
+    let allocated = match found.flags() {
+        SectionFlags::Elf { sh_flags } => sh_flags & ALLOCATED != 0,
+        _ => false,
+    };
+    let (address, bytes) = (found.address(), found.size());
+    if !allocated || bytes == 0 {
+        return None;
+    }
+    let loaded = found.file_range().is_some_and(|(_, length)| length > 0);
+    let (flash, memory, core_coupled) = match address {
+        FLASH_BASE..CORE_COUPLED_BASE => (bytes, 0, 0),
+        CORE_COUPLED_BASE..MEMORY_BASE => (0, 0, bytes),
+        MEMORY_BASE.. => (if loaded { bytes } else { 0 }, bytes, 0),
+        _ => return None,
+    };
+    let name = found.name().unwrap_or("?").to_owned();
+    Some((address, Section { name, bytes, flash, memory, core_coupled }))
+}

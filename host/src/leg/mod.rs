@@ -1,0 +1,14 @@
+//! A leg file becomes the firmware's configuration, its prior and its plant.
+
+pub mod background;
+pub mod board_words;
+pub mod matching;
+pub mod model_choice;
+pub mod motions;
+pub mod placed_mass;
+pub mod posture;
+pub mod setup;
+pub mod size;
+pub mod states;
+pub mod words;
+pub mod x2;

@@ -1,0 +1,52 @@
+//! Model terms that a leg file asks for, as choices of the firmware.
+
+use scarab::ident::{Choice, Constant, DriveChoice};
+
+use crate::formats::leg_file::{JointFile, Switch};
+
+/// Model requested for one joint by the leg file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    pub rotor: Switch,
+    pub offset: Switch,
+    pub stribeck: Switch,
+    pub asymmetric: Switch,
+}
+
+impl Asked {
+    /// Reads the request of a joint.
+    #[must_use]
+    pub fn of(joint: &JointFile) -> Self {
+        Self {
+            rotor: joint.rotor,
+            offset: joint.offset,
+            stribeck: joint.stribeck_model,
+            asymmetric: joint.asymmetric_coulomb,
+        }
+    }
+}
+
+fn choice(switch: Switch) -> Choice {
+    match switch {
+        Switch::Auto => Choice::Auto,
+        Switch::On => Choice::On,
+        Switch::Off => Choice::Off,
+    }
+}
+
+/// Choice for a joint's rotor and constant column.
+#[must_use]
+pub fn drive_choice(joint: &JointFile) -> DriveChoice {
+    let (constant, meaning) = match (joint.offset, joint.asymmetric_coulomb) {
+        (Switch::Off | Switch::Auto, Switch::On) => (Choice::On, Constant::Asymmetry),
+        (Switch::Off, Switch::Auto) => (Choice::Auto, Constant::Asymmetry),
+        (offset, _) => (choice(offset), Constant::Offset),
+    };
+    DriveChoice { rotor: choice(joint.rotor), constant, meaning }
+}
+
+/// Choice for a joint's Stribeck friction.
+#[must_use]
+pub fn stribeck_choice(joint: &JointFile) -> Choice {
+    choice(joint.stribeck_model)
+}

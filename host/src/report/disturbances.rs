@@ -1,0 +1,83 @@
+//! Reports of excluded data and of Stribeck friction.
+
+use serde::Serialize;
+
+use crate::base::number::Number;
+use crate::base::precision::{plain, sigma, value};
+
+/// Data excluded from the motion identified from.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OutliersReport {
+    /// `robust` or `plain`.
+    pub estimator: &'static str,
+    /// 500 Hz samples accepted.
+    pub samples: u32,
+    /// Isolated outliers among angles and torques of each joint, replaced before the filter.
+    pub replaced: Vec<u32>,
+    /// Share of each joint's rows with less than half of their weight, 0..1.
+    pub disturbed_share: Vec<Number>,
+    /// Longest stretch of such rows of each joint, s.
+    pub longest_s: Vec<Number>,
+    /// Longest stretch in which all joints' rows were disturbed at once, s.
+    pub longest_common_s: Number,
+}
+
+impl OutliersReport {
+    /// One line; `None` for plain least squares.
+    #[must_use]
+    pub fn line(&self) -> Option<String> {
+        if self.estimator == "plain" {
+            return Some("estimator: plain least squares, nothing set aside".into());
+        }
+        let joints: Vec<String> = self
+            .replaced
+            .iter()
+            .zip(&self.disturbed_share)
+            .zip(&self.longest_s)
+            .enumerate()
+            .map(|(joint, ((replaced, share), longest))| {
+                format!(
+                    "joint {}: {replaced} wild samples replaced, {:.1} % of the rows disturbed, {:.2} s at a stretch",
+                    joint + 1,
+                    100.0 * share.known().unwrap_or(f64::NAN),
+                    longest.known().unwrap_or(f64::NAN),
+                )
+            })
+            .collect();
+        Some(format!("set aside of {} samples: {}", self.samples, joints.join("; ")))
+    }
+}
+
+/// Stribeck friction of one joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StribeckReport {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// Static friction above Coulomb friction, N m.
+    pub surplus_nm: Number,
+    /// Standard deviation of the surplus.
+    pub surplus_sigma_nm: Number,
+    /// Speed at which the surplus has fallen to 1/e, rad/s.
+    pub speed_rad_s: Number,
+    /// Standard deviation of the speed.
+    pub speed_sigma_rad_s: Number,
+    /// Chi-square explained by the Stribeck term.
+    pub gain_chi2: Number,
+}
+
+impl StribeckReport {
+    /// One line of text.
+    #[must_use]
+    pub fn line(&self) -> String {
+        format!(
+            "Stribeck friction of joint {}: {} +- {} N m above Coulomb's at rest, fallen to 1/e at {} +- {} rad/s (explains {} \
+             chi-square units)",
+            self.joint,
+            value(self.surplus_nm, self.surplus_sigma_nm),
+            sigma(self.surplus_sigma_nm),
+            value(self.speed_rad_s, self.speed_sigma_rad_s),
+            sigma(self.speed_sigma_rad_s),
+            plain(self.gain_chi2),
+        )
+    }
+}

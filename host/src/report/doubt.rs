@@ -1,0 +1,249 @@
+//! Doubts about a recording, as data and in words.
+
+use serde::Serialize;
+
+use crate::base::number::Number;
+use crate::report::findings::FindingReport;
+
+/// Results of the doubts about a recording.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct DoubtReport {
+    /// Most likely reason of a refusal; `null` where nothing was refused.
+    pub likely_cause: Option<CauseReport>,
+    /// Every direction, whatever its value.
+    pub directions: Vec<DirectionReport>,
+    /// Root mean square misfit of the filtered torque over its noise, for each joint.
+    pub misfit_over_noise: Vec<Number>,
+    /// Parameters that end at a limit of the prior.
+    pub at_prior_limit: Vec<String>,
+    /// Scatter between the recordings identified from.
+    pub recordings: RecordingsReport,
+    /// Bandwidth of the rows.
+    #[serde(flatten)]
+    pub bandwidth: Option<BandwidthReport>,
+}
+
+/// Bandwidth of a replay.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BandwidthReport {
+    /// Frequency at which the low-pass is 3 dB down, Hz.
+    pub bandwidth_hz: f64,
+    /// Whether it was chosen by the encoders' steps.
+    #[serde(rename = "bandwidth_chosen")]
+    pub is_chosen: bool,
+}
+
+impl BandwidthReport {
+    /// Line of the report.
+    fn line(&self) -> String {
+        let hz = self.bandwidth_hz;
+        if self.is_chosen {
+            format!(
+                "bandwidth: {hz} Hz, the largest up to 16 Hz at which the encoders' steps shift no parameter by more than its \
+                 sigma"
+            )
+        } else {
+            format!("bandwidth: {hz} Hz")
+        }
+    }
+}
+
+/// Scatter of the parameters between recordings, by leaving one out.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RecordingsReport {
+    /// Number of recordings identified from.
+    pub count: usize,
+    /// Standard deviation of each base parameter, in their order; empty where it is unknown.
+    pub sigma: Vec<Number>,
+}
+
+impl RecordingsReport {
+    /// Line of the report: whether sigma contains the scatter.
+    #[must_use]
+    pub fn line(&self) -> String {
+        match (self.count, self.sigma.is_empty()) {
+            (0, _) => "sigma does not contain the scatter between recordings: too few rows".into(),
+            (1, _) => "sigma does not contain the scatter between recordings: there is one recording".into(),
+            (count, true) => format!(
+                "sigma does not contain the scatter between the {count} recordings: without one of them the others do not \
+                 determine every parameter"
+            ),
+            (count, false) => {
+                format!("sigma contains the scatter between {count} recordings (each left out once)")
+            }
+        }
+    }
+}
+
+/// Most likely reason of a refusal.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CauseReport {
+    /// A word of the closed list.
+    pub name: &'static str,
+    /// Joint, from 1; `null` for all or unknown.
+    pub joint: Option<usize>,
+    /// Size in the direction's unit; `null` if it has none.
+    pub value: Number,
+    /// Standard deviation of the size.
+    pub sigma: Number,
+    /// Sentence with the evidence.
+    pub words: String,
+}
+
+/// One direction of doubt.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DirectionReport {
+    /// `delay`, `encoder_scale`, `torque_scale`, `gravity`.
+    pub name: &'static str,
+    /// Joint, from 1; `null` for gravity.
+    pub joint: Option<usize>,
+    /// Estimate; `null` where the motion does not show it.
+    pub value: Number,
+    /// Standard deviation: the larger of noise and scatter over segments.
+    pub sigma: Number,
+    /// `noise` or `segments`: which one that is.
+    pub sigma_from: &'static str,
+    /// `ms`, `%` or `deg`.
+    pub unit: &'static str,
+    /// Magnitude beyond which it is no chance.
+    pub limit: Number,
+    /// Share of the misfit that it explains, 0..1.
+    pub explained: Number,
+    /// Share of the misfit from which it refuses.
+    pub explained_limit: Number,
+    /// Largest shift of a parameter in its sigma when it is fitted.
+    pub largest_shift: Number,
+    /// False where the recording is refused for it.
+    pub passed: bool,
+    /// Names of what cannot be distinguished from it.
+    pub alike: Vec<String>,
+}
+
+/// A fault of a recording's columns.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SampleFinding {
+    /// `saturation`, `held_samples`, `quantised` or `time_stamps`.
+    pub name: &'static str,
+    /// File, as named.
+    pub file: String,
+    /// Joint, from 1; `null` if it concerns all columns.
+    pub joint: Option<usize>,
+    /// Limit of the torque in N m, holding time in s, step in rad or N m, error of the stamps in s.
+    pub value: f64,
+    /// Unit of the value.
+    pub unit: &'static str,
+    /// Standard deviation of the value, if it is an estimate.
+    pub sigma: Option<f64>,
+    /// Share of the samples, 0..1.
+    pub share: f64,
+    /// Whether the recording must not be identified from.
+    pub refuses: bool,
+    /// The finding in a sentence.
+    pub text: String,
+}
+
+impl DirectionReport {
+    /// Estimate in words: "torque of joint 1: 9.8 +- 0.4 ms late".
+    #[must_use]
+    pub fn words(&self) -> String {
+        let joint = self.joint.unwrap_or(0);
+        let (Some(value), Some(sigma)) = (self.value.known(), self.sigma.known()) else {
+            return format!("{}: not shown by this motion", self.subject());
+        };
+        let size = format!("{:.*} +- {:.*}", digits(sigma), value.abs(), digits(sigma), sigma);
+        let negative = value < 0.0;
+        match self.name {
+            "delay" => {
+                format!("torque of joint {joint}: {size} ms {}", if negative { "early" } else { "late" })
+            }
+            "encoder_scale" => {
+                format!("angle of joint {joint}: {size} % too {}", if negative { "small" } else { "large" })
+            }
+            "torque_scale" => format!(
+                "torque of joint {joint}: {size} % too {} against joint 1",
+                if negative { "small" } else { "large" }
+            ),
+            _ => format!("gravity: turned by {}{size} degrees", if negative { "-" } else { "" }),
+        }
+    }
+
+    fn subject(&self) -> String {
+        match self.joint {
+            Some(joint) => format!("{} of joint {joint}", self.name.replace('_', " ")),
+            None => self.name.into(),
+        }
+    }
+
+    /// Line of the report.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let alike = match self.alike.as_slice() {
+            [] => String::new(),
+            names => format!(" (not distinguished from {})", names.join(", ").replace('_', " ")),
+        };
+        format!("{}{alike}", self.words())
+    }
+
+    /// Test of the verdict.
+    #[must_use]
+    pub fn finding(&self) -> FindingReport {
+        let words = if self.passed {
+            String::new()
+        } else {
+            format!(
+                "{}, limit {:.3} {}; it explains {:.0} % of the misfit and moves a parameter by {:.1} sigma",
+                self.words(),
+                self.limit.known().unwrap_or(f64::NAN),
+                self.unit,
+                100.0 * self.explained.known().unwrap_or(f64::NAN),
+                self.largest_shift.known().unwrap_or(f64::NAN),
+            )
+        };
+        FindingReport {
+            reason: "residual",
+            test: self.name,
+            joint: self.joint,
+            motion: None,
+            value: self.value,
+            limit: self.limit,
+            passed: self.passed,
+            words,
+        }
+    }
+}
+
+/// Decimals that show two digits of a standard deviation.
+fn digits(sigma: f64) -> usize {
+    (1.0 - sigma.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize
+}
+
+impl CauseReport {
+    /// Printed line.
+    #[must_use]
+    pub fn line(&self) -> String {
+        format!("likely cause: {}: {}", self.name.replace('_', " "), self.words)
+    }
+}
+
+impl DoubtReport {
+    /// Lines below the tables.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines: Vec<String> = self.bandwidth.iter().map(BandwidthReport::line).collect();
+        let ratios: Vec<String> = self
+            .misfit_over_noise
+            .iter()
+            .enumerate()
+            .filter_map(|(joint, ratio)| Some(format!("joint {}: {:.2}", joint + 1, ratio.known()?)))
+            .collect();
+        if !ratios.is_empty() {
+            lines.push(format!("misfit over noise: {}", ratios.join("; ")));
+        }
+        lines.extend(self.directions.iter().map(DirectionReport::line));
+        lines.push(self.recordings.line());
+        if !self.at_prior_limit.is_empty() {
+            lines.push(format!("at a limit of the prior: {}", self.at_prior_limit.join(", ")));
+        }
+        lines
+    }
+}

@@ -1,0 +1,167 @@
+//! Evidence of the verdict: every test with its value and limit, and a sentence for each failure.
+
+use scarab::ident::{Evidence, Reason, Test};
+use serde::Serialize;
+
+use crate::base::number::Number;
+
+/// One test of the verdict, passed or not.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FindingReport {
+    /// Reason for rejection if the test failed: a word of the closed list.
+    pub reason: &'static str,
+    /// Name of the test.
+    pub test: &'static str,
+    /// Joint, from 1; `null` if the test does not concern one joint.
+    pub joint: Option<usize>,
+    /// Name of the unused motion; `null` for the motion identified from, or for all.
+    pub motion: Option<String>,
+    /// Tested value.
+    pub value: Number,
+    /// Limit of the value.
+    pub limit: Number,
+    /// Whether the value is within the limit.
+    pub passed: bool,
+    /// Meaning of a failed test in a sentence with its numbers; empty if it passed.
+    pub words: String,
+}
+
+impl FindingReport {
+    /// Report of one piece of evidence; `motions` are the names of the unused motions.
+    #[must_use]
+    pub fn new(evidence: &Evidence<f32>, motions: &[&str]) -> Self {
+        let motion = evidence.motion.map(|index| {
+            motions.get(index).map_or_else(|| format!("motion {}", index + 1), |name| (*name).to_owned())
+        });
+        let words =
+            if evidence.passed { String::new() } else { sentence(evidence, motion.as_deref().unwrap_or("")) };
+        Self {
+            reason: evidence.reason.name(),
+            test: evidence.test.name(),
+            joint: evidence.joint.map(|joint| joint + 1),
+            motion,
+            value: evidence.value.into(),
+            limit: evidence.limit.into(),
+            passed: evidence.passed,
+            words,
+        }
+    }
+
+    /// Report of a drive that stopped before the end of the identification; `words` say why.
+    #[must_use]
+    pub fn stopped(words: String) -> Self {
+        Self {
+            reason: Reason::Input.name(),
+            test: Test::Drive.name(),
+            joint: None,
+            motion: None,
+            value: 0.0.into(),
+            limit: 1.0.into(),
+            passed: false,
+            words,
+        }
+    }
+}
+
+/// Sentence for a failed test.
+fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
+    let joint = evidence.joint.map_or(0, |joint| joint + 1);
+    let (value, limit) = (f64::from(evidence.value), f64::from(evidence.limit));
+    let known = value.abs() < 1e30;
+    let on = if motion.is_empty() { String::new() } else { format!(" on {motion}") };
+    match evidence.test {
+        Test::Rows => {
+            format!("joint {joint} moved in {value:.0} of the filtered rows, at least {limit:.0} are needed")
+        }
+        Test::NotFinite => format!("{value:.0} samples or rows{on} were not finite, none may be"),
+        Test::Torque => format!("the torque of joint {joint} is always zero"),
+        Test::Search => "the search did not come to its end".into(),
+        Test::Drive => "the drive stopped during the identification".into(),
+        Test::Speed => {
+            format!("joint {joint} hardly moved: {value:.4} rad/s rms, at least {limit:.3} are needed")
+        }
+        Test::EncoderPulse => format!(
+            "encoder too coarse at this bandwidth: one count of joint {joint} is a pulse of {value:.3} rad/s, at most \
+             {limit:.3} may be; {:.2} times this bandwidth is low enough",
+            limit / value
+        ),
+        Test::Determined => format!("the motion determines {value:.0} of {limit:.0} base parameters"),
+        Test::Condition if known => format!(
+            "the motion hardly tells the parameters apart: condition {value:.0}, at most {limit:.0} is allowed"
+        ),
+        Test::Condition => "the motion does not tell the parameters apart".into(),
+        Test::PredictedUncertainty => format!(
+            "the excitation leaves the torque of joint {joint}{on} uncertain by {:.1} % of its rms, at most {:.1} % \
+             is allowed",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::Finite => format!("a parameter of joint {joint} is not a number"),
+        Test::NegativeParameter => format!(
+            "a parameter of joint {joint} that no body has below zero is {value:.1} sigma below it, {limit:.0} may be \
+             noise"
+        ),
+        Test::NegativeEnergy => format!(
+            "kinetic energy would be negative in some posture, by {value:.1} sigma where {limit:.0} may be noise"
+        ),
+        Test::PriorBox => format!(
+            "every leg that the prior allows misses the data: {value:.0} chi-square units above least squares, at most \
+             {limit:.0} may be noise"
+        ),
+        Test::DynamicShare => format!(
+            "inertia and friction make {:.2} % of the torque of joint {joint}, at least {:.0} % are in any measured \
+             one: it was computed from the angle",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::TrainingError if known => format!(
+            "joint {joint} is off by {value:.3} N m rms on the motion identified from, at most {limit:.3} are explained"
+        ),
+        Test::TrainingError => format!("no torque of joint {joint} could be compared with the model"),
+        Test::WholeError => format!(
+            "what was found misses the motion identified from, rows set aside included, by {:.0} % of the torque of joint \
+             {joint}, at most {:.0} % may be: hold a motion out",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::ValidationError if known => {
+            format!(
+                "the torque of joint {joint}{on} is off by {value:.3} N m rms, at most {limit:.3} are explained"
+            )
+        }
+        Test::ValidationError => format!("no torque of joint {joint}{on} could be compared with the model"),
+        Test::SlowResidual => format!(
+            "what is left of the torque of joint {joint}{on} is no noise: {value:.3} N m last longer than half a \
+             second, at most {limit:.3} may"
+        ),
+        Test::LinkLength => format!(
+            "the torque asks for another geometry: a link before joint {joint} {:.1} % {} than believed, or what resembles \
+             it, a zero that is off or a trunk that leans; {:.1} % may be",
+            100.0 * value.abs(),
+            if value < 0.0 { "shorter" } else { "longer" },
+            100.0 * limit
+        ),
+        Test::EncoderZero => format!(
+            "the torque asks for another geometry: the zero of joint {joint} {:+.1} degrees from where it is believed, or \
+             what resembles it, another length or a trunk that leans; {:.1} may be",
+            value.to_degrees(),
+            limit.to_degrees()
+        ),
+        Test::CommonDisturbance => {
+            let on = if motion.is_empty() { " on the motion identified from" } else { on.as_str() };
+            format!(
+                "something held the leg{on}: all joints missed together for {value:.2} s, at most {limit:.2} s may"
+            )
+        }
+        Test::ReplacedShare => format!(
+            "{:.1} % of the samples of joint {joint}{on} were wild, at most {:.0} % may be",
+            100.0 * value,
+            100.0 * limit
+        ),
+        Test::DisturbedShare => format!(
+            "{:.0} % of the rows of joint {joint}{on} were disturbed, at most {:.0} % may be",
+            100.0 * value,
+            100.0 * limit
+        ),
+    }
+}

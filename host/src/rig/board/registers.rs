@@ -1,0 +1,215 @@
+//! Simulated registers below the firmware's levels.
+
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use scarab::board::odrive_v3_6::settings::analog::temperature_c;
+use scarab::hal::{AxisCommand, Contacts, Controller, Frame, Hardware};
+
+use crate::rig::bus::wire::Mailbox;
+
+/// Thermistor code of a bridge at 41 degrees Celsius.
+pub const WARM_CODE: u16 = 1500;
+/// Time for the most expensive common frame of the bus: 2,403 instructions, interrupted by the
+/// levels above. Each reading of the clock within a round of the bus is later by this.
+const FRAME_US: u64 = 20;
+/// Factor on the watchdog's time during a flash write: 8 s instead of 16 ms.
+pub const STRETCHED: u64 = 500;
+
+/// Readings of the clock in a round of the bus.
+#[derive(Debug, Default)]
+struct Readings(AtomicU64);
+
+impl Clone for Readings {
+    fn clone(&self) -> Self {
+        Self(AtomicU64::new(self.0.load(Ordering::Relaxed)))
+    }
+}
+
+impl PartialEq for Readings {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.load(Ordering::Relaxed) == other.0.load(Ordering::Relaxed)
+    }
+}
+
+/// State of the bus controller, and the frames in its three mailboxes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CanController {
+    /// Transmit mailboxes.
+    pub mailbox: Mailbox,
+    /// State that the firmware reads.
+    pub state: Controller,
+    /// Whether a frame was lost and the firmware has not yet read this.
+    pub overrun: bool,
+    /// Time, nanoseconds.
+    pub now_ns: u64,
+}
+
+/// Registers, contacts and pins of a board of `N` axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Registers<const N: usize> {
+    /// The operator's contacts.
+    pub contacts: Contacts,
+    /// Command of each bridge for its next period.
+    pub commands: [AxisCommand; N],
+    /// Duty cycle of the brake resistor.
+    pub brake: f32,
+    /// Encoder counters.
+    pub encoders: [u16; N],
+    /// Whether the gate drivers hold their configuration.
+    pub gates: [bool; N],
+    /// Whether the gate drivers are powered.
+    pub gates_on: bool,
+    /// Whether the gate drivers were configured since this was cleared: a reset has ended.
+    pub configured: bool,
+    /// Codes of the thermistors.
+    pub thermistors: [u16; N],
+    /// Whether the servo was requested.
+    pub servo_due: bool,
+    /// Whether a round of the bus was requested.
+    pub bus_due: bool,
+    /// The bus controller.
+    pub can: CanController,
+    /// Whether the watchdog was fed since this was cleared.
+    pub fed: bool,
+    /// Factor on the watchdog's usual time, if it changed.
+    pub stretched: Option<u64>,
+    /// Readings of the clock in this round of the bus.
+    readings: Readings,
+}
+
+impl<const N: usize> Registers<N> {
+    /// State after power-up: bridges off, contacts open.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            contacts: Contacts::default(),
+            commands: [AxisCommand::RELEASED; N],
+            brake: 0.0,
+            encoders: [0; N],
+            gates: [true; N],
+            gates_on: true,
+            configured: false,
+            thermistors: [WARM_CODE; N],
+            servo_due: false,
+            bus_due: false,
+            can: CanController {
+                mailbox: Mailbox::default(),
+                state: Controller::Active,
+                overrun: false,
+                now_ns: 0,
+            },
+            fed: false,
+            stretched: None,
+            readings: Readings::default(),
+        }
+    }
+
+    /// Sets the time, nanoseconds, at the start of a round of the bus.
+    pub fn set_time(&mut self, now_ns: u64) {
+        self.can.now_ns = now_ns;
+        self.readings = Readings::default();
+    }
+}
+
+impl<const N: usize> Default for Registers<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const N: usize> Hardware<N> for Registers<N> {
+    fn masked(&mut self, step: impl FnOnce(&mut Self)) {
+        step(self);
+    }
+
+    fn release_all(&mut self) {
+        self.commands = [AxisCommand::RELEASED; N];
+    }
+
+    fn release(&mut self, axis: usize) {
+        self.commands[axis] = AxisCommand::RELEASED;
+    }
+
+    fn set_duty(&mut self, axis: usize, duty: &[f32; 3]) {
+        self.commands[axis].duty = *duty;
+    }
+
+    fn enable(&mut self, axis: usize) {
+        self.commands[axis].enabled = true;
+    }
+
+    fn set_brake(&mut self, duty: f32) {
+        self.brake = duty;
+    }
+
+    fn pend_servo(&mut self) {
+        self.servo_due = true;
+    }
+
+    fn pend_bus(&mut self) {
+        self.bus_due = true;
+    }
+
+    fn contacts(&self) -> Contacts {
+        self.contacts
+    }
+
+    fn encoder_count(&self, axis: usize) -> u16 {
+        self.encoders[axis]
+    }
+
+    fn temperature(&self, axis: usize) -> Option<f32> {
+        temperature_c(self.thermistors[axis])
+    }
+
+    fn gate_holds(&mut self, axis: usize) -> bool {
+        self.gates[axis]
+    }
+
+    fn gate_status(&mut self, _: usize) -> u32 {
+        0
+    }
+
+    fn switch_gates(&mut self, on: bool) {
+        self.gates_on = on;
+    }
+
+    fn configure_gates(&mut self) -> bool {
+        self.configured = true;
+        self.gates.iter().all(|holds| *holds)
+    }
+
+    fn now_us(&self) -> u64 {
+        self.can.now_ns / 1000 + self.readings.0.fetch_add(1, Ordering::Relaxed) * FRAME_US
+    }
+
+    fn controller(&mut self) -> Controller {
+        if core::mem::take(&mut self.can.overrun) { Controller::Overrun } else { self.can.state }
+    }
+
+    fn mailboxes_waiting(&self) -> u32 {
+        self.can.mailbox.slots()
+    }
+
+    fn send(&mut self, mailbox: u32, frame: &Frame) {
+        self.can.mailbox.put(mailbox, *frame, self.can.now_ns);
+    }
+
+    fn abort_transmission(&mut self) {
+        self.can.mailbox.clear();
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.fed = true;
+    }
+
+    fn stretch_watchdog(&mut self) -> bool {
+        self.stretched = Some(STRETCHED);
+        true
+    }
+
+    fn tighten_watchdog(&mut self) -> bool {
+        self.stretched = Some(1);
+        true
+    }
+}

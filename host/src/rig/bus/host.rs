@@ -1,0 +1,475 @@
+//! Simulated host that moves one leg, frame by frame, like a program behind an adapter.
+//!
+//! ```text
+//! once              NMT start, compact mapping, cyclic position, controlwords 6, 7, F
+//! every millisecond SYNC and one frame with both joints' targets
+//! at intervals      heartbeat, and the controlword again
+//! ```
+//!
+//! Each of them can be stopped ([`Speaks`]).
+
+use core::f64::consts::TAU;
+
+use scarab::bus::Frame;
+use scarab::leg::Permission;
+
+use crate::base::error::ToolError;
+use crate::formats::leg_file::LegFile;
+use crate::rig::bus::board::{Board, TICK_NS};
+use crate::rig::bus::network::Network;
+use crate::rig::bus::wire::Sent;
+use crate::rig::faulty_board::Rig;
+
+/// Number of base parameters.
+const BASE: usize = 13;
+const JOINTS: usize = 2;
+const NODES: [u16; JOINTS] = [1, 2];
+/// Node-ID of the host.
+const NUMBER: u16 = 0x70;
+const START: u16 = 0;
+const SYNC: u16 = 0x80;
+/// COB-ID of both joints' targets; hip and knee take their half each.
+const TARGETS: u16 = 0x301;
+const WORDS: u16 = 0x200;
+const REQUEST: u16 = 0x600;
+const ANSWER: u16 = 0x580;
+const HEARTBEAT: u16 = 0x700;
+/// Bit 31 of a COB-ID: disabled.
+const UNUSED: u32 = 1 << 31;
+/// Controlword "enable operation".
+const ENABLED: u16 = 0xF;
+/// Servo ticks per cycle, and the timeout of an answer.
+const CYCLE: u64 = 4;
+const PATIENCE: u32 = 40;
+/// Motion towards the middle of each joint's range and back: amplitude in rad, rate in Hz.
+const WAY_RAD: f64 = 0.25;
+const RATE_HZ: f64 = 0.7;
+
+/// Frames that the host sends by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Speaks {
+    /// SYNC and targets.
+    pub targets: bool,
+    /// Repeated controlword.
+    pub words: bool,
+    /// Servo ticks between two heartbeats; 0 for none.
+    pub heartbeat: u64,
+}
+
+/// One leg, one bus, one host.
+#[derive(Clone, Debug)]
+pub struct Host {
+    /// Bus with the board.
+    pub network: Network<JOINTS, BASE>,
+    /// Frames sent at present.
+    pub speaks: Speaks,
+    /// Servo ticks per cycle.
+    pub cycle: u64,
+    ticks: u64,
+    /// Last reported joint positions, start and amplitude of the motion, all in micro-radian.
+    places: [i32; JOINTS],
+    from: Option<[f64; JOINTS]>,
+    way: [f64; JOINTS],
+    /// End of the last heartbeat and of the last targets on the wire.
+    heard_ns: [u64; 2],
+    /// End of the last cyclic frame to each node on the wire.
+    spoke_ns: [u64; JOINTS],
+    answer: Option<Frame>,
+    /// Emergency messages: node and code.
+    told: Vec<(u16, u16)>,
+}
+
+fn refused(words: String) -> ToolError {
+    ToolError::Refused(words)
+}
+
+impl Host {
+    /// Connects to one board; nothing is sent yet.
+    #[must_use]
+    pub fn new(board: Board<JOINTS, BASE>) -> Self {
+        Self {
+            network: Network::new(vec![board], 1_000_000),
+            speaks: Speaks { targets: false, words: false, heartbeat: 0 },
+            ticks: 0,
+            places: [0; JOINTS],
+            from: None,
+            way: [0.0; JOINTS],
+            cycle: CYCLE,
+            heard_ns: [0; 2],
+            spoke_ns: [0; JOINTS],
+            answer: None,
+            told: Vec::new(),
+        }
+    }
+
+    /// Returns the board.
+    pub fn board(&mut self) -> &mut Board<JOINTS, BASE> {
+        let [board] = self.network.boards() else { unreachable!("made with one") };
+        board
+    }
+
+    /// Firmware and plant of the leg.
+    pub fn rig(&mut self) -> &mut Rig<JOINTS, BASE> {
+        &mut self.board().rig
+    }
+
+    /// Whether the leg's drive is enabled.
+    pub fn is_enabled(&mut self) -> bool {
+        self.rig().state().permission() == Permission::Follow
+    }
+
+    /// Simulates one servo tick; each of its PWM periods is shown.
+    pub fn tick(&mut self, watch: impl FnMut(&Rig<JOINTS, BASE>)) {
+        if self.speaks.targets && self.ticks.is_multiple_of(self.cycle) {
+            let seconds = self.ticks as f64 * TICK_NS as f64 * 1e-9;
+            let share = 0.5 - 0.5 * (TAU * RATE_HZ * seconds).cos();
+            // Until the leg is enabled, the targets are the present positions.
+            let targets = match self.from {
+                None => self.places,
+                Some(from) => [0, 1].map(|joint| (from[joint] + share * self.way[joint]) as i32),
+            };
+            let targets = targets.map(i32::to_le_bytes).concat();
+            self.network.send(Frame::new(SYNC, &[]));
+            self.network.send(Frame::new(TARGETS, &targets));
+        }
+        if self.speaks.words && self.ticks.is_multiple_of(4 * self.cycle) {
+            NODES.into_iter().for_each(|node| self.command(node, ENABLED));
+        }
+        if self.speaks.heartbeat > 0 && self.ticks.is_multiple_of(self.speaks.heartbeat) {
+            self.network.send(Frame::new(HEARTBEAT + NUMBER, &[5]));
+        }
+        let (heard_ns, answer, spoke_ns) = (&mut self.heard_ns, &mut self.answer, &mut self.spoke_ns);
+        let (told, places) = (&mut self.told, &mut self.places);
+        let show = |sent: &Sent| {
+            let id = sent.frame.id();
+            match (sent.sender, id) {
+                (0, SYNC | TARGETS) => *spoke_ns = [sent.end_ns; JOINTS],
+                (0, 0x201) => spoke_ns[0] = sent.end_ns,
+                (0, 0x202) => spoke_ns[1] = sent.end_ns,
+                _ => {}
+            }
+            match (sent.sender, id) {
+                (0, TARGETS) => heard_ns[1] = sent.end_ns,
+                (0, _) if id == HEARTBEAT + NUMBER => heard_ns[0] = sent.end_ns,
+                (0, _) => {}
+                (_, 0x81..=0xFF) => {
+                    if let [low, high, ..] = sent.frame.data() {
+                        told.push((id & 0x7F, u16::from_le_bytes([*low, *high])));
+                    }
+                }
+                (_, 0x181 | 0x182) => {
+                    if let ([_, _, a, b, c, d, ..], Some(place)) =
+                        (sent.frame.data(), places.get_mut(usize::from(id - 0x181)))
+                    {
+                        *place = i32::from_le_bytes([*a, *b, *c, *d]);
+                    }
+                }
+                (_, 0x581..=0x5FF) => *answer = Some(sent.frame),
+                _ => {}
+            }
+        };
+        self.network.tick_watched(show, watch);
+        self.ticks += 1;
+    }
+
+    /// Simulates several ticks.
+    pub fn run(&mut self, ticks: u64) {
+        (0..ticks).for_each(|_| self.tick(|_| {}));
+    }
+
+    /// Sends a controlword.
+    pub fn command(&mut self, node: u16, word: u16) {
+        self.network.send(Frame::new(WORDS + node, &word.to_le_bytes()));
+    }
+
+    /// End of the last heartbeat and of the last targets on the wire.
+    #[must_use]
+    pub fn heard_ns(&self) -> [u64; 2] {
+        self.heard_ns
+    }
+
+    /// End of the last cyclic frame to each node on the wire: SYNC, targets, controlword.
+    #[must_use]
+    pub fn spoke_ns(&self) -> [u64; JOINTS] {
+        self.spoke_ns
+    }
+
+    /// Steps the motion back by `ticks`, after a pause of the host.
+    pub fn rewind(&mut self, ticks: u64) {
+        self.ticks -= ticks;
+    }
+
+    /// Sets the targets to the present positions from now on.
+    pub fn follow_places(&mut self) {
+        self.from = None;
+    }
+
+    /// Emergency messages so far: node and code.
+    #[must_use]
+    pub fn told(&self) -> &[(u16, u16)] {
+        &self.told
+    }
+
+    /// Sends an SDO request and returns the answer.
+    ///
+    /// # Errors
+    /// The node does not answer within 10 ms.
+    pub fn ask(&mut self, node: u16, request: [u8; 8]) -> Result<Frame, ToolError> {
+        self.answer = None;
+        self.network.send(Frame::new(REQUEST + node, &request));
+        for _ in 0..PATIENCE {
+            self.run(1);
+            if let Some(answer) = self.answer.take_if(|answer| answer.id() == ANSWER + node) {
+                return Ok(answer);
+            }
+        }
+        Err(refused(format!("node {node} does not answer to {request:x?}")))
+    }
+
+    /// Reads an object of at most four bytes.
+    ///
+    /// # Errors
+    /// The node does not answer, or not with a value.
+    pub fn read(&mut self, node: u16, index: u16, sub: u8) -> Result<u32, ToolError> {
+        let [low, high] = index.to_le_bytes();
+        let answer = self.ask(node, [0x40, low, high, sub, 0, 0, 0, 0])?;
+        match answer.data() {
+            [kind, _, _, _, a, b, c, d] if kind >> 5 == 2 => Ok(u32::from_le_bytes([*a, *b, *c, *d])),
+            data => Err(refused(format!("node {node}, object {index:x}:{sub}: {data:x?}"))),
+        }
+    }
+
+    /// Writes an object of `size` bytes.
+    ///
+    /// # Errors
+    /// The node does not answer, or refuses.
+    pub fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) -> Result<(), ToolError> {
+        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+        let answer = self.ask(node, [0x23 | (4 - size) << 2, low, high, sub, a, b, c, d])?;
+        match answer.data() {
+            [0x60, ..] => Ok(()),
+            data => Err(refused(format!("node {node}, object {index:x}:{sub}: {data:x?}"))),
+        }
+    }
+
+    /// Starts the nodes and configures the compact mapping: statusword, position and speed; both targets in
+    /// one frame.
+    ///
+    /// # Errors
+    /// A node refuses.
+    pub fn begin(&mut self) -> Result<(), ToolError> {
+        self.run(4);
+        self.network.send(Frame::new(START, &[1, 0]));
+        self.run(4);
+        for (joint, node) in NODES.into_iter().enumerate() {
+            for place in 1..4 {
+                self.write(node, 0x1800 + place, 1, UNUSED | u32::from(0x180 + 0x100 * place + node), 4)?;
+            }
+            let mut targets = [0x0007_0020; JOINTS];
+            targets[joint] = 0x607A_0020;
+            self.map(node, 0x1800, 0x180 + node, &[0x6041_0010, 0x6064_0020, 0x2010_0010])?;
+            self.map(node, 0x1401, TARGETS, &targets)?;
+            self.write(node, 0x6060, 0, 8, 1)?;
+        }
+        Ok(())
+    }
+
+    fn map(&mut self, node: u16, place: u16, identifier: u16, objects: &[u32]) -> Result<(), ToolError> {
+        let (mapping, identifier) = (place + 0x200, u32::from(identifier));
+        self.write(node, place, 1, UNUSED | identifier, 4)?;
+        self.write(node, mapping, 0, 0, 1)?;
+        self.write(node, place, 2, 1, 1)?;
+        for (sub, object) in (1..).zip(objects) {
+            self.write(node, mapping, sub, *object, 4)?;
+        }
+        self.write(node, mapping, 0, objects.len() as u32, 1)?;
+        self.write(node, place, 1, identifier, 4)
+    }
+
+    /// Enables the leg, then moves it back and forth until the host stops sending.
+    ///
+    /// # Errors
+    /// A node refuses, or the leg is not enabled.
+    pub fn move_leg(&mut self, leg: &LegFile) -> Result<(), ToolError> {
+        self.speaks.targets = true;
+        self.run(4 * CYCLE);
+        for word in [6, 7, ENABLED] {
+            NODES.into_iter().for_each(|node| self.command(node, word));
+            self.run(4 * CYCLE);
+        }
+        let from = self.places.map(f64::from);
+        for ((way, from), joint) in self.way.iter_mut().zip(from).zip(&leg.joints) {
+            let [low, high] = joint.range_deg.map(f64::to_radians);
+            *way = 1e6 * WAY_RAD * (0.5e6 * (low + high) - from).signum();
+        }
+        (self.ticks, self.from) = (0, Some(from));
+        self.speaks.words = true;
+        self.run(4 * CYCLE);
+        if self.is_enabled() {
+            return Ok(());
+        }
+        let (state, causes) = (self.rig().state(), self.rig().causes());
+        Err(refused(format!(
+            "a leg that its host does not enable: {state:?}, causes {causes:x}, told {:x?}",
+            self.told
+        )))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::kept_file::memory::Memory;
+    use crate::formats::leg_file::DEFAULT_LEG;
+    use crate::rig::options::{DriveModel, SimulationOptions};
+    use crate::rig::pair::Context;
+
+    fn host(leg: &LegFile) -> Host {
+        let options = SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(1) };
+        let context = Context::<JOINTS, BASE>::new(leg, &options).expect("a leg");
+        Host::new(Board::new(leg, context, 1, 1, Memory::new(None)).expect("a board"))
+    }
+
+    #[test]
+    fn a_failed_store_is_reported_and_not_recalled_by_a_reset() {
+        const WINDOW: u16 = 0x6065;
+        let mut host = host(&LegFile::load(DEFAULT_LEG).expect("shipped"));
+        host.begin().expect("nodes that answer");
+        let mut ask = |window: u32, (object, word): (u16, &[u8; 4]), fails: bool| {
+            host.told.clear();
+            host.write(1, WINDOW, 0, window, 4).expect("a window");
+            host.board().memory().fail_after(fails.then_some(1));
+            host.write(2, object, 1, u32::from_le_bytes(*word), 4).expect("a drive that is off");
+            host.run(8);
+            while host.board().flashing().is_under_way() {
+                host.run(1);
+            }
+            host.run(8);
+            host.board().memory().fail_after(None);
+            let codes: Vec<u16> = host.told.iter().map(|(_, code)| *code).collect();
+            host.network.send(Frame::new(START, &[129, 0]));
+            host.run(40);
+            (codes, host.read(1, WINDOW, 0).expect("an answer"))
+        };
+        let (save, load) = ((0x1010, b"save"), (0x1011, b"load"));
+        let codes = |code: u16| vec![0xFF0D, 0xFF0D, code, code];
+        assert_eq!(ask(11_111, save, false), (codes(0), 11_111));
+        assert_eq!(ask(22_222, save, true), (codes(0x5530), 11_111));
+        assert_eq!(ask(33_333, load, true), (codes(0x5530), 11_111));
+        assert_eq!(ask(44_444, load, false), (codes(0), 87_266));
+    }
+
+    #[test]
+    fn a_host_moves_a_leg_and_the_leg_stays_when_it_stops() {
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let mut host = host(&leg);
+        host.begin().expect("nodes that answer");
+        host.move_leg(&leg).expect("a leg that follows");
+        let place = |host: &mut Host| host.rig().world.anatomical_position();
+        let from = place(&mut host);
+        host.run(2857 - host.ticks);
+        let there = place(&mut host);
+        for (joint, (from, there)) in from.iter().zip(there).enumerate() {
+            assert!((there - from).abs() > 0.9 * WAY_RAD, "joint {joint}: {from} {there}");
+        }
+        host.speaks.targets = false;
+        host.run(1000);
+        let stands = place(&mut host);
+        assert!(host.is_enabled());
+        assert!(there.iter().zip(stands).all(|(there, stands)| (there - stands).abs() < 0.02));
+    }
+
+    /// Ticks per second.
+    const SECOND: u64 = 4000;
+
+    /// Steps of a usual host towards enabled. Returns whether the leg is enabled.
+    fn enable(host: &mut Host) -> bool {
+        for word in [6, 7, ENABLED] {
+            NODES.into_iter().for_each(|node| host.command(node, word));
+            host.run(40);
+        }
+        host.is_enabled()
+    }
+
+    /// Sends each joint a set-point (micro-radian) in profile position mode.
+    fn point(host: &mut Host, places: [i32; JOINTS]) {
+        for (node, place) in NODES.into_iter().zip(places) {
+            host.write(node, 0x607A, 0, place as u32, 4).expect("a target");
+            host.command(node, ENABLED);
+            host.command(node, ENABLED | 0x30);
+        }
+    }
+
+    /// Moves to random poses; returns how many of them ended outside a joint's range.
+    fn poses(leg: &LegFile, seed: u64, count: u32) -> u32 {
+        let mut random = crate::base::random::Random::new("poses", seed);
+        let ranges = leg.joints.iter().map(|joint| joint.range_deg.map(f64::to_radians)).collect::<Vec<_>>();
+        let micro = |joint: usize, share: f64| {
+            let [low, high] = ranges[joint];
+            (1e6 * (low + share * (high - low))) as i32
+        };
+        let mut host = host(leg);
+        host.begin().expect("nodes that answer");
+        for node in NODES {
+            for (object, value, size) in
+                [(0x6060, 1, 1), (0x6081, 1_500_000, 4), (0x6083, 8_000_000, 4), (0x6084, 8_000_000, 4)]
+            {
+                host.write(node, object, 0, value, size).expect("a setting");
+            }
+        }
+        let mut fallen = 0;
+        for pose in 0..count {
+            let words = format!("seed {seed}, pose {pose}");
+            host.told.clear();
+            for tries in 0.. {
+                if enable(&mut host) {
+                    break;
+                }
+                // A refused enable is explained by FF0E and ends when the leg stops swinging.
+                let code = host.read(1, 0x603F, 0).expect("an error code");
+                assert_eq!(code, 0xFF0E, "{words}: {:?} {:x?}", host.rig().state(), host.told);
+                assert!(tries < 20, "{words}: {:x?}", host.told);
+                host.run(SECOND / 4);
+            }
+            let outside = |host: &mut Host| {
+                let places = host.rig().world.anatomical_position();
+                (0..JOINTS).any(|joint| {
+                    let [low, high] = ranges[joint];
+                    places[joint] < low - 0.0088 || places[joint] > high + 0.0088
+                })
+            };
+            fallen += u32::from(outside(&mut host));
+            point(&mut host, [micro(0, 0.4), micro(1, 0.4)]);
+            host.run(4 * SECOND);
+            assert!(
+                host.is_enabled() && !outside(&mut host),
+                "{words}: {:?} {:x?}",
+                host.rig().state(),
+                host.told
+            );
+            let places = [0, 1].map(|joint| micro(joint, random.uniform(0.02, 0.98)));
+            point(&mut host, places);
+            host.run(1 + random.below(5 * SECOND / 4));
+            let stop = if random.coin() { 0 } else { 2 };
+            NODES.into_iter().for_each(|node| host.command(node, stop));
+            host.run(SECOND);
+            if random.coin() {
+                // The wearer sits down: a joint is pushed against its lower end stop.
+                let (joint, torque) = (random.below(2) as usize, random.uniform(30.0, 90.0));
+                host.rig().world.push(joint, -torque, 0.6);
+            }
+            host.run(2 * SECOND);
+            assert!(!host.is_enabled());
+        }
+        fallen
+    }
+
+    #[test]
+    fn a_host_can_enable_the_leg_again_after_each_of_100_poses() {
+        use rayon::prelude::*;
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let fallen: u32 = (1..=4_u64).into_par_iter().map(|seed| poses(&leg, seed, 25)).sum();
+        // Legs must fall out of their range often enough for the test to be valid.
+        assert!(fallen >= 20, "{fallen}");
+    }
+}

@@ -1,0 +1,24 @@
+//! Simulated legs on a CANopen bus, exact to the bit, for existing host software.
+//!
+//! | part | what it is |
+//! | --- | --- |
+//! | [`board`] | firmware and plant of a leg, with its nodes |
+//! | [`wire`], [`network`] | arbitration and bit timing; several legs and a host on one bus |
+//! | [`host`] | a host that moves a leg and can stop sending |
+//! | [`slcan`], [`server`] | serial line protocol and TCP port for host software |
+//! | [`adapter`], [`effect`] | queue between port and bus; which frames may be sent late |
+//! | [`pace`] | real-time pace and the report of delays |
+//! | [`storing`] | the writing of a board's flash |
+//! | [`serve`] | the complete server, in real time |
+
+pub mod adapter;
+pub mod board;
+pub mod effect;
+pub mod host;
+pub mod network;
+pub mod pace;
+pub mod serve;
+pub mod server;
+pub mod slcan;
+pub mod storing;
+pub mod wire;

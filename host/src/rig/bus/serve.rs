@@ -1,0 +1,190 @@
+//! Serves legs on the bus in real time, until the process is asked to end.
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::base::error::ToolError;
+use crate::base::files;
+use crate::formats::kept_file::memory::{BYTES, Memory};
+use crate::formats::leg_file::LegFile;
+use crate::rig::bus::adapter::{Adapter, Dropped, MOST_AGE};
+use crate::rig::bus::board::Board;
+use crate::rig::bus::network::Network;
+use crate::rig::bus::pace::{Pace, judge, reachable};
+use crate::rig::bus::server::{Event, Server, What};
+use crate::rig::options::{DriveModel, SimulationOptions};
+use crate::rig::pair::Context;
+
+/// Ticks between two polls of the port: 1 ms.
+const TICKS_PER_LOOK: u64 = 4;
+/// Longest store operation in ticks: 5 s.
+const MOST_STORING: u64 = 20_000;
+/// Sleep if no tick is due.
+const NAP: Duration = Duration::from_micros(200);
+
+/// Options of the command.
+#[derive(Clone, Debug)]
+pub struct ServeOptions {
+    /// Address of the port.
+    pub address: SocketAddr,
+    /// Number of boards on the bus, each with a leg.
+    pub legs: usize,
+    /// Simulated seconds per second.
+    pub speed: f64,
+    /// File of the boards' flash, which persists after the process.
+    pub flash: Option<PathBuf>,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Bit rate of the bus.
+    pub bits_per_s: u64,
+}
+
+/// Creates the bus with the legs, boards started.
+pub fn network<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &ServeOptions,
+    flash: Option<&[u8]>,
+) -> Result<Network<N, B>, ToolError> {
+    let simulation =
+        SimulationOptions { drive: DriveModel::Full, ..SimulationOptions::of_seed(options.seed) };
+    let context = Context::<N, B>::new(leg, &simulation)?;
+    let mut boards = Vec::new();
+    for place in 0..options.legs {
+        let memory = Memory::new(flash.and_then(|bytes| bytes.get(place * BYTES..(place + 1) * BYTES)));
+        let (seed, first) = (options.seed + place as u64, (1 + place * N) as u8);
+        boards.push(Board::new(leg, context.clone(), seed, first, memory)?);
+    }
+    Ok(Network::new(boards, options.bits_per_s))
+}
+
+/// Serves until the process is asked to end.
+pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptions) -> Result<(), ToolError> {
+    let flash = options.flash.as_deref().map(|path| read(path, options.legs)).transpose()?.flatten();
+    let mut network = network::<N, B>(leg, options, flash.as_deref())?;
+    // Written before any client connects, so that a file error shows before a host stores anything.
+    write(options.flash.as_deref(), &mut network)?;
+    if let Some(warning) =
+        judge(options.speed, reachable(&network), options.legs).map_err(ToolError::input)?
+    {
+        eprintln!("warning: {warning}");
+    }
+    if !options.address.ip().is_loopback() {
+        eprintln!(
+            "warning: {} can be reached from other machines, and slcan asks for no password: anybody who connects commands the legs",
+            options.address
+        );
+    }
+    let refused = |error: std::io::Error| ToolError::input(format!("{}: {error}", options.address));
+    let mut server = Server::new(options.address).map_err(refused)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(refused)?;
+    }
+    println!("listening {}", server.address().map_err(refused)?);
+    std::io::stdout().flush().map_err(refused)?;
+    let mut adapter = Adapter::new(options.bits_per_s, options.speed);
+    let mut pace = Pace::new(options.speed, Instant::now(), network.now_ns());
+    let mut alarms = vec![None; options.legs];
+    while !stop.load(Ordering::Relaxed) {
+        let now = Instant::now();
+        let take = |frame, since| adapter.push(frame, since, network.effect(&frame));
+        let events = server.poll(now, take);
+        report(&events, &mut adapter, network.now_ns());
+        let due = pace.due(now, network.now_ns()).min(TICKS_PER_LOOK);
+        for _ in 0..due {
+            adapter.tick(&mut network, Instant::now(), |sent| {
+                if sent.sender > 0 {
+                    server.tell(&sent.frame);
+                }
+            });
+        }
+        let events = server.flush();
+        report(&events, &mut adapter, network.now_ns());
+        if let Some(second) = pace.second(now, network.now_ns()) {
+            let reports = [second.report(options.speed), not_carried_out(adapter.take_dropped())];
+            reports.iter().flatten().for_each(|report| eprintln!("last second: {report}"));
+        }
+        for (place, (board, reported)) in network.boards().iter().zip(&mut alarms).enumerate() {
+            let alarm = board.rig.alarm();
+            if let Some(code) = alarm.filter(|_| alarm != *reported) {
+                eprintln!("leg {}: {} ({:#06x}): {}", place + 1, code.name(), code.number(), code.words());
+            }
+            *reported = alarm;
+        }
+        if network.boards().iter_mut().fold(false, |kept, board| board.flashing().take_kept() | kept) {
+            write(options.flash.as_deref(), &mut network)?;
+        }
+        if due == 0 {
+            std::thread::sleep(NAP);
+        }
+    }
+    // A store operation in progress is completed, as fast as possible.
+    for tick in 0..MOST_STORING {
+        if tick > TICKS_PER_LOOK && !network.boards().iter_mut().any(|board| board.flashing().is_under_way())
+        {
+            break;
+        }
+        network.tick(|_| {});
+    }
+    write(options.flash.as_deref(), &mut network)
+}
+
+/// Prints events of connections; the plug follows the client.
+fn report(events: &[Event], adapter: &mut Adapter, now_ns: u64) {
+    for event in events {
+        eprintln!("{event}");
+        match event.what {
+            What::Opened => adapter.opened(),
+            _ if event.ends() => adapter.closed(now_ns),
+            _ => {}
+        }
+    }
+}
+
+/// Report of client frames that were not sent, if any.
+fn not_carried_out(dropped: Dropped) -> Option<String> {
+    let Dropped { refused, displaced, old } = dropped;
+    (dropped != Dropped::default()).then(|| {
+        format!(
+            "frames of the client not carried out: {refused} refused (the queue held all that the wire carries in {} ms), {displaced} \
+             displaced by a stop, {old} set-points older than that",
+            MOST_AGE.as_millis()
+        )
+    })
+}
+
+/// Reads the flash of all boards; `None` if the file does not exist.
+fn read(path: &Path, legs: usize) -> Result<Option<Vec<u8>>, ToolError> {
+    let failed = |error: std::io::Error| ToolError::input(format!("{}: {error}", path.display()));
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(failed(error)),
+    };
+    let (mut bytes, length) = (Vec::new(), legs * BYTES);
+    // A device file may have no end.
+    file.take(length as u64 + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() == length {
+        return Ok(Some(bytes));
+    }
+    let found = if bytes.len() > length { format!("more than {length}") } else { bytes.len().to_string() };
+    Err(ToolError::input(format!(
+        "{}: {found} bytes, the flash of {legs} boards has {length}",
+        path.display()
+    )))
+}
+
+fn write<const N: usize, const B: usize>(
+    path: Option<&Path>,
+    network: &mut Network<N, B>,
+) -> Result<(), ToolError> {
+    let Some(path) = path else { return Ok(()) };
+    let bytes: Vec<u8> =
+        network.boards().iter_mut().flat_map(|board| board.memory().bytes().to_vec()).collect();
+    files::write(path, &bytes)
+}

@@ -1,0 +1,283 @@
+//! slcan over TCP for one client at a time.
+//!
+//! A connection becomes the client when it opens the channel, so a silent one blocks no other. A
+//! connection that arrives while another one has the channel is refused: a line with the reason, and a bell.
+
+use core::fmt::{Display, Formatter, Result as Formatted};
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::time::{Duration, Instant};
+
+use scarab::bus::Frame;
+
+use crate::rig::bus::slcan::{BELL, DONE, Heard, Line, TAKEN, tell};
+
+/// Unread bytes after which a client is disconnected.
+const MOST_UNREAD: usize = 1 << 22;
+/// Bytes read from a connection at once: several times what the bus carries until the next read.
+const MOST_AT_ONCE: usize = 4096;
+/// Limit of connections without a channel, and of refused ones. A further one displaces the oldest.
+const MOST_CONNECTIONS: usize = 8;
+/// Time for a refused connection to read the reason.
+const REFUSED_FOR: Duration = Duration::from_secs(1);
+
+/// Event of a connection.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum What {
+    /// Connected, without a channel yet.
+    Connected,
+    /// Opened the channel: the connection is now the client.
+    Opened,
+    /// The client closed the channel; it may open the channel again.
+    Closed,
+    /// Ended for this reason; `true` for the client's connection.
+    Gone(&'static str, bool),
+    /// Refused, because this client has the channel.
+    Refused(SocketAddr),
+}
+
+/// An event and its connection.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Event {
+    /// Address of the connection.
+    pub peer: SocketAddr,
+    /// What happened.
+    pub what: What,
+}
+
+impl Event {
+    /// Whether the client is gone.
+    #[must_use]
+    pub const fn ends(&self) -> bool {
+        matches!(self.what, What::Closed | What::Gone(_, true))
+    }
+}
+
+impl Display for Event {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Formatted {
+        write!(f, "client {}: ", self.peer)?;
+        match self.what {
+            What::Connected => f.write_str("connected"),
+            What::Opened => f.write_str("opened the channel"),
+            What::Closed => f.write_str("closed the channel: the boards' plug is pulled"),
+            What::Gone(why, true) => write!(f, "disconnected ({why}): the boards' plug is pulled"),
+            What::Gone(why, false) => write!(f, "disconnected ({why})"),
+            What::Refused(client) => write!(f, "refused, {client} has the channel"),
+        }
+    }
+}
+
+struct Connection {
+    stream: TcpStream,
+    peer: SocketAddr,
+    line: Line,
+    /// Bytes read but not processed.
+    heard: VecDeque<u8>,
+    out: Vec<u8>,
+}
+
+/// TCP port and its connections.
+pub struct Server {
+    listener: TcpListener,
+    client: Option<Connection>,
+    waiting: VecDeque<Connection>,
+    refused: VecDeque<(TcpStream, Instant)>,
+    /// All bytes sent before this instant have been processed.
+    drained: Instant,
+}
+
+impl Connection {
+    /// Reads and processes bytes. Returns whether no more are pending.
+    fn hear(
+        &mut self,
+        client: Option<SocketAddr>,
+        mut take: impl FnMut(Frame) -> bool,
+    ) -> Result<bool, What> {
+        let mut bytes = [0; MOST_AT_ONCE];
+        let is_client = client == Some(self.peer);
+        let gone = |why| Err(What::Gone(why, is_client));
+        let mut ended = None;
+        if self.heard.is_empty() {
+            match self.stream.read(&mut bytes) {
+                Ok(0) => ended = Some("end of the connection"),
+                Ok(count) => self.heard.extend(&bytes[..count]),
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+                    return Ok(error.kind() == ErrorKind::WouldBlock);
+                }
+                Err(error) if error.kind() == ErrorKind::ConnectionReset => {
+                    ended = Some("reset by the client")
+                }
+                Err(_) => ended = Some("error of the connection"),
+            }
+        }
+        while let Some(byte) = self.heard.pop_front() {
+            match self.line.hear(byte, &mut self.out) {
+                None => {}
+                Some(Heard::Frame(frame)) => {
+                    let answer = if take(frame) { TAKEN } else { BELL };
+                    self.out.extend_from_slice(answer);
+                }
+                Some(Heard::Open) => {
+                    if let Some(client) = client.filter(|_| !is_client) {
+                        return Err(What::Refused(client));
+                    }
+                    self.out.extend_from_slice(DONE);
+                    return Err(What::Opened);
+                }
+                Some(Heard::Close) => {
+                    self.out.extend_from_slice(DONE);
+                    return Err(What::Closed);
+                }
+            }
+        }
+        ended.map_or(Ok(false), gone)
+    }
+
+    /// Sends pending bytes, as many as the other side accepts.
+    fn flush(&mut self) -> Result<(), &'static str> {
+        while !self.out.is_empty() {
+            match self.stream.write(&self.out) {
+                Ok(0) => return Err("end of the connection"),
+                Ok(count) => {
+                    self.out.drain(..count);
+                }
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => return Err("error of the connection"),
+            }
+        }
+        if self.out.len() > MOST_UNREAD { Err("4 MB left unread") } else { Ok(()) }
+    }
+}
+
+impl Server {
+    /// Listens at `address`; port 0 selects a free one.
+    pub fn new(address: SocketAddr) -> std::io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        Ok(Self {
+            listener,
+            client: None,
+            waiting: VecDeque::new(),
+            refused: VecDeque::new(),
+            drained: Instant::now(),
+        })
+    }
+
+    /// Returns the address of the port.
+    pub fn address(&self) -> std::io::Result<SocketAddr> {
+        self.listener.local_addr()
+    }
+
+    /// Accepts connections and processes bytes of the client. Each frame is passed to `take` with the
+    /// earliest instant at which it may have been sent; a refused frame is answered by a bell. When a client
+    /// ends, no frame of another one is processed in the same call.
+    pub fn poll(&mut self, now: Instant, mut take: impl FnMut(Frame, Instant) -> bool) -> Vec<Event> {
+        let mut events = Vec::new();
+        self.forget_refused(now);
+        let since = self.drained;
+        let mut is_drained = true;
+        if let Some(client) = &mut self.client {
+            let peer = client.peer;
+            match client.hear(Some(peer), |frame| take(frame, since)) {
+                Ok(all) => is_drained = all,
+                Err(what) => {
+                    if let (What::Closed, Some(client)) = (&what, self.client.take()) {
+                        self.waiting.push_back(client);
+                    }
+                    events.push(Event { peer, what });
+                    return events;
+                }
+            }
+        }
+        // Accepted after the client was read, so that a client that has ended does not block the next one.
+        while let Ok((stream, peer)) = self.listener.accept() {
+            if stream.set_nonblocking(true).is_err() || stream.set_nodelay(true).is_err() {
+                continue;
+            }
+            if let Some(client) = &self.client {
+                let client = client.peer;
+                self.refuse(stream, client, now);
+                events.push(Event { peer, what: What::Refused(client) });
+                continue;
+            }
+            if self.waiting.len() >= MOST_CONNECTIONS
+                && let Some(oldest) = self.waiting.pop_front()
+            {
+                let what = What::Gone("too many connections without a channel", false);
+                events.push(Event { peer: oldest.peer, what });
+            }
+            events.push(Event { peer, what: What::Connected });
+            let (heard, out) = (VecDeque::new(), Vec::new());
+            self.waiting.push_back(Connection { stream, peer, line: Line::default(), heard, out });
+        }
+        for _ in 0..self.waiting.len() {
+            let Some(mut connection) = self.waiting.pop_front() else { break };
+            let (peer, client) = (connection.peer, self.client.as_ref().map(|client| client.peer));
+            match connection.hear(client, |_| false) {
+                Ok(_) => self.waiting.push_back(connection),
+                Err(What::Opened) => {
+                    self.client = Some(connection);
+                    is_drained = false;
+                    events.push(Event { peer, what: What::Opened });
+                }
+                Err(what) => {
+                    if let What::Refused(client) = what {
+                        self.refuse(connection.stream, client, now);
+                    }
+                    events.push(Event { peer, what });
+                }
+            }
+        }
+        if is_drained {
+            self.drained = now;
+        }
+        events
+    }
+
+    /// Sends the reason, and keeps the connection for a while: closing it at once would reset it.
+    fn refuse(&mut self, mut stream: TcpStream, client: SocketAddr, now: Instant) {
+        let _ = stream.write_all(format!("#refused: {client} has the channel\r\u{7}").as_bytes());
+        let _ = stream.shutdown(Shutdown::Write);
+        if self.refused.len() >= MOST_CONNECTIONS {
+            self.refused.pop_front();
+        }
+        self.refused.push_back((stream, now));
+    }
+
+    fn forget_refused(&mut self, now: Instant) {
+        let mut bytes = [0; MOST_AT_ONCE];
+        self.refused.retain_mut(|(stream, since)| {
+            let goes_on = match stream.read(&mut bytes) {
+                Ok(count) => count > 0,
+                Err(error) => error.kind() == ErrorKind::WouldBlock,
+            };
+            goes_on && now.saturating_duration_since(*since) < REFUSED_FOR
+        });
+    }
+
+    /// Sends a frame to the client, if there is one.
+    pub fn tell(&mut self, frame: &Frame) {
+        if let Some(client) = &mut self.client {
+            tell(frame, &mut client.out);
+        }
+    }
+
+    /// Sends pending bytes of all connections, as many as they accept.
+    pub fn flush(&mut self) -> Vec<Event> {
+        let mut events = Vec::new();
+        if let Some(client) = &mut self.client
+            && let Err(why) = client.flush()
+        {
+            events.push(Event { peer: client.peer, what: What::Gone(why, true) });
+            self.client = None;
+        }
+        self.waiting.retain_mut(|connection| {
+            let Err(why) = connection.flush() else { return true };
+            events.push(Event { peer: connection.peer, what: What::Gone(why, false) });
+            false
+        });
+        events
+    }
+}

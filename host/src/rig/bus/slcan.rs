@@ -1,0 +1,184 @@
+//! Serial line protocol of CAN adapters (Lawicel, "slcan"), adapter side.
+//!
+//! ```text
+//! S0 .. S8, s...   bit rate        reply CR      O, L   open    CR      C   close   CR
+//! tIIILDD..        frame           reply z CR; bell if the queue is full
+//! TIIIIIIIILDD..   29-bit frame    reply z CR; dropped
+//! rIIIL            remote frame    reply z CR; dropped
+//! V, v, N, F, Z, M, m              version, number, flags, settings
+//! anything else, or a frame while the channel is closed: bell
+//! ```
+//!
+//! Source: Lawicel CANUSB manual, version 2; the driver `slcan` of Linux; python-can's `slcan` interface.
+
+use scarab::bus::Frame;
+
+/// A line that the caller must decide and answer. All other lines are answered here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// A frame for the bus: [`TAKEN`] or [`BELL`].
+    Frame(Frame),
+    /// Request to open the channel: [`DONE`], or a refusal.
+    Open,
+    /// The open channel was closed: [`DONE`].
+    Close,
+}
+
+/// Length of the longest line: a frame with a 29-bit identifier.
+const LONGEST: usize = 1 + 8 + 1 + 16;
+/// Answer to a line that was refused.
+pub const BELL: &[u8] = b"\x07";
+/// Answer to a frame that was queued.
+pub const TAKEN: &[u8] = b"z\r";
+/// Answer to a command.
+pub const DONE: &[u8] = b"\r";
+
+/// State of the line to one client.
+#[derive(Clone, Debug, Default)]
+pub struct Line {
+    bytes: Vec<u8>,
+    /// The line is too long; it is discarded up to the next CR.
+    overlong: bool,
+    is_open: bool,
+}
+
+impl Line {
+    /// Whether the channel is open.
+    #[must_use]
+    pub const fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    /// Processes a byte from the client. Answers go to `out`, except the one to a returned line.
+    pub fn hear(&mut self, byte: u8, out: &mut Vec<u8>) -> Option<Heard> {
+        match byte {
+            b'\r' => {
+                let bytes = std::mem::take(&mut self.bytes);
+                if std::mem::take(&mut self.overlong) {
+                    out.extend_from_slice(BELL);
+                    return None;
+                }
+                match self.obey(&bytes) {
+                    Ok(heard) => return Some(heard),
+                    Err(answer) => out.extend_from_slice(answer),
+                }
+            }
+            b'\n' => {}
+            _ if self.bytes.len() < LONGEST => self.bytes.push(byte),
+            _ => self.overlong = true,
+        }
+        None
+    }
+
+    fn obey(&mut self, line: &[u8]) -> Result<Heard, &'static [u8]> {
+        match line {
+            [b'S' | b's', ..] if self.is_open => Err(BELL),
+            [b'O' | b'L'] if !self.is_open => {
+                self.is_open = true;
+                Ok(Heard::Open)
+            }
+            [b'C'] if self.is_open => {
+                self.is_open = false;
+                Ok(Heard::Close)
+            }
+            // Clients begin with a few empty lines.
+            [] | [b'O' | b'L' | b'C'] | [b'S' | b's' | b'Z' | b'M' | b'm', ..] => Err(DONE),
+            [b'V'] => Err(b"V1013\r"),
+            [b'v'] => Err(b"v1013\r"),
+            [b'N'] => Err(b"N5CA2\r"),
+            [b'F'] => Err(b"F00\r"),
+            [b't', rest @ ..] if self.is_open => frame(rest).map(Heard::Frame).ok_or(BELL),
+            [b'T' | b'r' | b'R', ..] if self.is_open => Err(TAKEN),
+            _ => Err(BELL),
+        }
+    }
+}
+
+fn digit(byte: u8) -> Option<u16> {
+    char::from(byte).to_digit(16).map(|digit| digit as u16)
+}
+
+/// Decodes `IIILDD..`.
+fn frame(text: &[u8]) -> Option<Frame> {
+    let (id, rest) = text.split_at_checked(3)?;
+    let id = id.iter().try_fold(0, |id, byte| Some(id << 4 | digit(*byte)?))?;
+    let (length, rest) = rest.split_first()?;
+    let length = usize::from(digit(*length)?);
+    if length > 8 || rest.len() != 2 * length || id > 0x7FF {
+        return None;
+    }
+    let mut data = Vec::with_capacity(8);
+    for pair in rest.chunks(2) {
+        data.push((digit(pair[0])? << 4 | digit(pair[1])?) as u8);
+    }
+    Some(Frame::new(id, &data))
+}
+
+/// Appends a frame from the bus as a line.
+pub fn tell(frame: &Frame, out: &mut Vec<u8>) {
+    out.extend_from_slice(format!("t{:03X}{}", frame.id(), frame.data().len()).as_bytes());
+    for byte in frame.data() {
+        out.extend_from_slice(format!("{byte:02X}").as_bytes());
+    }
+    out.push(b'\r');
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn say(line: &mut Line, text: &str) -> (Vec<Frame>, String) {
+        let mut out = Vec::new();
+        let mut frames = Vec::new();
+        for byte in text.bytes() {
+            match line.hear(byte, &mut out) {
+                Some(Heard::Frame(frame)) => {
+                    frames.push(frame);
+                    out.extend_from_slice(TAKEN);
+                }
+                Some(Heard::Open | Heard::Close) => out.extend_from_slice(DONE),
+                None => {}
+            }
+        }
+        (frames, String::from_utf8(out).expect("ASCII"))
+    }
+
+    #[test]
+    fn frames_pass_unchanged_once_the_channel_is_open() {
+        let mut line = Line::default();
+        assert_eq!(say(&mut line, "t0000\r"), (Vec::new(), "\x07".into()));
+        assert_eq!(say(&mut line, "C\rS8\rO\r"), (Vec::new(), "\r\r\r".into()));
+        let frame = Frame::new(0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
+        assert_eq!(say(&mut line, "t60184041600000000000\r"), (vec![frame], "z\r".into()));
+        let mut text = Vec::new();
+        tell(&frame, &mut text);
+        assert_eq!(text, b"t60184041600000000000\r");
+        assert_eq!(say(&mut line, "C\r").1, "\r");
+        assert!(!line.is_open());
+    }
+
+    #[test]
+    fn an_invalid_line_gets_a_bell_and_has_no_further_effect() {
+        let mut line = Line::default();
+        assert_eq!(say(&mut line, "O\r").1, "\r");
+        for text in ["x", "t60", "t6019", "tFFF0", "t60110", "t6011xx", "t6010Z", "O1", &"t".repeat(300)] {
+            assert_eq!(say(&mut line, &format!("{text}\r")), (Vec::new(), "\x07".into()), "{text}");
+        }
+        assert_eq!(say(&mut line, "t0010\r").0, [Frame::new(1, &[])]);
+        // Frames that this bus does not carry are acknowledged and dropped.
+        assert_eq!(say(&mut line, "T000000012AABB\rr0012\r"), (Vec::new(), "z\rz\r".into()));
+    }
+
+    #[test]
+    fn random_bytes_cause_no_panic() {
+        let mut line = Line::default();
+        let mut state = 1_u32;
+        let mut out = Vec::new();
+        let letters = b"tTrROCSVvNFZMm0123456789ABCDEFabcdef\r\r\r\n\x00\xFF";
+        for _ in 0..200_000 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let _ = line.hear(letters[(state >> 16) as usize % letters.len()], &mut out);
+            out.clear();
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Storing of a board's parameters, in the order of the firmware (`operation::Storing`), with the processor
+//! stalled.
+//!
+//! ```text
+//! hosts are informed; 20 ms later the flash is changed: 16 us per word, 1 to 2 s per erased sector
+//! (STM32F405, data sheet). The processor stalls for that time: received frames wait in the controller's
+//! queue of three, further ones are lost.
+//! ```
+
+use scarab::bus::device::Keeping;
+use scarab::bus::{Frame, StoredNode};
+use scarab::leg::DriveState;
+use scarab::operation::{Inhibit, Storing};
+use scarab::store::KeptModel;
+
+use crate::formats::kept_file::memory::{Memory, SECTOR};
+use crate::rig::board::levels::Levels;
+use crate::rig::bus::board::TICK_NS;
+use crate::rig::faulty_board::Rig;
+
+/// Period of the steps of `Storing`.
+const STEP_NS: u64 = 1_000_000;
+/// Time to program a word of four bytes, and to erase a sector.
+const WORD_NS: u64 = 16_000;
+const ERASING_NS: u64 = 1_000_000_000;
+/// Length of the controller's receive queue.
+const QUEUE: usize = 3;
+
+/// Pending store request.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<const N: usize> {
+    /// Store all, or restore the defaults.
+    pub what: Keeping,
+    /// Objects of each node.
+    pub objects: [StoredNode; N],
+    /// An accepted model that is not stored yet.
+    pub model: Option<KeptModel<N>>,
+}
+
+impl<const N: usize> Asked<N> {
+    /// Stores all objects and a model, or erases everything; returns whether this succeeded.
+    fn change(&self, memory: &mut Memory, state: DriveState) -> bool {
+        match self.what {
+            Keeping::Defaults => memory.forget(state),
+            Keeping::All => {
+                let mut nodes = self.objects.iter().enumerate();
+                nodes.all(|(joint, kept)| memory.keep_objects(state, joint, kept.bytes()))
+                    && self.model.is_none_or(|model| memory.keep_any(state, &model))
+            }
+        }
+    }
+
+    /// Number of stored models after success, if it changes.
+    #[must_use]
+    pub fn generation(&self) -> Option<u32> {
+        match self.what {
+            Keeping::Defaults => Some(0),
+            Keeping::All => self.model.map(|model| model.provenance.generation),
+        }
+    }
+}
+
+/// Storing and stall of a simulated board; see the module.
+#[derive(Clone, Debug)]
+pub struct Flashing<const N: usize> {
+    storing: Storing,
+    asked: Option<Asked<N>>,
+    /// An accepted model that is not stored yet.
+    accepted: Option<KeptModel<N>>,
+    /// Whether the flash was changed.
+    has_kept: bool,
+    /// Time of the next step.
+    due_ns: u64,
+    /// End of the stall.
+    until_ns: u64,
+    /// Frames received during the stall, and whether one was lost.
+    heard: Vec<Frame>,
+    lost: bool,
+    /// Time to erase a sector.
+    pub erasing_ns: u64,
+    /// For campaigns without announcement: the store's inhibit reason is not set in the firmware.
+    pub unannounced: bool,
+    unseen: Inhibit,
+}
+
+impl<const N: usize> Flashing<N> {
+    /// Creates the state without a request.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            storing: Storing::new(),
+            asked: None,
+            accepted: None,
+            has_kept: false,
+            due_ns: 0,
+            until_ns: 0,
+            heard: Vec::new(),
+            lost: false,
+            erasing_ns: ERASING_NS,
+            unannounced: false,
+            unseen: Inhibit::new(),
+        }
+    }
+
+    /// Whether a store request is in progress.
+    #[must_use]
+    pub fn is_under_way(&self) -> bool {
+        self.asked.is_some()
+    }
+
+    /// Sets the model to be stored with the next request.
+    pub(super) fn accept(&mut self, model: KeptModel<N>) {
+        self.accepted = Some(model);
+    }
+
+    /// Whether the processor stalls.
+    #[must_use]
+    pub fn stands(&self, now_ns: u64) -> bool {
+        now_ns < self.until_ns
+    }
+
+    /// Receives a frame during a stall. Returns whether the processor runs.
+    pub(super) fn hear(&mut self, frame: &Frame, now_ns: u64) -> bool {
+        let stands = self.stands(now_ns);
+        if stands && self.heard.len() < QUEUE {
+            self.heard.push(*frame);
+        } else if stands {
+            self.lost = true;
+        }
+        !stands
+    }
+
+    /// Takes the frames received during the stall, and whether one was lost.
+    pub(super) fn take_heard(&mut self) -> (Vec<Frame>, bool) {
+        (core::mem::take(&mut self.heard), core::mem::take(&mut self.lost))
+    }
+
+    /// Whether the flash was changed since the last call.
+    pub fn take_kept(&mut self) -> bool {
+        core::mem::take(&mut self.has_kept)
+    }
+
+    /// Runs a step, if one is due.
+    pub(super) fn step<const B: usize>(&mut self, now_ns: u64, rig: &mut Rig<N, B>, memory: &mut Memory) {
+        if now_ns < self.due_ns {
+            return;
+        }
+        self.due_ns = now_ns + STEP_NS;
+        let (before, state) = (memory.worked(), rig.state());
+        let Levels { signals, registers, bus, .. } = &mut *rig.board;
+        let inhibit = if self.unannounced { &self.unseen } else { &signals.inhibit };
+        let Some(storage) = bus.as_ref().map(|bus| &bus.storage) else { return };
+        let Some(mut keep) = storage.given() else {
+            return self.storing.look_after(inhibit, registers);
+        };
+        if self.asked.is_none() {
+            let model = self.accepted.map(|mut model| {
+                model.provenance.generation = keep.generation + 1;
+                model
+            });
+            self.asked = Some(Asked { what: keep.what, objects: keep.objects, model });
+        }
+        let Some(asked) = &self.asked else { return };
+        let done = self.storing.step(inhibit, signals.permission(), registers, || {
+            self.has_kept = true;
+            asked.change(memory, state)
+        });
+        let after = memory.worked();
+        let sectors = u64::from(after.1 - before.1);
+        // A sector erased during a power failure is not complete.
+        let words = (after.0 - before.0).saturating_sub(sectors * SECTOR as u64) / 4;
+        if after != before {
+            self.until_ns = now_ns + TICK_NS + words * WORD_NS + sectors * self.erasing_ns;
+        }
+        let Some(done) = done else { return };
+        if let Some(generation) = asked.generation().filter(|_| done) {
+            keep.generation = generation;
+            self.accepted = None;
+            if asked.what == Keeping::Defaults {
+                signals.forget_stored();
+            }
+        }
+        self.asked = None;
+        keep.done = done;
+        drop(keep);
+        storage.give_back();
+    }
+}
+
+impl<const N: usize> Default for Flashing<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,459 @@
+//! Most likely cause of a refusal, from refits with one thing corrected.
+//!
+//! ```text
+//! remaining     misfit of the refit over the torque, root mean square over the joints
+//! sound         nothing negative by more than 5 sigma that cannot be; torque of the prior's sign and size
+//! ```
+//!
+//! Ranked: samples; then the correction that is sound and leaves least of the misfit. Where the recording as
+//! it is leads to no sound leg, a correction has to restore that; otherwise it has to halve the misfit's
+//! power, or be a direction that refuses. Another leg is named only where a link's length or a zero asks for
+//! it.
+
+use crate::base::number::Number;
+use crate::report::doubt::{CauseReport, DirectionReport, SampleFinding};
+use crate::report::findings::FindingReport;
+use crate::run::doubt::directions::{Directions, Found, label};
+use crate::run::doubt::midway::Midway;
+use crate::run::doubt::rows::{Equations, Motion};
+use crate::run::doubt::{Doubts, Question, midway_words, sample_cause};
+
+/// Sigma by which a parameter may be negative.
+const NEGATIVE_SIGMA: f64 = 5.0;
+/// Ratio of a joint's torque to the prior's, beyond which its unit is wrong.
+const PLAUSIBLE_RATIO: f64 = 30.0;
+/// Part of the misfit that a correction may leave where the recording as it is is sound.
+const HALVED: f64 = 0.7;
+/// Significance of a direction that is named where nothing else is.
+const WEAKER: f64 = 3.0;
+/// Misfits closer than this are equal: the simpler correction is named.
+const EQUAL: f64 = 1.1;
+
+/// Change of the angles and torques of one instant.
+type Change<const N: usize> = Box<dyn Fn(&mut [f64; N], &mut [f64; N])>;
+
+/// A correction of the samples: angles and torques of one instant, anatomical.
+struct Correction<const N: usize> {
+    name: &'static str,
+    joint: Option<usize>,
+    words: String,
+    apply: Change<N>,
+}
+
+/// How good a fit is.
+#[derive(Clone, Copy, Debug)]
+struct Quality {
+    remaining: f64,
+    sound: bool,
+}
+
+/// A cause that was tried.
+struct Tried {
+    cause: CauseReport,
+    quality: Quality,
+    /// Whether the same error of another joint looks alike.
+    is_shared: bool,
+}
+
+/// Names the most likely cause of a refusal.
+#[must_use]
+pub fn likely<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    doubts: Option<&Doubts<N, B>>,
+    samples: &[&SampleFinding],
+    findings: &[FindingReport],
+) -> CauseReport {
+    if let Some(finding) = samples.iter().find(|finding| finding.refuses) {
+        return sample_cause(finding);
+    }
+    let Some(doubts) = doubts else { return unknown() };
+    if let Some(cause) = encoder_steps(question, doubts, findings) {
+        return cause;
+    }
+    // Damage looks like friction at rest and like columns without effect: neither is taken from the refused
+    // fit.
+    let plain = question.with_all_columns();
+    let again = plain.as_ref().and_then(|plain| Doubts::of(plain).ok().flatten());
+    let (question, doubts) = match (&plain, &again) {
+        (Some(plain), Some(again)) => (plain, again),
+        _ => (question, doubts),
+    };
+    let here = quality(question, &doubts.equations);
+    let mut tried = refits(question);
+    for (found, report) in doubts.found.iter().zip(&doubts.directions) {
+        let certain =
+            found.significance() > crate::run::doubt::directions::CHANCE && (!report.passed || !here.sound);
+        if certain {
+            tried.push(of_direction(question, doubts, found, report, here));
+        }
+    }
+    if let Some(midway) = doubts.midway.as_ref().filter(|midway| midway.refuses()) {
+        tried.push(Tried {
+            cause: CauseReport {
+                name: "changed_midway",
+                joint: midway.joint.map(|joint| joint + 1),
+                value: midway.change.into(),
+                sigma: midway.sigma.into(),
+                words: midway_words(midway),
+            },
+            quality: Quality {
+                remaining: here.remaining * (1.0 - midway.explained).max(0.0).sqrt(),
+                sound: true,
+            },
+            is_shared: false,
+        });
+    }
+    let refused: Vec<bool> = tried.iter().map(|tried| is_refusing(doubts, &tried.cause)).collect();
+    let passing = tried.into_iter().zip(refused).filter(|(tried, refused)| {
+        tried.quality.sound && (!here.sound || *refused || tried.quality.remaining < HALVED * here.remaining)
+    });
+    let best = nearest(passing.map(|(tried, _)| tried).collect());
+    let geometry = findings
+        .iter()
+        .find(|finding| !finding.passed && matches!(finding.test, "link_length" | "encoder_zero"));
+    match (best, geometry) {
+        (Some(best), _) => best,
+        (None, Some(finding)) => CauseReport {
+            name: "other_leg",
+            joint: finding.joint,
+            value: finding.value,
+            sigma: Number::UNKNOWN,
+            words: finding.words.clone(),
+        },
+        (None, None) => weaker(question, doubts, here).unwrap_or_else(unknown),
+    }
+}
+
+/// Steps of the encoders as the cause: where nothing else refuses, or where everything is right at a lower
+/// bandwidth.
+fn encoder_steps<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    doubts: &Doubts<N, B>,
+    findings: &[FindingReport],
+) -> Option<CauseReport> {
+    let bias = doubts.encoder?;
+    let mut failed = findings.iter().filter(|finding| !finding.passed);
+    let words = if let Some(steps) = failed.clone().find(|finding| finding.test == "encoder_steps")
+        && failed.all(|finding| finding.test == "encoder_steps")
+    {
+        steps.words.clone()
+    } else {
+        let hz = question.calmer_hz().ok()??;
+        let calmer = question.at(hz);
+        let doubts = Doubts::of(&calmer).ok()??;
+        let is_right = doubts.directions.iter().all(|direction| direction.passed)
+            && !doubts.midway.as_ref().is_some_and(Midway::refuses)
+            && !doubts.encoder.is_some_and(|bias| bias.refuses())
+            && quality(&calmer, &doubts.equations).sound;
+        if !is_right {
+            return None;
+        }
+        format!(
+            "encoder too coarse at this bandwidth: with `--bandwidth {hz}` nothing speaks against the recording"
+        )
+    };
+    let (joint, share) = bias.largest_share();
+    Some(CauseReport {
+        name: "encoder_steps",
+        joint: Some(joint + 1),
+        value: share.into(),
+        sigma: Number::UNKNOWN,
+        words,
+    })
+}
+
+/// A joint, or all, whose angle is in degrees: it spans more than two turns, and taken as degrees it leaves
+/// less than half of the misfit and a possible leg.
+#[must_use]
+pub fn in_degrees<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    doubts: &Doubts<N, B>,
+) -> Option<CauseReport> {
+    let here = quality(question, &doubts.equations);
+    let candidates = corrections::<N>().into_iter().filter(|correction| {
+        correction.name == "angle_unit" && spans(question, correction.joint, 2.0 * std::f64::consts::TAU)
+    });
+    let tried = candidates.filter_map(|correction| refit(question, &correction));
+    nearest(
+        tried.filter(|tried| tried.quality.sound && tried.quality.remaining < 0.5 * here.remaining).collect(),
+    )
+}
+
+/// The cause that leaves least; of nearly equal ones the simpler, and of one name the better.
+fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
+    let least = passing.iter().map(|tried| tried.quality.remaining).fold(f64::INFINITY, f64::min);
+    passing.retain(|tried| tried.quality.remaining <= EQUAL * least);
+    let name = passing.first()?.cause.name;
+    let of_name = passing.into_iter().filter(|tried| tried.cause.name == name);
+    let mut best = of_name.min_by(|one, other| one.quality.remaining.total_cmp(&other.quality.remaining))?;
+    if best.is_shared {
+        best.cause.joint = None;
+    }
+    Some(best.cause)
+}
+
+/// A direction that is not certain enough to refuse by itself, after something else refused.
+fn weaker<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    doubts: &Doubts<N, B>,
+    here: Quality,
+) -> Option<CauseReport> {
+    let pairs = doubts.found.iter().zip(&doubts.directions);
+    let likely = pairs.filter(|(found, report)| {
+        found.significance() > WEAKER
+            && found.explained() > 0.3 * report.explained_limit.known().unwrap_or(1.0)
+    });
+    let tried = likely.map(|(found, report)| of_direction(question, doubts, found, report, here));
+    nearest(tried.filter(|tried| tried.quality.sound).collect())
+}
+
+fn unknown() -> CauseReport {
+    CauseReport {
+        name: "unknown",
+        joint: None,
+        value: Number::UNKNOWN,
+        sigma: Number::UNKNOWN,
+        words: "no single correction of units, signs, columns, delay, scale or gravity makes it acceptable"
+            .into(),
+    }
+}
+
+fn is_refusing<const N: usize, const B: usize>(doubts: &Doubts<N, B>, cause: &CauseReport) -> bool {
+    cause.name == "changed_midway"
+        || doubts
+            .directions
+            .iter()
+            .any(|report| !report.passed && report.name == cause.name && report.joint == cause.joint)
+}
+
+fn of_direction<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    doubts: &Doubts<N, B>,
+    found: &Found<B>,
+    report: &DirectionReport,
+    here: Quality,
+) -> Tried {
+    let remaining = here.remaining * (1.0 - found.explained()).max(0.0).sqrt();
+    let sigma = doubts.sigma.map(|sigma| sigma.noise.max(sigma.segments));
+    let directions = Directions { equations: &doubts.equations, zero: question.zero(), axis: question.axis };
+    let (columns, torque) = directions.system(found.kind, found.value);
+    let sound =
+        is_sound(question, &found.values, &sigma) && agrees(question, &doubts.equations, &columns, &torque);
+    let mut cause = CauseReport::direction(found.kind, report);
+    if !found.alike.is_empty() {
+        cause.words = format!(
+            "{} ({} cannot be distinguished from {})",
+            cause.words,
+            label(found.kind),
+            found.alike.join(", ")
+        );
+    }
+    let is_shared = found.alike.iter().any(|other| other.starts_with(found.kind.name()));
+    Tried { cause, quality: Quality { remaining, sound }, is_shared }
+}
+
+fn refits<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Tried> {
+    let mut tried = Vec::new();
+    for correction in corrections::<N>() {
+        if correction.name == "angle_unit" && !spans(question, correction.joint, std::f64::consts::TAU) {
+            continue;
+        }
+        tried.extend(refit(question, &correction));
+    }
+    tried
+}
+
+/// Fit of the corrected motions; `None` with too few rows.
+fn refit<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    correction: &Correction<N>,
+) -> Option<Tried> {
+    let motions: Vec<Motion<N>> =
+        question.motions.iter().map(|motion| corrected(question, motion, correction)).collect();
+    let equations = question.equations(&motions).ok().flatten()?;
+    let quality = quality(question, &equations);
+    let words = format!(
+        "{}; then the misfit is {:.1} % of the torque and the parameters are possible",
+        correction.words,
+        100.0 * quality.remaining
+    );
+    let cause = CauseReport {
+        name: correction.name,
+        joint: correction.joint.map(|joint| joint + 1),
+        value: Number::UNKNOWN,
+        sigma: Number::UNKNOWN,
+        words,
+    };
+    Some(Tried { cause, quality, is_shared: false })
+}
+
+/// Whether the angle of a joint, or of each, spans more than this, rad.
+fn spans<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    joint: Option<usize>,
+    least: f64,
+) -> bool {
+    (0..N).filter(|at| joint.is_none_or(|joint| joint == *at)).all(|at| {
+        let angles = || question.motions.iter().flat_map(|motion| &motion.position).map(|angles| angles[at]);
+        angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min) > least
+    })
+}
+
+fn corrected<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    motion: &Motion<N>,
+    correction: &Correction<N>,
+) -> Motion<N> {
+    let anatomy = &question.anatomy;
+    let mut motion = motion.clone();
+    for (position, torque) in motion.position.iter_mut().zip(&mut motion.torque) {
+        let mut angles = core::array::from_fn(|joint| anatomy[joint].angle_from_chain(position[joint]));
+        let mut torques = core::array::from_fn(|joint| anatomy[joint].from_chain(torque[joint]));
+        (correction.apply)(&mut angles, &mut torques);
+        *position = core::array::from_fn(|joint| anatomy[joint].angle_to_chain(angles[joint]));
+        *torque = core::array::from_fn(|joint| anatomy[joint].to_chain(torques[joint]));
+    }
+    motion
+}
+
+/// All corrections of units, signs and columns; the simpler first.
+fn corrections<const N: usize>() -> Vec<Correction<N>> {
+    let mut all: Vec<Correction<N>> = Vec::new();
+    let chosen = |joint: Option<usize>, at: usize| joint.is_none_or(|joint| joint == at);
+    let mut subjects: Vec<Option<usize>> = vec![None];
+    if N > 1 {
+        subjects.extend((0..N).map(Some));
+    }
+    let who =
+        |joint: Option<usize>| joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
+    all.push(Correction {
+        name: "torque_unit",
+        joint: None,
+        words: "torque divided by 1000: is it in mN m?".into(),
+        apply: Box::new(|_, torques| torques.iter_mut().for_each(|torque| *torque /= 1000.0)),
+    });
+    for &joint in &subjects {
+        all.push(Correction {
+            name: "torque_sign",
+            joint,
+            words: format!("torque of {} negated", who(joint)),
+            apply: Box::new(move |_, torques| {
+                let each = torques.iter_mut().enumerate();
+                each.filter(|(at, _)| chosen(joint, *at)).for_each(|(_, torque)| *torque = -*torque);
+            }),
+        });
+        all.push(Correction {
+            name: "angle_unit",
+            joint,
+            words: format!("angle of {} taken as degrees", who(joint)),
+            apply: Box::new(move |angles, _| {
+                let each = angles.iter_mut().enumerate();
+                each.filter(|(at, _)| chosen(joint, *at)).for_each(|(_, angle)| *angle = angle.to_radians());
+            }),
+        });
+    }
+    for one in 0..N {
+        for other in one + 1..N {
+            let names = format!("{} and {}", one + 1, other + 1);
+            all.push(Correction {
+                name: "joints_swapped",
+                joint: None,
+                words: format!("torques of joints {names} exchanged"),
+                apply: Box::new(move |_, torques| torques.swap(one, other)),
+            });
+            all.push(Correction {
+                name: "joints_swapped",
+                joint: None,
+                words: format!("angles of joints {names} exchanged"),
+                apply: Box::new(move |angles, _| angles.swap(one, other)),
+            });
+            all.push(Correction {
+                name: "joints_swapped",
+                joint: None,
+                words: format!("joints {names} exchanged"),
+                apply: Box::new(move |angles, torques| {
+                    angles.swap(one, other);
+                    torques.swap(one, other);
+                }),
+            });
+        }
+    }
+    for joint in (0..N).filter(|_| N > 1) {
+        all.push(Correction {
+            name: "direction",
+            joint: Some(joint),
+            words: format!("angle and torque of joint {} with the other sign", joint + 1),
+            apply: Box::new(move |angles, torques| {
+                angles[joint] = -angles[joint];
+                torques[joint] = -torques[joint];
+            }),
+        });
+    }
+    all
+}
+
+fn quality<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    equations: &Equations<N, B>,
+) -> Quality {
+    let fit = equations.fit(&equations.columns, &equations.torque, false);
+    let segments: Vec<usize> = equations.places.iter().map(|place| place.cluster).collect();
+    let scatter = crate::run::doubt::fit::segment_sigma(
+        &fit,
+        &equations.columns,
+        &equations.torque,
+        &equations.weight,
+        &segments,
+    );
+    let sigma = core::array::from_fn(|base| fit.inverse[base][base].max(0.0).sqrt().max(scatter[base]));
+    let shares = (0..N).map(|joint| {
+        let torques = equations.places.iter().zip(&equations.torque);
+        let of: Vec<f64> =
+            torques.filter(|(place, _)| place.joint == joint).map(|(_, torque)| torque * torque).collect();
+        let power = of.iter().sum::<f64>() / of.len().max(1) as f64;
+        equations.row_sigma[joint].powi(2) * equations.information() / power.max(1e-300)
+    });
+    Quality {
+        remaining: (shares.sum::<f64>() / N as f64).sqrt(),
+        sound: is_sound(question, &fit.values, &sigma)
+            && agrees(question, equations, &equations.columns, &equations.torque),
+    }
+}
+
+/// Whether nothing is negative that cannot be.
+fn is_sound<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    values: &[f64; B],
+    sigma: &[f64; B],
+) -> bool {
+    (0..question.model.base.rank()).filter(|&base| question.active[base]).all(|base| {
+        let bounded = question.model.base.independent(base).is_some_and(|(_, kind)| kind.is_never_negative());
+        !bounded || values[base] > -NEGATIVE_SIGMA * sigma[base]
+    })
+}
+
+/// Whether the torque has the sign and size of the prior's; without a prior, at most thrice the joint's
+/// limit.
+fn agrees<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    equations: &Equations<N, B>,
+    columns: &[[f64; B]],
+    torque: &[f64],
+) -> bool {
+    let rows = || equations.places.iter().zip(torque).zip(columns);
+    let Some(prior) = question.prior else {
+        return rows().all(|((place, torque), _)| torque.abs() < 3.0 * question.torque_limit[place.joint]);
+    };
+    let (mut along, mut measured, mut expected) = (0.0, [0.0; N], [0.0; N]);
+    for ((place, torque), row) in rows() {
+        let guess: f64 = row.iter().zip(&prior).map(|(element, value)| element * value).sum();
+        along += guess * torque;
+        measured[place.joint] += torque * torque;
+        expected[place.joint] += guess * guess;
+    }
+    along > 0.0
+        && measured.iter().zip(expected).all(|(measured, expected)| {
+            let ratio = (measured / expected.max(1e-300)).sqrt();
+            (1.0 / PLAUSIBLE_RATIO..PLAUSIBLE_RATIO).contains(&ratio)
+        })
+}

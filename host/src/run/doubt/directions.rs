@@ -1,0 +1,365 @@
+//! Directions of doubt: errors of a logging chain that a rigid-body model can see, each fitted beside the
+//! parameters.
+//!
+//! ```text
+//! delay j           torque_j(t + d) = Y_j p                           torque of joint j is d late
+//! encoder_scale j   Y(q_j / (1 + d)) p, about the joint's zero        angle of joint j is logged too large
+//! torque_scale j    torque_j = (1 + d) Y_j p                          torque of joint j against joint 1
+//! gravity           Y with gravity turned back by d about axis 1      the leg file's gravity is turned by d
+//! ```
+//!
+//! Each is a nonlinear least-squares problem in d and p, solved by Gauss-Newton with p eliminated (Golub and
+//! Pereyra 1973). A delay starts from the best of a scan, because its cost is not convex beyond a quarter of
+//! a period; gravity from the best of four quarters. The column of a delay is the slope of the *predicted*
+//! torque: the slope of the measured one holds noise, which would count as information.
+//!
+//! A direction refuses when all of these hold:
+//!
+//! ```text
+//! |d| > 5.2 sigma                     sigma: the larger of noise and scatter over segments
+//! some parameter moves by > 2 sigma   when d is fitted
+//! gain > 0.1 x misfit                 x = 1 - noise^2 / misfit^2, at least 0.02
+//! ```
+//!
+//! The third keeps a machine whose misfit is mostly something else, as a real one's is. A torque scale common
+//! to all joints is invisible without a known mass. In the plane gravity's direction and the zero of joint 1
+//! are one.
+
+use std::borrow::Cow;
+
+use nalgebra::{Rotation3, Unit, Vector3};
+use scarab::ident::{RowModel, Smoothed};
+
+use crate::run::doubt::fit::{Fit, Score, score};
+use crate::run::doubt::rows::Equations;
+
+/// Standard deviations that chance exceeds once in ten million.
+pub const CHANCE: f64 = 5.2;
+/// Shift of a parameter that is tolerated, in its sigma.
+pub const TOLERATED_SHIFT: f64 = 2.0;
+/// Share of the misfit that a direction has to explain where nothing of it is noise.
+pub const EXPLAINED_SHARE: f64 = 0.1;
+/// Part of the misfit that is never noise, however well the model fits: in hours of motion any small error is
+/// certain.
+pub const SMALLEST_SYSTEMATIC: f64 = 0.02;
+/// Correlation of two columns from which both are called alike.
+const ALIKE: f64 = 0.95;
+/// Share of a column that the parameters must leave. Rounding leaves 1e-12 of an absorbed one; gravity of a
+/// slow leg 6e-6.
+const SEEN_SHARE: f64 = 1e-8;
+/// Range and step of a delay's scan, s.
+const SCAN_S: (f64, f64, f64) = (-0.040, 0.080, 0.004);
+/// Steps of Gauss-Newton.
+const STEPS: usize = 8;
+
+/// What may be wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Torque of a joint against its angle.
+    Delay(usize),
+    /// Scale of a joint's angle.
+    EncoderScale(usize),
+    /// Scale of a joint's torque against that of the first.
+    TorqueScale(usize),
+    /// Direction of gravity.
+    Gravity,
+}
+
+impl Kind {
+    /// All directions of a leg.
+    #[must_use]
+    pub fn all(joints: usize) -> Vec<Self> {
+        let delays = (0..joints).map(Self::Delay);
+        let scales = (0..joints).map(Self::EncoderScale);
+        delays.chain(scales).chain((1..joints).map(Self::TorqueScale)).chain([Self::Gravity]).collect()
+    }
+
+    /// Name in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Delay(_) => "delay",
+            Self::EncoderScale(_) => "encoder_scale",
+            Self::TorqueScale(_) => "torque_scale",
+            Self::Gravity => "gravity",
+        }
+    }
+
+    /// Joint, from 0.
+    #[must_use]
+    pub fn joint(self) -> Option<usize> {
+        match self {
+            Self::Delay(joint) | Self::EncoderScale(joint) | Self::TorqueScale(joint) => Some(joint),
+            Self::Gravity => None,
+        }
+    }
+
+    /// Unit of reports and the factor to it.
+    #[must_use]
+    pub fn unit(self) -> (&'static str, f64) {
+        match self {
+            Self::Delay(_) => ("ms", 1e3),
+            Self::EncoderScale(_) | Self::TorqueScale(_) => ("%", 100.0),
+            Self::Gravity => ("deg", 180.0 / std::f64::consts::PI),
+        }
+    }
+
+    /// Step of the difference quotient.
+    fn step(self) -> f64 {
+        match self {
+            Self::Gravity => 1e-3,
+            _ => 1e-4,
+        }
+    }
+
+    /// Largest plausible magnitude, and the largest step.
+    fn range(self) -> (f64, f64) {
+        match self {
+            Self::Delay(_) => (0.2, 0.02),
+            Self::EncoderScale(_) => (0.5, 0.1),
+            Self::TorqueScale(_) => (20.0, 1.0),
+            Self::Gravity => (10.0, 0.5),
+        }
+    }
+}
+
+/// One direction with the parameters fitted beside it.
+#[derive(Clone, Debug)]
+pub struct Found<const B: usize> {
+    /// What may be wrong.
+    pub kind: Kind,
+    /// Value, SI.
+    pub value: f64,
+    /// Standard deviation by the noise of the rows.
+    pub noise_sigma: f64,
+    /// Standard deviation by the scatter of the segments.
+    pub segment_sigma: f64,
+    /// Whether the motion shows it at all.
+    pub seen: bool,
+    /// Cost without and with it.
+    pub cost: (f64, f64),
+    /// Parameters of the motion identified from, with it minus without it.
+    pub shift: [f64; B],
+    /// All parameters with it.
+    pub values: [f64; B],
+    /// Directions that cannot be distinguished from this one.
+    pub alike: Vec<String>,
+    column: Vec<f64>,
+}
+
+impl<const B: usize> Found<B> {
+    /// The larger standard deviation.
+    #[must_use]
+    pub fn sigma(&self) -> f64 {
+        self.noise_sigma.max(self.segment_sigma)
+    }
+
+    /// Value over its standard deviation.
+    #[must_use]
+    pub fn significance(&self) -> f64 {
+        if self.seen { self.value.abs() / self.sigma() } else { 0.0 }
+    }
+
+    /// Share of the misfit that it explains.
+    #[must_use]
+    pub fn explained(&self) -> f64 {
+        if self.seen { ((self.cost.0 - self.cost.1) / self.cost.0).max(0.0) } else { 0.0 }
+    }
+
+    /// Variance that the doubt adds to each parameter: the shift, as far as the direction is not chance.
+    #[must_use]
+    pub fn variance(&self) -> [f64; B] {
+        let certain = (1.0 - (2.0 / self.significance().max(1e-9)).powi(2)).max(0.0);
+        self.shift.map(|shift| shift * shift * certain)
+    }
+}
+
+/// Joint's zero in chain angles, and its torques.
+pub struct Directions<'a, const N: usize, const B: usize> {
+    /// Rows.
+    pub equations: &'a Equations<N, B>,
+    /// Chain angle of each joint's zero, rad.
+    pub zero: [f64; N],
+    /// Axis of the first joint in the base frame.
+    pub axis: Vector3<f64>,
+}
+
+type System<'a, const B: usize> = (Cow<'a, [[f64; B]]>, Cow<'a, [f64]>);
+
+impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
+    /// Every direction, with those that cannot be distinguished from it.
+    #[must_use]
+    pub fn all(&self) -> Vec<Found<B>> {
+        let plain = self.equations.fit(&self.equations.columns, &self.equations.torque, false);
+        let training = self.equations.fit(&self.equations.columns, &self.equations.torque, true);
+        let mut found: Vec<Found<B>> =
+            Kind::all(N).into_iter().map(|kind| self.one(kind, &plain, &training)).collect();
+        for one in 0..found.len() {
+            let names: Vec<String> = (0..found.len())
+                .filter(|&other| other != one && found[one].seen && found[other].seen)
+                .filter(|&other| correlation(&found[one].column, &found[other].column).abs() > ALIKE)
+                .map(|other| label(found[other].kind))
+                .collect();
+            found[one].alike.extend(names);
+            if !found[one].seen {
+                found[one].alike.push("the parameters".into());
+            }
+            if found[one].kind == Kind::Gravity {
+                found[one].alike.push("zero of joint 1".into());
+            }
+        }
+        found
+    }
+
+    /// Columns and torques with a direction at `value`.
+    #[must_use]
+    pub fn system(&self, kind: Kind, value: f64) -> System<'a, B> {
+        let all = self.equations;
+        let plain = Cow::Borrowed(all.torque.as_slice());
+        match kind {
+            Kind::Delay(joint) => (Cow::Borrowed(&all.columns), Cow::Owned(all.delayed(joint, value))),
+            Kind::EncoderScale(joint) => (Cow::Owned(self.scaled(joint, 1.0 / (1.0 + value))), plain),
+            Kind::TorqueScale(joint) => {
+                let pairs = all.columns.iter().zip(&all.places);
+                let columns = pairs.map(|(row, place)| {
+                    if place.joint == joint { row.map(|element| (1.0 + value) * element) } else { *row }
+                });
+                (Cow::Owned(columns.collect()), plain)
+            }
+            Kind::Gravity => {
+                let model = all.model();
+                let turn = Rotation3::from_axis_angle(&Unit::new_normalize(self.axis), -value);
+                let turned = RowModel { gravity: turn * model.gravity, ..model.clone() };
+                (Cow::Owned(all.columns_of(&turned, &|_| {})), plain)
+            }
+        }
+    }
+
+    /// Columns with the angle of a joint multiplied about its zero.
+    #[must_use]
+    pub fn scaled(&self, joint: usize, factor: f64) -> Vec<[f64; B]> {
+        let zero = self.zero[joint];
+        let change = |instant: &mut Smoothed<f64, N>| {
+            instant.position[joint] = zero + factor * (instant.position[joint] - zero);
+            instant.velocity[joint] *= factor;
+            instant.acceleration[joint] *= factor;
+        };
+        self.equations.columns_of(self.equations.model(), &change)
+    }
+
+    /// Change of the prediction with the direction.
+    fn column(&self, kind: Kind, value: f64, columns: &[[f64; B]], fit: &Fit<B>) -> Vec<f64> {
+        let all = self.equations;
+        let predicted = fit.predictions(columns);
+        match kind {
+            Kind::Delay(joint) => {
+                let rates = all.rate_of(&predicted);
+                let pairs = rates.iter().zip(&all.places);
+                pairs.map(|(rate, place)| if place.joint == joint { -rate } else { 0.0 }).collect()
+            }
+            Kind::TorqueScale(joint) => {
+                let pairs = predicted.iter().zip(&all.places);
+                let factor = 1.0 / (1.0 + value);
+                pairs
+                    .map(|(torque, place)| if place.joint == joint { factor * torque } else { 0.0 })
+                    .collect()
+            }
+            Kind::EncoderScale(_) | Kind::Gravity => {
+                let step = kind.step();
+                let beside = fit.predictions(&self.system(kind, value + step).0);
+                beside.iter().zip(&predicted).map(|(beside, here)| (beside - here) / step).collect()
+            }
+        }
+    }
+
+    fn score(&self, kind: Kind, value: f64, system: &System<'_, B>, fit: &Fit<B>) -> Score {
+        let all = self.equations;
+        let z = self.column(kind, value, &system.0, fit);
+        let segments: Vec<usize> = all.places.iter().map(|place| place.cluster).collect();
+        score(fit, &system.0, &system.1, &z, &all.weight, &segments)
+    }
+
+    fn start(&self, kind: Kind, plain: &Fit<B>) -> f64 {
+        let cost = |value: f64| {
+            let (columns, torque) = self.system(kind, value);
+            self.equations.fit(&columns, &torque, false).cost
+        };
+        let starts: Vec<f64> = match kind {
+            Kind::Delay(_) => {
+                let largest = self.equations.largest_delay_s();
+                let (low, high, step) = SCAN_S;
+                let count = ((high - low) / step).round() as usize;
+                (0..=count)
+                    .map(|index| low + step * index as f64)
+                    .filter(|value| value.abs() < largest && value.abs() > 0.1 * step)
+                    .collect()
+            }
+            Kind::Gravity => [0.25, 0.5, 0.75].map(|turn| turn * std::f64::consts::TAU).to_vec(),
+            _ => Vec::new(),
+        };
+        let scanned = starts.into_iter().map(|value| (value, cost(value)));
+        let best = scanned.min_by(|one, other| one.1.total_cmp(&other.1));
+        best.filter(|best| best.1 < plain.cost).map_or(0.0, |best| best.0)
+    }
+
+    fn one(&self, kind: Kind, plain: &Fit<B>, training: &Fit<B>) -> Found<B> {
+        let mut value = self.start(kind, plain);
+        let (largest, step) = kind.range();
+        let largest = match kind {
+            Kind::Delay(_) => self.equations.largest_delay_s(),
+            _ => largest,
+        };
+        let mut system = self.system(kind, value);
+        let mut fit = self.equations.fit(&system.0, &system.1, false);
+        let mut found = self.score(kind, value, &system, &fit);
+        for _ in 0..STEPS {
+            if found.seen < SEEN_SHARE || found.delta.abs() < 0.05 * found.noise_sigma {
+                break;
+            }
+            let next = (value + found.delta.clamp(-step, step)).clamp(-largest, largest);
+            if kind.joint().is_some() && next <= -0.95 {
+                break;
+            }
+            value = next;
+            system = self.system(kind, value);
+            fit = self.equations.fit(&system.0, &system.1, false);
+            found = self.score(kind, value, &system, &fit);
+        }
+        if kind == Kind::Gravity {
+            value = (value + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+        }
+        let seen = found.seen >= SEEN_SHARE && found.sigma().is_finite();
+        // The weights are those of the misfit without the direction.
+        let remaining = if plain.cost > 0.0 { (fit.cost / plain.cost).min(1.0).sqrt() } else { 1.0 };
+        let with = self.equations.fit(&system.0, &system.1, true);
+        Found {
+            kind,
+            value,
+            noise_sigma: remaining * found.noise_sigma,
+            segment_sigma: found.segment_sigma,
+            seen,
+            cost: (plain.cost, fit.cost),
+            shift: core::array::from_fn(
+                |base| if seen { with.values[base] - training.values[base] } else { 0.0 },
+            ),
+            values: fit.values,
+            alike: Vec::new(),
+            column: found.column,
+        }
+    }
+}
+
+/// Name and joint in words.
+#[must_use]
+pub fn label(kind: Kind) -> String {
+    match kind.joint() {
+        Some(joint) => format!("{} of joint {}", kind.name(), joint + 1),
+        None => kind.name().into(),
+    }
+}
+
+fn correlation(one: &[f64], other: &[f64]) -> f64 {
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let size = (product(one, one) * product(other, other)).sqrt();
+    if size > 0.0 { product(one, other) / size } else { 0.0 }
+}

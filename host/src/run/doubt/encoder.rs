@@ -1,0 +1,412 @@
+//! Bias of the parameters by the steps of an encoder.
+//!
+//! Why: an angle in steps has noise in its acceleration, and least squares makes inertias too small by it
+//! (errors in variables). The noise is no white noise: it lies in the rows' band where a joint is slow,
+//! beside the reversals. So it is not computed but repeated: the smoothed motion is read once more by an
+//! encoder with the same steps, and the shift of the parameters is the bias of the first reading (Cook and
+//! Stefanski 1994, simulation and extrapolation, with one repetition).
+//!
+//! ```text
+//! q_s, tau_s = Y(q_s) p        smoothed motion, and the torque that the fitted parameters predict for it
+//! shift_k = p(round(q_s), tau_s) - p(q_s, tau_s)      four positions k of the encoder's counts
+//! bias    = sqrt(mean^2 + variance of shift_k)
+//! ```
+//!
+//! Both fits have the weights of the joints and the resampling of the recording. Cost: five times the rows of
+//! a recording. Known limits: where a servo answers to the steps they are part of the motion. The torque
+//! error of arms with such a servo was up to twice what is found here (`scripts/plant_coverage --coarse`).
+
+use std::path::PathBuf;
+
+use scarab::ident::{KernelError, RowModel, SAMPLE_RATE_HZ, Smoothed};
+use scarab::model::Parameter;
+use scarab::real::Real;
+
+use crate::formats::leg_file::LegFile;
+use crate::formats::recording::{JointSeries, Recording};
+use crate::leg::setup::encoder_steps;
+use crate::run::doubt::fit::{Fit, solve};
+use crate::run::doubt::rows::{Equations, Filters, Motion};
+use crate::run::resample::Resampled;
+
+/// Share of the changes of a column that must be whole steps.
+const WHOLE_STEPS: f64 = 0.95;
+/// Largest deviation from a whole step, share of a step.
+const EXACT: f64 = 0.05;
+/// Changes below this number of steps are counted, and how many there have to be.
+const SMALL_CHANGE: f64 = 20.0;
+const FEWEST: usize = 20;
+/// Readings of 4 kHz in one sample of the firmware's log.
+const READINGS: usize = 8;
+/// Positions of the counts under the motion.
+const PHASES: usize = 4;
+/// Acceleration noise over the motion's, in power, below which the steps cannot matter. White noise of a
+/// twelfth of the squared step has this power; slow stretches have up to ten times more.
+const NEGLIGIBLE: f64 = 1e-6;
+/// Largest error of a joint's torque by the steps, share of its rms: half of 3 %, see the known limits.
+pub const LARGEST_SHARE: f64 = 0.015;
+/// Largest noise of the steps in an inertial column, as a share of its power. An inertia is too small by this
+/// share; where it is small already, the second reading shows less.
+pub const LARGEST_NOISE: f64 = 0.1;
+/// Bandwidths to choose from, Hz.
+pub const BANDWIDTHS_HZ: [f64; 8] = [16.0, 12.5, 10.0, 8.0, 6.3, 5.0, 4.0, 3.2];
+
+/// How an angle was read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Encoder {
+    /// Angle of one count, rad.
+    pub step_rad: f64,
+    /// Readings whose mean is one sample.
+    pub readings: usize,
+}
+
+impl Encoder {
+    /// Encoder of a column of angles; `None` for a continuous one. `described_rad` is the step by the leg
+    /// file, which tells a mean of readings from finer counts.
+    #[must_use]
+    pub fn of(angle: &[f64], described_rad: f64) -> Option<Self> {
+        let mut changes: Vec<f64> =
+            angle.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|&change| change > 1e-12).collect();
+        changes.sort_by(f64::total_cmp);
+        // The smallest change is one step, unless a few samples were replaced by others between the counts.
+        let step_rad = [1000, 200, 50].iter().find_map(|part| step(&changes, changes.len() / part))?;
+        let is_mean = (READINGS as f64 * step_rad / described_rad - 1.0).abs() < EXACT;
+        Some(if is_mean {
+            Self { step_rad: described_rad, readings: READINGS }
+        } else {
+            Self { step_rad, readings: 1 }
+        })
+    }
+
+    /// Reading of an angle over time; `phase` moves the counts by that share of one.
+    fn read(&self, angle: impl Fn(f64) -> f64, time_s: f64, sample_s: f64, phase: f64) -> f64 {
+        let readings = self.readings as f64;
+        (0..self.readings)
+            .map(|reading| {
+                let early = (reading as f64 - 0.5 * (readings - 1.0)) / readings * sample_s;
+                ((angle(time_s + early) / self.step_rad + phase).round() - phase) * self.step_rad
+            })
+            .sum::<f64>()
+            / readings
+    }
+}
+
+/// How the angles of recordings were read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Encoders<const N: usize> {
+    /// Encoder of each joint; `None` where the angle is continuous.
+    pub joints: [Option<Encoder>; N],
+    /// Time between two samples, s.
+    pub sample_s: f64,
+}
+
+/// Effect of the steps on the parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bias<const N: usize, const B: usize> {
+    /// Bias of each base parameter, as a standard deviation.
+    pub sigma: [f64; B],
+    /// Error of each joint's torque, share of its rms.
+    pub torque_share: [f64; N],
+    /// Power of the steps' noise over that of a joint's noisiest inertial column.
+    pub column_noise: [f64; N],
+}
+
+impl<const N: usize, const B: usize> Bias<N, B> {
+    /// Joint whose torque is moved most, and by what share.
+    #[must_use]
+    pub fn largest_share(&self) -> (usize, f64) {
+        largest(&self.torque_share)
+    }
+
+    /// Joint whose columns are noisiest, and their noise.
+    #[must_use]
+    pub fn largest_noise(&self) -> (usize, f64) {
+        largest(&self.column_noise)
+    }
+
+    /// Whether the bias is so large that the second reading no longer shows it.
+    #[must_use]
+    pub fn is_beyond(&self) -> bool {
+        self.largest_noise().1 > LARGEST_NOISE
+    }
+
+    /// Whether the recording must be refused.
+    #[must_use]
+    pub fn refuses(&self) -> bool {
+        self.is_beyond() || self.largest_share().1 > LARGEST_SHARE
+    }
+}
+
+impl<const N: usize> Encoders<N> {
+    /// Describes the encoders to a model, for rows of this bandwidth: standstill by the leg file, pulses by
+    /// the coarser of leg file and recordings. The counts of a recording alone say little about standstill:
+    /// of the real pendulum sp, with 2.9 mrad, slow rows predict well.
+    pub fn describe<T: Real, const B: usize>(
+        &self,
+        leg: &LegFile,
+        bandwidth_hz: f64,
+        model: &mut RowModel<T, N, B>,
+    ) {
+        let described = encoder_steps::<T, N>(leg);
+        let seen = self.joints.map(|joint| T::of(joint.map_or(0.0, |encoder| encoder.step_rad)));
+        let coarser =
+            core::array::from_fn(
+                |joint| {
+                    if seen[joint] > described[joint] { seen[joint] } else { described[joint] }
+                },
+            );
+        model.set_encoders(&coarser, T::of(bandwidth_hz));
+        let pulse = model.pulse;
+        model.set_encoders(&described, T::of(bandwidth_hz));
+        model.pulse = pulse;
+    }
+
+    /// Bias of the parameters of `fit`; `None` where the steps cannot matter.
+    ///
+    /// # Errors
+    /// The bandwidth is not possible.
+    pub fn bias<const B: usize>(
+        &self,
+        equations: &Equations<N, B>,
+        fit: &Fit<B>,
+        bandwidth_hz: f64,
+    ) -> Result<Option<Bias<N, B>>, KernelError> {
+        if !self.can_matter(equations, bandwidth_hz) {
+            return Ok(None);
+        }
+        let refit = |phase: Option<f64>| -> Result<Option<(Equations<N, B>, [f64; B])>, KernelError> {
+            let motions: Vec<Motion<N>> = equations
+                .smoothed()
+                .filter(|(instants, _)| instants.len() > 1)
+                .map(|(instants, training_s)| self.repeated(equations, fit, instants, training_s, phase))
+                .collect();
+            let filters = Filters::new(bandwidth_hz)?;
+            let Some(again) = Equations::new(equations.model(), &motions, filters, &equations.active) else {
+                return Ok(None);
+            };
+            let weight: Vec<f64> = again
+                .places
+                .iter()
+                .map(|place| if place.training { 1.0 / equations.row_sigma[place.joint] } else { 0.0 })
+                .collect();
+            let values = solve(&again.columns, &again.torque, &weight, &again.active).values;
+            Ok(Some((again, values)))
+        };
+        let Some((smooth, before)) = refit(None)? else { return Ok(None) };
+        let (mut shifts, mut noise) = (Vec::new(), [0.0; N]);
+        for phase in 0..PHASES {
+            let Some((read, values)) = refit(Some(phase as f64 / PHASES as f64))? else { return Ok(None) };
+            shifts.push(core::array::from_fn::<f64, B, _>(|base| values[base] - before[base]));
+            if phase == 0 {
+                noise = column_noise(&smooth, &read);
+            }
+        }
+        let count = shifts.len() as f64;
+        let mean: [f64; B] =
+            core::array::from_fn(|base| shifts.iter().map(|shift| shift[base]).sum::<f64>() / count);
+        let sigma = core::array::from_fn(|base| {
+            let squares: f64 = shifts.iter().map(|shift| shift[base].powi(2)).sum();
+            (squares / count).sqrt()
+        });
+        let torque_share = core::array::from_fn(|joint| {
+            let (mut missed, mut all) = (0.0, 0.0);
+            let rows = equations.places.iter().zip(&equations.columns).zip(&equations.torque);
+            for ((_, row), torque) in rows.filter(|((place, _), _)| place.joint == joint && place.training) {
+                missed += row.iter().zip(&mean).map(|(element, bias)| element * bias).sum::<f64>().powi(2);
+                all += torque * torque;
+            }
+            (missed / all.max(1e-300)).sqrt()
+        });
+        Ok(Some(Bias { sigma, torque_share, column_noise: noise }))
+    }
+
+    /// Largest of [`BANDWIDTHS_HZ`] up to `largest_hz` at which the steps shift no parameter by more than its
+    /// standard deviation by noise and segments; the smallest one where none does.
+    ///
+    /// # Errors
+    /// A bandwidth is not possible.
+    pub fn bandwidth_hz<const B: usize>(
+        &self,
+        largest_hz: f64,
+        rows: impl Fn(f64) -> Result<Option<Equations<N, B>>, KernelError>,
+    ) -> Result<f64, KernelError> {
+        let [.., mut chosen] = BANDWIDTHS_HZ;
+        for &bandwidth_hz in BANDWIDTHS_HZ.iter().rev().filter(|&&bandwidth_hz| bandwidth_hz <= largest_hz) {
+            let Some(equations) = rows(bandwidth_hz)? else { continue };
+            let fit = equations.fit(&equations.columns, &equations.torque, true);
+            let sigma = equations.scatter(&fit);
+            let is_good = self.bias(&equations, &fit, bandwidth_hz)?.is_none_or(|bias| {
+                let shifts = bias.sigma.iter().zip(&sigma);
+                shifts.into_iter().all(|(shift, sigma)| *shift <= *sigma) && !bias.refuses()
+            });
+            if !is_good {
+                break;
+            }
+            chosen = bandwidth_hz;
+        }
+        Ok(chosen)
+    }
+
+    /// Whether the noise of the steps is more than [`NEGLIGIBLE`] in some joint's acceleration.
+    fn can_matter<const B: usize>(&self, equations: &Equations<N, B>, bandwidth_hz: f64) -> bool {
+        let rate_hz = (1.0 / self.sample_s).max(SAMPLE_RATE_HZ);
+        // Second derivative of white noise behind a low-pass: integral of (2 pi f)^4 over its band.
+        let gain = 2.0 / rate_hz * (core::f64::consts::TAU).powi(4) * bandwidth_hz.powi(5) / 5.0;
+        (0..N).any(|joint| {
+            let Some(encoder) = self.joints[joint] else { return false };
+            let (mut power, mut count) = (0.0, 0.0);
+            for instant in equations.smoothed().flat_map(|(instants, _)| instants) {
+                power += instant.acceleration[joint].powi(2);
+                count += 1.0;
+            }
+            let noise = gain * encoder.step_rad.powi(2) / 12.0;
+            power > 0.0 && noise > NEGLIGIBLE * power / f64::max(count, 1.0)
+        })
+    }
+
+    /// The smoothed motion with its predicted torque, read by the encoders, or as it is without a phase.
+    fn repeated<const B: usize>(
+        &self,
+        equations: &Equations<N, B>,
+        fit: &Fit<B>,
+        instants: &[Smoothed<f64, N>],
+        training_s: f64,
+        phase: Option<f64>,
+    ) -> Motion<N> {
+        let model = equations.model();
+        let torque: Vec<[f64; N]> = instants
+            .iter()
+            .map(|instant| {
+                let rows = model.rows(instant);
+                rows.regressor.map(|row| row.iter().zip(&fit.values).map(|(x, p)| x * p).sum())
+            })
+            .collect();
+        let end_s = instants.len().saturating_sub(1) as f64 / SAMPLE_RATE_HZ;
+        let samples = (end_s / self.sample_s).floor() as usize + 1;
+        let time_s: Vec<f64> = (0..samples).map(|sample| sample as f64 * self.sample_s).collect();
+        let joints = (0..N).map(|joint| {
+            let angle = |time_s: f64| angle_at(instants, joint, time_s);
+            JointSeries {
+                position_rad: time_s
+                    .iter()
+                    .map(|&time_s| match (self.joints[joint], phase) {
+                        (Some(encoder), Some(phase)) => encoder.read(angle, time_s, self.sample_s, phase),
+                        _ => angle(time_s),
+                    })
+                    .collect(),
+                torque_nm: time_s.iter().map(|&time_s| linear(&torque, joint, time_s)).collect(),
+            }
+        });
+        let recording =
+            Recording { file: PathBuf::new(), joints: joints.collect(), time_s, joints_in_file: N };
+        let grid = Resampled::of(&recording);
+        Motion {
+            training_s: training_s - grid.start_s,
+            position: (0..grid.len()).filter_map(|point| grid.position_rad::<N>(point)).collect(),
+            torque: (0..grid.len()).filter_map(|point| grid.torque_nm::<N>(point)).collect(),
+        }
+    }
+}
+
+fn largest(of_joints: &[f64]) -> (usize, f64) {
+    let joints = of_joints.iter().copied().enumerate();
+    joints.max_by(|one, other| one.1.total_cmp(&other.1)).unwrap_or((0, 0.0))
+}
+
+/// Power by which the noisiest inertial column of each joint differs between two motions, over its own.
+fn column_noise<const N: usize, const B: usize>(
+    smooth: &Equations<N, B>,
+    read: &Equations<N, B>,
+) -> [f64; N] {
+    let before = smooth.columns_at(&read.places);
+    core::array::from_fn(|joint| {
+        let inertial = (0..B).filter(|&base| {
+            let carrier = read.model().base.independent(base);
+            read.active[base]
+                && carrier.is_some_and(|(own, parameter)| {
+                    own == joint && matches!(parameter, Parameter::ZZ | Parameter::IA)
+                })
+        });
+        let share = |base: usize| {
+            let (mut noise, mut power) = (0.0, 0.0);
+            for ((place, before), after) in read.places.iter().zip(&before).zip(&read.columns) {
+                if place.joint == joint && place.training {
+                    noise += (after[base] - before[base]).powi(2);
+                    power += before[base].powi(2);
+                }
+            }
+            noise / f64::max(power, 1e-300)
+        };
+        inertial.map(share).fold(0.0, f64::max)
+    })
+}
+
+/// Step of an encoder from the changes of its angle in ascending order, if the change at this place is one
+/// step and the other small ones are whole steps.
+fn step(changes: &[f64], place: usize) -> Option<f64> {
+    let smallest = *changes.get(place)?;
+    // A mean, because numbers in text are rounded.
+    let single: Vec<f64> =
+        changes.iter().copied().filter(|change| (change / smallest - 1.0).abs() < EXACT).collect();
+    let step_rad = single.iter().sum::<f64>() / single.len().max(1) as f64;
+    let steps = changes.iter().map(|change| change / step_rad).take_while(|&steps| steps < SMALL_CHANGE);
+    let (mut small, mut whole) = (0, 0);
+    for steps in steps {
+        small += 1;
+        whole += usize::from((steps - steps.round()).abs() < EXACT);
+    }
+    (small >= FEWEST && whole as f64 >= WHOLE_STEPS * small as f64).then_some(step_rad)
+}
+
+/// Place of a time between two grid points: the first of them, and the share of the way to the second.
+fn between(time_s: f64, points: usize) -> (usize, f64) {
+    let place = (time_s * SAMPLE_RATE_HZ).clamp(0.0, points.saturating_sub(1) as f64);
+    let first = (place.floor() as usize).min(points.saturating_sub(2));
+    (first, place - first as f64)
+}
+
+fn linear<const N: usize>(series: &[[f64; N]], joint: usize, time_s: f64) -> f64 {
+    let (first, share) = between(time_s, series.len());
+    let after = series.get(first + 1).unwrap_or(&series[first])[joint];
+    series[first][joint] + share * (after - series[first][joint])
+}
+
+/// Angle at any time: cubic with the smoothed speeds.
+fn angle_at<const N: usize>(instants: &[Smoothed<f64, N>], joint: usize, time_s: f64) -> f64 {
+    let (first, share) = between(time_s, instants.len());
+    let left = &instants[first];
+    let right = instants.get(first + 1).unwrap_or(left);
+    let step_s = 1.0 / SAMPLE_RATE_HZ;
+    let rest = 1.0 - share;
+    rest * rest * ((1.0 + 2.0 * share) * left.position[joint] + share * step_s * left.velocity[joint])
+        + share * share * ((1.0 + 2.0 * rest) * right.position[joint] - rest * step_s * right.velocity[joint])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn swing(step_rad: f64) -> Vec<f64> {
+        (0..5000).map(|k| ((k as f64 * 0.002 * 3.0).sin() / step_rad).floor() * step_rad).collect()
+    }
+
+    #[test]
+    fn steps_are_found_in_a_column_and_a_continuous_angle_has_none() {
+        let found = Encoder::of(&swing(1.5e-3), 1e-4).expect("an encoder");
+        assert!((found.step_rad / 1.5e-3 - 1.0).abs() < 1e-6 && found.readings == 1, "{found:?}");
+        let smooth: Vec<f64> = (0..5000).map(|k| (k as f64 * 0.002 * 3.0).sin()).collect();
+        assert_eq!(Encoder::of(&smooth, 1e-4), None);
+        assert_eq!(Encoder::of(&[0.0; 100], 1e-4), None);
+    }
+
+    #[test]
+    fn means_of_eight_readings_are_told_from_finer_counts_by_the_leg_file() {
+        let fine: Vec<f64> =
+            (0..40_000).map(|k| ((k as f64 * 0.000_25).sin() / 1.6e-3).floor() * 1.6e-3).collect();
+        let means: Vec<f64> = fine.chunks_exact(8).map(|chunk| chunk.iter().sum::<f64>() / 8.0).collect();
+        let found = Encoder::of(&means, 1.6e-3).expect("an encoder");
+        assert_eq!((found.step_rad, found.readings), (1.6e-3, 8));
+        let without = Encoder::of(&means, 0.1).expect("an encoder");
+        assert!((without.step_rad / 2e-4 - 1.0).abs() < 1e-6 && without.readings == 1, "{without:?}");
+    }
+}

@@ -1,0 +1,180 @@
+//! A torque whose gain or sign changes midway.
+//!
+//! ```text
+//! before   torque = Y p                after   s torque = Y p       of one joint, or of all
+//! J(s)     = c1 + s^2 c2 - |b1 + s b2|^2,   |b|^2 = b' A^-1 b       least over p
+//! s        = b1' A^-1 b2 / (c2 - b2' A^-1 b2),    gain = 1 / s
+//! ```
+//!
+//! The point of change is the same share of every recording, or lies in one recording; the best of a grid
+//! counts. sigma is that of s with the columns of the parameters, noise or segments whichever is larger.
+
+use crate::run::doubt::directions::CHANCE;
+use crate::run::doubt::fit::{Fit, score};
+use crate::run::doubt::rows::{Equations, Place};
+
+/// Change of the gain that is tolerated beside chance: 5 % come with the temperature of a drive.
+const LARGEST_CHANGE: f64 = 0.05;
+/// Part of the misfit that a change of sign has to explain. A push moves the gain as well, but by less.
+const EXPLAINED_BY_SIGN: f64 = 0.5;
+/// Part of the misfit that a change has to explain.
+const EXPLAINED_SHARE: f64 = 0.1;
+/// Part of the torque's power that lies on either side of a change. Less is a gain of the whole recording.
+const SMALLEST_SIDE: f64 = 0.1;
+/// Points of change tried in each recording.
+const POINTS: usize = 39;
+
+/// Best change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Midway {
+    /// Joint, from 0; `None` for all.
+    pub joint: Option<usize>,
+    /// Share of the recording after which it acts.
+    pub share: f64,
+    /// Relative change of the gain; -2 is a change of sign.
+    pub change: f64,
+    /// Standard deviation of the change.
+    pub sigma: f64,
+    /// Part of the misfit that it explains.
+    pub explained: f64,
+}
+
+impl Midway {
+    /// Whether the recording is refused for it.
+    #[must_use]
+    pub fn refuses(&self) -> bool {
+        self.change.abs() > self.limit()
+    }
+
+    /// Limit of the change.
+    #[must_use]
+    pub fn limit(&self) -> f64 {
+        LARGEST_CHANGE + CHANCE * self.sigma
+    }
+}
+
+/// Normal equations' right side and power of some equations.
+#[derive(Clone, Copy)]
+struct Sums<const B: usize> {
+    right: [f64; B],
+    power: f64,
+}
+
+impl<const B: usize> Sums<B> {
+    fn of<const N: usize>(all: &Equations<N, B>, mut chosen: impl FnMut(&Place) -> bool) -> Self {
+        let mut sums = Self { right: [0.0; B], power: 0.0 };
+        let rows = all.columns.iter().zip(&all.torque).zip(all.weight.iter().zip(&all.places));
+        for ((row, torque), (weight, place)) in rows {
+            if chosen(place) {
+                let scaled = weight * weight * torque;
+                sums.power += scaled * torque;
+                for (slot, element) in sums.right.iter_mut().zip(row) {
+                    *slot += scaled * element;
+                }
+            }
+        }
+        sums
+    }
+}
+
+fn product<const B: usize>(fit: &Fit<B>, one: &[f64; B], other: &[f64; B]) -> f64 {
+    let rows = fit.inverse.iter().zip(one);
+    rows.map(|(row, one)| one * row.iter().zip(other).map(|(a, b)| a * b).sum::<f64>()).sum()
+}
+
+/// Factor of the torques in `after` that leaves least of the misfit over the torque, and what it explains.
+fn change<const B: usize>(plain: &Fit<B>, whole: &Sums<B>, after: &Sums<B>) -> (f64, f64) {
+    let share = |cost: f64, power: f64| cost / power.max(1e-300);
+    let right: [f64; B] = core::array::from_fn(|base| whole.right[base] - after.right[base]);
+    let own = after.power - product(plain, &after.right, &after.right);
+    let factor = product(plain, &right, &after.right) / own.max(1e-300);
+    let power = whole.power - after.power + factor * factor * after.power;
+    let total: [f64; B] = core::array::from_fn(|base| right[base] + factor * after.right[base]);
+    let cost = power - product(plain, &total, &total);
+    (factor, 1.0 - share(cost, power) / share(plain.cost, whole.power))
+}
+
+/// Looks for the change that explains most; `None` where none explains a tenth of the misfit.
+///
+/// Once with the robust weights, which forgive a push, and once with every row: after a change of sign,
+/// robust weights call what lies after it disturbed.
+#[must_use]
+pub fn look<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
+    let robust = strongest(all);
+    let whole = strongest(&all.with_equal_weights())
+        .filter(|found| found.refuses() && found.change < -1.0 && found.explained > EXPLAINED_BY_SIGN);
+    match (robust, whole) {
+        (Some(robust), Some(whole)) if robust.refuses() && robust.explained > whole.explained => Some(robust),
+        (robust, whole) => whole.or(robust),
+    }
+}
+
+fn strongest<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
+    let plain = all.fit(&all.columns, &all.torque, false);
+    let whole = Sums::of(all, |_| true);
+    let motions = all.places.iter().map(|place| place.motion).max()? + 1;
+    let mut scopes: Vec<Option<usize>> = vec![None];
+    if motions > 1 {
+        scopes.extend((0..motions).map(Some));
+    }
+    let mut joints: Vec<Option<usize>> = (0..N).map(Some).collect();
+    if N > 1 {
+        joints.push(None);
+    }
+    let mut best: Option<(Midway, Option<usize>, f64)> = None;
+    for scope in scopes {
+        for joint in joints.iter().copied() {
+            let own = Sums::of(all, |place| is_after(place, scope, joint, -1.0));
+            // A gain of all of it is another error: a torque scale, or another machine.
+            let always = if own.power < 0.999 * whole.power { change(&plain, &whole, &own).1 } else { 0.0 };
+            for point in 1..=POINTS {
+                let share = point as f64 / (POINTS + 1) as f64;
+                let after = Sums::of(all, |place| is_after(place, scope, joint, share));
+                if !(SMALLEST_SIDE..1.0 - SMALLEST_SIDE).contains(&(after.power / own.power.max(1e-300))) {
+                    continue;
+                }
+                let (factor, explained) = change(&plain, &whole, &after);
+                if explained > always + EXPLAINED_SHARE
+                    && best.is_none_or(|(best, _, _)| explained > best.explained)
+                {
+                    let found = Midway { joint, share, change: 1.0 / factor - 1.0, sigma: 0.0, explained };
+                    best = Some((found, scope, factor));
+                }
+            }
+        }
+    }
+    let (mut found, scope, factor) = best?;
+    // Uncertainty of the factor: the torque after the change as a further column.
+    let torque: Vec<f64> = all
+        .places
+        .iter()
+        .zip(&all.torque)
+        .map(
+            |(place, torque)| {
+                if is_after(place, scope, found.joint, found.share) { factor * torque } else { *torque }
+            },
+        )
+        .collect();
+    let fit = all.fit(&all.columns, &torque, false);
+    let predicted = fit.predictions(&all.columns);
+    let z: Vec<f64> = all
+        .places
+        .iter()
+        .zip(&predicted)
+        .map(|(place, torque)| if is_after(place, scope, found.joint, found.share) { *torque } else { 0.0 })
+        .collect();
+    let segments: Vec<usize> = all.places.iter().map(|place| place.cluster).collect();
+    let scored = score(&fit, &all.columns, &torque, &z, &all.weight, &segments);
+    // Chi-square of one for each independent row, whatever the misfit before was.
+    let rows = all.places.len() as f64 * all.information().min(1.0) - fit.rank as f64;
+    let noise = scored.noise_sigma * (fit.cost / rows.max(1.0)).sqrt();
+    // The change is 1 / s - 1, and the column has the size of s times the torque.
+    found.sigma = noise.max(scored.segment_sigma) * (1.0 + found.change).abs();
+    Some(found)
+}
+
+fn is_after(place: &Place, scope: Option<usize>, joint: Option<usize>, share: f64) -> bool {
+    place.share > share
+        && scope.is_none_or(|motion| place.motion == motion)
+        && joint.is_none_or(|joint| place.joint == joint)
+}

@@ -1,0 +1,361 @@
+//! Doubts about a recording: errors of the logging chain that the verdict on a model alone does not see.
+//!
+//! Why: a torque that is late, or an encoder of the wrong scale, is fitted almost as well as a right
+//! recording, by wrong parameters with a small sigma. Each such error is fitted beside the parameters,
+//! reported always, and refused where it is certain, moves the parameters and explains what the model misses.
+//!
+//! | file | subject |
+//! | --- | --- |
+//! | [`rows`] | filtered rows of whole recordings in double precision, weights |
+//! | [`fit`] | least squares, a further column beside it, both standard deviations |
+//! | [`directions`] | delay, encoder scale, torque scale, gravity |
+//! | [`midway`] | gain or sign of the torque that changes midway |
+//! | [`encoder`] | bias by the steps of an encoder |
+//! | [`noise`] | noise of the torque at the recording's own rate |
+//! | [`samples`], [`stamps`] | samples that no sensor measured, wrong time stamps |
+//! | [`cause`] | most likely cause of a refusal, by refits |
+//! | [`report`] | JSON and lines |
+//!
+//! Runs on the host only.
+
+pub mod cause;
+pub mod directions;
+pub mod encoder;
+pub mod fit;
+pub mod midway;
+pub mod noise;
+pub mod report;
+pub mod rows;
+pub mod samples;
+pub mod stamps;
+
+use nalgebra::Vector3;
+use scarab::ident::recorder::STILL_SPEED;
+use scarab::ident::{KernelError, RowModel};
+use scarab::model::AnatomicalJoint;
+
+use crate::base::number::Number;
+use crate::report::doubt::{CauseReport, DirectionReport, DoubtReport, RecordingsReport, SampleFinding};
+use crate::report::findings::FindingReport;
+use directions::{Directions, Found};
+use encoder::{Bias, Encoders, LARGEST_NOISE, LARGEST_SHARE};
+use midway::Midway;
+use rows::{Equations, Filters, Motion};
+
+/// What is asked about.
+pub struct Question<const N: usize, const B: usize> {
+    /// Model that was chosen.
+    pub model: RowModel<f64, N, B>,
+    /// Columns that were estimated.
+    pub active: [bool; B],
+    /// Anatomical angles of the joints.
+    pub anatomy: [AnatomicalJoint<f64>; N],
+    /// Axis of the first joint in the base frame.
+    pub axis: Vector3<f64>,
+    /// Whole recordings.
+    pub motions: Vec<Motion<N>>,
+    /// Bandwidth of the rows, Hz.
+    pub bandwidth_hz: f64,
+    /// Base parameters of the prior.
+    pub prior: Option<[f64; B]>,
+    /// Torque limit of each joint, N m.
+    pub torque_limit: [f64; N],
+    /// Density of each joint's torque noise, (N m)^2 s.
+    pub noise: [Option<f64>; N],
+    /// Standard deviation of each base parameter by noise.
+    pub sigma: [f64; B],
+    /// How the angles were read.
+    pub encoders: Encoders<N>,
+}
+
+impl<const N: usize, const B: usize> Question<N, B> {
+    /// Chain angles of the joints' zeros, rad.
+    #[must_use]
+    pub fn zero(&self) -> [f64; N] {
+        self.anatomy.map(|joint| joint.zero_offset())
+    }
+
+    /// The question with every column and without Stribeck friction; `None` if that is this one.
+    #[must_use]
+    pub fn with_all_columns(&self) -> Option<Self> {
+        let active = core::array::from_fn(|base| base < self.model.base.rank());
+        let is_plain = self.model.stribeck.iter().all(|curve| curve.excess == 0.0);
+        if is_plain && active == self.active {
+            return None;
+        }
+        let model = RowModel { stribeck: scarab::ident::no_stribeck(), ..self.model.clone() };
+        Some(Self { model, active, motions: self.motions.clone(), ..*self })
+    }
+
+    /// Equations of other motions under this model; `None` with too few rows.
+    ///
+    /// # Errors
+    /// The bandwidth is not possible.
+    pub fn equations(&self, motions: &[Motion<N>]) -> Result<Option<Equations<N, B>>, KernelError> {
+        self.equations_at(motions, self.bandwidth_hz)
+    }
+
+    /// Equations of other motions at another bandwidth.
+    ///
+    /// # Errors
+    /// The bandwidth is not possible.
+    pub fn equations_at(
+        &self,
+        motions: &[Motion<N>],
+        bandwidth_hz: f64,
+    ) -> Result<Option<Equations<N, B>>, KernelError> {
+        let model = self.model_at(bandwidth_hz);
+        Ok(Equations::new(&model, motions, Filters::new(bandwidth_hz)?, &self.active))
+    }
+
+    /// Model for rows of a lower bandwidth.
+    fn model_at(&self, bandwidth_hz: f64) -> RowModel<f64, N, B> {
+        let share = bandwidth_hz / self.bandwidth_hz;
+        let still_speed = self.model.still_speed.map(|speed| (share * speed).max(STILL_SPEED));
+        RowModel { still_speed, pulse: self.model.pulse.map(|pulse| share * pulse), ..self.model.clone() }
+    }
+
+    /// Bandwidth at which the encoders' steps do not matter, if they do at this one.
+    ///
+    /// # Errors
+    /// The bandwidth is not possible.
+    fn calmer_hz(&self) -> Result<Option<f64>, KernelError> {
+        let hz = self.encoders.bandwidth_hz(self.bandwidth_hz, |hz| self.equations_at(&self.motions, hz))?;
+        Ok((hz < self.bandwidth_hz).then_some(hz))
+    }
+
+    /// The question at a lower bandwidth.
+    fn at(&self, bandwidth_hz: f64) -> Self {
+        Self { model: self.model_at(bandwidth_hz), motions: self.motions.clone(), bandwidth_hz, ..*self }
+    }
+}
+
+/// Answers to a question.
+pub struct Doubts<const N: usize, const B: usize> {
+    /// Rows of all recordings.
+    pub equations: Equations<N, B>,
+    /// Directions with their fits.
+    pub found: Vec<Found<B>>,
+    /// Directions as reported.
+    pub directions: Vec<DirectionReport>,
+    /// Change midway.
+    pub midway: Option<Midway>,
+    /// Misfit over noise of each joint; `None` where the noise is unknown.
+    pub misfit_over_noise: [Option<f64>; N],
+    /// Standard deviation of each base parameter: noise, scatter over segments, and doubt that was not
+    /// refused.
+    pub sigma: [Sigma; B],
+    /// Effect of the encoders' steps; `None` where they cannot matter.
+    pub encoder: Option<Bias<N, B>>,
+    /// Bandwidth at which they do not matter, Hz; only where they refuse.
+    better_hz: Option<f64>,
+}
+
+/// Standard deviation of a parameter in its parts.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sigma {
+    /// By noise.
+    pub noise: f64,
+    /// By scatter over segments of the recording.
+    pub segments: f64,
+    /// By scatter between recordings; zero where it is unknown.
+    pub recordings: f64,
+    /// By directions that are not certain.
+    pub doubt: f64,
+    /// By the steps of the encoders.
+    pub encoder: f64,
+}
+
+impl Sigma {
+    /// Reported value.
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        self.noise.max(self.segments).max(self.recordings).hypot(self.doubt).hypot(self.encoder)
+    }
+
+    /// Largest part.
+    #[must_use]
+    pub fn source(&self) -> &'static str {
+        let scatter = self.noise.max(self.segments).max(self.recordings);
+        if self.doubt.max(self.encoder) > scatter {
+            if self.encoder > self.doubt { "encoder" } else { "doubt" }
+        } else if self.recordings > self.noise.max(self.segments) {
+            "recordings"
+        } else if self.segments > self.noise {
+            "segments"
+        } else {
+            "noise"
+        }
+    }
+}
+
+impl<const N: usize, const B: usize> Doubts<N, B> {
+    /// Fits every direction; `None` where a joint has too few rows.
+    ///
+    /// # Errors
+    /// The bandwidth is not possible.
+    pub fn of(question: &Question<N, B>) -> Result<Option<Self>, KernelError> {
+        let Some(equations) = question.equations(&question.motions)? else { return Ok(None) };
+        let found = Directions { equations: &equations, zero: question.zero(), axis: question.axis }.all();
+        let fit = equations.fit(&equations.columns, &equations.torque, true);
+        let scatter = equations.scatter(&fit);
+        let encoder = question.encoders.bias(&equations, &fit, question.bandwidth_hz)?;
+        let better_hz = match encoder {
+            Some(bias) if bias.refuses() => question.calmer_hz()?,
+            _ => None,
+        };
+        let mut sigma: [Sigma; B] = core::array::from_fn(|base| Sigma {
+            noise: question.sigma[base],
+            segments: scatter[base],
+            recordings: 0.0,
+            doubt: 0.0,
+            encoder: encoder.map_or(0.0, |bias| bias.sigma[base]),
+        });
+        let misfit_over_noise = core::array::from_fn(|joint| {
+            let misfit = equations.row_sigma[joint] * equations.information().sqrt();
+            let noise = (question.noise[joint]? * scarab::ident::SAMPLE_RATE_HZ * equations.energy()).sqrt();
+            (noise > 0.0).then(|| misfit / noise)
+        });
+        let systematic = systematic(&misfit_over_noise, &equations.rows);
+        let parameters = sigma.map(|sigma| sigma.total());
+        let directions: Vec<DirectionReport> =
+            found.iter().map(|found| DirectionReport::of(found, &parameters, systematic)).collect();
+        for (found, _) in found.iter().zip(&directions).filter(|(_, report)| report.passed) {
+            for (sigma, variance) in sigma.iter_mut().zip(found.variance()) {
+                sigma.doubt = sigma.doubt.hypot(variance.sqrt());
+            }
+        }
+        let midway = midway::look(&equations);
+        Ok(Some(Self { equations, found, directions, midway, misfit_over_noise, sigma, encoder, better_hz }))
+    }
+
+    /// Tests of the verdict.
+    #[must_use]
+    pub fn findings(&self) -> Vec<FindingReport> {
+        let mut findings: Vec<FindingReport> = self.directions.iter().map(DirectionReport::finding).collect();
+        findings.extend(self.encoder.as_ref().map(|bias| {
+            let ((joint, value), limit) = if bias.is_beyond() {
+                (bias.largest_noise(), LARGEST_NOISE)
+            } else {
+                (bias.largest_share(), LARGEST_SHARE)
+            };
+            FindingReport {
+                reason: "input",
+                test: "encoder_steps",
+                joint: Some(joint + 1),
+                motion: None,
+                value: value.into(),
+                limit: limit.into(),
+                passed: !bias.refuses(),
+                words: if bias.refuses() { self.encoder_words(bias) } else { String::new() },
+            }
+        }));
+        findings.extend(self.midway.as_ref().map(|midway| {
+            let refused = midway.refuses();
+            FindingReport {
+                reason: "residual",
+                test: "changed_midway",
+                joint: midway.joint.map(|joint| joint + 1),
+                motion: None,
+                value: midway.change.into(),
+                limit: midway.limit().into(),
+                passed: !refused,
+                words: if refused { midway_words(midway) } else { String::new() },
+            }
+        }));
+        findings
+    }
+
+    /// Steps that are too coarse, in words.
+    fn encoder_words(&self, bias: &Bias<N, B>) -> String {
+        let better = self.better_hz.map_or(String::new(), |hz| format!("; `--bandwidth {hz}` is better"));
+        let effect = if bias.is_beyond() {
+            let (joint, share) = bias.largest_noise();
+            format!(
+                "make {:.0} % of the acceleration of joint {}, at most {:.0} % may be",
+                100.0 * share,
+                joint + 1,
+                100.0 * LARGEST_NOISE
+            )
+        } else {
+            let (joint, share) = bias.largest_share();
+            format!(
+                "move the torque of joint {} by {:.1} % of its rms, at most {:.1} % may be",
+                joint + 1,
+                100.0 * share,
+                100.0 * LARGEST_SHARE
+            )
+        };
+        format!("encoder too coarse at this bandwidth: its steps {effect}{better}")
+    }
+
+    /// Report without a cause.
+    #[must_use]
+    pub fn report(&self) -> DoubtReport {
+        DoubtReport {
+            likely_cause: None,
+            directions: self.directions.clone(),
+            misfit_over_noise: self.misfit_over_noise.map(Number::from).to_vec(),
+            at_prior_limit: Vec::new(),
+            recordings: RecordingsReport::default(),
+            bandwidth: None,
+        }
+    }
+}
+
+/// Finding of a sample test in the verdict.
+#[must_use]
+pub fn sample_finding(finding: &SampleFinding) -> FindingReport {
+    FindingReport {
+        reason: "input",
+        test: finding.name,
+        joint: finding.joint,
+        motion: None,
+        value: finding.value.into(),
+        limit: Number::UNKNOWN,
+        passed: !finding.refuses,
+        words: if finding.refuses { format!("{}: {}", finding.file, finding.text) } else { String::new() },
+    }
+}
+
+/// Finding of a sample test as the cause.
+#[must_use]
+pub fn sample_cause(finding: &SampleFinding) -> CauseReport {
+    CauseReport {
+        name: finding.name,
+        joint: finding.joint,
+        value: finding.value.into(),
+        sigma: finding.sigma.into(),
+        words: finding.text.clone(),
+    }
+}
+
+/// A change midway in words.
+#[must_use]
+pub fn midway_words(midway: &Midway) -> String {
+    let who = midway.joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
+    let what = if midway.change < -1.0 {
+        "changes its sign".into()
+    } else {
+        format!("changes by {:+.0} +- {:.0} %", 100.0 * midway.change, 100.0 * midway.sigma)
+    };
+    format!(
+        "the torque of {who} {what} after {:.0} % of the recording, which explains {:.0} % of the misfit",
+        100.0 * midway.share,
+        100.0 * midway.explained
+    )
+}
+
+/// Part of the misfit's power that is no noise, 0..1; one where the noise is unknown.
+fn systematic<const N: usize>(misfit_over_noise: &[Option<f64>; N], rows: &[f64; N]) -> f64 {
+    let all: f64 = rows.iter().sum();
+    let noise: f64 = misfit_over_noise
+        .iter()
+        .zip(rows)
+        .map(|(ratio, rows)| ratio.map_or(0.0, |ratio| rows / (ratio * ratio).max(1.0)))
+        .sum();
+    (1.0 - noise / all.max(1.0)).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,490 @@
+//! Whole recordings as filtered rows in double precision, with everything that a direction of doubt changes.
+//!
+//! The filter chain is that of the identification: smoothing with twice the bandwidth, regressor, one
+//! low-pass for regressor and torque, 50 Hz. Windows are whole, so that a row's torque can be moved in time.
+//! Training and held-out part of a split file are one motion here.
+//!
+//! ```text
+//! row k of joint j:   torque_jk = columns_jk p + noise       used where the joint moves (stillness rule)
+//! weight            = sqrt(block weight) / s_j               s_j: one independent row, from the residual
+//! ```
+//!
+//! Blocks of 16 rows whose residual is far above the median lose their weight, so a push is no delay.
+//! Cost: one regressor for each 500 Hz sample, a few times. Memory: the rows.
+
+use scarab::ident::{
+    DECIMATION, Ends, FilteredRows, Kernel, KernelError, LARGEST_STILL_SHARE, LowPass, RowFilter, RowModel,
+    SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS, Smoothed,
+};
+
+use crate::run::doubt::fit::{Fit, segment_sigma, solve};
+
+/// Reserved filter taps: bandwidths from 1 Hz.
+const TAPS: usize = 2048;
+/// Open outputs of that filter.
+const PENDING: usize = 205;
+/// Rows of a block with a common weight.
+const BLOCK_ROWS: usize = 16;
+/// Residual of a block over the median, from which its weight falls, and at which it is zero.
+const DISTURBED: (f64, f64) = (3.0, 6.0);
+/// Largest length of a cluster, s.
+const LARGEST_CLUSTER_S: f64 = 2.0;
+/// Shortest length of a cluster, s.
+const SMALLEST_CLUSTER_S: f64 = 1.0;
+/// Clusters wanted at least.
+const CLUSTERS: f64 = 8.0;
+/// Rows of a joint below which nothing can be said, for each parameter.
+const ROWS_PER_PARAMETER: usize = 5;
+
+/// One recording on the 500 Hz grid, chain angles and torques.
+#[derive(Clone, Debug)]
+pub struct Motion<const N: usize> {
+    /// Time from its start for which it is identified from, s; infinite for a training file.
+    pub training_s: f64,
+    /// Chain angles, rad.
+    pub position: Vec<[f64; N]>,
+    /// Chain torques, N m.
+    pub torque: Vec<[f64; N]>,
+}
+
+/// Smoothing and low-pass.
+#[derive(Clone, Debug)]
+pub struct Filters {
+    smoothing: Box<Kernel<f64, TAPS>>,
+    low_pass: Box<LowPass<f64, TAPS>>,
+}
+
+impl Filters {
+    /// Filters of an identification at this bandwidth.
+    ///
+    /// # Errors
+    /// The bandwidth is not possible.
+    pub fn new(bandwidth_hz: f64) -> Result<Self, KernelError> {
+        Ok(Self {
+            smoothing: Box::new(Kernel::new(SMOOTHING_BANDWIDTHS * bandwidth_hz, SAMPLE_RATE_HZ)?),
+            low_pass: Box::new(LowPass::new(bandwidth_hz, SAMPLE_RATE_HZ)?),
+        })
+    }
+
+    /// Information of one row in independent rows.
+    #[must_use]
+    pub fn information(&self) -> f64 {
+        DECIMATION as f64 * self.low_pass.energy()
+    }
+
+    /// Share of a 500 Hz sample's noise variance that the low-pass leaves.
+    #[must_use]
+    pub fn energy(&self) -> f64 {
+        self.low_pass.energy()
+    }
+}
+
+/// One motion after the smoothing.
+#[derive(Clone, Debug)]
+struct Part<const N: usize> {
+    instants: Vec<Smoothed<f64, N>>,
+    /// Low-passed torque at every grid point; zero where the window is not whole.
+    filtered: [Vec<f64>; N],
+    /// Grid point of the first row's centre.
+    first: usize,
+    training_s: f64,
+}
+
+impl<const N: usize> Part<N> {
+    fn new(motion: &Motion<N>, filters: &Filters) -> Self {
+        let (smoothing, low_pass) = (&*filters.smoothing, &*filters.low_pass);
+        let reach = smoothing.reach();
+        let joints = |series: &[[f64; N]]| -> [Vec<f64>; N] {
+            core::array::from_fn(|joint| series.iter().map(|sample| sample[joint]).collect())
+        };
+        let (angles, torques) = (joints(&motion.position), joints(&motion.torque));
+        let samples = motion.position.len();
+        let instants = (reach..samples.saturating_sub(reach)).map(|at| {
+            let mut instant = Smoothed {
+                position: [0.0; N],
+                velocity: [0.0; N],
+                acceleration: [0.0; N],
+                torque: motion.torque[at],
+            };
+            for joint in 0..N {
+                let window = &angles[joint][at - reach..=at + reach];
+                (instant.position[joint], instant.velocity[joint], instant.acceleration[joint]) =
+                    smoothing.apply(window, &[], angles[joint][at]);
+            }
+            instant
+        });
+        let weights = low_pass.weights();
+        let filtered = torques.map(|torque| {
+            let mut filtered = vec![0.0; torque.len()];
+            let windows = torque.windows(weights.len());
+            for (slot, window) in filtered.iter_mut().skip(low_pass.reach()).zip(windows) {
+                *slot = window.iter().zip(weights).map(|(sample, weight)| sample * weight).sum();
+            }
+            filtered
+        });
+        Self {
+            instants: instants.collect(),
+            filtered,
+            first: reach + low_pass.reach(),
+            training_s: motion.training_s,
+        }
+    }
+
+    fn rows<const B: usize>(
+        &self,
+        filters: &Filters,
+        model: &RowModel<f64, N, B>,
+        change: &dyn Fn(&mut Smoothed<f64, N>),
+    ) -> Vec<FilteredRows<f64, N, B>> {
+        let mut filter = Box::new(RowFilter::<f64, N, B, PENDING>::new(Ends::Whole));
+        let mut rows = Vec::with_capacity(self.instants.len() / DECIMATION + 1);
+        for instant in &self.instants {
+            let mut instant = *instant;
+            change(&mut instant);
+            rows.extend(filter.push(&filters.low_pass, &model.rows(&instant)));
+        }
+        rows
+    }
+
+    /// Low-passed torque of a joint at a row, measured `late_s` later than its angle: cubic between grid
+    /// points.
+    fn torque(&self, joint: usize, row: usize, late_s: f64) -> f64 {
+        let place = (self.first + DECIMATION * row) as f64 + late_s * SAMPLE_RATE_HZ;
+        let base = place.floor();
+        let (at, share) = (base as usize, place - base);
+        let series = &self.filtered[joint];
+        if share == 0.0 {
+            return series[at];
+        }
+        let [before, left, right, after] = [series[at - 1], series[at], series[at + 1], series[at + 2]];
+        let (rise, fall) = (0.5 * (right - before), 0.5 * (after - left));
+        let rest = 1.0 - share;
+        rest * rest * ((1.0 + 2.0 * share) * left + share * rise)
+            + share * share * ((1.0 + 2.0 * rest) * right - rest * fall)
+    }
+}
+
+/// Place of an equation.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    part: usize,
+    row: usize,
+    /// Joint, from 0.
+    pub joint: usize,
+    /// Whether it belongs to the motion identified from.
+    pub training: bool,
+    /// Segment of at most two seconds.
+    pub cluster: usize,
+    /// Time from the start of its motion over its duration.
+    pub share: f64,
+    /// Number of its motion.
+    pub motion: usize,
+}
+
+impl Place {
+    /// Number of the row in its motion, at 50 Hz.
+    #[must_use]
+    pub fn row(&self) -> usize {
+        self.row
+    }
+}
+
+/// All usable rows of all joints, one equation each.
+#[derive(Clone, Debug)]
+pub struct Equations<const N: usize, const B: usize> {
+    filters: Filters,
+    parts: Vec<Part<N>>,
+    model: RowModel<f64, N, B>,
+    /// Columns that are estimated.
+    pub active: [bool; B],
+    /// Place of each equation.
+    pub places: Vec<Place>,
+    /// Regressor columns.
+    pub columns: Vec<[f64; B]>,
+    /// Low-passed torque, N m.
+    pub torque: Vec<f64>,
+    /// Weight of each equation, 1/(N m).
+    pub weight: Vec<f64>,
+    /// Number of clusters.
+    pub clusters: usize,
+    /// Standard deviation of an independent row of each joint, N m, from the residual.
+    pub row_sigma: [f64; N],
+    /// Rows of each joint's factor that count, in whole rows.
+    pub rows: [f64; N],
+}
+
+impl<const N: usize, const B: usize> Equations<N, B> {
+    /// Filters the motions; `None` where a joint has too few rows.
+    #[must_use]
+    pub fn new(
+        model: &RowModel<f64, N, B>,
+        motions: &[Motion<N>],
+        filters: Filters,
+        active: &[bool; B],
+    ) -> Option<Self> {
+        let parts: Vec<Part<N>> = motions.iter().map(|motion| Part::new(motion, &filters)).collect();
+        let mut all = Self {
+            filters,
+            parts,
+            model: model.clone(),
+            active: *active,
+            places: Vec::new(),
+            columns: Vec::new(),
+            torque: Vec::new(),
+            weight: Vec::new(),
+            clusters: 0,
+            row_sigma: [1.0; N],
+            rows: [0.0; N],
+        };
+        all.collect();
+        let columns = active.iter().filter(|on| **on).count();
+        let enough = (0..N).all(|joint| {
+            all.places.iter().filter(|place| place.joint == joint && place.training).count()
+                >= ROWS_PER_PARAMETER * columns
+        });
+        if !enough {
+            return None;
+        }
+        all.weigh();
+        Some(all)
+    }
+
+    /// Largest delay that can be tried, s.
+    #[must_use]
+    pub fn largest_delay_s(&self) -> f64 {
+        (self.filters.smoothing.reach() as f64 - 3.0) / SAMPLE_RATE_HZ
+    }
+
+    /// Information of one row in independent rows.
+    #[must_use]
+    pub fn information(&self) -> f64 {
+        self.filters.information()
+    }
+
+    /// Share of a 500 Hz sample's noise variance that the low-pass leaves.
+    #[must_use]
+    pub fn energy(&self) -> f64 {
+        self.filters.energy()
+    }
+
+    fn collect(&mut self) {
+        let row_s = DECIMATION as f64 / SAMPLE_RATE_HZ;
+        let total: f64 = self.parts.iter().map(|part| part.instants.len() as f64 / SAMPLE_RATE_HZ).sum();
+        let length = (total / CLUSTERS).clamp(SMALLEST_CLUSTER_S, LARGEST_CLUSTER_S);
+        for (number, part) in self.parts.iter().enumerate() {
+            let rows = part.rows(&self.filters, &self.model, &|_| {});
+            let count = rows.len().max(1) as f64;
+            let pieces = (count * row_s / length).round().max(1.0);
+            let start_s = part.first as f64 / SAMPLE_RATE_HZ;
+            for (row, filtered) in rows.iter().enumerate() {
+                let cluster = self.clusters + (row as f64 / count * pieces) as usize;
+                for joint in 0..N {
+                    if filtered.still[joint] > LARGEST_STILL_SHARE || !filtered.is_finite() {
+                        continue;
+                    }
+                    let time_s = start_s + row as f64 * row_s;
+                    self.places.push(Place {
+                        part: number,
+                        row,
+                        joint,
+                        training: time_s < part.training_s,
+                        cluster,
+                        share: time_s / (count * row_s + 2.0 * start_s),
+                        motion: number,
+                    });
+                    self.columns.push(filtered.regressor[joint]);
+                    self.torque.push(filtered.torque[joint]);
+                }
+            }
+            self.clusters += pieces as usize;
+        }
+        self.weight = vec![1.0; self.torque.len()];
+    }
+
+    /// Columns with a changed motion or model, for the same equations.
+    #[must_use]
+    pub fn columns_of(
+        &self,
+        model: &RowModel<f64, N, B>,
+        change: &dyn Fn(&mut Smoothed<f64, N>),
+    ) -> Vec<[f64; B]> {
+        let parts: Vec<_> = self.parts.iter().map(|part| part.rows(&self.filters, model, change)).collect();
+        self.places.iter().map(|place| parts[place.part][place.row].regressor[place.joint]).collect()
+    }
+
+    /// Smoothed motion of every recording on the 500 Hz grid, with the time from its first instant for which
+    /// it is identified from, s.
+    pub fn smoothed(&self) -> impl Iterator<Item = (&[Smoothed<f64, N>], f64)> {
+        let late_s = self.filters.smoothing.reach() as f64 / SAMPLE_RATE_HZ;
+        self.parts.iter().map(move |part| (&part.instants[..], part.training_s - late_s))
+    }
+
+    /// Standard deviations of the parameters of a fit to the training motion, by the scatter of its segments.
+    #[must_use]
+    pub fn scatter(&self, fit: &Fit<B>) -> [f64; B] {
+        let segments: Vec<usize> = self.places.iter().map(|place| place.cluster).collect();
+        segment_sigma(fit, &self.columns, &self.torque, &self.training_weight(), &segments)
+    }
+
+    /// Columns at the places of equations of a motion with as many samples.
+    #[must_use]
+    pub fn columns_at(&self, places: &[Place]) -> Vec<[f64; B]> {
+        let rows: Vec<_> =
+            self.parts.iter().map(|part| part.rows(&self.filters, &self.model, &|_| {})).collect();
+        places.iter().map(|place| rows[place.part][place.row].regressor[place.joint]).collect()
+    }
+
+    /// Row model, without any change.
+    #[must_use]
+    pub fn model(&self) -> &RowModel<f64, N, B> {
+        &self.model
+    }
+
+    /// Torque of all equations, that of `joint` taken `late_s` after its angle.
+    #[must_use]
+    pub fn delayed(&self, joint: usize, late_s: f64) -> Vec<f64> {
+        let pairs = self.places.iter().zip(&self.torque);
+        pairs
+            .map(|(place, &torque)| {
+                if place.joint == joint {
+                    self.parts[place.part].torque(joint, place.row, late_s)
+                } else {
+                    torque
+                }
+            })
+            .collect()
+    }
+
+    /// Torque of all equations in the other order of the joints: equation of joint `j` gets that of `of[j]`.
+    #[must_use]
+    pub fn exchanged(&self, of: &[usize; N]) -> Vec<f64> {
+        self.places
+            .iter()
+            .map(|place| self.parts[place.part].torque(of[place.joint], place.row, 0.0))
+            .collect()
+    }
+
+    /// Change per second of a series given at the equations, within each joint and motion; zero at gaps and
+    /// ends.
+    #[must_use]
+    pub fn rate_of(&self, series: &[f64]) -> Vec<f64> {
+        let step = DECIMATION as f64 / SAMPLE_RATE_HZ;
+        let mut slots: Vec<[usize; N]> = Vec::new();
+        let mut starts = Vec::with_capacity(self.parts.len());
+        for part in &self.parts {
+            starts.push(slots.len());
+            slots.resize(slots.len() + part.instants.len() / DECIMATION + 2, [usize::MAX; N]);
+        }
+        for (index, place) in self.places.iter().enumerate() {
+            slots[starts[place.part] + place.row][place.joint] = index;
+        }
+        let at = |place: &Place, offset: isize| -> Option<f64> {
+            let row = place.row.checked_add_signed(offset)?;
+            let end = starts.get(place.part + 1).copied().unwrap_or(slots.len());
+            let slot = starts[place.part] + row;
+            let index = *slots.get(slot).filter(|_| slot < end)?.get(place.joint)?;
+            series.get(index).copied()
+        };
+        let rate = |place: &Place| -> f64 {
+            let [two_back, back, on, two_on] = [-2, -1, 1, 2].map(|offset| at(place, offset));
+            match (two_back, back, on, two_on) {
+                (Some(a), Some(b), Some(c), Some(d)) => (8.0 * (c - b) - (d - a)) / (12.0 * step),
+                (_, Some(b), Some(c), _) => (c - b) / (2.0 * step),
+                _ => 0.0,
+            }
+        };
+        self.places.iter().map(rate).collect()
+    }
+
+    /// Least squares with these columns and torques, all equations or those of the training motion.
+    #[must_use]
+    pub fn fit(&self, columns: &[[f64; B]], torque: &[f64], training_only: bool) -> Fit<B> {
+        if !training_only {
+            return solve(columns, torque, &self.weight, &self.active);
+        }
+        solve(columns, torque, &self.training_weight(), &self.active)
+    }
+
+    /// Copy in which every equation has the weight of its joint.
+    #[must_use]
+    pub fn with_equal_weights(&self) -> Self {
+        let weight = self.places.iter().map(|place| 1.0 / self.row_sigma[place.joint]).collect();
+        Self { weight, ..self.clone() }
+    }
+
+    /// Weights of the equations of the motion identified from; zero for the others.
+    #[must_use]
+    pub fn training_weight(&self) -> Vec<f64> {
+        let pairs = self.weight.iter().zip(&self.places);
+        pairs.map(|(&weight, place)| if place.training { weight } else { 0.0 }).collect()
+    }
+
+    /// Weights by the residual: first scales of the joints, then blocks that are far off.
+    fn weigh(&mut self) {
+        let mut trust = vec![1.0; self.torque.len()];
+        for joint in 0..N {
+            let square: f64 = self.of_joint(joint).map(|index| self.torque[index].powi(2)).sum();
+            let count = self.of_joint(joint).count().max(1) as f64;
+            self.row_sigma[joint] = (square / count).sqrt().max(1e-9);
+        }
+        for round in 0..10 {
+            self.weight = self
+                .places
+                .iter()
+                .zip(&trust)
+                .map(|(place, trust): (&Place, &f64)| trust.sqrt() / self.row_sigma[place.joint])
+                .collect();
+            let fit = solve(&self.columns, &self.torque, &self.weight, &self.active);
+            let residual = fit.residuals(&self.columns, &self.torque);
+            for joint in 0..N {
+                self.trust(joint, &residual, round < 5, &mut trust);
+                self.scale(joint, &residual, &trust, fit.rank);
+            }
+        }
+    }
+
+    fn of_joint(&self, joint: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..self.places.len()).filter(move |&index| self.places[index].joint == joint)
+    }
+
+    fn trust(&self, joint: usize, residual: &[f64], gently: bool, trust: &mut [f64]) {
+        let mut blocks: Vec<(usize, usize, Vec<usize>)> = Vec::new();
+        for index in self.of_joint(joint) {
+            let place = &self.places[index];
+            let key = (place.part, place.row / BLOCK_ROWS);
+            match blocks.last_mut() {
+                Some((part, block, list)) if (*part, *block) == key => list.push(index),
+                _ => blocks.push((key.0, key.1, vec![index])),
+            }
+        }
+        let size = |list: &[usize]| {
+            (list.iter().map(|&index| residual[index].powi(2)).sum::<f64>() / list.len() as f64).sqrt()
+        };
+        let sizes: Vec<f64> = blocks.iter().map(|(_, _, list)| size(list)).collect();
+        let mut sorted = sizes.clone();
+        sorted.sort_by(f64::total_cmp);
+        let Some(&median) = sorted.get(sorted.len() / 2) else { return };
+        for ((_, _, list), size) in blocks.iter().zip(&sizes) {
+            let ratio = size / median.max(1e-12);
+            let (from, to) = DISTURBED;
+            let share = if gently {
+                (from / ratio.max(1e-12)).min(1.0)
+            } else {
+                ((to - ratio) / (to - from)).clamp(0.0, 1.0)
+            };
+            list.iter().for_each(|&index| trust[index] = share);
+        }
+    }
+
+    fn scale(&mut self, joint: usize, residual: &[f64], trust: &[f64], rank: usize) {
+        let list: Vec<usize> = self.of_joint(joint).collect();
+        let counted: f64 = list.iter().map(|&index| trust[index]).sum();
+        let square: f64 = list.iter().map(|&index| trust[index] * residual[index].powi(2)).sum();
+        let torque: f64 = list.iter().map(|&index| self.torque[index].powi(2)).sum::<f64>();
+        let information = self.information().max(1e-3);
+        let free = (counted - rank as f64 / information).max(1.0);
+        let floor = 1e-5 * (torque / list.len().max(1) as f64).sqrt();
+        self.rows[joint] = counted;
+        self.row_sigma[joint] = (square / free / information).sqrt().max(floor).max(1e-9);
+    }
+}

@@ -1,0 +1,598 @@
+//! Samples that no sensor measured: torque at a limit, values that are held, frozen or coarse.
+//!
+//! Why: clipped or repeated values look like measurements to every later step, and bias the parameters with a
+//! small sigma. They leave traces in the columns themselves, before any model is fitted.
+//!
+//! ```text
+//! u  step of a column: 5 % quantile of its changes      R  range of a torque      D = max(0.01 R, 0.99 u)
+//! a  samples within D of an extreme                      b  samples in the next band of width D
+//! e  samples equal to the extreme                        c  other samples within D (coarse columns: b)
+//!
+//! saturation    e >= 20 with a run of 3, and  no column repeats otherwise,  e >= 3 (c + 1) where u <= 0.4 D,
+//!               or e >= 6 (c + 1)
+//!          or   a >= 20, a >= 3 (b + 1), and less than 0.3 of the noise elsewhere: flattened by a filter
+//! held          runs of 2 and more that end in a jump of 3 u: 20 % of the torques, 40 % of the angles
+//! frozen        a run of 25 ms, at least 5 samples, in a column that is noisy elsewhere; or an angle that
+//!               then jumps by 5 u and 3 times its next step
+//! ```
+//!
+//! Only samples in which the leg moves count, since a leg at rest repeats its values rightly. A smooth peak
+//! has a = 2.4 b where it is a parabola and 5.3 b where it is of the fourth order; the limits lie above what
+//! such a peak can reach in each case. A sample beside none of its own size is an outlier, not a limit.
+//!
+//! Saturated and frozen stretches are excluded ([`Screened::spans`]) while they are few. A held column is
+//! late by half of its holding time on average, and is refused. Cost: linear in the samples, but for two
+//! sorts. Known limits: a drive at its own limit gives the same torque column as a sensor at its limit; its
+//! rows are excluded although they are right.
+
+use std::ops::Range;
+
+use crate::formats::recording::Recording;
+use crate::report::doubt::SampleFinding;
+use crate::run::doubt::encoder::Encoder;
+
+/// Finding of saturated torque.
+pub const SATURATION: &str = "saturation";
+/// Finding of values that are repeated.
+pub const HELD: &str = "held_samples";
+/// Finding of a coarse column; never a reason to refuse.
+pub const QUANTISED: &str = "quantised";
+
+/// Speed above which a leg moves, rad/s, and half the time over which it is measured, s.
+const MOVING_RADPS: f64 = 0.03;
+const MOVING_S: f64 = 0.025;
+/// Width of the bands at the extremes, share of the range.
+const BAND: f64 = 0.01;
+/// Samples at an extreme from which there is a limit.
+const LEAST_AT_LIMIT: usize = 20;
+/// Time by which a saturated stretch is widened, s: a filter of 50 Hz has forgotten the limit then.
+const WIDENED_S: f64 = 0.02;
+/// Stretches closer than this are one, s.
+const JOINED_S: f64 = 0.05;
+/// Time from which an unchanged value is frozen, s, and the fewest samples.
+const FROZEN_S: f64 = 0.025;
+const FROZEN_SAMPLES: usize = 5;
+/// Shares of held samples that are refused, of torque and angle.
+const HELD_TORQUE: f64 = 0.2;
+const HELD_ANGLE: f64 = 0.4;
+/// Holding time up to which a column is not refused, s: two periods of the firmware's log.
+const HARMLESS_HOLD_S: f64 = 0.0045;
+/// Longest time for which a column that is updated regularly holds a value, s.
+const LONGEST_HOLD_S: f64 = 0.1;
+/// Largest lost share of a recording: the rest would be a biased choice (as of disturbed rows).
+const LARGEST_LOSS: f64 = 1.0 / 3.0;
+/// Steps from which a column is coarse: 12 bits at the joint, and a share of a torque's range.
+const COARSE_RAD: f64 = 1.5e-3;
+const COARSE_SHARE: f64 = 0.01;
+
+/// Findings of one recording, and the stretches that must be excluded.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Screened {
+    /// What was found.
+    pub findings: Vec<SampleFinding>,
+    /// Times without a valid sample in some column, on the recording's clock, s; ordered and apart.
+    pub spans: Vec<Range<f64>>,
+}
+
+/// Examines recordings of one machine. Limits of the torque are looked for in each by itself and in all of
+/// them. `described_rad` are the steps of the encoders by the leg file. `reach_s` is the time that is lost on
+/// either side of an excluded stretch.
+#[must_use]
+pub fn screen(recordings: &[&Recording], described_rad: &[f64], reach_s: f64) -> Vec<Screened> {
+    let mut looks: Vec<Look> =
+        recordings.iter().map(|recording| Look::new(recording, described_rad)).collect();
+    for look in &mut looks {
+        look.find_limits();
+    }
+    if looks.len() > 1 {
+        find_common_limits(&mut looks);
+    }
+    looks.into_iter().map(|look| look.finish(reach_s)).collect()
+}
+
+/// One recording under examination.
+struct Look<'a> {
+    recording: &'a Recording,
+    /// Step of each joint's angle, rad.
+    angle_steps: Vec<f64>,
+    is_moving: Vec<bool>,
+    /// Samples of a frozen column.
+    is_frozen: Vec<bool>,
+    /// Joint, limit and samples of each saturated side.
+    limits: Vec<Limit>,
+}
+
+struct Limit {
+    joint: usize,
+    upper: bool,
+    limit_nm: f64,
+    is_at: Vec<bool>,
+}
+
+impl<'a> Look<'a> {
+    fn new(recording: &'a Recording, described_rad: &[f64]) -> Self {
+        let angles = recording.joints.iter().map(|joint| &joint.position_rad);
+        let angle_steps: Vec<f64> = angles
+            .clone()
+            .zip(described_rad)
+            .map(|(values, &described_rad)| {
+                let encoder = Encoder::of(values, described_rad).map_or(0.0, |encoder| encoder.step_rad);
+                step(values).max(encoder)
+            })
+            .collect();
+        let is_moving = moving(recording, &angle_steps);
+        let mut is_frozen = vec![false; recording.time_s.len()];
+        let mut look = Self {
+            recording,
+            angle_steps: angle_steps.clone(),
+            is_moving,
+            is_frozen: Vec::new(),
+            limits: Vec::new(),
+        };
+        for (values, &u) in angles.zip(&angle_steps) {
+            if look.held(values, u, &[]).share > HELD_ANGLE {
+                continue;
+            }
+            for run in frozen_runs(recording, values).filter(|run| ends_in_jump(values, run, u)) {
+                is_frozen[run].fill(true);
+            }
+        }
+        look.is_frozen = is_frozen;
+        look
+    }
+
+    /// Samples with valid values about them and motion on both sides. The edges of a rest are not among them.
+    fn usable(&self) -> Vec<bool> {
+        let half = half_window(self.recording);
+        let mut usable: Vec<bool> = self.is_frozen.iter().map(|&frozen| !frozen).collect();
+        for run in runs(&self.is_moving).filter(|run| !self.is_moving[run.start]) {
+            let end = (run.end + half).min(usable.len());
+            usable[run.start.saturating_sub(half)..end].fill(false);
+        }
+        usable
+    }
+
+    /// Looks for limits of every torque that is not held.
+    fn find_limits(&mut self) {
+        let usable = self.usable();
+        for (joint, series) in self.recording.joints.iter().enumerate() {
+            if self.held_torque(&series.torque_nm, &[]).share > HELD_TORQUE {
+                continue;
+            }
+            let part = Part { values: &series.torque_nm, usable: &usable, rate_hz: self.rate_hz() };
+            for upper in [true, false] {
+                if let Some((limit_nm, mut at)) = limit(&[part], upper) {
+                    self.limits.push(Limit { joint, upper, limit_nm, is_at: at.remove(0) });
+                }
+            }
+        }
+    }
+
+    fn rate_hz(&self) -> f64 {
+        1.0 / self.recording.median_step_s().max(1e-9)
+    }
+
+    /// Share and median duration of held values of a column with steps `u`; samples marked in `known` do not
+    /// count.
+    fn held(&self, values: &[f64], u: f64, known: &[bool]) -> Held {
+        let counts = |sample: usize| self.is_moving[sample] && !known.get(sample).is_some_and(|&known| known);
+        let longest = (LONGEST_HOLD_S / self.recording.median_step_s().max(1e-9)).round() as usize;
+        let (mut lengths, mut held) = (Vec::new(), 0);
+        for run in runs(values).filter(|run| run.len() <= longest) {
+            let jump = values.get(run.end).map_or(0.0, |next| (next - values[run.start]).abs());
+            if run.len() > 1 && jump > 0.0 && jump >= 3.0 * u && counts(run.start) {
+                held += run.len();
+                lengths.extend(std::iter::repeat_n(run.len(), run.len()));
+            }
+        }
+        lengths.sort_unstable();
+        let all = (0..values.len()).filter(|&sample| counts(sample)).count();
+        Held {
+            share: (held as f64 / all.max(1) as f64).min(1.0),
+            time_s: lengths.get(lengths.len() / 2).map_or(0.0, |&length| length as f64)
+                * self.recording.median_step_s(),
+        }
+    }
+
+    fn held_torque(&self, values: &[f64], known: &[bool]) -> Held {
+        self.held(values, step(values), known)
+    }
+
+    fn finish(mut self, reach_s: f64) -> Screened {
+        let file = self.recording.file.display().to_string();
+        let samples = self.recording.time_s.len().max(1) as f64;
+        let mut findings = Vec::new();
+        let at_limit: Vec<bool> = (0..self.recording.time_s.len())
+            .map(|k| self.limits.iter().any(|limit| limit.is_at[k]))
+            .collect();
+        self.find_frozen_torque(&at_limit);
+        let frozen_s = self.is_frozen.iter().filter(|&&frozen| frozen).count() as f64 / samples
+            * self.recording.duration_s();
+
+        let mut known = self.is_frozen.clone();
+        known.iter_mut().zip(&at_limit).for_each(|(known, &at)| *known |= at);
+        let mut is_held = false;
+        for (joint, series) in self.recording.joints.iter().enumerate() {
+            let columns = [
+                (&series.torque_nm, step(&series.torque_nm), "tau", "Nm", HELD_TORQUE),
+                (&series.position_rad, self.angle_steps[joint], "q", "rad", HELD_ANGLE),
+            ];
+            for (values, u, symbol, unit, limit) in columns {
+                let held = self.held(values, u, &known);
+                if held.share > limit {
+                    let refuses = held.time_s > HARMLESS_HOLD_S;
+                    is_held |= refuses;
+                    findings.push(SampleFinding {
+                        name: HELD,
+                        file: file.clone(),
+                        joint: Some(joint + 1),
+                        value: held.time_s,
+                        unit: "s",
+                        sigma: None,
+                        share: held.share,
+                        refuses,
+                        text: format!(
+                            "{symbol}{}_{unit} repeats its values: {:.0} % of the samples are held, for {:.1} ms each. On \
+                             average they are {:.1} ms late: record every value when it is measured",
+                            joint + 1,
+                            100.0 * held.share,
+                            1e3 * held.time_s,
+                            0.5e3 * held.time_s
+                        ),
+                    });
+                }
+                if let Some(finding) = coarse(values, &format!("{symbol}{}_{unit}", joint + 1), unit) {
+                    findings.push(SampleFinding { file: file.clone(), joint: Some(joint + 1), ..finding });
+                }
+            }
+        }
+
+        let spans = if is_held { Vec::new() } else { self.spans(&at_limit) };
+        let lost = lost_share(self.recording, &spans, reach_s);
+        let refuses = lost > LARGEST_LOSS;
+        let fate = |what: &str| {
+            if is_held {
+                String::new()
+            } else if refuses {
+                format!(
+                    ". {:.0} % of the recording would be lost, at most {:.0} % may be: {what}",
+                    100.0 * lost,
+                    100.0 * LARGEST_LOSS
+                )
+            } else {
+                format!(". These stretches are excluded, {:.1} % of the recording", 100.0 * lost)
+            }
+        };
+        for limit in &self.limits {
+            let share = limit.is_at.iter().filter(|&&at| at).count() as f64 / samples;
+            findings.push(SampleFinding {
+                name: SATURATION,
+                file: file.clone(),
+                joint: Some(limit.joint + 1),
+                value: limit.limit_nm,
+                unit: "N m",
+                sigma: None,
+                share,
+                refuses,
+                text: format!(
+                    "tau{}_Nm ends at a limit of {:.4} N m, where {:.1} % of the samples lie{}",
+                    limit.joint + 1,
+                    limit.limit_nm,
+                    100.0 * share,
+                    fate("record with a larger range of the torque, or a calmer motion")
+                ),
+            });
+        }
+        if frozen_s > 0.0 {
+            findings.push(SampleFinding {
+                name: HELD,
+                file,
+                joint: None,
+                value: frozen_s,
+                unit: "s",
+                sigma: None,
+                share: frozen_s / self.recording.duration_s(),
+                refuses,
+                text: format!(
+                    "columns stand still for {frozen_s:.2} s in all while the leg moves{}",
+                    fate("the recorder loses samples")
+                ),
+            });
+        }
+        Screened { findings, spans }
+    }
+
+    /// Marks torques that stand still, where the column is noisy and not at its limit.
+    fn find_frozen_torque(&mut self, at_limit: &[bool]) {
+        for joint in 0..self.recording.joints.len() {
+            let values = &self.recording.joints[joint].torque_nm;
+            if !is_noisy(values) || self.held_torque(values, at_limit).share > HELD_TORQUE {
+                continue;
+            }
+            for run in frozen_runs(self.recording, values) {
+                let known = run.clone().filter(|&sample| at_limit[sample]).count();
+                if 2 * known < run.len() && run.clone().any(|sample| self.is_moving[sample]) {
+                    self.is_frozen[run].fill(true);
+                }
+            }
+        }
+    }
+
+    /// Times to be excluded: frozen stretches as they are, saturated ones wider.
+    fn spans(&self, at_limit: &[bool]) -> Vec<Range<f64>> {
+        let time = &self.recording.time_s;
+        let mut spans: Vec<Range<f64>> = Vec::new();
+        for (marks, wider) in [(at_limit, WIDENED_S), (&self.is_frozen[..], 0.0)] {
+            for run in runs(marks).filter(|run| marks[run.start]) {
+                // The sample after a run is measured again; between both, values are interpolated.
+                let end = time[run.end.min(time.len() - 1)];
+                spans.push(time[run.start] - wider..end + wider);
+            }
+        }
+        spans.sort_by(|one, other| one.start.total_cmp(&other.start));
+        let mut joined: Vec<Range<f64>> = Vec::new();
+        for span in spans {
+            match joined.last_mut() {
+                Some(last) if span.start <= last.end + JOINED_S => last.end = last.end.max(span.end),
+                _ => joined.push(span),
+            }
+        }
+        joined
+    }
+}
+
+struct Held {
+    share: f64,
+    time_s: f64,
+}
+
+/// Share of a recording that is lost by excluded spans and by windows that need `reach_s` on either side.
+fn lost_share(recording: &Recording, spans: &[Range<f64>], reach_s: f64) -> f64 {
+    let (Some(&first), Some(&last)) = (recording.time_s.first(), recording.time_s.last()) else { return 0.0 };
+    if spans.is_empty() {
+        return 0.0;
+    }
+    let starts = std::iter::once(first).chain(spans.iter().map(|span| span.end));
+    let ends = spans.iter().map(|span| span.start).chain(std::iter::once(last));
+    let left: f64 = starts.zip(ends).map(|(start, end)| (end - start - 2.0 * reach_s).max(0.0)).sum();
+    1.0 - left / (last - first - 2.0 * reach_s).max(1e-9)
+}
+
+/// Column whose steps are coarse, without file and joint.
+fn coarse(values: &[f64], column: &str, unit: &'static str) -> Option<SampleFinding> {
+    let u = step(values);
+    let (low, high) = range(values);
+    let changes = changes(values);
+    // Steps of a sensor are equal; those of a continuous signal are not.
+    let single = changes.iter().filter(|&&change| (change - u).abs() < 0.01 * u).count();
+    let is_coarse = if unit == "rad" { u >= COARSE_RAD } else { u > COARSE_SHARE * (high - low) };
+    (is_coarse && 4 * single > changes.len()).then(|| SampleFinding {
+        name: QUANTISED,
+        file: String::new(),
+        joint: None,
+        value: u,
+        unit: if unit == "rad" { "rad" } else { "N m" },
+        sigma: None,
+        share: 1.0,
+        refuses: false,
+        text: format!("{column} has steps of {u:.3e}: a coarse sensor"),
+    })
+}
+
+/// Limits of the torque that only all recordings together show.
+fn find_common_limits(looks: &mut [Look]) {
+    let joints = looks.iter().map(|look| look.recording.joints.len()).min().unwrap_or(0);
+    let usable: Vec<Vec<bool>> = looks.iter().map(Look::usable).collect();
+    for joint in 0..joints {
+        let is_held =
+            |look: &Look| look.held_torque(&look.recording.joints[joint].torque_nm, &[]).share > HELD_TORQUE;
+        if looks.iter().any(is_held) {
+            continue;
+        }
+        let parts: Vec<Part> = looks
+            .iter()
+            .zip(&usable)
+            .map(|(look, usable)| Part {
+                values: &look.recording.joints[joint].torque_nm,
+                usable,
+                rate_hz: look.rate_hz(),
+            })
+            .collect();
+        for upper in [true, false] {
+            let Some((limit_nm, at)) = limit(&parts, upper) else { continue };
+            for (look, is_at) in looks.iter_mut().zip(at) {
+                let is_known = look.limits.iter().any(|limit| limit.joint == joint && limit.upper == upper);
+                if !is_known && is_at.contains(&true) {
+                    look.limits.push(Limit { joint, upper, limit_nm, is_at });
+                }
+            }
+        }
+    }
+}
+
+/// One column of torques.
+#[derive(Clone, Copy)]
+struct Part<'a> {
+    values: &'a [f64],
+    usable: &'a [bool],
+    rate_hz: f64,
+}
+
+/// Limit at the upper or lower end of the torques, and the samples of each part that lie at it.
+fn limit(parts: &[Part], upper: bool) -> Option<(f64, Vec<Vec<bool>>)> {
+    let sign = if upper { 1.0 } else { -1.0 };
+    let (low, high) = parts
+        .iter()
+        .map(|part| range(part.values))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (lower, higher)| {
+            (low.min(lower), high.max(higher))
+        });
+    let (range, top) = (high - low, if upper { high } else { -low });
+    if !(range > 0.0) {
+        return None;
+    }
+    let u = parts.iter().map(|part| step(part.values)).fold(f64::INFINITY, f64::min);
+    let band = (BAND * range).max(0.99 * u);
+    // Distance below the limit of one sample.
+    let below = |part: &Part, sample: usize| top - sign * part.values[sample];
+    // Samples at the limit, moving or not; those that count are usable as well.
+    let at: Vec<Vec<bool>> = parts
+        .iter()
+        .map(|part| {
+            let close = |sample: Option<usize>| {
+                sample.is_some_and(|sample| sample < part.values.len() && below(part, sample) < 10.0 * band)
+            };
+            (0..part.values.len())
+                .map(|sample| {
+                    below(part, sample) < band && (close(sample.checked_sub(1)) || close(Some(sample + 1)))
+                })
+                .collect()
+        })
+        .collect();
+    let near: Vec<Vec<bool>> = parts
+        .iter()
+        .zip(&at)
+        .map(|(part, at)| at.iter().zip(part.usable).map(|(&at, &usable)| at && usable).collect())
+        .collect();
+    let all = || parts.iter().zip(&near);
+    let count = |test: &dyn Fn(&Part, &Vec<bool>, usize) -> bool| -> usize {
+        all().map(|(part, near)| (0..near.len()).filter(|&sample| test(part, near, sample)).count()).sum()
+    };
+    let within = count(&|_, near, sample| near[sample]);
+    if within < LEAST_AT_LIMIT {
+        return None;
+    }
+    let equal = count(&|part, near, sample| near[sample] && below(part, sample) <= 0.0);
+    let next =
+        count(&|part, _, sample| part.usable[sample] && (band..2.0 * band).contains(&below(part, sample)));
+    let longest = all()
+        .flat_map(|(part, near)| {
+            let top: Vec<bool> =
+                (0..near.len()).map(|sample| near[sample] && below(part, sample) <= 0.0).collect();
+            runs(&top).filter(|run| top[run.start]).map(|run| run.len()).collect::<Vec<_>>()
+        })
+        .max()
+        .unwrap_or(0);
+    let others = if u < band { within - equal } else { next };
+    let repeats = count(&|part, near, sample| {
+        sample > 0 && part.usable[sample] && !near[sample] && part.values[sample] == part.values[sample - 1]
+    });
+    let apart = count(&|part, near, sample| part.usable[sample] && !near[sample]);
+    let is_exact = equal >= LEAST_AT_LIMIT
+        && longest >= 3
+        && (50 * repeats < apart
+            || (u <= 0.4 * band && equal >= 3 * (others + 1))
+            || equal >= 6 * (others + 1));
+    let slowest = parts.iter().map(|part| part.rate_hz).fold(f64::INFINITY, f64::min);
+    let ratio = if slowest >= 200.0 { 3 } else { 6 };
+    let is_flat = within >= ratio * (next + 1) && {
+        let roughness = |inside: bool| {
+            let mut rough: Vec<f64> = all()
+                .flat_map(|(part, near)| {
+                    (3..near.len())
+                        .filter(move |&last| (last - 3..=last).all(|k| part.usable[k] && near[k] == inside))
+                        .map(move |last| third_difference(&part.values[last - 3..=last]))
+                })
+                .collect();
+            (rough.len() >= 8).then(|| median(&mut rough))
+        };
+        match (roughness(true), roughness(false)) {
+            (Some(inside), Some(outside)) => inside < 0.3 * outside && outside > NOISY * range,
+            _ => false,
+        }
+    };
+    (is_exact || is_flat).then_some((sign * top, at))
+}
+
+/// Third difference, as a share of the range, from which a column is noisy.
+const NOISY: f64 = 5e-4;
+
+fn third_difference(values: &[f64]) -> f64 {
+    match values {
+        [a, b, c, d] => (d - 3.0 * c + 3.0 * b - a).abs(),
+        _ => 0.0,
+    }
+}
+
+/// Whether neighbouring samples differ by noise. A coarse column that rarely changes does not.
+fn is_noisy(values: &[f64]) -> bool {
+    let (low, high) = range(values);
+    let repeated =
+        runs(values).filter(|run| run.len() < FROZEN_SAMPLES).map(|run| run.len() - 1).sum::<usize>();
+    let mut rough: Vec<f64> = values.windows(4).map(third_difference).collect();
+    20 * repeated < values.len() && !rough.is_empty() && median(&mut rough) > NOISY * (high - low)
+}
+
+/// Samples on either side over which a speed is measured.
+fn half_window(recording: &Recording) -> usize {
+    ((MOVING_S / recording.median_step_s().max(1e-9)).round() as usize).max(1)
+}
+
+/// Samples in which some joint moves.
+fn moving(recording: &Recording, steps: &[f64]) -> Vec<bool> {
+    let time = &recording.time_s;
+    let half = half_window(recording);
+    (0..time.len())
+        .map(|sample| {
+            let (before, after) = (sample.saturating_sub(half), (sample + half).min(time.len() - 1));
+            recording.joints.iter().zip(steps).any(|(joint, &u)| {
+                let travel = (joint.position_rad[after] - joint.position_rad[before]).abs();
+                travel > (MOVING_RADPS * (time[after] - time[before])).max(2.5 * u)
+            })
+        })
+        .collect()
+}
+
+/// Runs of unchanged values that are long enough to be frozen.
+fn frozen_runs<'a>(recording: &Recording, values: &'a [f64]) -> impl Iterator<Item = Range<usize>> + use<'a> {
+    let least = (FROZEN_S / recording.median_step_s().max(1e-9)).round() as usize;
+    runs(values).filter(move |run| run.len() >= least.max(FROZEN_SAMPLES))
+}
+
+/// Whether an angle jumps after a run, by far more than the next step: the joint moved during the run.
+fn ends_in_jump(values: &[f64], run: &Range<usize>, u: f64) -> bool {
+    let (Some(after), Some(next)) = (values.get(run.end), values.get(run.end + 1)) else { return false };
+    let jump = (after - values[run.start]).abs();
+    jump > 0.0 && jump >= 5.0 * u && jump >= 3.0 * (next - after).abs()
+}
+
+/// Runs of equal values.
+pub(super) fn runs<T: PartialEq>(values: &[T]) -> impl Iterator<Item = Range<usize>> + use<'_, T> {
+    let mut start = 0;
+    std::iter::from_fn(move || {
+        let value = values.get(start)?;
+        let length = values[start..].iter().take_while(|&other| other == value).count();
+        let run = start..start + length;
+        start = run.end;
+        Some(run)
+    })
+}
+
+fn range(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| (low.min(value), high.max(value)))
+}
+
+/// Changes between neighbouring samples, in ascending order, without zeros.
+fn changes(values: &[f64]) -> Vec<f64> {
+    let mut changes: Vec<f64> =
+        values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|&change| change > 0.0).collect();
+    changes.sort_by(f64::total_cmp);
+    changes
+}
+
+/// Step of a column: the sensor's last bit, or less than its typical change.
+pub(super) fn step(values: &[f64]) -> f64 {
+    let changes = changes(values);
+    changes.get(changes.len() / 20).copied().unwrap_or(0.0)
+}
+
+/// Median; zero for an empty list.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,304 @@
+//! Designs a motion for a leg file, or checks a given one, and reports it.
+
+use std::path::Path;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use scarab::ident::status;
+use scarab::model::{PARAMETERS_PER_JOINT, Parameter, Payload};
+use scarab::motion::Motion;
+
+use crate::base::error::ToolError;
+use crate::base::number::Number;
+use crate::formats::excitation::{Excitation, Expected, Proved, geometry};
+use crate::formats::leg_file::LegFile;
+use crate::leg::background::Background;
+use crate::leg::motions::EXCITATION_CYCLES;
+use crate::report::excite::{
+    ComparedBase, ExciteReport, ExpectedBase, ExpectedParameter, JointReport, RandomMotion, SCHEMA,
+};
+use crate::run::excite::assumption::Assumption;
+use crate::run::excite::bench::{Bench, ExciteOptions};
+use crate::run::excite::design::{Candidate, DesignOptions, candidates, smaller};
+use crate::run::excite::expectation::{Expectation, Rehearsal};
+
+/// Motion with its report.
+#[derive(Clone, Debug)]
+pub struct Excited {
+    /// Motion as written to the file.
+    pub motion: Excitation,
+    /// Report.
+    pub report: ExciteReport,
+}
+
+/// Rejects a motion that belongs to another leg, or exceeds the limits of angle, speed,
+/// acceleration or torque. The torque includes carried masses.
+///
+/// # Errors
+/// Names the file.
+pub fn check<const N: usize, const B: usize>(
+    leg: &LegFile,
+    file: &Path,
+    motion: &Excitation,
+    carried: &[Payload<f64>],
+) -> Result<(), ToolError> {
+    // First: another leg's motion is the most likely mistake.
+    motion.table::<N>(leg).map_err(|reason| about(file, &reason))?;
+    let options = ExciteOptions {
+        design: DesignOptions { duration_s: 0.0, seed: 0, evaluations: 0 },
+        given: None,
+        carried: carried.to_vec(),
+        torque_noise_percent: None,
+        margin_percent: 0.0,
+        assumption: Assumption::Best,
+    };
+    Bench::<N, B>::new(leg, &options)?.given(motion).map_err(|reason| about(file, &reason))?;
+    Ok(())
+}
+
+/// Error about a motion's file.
+fn about(file: &Path, reason: &dyn std::fmt::Display) -> ToolError {
+    ToolError::input(format!("{}: {reason}", file.display()))
+}
+
+/// Designs a motion, or checks a given one.
+///
+/// # Errors
+/// The leg file cannot be used, or no motion fits.
+pub fn excite<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &ExciteOptions,
+) -> Result<Excited, ToolError> {
+    // First: another leg's motion is the most likely mistake.
+    if let Some((file, given)) = &options.given {
+        given.table::<N>(leg).map_err(|reason| about(file, &reason))?;
+    }
+    let bench = Bench::<N, B>::new(leg, options)?;
+    bench.require_noise()?;
+    let found = match &options.given {
+        Some((file, given)) => vec![bench.given(given).map_err(|reason| about(file, &reason))?],
+        None => design(&bench, &options.design)?,
+    };
+    let mut best: Option<(f64, Candidate<N>, Rehearsal<N, B>)> = None;
+    let mut fault = None;
+    for candidate in found {
+        let rehearsed = match &options.given {
+            Some(_) => bench.rehearse(&candidate.table).map(|rehearsal| (candidate, rehearsal)),
+            None => untouched(&bench, candidate),
+        };
+        match rehearsed {
+            Ok((candidate, rehearsal)) => {
+                let information = rehearsal.at_noise(&bench.scorer.noise_nm).log_determinant;
+                if best.as_ref().is_none_or(|(most, ..)| information > *most) {
+                    best = Some((information, candidate, rehearsal));
+                }
+            }
+            Err(error) => fault = Some(error),
+        }
+    }
+    match (best, fault) {
+        (Some((_, candidate, rehearsal)), _) => Ok(bench.excited(options, &candidate, &rehearsal)),
+        (None, Some(error)) => Err(error),
+        (None, None) => Err(ToolError::input("no motion was found")),
+    }
+}
+
+/// Shrinks a motion until the monitor never reduces the simulated plant's torque. Friction at a
+/// reversal and the position loop add torque that the computed demand does not contain.
+fn untouched<const N: usize, const B: usize>(
+    bench: &Bench<N, B>,
+    mut candidate: Candidate<N>,
+) -> Result<(Candidate<N>, Rehearsal<N, B>), ToolError> {
+    for _ in 0..SMALLER {
+        let rehearsal = bench.rehearse(&candidate.table)?;
+        if rehearsal.seen.iter().all(|joint| joint.limited_ticks == 0) {
+            return Ok((candidate, rehearsal));
+        }
+        let Some(next) = smaller(&bench.frame(), &candidate) else { break };
+        candidate = next;
+    }
+    Err(ToolError::input(format!(
+        "{}: no motion can be designed for this leg: however small, near an end of its range the monitor takes torque from it, \
+         for a joint that is slow to follow could not stop there; `identify` has the default motion",
+        bench.leg.name
+    )))
+}
+
+/// Limit of the shrinking steps.
+const SMALLER: u32 = 12;
+
+fn design<const N: usize, const B: usize>(
+    bench: &Bench<N, B>,
+    options: &DesignOptions,
+) -> Result<Vec<Candidate<N>>, ToolError> {
+    let progress = ProgressBar::new(u64::from(options.evaluations));
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} curves, {elapsed} gone, {eta} left")
+    {
+        progress.set_style(style);
+    }
+    let found = candidates(&bench.frame(), options, &progress);
+    progress.finish_and_clear();
+    found
+}
+
+impl<const N: usize, const B: usize> Bench<N, B> {
+    fn excited(
+        &self,
+        options: &ExciteOptions,
+        candidate: &Candidate<N>,
+        rehearsal: &Rehearsal<N, B>,
+    ) -> Excited {
+        let mut motion = Excitation::of(&self.leg, &candidate.table);
+        let expectation = &rehearsal.at_noise(&rehearsal.noise_nm);
+        // All motions are compared at one noise; otherwise the motion with less torque would win by
+        // that alone.
+        let designed = rehearsal.at_noise(&self.scorer.noise_nm);
+        let at_same_noise =
+            |(rehearsal, keeps): (Rehearsal<N, B>, bool)| (rehearsal.at_noise(&self.scorer.noise_nm), keeps);
+        let random = |cycles| self.random(motion.duration_s(), cycles).map(at_same_noise);
+        let (random, quick) = (random(EXCITATION_CYCLES), random(candidate.table.cycles));
+        let compared = |random: &Option<(Expectation<N, B>, bool)>| RandomMotion {
+            log_determinant: random.as_ref().map(|(random, _)| random.log_determinant).into(),
+            keeps_torque_limits: random.as_ref().is_some_and(|(_, keeps)| *keeps),
+        };
+        let background = &self.context.background;
+        let joints: Vec<_> = (0..N).map(|joint| self.joint(candidate, rehearsal, joint)).collect();
+        let base: Vec<_> = (0..background.model.base.rank())
+            .map(|base| self.base(expectation, &designed, random.as_ref().map(|(random, _)| random), base))
+            .collect();
+        let parameters = parameters(background, expectation, &base);
+        for (file, report) in motion.joints.iter_mut().zip(&joints) {
+            file.proved = Some(Proved {
+                angle_deg: report.angle_deg.map(millis),
+                speed_deg_s: millis(report.speed_deg_s),
+                acceleration_deg_s2: millis(report.acceleration_deg_s2),
+                torque_nm: millis(report.torque_with_margin_nm),
+            });
+        }
+        motion.expected = Some(Expected {
+            assumed: self.assumed.into(),
+            torque_noise_nm: rehearsal.noise_nm.to_vec(),
+            base_parameter: base.iter().map(|base| base.expected.clone()).collect(),
+        });
+        let report = ExciteReport {
+            schema: SCHEMA,
+            leg: self.leg.name.clone(),
+            geometry: geometry(&self.leg),
+            assumed: self.assumed,
+            seed: options.given.is_none().then_some(options.design.seed),
+            torque_noise_percent: self.noise.percent,
+            torque_noise_of: self.noise.of,
+            margin_percent: options.margin_percent,
+            duration_s: motion.duration_s(),
+            period_s: candidate.table.period_s.into(),
+            cycles: candidate.table.cycles,
+            blend_s: candidate.table.blend_s.into(),
+            log_determinant: designed.log_determinant.into(),
+            random: compared(&random),
+            random_same_pace: compared(&quick),
+            condition: expectation.condition.into(),
+            warnings: crate::run::excite::warnings::warnings(
+                &self.leg,
+                self.noise,
+                &joints,
+                &base,
+                &parameters,
+            ),
+            joints,
+            base_parameters: base,
+            parameters,
+        };
+        Excited { motion, report }
+    }
+
+    fn joint(&self, candidate: &Candidate<N>, rehearsal: &Rehearsal<N, B>, joint: usize) -> JointReport {
+        let (file, demand) = (&self.leg.joints[joint], &candidate.demand[joint]);
+        let bounds = Motion::Periodic(candidate.motion).envelope()[joint];
+        let anatomy = &self.context.configuration.joints[joint].scale.anatomy;
+        let (sign, zero) = (f64::from(anatomy.direction()), f64::from(anatomy.zero_offset()));
+        let ends = [bounds.low.0, bounds.high.0].map(|angle| (sign * (f64::from(angle) - zero)).to_degrees());
+        let torque = [sign * demand.low_nm, sign * demand.high_nm];
+        let sorted = |[one, other]: [f64; 2]| [one.min(other), one.max(other)];
+        JointReport {
+            name: file.name.clone(),
+            angle_deg: sorted(ends),
+            range_deg: file.range_deg,
+            speed_deg_s: f64::from(bounds.speed.0).to_degrees(),
+            speed_limit_deg_s: file.speed_limit_deg_s,
+            acceleration_deg_s2: f64::from(bounds.acceleration.0).to_degrees(),
+            acceleration_limit_deg_s2: file.acceleration_limit_deg_s2,
+            torque_nm: sorted(torque),
+            torque_with_margin_nm: demand.largest(),
+            torque_limit_nm: self.torque_limit[joint],
+            torque_noise_nm: rehearsal.noise_nm[joint],
+            lost_share: rehearsal.lost_share[joint],
+            simulated: rehearsal.seen[joint],
+        }
+    }
+
+    fn base(
+        &self,
+        expectation: &Expectation<N, B>,
+        designed: &Expectation<N, B>,
+        random: Option<&Expectation<N, B>>,
+        base: usize,
+    ) -> ComparedBase {
+        let background = &self.context.background;
+        let unit = background.model.base.independent(base).map_or("", |(_, parameter)| parameter.unit());
+        let sigma = expectation.estimate.sigma(base);
+        ComparedBase {
+            expected: ExpectedBase {
+                name: background.base_name(base),
+                unit: unit.into(),
+                assumed: self.scorer.values[base],
+                sigma,
+                systematic: sigma.map(|_| expectation.systematic[base]),
+            },
+            ratio_to_random: random
+                .and_then(|random| Some(designed.estimate.sigma(base)? / random.estimate.sigma(base)?))
+                .into(),
+        }
+    }
+}
+
+fn millis(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
+
+/// Fourteen parameters of every joint with the status that the firmware will assign.
+fn parameters<const N: usize, const B: usize>(
+    background: &Background<N, B>,
+    expectation: &Expectation<N, B>,
+    base: &[ComparedBase],
+) -> Vec<ExpectedParameter> {
+    let model = &background.model;
+    let mut all = Vec::with_capacity(N * PARAMETERS_PER_JOINT);
+    for joint in 0..N {
+        for parameter in Parameter::ALL {
+            let status = status(model, &expectation.record, &expectation.estimate, joint, parameter);
+            let carriers: Vec<usize> = model.base.carriers(joint, parameter).collect();
+            let mut grouped_with = Vec::new();
+            for terms in carriers.iter().map(|&carrier| model.base.terms(carrier)) {
+                for (other, symbol) in (0..N).flat_map(|other| Parameter::ALL.map(|symbol| (other, symbol))) {
+                    if terms[other][symbol.index()] != 0.0 && (other, symbol) != (joint, parameter) {
+                        grouped_with.push(background.name(other, symbol));
+                    }
+                }
+            }
+            grouped_with.sort();
+            grouped_with.dedup();
+            let alone = matches!(status.name(), "identified" | "weak").then(|| carriers.first()).flatten();
+            all.push(ExpectedParameter {
+                name: background.name(joint, parameter),
+                joint: joint + 1,
+                unit: parameter.unit(),
+                assumed: background.truth.map(|truth| truth[joint][parameter.index()]).into(),
+                status: status.name(),
+                sigma: alone
+                    .and_then(|&base_index| base.get(base_index)?.expected.sigma)
+                    .map_or(Number::UNKNOWN, Number::from),
+                grouped_with,
+            });
+        }
+    }
+    all
+}

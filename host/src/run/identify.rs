@@ -1,0 +1,84 @@
+//! `identify`: one or many simulated runs, their logs and statistics.
+
+use std::path::Path;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use scarab::leg::{LoggedSample, Segment};
+use scarab::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
+
+use crate::base::error::ToolError;
+use crate::base::files::NewFile;
+use crate::formats::leg_file::LegFile;
+use crate::formats::recording::{JointSeries, Recording};
+use crate::report::series::Series;
+use crate::report::{RunReport, RunsReport, SCHEMA};
+use crate::rig::options::SimulationOptions;
+use crate::run::simulate::{SimulatedRun, simulate};
+
+/// Runs one identification, with curves on request; writes its log if a path is given.
+pub fn identify_one<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &SimulationOptions,
+    log: Option<&Path>,
+) -> Result<(RunReport, Series), ToolError> {
+    let run: SimulatedRun<N> = simulate::<N, B>(leg, options)?;
+    if let Some(path) = log {
+        let training: Vec<_> =
+            run.log.iter().filter(|logged| logged.segment == Some(Segment::Training)).copied().collect();
+        write_log(path, leg, &training)?;
+    }
+    Ok((run.report, run.series))
+}
+
+/// Runs one identification per seed, in parallel.
+pub fn identify_many<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &[SimulationOptions],
+) -> Result<RunsReport, ToolError> {
+    let progress = ProgressBar::new(options.len() as u64);
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} gone, {eta} left") {
+        progress.set_style(style);
+    }
+    let runs = options
+        .par_iter()
+        .map(|options| {
+            let run = simulate::<N, B>(leg, options).map(|run| run.report);
+            progress.inc(1);
+            run
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    progress.finish_and_clear();
+    Ok(RunsReport { schema: SCHEMA, runs })
+}
+
+/// Writes the training motion in the format of `replay`: anatomical angles and torques.
+pub fn write_log<const N: usize>(
+    path: &Path,
+    leg: &LegFile,
+    log: &[LoggedSample<N>],
+) -> Result<(), ToolError> {
+    let mut recording = Recording {
+        file: path.to_owned(),
+        time_s: Vec::with_capacity(log.len()),
+        joints: vec![JointSeries::default(); N],
+        joints_in_file: N,
+    };
+    let first = log.first().map_or(0, |logged| logged.sample.tick);
+    for logged in log {
+        let ticks = logged.sample.tick.wrapping_sub(first);
+        recording.time_s.push(f64::from(ticks) / f64::from(SERVO_RATE_HZ));
+        for (joint, series) in recording.joints.iter_mut().enumerate() {
+            let file = &leg.joints[joint];
+            let radian_per_count =
+                core::f64::consts::TAU / (f64::from(file.encoder.counts) * file.encoder.ratio);
+            let counts = f64::from(logged.sample.counts_sum[joint]) / f64::from(TICKS_PER_LOG);
+            let direction = if file.direction < 0 { -1.0 } else { 1.0 };
+            series.position_rad.push(leg.side.mounting() * counts * radian_per_count);
+            series.torque_nm.push(direction * f64::from(logged.sample.torque_nm[joint]));
+        }
+    }
+    let mut out = NewFile::create(path)?;
+    recording.write(&mut out).map_err(|error| ToolError::cannot_write(path, &error))?;
+    out.finish()
+}

@@ -1,0 +1,78 @@
+//! Known masses in recordings: a load that is taken off, and a mass that determines the scale of the torques.
+//!
+//! A load is taken off the rows of the identification, as on the drive ([`crate::run::scale`]). The doubts
+//! keep it: their sigma and directions do not depend on a constant part of the parameters. A mass in a second
+//! set of recordings determines recorded over true torque ([`scarab::ident::torque_constant_ratio`]). All
+//! torques are then divided by it before anything else.
+
+use scarab::ident::{Record, Solver, torque_constant_ratio};
+use scarab::model::Payload;
+
+use super::{ReplayOptions, Samples, feed, new_recorder, read_all};
+use crate::base::error::ToolError;
+use crate::formats::leg_file::LegFile;
+use crate::formats::leg_file::geometry::anatomy;
+use crate::leg::background::Background;
+use crate::run::scale::{Scale, base_of};
+
+/// Solves a record up to the choice of its columns.
+pub(super) fn settled<const N: usize, const B: usize>(
+    background: &Background<N, B>,
+    record: Record<f32, N, B>,
+    options: &ReplayOptions,
+) -> Solver<f32, N, B> {
+    let prior = background.prior.map(|prior| prior.map(|link| link.convert()));
+    let mut solver =
+        Solver::new(&background.device, record, options.plan, prior.as_ref(), options.swarm_seed);
+    while !solver.is_selected() {
+        solver.advance(&background.device, 1);
+    }
+    solver
+}
+
+/// Scale of the torques from the recordings with the mass and those without it.
+pub(super) fn scale<const N: usize, const B: usize>(
+    leg: &LegFile,
+    background: &Background<N, B>,
+    options: &ReplayOptions,
+    payload: &Payload<f64>,
+) -> Result<Scale<N, B>, ToolError> {
+    let with = ReplayOptions {
+        files: options.with_payload.clone(),
+        validate: Vec::new(),
+        split: None,
+        ..options.clone()
+    };
+    let (without, with) = (record(leg, background, options)?, record(leg, background, &with)?);
+    let base = base_of(background, payload);
+    Ok(Scale {
+        payload: Some(*payload),
+        ratios: core::array::from_fn(|joint| torque_constant_ratio(&without, &with, joint, &base)),
+        load: options.load,
+        load_base: load_base(background, options),
+    })
+}
+
+/// Base parameters of the load; zero without one.
+pub(super) fn load_base<const N: usize, const B: usize>(
+    background: &Background<N, B>,
+    options: &ReplayOptions,
+) -> [f32; B] {
+    options.load.as_ref().map_or([0.0; B], |load| base_of(background, load))
+}
+
+/// Record of the training recordings as they are.
+fn record<const N: usize, const B: usize>(
+    leg: &LegFile,
+    background: &Background<N, B>,
+    options: &ReplayOptions,
+) -> Result<Record<f32, N, B>, ToolError> {
+    let anatomy = anatomy::<N>(leg)?;
+    let (training, _, _, screening) = read_all(options, leg, &[1.0; N])?;
+    let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
+    recorder.set_estimator(options.estimator);
+    let samples: Vec<Samples<N>> =
+        training.iter().map(|recording| Samples::of(recording, &anatomy, options, &screening)).collect();
+    feed(&mut recorder, background, &samples, "training", |_, _, _| {});
+    Ok(settled(background, recorder.finish(), options).record().clone())
+}

@@ -1,0 +1,163 @@
+//! Examination of the recordings before anything is identified: copies, and samples that no sensor measured.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use crate::base::error::ToolError;
+use crate::formats::leg_file::LegFile;
+use crate::formats::recording::Recording;
+use crate::report::doubt::SampleFinding;
+use crate::run::doubt::samples::{self, QUANTISED};
+use crate::run::doubt::stamps;
+
+/// Reach of the smoothing to each side, in periods of the rows' bandwidth.
+const REACH_PERIODS: f64 = 0.983;
+
+/// What was found in the recordings, and their stretches to be excluded.
+pub(super) struct Screening {
+    findings: Vec<SampleFinding>,
+    spans: Vec<(PathBuf, Vec<Range<f64>>)>,
+}
+
+impl Screening {
+    /// Examines whole recordings for rows with this bandwidth.
+    pub(super) fn of(recordings: &[&Recording], leg: &LegFile, bandwidth_hz: f64) -> Self {
+        let (mut findings, mut spans) = (Vec::new(), Vec::new());
+        let described_rad: Vec<f64> = leg.joints.iter().map(|joint| joint.encoder.step_rad()).collect();
+        let screened = samples::screen(recordings, &described_rad, REACH_PERIODS / bandwidth_hz);
+        for (recording, screened) in recordings.iter().zip(screened) {
+            findings.extend(screened.findings);
+            findings.extend(stamps::examine(recording, bandwidth_hz));
+            spans.push((recording.file.clone(), screened.spans));
+        }
+        Self { findings, spans }
+    }
+
+    /// Prints what was found and does not refuse.
+    pub(super) fn warn(&self) {
+        let findings = self.findings.iter().filter(|finding| !finding.refuses && finding.name != QUANTISED);
+        findings.for_each(|finding| crate::run::replay::warn(Path::new(&finding.file), &finding.text));
+    }
+
+    /// Grid points of a recording, from `start_s` at 500 Hz, that touch an excluded stretch.
+    pub(super) fn excluded(&self, recording: &Recording, start_s: f64) -> Vec<Range<usize>> {
+        // The interpolation of a point sees two samples on either side.
+        let margin_s = 2.0 * recording.median_step_s();
+        let spans =
+            self.spans.iter().filter(|(file, _)| *file == recording.file).flat_map(|(_, spans)| spans);
+        let point = |time_s: f64| ((time_s - start_s) * 500.0).max(0.0);
+        spans
+            .map(|span| {
+                point(span.start - margin_s).floor() as usize..point(span.end + margin_s).ceil() as usize
+            })
+            .filter(|points| !points.is_empty())
+            .collect()
+    }
+
+    /// Everything that was found.
+    pub(super) fn findings(&self) -> &[SampleFinding] {
+        &self.findings
+    }
+
+    /// The findings for the report.
+    pub(super) fn into_findings(self) -> Vec<SampleFinding> {
+        self.findings
+    }
+}
+
+/// Refuses recordings that hold the same samples, whatever their names: twice the same data are no second
+/// measurement, and a motion that was identified from proves nothing when it is held out.
+pub(super) fn refuse_copies(training: &[Recording], held_out: &[Recording]) -> Result<(), ToolError> {
+    for (index, one) in training.iter().enumerate() {
+        if let Some(copy) = training[index + 1..].iter().find(|other| one.joints == other.joints) {
+            return Err(ToolError::input(format!(
+                "{}: holds the same samples as {}: give every recording once",
+                copy.file.display(),
+                one.file.display()
+            )));
+        }
+    }
+    for held_out in held_out {
+        if let Some(same) = training.iter().find(|other| held_out.joints == other.joints) {
+            return Err(ToolError::input(format!(
+                "--validate {}: holds the same samples as {}, which is identified from: it cannot be held out as well \
+                 (--split holds out a part)",
+                held_out.file.display(),
+                same.file.display()
+            )));
+        }
+    }
+    for (index, one) in held_out.iter().enumerate() {
+        if let Some(copy) = held_out[index + 1..].iter().find(|other| one.joints == other.joints) {
+            return Err(ToolError::input(format!(
+                "--validate {}: holds the same samples as {}: give every recording once",
+                copy.file.display(),
+                one.file.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Where a stream of grid points breaks off: at another file, and behind an excluded stretch.
+#[derive(Default)]
+pub(super) struct Continuity {
+    before: Option<(usize, f64)>,
+}
+
+impl Continuity {
+    /// Whether this point does not follow the one before it.
+    pub(super) fn breaks(&mut self, file: usize, time_s: f64) -> bool {
+        let before = self.before.replace((file, time_s));
+        before
+            .is_some_and(|(last, last_s)| last != file || time_s - last_s > 1.5 * crate::run::replay::GRID_S)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::recording::JointSeries;
+
+    fn recording(name: &str, values: &[f64]) -> Recording {
+        Recording {
+            file: name.into(),
+            time_s: (0..values.len()).map(|sample| sample as f64 * 0.002).collect(),
+            joints: vec![JointSeries { position_rad: values.to_vec(), torque_nm: values.to_vec() }],
+            joints_in_file: 1,
+        }
+    }
+
+    #[test]
+    fn the_same_samples_under_another_name_are_refused() {
+        let (one, copy) = (recording("a.csv", &[1.0, 2.0]), recording("./a.csv", &[1.0, 2.0]));
+        let other = recording("b.csv", &[1.0, 3.0]);
+        assert!(refuse_copies(&[one.clone(), other.clone()], &[]).is_ok());
+        let refused = |training: &[&Recording], held_out: &[&Recording]| {
+            let all = |list: &[&Recording]| list.iter().map(|&one| one.clone()).collect::<Vec<_>>();
+            refuse_copies(&all(training), &all(held_out)).expect_err("copies").to_string()
+        };
+        assert!(refused(&[&one, &other, &copy], &[]).starts_with("./a.csv: holds the same samples as a.csv"));
+        assert!(refused(&[&one], &[&other, &copy]).contains("which is identified from"));
+        assert!(refused(&[&other], &[&one, &copy]).starts_with("--validate ./a.csv: holds the same samples"));
+    }
+
+    #[test]
+    fn points_beside_an_excluded_stretch_are_excluded_as_their_interpolation_sees_it() {
+        let recording = recording("a.csv", &[0.0; 100]);
+        let screening =
+            Screening { findings: Vec::new(), spans: vec![("a.csv".into(), vec![0.1..0.12, 0.0..0.001])] };
+        // Two steps of 2 ms on either side: 0.096 s to 0.124 s, and up to 0.005 s.
+        assert_eq!(screening.excluded(&recording, 0.0), [48..62, 0..3]);
+    }
+
+    #[test]
+    fn a_stream_breaks_at_a_file_and_at_a_gap() {
+        let mut continuity = Continuity::default();
+        let points = [(1, 0.0), (1, 0.002), (1, 0.2), (1, 0.202), (2, 0.204)];
+        assert_eq!(
+            points.map(|(file, time)| continuity.breaks(file, time)),
+            [false, false, true, false, true]
+        );
+    }
+}

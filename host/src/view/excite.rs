@@ -1,0 +1,152 @@
+//! Report of a motion in words and tables.
+
+use comfy_table::{CellAlignment, Table};
+
+use crate::base::number::number;
+use crate::base::text_table::headed;
+use crate::report::excite::ExciteReport;
+
+/// Formats the report for standard output.
+#[must_use]
+pub fn report(report: &ExciteReport) -> String {
+    let mut lines = vec![
+        format!(
+            "{}: {:.1} s: {} cycles of {} s between blends of {} s",
+            report.leg,
+            report.duration_s,
+            report.cycles,
+            number(report.period_s.into()),
+            number(report.blend_s.into())
+        ),
+        format!(
+            "assumed: the leg file's {}, torque noise {}; each base parameter may be {} % off in the torque's bound",
+            report.assumed,
+            noise(report),
+            number(report.margin_percent.into()),
+        ),
+        String::new(),
+        joints(report),
+        base_parameters(report),
+        parameters(report),
+        information(report),
+    ];
+    lines.extend(report.warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines.join("\n") + "\n"
+}
+
+fn noise(report: &ExciteReport) -> String {
+    if report.torque_noise_percent == 0.0 {
+        return "as stated in N m".into();
+    }
+    let whose = if report.torque_noise_of == "truth" { "the simulated leg's" } else { "the assumed leg's" };
+    let percent = number(report.torque_noise_percent.into());
+    format!("{percent} % of {whose} mean absolute torque on the default motion")
+}
+
+fn joints(report: &ExciteReport) -> String {
+    let mut rows = headed(&[
+        "joint",
+        "angle deg",
+        "of",
+        "deg/s",
+        "of",
+        "deg/s2",
+        "of",
+        "torque N m",
+        "with margin",
+        "of",
+        "noise N m",
+        "rows lost %",
+    ]);
+    let range = |[low, high]: [f64; 2]| format!("{low:.1}..{high:.1}");
+    for joint in &report.joints {
+        rows.add_row(vec![
+            joint.name.clone(),
+            range(joint.angle_deg),
+            range(joint.range_deg),
+            format!("{:.0}", joint.speed_deg_s),
+            format!("{:.0}", joint.speed_limit_deg_s),
+            format!("{:.0}", joint.acceleration_deg_s2),
+            format!("{:.0}", joint.acceleration_limit_deg_s2),
+            range(joint.torque_nm),
+            format!("{:.1}", joint.torque_with_margin_nm),
+            format!("{:.1}", joint.torque_limit_nm),
+            number(joint.torque_noise_nm.into()),
+            format!("{:.1}", 100.0 * joint.lost_share),
+        ]);
+    }
+    finished(rows, 1..12)
+}
+
+fn base_parameters(report: &ExciteReport) -> String {
+    let mut rows = headed(&[
+        "base parameter",
+        "assumed",
+        "expected sigma",
+        "unit",
+        "systematic",
+        "over a random motion's",
+    ]);
+    for base in &report.base_parameters {
+        let expected = &base.expected;
+        rows.add_row(vec![
+            expected.name.clone(),
+            number(expected.assumed.into()),
+            number(expected.sigma.into()),
+            expected.unit.clone(),
+            number(expected.systematic.into()),
+            base.ratio_to_random.known().map_or_else(|| "-".into(), |ratio| format!("{ratio:.2}")),
+        ]);
+    }
+    finished(rows, [1, 2, 4, 5])
+}
+
+fn parameters(report: &ExciteReport) -> String {
+    let mut rows = headed(&["parameter", "status", "expected sigma", "unit", "grouped with"]);
+    for parameter in &report.parameters {
+        rows.add_row(vec![
+            parameter.name.clone(),
+            parameter.status.into(),
+            number(parameter.sigma),
+            parameter.unit.into(),
+            parameter.grouped_with.join(" "),
+        ]);
+    }
+    finished(rows, [2])
+}
+
+fn information(report: &ExciteReport) -> String {
+    let count = report.base_parameters.len().max(1) as f64;
+    let mut text = format!(
+        "information: ln det {}, condition {}",
+        number(report.log_determinant),
+        number(report.condition)
+    );
+    for (random, what) in [
+        (report.random, "the best of 300 random motions of two cycles"),
+        (report.random_same_pace, "the best of 300 of as many cycles"),
+    ] {
+        let limits = if random.keeps_torque_limits {
+            ""
+        } else {
+            " (that one takes too much torque, or is too fast near the ends)"
+        };
+        if let Some((own, other)) = report.log_determinant.known().zip(random.log_determinant.known()) {
+            let sigma = ((other - own) / (2.0 * count)).exp();
+            text += &format!(
+                "\n  {:+.2} over {what}: a mean sigma {sigma:.2} times as large{limits}",
+                own - other
+            );
+        }
+    }
+    text
+}
+
+fn finished(mut rows: Table, numbers: impl IntoIterator<Item = usize>) -> String {
+    for index in numbers {
+        if let Some(column) = rows.column_mut(index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    rows.trim_fmt() + "\n"
+}

@@ -1,0 +1,10 @@
+//! Results as tables, figures and pages. Runs nothing.
+
+pub mod document;
+pub mod excite;
+pub mod figures;
+pub mod html;
+pub mod monitor;
+pub mod motor;
+pub mod runs;
+pub mod tables;

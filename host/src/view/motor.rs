@@ -1,0 +1,126 @@
+//! Formats the measurements of `motor` as tables.
+
+use crate::base::text_table::headed;
+use crate::report::motor::MotorReport;
+
+/// Formats all tables.
+#[must_use]
+pub fn tables(report: &MotorReport) -> String {
+    let [from, to] = report.steps.first().map_or([0.0; 2], |step| [step.from_a, step.to_a]);
+    let mut text = format!(
+        "{}, {}: current loop of {:.0} Hz at 24 kHz\n\nsteps of the quadrature current, {} to {} A\n",
+        report.leg,
+        report.joint,
+        report.bandwidth_hz,
+        ampere(from),
+        ampere(to)
+    );
+    let mut table =
+        headed(&["speed, rad/s", "feedforward", "rise, ms", "overshoot, %", "coupling, %", "error, A"]);
+    let designed = &report.designed;
+    table.add_row(vec![
+        "designed".to_owned(),
+        String::new(),
+        rise(designed.rise_ms),
+        format!("{:.1}", designed.overshoot_percent),
+        "0.0".into(),
+        "0.00".into(),
+    ]);
+    for step in &report.steps {
+        table.add_row(vec![
+            format!("{:.0}", step.speed_rad_s),
+            yes(step.feedforward),
+            rise(step.shape.rise_ms),
+            format!("{:.1}", step.shape.overshoot_percent),
+            format!("{:.1}", step.coupling_percent),
+            format!("{:+.2}", step.error_a),
+        ]);
+    }
+    let current = report.ripple.first().map_or(0.0, |ripple| ripple.current_a);
+    text += &format!("{}\n\ntorque ripple at {} A, no cogging\n", table.trim_fmt(), ampere(current));
+    let mut table = headed(&[
+        "speed, rad/s",
+        "sensor noise",
+        "dead time given back",
+        "sine",
+        "torque, % rms",
+        "6th harmonic, %",
+        "mean, %",
+        "direct, A rms",
+    ]);
+    for ripple in &report.ripple {
+        table.add_row(vec![
+            format!("{:.0}", ripple.speed_rad_s),
+            yes(ripple.noise),
+            yes(ripple.compensated),
+            ripple.sine.into(),
+            format!("{:.3}", ripple.torque_percent),
+            format!("{:.3}", ripple.sixth_percent),
+            format!("{:+.3}", ripple.mean_error_percent),
+            format!("{:.3}", ripple.direct_a),
+        ]);
+    }
+    let asked = report.limit.first().map_or(0.0, |limit| limit.asked_a);
+    text += &format!(
+        "{}\n\nvoltage limit: {} A asked for 100 ms, and then less\n",
+        table.trim_fmt(),
+        ampere(asked)
+    );
+    let mut table = headed(&[
+        "speed, rad/s",
+        "supply, V",
+        "reached, A",
+        "then, A",
+        "direct, A",
+        "recovery, ms",
+        "overshoot, A",
+        "released",
+    ]);
+    for limit in &report.limit {
+        table.add_row(vec![
+            format!("{:.0}", limit.speed_rad_s),
+            format!("{:.0}", limit.supply_v),
+            format!("{:.1}", limit.reached_a),
+            ampere(limit.target_a),
+            format!("{:+.2}", limit.direct_a),
+            limit.recovery_ms.map_or("never".into(), |time| format!("{time:.2}")),
+            format!("{:.2}", limit.overshoot_a),
+            yes(limit.released),
+        ]);
+    }
+    let current = report.regeneration.first().map_or(0.0, |braking| braking.current_a);
+    let words = format!("braking with {} A from the joint's top speed", ampere(current));
+    text += &format!("{}\n\n{words}\n", table.trim_fmt());
+    let mut table = headed(&[
+        "chopper",
+        "highest bus, V",
+        "motion, J",
+        "given back, J",
+        "brake resistor, J",
+        "released by",
+    ]);
+    for braking in &report.regeneration {
+        table.add_row(vec![
+            yes(braking.chopper),
+            format!("{:.1}", braking.highest_bus_v),
+            format!("{:.1}", braking.motion_j),
+            format!("{:.1}", braking.returned_j),
+            format!("{:.1}", braking.brake_j),
+            braking.fault.unwrap_or("-").into(),
+        ]);
+    }
+    text + &table.trim_fmt() + "\n"
+}
+
+/// Formats whole amperes without decimals.
+fn ampere(current: f64) -> String {
+    if current.fract() == 0.0 { format!("{current:.0}") } else { format!("{current:.2}") }
+}
+
+fn rise(ms: Option<f64>) -> String {
+    ms.map_or("never".into(), |ms| format!("{ms:.3}"))
+}
+
+fn yes(value: bool) -> String {
+    if value { "yes" } else { "no" }.into()
+}

@@ -1,0 +1,170 @@
+//! `cargo sim faults` from the command line.
+
+use serde_json::Value;
+
+use crate::command::{Folder, scarab};
+
+/// Runs within the first second, the approach to the exciting motion, to keep the tests short.
+fn report(arguments: &str, code: i32) -> Value {
+    let folder = Folder::new();
+    let seconds = if arguments.contains("--seconds") { "" } else { "--seconds 1" };
+    let line = format!("faults {seconds} {arguments} --json");
+    scarab(&line, &[&folder.path("faults.json")]).ends_with(code);
+    folder.json("faults.json")
+}
+
+#[test]
+fn the_json_is_that_of_the_interface_and_its_numbers_add_up() {
+    let report = report("--seeds 4 --sweep 20 --pairs 20", 0);
+    assert_eq!((report["schema"].as_u64(), report["invariants_broken"].as_u64()), (Some(1), Some(0)));
+    assert_eq!(report["failures"], Value::Array(vec![]));
+    let rows = report["rows"].as_array().expect("a list");
+    assert!(rows.len() >= 36, "{}", rows.len());
+    for row in rows {
+        let count = |name: &str| row[name].as_u64().unwrap_or_else(|| panic!("{name}: {row}"));
+        assert_eq!(count("runs"), 4);
+        assert_eq!(count("runs"), count("detected") + count("missed") + count("undetectable_by_design"));
+        assert!(count("state_reached") <= count("runs") && count("false_alarms") == 0, "{row}");
+        let (worst, deadline) = (&row["worst_ms"], &row["deadline_ms"]);
+        // One turn of a rotor, the end of an identification, the way back into the range, and events that
+        // must never happen have no time limit.
+        let timeless =
+            ["E3", "E4", "E5", "V3", "B3", "B4", "X3", "F1", "F2", "F3", "J1", "J3", "H2", "H3", "H4", "I1"];
+        assert_eq!(deadline.is_null(), timeless.iter().any(|fault| row["fault"] == *fault), "{row}");
+        if let (Some(worst), Some(deadline)) = (worst.as_f64(), deadline.as_f64()) {
+            assert!(worst <= deadline + 1e-9, "{row}");
+        }
+        assert!(count("seen_by_own") <= count("detected"));
+        assert!(row["state"].is_string());
+    }
+    let ids: Vec<_> = rows.iter().map(|row| row["fault"].as_str().expect("a word")).collect();
+    assert!(ids.iter().all(|id| ids.iter().filter(|other| *other == id).count() == 1), "{ids:?}");
+    assert_eq!(report["detected_of_detectable"].as_f64(), Some(1.0));
+    for (trials, kind) in report["trials"].as_array().expect("a list").iter().zip(["sweep", "pairs"]) {
+        assert_eq!((&trials["kind"], &trials["runs"]), (&kind.into(), &20.into()));
+        assert_eq!(trials["invariants_broken"], 0);
+        assert!(trials["raised"].as_u64() > Some(0), "{trials}");
+    }
+}
+
+#[test]
+fn the_same_seeds_leave_the_same_trace_and_one_of_them_is_repeated_alone() {
+    let rows = "--fault X1 --fault C2 --fault E4";
+    let [one, other] = [(); 2].map(|()| report(&format!("{rows} --seeds 3"), 0));
+    assert_eq!(one, other);
+    let alone = scarab("faults --seconds 1 --fault C2 --replay 2", &[]).ends_with(0);
+    let all = scarab("faults --seconds 1 --fault C2 --seeds 2", &[]).ends_with(0);
+    assert!(
+        alone.printed.contains("C2 seed 2: seen, after 0.083 ms, state Off, code current_sense"),
+        "{}",
+        alone.printed
+    );
+    assert!(all.printed.contains("trace hash"), "{}", all.printed);
+}
+
+/// The hash of all runs is made from those of single repeated runs: all of them agree bit for bit.
+#[test]
+fn runs_of_the_sweep_and_of_two_faults_are_repeated_alone() {
+    for kind in ["sweep", "pairs"] {
+        let all = report(&format!("--fault {kind} --seeds 3"), 0);
+        assert_eq!((&all["rows"], &all["trials"][0]["runs"]), (&Value::Array(vec![]), &3.into()));
+        let folder = Folder::new();
+        let alone: String = (1..=3)
+            .map(|seed| {
+                let line = format!("faults --seconds 1 --fault {kind} --replay {seed} --report");
+                let printed = scarab(&line, &[&folder.path("run.html")]).ends_with(0).printed;
+                let told = printed.split_once(&format!("{kind} seed {seed}: ")).expect("it is told").1;
+                told.split_once("hash ").expect("its hash").1[..16].to_owned()
+            })
+            .collect();
+        let folded = alone.bytes().fold(0_u64, |hash, byte| {
+            hash.rotate_left(5).wrapping_mul(0x0000_0100_0000_01b3) ^ u64::from(byte)
+        });
+        assert_eq!(all["trace_hash"], format!("{folded:016x}"));
+        let page = std::fs::read_to_string(folder.path("run.html")).expect("written");
+        assert!(page.contains("<svg") && page.contains(&format!("{kind}, seed 3")));
+        // Eleven columns are wider than a screen: words may wrap, and the table scrolls.
+        assert!(page.contains("<div class=\"wide\"><table class=\"any\">"));
+    }
+}
+
+/// Every row is included, also those with their own bench.
+#[test]
+fn every_detector_that_is_switched_off_is_noticed() {
+    // Faults that appear only in motion need more than its first second: whole identifications.
+    let report = report("--seconds 300 --seeds 16 --blind", 0);
+    let rows = report["rows"].as_array().expect("a list");
+    assert!(rows.len() >= 36, "{}", rows.len());
+    for row in rows {
+        assert!(
+            row["missed"].as_u64() > Some(0) || row["seen_by_own"] == 0,
+            "no run misses {}",
+            row["fault"]
+        );
+    }
+    let detectors = report["detectors"].as_array().expect("a list");
+    assert!(detectors.len() >= 20, "{}", detectors.len());
+    for detector in detectors {
+        let of = |name: &str| detector[name].as_u64().expect("a number");
+        assert!(of("missed_without") + of("seen_by_others") > 0, "no run misses {}", detector["code"]);
+    }
+}
+
+/// The phase stays at zero current until the loop overcomes dead time; 1 in 500 runs took this for
+/// a stuck conversion.
+#[test]
+fn a_leg_that_its_host_holds_still_is_not_released() {
+    let report = report("--fault F3 --replay 894", 0);
+    assert_eq!(report["rows"][0]["detected"], 1);
+}
+
+/// A hang of each monitored level is answered by a reset, within the tolerance of the watchdog's
+/// oscillator. The restarted firmware is inhibited for it.
+#[test]
+fn whoever_hangs_is_reset_and_refused() {
+    let report = report("--fault K3 --seeds 24", 0);
+    let row = &report["rows"][0];
+    assert_eq!((&row["detected"], &row["state_reached"]), (&24.into(), &24.into()));
+    assert_eq!(row["codes"], serde_json::json!(["watchdog"]));
+    let worst = row["worst_ms"].as_f64().expect("a number");
+    assert!((20.0..34.2).contains(&worst), "{worst}");
+}
+
+#[test]
+fn normal_motion_with_a_pushing_wearer_raises_nothing() {
+    let report = report("--fault C2 --seeds 1 --hours 0.002", 0);
+    let hours = &report["hours"];
+    assert_eq!(hours["false_alarms"], Value::Array(vec![]));
+    assert!((hours["hours"].as_f64().expect("a number") - 0.002).abs() < 1e-6, "{hours}");
+}
+
+#[test]
+fn the_emergency_stop_is_tried_at_every_tick() {
+    let report = report("--fault X1 --seeds 1 --every-tick", 0);
+    // One second of servo ticks, including the first and the last.
+    assert_eq!((report["every_tick"].as_u64(), report["rows"][0]["missed"].as_u64()), (Some(4001), Some(0)));
+}
+
+#[test]
+fn bad_input_names_the_option() {
+    for (arguments, words) in [
+        ("--fault Z9", "--fault Z9: is none of E"),
+        ("--seconds 0", "--seconds: 0"),
+        ("--hours -1", "unexpected argument"),
+        ("--hours=-1", "--hours: -1 is not from 0 to 1000"),
+        ("--fault C2 --every-tick", "--every-tick: is about the emergency stop"),
+        ("--leg mujoco-leg", "has no [joint.motor]"),
+        ("--blind --fault K4", "--blind: of --fault K4 not every one"),
+        ("--blind --fault K4 --fault C2", "--blind: of --fault K4 --fault C2 not every one"),
+        ("--blind --fault sweep --fault pairs", "--blind: of --fault sweep --fault pairs not every one"),
+        ("--blind --docs README.md", "cannot be used with"),
+        ("--replay 1 --docs README.md", "cannot be used with"),
+        ("--json no-such-folder/faults.json", "no-such-folder/faults.json: cannot be written"),
+        ("--report no-such-folder/faults.html", "no-such-folder/faults.html: cannot be written"),
+        ("--docs no-such-file.md", "no-such-file.md: cannot be read"),
+        ("--docs Cargo.toml", "Cargo.toml: has no `<!-- faults: table -->`"),
+    ] {
+        let message = scarab(&format!("faults {arguments}"), &[]).refusal();
+        assert!(message.contains(words), "{arguments}: {message}");
+    }
+}

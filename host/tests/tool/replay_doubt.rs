@@ -1,0 +1,224 @@
+//! Doubts about recordings: what is wrong with a logging chain is estimated, refused and named by `scarab
+//! replay`.
+
+use crate::command::{Folder, MUJOCO, Run, Table, base, reasons, scarab};
+use serde_json::Value;
+use std::env;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Recording of the MuJoCo leg: time, angles and torques of both joints.
+fn samples() -> Vec<[f64; 5]> {
+    let table = Table::read(MUJOCO);
+    table.rows.iter().map(|row| core::array::from_fn(|column| row[column])).collect()
+}
+
+fn csv(samples: &[[f64; 5]]) -> String {
+    let mut text = String::from("t_s,q1_rad,q2_rad,tau1_Nm,tau2_Nm\n");
+    for [time, q1, q2, tau1, tau2] in samples {
+        writeln!(text, "{time:.7},{q1:.9},{q2:.9},{tau1:.9},{tau2:.9}").expect("memory");
+    }
+    text
+}
+
+/// Recording whose torque of a joint (from 0) is this many samples late.
+fn late(joint: usize, by: usize) -> Vec<[f64; 5]> {
+    let right = samples();
+    let mut late = right.clone();
+    for (index, row) in late.iter_mut().enumerate() {
+        row[3 + joint] = right[index.saturating_sub(by)][3 + joint];
+    }
+    late
+}
+
+/// Identifies from two thirds of the samples.
+fn replay(samples: &[[f64; 5]], arguments: &str, code: i32) -> (Value, Run) {
+    let folder = Folder::new();
+    let (file, json) = (folder.write("walk.csv", &csv(samples)), folder.path("report.json"));
+    let arguments = format!("replay --leg mujoco-leg --split 0.666666 {arguments}");
+    let run = scarab(&arguments, &[&file, Path::new("--json"), &json]).ends_with(code);
+    (folder.json("report.json"), run)
+}
+
+fn direction<'a>(report: &'a Value, name: &str, joint: usize) -> &'a Value {
+    let all = report["directions"].as_array().expect("a list");
+    let found = all.iter().find(|one| one["name"] == name && one["joint"] == joint);
+    found.unwrap_or_else(|| panic!("{name} {joint}: {all:?}"))
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+const NAMES: [&str; 13] =
+    ["ZZ1R", "HX1R", "HY1", "FC1", "FV1", "OFF1", "ZZ2", "HX2", "HY2", "IA2", "FC2", "FV2", "OFF2"];
+
+/// Recording whose angles are those of an encoder at the joint with this many bits.
+fn quantised(bits: i32) -> Vec<[f64; 5]> {
+    let step = core::f64::consts::TAU / f64::from(1 << bits);
+    samples()
+        .into_iter()
+        .map(|[time, q1, q2, tau1, tau2]| {
+            let [q1, q2] = [q1, q2].map(|angle| (angle / step + 1e-6).floor() * step);
+            [time, q1, q2, tau1, tau2]
+        })
+        .collect()
+}
+
+#[test]
+fn coarse_encoders_widen_sigma_by_their_bias_and_are_refused_where_a_lower_bandwidth_is_needed() {
+    let (clean, _) = replay(&samples(), "--bandwidth 8", 0);
+    let (coarse, _) = replay(&quantised(12), "--bandwidth 8", 0);
+    assert!(
+        coarse["base_parameters"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .any(|row| row["sigma_from"] == "encoder")
+    );
+    let difference = |one: &Value, name: &str| {
+        let [right, wrong] = [&clean, one].map(|report| base(report, name, "value"));
+        (wrong - right).abs() / base(one, name, "sigma")
+    };
+    for name in NAMES {
+        assert!(difference(&coarse, name) < 3.0, "{name}: {:.1} sigma", difference(&coarse, name));
+    }
+    let (refused, run) = replay(&quantised(10), "--bandwidth 16", 3);
+    assert_eq!(refused["likely_cause"]["name"], "encoder_steps");
+    assert!(run.printed.contains("encoder too coarse at this bandwidth"), "{}", run.printed);
+    let (chosen, _) = replay(&quantised(10), "--bandwidth auto", 0);
+    assert_eq!(chosen["bandwidth_chosen"], true);
+    assert!(number(&chosen["bandwidth_hz"]) < 8.0);
+    for name in NAMES {
+        assert!(difference(&chosen, name) < 3.0, "{name}: {:.1} sigma", difference(&chosen, name));
+    }
+}
+
+#[test]
+fn a_right_recording_is_accepted_and_reports_every_direction() {
+    let (report, run) = replay(&samples(), "", 0);
+    assert!(report["likely_cause"].is_null());
+    for (name, joint, unit) in [
+        ("delay", 1, "ms"),
+        ("delay", 2, "ms"),
+        ("encoder_scale", 1, "%"),
+        ("encoder_scale", 2, "%"),
+        ("torque_scale", 2, "%"),
+    ] {
+        let found = direction(&report, name, joint);
+        assert_eq!((found["unit"].as_str(), found["passed"].as_bool()), (Some(unit), Some(true)));
+        assert!(number(&found["value"]).abs() < 4.0 * number(&found["sigma"]), "{found}");
+    }
+    for ratio in report["misfit_over_noise"].as_array().expect("a list") {
+        // The model is right: the misfit is the noise, within the scatter of its estimate.
+        assert!((number(ratio) - 1.0).abs() < 0.2, "{ratio}");
+    }
+    assert!(run.printed.contains("torque of joint 1: ") && run.printed.contains(" ms "), "{}", run.printed);
+    assert!(run.printed.contains("misfit over noise: joint 1: "), "{}", run.printed);
+}
+
+#[test]
+fn a_torque_20_ms_late_is_refused_with_its_joint_and_size() {
+    for joint in [1, 2] {
+        let (report, run) = replay(&late(joint - 1, 10), "", 3);
+        assert!(reasons(&report).contains(&"residual"));
+        let cause = &report["likely_cause"];
+        assert_eq!((cause["name"].as_str(), cause["joint"].as_u64()), (Some("delay"), Some(joint as u64)));
+        let (value, sigma) = (number(&cause["value"]), number(&cause["sigma"]));
+        assert!((value - 20.0).abs() < 4.0 * sigma && sigma < 3.0, "{value} +- {sigma}");
+        assert!(run.printed.contains("likely cause: delay: torque of joint"), "{}", run.printed);
+    }
+}
+
+#[test]
+fn a_delay_that_is_taken_out_gives_the_parameters_back() {
+    let (right, _) = replay(&samples(), "", 0);
+    let (corrected, _) = replay(&late(1, 10), "--torque-delay 0,20", 0);
+    for name in NAMES {
+        let difference = base(&corrected, name, "value") - base(&right, name, "value");
+        // The last 20 ms are missing.
+        assert!(difference.abs() < 0.5 * base(&right, name, "sigma"), "{name}: {difference}");
+    }
+}
+
+#[test]
+fn stamps_that_move_by_a_tenth_of_a_sample_change_neither_verdict_nor_sigma() {
+    let (right, _) = replay(&samples(), "", 0);
+    let mut moved = samples();
+    moved.iter_mut().step_by(2).for_each(|row| row[0] += 20e-6);
+    for arguments in ["", "--even-stamps"] {
+        let (report, _) = replay(&moved, arguments, 0);
+        assert_eq!(report["reasons"], right["reasons"]);
+        for name in NAMES {
+            let ratio = base(&report, name, "sigma") / base(&right, name, "sigma");
+            assert!((ratio - 1.0).abs() < 0.1, "{arguments} {name}: {ratio}");
+        }
+    }
+}
+
+#[test]
+fn a_torque_of_the_wrong_sign_or_unit_is_named_and_is_not_called_computed() {
+    for (name, factor) in [("torque_sign", -1.0), ("torque_unit", 1000.0)] {
+        let mut wrong = samples();
+        wrong.iter_mut().flat_map(|row| &mut row[3..]).for_each(|torque| *torque *= factor);
+        let (report, run) = replay(&wrong, "", 3);
+        assert_eq!(report["likely_cause"]["name"], name);
+        assert!(!run.printed.contains("computed from the angle"), "{}", run.printed);
+    }
+}
+
+#[test]
+fn a_sign_that_flips_midway_is_named() {
+    for share in [0.25, 0.5, 0.75] {
+        let mut flipped = samples();
+        let from = (share * flipped.len() as f64) as usize;
+        flipped[from..].iter_mut().flat_map(|row| &mut row[3..]).for_each(|torque| *torque = -*torque);
+        let (report, _) = replay(&flipped, "", 3);
+        assert_eq!(report["likely_cause"]["name"], "changed_midway", "{share}: {}", report["likely_cause"]);
+    }
+}
+
+#[test]
+fn torque_delays_that_cannot_be_are_refused() {
+    let refused = |value: &str| {
+        scarab(&format!("replay {MUJOCO} --leg mujoco-leg --torque-delay {value}"), &[]).refusal()
+    };
+    let message = refused("1,2,3");
+    assert!(
+        message.contains("--torque-delay: 3 values; one for all joints, or one for each of 2"),
+        "{message}"
+    );
+    assert!(refused("nan").contains("less than a tenth of the recording"));
+    assert!(refused("9000").contains("less than a tenth of the recording"));
+    assert!(refused("late").contains("invalid value 'late'"));
+}
+
+fn recordings() -> Option<PathBuf> {
+    let folder = env::var_os("SCARAB_RECORDINGS").map(PathBuf::from);
+    if folder.is_none() {
+        println!("SCARAB_RECORDINGS is not set: the test says nothing");
+    }
+    folder
+}
+
+#[test]
+fn a_real_arm_whose_misfit_is_many_times_its_noise_stays_accepted() {
+    let Some(recordings) = recordings() else { return };
+    let folder = Folder::new();
+    let json = folder.path("report.json");
+    let file = |number: &str| recordings.join("dp_A0").join(format!("{number}.csv"));
+    let files: Vec<PathBuf> = ["00", "01", "03", "05", "13"].map(file).to_vec();
+    let held_out: Vec<PathBuf> = ["02", "04", "12"].map(file).to_vec();
+    let mut paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    paths.extend([Path::new("--json"), &json, Path::new("--validate")]);
+    paths.extend(held_out.iter().map(PathBuf::as_path));
+    scarab("replay --leg dp-a0 --bandwidth 5", &paths).ends_with(0);
+    let report = folder.json("report.json");
+    let ratios = report["misfit_over_noise"].as_array().expect("a list");
+    assert!(ratios.iter().all(|ratio| number(ratio) > 3.0), "{ratios:?}");
+    // The shoulder's torque is late by itself, and its scale differs from the elbow's.
+    let delay = direction(&report, "delay", 1);
+    assert!((2.0..9.0).contains(&number(&delay["value"])), "{delay}");
+    let scale = direction(&report, "torque_scale", 2);
+    assert!(number(&scale["value"]) > 5.0 && scale["passed"] == true, "{scale}");
+}

@@ -1,0 +1,65 @@
+//! Several recordings of one leg: the scatter between them is part of sigma.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::command::{Folder, MUJOCO, Table, base, scarab};
+
+/// The three periods of the MuJoCo recording, a file each, with an offset added to the knee's torque, N m.
+fn periods(folder: &Folder, offset_nm: [f64; 3]) -> Vec<PathBuf> {
+    let table = Table::read(MUJOCO);
+    let [time, torque] =
+        ["t_s", "tau2_Nm"].map(|name| table.header.iter().position(|own| own == name).expect("a column"));
+    let part = |(number, offset): (usize, &f64)| {
+        let from = 10.0 * number as f64;
+        let rows = table.rows.iter().filter(|row| row[time] >= from && row[time] < from + 10.0);
+        let line = |row: &Vec<f64>| {
+            let mut row = row.clone();
+            row[torque] += offset;
+            row.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+        };
+        let lines: Vec<String> = rows.map(line).collect();
+        folder.write(&format!("{number}.csv"), &format!("{}\n{}\n", table.header.join(","), lines.join("\n")))
+    };
+    offset_nm.iter().enumerate().map(part).collect()
+}
+
+fn replay(folder: &Folder, files: &[PathBuf]) -> (String, Value) {
+    let json = folder.path("run.json");
+    let mut paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    paths.extend([Path::new("--json"), &json]);
+    let run = scarab("replay --leg mujoco-leg", &paths);
+    (run.printed, folder.json("run.json"))
+}
+
+#[test]
+fn a_parameter_that_differs_between_recordings_has_that_scatter_as_sigma() {
+    let folder = Folder::new();
+    let offsets = [0.0, 1.0, -1.0];
+    let files = periods(&folder, offsets);
+    let (printed, report) = replay(&folder, &files);
+    assert!(printed.contains("sigma contains the scatter between 3 recordings"), "{printed}");
+    assert_eq!(report["recordings"]["count"], 3);
+    let names = report["base_parameters"].as_array().expect("a list");
+    let index = names.iter().position(|entry| entry["name"] == "OFF2").expect("the knee's offset");
+    assert_eq!(names[index]["sigma_from"], "recordings");
+    let (sigma, scatter) = (base(&report, "OFF2", "sigma"), &report["recordings"]["sigma"][index]);
+    // Three equal recordings: standard deviation 1 N m over sqrt 3. Offsets also move the other parameters.
+    assert!((0.4..1.2).contains(&sigma) && sigma >= scatter.as_f64().expect("known"), "{sigma}, {scatter}");
+    // Alike recordings keep the sigma of noise or segments.
+    let (_, alike) = replay(&folder, &periods(&folder, [0.0; 3]));
+    assert!(base(&alike, "OFF2", "sigma") < 0.3 * sigma, "{alike}");
+}
+
+#[test]
+fn one_recording_says_that_the_scatter_between_recordings_is_not_in_sigma() {
+    let folder = Folder::new();
+    let files = periods(&folder, [0.0; 3]);
+    let (printed, report) = replay(&folder, &files[..1]);
+    assert!(
+        printed.contains("sigma does not contain the scatter between recordings: there is one"),
+        "{printed}"
+    );
+    assert_eq!(report["recordings"], serde_json::json!({ "count": 1, "sigma": [] }));
+}

@@ -1,0 +1,222 @@
+//! Rejections of `scarab replay`: bad input with a message and exit code 2, bad results with a
+//! reason and 3.
+
+use crate::command::{Folder, MUJOCO, reasons, scarab};
+use crate::pendulum::{Motion, leg};
+use std::path::Path;
+
+/// Message for a recording, without its folder. No report may be left behind.
+fn refusal(text: &str) -> String {
+    let folder = Folder::new();
+    let (file, leg) = (folder.write("walk.csv", text), folder.write("leg.toml", &leg("")));
+    let json = folder.path("report.json");
+    let message = scarab("replay", &[&file, Path::new("--leg"), &leg, Path::new("--json"), &json]).refusal();
+    assert!(!json.exists(), "a report of bad input");
+    message.replace(&folder.path("").display().to_string(), "")
+}
+
+/// Message for a valid recording with line 102 replaced.
+fn refusal_with(line: &str) -> String {
+    let good = Motion::default().csv();
+    let mut lines: Vec<&str> = good.lines().collect();
+    lines[101] = line;
+    refusal(&lines.join("\n"))
+}
+
+#[test]
+fn bad_recordings_are_refused_with_file_line_and_reason() {
+    assert_eq!(refusal(""), "error: walk.csv: the file is empty\n");
+    assert_eq!(
+        refusal("t_s,q1_rad,tau1_Nm\n"),
+        "error: walk.csv: too short: 0 samples over 0.000 s, but at least 50 over 1 s are needed\n"
+    );
+    assert_eq!(
+        refusal("t_s,q1_rad,torque\n0,0,0\n"),
+        "error: walk.csv:1: the header has no column `tau1_Nm`; its columns are: t_s, q1_rad, torque; needed \
+         are: t_s, q1_rad, tau1_Nm\n"
+    );
+    assert_eq!(refusal_with("0.2,NaN,1.0"), "error: walk.csv:102: `NaN` in column `q1_rad` is not finite\n");
+    assert_eq!(refusal_with("0.1,0.2,1.0"), "error: walk.csv:102: time goes back from 0.198 s to 0.1 s\n");
+    assert_eq!(
+        refusal_with("0.198,0.2,1.0"),
+        "error: walk.csv:102: time stands still from 0.198 s to 0.198 s\n"
+    );
+    let whole = Motion::default().csv();
+    let truncated = &whole[..whole.len() - 12];
+    assert_eq!(
+        refusal(truncated),
+        "error: walk.csv:5001: 2 fields, but the header has 3: is the line truncated?\n"
+    );
+}
+
+#[test]
+fn absurd_options_are_refused_with_what_is_possible() {
+    let refused =
+        |arguments: &str| scarab(&format!("replay {MUJOCO} --leg mujoco-leg {arguments}"), &[]).refusal();
+    for (bandwidth, reason) in [
+        ("0", "must be a positive number"),
+        ("-3", "must be a positive number"),
+        ("nan", "must be a positive number"),
+        ("inf", "at most"),
+        ("0.01", "at least 1 Hz"),
+        ("240", "at most"),
+        ("1e9", "at most"),
+    ] {
+        let message = refused(&format!("--bandwidth {bandwidth}"));
+        assert!(message.starts_with("error: --bandwidth ") && message.contains(reason), "{message}");
+        assert_eq!(message.lines().count(), 1, "{message}");
+    }
+    assert!(refused("--bandwidth fast").contains("invalid value 'fast' for '--bandwidth"));
+    for split in ["0", "1", "-0.5", "1.5", "nan"] {
+        let message = refused(&format!("--split {split}"));
+        assert_eq!(message, "error: --split: a fraction above 0 and below 1\n");
+    }
+    let message = refused("--split 0.001");
+    assert!(message.contains("fourier.csv: too short: 15 samples over 0.028 s"), "{message}");
+    assert!(refused(&format!("--split 0.5 --validate {MUJOCO}")).contains("cannot be used with"));
+    assert!(refused("--validate no-such-file.csv").contains("no-such-file.csv: cannot be read"));
+    assert!(refused("--prior wrong:200").contains("is not a percentage"));
+    assert!(
+        refused("--json /no-such-folder/report.json")
+            .contains("/no-such-folder/report.json: cannot be written")
+    );
+    assert!(
+        refused("--csv /no-such-folder/torque.csv").contains("/no-such-folder/torque.csv: cannot be written")
+    );
+}
+
+#[test]
+fn a_replay_without_a_leg_is_refused_and_shown_how() {
+    let message = scarab("replay", &[Path::new(MUJOCO)]).refusal();
+    assert!(message.contains("--leg is missing"), "{message}");
+    assert!(message.contains("cargo sim replay run.csv --leg my-leg.toml"), "{message}");
+    assert!(message.contains("x2-wearer-75kg, x2-rough, mujoco-leg"), "{message}");
+}
+
+#[test]
+fn time_in_another_unit_is_refused_by_the_rate_with_the_likely_unit() {
+    let motion = Motion::default().samples();
+    let refused = |factor: f64| {
+        let samples: Vec<[f64; 3]> = motion.iter().map(|[t, q, tau]| [factor * t, *q, *tau]).collect();
+        refusal(&crate::pendulum::csv(&samples))
+    };
+    assert_eq!(
+        refused(1e3),
+        "error: walk.csv: the median step of `t_s` is 2 s, which is 0.5 Hz; at least 10 Hz are needed. `t_s` is in \
+         seconds: are these milliseconds? In milliseconds it would be 500 Hz\n"
+    );
+    assert!(refused(1e6).ends_with("are these microseconds? In microseconds it would be 500 Hz\n"));
+    // Sample numbers instead of times.
+    assert!(refused(500.0).contains("are these milliseconds or sample numbers?"));
+}
+
+#[test]
+fn legs_that_do_not_exist_or_cannot_be_are_refused() {
+    let folder = Folder::new();
+    let recording = folder.write("walk.csv", &Motion::default().csv());
+    let refused = |leg: &Path| scarab("replay --leg", &[leg, &recording]).refusal();
+    let message = refused(Path::new("nobody"));
+    assert!(message.starts_with("error: nobody: cannot be read"), "{message}");
+    assert!(
+        message.contains("no shipped leg is called so (x2-wearer-75kg, x2-rough, mujoco-leg,"),
+        "{message}"
+    );
+    let message = refused(&folder.write("leg.toml", &leg("colour = \"red\"\n")));
+    assert!(message.contains("leg.toml:7: unknown field `colour`"), "{message}");
+    let message = refused(&folder.write("leg.toml", &leg("").replace("gravity", "# gravity")));
+    assert!(message.contains("missing field `gravity`"), "{message}");
+    let message = refused(&folder.write("leg.toml", &leg("direction = 2\n")));
+    assert!(message.contains("leg.toml:7: "), "{message}");
+    // Leg of two joints and a recording of one.
+    let message = refused(Path::new("mujoco-leg"));
+    assert!(message.contains("walk.csv:1: the header has no column `q2_rad`"), "{message}");
+}
+
+/// Reasons of the verdict for a recording of the MuJoCo leg with a replaced header.
+fn reasons_with_header(header: &str, arguments: &str) -> Vec<String> {
+    let folder = Folder::new();
+    let text = std::fs::read_to_string(MUJOCO).expect("the recording");
+    let (_, rows) = text.split_once('\n').expect("lines");
+    let file = folder.write("walk.csv", &format!("{header}\n{rows}"));
+    let json = folder.path("report.json");
+    let run = scarab(&format!("replay --leg mujoco-leg {arguments}"), &[&file, Path::new("--json"), &json]);
+    run.ends_with(3);
+    reasons(&folder.json("report.json")).into_iter().map(str::to_owned).collect()
+}
+
+#[test]
+fn swapped_columns_are_refused_with_and_without_prior_and_held_out_motion() {
+    for header in [
+        "t_s,q2_rad,q1_rad,tau1_Nm,tau2_Nm",
+        "t_s,q1_rad,q2_rad,tau2_Nm,tau1_Nm",
+        "t_s,q2_rad,q1_rad,tau2_Nm,tau1_Nm",
+        "t_s,tau1_Nm,q2_rad,q1_rad,tau2_Nm",
+    ] {
+        for arguments in ["", "--split 0.66", "--prior none", "--prior none --split 0.66"] {
+            let reasons = reasons_with_header(header, arguments);
+            assert!(reasons.contains(&"unphysical".to_owned()), "{header} {arguments}: {reasons:?}");
+        }
+    }
+}
+
+#[test]
+fn a_motionless_joint_is_refused_as_unexcited() {
+    let folder = Folder::new();
+    let leg = folder.write("leg.toml", &leg(""));
+    let json = folder.path("report.json");
+    // A flickering encoder bit and a drifting torque change nothing.
+    let still: Vec<[f64; 3]> = (0..5000)
+        .map(|k| [f64::from(k) * 0.002, 0.3 + 3.8e-4 * f64::from(k % 7 / 6), 1.5 + 1e-4 * f64::from(k)])
+        .collect();
+    let still = folder.write("still.csv", &crate::pendulum::csv(&still));
+    let run = scarab("replay", &[&still, Path::new("--leg"), &leg, Path::new("--json"), &json]).ends_with(3);
+    assert!(run.printed.contains("unexcited: joint 1 hardly moved"), "{}", run.printed);
+    assert!(reasons(&folder.json("report.json")).contains(&"unexcited"));
+
+    // Only one joint moves: the knee's column repeats its first angle.
+    let text = std::fs::read_to_string(MUJOCO).expect("the recording");
+    let knee_still: Vec<String> = text
+        .lines()
+        .map(|line| {
+            let mut fields: Vec<&str> = line.split(',').collect();
+            if fields[0] != "t_s" {
+                fields[2] = "0.857";
+            }
+            fields.join(",")
+        })
+        .collect();
+    let file = folder.write("knee.csv", &knee_still.join("\n"));
+    scarab("replay --leg mujoco-leg", &[&file, Path::new("--json"), &json]).ends_with(3);
+    assert!(reasons(&folder.json("report.json")).contains(&"unexcited"));
+}
+
+#[test]
+fn a_torque_that_is_always_zero_is_refused() {
+    let folder = Folder::new();
+    let samples: Vec<[f64; 3]> =
+        Motion::default().samples().into_iter().map(|[time, angle, _]| [time, angle, 0.0]).collect();
+    let (file, leg) =
+        (folder.write("walk.csv", &crate::pendulum::csv(&samples)), folder.write("leg.toml", &leg("")));
+    let json = folder.path("report.json");
+    scarab("replay", &[&file, Path::new("--leg"), &leg, Path::new("--json"), &json]).ends_with(3);
+    assert!(reasons(&folder.json("report.json")).contains(&"input"));
+}
+
+#[test]
+fn a_held_out_motion_of_another_machine_is_refused() {
+    let folder = Folder::new();
+    let other: Vec<[f64; 3]> = Motion { centre: 0.1, seed: 5, ..Motion::default() }
+        .samples()
+        .into_iter()
+        .map(|[time, angle, torque]| [time, angle, 1.3 * torque])
+        .collect();
+    let (train, held_out) = (
+        folder.write("a.csv", &Motion::default().csv()),
+        folder.write("b.csv", &crate::pendulum::csv(&other)),
+    );
+    let (leg, json) = (folder.write("leg.toml", &leg("")), folder.path("report.json"));
+    let options =
+        [&train, Path::new("--leg"), &leg, Path::new("--json"), &json, Path::new("--validate"), &held_out];
+    scarab("replay", &options).ends_with(3);
+    assert_eq!(reasons(&folder.json("report.json")), ["validation"]);
+}

@@ -1,0 +1,360 @@
+//! `serve` as a client at its port has it: what it says, whom it refuses, and what it does not carry out.
+
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crate::command::Folder;
+
+const MS: Duration = Duration::from_millis(1);
+const PATIENCE: Duration = Duration::from_secs(20);
+const OFF: u32 = 0x40;
+const SWITCHED_ON: u32 = 0x23;
+const ENABLED: u32 = 0x27;
+
+/// A `serve` that runs, and what it has printed.
+struct Serve {
+    child: Child,
+    address: String,
+    errors: Arc<Mutex<String>>,
+}
+
+impl Serve {
+    fn at(address: &str, arguments: &str) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_scarab"))
+            .args(["serve", "--slcan", address])
+            .args(arguments.split_whitespace())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the tool runs");
+        let errors = Arc::new(Mutex::new(String::new()));
+        let (lines, kept) = (child.stderr.take().expect("piped"), Arc::clone(&errors));
+        thread::spawn(move || {
+            for line in BufReader::new(lines).lines().map_while(Result::ok) {
+                kept.lock().expect("nobody panics").push_str(&format!("{line}\n"));
+            }
+        });
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("a line");
+        let address = line.trim().strip_prefix("listening ").expect("it listens").to_owned();
+        Self { child, address, errors }
+    }
+
+    fn new() -> Self {
+        Self::at("127.0.0.1:0", "")
+    }
+
+    fn errors(&self) -> String {
+        self.errors.lock().expect("nobody panics").clone()
+    }
+
+    fn waits_for(&self, words: &str) {
+        let begin = Instant::now();
+        while !self.errors().contains(words) {
+            assert!(begin.elapsed() < PATIENCE, "no {words:?} in:\n{}", self.errors());
+            thread::sleep(5 * MS);
+        }
+    }
+
+    fn signal(&self, name: &str) {
+        let id = self.child.id().to_string();
+        assert!(Command::new("kill").args([name, &id]).status().expect("kill").success());
+    }
+
+    /// The largest share of memory so far, KB; 0 where the system does not say.
+    fn memory_kb(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap_or_default();
+        let line = status.lines().find(|line| line.starts_with("VmHWM:"));
+        line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).unwrap_or(0)
+    }
+}
+
+impl Drop for Serve {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+struct Client {
+    stream: TcpStream,
+    heard: Vec<u8>,
+}
+
+impl Client {
+    fn silent(serve: &Serve) -> Self {
+        let stream = TcpStream::connect(&serve.address).expect("it listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
+        Self { stream, heard: Vec::new() }
+    }
+
+    fn new(serve: &Serve) -> Self {
+        let mut client = Self::silent(serve);
+        client.say("C\rS8\rO\r");
+        for _ in 0..3 {
+            assert_eq!(client.line().as_deref(), Some(""), "{}", serve.errors());
+        }
+        client
+    }
+
+    fn say(&mut self, text: &str) {
+        self.stream.write_all(text.as_bytes()).expect("a connection");
+    }
+
+    /// The next line without its end; `None` at the end of the connection.
+    fn line(&mut self) -> Option<String> {
+        loop {
+            if let Some(end) = self.heard.iter().position(|byte| *byte == b'\r' || *byte == 7) {
+                let line: Vec<u8> = self.heard.drain(..=end).collect();
+                return Some(String::from_utf8(line).expect("ASCII").trim_end_matches('\r').to_owned());
+            }
+            let mut bytes = [0; 4096];
+            match self.stream.read(&mut bytes).expect("an answer") {
+                0 => return None,
+                count => self.heard.extend(&bytes[..count]),
+            }
+        }
+    }
+
+    fn frame(&mut self, id: u16, data: &[u8]) {
+        let bytes: String = data.iter().map(|byte| format!("{byte:02X}")).collect();
+        self.say(&format!("t{id:03X}{}{bytes}\r", data.len()));
+    }
+
+    fn request(&mut self, node: u16, request: [u8; 8]) -> [u8; 8] {
+        self.frame(0x600 + node, &request);
+        let begin = format!("t{:03X}8", 0x580 + node);
+        loop {
+            let line = self.line().expect("an answer");
+            if let Some(data) = line.strip_prefix(&begin) {
+                return core::array::from_fn(|place| {
+                    u8::from_str_radix(&data[2 * place..2 * place + 2], 16).expect("a digit")
+                });
+            }
+        }
+    }
+
+    fn read(&mut self, node: u16, index: u16, sub: u8) -> u32 {
+        let [low, high] = index.to_le_bytes();
+        let [kind, _, _, _, a, b, c, d] = self.request(node, [0x40, low, high, sub, 0, 0, 0, 0]);
+        assert_eq!(kind >> 5, 2, "{index:x}:{sub}");
+        u32::from_le_bytes([a, b, c, d])
+    }
+
+    fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) {
+        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+        let answer = self.request(node, [0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]);
+        assert_eq!(answer[0], 0x60, "{index:x}:{sub}");
+    }
+
+    fn state(&mut self, node: u16) -> u32 {
+        self.read(node, 0x6041, 0) & 0x806F
+    }
+
+    fn until(&mut self, state: u32) {
+        for node in [1, 2] {
+            let begin = Instant::now();
+            loop {
+                let found = self.state(node);
+                if found == state {
+                    break;
+                }
+                assert!(begin.elapsed() < PATIENCE, "node {node}: {found:x} instead of {state:x}");
+            }
+        }
+    }
+
+    /// Takes the leg up to "switched on", or further to "operation enabled".
+    fn enable(&mut self, to: u32) {
+        for (word, state) in [(6, 0x21), (7, SWITCHED_ON), (15, ENABLED)] {
+            [1, 2].into_iter().for_each(|node| self.write(node, 0x6040, 0, word, 2));
+            self.until(state);
+            if state == to {
+                break;
+            }
+        }
+    }
+}
+
+#[test]
+fn a_client_that_is_gone_is_a_pulled_plug_and_the_leg_stops() {
+    for closes in [false, true] {
+        let serve = Serve::new();
+        let mut client = Client::new(&serve);
+        serve.waits_for("opened the channel");
+        client.enable(ENABLED);
+        client.write(1, 0x6060, 0, 3, 1);
+        client.write(1, 0x60FF, 0, 100_000, 4);
+        let begin = Instant::now();
+        while (client.read(1, 0x606C, 0) as i32) < 60_000 {
+            assert!(begin.elapsed() < PATIENCE, "the hip does not move");
+        }
+        if closes {
+            client.say("C\r");
+            serve.waits_for("closed the channel: the boards' plug is pulled");
+        }
+        drop(client);
+        serve.waits_for("disconnected (");
+        let mut client = Client::new(&serve);
+        client.until(OFF);
+        for node in [1, 2] {
+            assert_eq!(client.read(node, 0x1003, 1) & 0xFFFF, 0x8120, "node {node}");
+        }
+        // Nothing starts by itself.
+        thread::sleep(200 * MS);
+        client.until(OFF);
+    }
+}
+
+#[test]
+fn a_second_client_is_refused_and_a_silent_connection_keeps_nobody_out() {
+    let serve = Serve::at("localhost:0", "");
+    let _silent: Vec<Client> = (0..3).map(|_| Client::silent(&serve)).collect();
+    let mut late = Client::silent(&serve);
+    let mut client = Client::new(&serve);
+    assert_eq!(client.state(1), OFF);
+    let peer = client.stream.local_addr().expect("connected");
+    // One that comes now, and one that was silent before.
+    let mut second = Client::silent(&serve);
+    second.say("C\rS8\rO\r");
+    late.say("O\r");
+    for mut refused in [second, late] {
+        assert_eq!(refused.line(), Some(format!("#refused: {peer} has the channel")));
+        assert_eq!(refused.line().as_deref(), Some("\u{7}"));
+        let mut rest = Vec::new();
+        match refused.stream.read_to_end(&mut rest) {
+            Ok(_) => assert_eq!(rest, b""),
+            Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
+        }
+    }
+    serve.waits_for(&format!("refused, {peer} has the channel"));
+    assert_eq!(client.state(1), OFF);
+    drop(client);
+    serve.waits_for("the boards' plug is pulled");
+    Client::new(&serve).until(OFF);
+}
+
+#[test]
+fn what_waited_while_the_process_stood_enables_nothing_but_still_stops() {
+    let serve = Serve::new();
+    let mut client = Client::new(&serve);
+    client.frame(0, &[1, 0]);
+    client.enable(SWITCHED_ON);
+    let late = |client: &mut Client, word: u8| {
+        serve.signal("-STOP");
+        [0x201, 0x202].into_iter().for_each(|id| client.frame(id, &[word, 0]));
+        thread::sleep(300 * MS);
+        serve.signal("-CONT");
+        thread::sleep(300 * MS);
+    };
+    late(&mut client, 15);
+    client.until(SWITCHED_ON);
+    serve.waits_for(" 2 set-points older than that");
+    serve.waits_for(" ms not simulated");
+    // In time they enable.
+    [0x201, 0x202].into_iter().for_each(|id| client.frame(id, &[15, 0]));
+    client.until(ENABLED);
+    late(&mut client, 0);
+    client.until(OFF);
+}
+
+#[test]
+fn a_flood_is_answered_by_bells_within_bounded_memory() {
+    const FRAMES: u32 = 200_000;
+    let serve = Serve::new();
+    let mut client = Client::new(&serve);
+    client.until(OFF);
+    let before = serve.memory_kb();
+    let mut stream = client.stream.try_clone().expect("a socket");
+    let begin = Instant::now();
+    let flood = thread::spawn(move || {
+        let mut random = 1_u32;
+        for _ in 0..FRAMES / 100 {
+            let mut lines = String::new();
+            for _ in 0..100 {
+                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                // Below 0x780, and without network management: all of these are answered.
+                lines.push_str(&format!(
+                    "t{:03X}2{:04X}\r",
+                    1 + (random >> 20) % 0x77F,
+                    random >> 8 & 0xFFFF
+                ));
+            }
+            stream.write_all(lines.as_bytes()).expect("a connection");
+        }
+    });
+    let (mut taken, mut refused) = (0_u64, 0_u64);
+    while taken + refused < u64::from(FRAMES) {
+        match client.line().expect("an answer").as_str() {
+            "z" => taken += 1,
+            "\u{7}" => refused += 1,
+            _ => {}
+        }
+    }
+    flood.join().expect("sent");
+    // The shortest of these frames have 63 bits.
+    let most = (begin.elapsed().as_secs_f64() + 0.2) * 1e6 / 63.0;
+    assert!(
+        refused > 0 && (taken as f64) < most,
+        "{taken} taken, {refused} refused, the wire carries {most:.0}"
+    );
+    let grown = serve.memory_kb() - before;
+    assert!(grown < 20_000, "{grown} KB more");
+    serve.waits_for(" refused (the queue held all that the wire carries in 100 ms)");
+    thread::sleep(200 * MS);
+    client.until(OFF);
+}
+
+/// Runs a command that is to be refused before it listens; what it said.
+fn refusal(command: &mut Command) -> String {
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the tool runs");
+    let begin = Instant::now();
+    while child.try_wait().expect("a child").is_none() && begin.elapsed() < PATIENCE {
+        thread::sleep(5 * MS);
+    }
+    // One that serves is not refused.
+    let _ = child.kill();
+    let output = child.wait_with_output().expect("a child");
+    let errors = String::from_utf8(output.stderr).expect("text");
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{errors}");
+    errors
+}
+
+#[test]
+fn what_cannot_be_held_reached_or_written_is_refused_before_anybody_listens() {
+    let tool = env!("CARGO_BIN_EXE_scarab");
+    let serve = |arguments: &str| {
+        let arguments = arguments.split_whitespace();
+        refusal(Command::new(tool).args(["serve", "--slcan"]).args(arguments))
+    };
+    let words = serve("127.0.0.1:0 --legs 4 --speed 100");
+    assert!(words.contains("100 cannot be held; this machine simulates 4 legs at "), "{words}");
+    let words = serve("nowhere.invalid:0");
+    assert!(words.contains("nowhere.invalid:0"), "{words}");
+    // Without an end.
+    let words = serve("127.0.0.1:0 --flash /dev/zero");
+    assert!(words.contains("/dev/zero: more than 262144 bytes"), "{words}");
+    // Files may have 4 KB here; the flash has 256.
+    let folder = Folder::new();
+    let words = refusal(
+        Command::new("sh")
+            .args([
+                "-c",
+                "trap '' XFSZ; ulimit -f 8; exec \"$0\" serve --slcan 127.0.0.1:0 --flash \"$1\"",
+                tool,
+            ])
+            .arg(folder.path("flash")),
+    );
+    assert!(words.contains("flash"), "{words}");
+}
+
+#[test]
+fn an_address_that_others_reach_is_warned_about() {
+    let serve = Serve::at("0.0.0.0:0", "");
+    serve.waits_for("warning: 0.0.0.0:0 can be reached from other machines");
+    assert_eq!(Serve::new().errors(), "");
+}

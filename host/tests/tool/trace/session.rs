@@ -1,0 +1,191 @@
+//! Simulated leg that sends records as a board would.
+
+use std::sync::OnceLock;
+
+use scarab::leg::{Activity, ControlRequest, LoggedSample};
+use scarab::trace::{GRAMMAR, Record, Report, words};
+use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_host::formats::trace::Trace;
+use scarab_host::rig::options::SimulationOptions;
+use scarab_host::rig::pair;
+
+/// Joints and base parameters of the default leg.
+const JOINTS: usize = 2;
+const BASE: usize = 13;
+
+type Context = pair::Context<JOINTS, BASE>;
+type Pair = pair::Pair<JOINTS, BASE>;
+
+/// Ticks between two records of the search.
+const PROGRESS_TICKS: u64 = 100;
+/// Limit of an identification, ticks; one takes 53 s.
+const LONGEST: u64 = 100 * 4000;
+
+pub fn default_leg() -> LegFile {
+    LegFile::load(DEFAULT_LEG).expect("shipped")
+}
+
+/// Lines with their record numbers.
+#[derive(Default)]
+pub struct Teller {
+    pub lines: Vec<String>,
+}
+
+impl Teller {
+    pub fn tell(&mut self, record: &Record<JOINTS>) {
+        let mut line = String::new();
+        record.write(self.lines.len() as u32, &mut line).expect("a string takes everything");
+        self.lines.push(line);
+    }
+
+    pub fn boot(&mut self) {
+        self.tell(&Record::Boot {
+            grammar: GRAMMAR,
+            version: "0.1.0",
+            leg: DEFAULT_LEG,
+            joints: JOINTS as u8,
+            base: BASE as u8,
+            servo_hz: 4000,
+            log_hz: 500,
+            reset: "power_on",
+        });
+        self.tell(&Record::Board {
+            uid0: 0,
+            uid1: 0,
+            uid2: 0,
+            version: 3,
+            version_minor: 6,
+            version_volt: 56,
+            clock_hz: 168_000_000,
+        });
+    }
+
+    fn state(&mut self, pair: &Pair) {
+        let (activity, phase, motion) = words::activity(pair.leg.control().activity());
+        let drive = words::drive(pair.leg.control().state());
+        self.tell(&Record::State { tick: pair.ticks as u32, drive, activity, phase, motion });
+    }
+
+    fn log(&mut self, logged: &LoggedSample<JOINTS>) {
+        let (segment, motion) = words::segment(logged.segment);
+        let sample = &logged.sample;
+        self.tell(&Record::Log {
+            tick: sample.tick,
+            segment,
+            motion,
+            position_rad: sample.position_rad,
+            torque_nm: sample.torque_nm,
+            counts: sample.counts_sum,
+        });
+    }
+
+    fn progress(&mut self, pair: &Pair) {
+        if let Some(solver) = pair.leg.identification().solver() {
+            self.tell(&Record::Progress {
+                tick: pair.ticks as u32,
+                iterations: solver.search().iterations(),
+                evaluations: solver.search().evaluations(),
+                excess_chi2: 1.0,
+            });
+        }
+    }
+
+    pub fn loops(&mut self, missed: u32) {
+        self.tell(&Record::Loops {
+            tick: 200_000,
+            current_worst: 690,
+            servo_worst: 21_000,
+            current_missed: 0,
+            servo_missed: missed,
+            cycles_per_tick: 42_000,
+            stack_used: 9_000,
+            stack_bytes: 32_768,
+            samples_lost: 0,
+            records_lost: 0,
+        });
+    }
+}
+
+/// Identifies the leg `simulated`, assumed to be the default one, and returns all records.
+fn told_by(simulated: &LegFile, seed: u64) -> Vec<String> {
+    let context = Context::new(&default_leg(), &SimulationOptions::of_seed(seed))
+        .expect("the default leg is simulated");
+    let mut pair = Pair::new(simulated, &context, seed).expect("the firmware takes the default leg");
+    let mut teller = Teller::default();
+    teller.boot();
+    assert!(pair.enable(context.gravity));
+    teller.state(&pair);
+    teller.tell(&Record::Request { tick: pair.ticks as u32, name: "identify", accepted: true });
+    let mut request = Some(ControlRequest::Identify);
+    let mut before = Activity::Idle;
+    for _ in 0..LONGEST {
+        let output = pair.tick(request.take(), context.gravity);
+        if let Some(logged) = output.logged.filter(|logged| logged.segment.is_some()) {
+            teller.log(&logged);
+        }
+        let activity = pair.leg.control().activity();
+        if activity != before {
+            teller.state(&pair);
+            before = activity;
+            if activity == Activity::Idle {
+                break;
+            }
+        }
+        // The search begins while the leg settles.
+        let searching = ["settle", "solve"].contains(&words::activity(activity).1);
+        if searching && pair.ticks.is_multiple_of(PROGRESS_TICKS) {
+            teller.progress(&pair);
+        }
+    }
+    assert!(pair.leg.control().verdict().is_some(), "it came to its end");
+    let mut report = Report::default();
+    while let Some(record) = report.advance(pair.leg.identification()) {
+        teller.tell(&record);
+    }
+    teller.loops(0);
+    teller.lines
+}
+
+/// Records of the default leg with seed 1, including the log.
+pub fn accepted() -> &'static [String] {
+    static LINES: OnceLock<Vec<String>> = OnceLock::new();
+    LINES.get_or_init(|| told_by(&default_leg(), 1))
+}
+
+/// Records without the log.
+pub fn quiet() -> Vec<String> {
+    renumbered(accepted().iter().filter(|line| !line.starts_with("log ")))
+}
+
+/// Records of a leg whose shank hangs 10 % lower than assumed.
+pub fn refused() -> &'static [String] {
+    static LINES: OnceLock<Vec<String>> = OnceLock::new();
+    LINES.get_or_init(|| {
+        let mut leg = default_leg();
+        leg.joints[1].dh.a *= 1.1;
+        renumbered(told_by(&leg, 1).iter().filter(|line| !line.starts_with("log ")))
+    })
+}
+
+/// Records renumbered from 0.
+pub fn renumbered<'a>(lines: impl Iterator<Item = &'a String>) -> Vec<String> {
+    lines.enumerate().map(|(number, line)| with_number(line, number)).collect()
+}
+
+fn with_number(line: &str, number: usize) -> String {
+    let (kind, rest) = line.split_once(" n=").expect("a record");
+    let rest = rest.split_once(' ').map_or("", |(_, rest)| rest);
+    format!("{kind} n={number} {rest}")
+}
+
+pub fn text(lines: &[String]) -> String {
+    lines.join("\n") + "\n"
+}
+
+/// Trace read to its end.
+pub fn read(lines: &[String]) -> Trace {
+    let mut trace = Trace::default();
+    lines.iter().for_each(|line| trace.push(line));
+    trace.finish();
+    trace
+}

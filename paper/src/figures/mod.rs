@@ -1,0 +1,4 @@
+//! Figures of the paper, drawn with the means of [`scarab_host::view::figures`].
+
+pub mod chain;
+pub mod swarm;

@@ -1,0 +1,166 @@
+//! The experiments of the paper, reproduced and compared with its printed results. `cargo paper` runs them.
+//!
+//! Why one command: each statement about the paper needs a run behind it. Each part yields one
+//! [`Section`], the source of terminal output, JSON report, figures and `docs/results/paper.md`.
+//!
+//! | part | contents |
+//! | --- | --- |
+//! | [`table_three`] | the test functions as printed and as intended, and their least values |
+//! | [`table_four`] | the searches on test functions: [`searches`], [`contenders`], [`goals`] |
+//! | [`figure_five`] | paths of the searches in the plane |
+//! | [`problems`], [`seeds`], [`recorder`], [`statistics`] | test problems, seeds, evaluation counts, rows |
+//! | [`tables_five_six`] | parameters of the three-joint chain, by both methods |
+//! | [`figure_seven`] | torque of the chain on the verification motion |
+//! | [`load_change`] | the chain identified before and after its load changes |
+//! | [`convergence`] | iterations of the default swarm on identification problems |
+//! | [`figures`] | paths and convergence of swarms; torque of the chain |
+
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the paper's experiments run on the host only and may use std's mathematics"
+)]
+
+pub mod chain;
+pub mod contenders;
+pub mod convergence;
+pub mod figure_five;
+pub mod figure_seven;
+pub mod figures;
+pub mod goals;
+pub mod load_change;
+pub mod markdown;
+pub mod printed;
+pub mod problems;
+pub mod ranks;
+pub mod raw_cost;
+pub mod recorder;
+pub mod searches;
+pub mod seeds;
+pub mod seen_links;
+pub mod statistics;
+pub mod swarm_bench;
+pub mod table_four;
+pub mod table_three;
+pub mod tables_five_six;
+pub mod verification;
+
+use scarab_host::base::error::ToolError;
+use scarab_host::report::SCHEMA;
+use scarab_host::view::figures::Figure;
+use serde_json::{Map, Value};
+
+/// A table, figure or experiment of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The test functions.
+    TableThree,
+    /// The searches.
+    TableFour,
+    /// Paths of the searches in the plane.
+    FigureFive,
+    /// Parameters of the chain; both tables come from the same runs.
+    TablesFiveSix,
+    /// Torque of the chain on the verification motion.
+    FigureSeven,
+    /// The chain before and after its load changes.
+    LoadChange,
+    /// Convergence of the swarm on identification problems.
+    Convergence,
+}
+
+impl Part {
+    /// All parts, in the paper's order.
+    pub const ALL: [Self; 6] = [
+        Self::TableThree,
+        Self::TableFour,
+        Self::FigureFive,
+        Self::TablesFiveSix,
+        Self::FigureSeven,
+        Self::LoadChange,
+    ];
+
+    /// Name of the part's place in a document ([`scarab_host::view::document`]).
+    #[must_use]
+    pub const fn section_name(self) -> &'static str {
+        match self {
+            Self::TableThree => "table-iii",
+            Self::TableFour => "table-iv",
+            Self::FigureFive => "figure-5",
+            Self::TablesFiveSix => "tables-v-vi",
+            Self::FigureSeven => "figure-7",
+            Self::LoadChange => "load-change",
+            Self::Convergence => "convergence",
+        }
+    }
+}
+
+/// Options of all parts.
+#[derive(Clone, Debug)]
+pub struct PaperOptions {
+    /// Runs of each row; `None` uses the default of each part.
+    pub seeds: Option<u64>,
+    /// Searches of Table IV; empty for all.
+    pub algorithms: Vec<contenders::Algorithm>,
+}
+
+/// Results of one part.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// Name of the section's place in a document ([`scarab_host::view::document`]).
+    pub name: &'static str,
+    /// Tables and text, Markdown.
+    pub markdown: String,
+    /// Drawings.
+    pub figures: Vec<Figure>,
+    /// Entries for the JSON report.
+    pub json: Map<String, Value>,
+}
+
+impl Section {
+    /// Section from a report, with its entry of the JSON report and its figures.
+    fn of(
+        part: Part,
+        entry: &str,
+        report: &impl serde::Serialize,
+        markdown: String,
+        figures: Vec<Figure>,
+    ) -> Result<Self, ToolError> {
+        let value =
+            serde_json::to_value(report).map_err(|error| ToolError::input(format!("no JSON: {error}")))?;
+        Ok(Self {
+            name: part.section_name(),
+            markdown,
+            figures,
+            json: Map::from_iter([(entry.to_owned(), value)]),
+        })
+    }
+}
+
+/// Runs these parts, one after the other.
+pub fn run(parts: &[Part], options: &PaperOptions) -> Result<Vec<Section>, ToolError> {
+    parts.iter().map(|part| section(*part, options)).collect()
+}
+
+fn section(part: Part, options: &PaperOptions) -> Result<Section, ToolError> {
+    match part {
+        Part::TableThree => table_three::section(),
+        Part::TableFour => table_four::section(options),
+        Part::FigureFive => figure_five::section(options),
+        Part::TablesFiveSix => tables_five_six::section(options),
+        Part::FigureSeven => figure_seven::section(options),
+        Part::LoadChange => load_change::section(options),
+        Part::Convergence => convergence::section(options),
+    }
+}
+
+/// JSON report: schema, rows of Table IV, and the entries of the other parts.
+#[must_use]
+pub fn report(sections: &[Section]) -> Value {
+    let mut report = Map::new();
+    report.insert("schema".into(), SCHEMA.into());
+    report.insert("rows".into(), Value::Array(Vec::new()));
+    for section in sections {
+        report.extend(section.json.clone());
+    }
+    Value::Object(report)
+}

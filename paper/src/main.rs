@@ -1,0 +1,145 @@
+//! `cargo paper`: reproduces the paper's tables and figures and compares them with its printed results.
+
+use std::process::ExitCode;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Parser, ValueEnum};
+use scarab_host::base::error::{EXIT_ACCEPTED, ToolError};
+use scarab_host::base::output;
+use scarab_host::cli::arguments::{Output, OutputFolder, Updated};
+use scarab_host::cli::common::write_json;
+use scarab_host::cli::perform;
+use scarab_host::view::{document, figures};
+use scarab_paper::contenders::Algorithm;
+use scarab_paper::{PaperOptions, Part};
+
+/// Limit of the runs.
+const MOST_SEEDS: u64 = 100_000;
+
+/// A table of the paper.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum TableArgument {
+    /// The test functions and their least values.
+    #[value(name = "III")]
+    Three,
+    /// The searches on the test functions.
+    #[value(name = "IV")]
+    Four,
+    /// The chain's parameters one by one; always with VI.
+    #[value(name = "V")]
+    Five,
+    /// The combinations of the chain's parameters that torque determines; always with V.
+    #[value(name = "VI")]
+    Six,
+    /// The chain identified before and after its load changes; no table of the paper, but its argument.
+    LoadChange,
+    /// Iterations of the default swarm on identification problems; no table of the paper.
+    Convergence,
+}
+
+/// A figure of the paper.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FigureArgument {
+    /// Paths of the swarms on f1 to f4.
+    #[value(name = "5")]
+    Five,
+    /// Torque of the chain, predicted and real.
+    #[value(name = "7")]
+    Seven,
+}
+
+/// Reproduces the paper's tables and figures and compares them with its printed results.
+#[derive(Parser, Debug)]
+#[command(name = "scarab-paper", version)]
+struct Arguments {
+    /// A table; may be repeated. Without a table and a figure everything is made.
+    #[arg(long, value_enum, ignore_case = true)]
+    table: Vec<TableArgument>,
+    /// A figure; may be repeated.
+    #[arg(long, value_enum)]
+    figure: Vec<FigureArgument>,
+    /// Runs of each row, each with its own seed.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
+    seeds: Option<u64>,
+    /// A search of Table IV; may be repeated. All of them unless given.
+    #[arg(long, value_parser = algorithms())]
+    algorithm: Vec<Algorithm>,
+    /// Draw into this directory, as SVG.
+    #[arg(long)]
+    out: Option<OutputFolder>,
+    /// Write the rows here.
+    #[arg(long)]
+    json: Option<Output>,
+    /// Put the tables into this document, each between its markers.
+    #[arg(long)]
+    docs: Option<Updated>,
+}
+
+/// Searches by their names in the report.
+fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
+    PossibleValuesParser::new(Algorithm::ALL.map(Algorithm::id)).try_map(|id| {
+        Algorithm::ALL.into_iter().find(|algorithm| algorithm.id() == id).ok_or("is no search of Table IV")
+    })
+}
+
+impl Arguments {
+    fn parts(&self) -> Vec<Part> {
+        if self.table.is_empty() && self.figure.is_empty() {
+            return Part::ALL.to_vec();
+        }
+        let tables = self.table.iter().map(|table| match table {
+            TableArgument::Three => Part::TableThree,
+            TableArgument::Four => Part::TableFour,
+            TableArgument::Five | TableArgument::Six => Part::TablesFiveSix,
+            TableArgument::LoadChange => Part::LoadChange,
+            TableArgument::Convergence => Part::Convergence,
+        });
+        let figures = self.figure.iter().map(|figure| match figure {
+            FigureArgument::Five => Part::FigureFive,
+            FigureArgument::Seven => Part::FigureSeven,
+        });
+        let mut parts: Vec<Part> = Vec::new();
+        for part in tables.chain(figures) {
+            if !parts.contains(&part) {
+                parts.push(part);
+            }
+        }
+        parts
+    }
+}
+
+fn main() -> ExitCode {
+    perform(std::env::args_os().collect(), run)
+}
+
+/// Runs, prints and writes; returns the exit code.
+fn run(arguments: &Arguments) -> Result<u8, ToolError> {
+    let options = PaperOptions { seeds: arguments.seeds, algorithms: arguments.algorithm.clone() };
+    let parts = arguments.parts();
+    if !arguments.algorithm.is_empty() && !parts.contains(&Part::TableFour) {
+        return Err(ToolError::input("--algorithm: searches are chosen for table IV only"));
+    }
+    if let Some(path) = &arguments.docs {
+        parts.iter().try_for_each(|part| document::check(path, "paper", part.section_name()))?;
+    }
+    let sections = scarab_paper::run(&parts, &options)?;
+    // Outputs that cannot fail come first: runs take minutes.
+    for section in &sections {
+        output::print(&format!("{}\n", section.markdown))?;
+    }
+    if let Some(path) = &arguments.json {
+        write_json(path, &scarab_paper::report(&sections))?;
+    }
+    if let Some(directory) = &arguments.out {
+        let drawn: Vec<_> = sections.iter().flat_map(|section| section.figures.iter().cloned()).collect();
+        figures::write(directory, &drawn)?;
+        output::print(&format!("figures: {}\n", directory.display()))?;
+    }
+    if let Some(path) = &arguments.docs {
+        for section in &sections {
+            document::replace(path, "paper", section.name, &section.markdown)?;
+        }
+        output::print(&format!("document: {}\n", path.display()))?;
+    }
+    Ok(EXIT_ACCEPTED)
+}

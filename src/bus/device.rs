@@ -1,0 +1,426 @@
+//! One board on the bus: the nodes and axes of one leg, their coupling to the leg, and the stored parameters
+//! that a reset recalls.
+//!
+//! Why here: the board's task and the simulated leg connect the same parts in the same order. That order
+//! depends on values only, so it exists once. The caller provides frames, clock, leg and flash.
+//!
+//! ```text
+//! frame received           hear(frame, now, sender)             a reset node recalls its stored parameters
+//! mailbox free             poll(joint, now) -> frame            repeat until there is none
+//! leg has ticked           update(LegStatus), order() -> LegOrder   commands, one request, faults of a host
+//! host wrote 1010 or 1011  take_store(into) -> Keeping          then storing(Busy), stored(done, objects)
+//! ```
+//!
+//! **Control source.** The operator controls the leg until a host has sent a controlword other than 0. Until
+//! then the bus sends no commands or requests, and the statuswords show the leg's state. Afterwards the host
+//! controls it, until every node was reset and the drive is off. The enabling switch always stays with the
+//! operator. While it is open, or an inhibit reason is active, no step towards enabled is passed on. The host
+//! sees a refused request.
+//!
+//! **Refusals.** A refused step towards enabled is an error of both nodes (FF0E, with joint, reason and
+//! inhibit reasons). The error begins with the first request and ends when the reason is gone or the leg is
+//! enabled. It is reported once, however often the host asks. The leg's side writes the record.
+//!
+//! Cost per tick: two polls of a node and one copy of the leg's values. Measured: docs/results/bus.md.
+
+use super::communication::Identity;
+use super::drive::{Axis, AxisConstants, Coupling};
+use super::emergency::ErrorReport;
+use super::identification::{Ask, JointObjects, LegObjects, Results};
+use super::nmt::Reset;
+use super::node::{Heard, Node, Storing};
+use super::node_id::NodeId;
+use super::stored_parameters::StoredNode;
+use crate::hal::{Controller, Frame};
+use crate::leg::{
+    Activity, DriveState, FaultCode, JointCommand, JointStatus, LoggedSample, NoticeCode, Permission, Plan,
+    PowerRequest, RETURN_SPEED, Refusal, RefusalReason,
+};
+
+mod keeping;
+
+/// Gap between two calls, us, beyond which the board cannot have received frames.
+const STOOD_US: u64 = 2_000;
+
+/// State of the leg after one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LegStatus<const N: usize> {
+    /// Status of each joint. The inputs are replaced here.
+    pub joints: [JointStatus; N],
+    /// Activity of the leg.
+    pub activity: Activity,
+    /// Model monitor: the model no longer fits; an update is offered.
+    pub change: [bool; 2],
+    /// Why the last power request was refused.
+    pub refused: Option<Refusal>,
+    /// Whether the operator holds the enabling switch.
+    pub held: bool,
+    /// Whether an inhibit reason is active.
+    pub blocked: bool,
+    /// Inhibit reasons, one bit each.
+    pub causes: u32,
+    /// Whether every axis is calibrated.
+    pub calibrated: bool,
+    /// Whether the leg does not tick, because calibration or reference is missing.
+    pub rests: bool,
+}
+
+impl<const N: usize> LegStatus<N> {
+    /// State of a leg that does not tick yet.
+    pub const NONE: Self = Self {
+        joints: [JointStatus::NONE; N],
+        activity: Activity::Idle,
+        change: [false; 2],
+        refused: None,
+        held: false,
+        blocked: true,
+        causes: 0,
+        calibrated: false,
+        rests: true,
+    };
+
+    /// Whether a reason applies to the leg as a whole.
+    const fn has(&self, reason: RefusalReason) -> bool {
+        match reason {
+            RefusalReason::SwitchOpen => !self.held,
+            RefusalReason::Blocked => self.blocked,
+            RefusalReason::NoReference => self.rests,
+            RefusalReason::NotCalibrated => self.rests && !self.calibrated,
+            _ => false,
+        }
+    }
+
+    /// First reason that applies, or `None`.
+    fn stands_against(&self) -> Option<RefusalReason> {
+        use RefusalReason::{Blocked, NoReference, NotCalibrated, SwitchOpen};
+        [NotCalibrated, NoReference, Blocked, SwitchOpen].into_iter().find(|reason| self.has(*reason))
+    }
+}
+
+/// Request to the leg, besides the joints' targets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LegRequest {
+    /// Step of the drive's power states.
+    Power(PowerRequest),
+    /// Start an identification.
+    Identify {
+        /// One-time or sequential identification.
+        plan: Plan,
+        /// Seed of the swarm's random numbers.
+        seed: u64,
+    },
+    /// Cancel the identification.
+    Cancel,
+    /// Use the offered model update.
+    TakeUpdate,
+}
+
+/// Orders for the leg's next tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LegOrder<const N: usize> {
+    /// Command of each joint; `None` while no host controls the drive.
+    pub commands: Option<[JointCommand; N]>,
+    /// Request, issued once.
+    pub request: Option<LegRequest>,
+    /// Fault of each joint that the leg must react to; issued once.
+    pub faults: [Option<FaultCode>; N],
+    /// Whether each joint may be enabled outside its range.
+    pub may_return: [bool; N],
+    /// Request that the bus refused; issued once, for a record.
+    pub refused: Option<Refusal>,
+}
+
+/// Store operation requested by a host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keeping {
+    /// Store all objects, and the model if one was accepted since the last store.
+    All,
+    /// Erase everything; defaults apply after the next start.
+    Defaults,
+}
+
+/// Nodes, axes and objects of one leg; see the module. The log holds `LOG` samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Device<const N: usize, const LOG: usize> {
+    nodes: [Node; N],
+    axes: [Axis; N],
+    leg: LegObjects<N, LOG>,
+    coupling: Coupling,
+    own: [NodeId; N],
+    identity: Identity,
+    /// Stored parameters that a reset recalls: what the store has confirmed.
+    kept: [StoredNode; N],
+    /// Whether a host controls the drive.
+    hosted: bool,
+    /// A request was held back because the leg would refuse it.
+    refused: bool,
+    /// Last refusal, while its reason lasts.
+    refusal: Option<Refusal>,
+    /// Refusal to be recorded by the leg's side.
+    noted: Option<Refusal>,
+    request: Option<LegRequest>,
+    /// Last reported state of the controller.
+    controller: Controller,
+    /// State of the store.
+    storing: Storing,
+    /// Time of the last call.
+    looked_us: u64,
+    /// Pending reset of each node, whose stored parameters must be recalled.
+    pending_reset: [Option<Reset>; N],
+}
+
+impl<const N: usize, const LOG: usize> Device<N, LOG> {
+    /// Creates nodes with these node-IDs and without stored parameters. No boot-up message has been sent.
+    #[must_use]
+    pub fn new(
+        own: [NodeId; N],
+        identity: Identity,
+        constants: [AxisConstants; N],
+        plan: Plan,
+        seed: u64,
+    ) -> Self {
+        Self {
+            nodes: own.map(|number| Node::new(number, identity)),
+            axes: constants.map(Axis::new),
+            leg: LegObjects::new(plan, seed, 0),
+            coupling: Coupling::default(),
+            own,
+            identity,
+            kept: [StoredNode::NOTHING; N],
+            hosted: false,
+            refused: false,
+            refusal: None,
+            noted: None,
+            request: None,
+            controller: Controller::Active,
+            storing: Storing::Done,
+            looked_us: 0,
+            pending_reset: [None; N],
+        }
+    }
+
+    /// Handles a frame for every node but its sender. Returns whether a node may have something to send or
+    /// do. A reset node recalls its stored parameters at the next call, once for any number of frames.
+    pub fn hear<R: Results>(
+        &mut self,
+        frame: &Frame,
+        now_us: u64,
+        sender: Option<usize>,
+        results: &R,
+    ) -> bool {
+        self.look_back(now_us);
+        let mut concerns = false;
+        for joint in (0..N).filter(|joint| Some(*joint) != sender) {
+            let heard = self.with(joint, results, |node, objects| node.on_frame(frame, now_us, objects));
+            match heard.unwrap_or(Heard::Nothing) {
+                Heard::Nothing => continue,
+                Heard::Something => {}
+                Heard::Reset(reset) => {
+                    if let Some(pending_reset) = self.pending_reset.get_mut(joint) {
+                        *pending_reset = Some(reset).max(*pending_reset);
+                    }
+                    concerns = true;
+                    continue;
+                }
+            }
+            concerns = true;
+            self.share_bit_rate(joint);
+        }
+        concerns
+    }
+
+    /// Returns the next frame that a node has to send; call until `None`. While the controller is bus-off,
+    /// nothing is returned: such a frame would be outdated when sent.
+    pub fn poll<R: Results>(&mut self, joint: usize, now_us: u64, results: &R) -> Option<Frame> {
+        self.recall_reset();
+        if self.controller == Controller::Off {
+            return None;
+        }
+        self.with(joint, results, |node, objects| node.poll(now_us, objects))?
+    }
+
+    /// Whether the frame is an emergency or boot-up message of a node, which is sent only once.
+    #[must_use]
+    pub fn tells_once(&self, frame: &Frame) -> bool {
+        self.nodes.iter().any(|node| node.tells_once(frame))
+    }
+
+    /// Restarts all timeouts if the board could not receive since the last call.
+    pub fn look_back(&mut self, now_us: u64) {
+        let since_us = now_us.saturating_sub(self.looked_us);
+        self.looked_us = self.looked_us.max(now_us);
+        if since_us > STOOD_US {
+            self.nodes.iter_mut().for_each(|node| node.stood_still(now_us));
+        }
+    }
+
+    /// Checks all timeouts, independently of the bus load. Call it every millisecond; a longer gap restarts
+    /// the timeouts.
+    pub fn watch<R: Results>(&mut self, now_us: u64, results: &R) {
+        self.recall_reset();
+        self.look_back(now_us);
+        for joint in 0..N {
+            self.with(joint, results, |node, objects| node.look_around(now_us, objects));
+        }
+    }
+
+    /// Handles a change of the CAN controller's state.
+    pub fn on_controller<R: Results>(&mut self, controller: Controller, results: &R) {
+        if controller != Controller::Overrun {
+            self.controller = controller;
+        }
+        for joint in 0..N {
+            self.with(joint, results, |node, objects| node.on_controller(controller, objects));
+        }
+    }
+
+    fn with<R: Results, T>(
+        &mut self,
+        joint: usize,
+        results: &R,
+        ask: impl FnOnce(&mut Node, &mut JointObjects<'_, R, N, LOG>) -> T,
+    ) -> Option<T> {
+        let (node, axis) = (self.nodes.get_mut(joint)?, self.axes.get_mut(joint)?);
+        Some(ask(node, &mut JointObjects { axis, joint, leg: &mut self.leg, results }))
+    }
+
+    /// Takes over the leg's state after a tick. Fetch the resulting request with [`Self::order`] before the
+    /// next tick.
+    pub fn update(&mut self, status: &LegStatus<N>) {
+        let drive = status.joints.first().map_or(DriveState::NotReadyToSwitchOn, |joint| joint.drive);
+        let inputs = self.inputs(status);
+        for ((axis, status), inputs) in self.axes.iter_mut().zip(&status.joints).zip(inputs) {
+            axis.update(&JointStatus { inputs, ..*status });
+        }
+        let mut rises = false;
+        for axis in &mut self.axes {
+            rises |= axis.take_rises();
+        }
+        (self.leg.activity, self.leg.change) = (status.activity, status.change);
+        let commanded = self.axes.iter().any(Axis::is_commanded);
+        self.hosted = commanded || self.hosted && drive.permission() != Permission::Released;
+        let refused = core::mem::take(&mut self.refused) || status.refused.is_some();
+        if !self.hosted {
+            self.coupling.look_on(self.axes.each_mut(), drive);
+        }
+        let power = self.coupling.power(self.axes.each_mut(), drive, refused).filter(|_| self.hosted);
+        // A step of the drive goes first; other requests wait for the next tick. An identification requested
+        // on the way up is discarded: nothing requested before the leg is enabled starts afterwards.
+        let asked = match power {
+            None => self.leg.take_asked(),
+            Some(power) if power.enables() && self.leg.has_asked(Ask::Identify) => self.leg.take_asked(),
+            Some(_) => None,
+        };
+        self.request = match (power, asked) {
+            (Some(power), _) if power.enables() && status.stands_against().is_some() => {
+                self.refused = true;
+                None
+            }
+            (Some(power), _) => Some(LegRequest::Power(power)),
+            // While the operator controls the leg, a host must not start a motion.
+            (None, Some(Ask::Identify | Ask::TakeUpdate)) if !self.hosted => None,
+            (None, Some(Ask::Identify)) => {
+                Some(LegRequest::Identify { plan: self.leg.plan, seed: self.leg.seed })
+            }
+            (None, Some(Ask::Cancel)) => Some(LegRequest::Cancel),
+            (None, Some(Ask::TakeUpdate)) => Some(LegRequest::TakeUpdate),
+            (None, None) => None,
+        };
+        self.explain(status, rises || self.refused);
+    }
+
+    /// Digital inputs of each joint (60FD).
+    fn inputs(&self, status: &LegStatus<N>) -> [u32; N] {
+        let bit = |is_set: bool, reason: RefusalReason| u32::from(is_set) * reason.bit();
+        use RefusalReason::{Blocked, NoReference, NotCalibrated, SwitchOpen};
+        let whole = [Blocked, NoReference, NotCalibrated]
+            .into_iter()
+            .fold(bit(status.held, SwitchOpen), |bits, reason| bits | bit(status.has(reason), reason));
+        core::array::from_fn(|joint| {
+            let of_joint = self.refusal.filter(|refusal| usize::from(refusal.joint) == joint);
+            let status = status.joints.get(joint).map_or(0, |status| status.inputs);
+            whole | status | of_joint.map_or(0, |refusal| refusal.reason.bit())
+        })
+    }
+
+    /// Updates the refusal of a step towards enabled, and its error report.
+    fn explain(&mut self, status: &LegStatus<N>, asked: bool) {
+        let before = self.refusal.filter(|refusal| self.hosted && still(status, *refusal));
+        let own = status.stands_against().filter(|_| asked && self.hosted);
+        let own = own.map(|reason| Refusal { joint: Refusal::LEG, reason });
+        self.refusal = status.refused.filter(|_| self.hosted).or(own).or(before);
+        if self.refusal.is_some() && self.refusal == before {
+            return;
+        }
+        // The leg records its own refusals.
+        self.noted = self.refusal.filter(|refusal| refusal.joint == Refusal::LEG).or(self.noted);
+        let report = self.refusal.map(|refusal| {
+            let [low, high, ..] = status.causes.to_le_bytes();
+            let information = [refusal.number(), refusal.reason as u8, low, high, 0];
+            ErrorReport { code: NoticeCode::NotEnabled.number(), information }
+        });
+        self.axes.iter_mut().for_each(|axis| axis.refused = report);
+    }
+
+    /// Returns the orders for the leg; targets received since [`Self::update`] are included.
+    pub fn order(&mut self) -> LegOrder<N> {
+        LegOrder {
+            commands: self.hosted.then(|| self.axes.each_ref().map(Axis::command)),
+            request: self.request.take(),
+            // A lost bus is a fault only if a host controls the drive.
+            faults: self.axes.each_mut().map(|axis| axis.take_fault().filter(|_| self.hosted)),
+            may_return: self.axes.each_ref().map(Axis::may_return),
+            refused: self.noted.take(),
+        }
+    }
+
+    /// Whether a host controls the drive. The operator's contacts can then only inhibit it.
+    #[must_use]
+    pub const fn is_hosted(&self) -> bool {
+        self.hosted
+    }
+
+    /// Adds a sample to the log.
+    pub fn log(&mut self, logged: &LoggedSample<N>) {
+        self.leg.log.push(logged);
+    }
+
+    /// Returns the number of models accepted and stored on this board (2100:7).
+    #[must_use]
+    pub const fn generation(&self) -> u32 {
+        self.leg.generation
+    }
+
+    /// Sets the number of accepted models, after one was stored or recalled.
+    pub fn set_generation(&mut self, generation: u32) {
+        self.leg.generation = generation;
+    }
+
+    /// Returns the seed of the next identification's random numbers (2100:5, 6).
+    #[must_use]
+    pub const fn seed(&self) -> u64 {
+        self.leg.seed
+    }
+
+    /// Returns the nodes.
+    #[must_use]
+    pub const fn nodes(&self) -> &[Node; N] {
+        &self.nodes
+    }
+}
+
+/// Whether the reason of a refusal still applies.
+fn still<const N: usize>(status: &LegStatus<N>, refusal: Refusal) -> bool {
+    let Some(joint) = status.joints.get(usize::from(refusal.joint)) else {
+        return status.has(refusal.reason);
+    };
+    let lasts = match refusal.reason {
+        RefusalReason::Moving => joint.velocity.0.abs() > RETURN_SPEED,
+        RefusalReason::OutOfRange => joint.inputs & refusal.reason.bit() != 0,
+        _ => joint.drive == DriveState::SwitchedOn,
+    };
+    lasts && joint.drive != DriveState::OperationEnabled
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,108 @@
+//! Stored parameters of a board: what a host wants stored, the outcome, and what a reset recalls.
+
+use super::{Device, Keeping};
+use crate::bus::drive::{Axis, USUAL_KBIT};
+use crate::bus::nmt::{NmtState, Reset};
+use crate::bus::node::{Node, Storing};
+use crate::bus::node_id::NodeId;
+use crate::bus::stored_parameters::{StoredNode, kept_bit_rate, kept_node_id};
+
+impl<const N: usize, const LOG: usize> Device<N, LOG> {
+    /// Sets the stored parameters of a node and restarts all nodes with theirs.
+    pub fn recall(&mut self, joint: usize, bytes: &[u8]) {
+        if let Some(kept) = self.kept.get_mut(joint) {
+            *kept = StoredNode::of(bytes);
+        }
+        // The new node-ID of one node may free the default of another.
+        self.pending_reset = [Some(Reset::Node); N];
+        self.recall_reset();
+    }
+
+    /// Node-IDs according to these parameters; `None` if two nodes would share one.
+    fn numbers(&self, kept: &[StoredNode; N]) -> Option<[NodeId; N]> {
+        let mut numbers = self.own;
+        for (number, kept) in numbers.iter_mut().zip(kept) {
+            *number = kept_node_id(kept.bytes()).unwrap_or(*number);
+        }
+        let is_other = |place: usize, number| numbers.iter().skip(place + 1).all(|other| other != number);
+        numbers.iter().enumerate().all(|(place, number)| is_other(place, number)).then_some(numbers)
+    }
+
+    /// Restarts the nodes that were reset, with their stored parameters.
+    pub(super) fn recall_reset(&mut self) {
+        if self.pending_reset.iter().all(Option::is_none) {
+            return;
+        }
+        let numbers = self.numbers(&self.kept).unwrap_or(self.own);
+        for (joint, number) in numbers.into_iter().enumerate() {
+            let Some(reset) = self.pending_reset.get_mut(joint).and_then(Option::take) else { continue };
+            let (Some(node), Some(axis), Some(kept)) =
+                (self.nodes.get_mut(joint), self.axes.get_mut(joint), self.kept.get(joint))
+            else {
+                continue;
+            };
+            // A reset node already has its initial state, except for its node-ID.
+            if node.id() != number || node.state() != NmtState::Initialising {
+                *node = Node::new(number, self.identity);
+            }
+            node.recall(kept.bytes(), reset, axis);
+            node.goes_on(self.controller, self.storing);
+            if reset == Reset::Node {
+                // The bit rate applies to all nodes; without a stored one the default returns.
+                let rate = self.bit_rate().unwrap_or(USUAL_KBIT);
+                self.axes.iter_mut().for_each(|axis| axis.set_bit_rate(rate));
+            }
+        }
+    }
+
+    /// Copies a node's bit rate to all nodes, because the board has one controller.
+    pub(super) fn share_bit_rate(&mut self, joint: usize) {
+        let Some(rate) = self.axes.get(joint).map(Axis::bit_rate) else { return };
+        self.axes.iter_mut().for_each(|axis| axis.set_bit_rate(rate));
+    }
+
+    /// Takes the pending store request and encodes each node's objects into `into`. The objects apply only
+    /// after [`Self::stored`]. If they do not fit, or two nodes would share a node-ID, nothing is stored;
+    /// hosts receive FF0D, then 5530.
+    pub fn take_store(&mut self, into: &mut [StoredNode; N]) -> Option<Keeping> {
+        self.recall_reset();
+        let defaults = self.leg.take_store()?;
+        let mut fits = true;
+        for ((node, axis), kept) in self.nodes.iter_mut().zip(&mut self.axes).zip(into.iter_mut()) {
+            *kept = StoredNode::NOTHING;
+            if !defaults {
+                fits &= node.keep_into(axis, kept).is_ok();
+            }
+        }
+        if !fits || self.numbers(into).is_none() {
+            // All or nothing. The detour by `Busy` reports a repeated failure again.
+            self.storing(Storing::Busy);
+            self.storing(Storing::Failed);
+            return None;
+        }
+        Some(if defaults { Keeping::Defaults } else { Keeping::All })
+    }
+
+    /// Reports the outcome of storing `objects`. A reset recalls them only after success; after a failure it
+    /// recalls the previous ones.
+    pub fn stored(&mut self, done: bool, objects: &[StoredNode; N]) {
+        if done {
+            self.kept = *objects;
+        }
+        // No frame was received during the flash write, and a board's clock did not advance.
+        self.nodes.iter_mut().for_each(|node| node.stood_still(self.looked_us));
+        self.storing(if done { Storing::Done } else { Storing::Failed });
+    }
+
+    /// Sets the state of the store; hosts receive an emergency message.
+    pub fn storing(&mut self, storing: Storing) {
+        self.storing = storing;
+        self.nodes.iter_mut().for_each(|node| node.on_store(storing));
+    }
+
+    /// Returns the stored bit rate, kbit/s.
+    #[must_use]
+    pub fn bit_rate(&self) -> Option<u16> {
+        self.kept.iter().find_map(|kept| kept_bit_rate(kept.bytes()))
+    }
+}

@@ -1,0 +1,457 @@
+extern crate std;
+
+use std::vec::Vec;
+
+use super::super::tests::IDENTITY;
+use super::*;
+use crate::bus::drive::Mode;
+use crate::bus::identification::ResultsCopy;
+use crate::units::{Ampere, NewtonMetre};
+
+mod kept;
+
+/// No identification result.
+const NOTHING: ResultsCopy<2, 1> = ResultsCopy::nothing();
+
+/// A leg that follows its orders, and a host on the bus.
+struct Bench {
+    device: Device<2, 4>,
+    drive: DriveState,
+    held: bool,
+    blocked: bool,
+    rests: bool,
+    causes: u32,
+    calibrated: bool,
+    /// Refusal of the leg when it is to be enabled.
+    refuses: Option<Refusal>,
+    refused: Option<Refusal>,
+    velocity: f32,
+    now_us: u64,
+    orders: Vec<LegOrder<2>>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let constants = AxisConstants {
+            rated_torque: NewtonMetre(40.0),
+            rated_current: Ampere(20.0),
+            modes: Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.bit()),
+            ..AxisConstants::UNKNOWN
+        };
+        let own = [1, 2].map(|number| NodeId::new(number).expect("a number"));
+        let device = Device::new(own, IDENTITY, [constants; 2], Plan::OneTime, 1);
+        let mut bench = Self {
+            device,
+            drive: DriveState::SwitchOnDisabled,
+            held: true,
+            blocked: false,
+            rests: false,
+            causes: 0,
+            calibrated: false,
+            refuses: None,
+            refused: None,
+            velocity: 0.0,
+            now_us: 0,
+            orders: Vec::new(),
+        };
+        assert_eq!(bench.run(4).len(), 2);
+        bench
+    }
+
+    /// Runs ticks of the leg. Returns the nodes' frames; each node also receives those of the other.
+    fn run(&mut self, ticks: u32) -> Vec<Frame> {
+        let mut frames = Vec::new();
+        for _ in 0..ticks {
+            self.now_us += 250;
+            self.drive = self.drive.after(crate::leg::DriveEvent::Tick, 4);
+            let drive = if self.rests { DriveState::NotReadyToSwitchOn } else { self.drive };
+            let velocity = crate::units::RadianPerSecond(self.velocity);
+            let joint = JointStatus { drive, velocity, ..JointStatus::NONE };
+            let (held, blocked) = (self.held, self.blocked);
+            self.device.update(&LegStatus {
+                joints: [joint; 2],
+                held,
+                blocked,
+                rests: self.rests,
+                causes: self.causes,
+                calibrated: self.calibrated,
+                refused: self.refused.take(),
+                ..LegStatus::NONE
+            });
+            let order = self.device.order();
+            if order.request == Some(LegRequest::Power(PowerRequest::EnableOperation)) {
+                self.refused = self.refuses;
+            }
+            if let Some(LegRequest::Power(power)) = order.request.filter(|_| self.refused.is_none()) {
+                self.drive = self.drive.after(crate::leg::DriveEvent::Asked(power), 4);
+            }
+            self.orders.push(order);
+            for joint in 0..2 {
+                while let Some(frame) = self.device.poll(joint, self.now_us, &NOTHING) {
+                    self.device.hear(&frame, self.now_us, Some(joint), &NOTHING);
+                    frames.push(frame);
+                }
+            }
+        }
+        frames
+    }
+
+    fn send(&mut self, id: u16, data: &[u8]) -> Vec<Frame> {
+        self.device.hear(&Frame::new(id, data), self.now_us, None, &NOTHING);
+        self.run(8)
+    }
+
+    fn write(&mut self, node: u16, index: u16, sub: u8, value: u32, size: u8) {
+        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+        let frames = self.send(0x600 + node, &[0x23 | (4 - size) << 2, low, high, sub, a, b, c, d]);
+        let answer = frames.iter().find(|frame| frame.id() == 0x580 + node).expect("an answer");
+        assert_eq!(answer.data()[0], 0x60, "{index:x}");
+    }
+
+    fn read(&mut self, node: u16, index: u16) -> u32 {
+        let [low, high] = index.to_le_bytes();
+        let frames = self.send(0x600 + node, &[0x40, low, high, 0, 0, 0, 0, 0]);
+        let answer = frames.iter().find(|frame| frame.id() == 0x580 + node).expect("an answer");
+        u32::from_le_bytes(answer.data()[4..].try_into().expect("four bytes"))
+    }
+
+    /// Performs the pending store request and reports its outcome.
+    fn store(&mut self, done: bool) -> Option<(Keeping, [StoredNode; 2])> {
+        let mut objects = [StoredNode::of(&[0x55; 9]); 2];
+        let what = self.device.take_store(&mut objects)?;
+        self.device.stored(done, &objects);
+        Some((what, objects))
+    }
+
+    fn save(&mut self, node: u16) {
+        self.write(node, 0x1010, 1, u32::from_le_bytes(*b"save"), 4);
+    }
+
+    fn load(&mut self, node: u16) {
+        self.write(node, 0x1011, 1, u32::from_le_bytes(*b"load"), 4);
+    }
+
+    fn enable(&mut self) {
+        for word in [6, 7, 15] {
+            self.write(1, 0x6040, 0, word, 2);
+            self.write(2, 0x6040, 0, word, 2);
+        }
+    }
+}
+
+#[test]
+fn the_operator_controls_the_leg_until_a_host_sends_a_controlword() {
+    let mut bench = Bench::new();
+    bench.drive = DriveState::OperationEnabled;
+    bench.orders.clear();
+    // NMT start, configuration, reads and a controlword of 0 leave control with the operator.
+    bench.send(0, &[1, 0]);
+    bench.write(1, 0x6060, 0, 8, 1);
+    bench.write(1, 0x6040, 0, 0, 2);
+    assert_eq!(bench.read(2, 0x6041) & 0x6F, 0x27);
+    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::OperationEnabled, false));
+    assert!(bench.orders.iter().all(|order| order.request.is_none() && order.commands.is_none()));
+    // An NMT stop does not affect the operator's leg either.
+    bench.send(0, &[2, 0]);
+    assert_eq!(bench.drive, DriveState::OperationEnabled);
+    bench.write_after_start();
+    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::ReadyToSwitchOn, true));
+    assert!(bench.orders.last().is_some_and(|order| order.commands.is_some()));
+}
+
+impl Bench {
+    fn write_after_start(&mut self) {
+        self.send(0, &[1, 0]);
+        self.write(1, 0x6040, 0, 6, 2);
+    }
+}
+
+#[test]
+fn a_reset_of_all_nodes_stops_the_leg_and_ends_host_control() {
+    let mut bench = Bench::new();
+    bench.enable();
+    assert_eq!(bench.drive, DriveState::OperationEnabled);
+    bench.orders.clear();
+    bench.send(0, &[129, 0]);
+    let stop = Some(LegRequest::Power(PowerRequest::QuickStop));
+    assert!(bench.orders.iter().any(|order| order.request == stop));
+    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::SwitchOnDisabled, false));
+    // After a reset of one node only, the host still controls the leg.
+    bench.enable();
+    bench.send(0, &[129, 1]);
+    assert_eq!((bench.drive, bench.device.is_hosted()), (DriveState::SwitchOnDisabled, true));
+}
+
+#[test]
+fn an_open_switch_or_an_inhibit_reason_stops_every_step_up() {
+    for (held, blocked) in [(false, false), (true, true), (false, true)] {
+        let mut bench = Bench::new();
+        (bench.held, bench.blocked) = (held, blocked);
+        bench.orders.clear();
+        bench.enable();
+        assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
+        assert!(bench.orders.iter().all(|order| order.request.is_none()));
+        assert_eq!(bench.read(1, 0x6041) & 0x6F, 0x40, "the node follows the leg down");
+        assert_eq!(bench.read(1, 0x60FD), u32::from(held) << 16 | u32::from(blocked) << 17);
+        // A request made before the reason is gone does not take effect later.
+        (bench.held, bench.blocked) = (true, false);
+        bench.run(40);
+        assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
+        bench.enable();
+        assert_eq!(bench.drive, DriveState::OperationEnabled);
+    }
+}
+
+#[test]
+fn a_target_received_after_the_tick_is_in_the_next_order() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    bench.write(1, 0x6060, 0, 8, 1);
+    bench.enable();
+    bench.device.hear(&Frame::new(0x301, &500_000_i32.to_le_bytes()), bench.now_us, None, &NOTHING);
+    let commands = bench.device.order().commands.expect("a host has the drive");
+    let crate::leg::Target::CyclicPosition { position, .. } = commands[0].target else {
+        panic!("{:?}", commands[0].target)
+    };
+    assert!((position.0 - 0.5).abs() < 1e-6);
+}
+
+#[test]
+fn a_reset_node_restarts_once_even_on_a_full_bus() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x6065, 0, 12_345, 4);
+    bench.save(1);
+    assert!(bench.store(true).is_some());
+    bench.write(1, 0x6065, 0, 1, 4);
+    // Communication reset, then node reset; no mailbox is free for the boot-up message.
+    for command in [130, 129, 129] {
+        bench.device.hear(&Frame::new(0, &[command, 0]), bench.now_us, None, &NOTHING);
+    }
+    assert_eq!(bench.device.pending_reset, [Some(Reset::Node); 2]);
+    bench.device.watch(bench.now_us, &NOTHING);
+    assert_eq!(bench.device.pending_reset, [None; 2]);
+    for id in [0x080, 0x201, 0x601, 0x700] {
+        bench.device.hear(&Frame::new(id, &[0; 8]), bench.now_us, None, &NOTHING);
+    }
+    assert_eq!(bench.device.pending_reset, [None; 2], "no second restart");
+    let boots = bench.run(4).iter().filter(|frame| frame.id() & 0x780 == 0x700).count();
+    assert_eq!((boots, bench.read(1, 0x6065)), (2, 12_345));
+}
+
+#[test]
+fn storing_while_the_other_node_resets_stores_its_old_parameters() {
+    let mut bench = Bench::new();
+    bench.write(1, 0x6065, 0, 12_345, 4);
+    bench.save(2);
+    let before = bench.store(true);
+    assert!(before.is_some());
+    let save = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
+    for frame in [Frame::new(0, &[129, 1]), Frame::new(0x602, &save)] {
+        bench.device.hear(&frame, bench.now_us, None, &NOTHING);
+    }
+    assert_eq!(bench.store(true), before);
+}
+
+#[test]
+fn nothing_is_sent_while_bus_off_and_only_new_frames_afterwards() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    bench.write(1, 0x1800, 2, 255, 1);
+    bench.device.on_controller(Controller::Off, &NOTHING);
+    let request = Frame::new(0x080, &[]);
+    for _ in 0..50 {
+        bench.device.hear(&request, bench.now_us, None, &NOTHING);
+        assert_eq!(bench.run(4), []);
+    }
+    bench.drive = DriveState::ReadyToSwitchOn;
+    bench.device.on_controller(Controller::Active, &NOTHING);
+    let frames = bench.run(1);
+    let emergencies: Vec<u16> = frames
+        .iter()
+        .filter(|frame| frame.id() == 0x81)
+        .map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]]))
+        .collect();
+    assert_eq!(emergencies, [0x8140, 0]);
+    // The present statusword is sent once.
+    let words: Vec<&[u8]> = frames.iter().filter(|frame| frame.id() == 0x181).map(Frame::data).collect();
+    assert_eq!(words.len(), 1, "{frames:?}");
+    assert_eq!(words[0][0] & 0x6F, 0x21);
+}
+
+#[test]
+fn a_request_waits_for_a_step_of_the_drive() {
+    let mut bench = Bench::new();
+    bench.enable();
+    // In one tick: the drive steps down and the update is requested.
+    let ask = |bench: &mut Bench, command: u8| {
+        let frames = [
+            Frame::new(0x601, &[0x2F, 0x00, 0x21, 1, command, 0, 0, 0]),
+            Frame::new(0x601, &[0x2B, 0x40, 0x60, 0, 7, 0, 0, 0]),
+        ];
+        bench.orders.clear();
+        for frame in frames {
+            bench.device.hear(&frame, bench.now_us, None, &NOTHING);
+            bench.device.poll(0, bench.now_us, &NOTHING);
+        }
+        bench.run(8);
+        bench.orders.iter().filter_map(|order| order.request).collect::<Vec<LegRequest>>()
+    };
+    for (command, asked) in [(3, LegRequest::TakeUpdate), (2, LegRequest::Cancel)] {
+        bench.enable();
+        assert_eq!(bench.drive, DriveState::OperationEnabled);
+        let requests = ask(&mut bench, command);
+        assert_eq!(requests, [LegRequest::Power(PowerRequest::DisableOperation), asked]);
+    }
+}
+
+#[test]
+fn an_identification_requested_on_the_way_up_is_discarded() {
+    let mut bench = Bench::new();
+    for word in [6, 7] {
+        bench.write(1, 0x6040, 0, word, 2);
+        bench.write(2, 0x6040, 0, word, 2);
+    }
+    bench.write(1, 0x6040, 0, 15, 2);
+    bench.orders.clear();
+    for (id, data) in
+        [(0x602, [0x2B, 0x40, 0x60, 0, 15, 0, 0, 0]), (0x601, [0x2F, 0x00, 0x21, 1, 1, 0, 0, 0])]
+    {
+        bench.device.hear(&Frame::new(id, &data), bench.now_us, None, &NOTHING);
+    }
+    bench.run(8);
+    assert_eq!(bench.drive, DriveState::OperationEnabled);
+    let identifies = |order: &LegOrder<2>| matches!(order.request, Some(LegRequest::Identify { .. }));
+    assert!(!bench.orders.iter().any(identifies));
+    // A new request starts it.
+    bench.send(0x601, &[0x2F, 0x00, 0x21, 1, 1, 0, 0, 0]);
+    assert_eq!(bench.orders.iter().filter(|order| identifies(order)).count(), 1);
+}
+
+#[test]
+fn lost_frames_act_like_a_lost_bus_only_under_host_control() {
+    for (option, drive) in [
+        (0, DriveState::OperationEnabled),
+        (1, DriveState::OperationEnabled),
+        (2, DriveState::SwitchOnDisabled),
+        (3, DriveState::SwitchOnDisabled),
+    ] {
+        let mut bench = Bench::new();
+        for node in [1, 2] {
+            bench.write(node, 0x6007, 0, option, 2);
+        }
+        bench.enable();
+        assert_eq!(bench.drive, DriveState::OperationEnabled);
+        bench.orders.clear();
+        bench.device.on_controller(Controller::Overrun, &NOTHING);
+        bench.device.on_controller(Controller::Active, &NOTHING);
+        let frames = bench.run(40);
+        assert_eq!(bench.drive, drive, "{option}");
+        let sent = frames.iter().filter(|frame| frame.id() == 0x81 && frame.data()[..2] == [0x10, 0x81]);
+        assert_eq!(sent.count(), 1, "8110");
+        // With option 1 the leg reacts to the fault itself.
+        let fault = bench.orders.iter().find_map(|order| order.faults[0]);
+        assert_eq!(fault, (option == 1).then_some(FaultCode::BusOff));
+    }
+    let mut bench = Bench::new();
+    bench.drive = DriveState::OperationEnabled;
+    bench.device.on_controller(Controller::Overrun, &NOTHING);
+    bench.run(40);
+    assert_eq!(bench.drive, DriveState::OperationEnabled);
+}
+
+#[test]
+fn a_leg_without_a_reference_reports_why_it_is_not_enabled() {
+    let mut bench = Bench::new();
+    bench.rests = true;
+    bench.enable();
+    assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
+    // Neither calibrated nor referenced.
+    assert_eq!(bench.read(1, 0x60FD) >> 16, 0b1101);
+    assert_ne!(bench.read(1, 0x6041) & 0x6F, 0x27);
+    // Storing is still possible.
+    bench.save(1);
+    assert!(bench.store(true).is_some());
+    bench.rests = false;
+    bench.run(4);
+    bench.enable();
+    assert_eq!((bench.drive, bench.read(1, 0x60FD) >> 16), (DriveState::OperationEnabled, 0b001));
+}
+
+impl Bench {
+    /// Requests each step in every cycle, as an insistent host does. Returns the nodes' emergency messages.
+    fn insist(&mut self, cycles: u32) -> Vec<Frame> {
+        let mut sent = Vec::new();
+        for word in [6, 7, 15].into_iter().cycle().take(3 * cycles as usize) {
+            for node in [1, 2] {
+                sent.extend(self.send(0x200 + node, &[word, 0]));
+            }
+        }
+        sent.retain(|frame| matches!(frame.id(), 0x81 | 0x82));
+        sent
+    }
+}
+
+#[test]
+fn each_refusal_reason_is_reported_once_until_it_ends() {
+    type Inject = fn(&mut Bench);
+    let reasons: [(u8, [u8; 2], Inject); 4] = [
+        (16, [0; 2], |bench| bench.held = false),
+        (17, [0x21, 0x80], |bench| (bench.blocked, bench.causes) = (true, 0x8021)),
+        (18, [0; 2], |bench| (bench.rests, bench.calibrated) = (true, true)),
+        (19, [0; 2], |bench| bench.rests = true),
+    ];
+    for (reason, [low, high], inject) in reasons {
+        let mut bench = Bench::new();
+        bench.send(0, &[1, 0]);
+        inject(&mut bench);
+        let emergencies = |frames: Vec<Frame>| -> Vec<Frame> {
+            frames.into_iter().filter(|frame| frame.id() & !3 == 0x80).collect()
+        };
+        assert_eq!(emergencies(bench.run(40)), [], "no request yet");
+        bench.orders.clear();
+        let refused = [0x81, 0x82].map(|id| Frame::new(id, &[0x0E, 0xFF, 0x81, 0, reason, low, high, 0]));
+        assert_eq!(bench.insist(30), refused, "{reason}");
+        assert_ne!(bench.drive, DriveState::OperationEnabled);
+        assert_eq!((bench.read(1, 0x603F), bench.read(2, 0x603F)), (0xFF0E, 0xFF0E));
+        let bit = bench.read(1, 0x60FD) >> reason & 1;
+        assert_eq!(bit, u32::from(reason != 16), "{reason}");
+        let noted: Vec<Refusal> = bench.orders.iter().filter_map(|order| order.refused).collect();
+        assert_eq!(
+            noted.iter().map(|noted| (noted.number(), noted.reason as u8)).collect::<Vec<_>>(),
+            [(0, reason)]
+        );
+        (bench.held, bench.blocked, bench.rests) = (true, false, false);
+        let over = [0x81, 0x82].map(|id| Frame::new(id, &[0; 8]));
+        assert_eq!(emergencies(bench.run(8)), over, "{reason}");
+        assert_eq!(bench.insist(1), []);
+        assert_eq!((bench.drive, bench.read(1, 0x603F)), (DriveState::OperationEnabled, 0xFF0E));
+    }
+}
+
+#[test]
+fn a_refusal_of_the_leg_is_reported_with_its_joint_until_it_ends() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    let refusal = Refusal { joint: 1, reason: RefusalReason::Moving };
+    (bench.refuses, bench.velocity) = (Some(refusal), 0.5);
+    bench.orders.clear();
+    let refused = [0x81, 0x82].map(|id| Frame::new(id, &[0x0E, 0xFF, 0x81, 2, 21, 0, 0, 0]));
+    assert_eq!(bench.insist(30), refused);
+    assert_eq!((bench.read(1, 0x60FD) >> 21, bench.read(2, 0x60FD) >> 21), (0, 1));
+    // The leg records its own refusals.
+    assert!(bench.orders.iter().all(|order| order.refused.is_none()));
+    (bench.refuses, bench.velocity) = (None, 0.0);
+    assert_eq!(bench.insist(1), [0x81, 0x82].map(|id| Frame::new(id, &[0; 8])));
+    assert_eq!((bench.drive, bench.read(2, 0x60FD) >> 21), (DriveState::OperationEnabled, 0));
+}
+
+#[test]
+fn a_refusal_under_operator_control_is_not_sent_to_hosts() {
+    let mut bench = Bench::new();
+    bench.send(0, &[1, 0]);
+    bench.held = false;
+    bench.refused = Some(Refusal { joint: 0, reason: RefusalReason::Encoder });
+    assert!(bench.run(40).iter().all(|frame| frame.id() & !3 != 0x80));
+    bench.write(1, 0x2012, 0, 0, 1);
+    assert_eq!(bench.orders.last().map(|order| order.may_return), Some([false, true]));
+}

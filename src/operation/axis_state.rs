@@ -1,0 +1,169 @@
+//! State of one axis: off, under calibration, or running.
+
+use crate::hal::{AxisCommand, AxisSample};
+use crate::leg::{Calibration, CalibrationRefusal};
+use crate::motor::{Axis, AxisFault, AxisRequest, BridgeRequest, CalibrationStep, Calibrator};
+use crate::safety::Bridges;
+
+/// Order for an axis, effective from its next tick.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Order {
+    /// Turn the outputs off.
+    Off,
+    /// Calibrate.
+    Calibrate(Calibrator),
+    /// Control the current.
+    Run(Axis),
+    /// Set the joint's position to these counts.
+    Place(i32),
+    /// Clear a fault.
+    ClearFault,
+}
+
+/// Event of an axis for the housekeeping.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outcome {
+    /// The calibration succeeded.
+    Calibrated(Calibration),
+    /// The calibration was refused.
+    Refused(CalibrationRefusal),
+    /// The interlock or an order ended the calibration.
+    Interrupted,
+    /// The axis turned its outputs off, or brakes.
+    Fault {
+        /// Kind of fault.
+        fault: AxisFault,
+        /// A new calibration is required.
+        lost: bool,
+    },
+    /// The flash was erased. The joint may have moved by any amount during the erase, so its zero is unknown.
+    StoodStill,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Doing {
+    Nothing,
+    Calibrating(Calibrator),
+    Running(Axis),
+}
+
+/// State of one axis; see the module.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisState {
+    doing: Doing,
+    /// Fault that was already reported.
+    faulted: Option<AxisFault>,
+}
+
+impl AxisState {
+    /// Initial state: outputs off.
+    pub const OFF: Self = Self { doing: Doing::Nothing, faulted: None };
+
+    /// A running axis that was calibrated elsewhere.
+    #[must_use]
+    pub const fn running(axis: Axis) -> Self {
+        Self { doing: Doing::Running(axis), faulted: None }
+    }
+
+    /// Returns whether the axis has a calibration.
+    #[must_use]
+    pub const fn is_running(&self) -> bool {
+        matches!(self.doing, Doing::Running(_))
+    }
+
+    /// The axis, if it runs.
+    #[inline(always)]
+    pub fn axis_mut(&mut self) -> Option<&mut Axis> {
+        match &mut self.doing {
+            Doing::Running(axis) => Some(axis),
+            Doing::Nothing | Doing::Calibrating(_) => None,
+        }
+    }
+
+    /// The fault of a running axis.
+    #[must_use]
+    pub fn fault(&self) -> Option<AxisFault> {
+        match &self.doing {
+            Doing::Running(axis) => axis.fault(),
+            Doing::Nothing | Doing::Calibrating(_) => None,
+        }
+    }
+
+    /// Executes an order. Returns a calibration that it interrupts, or a lost rotor position.
+    #[inline(never)]
+    pub fn obey(&mut self, order: Order) -> Option<Outcome> {
+        match order {
+            Order::Off => {
+                let measuring = matches!(self.doing, Doing::Calibrating(_));
+                self.doing = Doing::Nothing;
+                return measuring.then_some(Outcome::Interrupted);
+            }
+            Order::Calibrate(calibrator) => self.doing = Doing::Calibrating(calibrator),
+            Order::Run(axis) => *self = Self::running(axis),
+            Order::Place(counts) => {
+                if let Some(axis) = self.axis_mut() {
+                    axis.set_counts(counts);
+                }
+            }
+            Order::ClearFault => {
+                // A lost rotor position stays lost until a new calibration, so the fault is reported again. A
+                // braking motor is released and has to be calibrated as well.
+                let fault = self.fault();
+                let is_lost = self.axis_mut().is_some_and(|axis| !axis.clear_fault());
+                self.faulted = None;
+                if is_lost {
+                    self.doing = Doing::Nothing;
+                    return fault.map(|fault| Outcome::Fault { fault, lost: true });
+                }
+            }
+        }
+        None
+    }
+
+    /// Resumes after a flash write, during which no tick ran and the bridge was off. `long` marks a stall in
+    /// which the joint's motion is unknown. Returns whether there is an axis that followed the motion before.
+    #[cold]
+    #[inline(never)]
+    pub fn stood_still(&mut self, sample: &AxisSample, long: bool) -> bool {
+        let axis = self.axis_mut();
+        axis.map(|axis| axis.resume(sample, long)).is_some()
+    }
+
+    /// Runs one PWM period. Returns the bridge's command for the next one and an event to report. With a
+    /// fault, the flag states whether the axis was requested to do anything.
+    #[inline(always)]
+    pub fn tick(
+        &mut self,
+        sample: &AxisSample,
+        bridges: Bridges,
+        target: AxisRequest,
+    ) -> (AxisCommand, Option<(Outcome, bool)>) {
+        match &mut self.doing {
+            Doing::Nothing => (AxisCommand::RELEASED, None),
+            Doing::Calibrating(_) if bridges != Bridges::Follow => self.end(Outcome::Interrupted),
+            Doing::Calibrating(calibrator) => match calibrator.tick(sample) {
+                CalibrationStep::Running(command) => (command, None),
+                CalibrationStep::Done(calibration) => self.end(Outcome::Calibrated(calibration)),
+                CalibrationStep::Refused(refusal) => self.end(Outcome::Refused(refusal)),
+            },
+            Doing::Running(running) => {
+                let request = match bridges {
+                    Bridges::Follow => target.into(),
+                    Bridges::Brake => BridgeRequest::Brake,
+                    Bridges::Release => BridgeRequest::Released,
+                };
+                let command = running.act(sample, request);
+                let event = running.fault().filter(|fault| self.faulted != Some(*fault)).map(|fault| {
+                    self.faulted = Some(fault);
+                    (Outcome::Fault { fault, lost: running.is_lost() }, request != BridgeRequest::Released)
+                });
+                (command, event)
+            }
+        }
+    }
+
+    fn end(&mut self, outcome: Outcome) -> (AxisCommand, Option<(Outcome, bool)>) {
+        self.doing = Doing::Nothing;
+        (AxisCommand::RELEASED, Some((outcome, false)))
+    }
+}
