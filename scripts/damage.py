@@ -276,7 +276,8 @@ KINDS = {
     "gain": Kind(gain, [0.03, 0.1, 0.3], {"torque_scale"}, True, False, 2, show="%g", direction="torque_scale", injected=SAME, tells_joint=False),
     "clip": Kind(clip, [0.8, 0.6, 0.3], {"saturation"}),
     "clip_one_side": Kind(clip_one_side, [0.8, 0.6, 0.3], {"saturation"}),
-    "clip_filtered": Kind(clip_filtered, [0.8, 0.6, 0.3], {"saturation"}),
+    # Its low-pass is a fault as well: 3 ms late.
+    "clip_filtered": Kind(clip_filtered, [0.8, 0.6, 0.3], {"saturation", "torque_filter", "delay"}),
     "flip_midway": Kind(flip_midway, [0.25, 0.5, 0.75], {"changed_midway"}),
     "gain_midway": Kind(gain_midway, [0.1, 0.3, 1.0], {"changed_midway"}, least_training_s=8.0),
     "swap_torques": Kind(swap_torques, [0], {"joints_swapped"}, least_joints=2, show="-"),

@@ -13,7 +13,8 @@
 use crate::base::number::Number;
 use crate::report::doubt::{CauseReport, DirectionReport, SampleFinding};
 use crate::report::findings::FindingReport;
-use crate::run::doubt::directions::{Directions, Found, label};
+use crate::run::doubt::directions::{CHANCE, Directions, Found, label};
+use crate::run::doubt::lag::{self, Lag};
 use crate::run::doubt::midway::Midway;
 use crate::run::doubt::rows::{Equations, Motion};
 use crate::run::doubt::{Doubts, Question, midway_words, sample_cause};
@@ -80,9 +81,11 @@ pub fn likely<const N: usize, const B: usize>(
     };
     let here = quality(question, &doubts.equations);
     let mut tried = refits(question);
+    // Before the delays, because a low-pass is tried only where it is clearer than a delay.
+    let lags = lag::all(&doubts.equations).into_iter().filter(|lag| lag.significance > CHANCE);
+    tried.extend(lags.map(|lag| of_lag(question, doubts, lag, here)));
     for (found, report) in doubts.found.iter().zip(&doubts.directions) {
-        let certain =
-            found.significance() > crate::run::doubt::directions::CHANCE && (!report.passed || !here.sound);
+        let certain = found.significance() > CHANCE && (!report.passed || !here.sound);
         if certain {
             tried.push(of_direction(question, doubts, found, report, here));
         }
@@ -219,11 +222,25 @@ fn unknown() -> CauseReport {
 }
 
 fn is_refusing<const N: usize, const B: usize>(doubts: &Doubts<N, B>, cause: &CauseReport) -> bool {
+    // A low-pass, or a delay of all joints, is one of the delays that refused.
+    let is_lag = cause.name == "torque_filter" || (cause.name == "delay" && cause.joint.is_none());
     cause.name == "changed_midway"
-        || doubts
-            .directions
-            .iter()
-            .any(|report| !report.passed && report.name == cause.name && report.joint == cause.joint)
+        || doubts.directions.iter().filter(|report| !report.passed).any(|report| {
+            (is_lag && report.name == "delay") || (report.name == cause.name && report.joint == cause.joint)
+        })
+}
+
+fn of_lag<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    doubts: &Doubts<N, B>,
+    lag: Lag<B>,
+    here: Quality,
+) -> Tried {
+    let sigma = doubts.sigma.map(|sigma| sigma.noise.max(sigma.segments));
+    let sound = is_sound(question, &lag.values, &sigma)
+        && agrees(question, &doubts.equations, &lag.columns, &lag.torque);
+    let remaining = here.remaining * lag.remaining.sqrt();
+    Tried { cause: lag.cause, quality: Quality { remaining, sound }, is_shared: false }
 }
 
 fn of_direction<const N: usize, const B: usize>(

@@ -10,7 +10,7 @@
 //!
 //! Each is a nonlinear least-squares problem in d and p, solved by Gauss-Newton with p eliminated (Golub and
 //! Pereyra 1973). A delay starts from the best of a scan, because its cost is not convex beyond a quarter of
-//! a period; gravity from the best of four quarters. The column of a delay is the slope of the *predicted*
+//! a period; gravity from the best of 24 directions. The column of a delay is the slope of the *predicted*
 //! torque: the slope of the measured one holds noise, which would count as information.
 //!
 //! A direction refuses when all of these hold:
@@ -49,6 +49,8 @@ const ALIKE: f64 = 0.95;
 const SEEN_SHARE: f64 = 1e-8;
 /// Range and step of a delay's scan, s.
 const SCAN_S: (f64, f64, f64) = (-0.040, 0.080, 0.004);
+/// Angles of gravity's scan.
+const GRAVITY_SCAN: usize = 24;
 /// Steps of Gauss-Newton.
 const STEPS: usize = 8;
 
@@ -217,7 +219,7 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
         let all = self.equations;
         let plain = Cow::Borrowed(all.torque.as_slice());
         match kind {
-            Kind::Delay(joint) => (Cow::Borrowed(&all.columns), Cow::Owned(all.delayed(joint, value))),
+            Kind::Delay(joint) => (Cow::Borrowed(&all.columns), Cow::Owned(all.delayed(Some(joint), value))),
             Kind::EncoderScale(joint) => (Cow::Owned(self.scaled(joint, 1.0 / (1.0 + value))), plain),
             Kind::TorqueScale(joint) => {
                 let pairs = all.columns.iter().zip(&all.places);
@@ -280,11 +282,8 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
     }
 
     fn start(&self, kind: Kind, plain: &Fit<B>) -> f64 {
-        let cost = |value: f64| {
-            let (columns, torque) = self.system(kind, value);
-            self.equations.fit(&columns, &torque, false).cost
-        };
-        let starts: Vec<f64> = match kind {
+        let cost = |system: System<'_, B>| self.equations.fit(&system.0, &system.1, false).cost;
+        let scanned: Vec<(f64, f64)> = match kind {
             Kind::Delay(_) => {
                 let largest = self.equations.largest_delay_s();
                 let (low, high, step) = SCAN_S;
@@ -292,14 +291,41 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
                 (0..=count)
                     .map(|index| low + step * index as f64)
                     .filter(|value| value.abs() < largest && value.abs() > 0.1 * step)
+                    .map(|value| (value, cost(self.system(kind, value))))
                     .collect()
             }
-            Kind::Gravity => [0.25, 0.5, 0.75].map(|turn| turn * std::f64::consts::TAU).to_vec(),
+            Kind::Gravity => {
+                let turned = self.turned_gravity();
+                (1..GRAVITY_SCAN)
+                    .map(|index| std::f64::consts::TAU * index as f64 / GRAVITY_SCAN as f64)
+                    .map(|value| {
+                        (value, cost((Cow::Owned(turned(value)), Cow::Borrowed(&self.equations.torque))))
+                    })
+                    .collect()
+            }
             _ => Vec::new(),
         };
-        let scanned = starts.into_iter().map(|value| (value, cost(value)));
-        let best = scanned.min_by(|one, other| one.1.total_cmp(&other.1));
+        let best = scanned.into_iter().min_by(|one, other| one.1.total_cmp(&other.1));
         best.filter(|best| best.1 < plain.cost).map_or(0.0, |best| best.0)
+    }
+
+    /// Columns with gravity turned by any angle, from those of three angles: the regressor is linear in
+    /// gravity.
+    fn turned_gravity(&self) -> impl Fn(f64) -> Vec<[f64; B]> {
+        let quarter = 0.5 * std::f64::consts::PI;
+        let [ahead, across, back] =
+            [0.0, quarter, 2.0 * quarter].map(|angle| self.system(Kind::Gravity, angle).0.into_owned());
+        move |angle| {
+            let (sine, cosine) = angle.sin_cos();
+            let rows = ahead.iter().zip(&across).zip(&back);
+            rows.map(|((ahead, across), back)| {
+                core::array::from_fn(|base| {
+                    let without = 0.5 * (ahead[base] + back[base]);
+                    without + cosine * 0.5 * (ahead[base] - back[base]) + sine * (across[base] - without)
+                })
+            })
+            .collect()
+        }
     }
 
     fn one(&self, kind: Kind, plain: &Fit<B>, training: &Fit<B>) -> Found<B> {

@@ -20,7 +20,7 @@ const EXPLAINED_BY_SIGN: f64 = 0.5;
 /// Part of the misfit that a change has to explain.
 const EXPLAINED_SHARE: f64 = 0.1;
 /// Part of the torque's power that lies on either side of a change. Less is a gain of the whole recording.
-const SMALLEST_SIDE: f64 = 0.1;
+const SMALLEST_SIDE: f64 = 0.02;
 /// Points of change tried in each recording.
 const POINTS: usize = 39;
 

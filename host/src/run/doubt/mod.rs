@@ -9,6 +9,7 @@
 //! | [`rows`] | filtered rows of whole recordings in double precision, weights |
 //! | [`fit`] | least squares, a further column beside it, both standard deviations |
 //! | [`directions`] | delay, encoder scale, torque scale, gravity |
+//! | [`lag`] | low-pass or delay of the torque as a cause |
 //! | [`midway`] | gain or sign of the torque that changes midway |
 //! | [`encoder`] | bias by the steps of an encoder |
 //! | [`noise`] | noise of the torque at the recording's own rate |
@@ -22,6 +23,7 @@ pub mod cause;
 pub mod directions;
 pub mod encoder;
 pub mod fit;
+pub mod lag;
 pub mod midway;
 pub mod noise;
 pub mod report;

@@ -340,19 +340,55 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         &self.model
     }
 
-    /// Torque of all equations, that of `joint` taken `late_s` after its angle.
+    /// Torque of all equations, that of `joint` or of all joints taken `late_s` after the angle.
     #[must_use]
-    pub fn delayed(&self, joint: usize, late_s: f64) -> Vec<f64> {
+    pub fn delayed(&self, joint: Option<usize>, late_s: f64) -> Vec<f64> {
         let pairs = self.places.iter().zip(&self.torque);
         pairs
             .map(|(place, &torque)| {
-                if place.joint == joint {
-                    self.parts[place.part].torque(joint, place.row, late_s)
+                if joint.is_none_or(|joint| joint == place.joint) {
+                    self.parts[place.part].torque(place.joint, place.row, late_s)
                 } else {
                     torque
                 }
             })
             .collect()
+    }
+
+    /// Columns of every row of every recording, those without an equation included.
+    #[must_use]
+    pub fn every_row(&self) -> Vec<Vec<[[f64; B]; N]>> {
+        let rows = self.parts.iter().map(|part| part.rows(&self.filters, &self.model, &|_| {}));
+        rows.map(|rows| rows.into_iter().map(|row| row.regressor).collect()).collect()
+    }
+
+    /// Columns of all equations, those of `joint` or of all joints behind a first-order low-pass of this time
+    /// constant. Exact where the columns of `every_row` are straight between two rows.
+    #[must_use]
+    pub fn low_passed(
+        &self,
+        every_row: &[Vec<[[f64; B]; N]>],
+        joint: Option<usize>,
+        constant_s: f64,
+    ) -> Vec<[f64; B]> {
+        let step_s = DECIMATION as f64 / SAMPLE_RATE_HZ;
+        let (decay, lag) = ((-step_s / constant_s).exp(), constant_s / step_s);
+        let behind = every_row.iter().map(|rows| {
+            let mut behind = rows.clone();
+            for at in 1..rows.len() {
+                for own in (0..N).filter(|own| joint.is_none_or(|joint| joint == *own)) {
+                    for base in 0..B {
+                        let (before, now) = (rows[at - 1][own][base], rows[at][own][base]);
+                        let rise = lag * (now - before);
+                        behind[at][own][base] =
+                            now - rise + (behind[at - 1][own][base] - before + rise) * decay;
+                    }
+                }
+            }
+            behind
+        });
+        let behind: Vec<_> = behind.collect();
+        self.places.iter().map(|place| behind[place.part][place.row][place.joint]).collect()
     }
 
     /// Torque of all equations in the other order of the joints: equation of joint `j` gets that of `of[j]`.

@@ -145,6 +145,34 @@ fn a_late_torque_is_found_at_its_size_and_refused_with_its_joint() {
     }
 }
 
+/// Motion whose torques of some joints pass a first-order low-pass.
+fn filtered(joints: &[usize], constant_s: f64) -> Motion<2> {
+    let mut motion = motion([0.0; 2], 1);
+    for &joint in joints {
+        let mut state = motion.torque[0][joint];
+        for torques in &mut motion.torque {
+            state += (1.0 - (-0.002 / constant_s).exp()) * (torques[joint] - state);
+            torques[joint] = state;
+        }
+    }
+    motion
+}
+
+#[test]
+fn a_low_pass_of_the_torque_is_not_called_a_delay() {
+    for (joints, joint) in [(&[0, 1][..], None), (&[1], Some(2))] {
+        let cause = cause_of(&question(vec![filtered(joints, 0.032)]));
+        assert_eq!((cause.name, cause.joint), ("torque_filter", joint), "{}", cause.words);
+        let (value, sigma) = (cause.value.known().expect("a time"), cause.sigma.known().expect("a time"));
+        // Half a sample for the filter's discrete form, 2 % for the slope of the sampled torque.
+        assert!((value - 32.0).abs() < 4.0 * sigma + 1.7, "{value} +- {sigma}");
+    }
+    let cause = cause_of(&question(vec![motion([0.020, 0.020], 1)]));
+    assert_eq!((cause.name, cause.joint), ("delay", None), "{}", cause.words);
+    let (value, sigma) = (cause.value.known().expect("a time"), cause.sigma.known().expect("a time"));
+    assert!((value - 20.0).abs() < 4.0 * sigma + 0.2, "{value} +- {sigma}");
+}
+
 #[test]
 fn scales_and_gravity_are_found_at_their_size() {
     let mut scaled = motion([0.0; 2], 1);

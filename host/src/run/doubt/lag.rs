@@ -1,0 +1,188 @@
+//! Torque that lags behind the angle: late, or behind a filter.
+//!
+//! ```text
+//! filter   tau        = LP(Y) p    LP: first-order low-pass of time constant T, corner 1 / (2 pi T)
+//! delay    tau(t + d) = Y p        of all joints together; of one joint it is a direction of doubt
+//! ```
+//!
+//! Why: both look alike where the motion is slow against 1 / T, but they need different corrections. Each is
+//! fitted with the parameters eliminated. The columns are filtered, not the torque taken back: that would
+//! amplify its noise, and the least misfit would belong to too short a time. The time comes from a scan and a
+//! search between its best points. Runs after a refusal only. Cost: about 25 fits of the rows for each joint
+//! and for all.
+
+use crate::report::doubt::CauseReport;
+use crate::run::doubt::fit::{Fit, score};
+use crate::run::doubt::rows::Equations;
+
+/// Times that the scan tries, s.
+const SCAN_S: [f64; 8] = [0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064, 0.128];
+/// Steps of the search between two points of the scan. Each leaves 0.62 of the interval.
+const STEPS: usize = 16;
+/// Shortest time that is searched, s.
+const SHORTEST_S: f64 = 1e-4;
+/// Share of the time constant by which the difference quotient changes it.
+const DIFFERENCE: f64 = 1e-2;
+/// Factor by which a low-pass must leave less of the misfit than a delay. On a real arm whose torque is 60 ms
+/// late it leaves 1.15 times less, by chance.
+const CLEARER: f64 = 1.25;
+/// Golden section.
+const SECTION: f64 = 0.618_033_988_749_895;
+
+/// How a torque lags.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Delay,
+    Filter,
+}
+
+/// A lag with the parameters fitted beside it.
+pub struct Lag<const B: usize> {
+    /// The lag as a cause.
+    pub cause: CauseReport,
+    /// Time over its standard deviation.
+    pub significance: f64,
+    /// Part of the misfit's power that it leaves.
+    pub remaining: f64,
+    /// Cost of the equations of the joints that lag.
+    own_cost: f64,
+    /// All parameters with it.
+    pub values: [f64; B],
+    /// Columns with it.
+    pub columns: Vec<[f64; B]>,
+    /// Torques without it.
+    pub torque: Vec<f64>,
+}
+
+/// Delay of all torques, then the low-pass of all and of each joint where it fits clearly better than a delay.
+#[must_use]
+pub fn all<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Vec<Lag<B>> {
+    let search = Search { equations, every_row: equations.every_row() };
+    let mut found = Vec::new();
+    let joints = (0..N).map(Some);
+    for joint in joints.chain((N > 1).then_some(None)) {
+        let [delay, filter] = [Kind::Delay, Kind::Filter].map(|kind| search.one(kind, joint));
+        let is_clearer = CLEARER * CLEARER * filter.own_cost < delay.own_cost;
+        // The delay of one joint is a direction of doubt.
+        found.extend(joint.is_none().then_some(delay));
+        found.extend(is_clearer.then_some(filter));
+    }
+    found
+}
+
+struct Search<'a, const N: usize, const B: usize> {
+    equations: &'a Equations<N, B>,
+    every_row: Vec<Vec<[[f64; B]; N]>>,
+}
+
+impl<const N: usize, const B: usize> Search<'_, N, B> {
+    /// Columns and torques with the lag of a joint, or of all.
+    fn system(&self, kind: Kind, joint: Option<usize>, time_s: f64) -> (Vec<[f64; B]>, Vec<f64>) {
+        let all = self.equations;
+        match kind {
+            Kind::Delay => (all.columns.clone(), all.delayed(joint, time_s)),
+            Kind::Filter => (all.low_passed(&self.every_row, joint, time_s), all.torque.clone()),
+        }
+    }
+
+    fn fit(&self, kind: Kind, joint: Option<usize>, time_s: f64) -> Fit<B> {
+        let (columns, torque) = self.system(kind, joint, time_s);
+        self.equations.fit(&columns, &torque, false)
+    }
+
+    fn one(&self, kind: Kind, joint: Option<usize>) -> Lag<B> {
+        let all = self.equations;
+        let largest_s = all.largest_delay_s();
+        let cost = |time_s: f64| self.fit(kind, joint, time_s).cost;
+        let times: Vec<f64> = SCAN_S.into_iter().filter(|&time_s| time_s < largest_s).collect();
+        let costs: Vec<f64> = times.iter().map(|&time_s| cost(time_s)).collect();
+        let best = (0..costs.len()).min_by(|&one, &other| costs[one].total_cmp(&costs[other])).unwrap_or(0);
+        let first = best.checked_sub(1).map_or(SHORTEST_S, |before| times[before]);
+        let time_s = least(first, times.get(best + 1).copied().unwrap_or(largest_s), cost);
+
+        let plain = all.fit(&all.columns, &all.torque, false).cost;
+        let (columns, torque) = self.system(kind, joint, time_s);
+        let fit = all.fit(&columns, &torque, false);
+        // A later torque is the same change as an earlier prediction.
+        let step_s = DIFFERENCE * time_s;
+        let predicted = fit.predictions(&columns);
+        let slope: Vec<f64> = match kind {
+            Kind::Delay => all.rate_of(&predicted).into_iter().map(|rate| -rate).collect(),
+            Kind::Filter => {
+                let beside = fit.predictions(&self.system(kind, joint, time_s + step_s).0);
+                beside.iter().zip(&predicted).map(|(beside, here)| (beside - here) / step_s).collect()
+            }
+        };
+        let segments: Vec<usize> = all.places.iter().map(|place| place.cluster).collect();
+        let scored = score(&fit, &columns, &torque, &slope, &all.weight, &segments);
+        let remaining = (fit.cost / plain.max(1e-300)).min(1.0);
+        let rows = fit.residuals(&columns, &torque).into_iter().zip(&all.weight).zip(&all.places);
+        let own_cost = rows
+            .filter(|(_, place)| joint.is_none_or(|joint| joint == place.joint))
+            .map(|((residual, weight), _)| (residual * weight).powi(2))
+            .sum();
+        let sigma_s = (remaining.sqrt() * scored.noise_sigma).max(scored.segment_sigma);
+        Lag {
+            cause: cause(kind, joint, time_s, sigma_s, remaining),
+            significance: time_s / sigma_s.max(1e-12),
+            remaining,
+            own_cost,
+            values: fit.values,
+            columns,
+            torque,
+        }
+    }
+}
+
+/// Place of the least cost between two times, by golden section.
+fn least(mut low: f64, mut high: f64, cost: impl Fn(f64) -> f64) -> f64 {
+    let (mut one, mut other) = (high - SECTION * (high - low), low + SECTION * (high - low));
+    let (mut at_one, mut at_other) = (cost(one), cost(other));
+    for _ in 0..STEPS {
+        if at_one < at_other {
+            (high, other, at_other) = (other, one, at_one);
+            one = high - SECTION * (high - low);
+            at_one = cost(one);
+        } else {
+            (low, one, at_one) = (one, other, at_other);
+            other = low + SECTION * (high - low);
+            at_other = cost(other);
+        }
+    }
+    0.5 * (low + high)
+}
+
+fn cause(kind: Kind, joint: Option<usize>, time_s: f64, sigma_s: f64, remaining: f64) -> CauseReport {
+    let who = joint.map_or("all joints".into(), |joint| format!("joint {}", joint + 1));
+    let (time_ms, sigma_ms) = (1e3 * time_s, 1e3 * sigma_s);
+    let explained = 100.0 * (1.0 - remaining);
+    let (name, words) = match kind {
+        Kind::Delay => ("delay", format!("torque of {who}: {time_ms:.1} +- {sigma_ms:.1} ms late")),
+        Kind::Filter => (
+            "torque_filter",
+            format!(
+                "torque of {who} behind a low-pass of {:.1} Hz (time constant {time_ms:.1} +- {sigma_ms:.1} ms): log it \
+                 before the filter, or filter the angle alike",
+                1.0 / (std::f64::consts::TAU * time_s)
+            ),
+        ),
+    };
+    CauseReport {
+        name,
+        joint: joint.map(|joint| joint + 1),
+        value: time_ms.into(),
+        sigma: sigma_ms.into(),
+        words: format!("{words}; fitted, it explains {explained:.0} % of the misfit"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::least;
+
+    #[test]
+    fn the_search_finds_a_minimum_inside_and_at_an_end() {
+        assert!((least(0.0, 2.0, |x| (x - 0.7).powi(2)) - 0.7).abs() < 1e-3);
+        assert!(least(0.5, 2.0, |x| x) < 0.501);
+    }
+}
