@@ -17,6 +17,7 @@ use crate::run::doubt::directions::{CHANCE, Directions, Found, label};
 use crate::run::doubt::lag::{self, Lag};
 use crate::run::doubt::midway::Midway;
 use crate::run::doubt::rows::{Equations, Motion};
+use crate::run::doubt::samples::SATURATION;
 use crate::run::doubt::{Doubts, Question, midway_words, sample_cause};
 
 /// Sigma by which a parameter may be negative.
@@ -61,13 +62,13 @@ struct Tried {
 pub fn likely<const N: usize, const B: usize>(
     question: &Question<N, B>,
     doubts: Option<&Doubts<N, B>>,
-    samples: &[&SampleFinding],
+    samples: &[SampleFinding],
     findings: &[FindingReport],
 ) -> CauseReport {
     if let Some(finding) = samples.iter().find(|finding| finding.refuses) {
         return sample_cause(finding);
     }
-    let Some(doubts) = doubts else { return unknown() };
+    let Some(doubts) = doubts else { return excluded(samples).unwrap_or_else(unknown) };
     if let Some(cause) = encoder_steps(question, doubts, findings) {
         return cause;
     }
@@ -123,7 +124,7 @@ pub fn likely<const N: usize, const B: usize>(
             sigma: Number::UNKNOWN,
             words: finding.words.clone(),
         },
-        (None, None) => weaker(question, doubts, here).unwrap_or_else(unknown),
+        (None, None) => weaker(question, doubts, here).or_else(|| excluded(samples)).unwrap_or_else(unknown),
     }
 }
 
@@ -208,6 +209,11 @@ fn weaker<const N: usize, const B: usize>(
     });
     let tried = likely.map(|(found, report)| of_direction(question, doubts, found, report, here));
     nearest(tried.filter(|tried| tried.quality.sound).collect())
+}
+
+/// Saturated stretches whose exclusion leaves too little to judge.
+fn excluded(samples: &[SampleFinding]) -> Option<CauseReport> {
+    samples.iter().find(|finding| finding.name == SATURATION).map(sample_cause)
 }
 
 fn unknown() -> CauseReport {

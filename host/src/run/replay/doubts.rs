@@ -221,8 +221,7 @@ pub(super) struct Subject<'a, const N: usize, const B: usize> {
 impl<const N: usize, const B: usize> Subject<'_, N, B> {
     /// Adds directions, sigma, tests and the likely cause of a refusal to the report.
     pub(super) fn examine(&self, run: &mut RunReport) -> Result<(), ToolError> {
-        let samples: Vec<&SampleFinding> =
-            self.screening.findings().iter().filter(|found| found.refuses).collect();
+        let samples = self.screening.findings();
         let (question, file_of) = self.question();
         let mut doubts =
             Doubts::of(&question).map_err(|error| bandwidth_error(self.options.bandwidth_hz, error))?;
@@ -242,7 +241,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
                 words: found.words,
             }));
         }
-        run.findings.extend(samples.iter().map(|found| sample_finding(found)));
+        run.findings.extend(samples.iter().filter(|found| found.refuses).map(sample_finding));
         let failed =
             |name: &str| run.findings.iter().any(|finding| !finding.passed && finding.reason == name);
         let before: Vec<&str> =
@@ -259,7 +258,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         });
         run.verdict = if run.accepted() { "accepted" } else { "refused" };
         if !run.accepted() {
-            let cause = cause::likely(&question, doubts.as_ref(), &samples, &run.findings);
+            let cause = cause::likely(&question, doubts.as_ref(), samples, &run.findings);
             correct_words(run, cause.name);
             report.likely_cause = Some(cause);
         }
