@@ -54,7 +54,7 @@ pub struct Lag<const B: usize> {
     pub torque: Vec<f64>,
 }
 
-/// Delay of all torques, then the low-pass of all and of each joint where it fits clearly better than a delay.
+/// Delay of all torques, then the low-pass of all and of each joint where it fits better than a delay.
 #[must_use]
 pub fn all<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Vec<Lag<B>> {
     let search = Search { equations, every_row: equations.every_row() };

@@ -15,7 +15,7 @@ use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::recording::{JointSeries, Recording};
 use crate::leg::background::Background;
 use crate::report::RunReport;
-use crate::report::doubt::{BandwidthReport, RecordingsReport, SampleFinding};
+use crate::report::doubt::{BandwidthReport, RecordingsReport};
 use crate::report::findings::FindingReport;
 use crate::run::doubt::encoder::{Encoder, Encoders};
 use crate::run::doubt::rows::{Equations, Filters, Motion};
