@@ -136,7 +136,7 @@ impl<const N: usize> CurrentLoops<N> {
         let period = self.period;
         let Some(this) = self.axes.get_mut(axis) else { return };
         let mut sample = tick.sample;
-        if let Some(stood) = this.look(tick, period, signals) {
+        if let Some(stood) = this.look(axis, tick, period, signals) {
             if stood > 0 {
                 this.late = LATE_TICKS;
             }
@@ -248,7 +248,13 @@ impl AxisLoop {
     /// Sets inhibit reasons from contacts, conversion and the time since the last tick. During a flash write
     /// missing ticks and conversions are no fault; returns the number of missed periods then.
     #[inline(always)]
-    fn look<const N: usize>(&mut self, tick: &Tick, period: NonZeroU32, signals: &Signals<N>) -> Option<u32> {
+    fn look<const N: usize>(
+        &mut self,
+        axis: usize,
+        tick: &Tick,
+        period: NonZeroU32,
+        signals: &Signals<N>,
+    ) -> Option<u32> {
         // Rounded: half a period late is one missed period, a gap of three periods two.
         let since = |last| tick.now.wrapping_sub(last).saturating_add(period.get() / 2) / period;
         let periods = self.last.map_or(1, since).saturating_sub(1);
@@ -267,7 +273,7 @@ impl AxisLoop {
         let (forbids, damp) = self.watch.look(&state);
         signals.inhibit.raise_bits(forbids);
         if damp {
-            signals.report(BoardFault::CurrentTicks, 0);
+            signals.report(BoardFault::CurrentTicks, axis);
         }
         stood
     }

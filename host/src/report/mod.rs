@@ -69,6 +69,11 @@ pub struct BaseReport {
     pub sigma: Number,
     /// What it is from: `noise`; in a replay also `segments`, `recordings` or `doubt`.
     pub sigma_from: &'static str,
+    /// Standard deviation by the noise of the torque.
+    pub sigma_noise: Number,
+    /// Standard deviation by the model's misfit: the larger of the scatter over segments and between
+    /// recordings; only in a replay.
+    pub sigma_misfit: Number,
     /// True value of the simulated leg.
     pub truth: Number,
     /// Least standard deviation of an unbiased estimator from the logged samples (Cramer-Rao).

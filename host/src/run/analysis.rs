@@ -241,6 +241,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 unit: "N m",
                 sigma: found.map_or(Number::UNKNOWN, |found| found.surplus_sigma_nm),
                 sigma_from: "noise",
+                sigma_noise: found.map_or(Number::UNKNOWN, |found| found.surplus_sigma_nm),
+                sigma_misfit: Number::UNKNOWN,
                 truth: match self.truth {
                     Some(_) => truth.map_or(0.0, |truth| truth.surplus).into(),
                     None => Number::UNKNOWN,
@@ -275,6 +277,8 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 unit: self.unit(base),
                 sigma: estimate.sigma(base).into(),
                 sigma_from: "noise",
+                sigma_noise: estimate.sigma(base).into(),
+                sigma_misfit: Number::UNKNOWN,
                 truth: truth.map(|truth| truth[base]).into(),
                 cramer_rao: cramer_rao.filter(|_| estimate.determined[base]).map(|bound| bound[base]).into(),
             })

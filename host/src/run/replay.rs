@@ -412,7 +412,7 @@ fn read_all(options: &ReplayOptions, leg: &LegFile, ratios: &[f64]) -> Result<Pa
     let whole = |recording: &Recording, training_s| Whole { recording: recording.clone(), training_s };
     let mut wholes: Vec<Whole> = training.iter().map(|file| whole(file, share(file))).collect();
     wholes.extend(held_out.iter().map(|file| whole(file, 0.0)));
-    refuse_copies(&training, &held_out)?;
+    refuse_copies(&training, &held_out, "--validate")?;
     let all: Vec<&Recording> = training.iter().chain(&held_out).collect();
     let screening = Screening::of(&all, leg, options.bandwidth_hz);
     if let Some(fraction) = options.split {

@@ -10,10 +10,20 @@ use crate::report::{
     AddedMassReport, ComparisonReport, ConsistentSearchReport, FitReport, RunReport, Source,
 };
 
-/// Table of the base parameters: value, sigma, truth and error in sigma.
+/// Table of the base parameters: value, sigma with its parts, truth and error in sigma.
 #[must_use]
 pub fn base_parameters(run: &RunReport) -> String {
-    let mut rows = headed(&["base parameter", "value", "sigma", "unit", "truth", "error/sigma", "= sum of"]);
+    let mut rows = headed(&[
+        "base parameter",
+        "value",
+        "sigma",
+        "of noise",
+        "of misfit",
+        "unit",
+        "truth",
+        "error/sigma",
+        "= sum of",
+    ]);
     for base in &run.base_parameters {
         let off = match (base.value.known(), base.truth.known(), base.sigma.known()) {
             (Some(found), Some(truth), Some(deviation)) if deviation > 0.0 => {
@@ -32,15 +42,23 @@ pub fn base_parameters(run: &RunReport) -> String {
             base.name.clone(),
             value(base.value, base.sigma),
             sigma(base.sigma),
+            sigma(base.sigma_noise),
+            sigma(base.sigma_misfit),
             base.unit.into(),
             value(base.truth, base.sigma),
             off,
             if terms.len() > 1 { terms.join(" + ").replace("+ -", "- ") } else { String::new() },
         ]);
     }
-    align_numbers(&mut rows, [1, 2, 4, 5]);
+    align_numbers(&mut rows, [1, 2, 3, 4, 6, 7]);
+    let misfit = run.base_parameters.iter().any(|base| base.sigma_misfit.known().is_some());
     let known = run.base_parameters.iter().any(|base| base.truth.known().is_some());
-    text(rows, if known { &[] } else { &[4, 5] })
+    let absent: Vec<usize> = [(misfit, [3, 4]), (known, [6, 7])]
+        .into_iter()
+        .filter(|(is_shown, _)| !is_shown)
+        .flat_map(|(_, columns)| columns)
+        .collect();
+    text(rows, &absent)
 }
 
 /// Table of all parameters with their status.

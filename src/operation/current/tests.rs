@@ -34,8 +34,8 @@ struct Bench {
     late_index: bool,
     /// Outcomes sent to the housekeeping.
     outcomes: Vec<(usize, Outcome)>,
-    /// The servo was requested to damp.
-    damped: bool,
+    /// Joints whose servo was requested to damp.
+    damped: [bool; 2],
 }
 
 impl Bench {
@@ -58,7 +58,7 @@ impl Bench {
             now: 0,
             late_index: false,
             outcomes: Vec::new(),
-            damped: false,
+            damped: [false; 2],
         };
         bench.signals.begin_servo();
         bench.run(100);
@@ -82,7 +82,9 @@ impl Bench {
         while let Some(outcome) = housekeeping.outcomes[axis].dequeue() {
             self.outcomes.push((axis, outcome));
         }
-        self.damped |= self.signals.take_reported(0).any(|fault| fault == BoardFault::CurrentTicks);
+        for (joint, damped) in self.damped.iter_mut().enumerate() {
+            *damped |= self.signals.take_reported(joint).any(|fault| fault == BoardFault::CurrentTicks);
+        }
     }
 
     /// Runs one period with a tick of every axis; if `torn`, one shunt's conversion is missing.
@@ -168,7 +170,8 @@ fn an_erasure_discards_only_the_zeros() {
         bench.late_index = false;
         bench.stand(ERASED, turns);
         bench.stored();
-        assert!(!bench.signals.has_begun() && !bench.damped);
+        assert!(!bench.signals.has_begun());
+        assert_eq!(bench.damped, [false; 2]);
         let expected = [0, 1, 0, 1].map(|axis| (axis, Outcome::StoodStill));
         assert_eq!(bench.outcomes, expected, "{turns}");
         assert_eq!(bench.causes(), 0);
@@ -211,11 +214,29 @@ fn the_same_gap_without_a_flash_write_is_a_fault() {
     let mut bench = Bench::new(&CONFIGURATION);
     bench.stand(ERASED, 0.4);
     bench.run(3);
-    assert!(bench.damped);
+    assert_eq!(bench.damped, [true; 2]);
     assert_eq!(bench.causes() & Cause::CurrentTicks.bit(), Cause::CurrentTicks.bit());
     let mut bench = Bench::new(&CONFIGURATION);
     bench.tick(true);
     assert_eq!(bench.causes(), Cause::Conversion.bit());
+}
+
+#[test]
+fn late_ticks_are_reported_for_their_own_joint() {
+    for late in [0, 1] {
+        let mut bench = Bench::new(&CONFIGURATION);
+        // The other axis' ticks are on time.
+        for period in 1..=8 {
+            bench.now = bench.now.wrapping_add(PERIOD.get());
+            for axis in 0..2 {
+                if axis != late || period > 4 {
+                    let sample = bench.motors[axis].period(AxisCommand::RELEASED);
+                    bench.tick_axis(axis, &tick_at(bench.now, sample));
+                }
+            }
+        }
+        assert_eq!(bench.damped, [late == 0, late == 1]);
+    }
 }
 
 #[test]

@@ -156,29 +156,35 @@ pub struct Doubts<const N: usize, const B: usize> {
 /// Standard deviation of a parameter in its parts.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sigma {
-    /// By noise.
+    /// Part caused by noise.
     pub noise: f64,
-    /// By scatter over segments of the recording.
+    /// Part caused by the scatter over segments of the recording.
     pub segments: f64,
-    /// By scatter between recordings; zero where it is unknown.
+    /// Part caused by the scatter between recordings; zero where unknown.
     pub recordings: f64,
-    /// By directions that are not certain.
+    /// Part caused by directions that are not certain.
     pub doubt: f64,
-    /// By the steps of the encoders.
+    /// Part caused by the steps of the encoders.
     pub encoder: f64,
 }
 
 impl Sigma {
+    /// Part caused by what the model does not explain.
+    #[must_use]
+    pub fn misfit(&self) -> f64 {
+        self.segments.max(self.recordings)
+    }
+
     /// Reported value.
     #[must_use]
     pub fn total(&self) -> f64 {
-        self.noise.max(self.segments).max(self.recordings).hypot(self.doubt).hypot(self.encoder)
+        self.noise.max(self.misfit()).hypot(self.doubt).hypot(self.encoder)
     }
 
     /// Largest part.
     #[must_use]
     pub fn source(&self) -> &'static str {
-        let scatter = self.noise.max(self.segments).max(self.recordings);
+        let scatter = self.noise.max(self.misfit());
         if self.doubt.max(self.encoder) > scatter {
             if self.encoder > self.doubt { "encoder" } else { "doubt" }
         } else if self.recordings > self.noise.max(self.segments) {

@@ -327,6 +327,8 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             let sigma = doubts.sigma[*base];
             report.sigma = sigma.total().into();
             report.sigma_from = sigma.source();
+            report.sigma_noise = sigma.noise.into();
+            report.sigma_misfit = sigma.misfit().into();
             if before > 0.0 {
                 *ratio = sigma.total() / before;
             }

@@ -5,6 +5,8 @@
 //! set of recordings determines recorded over true torque ([`scarab::ident::torque_constant_ratio`]). All
 //! torques are then divided by it before anything else.
 
+use std::path::PathBuf;
+
 use scarab::ident::{Record, Solver, torque_constant_ratio};
 use scarab::model::Payload;
 
@@ -12,7 +14,9 @@ use super::{ReplayOptions, Samples, feed, new_recorder, read_all};
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
+use crate::formats::recording::Recording;
 use crate::leg::background::Background;
+use crate::run::replay::screening::refuse_copies;
 use crate::run::scale::{Scale, base_of};
 
 /// Solves a record up to the choice of its columns.
@@ -43,6 +47,10 @@ pub(super) fn scale<const N: usize, const B: usize>(
         split: None,
         ..options.clone()
     };
+    let read = |paths: &[PathBuf]| -> Result<Vec<Recording>, ToolError> {
+        paths.iter().map(|path| Ok(Recording::read(path, leg.joints.len())?)).collect()
+    };
+    refuse_copies(&read(&options.files)?, &read(&with.files)?, "--with-payload")?;
     let (without, with) = (record(leg, background, options)?, record(leg, background, &with)?);
     let base = base_of(background, payload);
     Ok(Scale {

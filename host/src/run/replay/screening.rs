@@ -66,33 +66,37 @@ impl Screening {
 }
 
 /// Refuses recordings that hold the same samples, whatever their names: twice the same data are no second
-/// measurement, and a motion that was identified from proves nothing when it is held out.
-pub(super) fn refuse_copies(training: &[Recording], held_out: &[Recording]) -> Result<(), ToolError> {
-    for (index, one) in training.iter().enumerate() {
-        if let Some(copy) = training[index + 1..].iter().find(|other| one.joints == other.joints) {
-            return Err(ToolError::input(format!(
-                "{}: holds the same samples as {}: give every recording once",
-                copy.file.display(),
-                one.file.display()
-            )));
-        }
+/// measurement, and a motion that was identified from proves nothing when it is held out. `option` names
+/// the others.
+pub(super) fn refuse_copies(
+    training: &[Recording],
+    others: &[Recording],
+    option: &str,
+) -> Result<(), ToolError> {
+    let twice = |files: &[Recording], option: &str| {
+        let pairs = files.iter().enumerate();
+        pairs.flat_map(|(index, one)| files[index + 1..].iter().map(move |other| (one, other))).find_map(
+            |(one, copy)| {
+                (one.joints == copy.joints).then(|| {
+                    ToolError::input(format!(
+                        "{option}{}: holds the same samples as {}: give every recording once",
+                        copy.file.display(),
+                        one.file.display()
+                    ))
+                })
+            },
+        )
+    };
+    if let Some(error) = twice(training, "").or_else(|| twice(others, &format!("{option} "))) {
+        return Err(error);
     }
-    for held_out in held_out {
-        if let Some(same) = training.iter().find(|other| held_out.joints == other.joints) {
+    for other in others {
+        if let Some(same) = training.iter().find(|training| other.joints == training.joints) {
+            let hint = if option == "--validate" { " (--split holds out a part)" } else { "" };
             return Err(ToolError::input(format!(
-                "--validate {}: holds the same samples as {}, which is identified from: it cannot be held out as well \
-                 (--split holds out a part)",
-                held_out.file.display(),
+                "{option} {}: holds the same samples as {}, which is identified from: another recording is needed{hint}",
+                other.file.display(),
                 same.file.display()
-            )));
-        }
-    }
-    for (index, one) in held_out.iter().enumerate() {
-        if let Some(copy) = held_out[index + 1..].iter().find(|other| one.joints == other.joints) {
-            return Err(ToolError::input(format!(
-                "--validate {}: holds the same samples as {}: give every recording once",
-                copy.file.display(),
-                one.file.display()
             )));
         }
     }
@@ -132,10 +136,10 @@ mod tests {
     fn the_same_samples_under_another_name_are_refused() {
         let (one, copy) = (recording("a.csv", &[1.0, 2.0]), recording("./a.csv", &[1.0, 2.0]));
         let other = recording("b.csv", &[1.0, 3.0]);
-        assert!(refuse_copies(&[one.clone(), other.clone()], &[]).is_ok());
+        assert!(refuse_copies(&[one.clone(), other.clone()], &[], "--validate").is_ok());
         let refused = |training: &[&Recording], held_out: &[&Recording]| {
             let all = |list: &[&Recording]| list.iter().map(|&one| one.clone()).collect::<Vec<_>>();
-            refuse_copies(&all(training), &all(held_out)).expect_err("copies").to_string()
+            refuse_copies(&all(training), &all(held_out), "--validate").expect_err("copies").to_string()
         };
         assert!(refused(&[&one, &other, &copy], &[]).starts_with("./a.csv: holds the same samples as a.csv"));
         assert!(refused(&[&one], &[&other, &copy]).contains("which is identified from"));

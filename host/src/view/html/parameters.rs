@@ -15,13 +15,18 @@ const BAR: (f64, f64) = (150.0, 16.0);
 pub fn base(run: &RunReport) -> Markup {
     let known = run.base_parameters.iter().any(|base| base.truth.known().is_some());
     let bounded = run.base_parameters.iter().any(|base| base.cramer_rao.known().is_some());
+    let misfit = run.base_parameters.iter().any(|base| base.sigma_misfit.known().is_some());
     html! {
         h3 { "What torque determines" }
-        p { "Base parameters: the sums of parameters that show in the torque, by the swarm, with the standard deviation that \
-            the noise leaves." @if bounded { " No unbiased estimator can have a smaller one than the Cram\u{e9}r-Rao bound." } }
+        p { "Base parameters: the sums of parameters that show in the torque, by the swarm, with their standard deviation."
+            @if misfit { " Sigma is the larger of its part by noise and its part by the model's misfit, with the bias of \
+            the encoders and of what is in doubt." }
+            @if bounded { " No unbiased estimator can have a smaller one than the Cram\u{e9}r-Rao bound." } }
         div.wide { table {
             thead { tr {
-                th scope="col" { "name" } th.n scope="col" { "value" } th.n scope="col" { "sigma" } th scope="col" { "unit" }
+                th scope="col" { "name" } th.n scope="col" { "value" } th.n scope="col" { "sigma" }
+                @if misfit { th.n scope="col" { "of noise" } th.n scope="col" { "of misfit" } }
+                th scope="col" { "unit" }
                 @if known { th.n scope="col" { "truth" } th.n scope="col" { "error / sigma" } }
                 @if bounded { th.n scope="col" { "Cram\u{e9}r-Rao" } }
                 th scope="col" { "sum of" }
@@ -31,7 +36,9 @@ pub fn base(run: &RunReport) -> Markup {
                 @let off = base.value.known().zip(base.truth.known()).zip(deviation);
                 tr {
                     th scope="row" { (base.name) }
-                    td.n { (measured(base.value, base.sigma)) } td.n { (sigma(base.sigma)) } td { (unit(base.unit)) }
+                    td.n { (measured(base.value, base.sigma)) } td.n { (sigma(base.sigma)) }
+                    @if misfit { td.n { (sigma(base.sigma_noise)) } td.n { (sigma(base.sigma_misfit)) } }
+                    td { (unit(base.unit)) }
                     @if known {
                         td.n { (measured(base.truth, base.sigma)) }
                         td.n { @match off {
