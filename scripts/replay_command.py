@@ -1,4 +1,4 @@
-"""Runs `scarab replay` and reads its report; shared by `plant_coverage` and `damage_table`."""
+"""Runs `scarab replay` and reads its report; shared by the scripts that judge its verdicts."""
 
 import json
 import os
@@ -57,3 +57,19 @@ def run(command, files, leg, options=(), csv=None):
             raise SystemExit(f"error: {' '.join(arguments)}: exit code {done.returncode}\n{done.stderr}")
         content = json.loads(report.read_text()) if report.exists() else None
         return Outcome(done.returncode, content, done.stderr.strip())
+
+
+def simulated_log(command, leg, seed, folder):
+    """Log of one simulated identification, and its report, which holds the truth."""
+    log, report = Path(folder) / "log.csv", Path(folder) / "identify.json"
+    arguments = ["identify", "--leg", str(leg), "--seed", str(seed), "--log", str(log), "--json", str(report)]
+    done = subprocess.run([*command, *arguments], cwd=ROOT, capture_output=True, text=True)
+    if done.returncode not in (0, 3):
+        raise SystemExit(f"error: {' '.join(arguments)}: exit code {done.returncode}\n{done.stderr}")
+    return log, json.loads(report.read_text())
+
+
+def seeds(text):
+    """Seeds of `A..B`, both ends included."""
+    first, last = text.split("..")
+    return range(int(first), int(last) + 1)

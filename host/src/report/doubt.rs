@@ -31,6 +31,9 @@ pub struct BandwidthReport {
     /// Whether it was chosen by the encoders' steps.
     #[serde(rename = "bandwidth_chosen")]
     pub is_chosen: bool,
+    /// Larger bandwidth that the encoders allow, where the noise explains the misfit.
+    #[serde(rename = "bandwidth_proposed_hz")]
+    pub proposed_hz: Option<f64>,
 }
 
 impl BandwidthReport {
@@ -39,8 +42,12 @@ impl BandwidthReport {
         let hz = self.bandwidth_hz;
         if self.is_chosen {
             format!(
-                "bandwidth: {hz} Hz, the largest up to 16 Hz at which the encoders' steps shift no parameter by more than its \
-                 sigma"
+                "bandwidth: {hz} Hz, chosen from 3.2 to 16 Hz: the largest that the recording's rate allows and at which the \
+                 encoders' steps shift no parameter by more than its sigma, or the smallest where none is"
+            )
+        } else if let Some(larger) = self.proposed_hz {
+            format!(
+                "bandwidth: {hz} Hz; the encoders allow {larger} Hz, at which sticking biases friction less: `--bandwidth {larger}`"
             )
         } else {
             format!("bandwidth: {hz} Hz")

@@ -305,6 +305,12 @@ fn identified<const N: usize, const B: usize>(
     let validation = if validated { vec![motion(unused)] } else { Vec::new() };
     let mut run =
         background.report(&solver, verdict, &[motion(solver.record().clone())], &validation, &circumstances);
+    // A misfit above the noise may be vibration, of which a larger bandwidth lets more through.
+    let proposed_hz = if noise_is_known && !options.chooses_bandwidth {
+        Some(chosen_bandwidth(leg, &background, options)?).filter(|hz| *hz > options.bandwidth_hz)
+    } else {
+        None
+    };
     let subject = Subject {
         leg,
         background: &background,
@@ -315,6 +321,7 @@ fn identified<const N: usize, const B: usize>(
         noise: noise[0],
         screening: &screening,
         load,
+        proposed_hz,
     };
     subject.examine(&mut run)?;
     run.scale.load = options.load.as_ref().map(MassReport::from);

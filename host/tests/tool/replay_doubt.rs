@@ -94,6 +94,101 @@ fn coarse_encoders_widen_sigma_by_their_bias_and_are_refused_where_a_lower_bandw
     }
 }
 
+/// The same samples on another clock: interpolated at `rate_hz`, or with every second stamp a twentieth late.
+fn on_another_clock(samples: &[[f64; 5]], rate_hz: Option<f64>) -> Vec<[f64; 5]> {
+    let Some(rate_hz) = rate_hz else {
+        let period = samples[1][0] - samples[0][0];
+        let late = |(index, row): (usize, &[f64; 5])| {
+            let mut row = *row;
+            row[0] += if index % 2 == 1 { 0.05 * period } else { 0.0 };
+            row
+        };
+        return samples.iter().enumerate().map(late).collect();
+    };
+    let (first, last) = (samples[0][0], samples[samples.len() - 1][0]);
+    let count = ((last - first) * rate_hz).floor() as usize;
+    let at = |index: usize| {
+        let time = first + index as f64 / rate_hz;
+        let right = samples.partition_point(|row| row[0] < time).clamp(1, samples.len() - 1);
+        let (before, after) = (samples[right - 1], samples[right]);
+        let share = (time - before[0]) / (after[0] - before[0]);
+        core::array::from_fn(|column| before[column] + share * (after[column] - before[column]))
+    };
+    (0..=count).map(at).collect()
+}
+
+#[test]
+fn verdict_and_sigma_do_not_depend_on_the_time_stamps() {
+    let samples = samples();
+    let (even, _) = replay(&samples, "", 0);
+    for rate_hz in [None, Some(400.0), Some(500.0), Some(1_000.0), Some(5_000.0)] {
+        let (other, _) = replay(&on_another_clock(&samples, rate_hz), "", 0);
+        for name in NAMES {
+            let ratio = base(&other, name, "sigma") / base(&even, name, "sigma");
+            assert!((0.9..1.1).contains(&ratio), "{rate_hz:?}, {name}: {ratio:.3}");
+        }
+    }
+}
+
+#[test]
+fn a_larger_bandwidth_is_proposed_where_the_encoders_allow_it() {
+    let (at_5_hz, run) = replay(&samples(), "--bandwidth 5", 0);
+    let proposed = number(&at_5_hz["bandwidth_proposed_hz"]);
+    assert!(proposed > 5.0);
+    assert!(run.printed.contains(&format!("`--bandwidth {proposed}`")), "{}", run.printed);
+    let (there, _) = replay(&samples(), &format!("--bandwidth {proposed}"), 0);
+    assert!(there["bandwidth_proposed_hz"].is_null());
+    let (chosen, _) = replay(&samples(), "--bandwidth auto", 0);
+    assert_eq!(
+        (number(&chosen["bandwidth_hz"]), chosen["bandwidth_proposed_hz"].is_null()),
+        (proposed, true)
+    );
+}
+
+#[test]
+fn sigma_states_its_parts_by_noise_and_by_misfit() {
+    let (report, run) = replay(&samples(), "", 0);
+    assert!(run.printed.contains("of noise") && run.printed.contains("of misfit"), "{}", run.printed);
+    for name in NAMES {
+        let [sigma, noise, misfit] =
+            ["sigma", "sigma_noise", "sigma_misfit"].map(|part| base(&report, name, part));
+        assert!(
+            noise > 0.0 && misfit > 0.0 && sigma >= noise.max(misfit),
+            "{name}: {sigma} {noise} {misfit}"
+        );
+    }
+}
+
+/// Where nothing touches the leg, other damage is no contact.
+#[test]
+fn damage_of_the_recording_is_not_called_contact() {
+    let right = samples();
+    let changed = |change: &dyn Fn(usize, &mut [f64; 5])| {
+        let mut rows = right.clone();
+        rows.iter_mut().enumerate().for_each(|(index, row)| change(index, row));
+        rows
+    };
+    let half = right.len() / 2;
+    let clipped = changed(&|_, row| row[3] = row[3].clamp(-8.0, 8.0));
+    let flipped = changed(&|index, row| {
+        if index > half {
+            row[3] = -row[3];
+        }
+    });
+    for (name, rows) in
+        [("10 bits", quantised(10)), ("12 bits", quantised(12)), ("clipped", clipped), ("flipped", flipped)]
+    {
+        for bandwidth in ["8", "16"] {
+            let folder = Folder::new();
+            let (file, json) = (folder.write("walk.csv", &csv(&rows)), folder.path("report.json"));
+            let arguments = format!("replay --leg mujoco-leg --split 0.666666 --bandwidth {bandwidth}");
+            scarab(&arguments, &[&file, Path::new("--json"), &json]);
+            let report = folder.json("report.json");
+            assert!(!reasons(&report).contains(&"contact"), "{name} at {bandwidth} Hz: {report}");
+        }
+    }
+}
+
 #[test]
 fn a_right_recording_is_accepted_and_reports_every_direction() {
     let (report, run) = replay(&samples(), "", 0);

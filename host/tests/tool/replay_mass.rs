@@ -88,6 +88,9 @@ fn recordings_with_a_known_mass_determine_the_scale_of_the_torques() {
     assert!(distance(&report, &truth) < 3.0, "{}", distance(&report, &truth));
     let refusal = scarab("replay --leg x2-wearer-75kg --payload 3@knee:0.3", &[&bare]).ends_with(2);
     assert!(refusal.errors.contains("--with-payload"), "{}", refusal.errors);
+    let options = format!("replay --leg x2-wearer-75kg --payload {MASS}");
+    let copied = scarab(&options, &[&bare, Path::new("--with-payload"), &bare]).ends_with(2);
+    assert!(copied.errors.contains("holds the same samples as"), "{}", copied.errors);
 }
 
 /// Whether a number with its sigma lies within three sigma of `expected`.

@@ -133,7 +133,10 @@ impl<'a> Look<'a> {
             if look.held(values, u, &[]).share > HELD_ANGLE {
                 continue;
             }
-            for run in frozen_runs(recording, values).filter(|run| ends_in_jump(values, run, u)) {
+            // The steps of an interpolated column are hidden: its typical change is as large as they are.
+            let typical = median(&mut changes(values));
+            for run in frozen_runs(recording, values).filter(|run| ends_in_jump(values, run, u.max(typical)))
+            {
                 is_frozen[run].fill(true);
             }
         }

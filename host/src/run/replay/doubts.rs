@@ -216,6 +216,8 @@ pub(super) struct Subject<'a, const N: usize, const B: usize> {
     pub screening: &'a Screening,
     /// Base parameters of a known load, which the recorded torque contains.
     pub load: [f32; B],
+    /// Larger bandwidth that the encoders allow.
+    pub proposed_hz: Option<f64>,
 }
 
 impl<const N: usize, const B: usize> Subject<'_, N, B> {
@@ -255,6 +257,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         report.bandwidth = Some(BandwidthReport {
             bandwidth_hz: self.options.bandwidth_hz,
             is_chosen: self.options.chooses_bandwidth,
+            proposed_hz: self.proposed_hz,
         });
         run.verdict = if run.accepted() { "accepted" } else { "refused" };
         if !run.accepted() {

@@ -92,9 +92,12 @@ pub(super) fn refuse_copies(
     }
     for other in others {
         if let Some(same) = training.iter().find(|training| other.joints == training.joints) {
-            let hint = if option == "--validate" { " (--split holds out a part)" } else { "" };
+            let advice = match option {
+                "--validate" => "it cannot be held out as well (--split holds out a part)",
+                _ => "another recording is needed",
+            };
             return Err(ToolError::input(format!(
-                "{option} {}: holds the same samples as {}, which is identified from: another recording is needed{hint}",
+                "{option} {}: holds the same samples as {}, which is identified from: {advice}",
                 other.file.display(),
                 same.file.display()
             )));
