@@ -215,7 +215,9 @@ fn emergencies_are_printed_once_with_their_reason() {
     let serve = Serve::new();
     let mut client = Client::new(&serve);
     client.write(1, 0x6040, 0, 15, 2);
-    serve.waits_for("leg 1: emergency FF0E: a step towards enabled is refused: joint 1, no such step from this state");
+    serve.waits_for(
+        "leg 1: emergency FF0E: a step towards enabled is refused: joint 1, no such step from this state",
+    );
     client.enable(ENABLED);
     // A heartbeat each 50 ms, once.
     client.write(1, 0x1016, 1, 0x50 << 16 | 50, 4);

@@ -96,7 +96,8 @@ fn the_fastest_kind_decides_but_two_periods_of_the_slowest_are_awaited() {
     // Periods of SYNC and controlword, ms, which end together; time after the last frame of any kind.
     for (fast, slow, time) in [(2, 240, 480), (2, 60, 120), (2, 20, 100), (20, 60, 200), (80, 240, 800)] {
         let last = 12_000 * MS;
-        let until_last = |kind, period| cyclic(kind, last - 30 * slow * MS, period * MS, 30 * slow / period + 1);
+        let until_last =
+            |kind, period| cyclic(kind, last - 30 * slow * MS, period * MS, 30 * slow / period + 1);
         let host = sorted(&[until_last(Kind::Sync, fast), until_last(Kind::Word, slow)]);
         assert_eq!(begins(&host, last + 4000 * MS), Some(last + time * MS + 500), "{fast} {slow}");
     }

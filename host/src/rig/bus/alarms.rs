@@ -100,7 +100,10 @@ mod tests {
         assert_eq!(silent.as_deref(), Some("emergency FF0F: its host fell silent"));
         // A fault of the leg has its own line.
         let fault = alarms.fault(Some(FaultCode::Overspeed));
-        assert_eq!(fault.as_deref(), Some("overspeed (0x8400): it was faster than 1.1 times its speed limit"));
+        assert_eq!(
+            fault.as_deref(),
+            Some("overspeed (0x8400): it was faster than 1.1 times its speed limit")
+        );
         assert_eq!(alarms.fault(Some(FaultCode::Overspeed)), None);
         assert_eq!(alarms.emergency(&message(0x81, 0x8400, [1, 0, 0, 0, 0])), None);
     }

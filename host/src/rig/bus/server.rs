@@ -166,7 +166,8 @@ fn set_up(stream: &TcpStream) -> std::io::Result<()> {
     stream.set_nonblocking(true)?;
     stream.set_nodelay(true)?;
     let socket = SockRef::from(stream);
-    socket.set_tcp_keepalive(&TcpKeepalive::new().with_time(QUIET).with_interval(PROBE).with_retries(PROBES))?;
+    socket
+        .set_tcp_keepalive(&TcpKeepalive::new().with_time(QUIET).with_interval(PROBE).with_retries(PROBES))?;
     // Unacknowledged frames replace the probes.
     #[cfg(target_os = "linux")]
     socket.set_tcp_user_timeout(Some(QUIET + PROBE * PROBES))?;
