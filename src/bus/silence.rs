@@ -12,13 +12,13 @@
 //! given up   a kind later than its own 10 mean periods, at least 100 ms, when another armed kind comes
 //! ```
 //!
-//! Why the fastest: SYNC every 2 ms beside a controlword every 240 ms is missed after 480 ms instead of 2.4 s.
+//! Why the fastest: SYNC every 2 ms beside a controlword every 240 ms is missed after 480 ms, not 2.4 s.
 //! Why two periods of the slowest: a host that gives up SYNC on purpose must be heard by its next frame.
 //!
-//! A kind that stops while another one continues is thus disarmed. One that was never cyclic is ignored: single
-//! frames, set-points of an operator, a polling host. Tolerated jitter: pauses below 100 ms and bursts after
-//! them. Limits: the node cannot tell which device sends SYNC. If another device does, only 1016 detects a
-//! lost host.
+//! A kind that stops while another one continues is thus disarmed. A kind that was never cyclic is ignored:
+//! single frames, set-points of an operator, a polling host. Tolerated jitter: pauses below 100 ms and bursts
+//! after them. Limits: the node cannot tell which device sends SYNC. If another device does, only 1016
+//! detects a lost host.
 //!
 //! Cost: about 20 instructions per frame and loops over six kinds per frame and poll. Memory: 16 bytes per
 //! kind.

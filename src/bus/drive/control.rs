@@ -13,9 +13,9 @@
 //! bit 8         halt
 //! ```
 //!
-//! A controlword that asks for a step which does not exist from the present state has no effect, such as 7 or F
-//! at switch on disabled, or any step during a quick stop or with bit 7 set. It is reported (FF0E) when the
-//! host sends it newly. A repeated word is not: hosts repeat theirs while the other joint stops the leg.
+//! A controlword that asks for a step which does not exist from the present state has no effect, such as 7
+//! or F at switch on disabled, or any step during a quick stop or with bit 7 set. A new word of that kind is
+//! reported (FF0E). A repeated one is not: hosts repeat theirs while the other joint stops the leg.
 //! Source: CiA 402, controlword.
 
 use super::coupling::level;

@@ -3,8 +3,8 @@
 //! ```text
 //! capacity              what the bus carries in 100 ms of the clock; further frames are refused
 //! older than 100 ms     a set-point (`Effect::SetPoint`) is dropped; other frames are still sent
-//! full, and a stop      displaces the oldest frame that is not a stop; in a queue of stops the older one that it
-//!                       supersedes; without such a stop it is queued beyond the capacity
+//! full, and a stop      displaces the oldest frame that is not a stop, else the older stop that it
+//!                       supersedes, else it is queued beyond the capacity
 //! the client ends       its set-points are dropped, its stops sent, then every board is disconnected
 //! ```
 
