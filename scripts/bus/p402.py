@@ -1,39 +1,39 @@
 """Drive profile by `canopen.BaseNode402`: `p402.py HOST:PORT FOLDER`; `cargo sim eds --out FOLDER` first.
 
-Both joints go to OPERATION ENABLED, profile velocity, profile position, off. TPDO 1 contains the statusword
-and is sent every 20 ms, because the library waits for it before each step. The last line is `p402: ok`.
+Runs the code of docs/hosts/python-canopen.md, which enables both joints and commands a velocity. Then checks
+that velocity, profile position and off. The last line is `p402: ok`.
 """
 
 import os
+import re
 import sys
 import time
 
-import canopen
+from scarab_bus import MICRO, until
 
-from scarab_bus import MICRO, connect, until
-
-JOINTS = ((1, "hip"), (2, "knee"))
-EVENT_DRIVEN, PERIOD_MS = 255, 20
+PAGE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../docs/hosts/python-canopen.md")
+PLACEHOLDER = "127.0.0.1:PORT"
 SPEED, WAY = 0.1, 0.1
 NEW_SET_POINT, AT_ONCE = 1 << 4, 1 << 5
 ENABLED = 0x0F
 
 
-def set_up(network, number, sheet):
-    """Creates a node from its sheet, with a statusword every 20 ms."""
-    node = canopen.BaseNode402(number, sheet)
-    network.add_node(node)
-    # On a busy machine `serve` drops a controlword that waited for more than 100 ms, so it is sent again.
-    node.sdo.RESPONSE_TIMEOUT, node.sdo.MAX_RETRIES = 2.0, 3
-    node.nmt.state = "PRE-OPERATIONAL"
-    node.tpdo.read()
-    node.rpdo.read()
-    node.tpdo[1].trans_type = EVENT_DRIVEN
-    node.tpdo[1].event_timer = PERIOD_MS
-    node.tpdo[1].save()
-    node.nmt.state = "OPERATIONAL"
-    node.setup_402_state_machine()
-    return node
+def page_code():
+    """Code of the page for host programmers."""
+    with open(PAGE, encoding="utf-8") as page:
+        blocks = re.findall(r"^```python\n(.*?)^```$", page.read(), re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 1, f"{PAGE}: {len(blocks)} blocks of Python"
+    return blocks[0]
+
+
+def run_page(address, folder):
+    """Runs the page's code at this address, in the folder of the sheets. Returns its network and nodes."""
+    code = page_code()
+    assert code.count(PLACEHOLDER) == 1, f"{PAGE}: no {PLACEHOLDER}"
+    names = {}
+    os.chdir(folder)
+    exec(compile(code.replace(PLACEHOLDER, address), PAGE, "exec"), names)
+    return names["network"], names["nodes"]
 
 
 def position(node):
@@ -42,11 +42,9 @@ def position(node):
 
 
 def profile_velocity(node):
-    """Commands 0.1 rad/s until it is reached, then rest."""
-    node.op_mode = "PROFILED VELOCITY"
+    """Awaits the 0.1 rad/s that the page's code has commanded, then commands rest."""
     assert node.op_mode == "PROFILED VELOCITY", node.op_mode
     begin = position(node)
-    node.sdo[0x60FF].raw = round(SPEED / MICRO)
     until("0.1 rad/s", lambda: abs(node.sdo[0x606C].raw * MICRO - SPEED) < 0.04)
     until("0.05 rad", lambda: position(node) - begin > 0.05)
     node.sdo[0x60FF].raw = 0
@@ -73,14 +71,7 @@ def profile_position(node):
 
 def main():
     address, folder = sys.argv[1:3]
-    network = connect(address)
-    nodes = [set_up(network, number, os.path.join(folder, f"scarab-{joint}.eds")) for number, joint in JOINTS]
-    for node in nodes:
-        # The library assumes a statusword of 0 until it has received a PDO. It knows that the PDO is periodic only
-        # after the second one; until then its `check_statusword` does not wait.
-        until("switch on disabled", lambda: node.state == "SWITCH ON DISABLED")
-    for node in nodes:
-        node.state = "OPERATION ENABLED"
+    network, nodes = run_page(address, folder)
     # Bit 15: the other joint has not requested enabling yet.
     until("the leg's drive", lambda: not any(node.statusword & 1 << 15 for node in nodes))
     print("enabled by the library's state machine:", ", ".join(node.state for node in nodes))

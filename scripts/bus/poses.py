@@ -1,9 +1,9 @@
 """Stop and enable from random poses: `poses.py HOST:PORT [--poses COUNT] [--seed SEED] [--leg FILE]`.
 
 Each time the leg goes to a random pose within its range, is stopped in one of five ways that let it fall, and
-is enabled again. If enabling fails, the nodes must report the reason (a new bit of 60FD, an emergency
-message, 603F). A host that only resets faults and requests again must then succeed. The last line is
-`poses: ok`.
+is enabled again. If enabling fails, the nodes must report the reason: a new FF0E, by an emergency message or
+603F, after the history was cleared. A host that only resets faults and requests again must then succeed. An
+enabled leg must arrive in its range. The last line is `poses: ok`.
 """
 
 import argparse
@@ -21,6 +21,10 @@ WAYS = ("disable voltage", "quick stop", "reset of the nodes", "connection cut",
 STEPS = ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27))
 # Time for a fallen leg to come to rest.
 ENABLE_WITHIN_S, BACK_WITHIN_S, FALL_S = 2.0, 60.0, 1.5
+# A step towards enabled was refused.
+NOT_ENABLED = 0xFF0E
+# Time to return into the range at 0.1 rad/s from the end stops, 7 degrees outside, and the range's tolerance.
+RETURN_WITHIN_S, TOLERANCE = 20.0, math.radians(0.5)
 
 
 class Leg:
@@ -108,16 +112,43 @@ def stop(leg, way):
     time.sleep(FALL_S)
 
 
-def reason(joints, inputs):
-    """Reasons reported by the nodes why the leg is not enabled."""
+def forget(joints):
+    """Clears the errors of the past, so that they do not pass for the reason of a later refusal."""
+    for joint in joints:
+        joint.write(0x1003, 0, 0, "<B")
+        joint.emergencies.clear()
+
+
+def reason(joints):
+    """Reasons reported by the nodes since `forget` why the leg is not enabled, with the bits of 60FD."""
     found = []
-    for joint, before in zip(joints, inputs):
-        now = joint.read(0x60FD)
-        found += [f"node {joint.number}: 60FD is {now:08X}, {before:08X} before"] * (now != before)
-        found += [f"node {joint.number}: emergency {code:04X}" for code in joint.emergencies if code]
-        code = joint.read(0x603F, 0, "<H")
-        found += [f"node {joint.number}: 603F is {code:04X}"] * (code != 0)
+    for joint in joints:
+        if NOT_ENABLED in joint.emergencies or joint.read(0x603F, 0, "<H") == NOT_ENABLED:
+            found.append(f"node {joint.number}: FF0E, 60FD is {joint.read(0x60FD):08X}")
     return found
+
+
+def outside(joints, limits):
+    """Joints outside their range."""
+    places = [(joint.number, joint.position(), low, high) for joint, (low, high) in zip(joints, limits)]
+    return [f"node {number} at {place:.3f} rad, range {low:.3f} to {high:.3f}"
+            for number, place, low, high in places if not low - TOLERANCE <= place <= high + TOLERANCE]
+
+
+def arrive(joints, limits, where):
+    """Commands the nearest place within the range; the leg must arrive there. A hand may be needed if it cannot."""
+    for joint, (low, high) in zip(joints, limits):
+        joint.write(0x6060, 0, 0, "<b")
+        middle = min(max(joint.position(), low + 0.1), high - 0.1)
+        joint.write(0x607A, 0, round(middle / MICRO), "<i")
+        joint.write(0x6060, 0, 1, "<b")
+    for word in (0x0F, 0x3F):
+        for joint in joints:
+            joint.write(0x6040, 0, word, "<H")
+    until(f"{where}: return into the range", lambda: not outside(joints, limits), RETURN_WITHIN_S)
+    off_again = [joint.number for joint in joints if joint.read(0x6041, 0, "<H") & 0x6F != 0x27]
+    if off_again:
+        raise SystemExit(f"{where}: nodes {off_again} stopped on the way into the range")
 
 
 def main():
@@ -131,21 +162,22 @@ def main():
     leg = Leg(arguments.address)
     off(leg.joints)
     if not is_up(leg.joints, 10):
-        raise SystemExit(f"not enabled at the start: {reason(leg.joints, [0, 0])}")
-    inputs = [joint.read(0x60FD) for joint in leg.joints]
+        raise SystemExit(f"not enabled at the start: {reason(leg.joints)}")
+    outsiders = 0
     refused, silent, locked = 0, [], []
     for number in range(1, count + 1):
         goals = pose(leg.joints, limits, dice)
         way = dice.choice(WAYS)
         stop(leg, way)
-        for joint in leg.joints:
-            joint.emergencies.clear()
+        forget(leg.joints)
+        outsiders += bool(outside(leg.joints, limits))
         rests = [joint.position() for joint in leg.joints]
         where = f"pose {number} ({', '.join(f'{goal:.2f}' for goal in goals)}), {way}, rests at {', '.join(f'{rest:.2f}' for rest in rests)}"
         if is_up(leg.joints, ENABLE_WITHIN_S):
+            arrive(leg.joints, limits, where)
             continue
         refused += 1
-        why = reason(leg.joints, inputs)
+        why = reason(leg.joints)
         print(f"{where}: not enabled; {'; '.join(why) or 'NO REASON'}", flush=True)
         if not why:
             silent.append(where)
@@ -153,6 +185,7 @@ def main():
         while time.monotonic() < end:
             off(leg.joints)
             if is_up(leg.joints, ENABLE_WITHIN_S):
+                arrive(leg.joints, limits, where)
                 break
         else:
             locked.append(where)
@@ -161,7 +194,7 @@ def main():
             break
     off(leg.joints)
     leg.close()
-    print(f"{number} poses, {refused} not enabled at once, {len(silent)} of them without a reason, {len(locked)} locked out")
+    print(f"{number} poses, {outsiders} rests outside the range, {refused} not enabled at once, {len(silent)} of them without a reason, {len(locked)} locked out")
     if silent or locked:
         raise SystemExit("poses: failed")
     print("poses: ok")

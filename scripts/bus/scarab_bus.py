@@ -129,7 +129,7 @@ class Heartbeat:
 def enable(joints):
     """Sends 6, 7, F; a leg is enabled once all of its joints have requested it.
 
-    A stop is awaited first, such as that of a lost host: a word sent while it lasts is not kept for later.
+    A stop is awaited first, such as that of a lost host: a word sent while it lasts is refused (FF0E, reason 23).
     """
     for joint in joints:
         until(f"the end of the stop of node {joint.number}", lambda: joint.read(0x6041, 0, "<H") & 0x6F != 0x07)

@@ -101,7 +101,7 @@ def enable(port):
         port.write(node, 0x6040, 0, 0x80, 2)
         port.write(node, 0x6040, 0, 0, 2)
     for node in NODES:
-        # A word that is sent while a stop lasts is not kept for later.
+        # A word that is sent while a stop lasts is refused (FF0E, reason 23).
         end = time.monotonic() + 10
         while port.value(node, 0x6041) & 0x6F == 0x07 and time.monotonic() < end:
             time.sleep(0.02)

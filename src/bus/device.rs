@@ -345,15 +345,20 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
 
     /// Updates the refusal of a step towards enabled, and its error report.
     fn explain(&mut self, status: &LegStatus<N>, asked: bool) {
-        let before = self.refusal.filter(|refusal| self.hosted && still(status, *refusal));
+        let joint = self.axes.iter().position(Axis::is_out_of_order);
+        let order = joint.map(|joint| Refusal { joint: joint as u8, reason: RefusalReason::NoTransition });
+        let order = order.filter(|_| self.hosted);
+        let lasts = |refusal: &Refusal| Some(*refusal) == order || self.hosted && still(status, *refusal);
+        let before = self.refusal.filter(lasts);
         let own = status.stands_against().filter(|_| asked && self.hosted);
         let own = own.map(|reason| Refusal { joint: Refusal::LEG, reason });
-        self.refusal = status.refused.filter(|_| self.hosted).or(own).or(before);
+        self.refusal = status.refused.filter(|_| self.hosted).or(own).or(before).or(order);
         if self.refusal.is_some() && self.refusal == before {
             return;
         }
         // The leg records its own refusals.
-        self.noted = self.refusal.filter(|refusal| refusal.joint == Refusal::LEG).or(self.noted);
+        let is_own = |refusal: &Refusal| refusal.joint == Refusal::LEG || Some(*refusal) == order;
+        self.noted = self.refusal.filter(is_own).or(self.noted);
         let report = self.refusal.map(|refusal| {
             let [low, high, ..] = status.causes.to_le_bytes();
             let information = [refusal.number(), refusal.reason as u8, low, high, 0];
@@ -417,6 +422,8 @@ fn still<const N: usize>(status: &LegStatus<N>, refusal: Refusal) -> bool {
     let lasts = match refusal.reason {
         RefusalReason::Moving => joint.velocity.0.abs() > RETURN_SPEED,
         RefusalReason::OutOfRange => joint.inputs & refusal.reason.bit() != 0,
+        // The joint's controlword decides, not the leg.
+        RefusalReason::NoTransition => false,
         _ => joint.drive == DriveState::SwitchedOn,
     };
     lasts && joint.drive != DriveState::OperationEnabled

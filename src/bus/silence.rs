@@ -7,15 +7,21 @@
 //! kind       SYNC, each received PDO, the controlword written by SDO; each has its own cycle
 //! armed      after 20 frames of one kind; each interval at most 250 ms, and at most max(4 means, 50 ms)
 //! mean       mean interval; once armed a moving mean over about 16, so that a host may change its rate
-//! silent     when all armed kinds have exceeded 10 mean periods, at least 100 ms
+//! silent     when no armed kind has come for 10 mean periods of the fastest one, at least 100 ms, and for 2
+//!            of the slowest one
+//! given up   a kind later than its own 10 mean periods, at least 100 ms, when another armed kind comes
 //! ```
 //!
-//! A kind that stops while another one continues is ignored. So is one that was never cyclic: single frames,
-//! set-points of an operator, a polling host. Tolerated jitter: pauses below 100 ms and bursts after them.
-//! Limits: the node cannot tell which device sends SYNC. If another device does, only 1016 detects a lost
-//! host.
+//! Why the fastest: SYNC every 2 ms beside a controlword every 240 ms is missed after 480 ms, not 2.4 s.
+//! Why two periods of the slowest: a host that gives up SYNC on purpose must be heard by its next frame.
 //!
-//! Cost: about 20 instructions per frame and a loop over six kinds per poll. Memory: 16 bytes per kind.
+//! A kind that stops while another one continues is thus disarmed. A kind that was never cyclic is ignored:
+//! single frames, set-points of an operator, a polling host. Tolerated jitter: pauses below 100 ms and bursts
+//! after them. Limits: the node cannot tell which device sends SYNC. If another device does, only 1016
+//! detects a lost host.
+//!
+//! Cost: about 20 instructions per frame and loops over six kinds per frame and poll. Memory: 16 bytes per
+//! kind.
 
 use super::pdo::PDOS;
 
@@ -30,6 +36,8 @@ const SLACK_US: u32 = 50_000;
 /// Timeout in mean periods, and its lower bound, us.
 const PERIODS: u64 = 10;
 const LEAST_US: u64 = 100_000;
+/// Mean periods of the slowest kind that the timeout covers.
+const SLOWEST_PERIODS: u64 = 2;
 
 /// Kind of frame that a host may send cyclically.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,9 +87,13 @@ impl Cycle {
         self.count = self.count.saturating_add(1).min(ARMED);
     }
 
-    fn due_us(&self) -> Option<u64> {
-        let time_us = (PERIODS * u64::from(self.mean_us)).max(LEAST_US);
-        (self.count >= ARMED).then(|| self.last_us + time_us)
+    const fn is_armed(&self) -> bool {
+        self.count >= ARMED
+    }
+
+    /// Timeout of this kind alone, us.
+    fn time_us(&self) -> u64 {
+        (PERIODS * u64::from(self.mean_us)).max(LEAST_US)
     }
 }
 
@@ -94,15 +106,25 @@ pub struct Silence {
 impl Silence {
     /// Handles a frame of a kind.
     pub fn heard(&mut self, kind: Kind, now_us: u64) {
-        if let Some(cycle) = self.cycles.get_mut(kind.place()) {
-            cycle.heard(now_us);
+        let Some(cycle) = self.cycles.get_mut(kind.place()) else { return };
+        cycle.heard(now_us);
+        if cycle.is_armed() {
+            // The host still sends, so a kind that is late was given up.
+            let is_late = |other: &&mut Cycle| other.is_armed() && now_us > other.last_us + other.time_us();
+            self.cycles.iter_mut().filter(is_late).for_each(|other| *other = Cycle::default());
         }
     }
 
     /// Whether the host has just fallen silent; reported once, until it is cyclic again.
     pub fn begins(&mut self, now_us: u64) -> bool {
-        let due = self.cycles.iter().filter_map(Cycle::due_us).max();
-        let begins = due.is_some_and(|due| now_us > due);
+        let (mut last_us, mut time_us, mut slowest_us) = (0, u64::MAX, 0);
+        for cycle in self.cycles.iter().filter(|cycle| cycle.is_armed()) {
+            last_us = last_us.max(cycle.last_us);
+            time_us = time_us.min(cycle.time_us());
+            slowest_us = slowest_us.max(SLOWEST_PERIODS * u64::from(cycle.mean_us));
+        }
+        // Without an armed kind the time never ends.
+        let begins = now_us > last_us.saturating_add(time_us.max(slowest_us));
         if begins {
             *self = Self::default();
         }

@@ -42,6 +42,8 @@ pub enum RefusalReason {
     Moving = 21,
     /// The encoder reading of this tick was rejected.
     Encoder = 22,
+    /// CiA 402 has no such step from the joint's state, or bit 7 of the controlword is set.
+    NoTransition = 23,
 }
 
 impl RefusalReason {

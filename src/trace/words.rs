@@ -74,6 +74,7 @@ pub const fn refusal(reason: RefusalReason) -> &'static str {
         RefusalReason::OutOfRange => "out_of_range",
         RefusalReason::Moving => "moving",
         RefusalReason::Encoder => "encoder",
+        RefusalReason::NoTransition => "no_transition",
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod common;
 mod complete_drive;
+mod end_stop;
 mod friction;
 mod integration;
 mod mechanism;

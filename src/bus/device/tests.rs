@@ -420,6 +420,9 @@ fn each_refusal_reason_is_reported_once_until_it_ends() {
             noted.iter().map(|noted| (noted.number(), noted.reason as u8)).collect::<Vec<_>>(),
             [(0, reason)]
         );
+        // The first word of a new attempt ends it.
+        bench.send(0x201, &[0, 0]);
+        bench.send(0x202, &[0, 0]);
         (bench.held, bench.blocked, bench.rests) = (true, false, false);
         let over = [0x81, 0x82].map(|id| Frame::new(id, &[0; 8]));
         assert_eq!(emergencies(bench.run(8)), over, "{reason}");
@@ -454,4 +457,87 @@ fn a_refusal_under_operator_control_is_not_sent_to_hosts() {
     assert!(bench.run(40).iter().all(|frame| frame.id() & !3 != 0x80));
     bench.write(1, 0x2012, 0, 0, 1);
     assert_eq!(bench.orders.last().map(|order| order.may_return), Some([false, true]));
+}
+
+/// Emergency messages of both nodes: a step of this joint that does not exist, and its end.
+fn out_of_order(joint: u8) -> [[Frame; 2]; 2] {
+    let message = |data: [u8; 8]| [0x81, 0x82].map(|id| Frame::new(id, &data));
+    [message([0x0E, 0xFF, 0x81, joint, 23, 0, 0, 0]), message([0; 8])]
+}
+
+impl Bench {
+    /// Sends a controlword to both nodes; returns their emergency messages.
+    fn word(&mut self, word: u8) -> Vec<Frame> {
+        let mut sent = self.send(0x201, &[word, 0]);
+        sent.extend(self.send(0x202, &[word, 0]));
+        sent.retain(|frame| matches!(frame.id(), 0x81 | 0x82));
+        sent
+    }
+}
+
+#[test]
+fn a_step_that_does_not_exist_is_reported_until_a_step_is_made() {
+    let [begins, ends] = out_of_order(1);
+    for word in [7, 15, 0x86, 0x8F] {
+        let mut bench = Bench::new();
+        bench.send(0, &[1, 0]);
+        bench.orders.clear();
+        assert_eq!(bench.word(word), begins, "{word:x}");
+        assert_eq!((bench.drive, bench.read(1, 0x603F)), (DriveState::SwitchOnDisabled, 0xFF0E));
+        assert_eq!([1, 2].map(|node| bench.read(node, 0x60FD) >> 23), [1, 0]);
+        // Once, however often it is repeated.
+        assert_eq!((0..50).flat_map(|_| bench.word(word)).collect::<Vec<_>>(), []);
+        let noted: Vec<Refusal> = bench.orders.iter().filter_map(|order| order.refused).collect();
+        assert_eq!(noted, [Refusal { joint: 0, reason: RefusalReason::NoTransition }]);
+        // The second joint still has the word when the first one goes on.
+        let sent: Vec<Frame> = [6, 7, 15].into_iter().flat_map(|word| bench.word(word)).collect();
+        assert_eq!(sent, [out_of_order(2)[0].to_vec(), ends.to_vec()].concat(), "{word:x}");
+        assert_eq!(bench.drive, DriveState::OperationEnabled);
+        assert_eq!(bench.read(1, 0x60FD) >> 23, 0);
+    }
+}
+
+#[test]
+fn a_step_during_a_quick_stop_is_reported_as_refused() {
+    for word in [6, 7, 15] {
+        let mut bench = Bench::new();
+        bench.send(0, &[1, 0]);
+        bench.enable();
+        bench.device.hear(&Frame::new(0x201, &[2, 0]), bench.now_us, None, &NOTHING);
+        bench.run(2);
+        assert!(matches!(bench.drive, DriveState::QuickStopActive { .. }));
+        bench.device.hear(&Frame::new(0x201, &[word, 0]), bench.now_us, None, &NOTHING);
+        let mut sent = bench.run(1);
+        assert!(matches!(bench.drive, DriveState::QuickStopActive { .. }));
+        sent.retain(|frame| matches!(frame.id(), 0x81 | 0x82));
+        assert_eq!(sent, out_of_order(1)[0], "{word:x}");
+        // The word is not carried out later; sent again, a 6 is.
+        bench.run(20);
+        assert_eq!(bench.drive, DriveState::SwitchOnDisabled);
+        assert_eq!(bench.word(6), out_of_order(1)[1]);
+        assert_eq!(bench.drive, DriveState::ReadyToSwitchOn);
+    }
+}
+
+#[test]
+fn usual_words_cause_no_report_of_order() {
+    // Enabling by 6, 7, F and by 6, F; repeated words while one joint stops both; stops; fault resets.
+    let words: [&[[u8; 2]]; 7] = [
+        &[[6, 6], [7, 7], [15, 15], [15, 15], [7, 7], [15, 15], [6, 6], [0, 0]],
+        &[[6, 0], [15, 0], [15, 6], [15, 15], [15, 0], [15, 0], [0, 0]],
+        &[[6, 6], [15, 15], [2, 15], [2, 15], [2, 2], [0, 0]],
+        &[[6, 6], [15, 15], [0, 15], [0, 15], [0, 0]],
+        &[[6, 6], [15, 15], [6, 15], [6, 15], [0, 0]],
+        &[[0, 0], [0x80, 0x80], [0, 0], [6, 6], [0x80, 0x80], [0, 0]],
+        &[[6, 6], [15, 15], [0x3F, 0x1F], [0x0F, 0x0F], [0, 0]],
+    ];
+    for words in words {
+        let mut bench = Bench::new();
+        let mut sent = bench.send(0, &[1, 0]);
+        for [hip, knee] in words {
+            sent.extend(bench.send(0x201, &[*hip, 0]));
+            sent.extend(bench.send(0x202, &[*knee, 0]));
+        }
+        assert!(sent.iter().all(|frame| frame.id() & !3 != 0x80), "{words:?}: {sent:?}");
+    }
 }

@@ -12,6 +12,10 @@
 //! bit 4 rising  profile position: new set-point; bit 5 immediately, bit 6 relative; homing: start
 //! bit 8         halt
 //! ```
+//!
+//! A controlword that asks for a step which does not exist from the present state has no effect, such as 7
+//! or F at switch on disabled, or any step during a quick stop or with bit 7 set. A new word of that kind is
+//! reported (FF0E). A repeated one is not: hosts repeat theirs while the other joint stops the leg.
 //! Source: CiA 402, controlword.
 
 use super::coupling::level;
@@ -25,6 +29,8 @@ use crate::units::{
 };
 
 const RESET: u16 = 1 << 7;
+/// Bits that select the command.
+const COMMAND: u16 = RESET | 0xF;
 const NEW: u16 = 1 << 4;
 const IMMEDIATELY: u16 = 1 << 5;
 const RELATIVE: u16 = 1 << 6;
@@ -159,6 +165,8 @@ pub struct Axis {
     pub(super) commanded: bool,
     /// A step towards enabled was requested and not processed yet.
     rises: bool,
+    /// The present controlword asked for a step that does not exist.
+    is_out_of_order: bool,
     /// Reason why such a step is refused, while it lasts.
     pub(in crate::bus) refused: Option<ErrorReport>,
 }
@@ -200,6 +208,7 @@ impl Axis {
             fault: None,
             commanded: false,
             rises: false,
+            is_out_of_order: false,
             refused: None,
         }
     }
@@ -231,6 +240,13 @@ impl Axis {
         core::mem::take(&mut self.rises)
     }
 
+    /// Whether the present controlword asked in vain for a step that does not exist in CiA 402. A fault says
+    /// itself why there is no step.
+    pub(in crate::bus) const fn is_out_of_order(&self) -> bool {
+        self.is_out_of_order
+            && matches!(self.own, DriveState::SwitchOnDisabled | DriveState::QuickStopActive { .. })
+    }
+
     /// Returns the state of the leg's drive.
     #[must_use]
     pub const fn drive(&self) -> DriveState {
@@ -256,21 +272,23 @@ impl Axis {
     /// Handles a controlword.
     pub(super) fn control(&mut self, word: u16) {
         let rising = word & !self.controlword;
+        let is_new = (word ^ self.controlword) & COMMAND != 0;
         self.controlword = word;
         self.commanded |= word != 0;
         if rising & RESET != 0 {
             self.resets = self.own.fault().is_some();
         }
+        let wanted = match word & 0xF {
+            0b0110 | 0b1110 => 1,
+            0b0111 => 2,
+            0b1111 => 3,
+            _ => 0,
+        };
         if word & RESET == 0 {
-            let wanted = match word & 0xF {
-                0b0110 | 0b1110 => 1,
-                0b0111 => 2,
-                0b1111 => 3,
-                _ => 0,
-            };
             self.rises |= wanted > level(self.own);
             self.ask(word);
         }
+        self.is_out_of_order = (is_new || self.is_out_of_order) && wanted > level(self.own);
         self.taken &= word & NEW != 0;
         if rising & NEW == 0 || !self.is_powered() {
             return;
@@ -328,7 +346,7 @@ impl Axis {
             _ => {}
         }
         // Bits held down are released, so that the next controlword has rising edges.
-        self.controlword = 0;
+        (self.controlword, self.is_out_of_order) = (0, false);
         self.taken = false;
     }
 

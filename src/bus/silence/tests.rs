@@ -91,6 +91,30 @@ fn a_kind_that_stops_while_another_continues_is_ignored() {
     assert_eq!(begins(&sorted(&parts), 6000 * MS), Some(last + 100 * MS + 500));
 }
 
+#[test]
+fn the_fastest_kind_decides_but_two_periods_of_the_slowest_are_awaited() {
+    // Periods of SYNC and controlword, ms, which end together; time after the last frame of any kind.
+    for (fast, slow, time) in [(2, 240, 480), (2, 60, 120), (2, 20, 100), (20, 60, 200), (80, 240, 800)] {
+        let last = 12_000 * MS;
+        let until_last =
+            |kind, period| cyclic(kind, last - 30 * slow * MS, period * MS, 30 * slow / period + 1);
+        let host = sorted(&[until_last(Kind::Sync, fast), until_last(Kind::Word, slow)]);
+        assert_eq!(begins(&host, last + 4000 * MS), Some(last + time * MS + 500), "{fast} {slow}");
+    }
+}
+
+#[test]
+fn a_host_that_gives_up_its_fastest_kind_is_not_silent() {
+    // SYNC at 2 ms ends at 6 s in any phase of the controlword, which goes on every 240 ms.
+    for phase in (0..240).step_by(20) {
+        let word = cyclic(Kind::Word, phase * MS, 240 * MS, 40);
+        let last = phase * MS + 39 * 240 * MS;
+        let host = sorted(&[cyclic(Kind::Sync, 0, 2 * MS, 3000), word]);
+        // The controlword alone has ten of its own periods.
+        assert_eq!(begins(&host, last + 4000 * MS), Some(last + 2400 * MS + 500), "{phase}");
+    }
+}
+
 impl Board {
     /// Sends `count` host cycles of 2 ms: SYNC, or a frame to the first node with the controlword.
     fn cycles(&mut self, id: u16, data: &[u8], count: u32) {

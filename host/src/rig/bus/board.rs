@@ -254,6 +254,12 @@ impl<const N: usize, const B: usize> Board<N, B> {
         &mut self.memory
     }
 
+    /// Whether a frame is an emergency message of this board.
+    #[must_use]
+    pub fn is_emergency(&self, frame: &Frame) -> bool {
+        frame.full().is_some() && self.device.tells_once(frame)
+    }
+
     /// Returns the nodes.
     #[must_use]
     pub fn nodes(&self) -> &[Node; N] {

@@ -83,7 +83,8 @@ impl Effect {
     /// Returns the effect of a frame on these nodes.
     pub fn of<'a>(frame: &Frame, nodes: impl Iterator<Item = &'a Node>, now_us: u64) -> Self {
         if frame.id() == NMT {
-            return Self::Stop;
+            // Other lengths are no command.
+            return if frame.data().len() == 2 { Self::Stop } else { Self::Other };
         }
         let mut found = Recorder::default();
         for node in nodes {
@@ -160,6 +161,7 @@ mod tests {
             assert_eq!(of(&node, 0x601, &download), effect, "SDO, {word:x}");
         }
         assert_eq!(of(&node, 0, &[129, 0]), Effect::Stop);
+        assert_eq!(of(&node, 0, &[129, 0, 0]), Effect::Other);
         assert_eq!(of(&node, 0x80, &[]), Effect::Other);
         // Reading, a heartbeat, and the controlword of another node have no effect here.
         for (id, data) in [(0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0][..]), (0x750, &[5]), (0x202, &[15, 0])]

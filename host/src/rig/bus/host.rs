@@ -420,6 +420,8 @@ mod tests {
         let mut fallen = 0;
         for pose in 0..count {
             let words = format!("seed {seed}, pose {pose}");
+            // Earlier errors must not pass for the reason of a refusal.
+            NODES.into_iter().for_each(|node| host.write(node, 0x1003, 0, 0, 1).expect("a history"));
             host.told.clear();
             for tries in 0.. {
                 if enable(&mut host) {
@@ -428,6 +430,7 @@ mod tests {
                 // A refused enable is explained by FF0E and ends when the leg stops swinging.
                 let code = host.read(1, 0x603F, 0).expect("an error code");
                 assert_eq!(code, 0xFF0E, "{words}: {:?} {:x?}", host.rig().state(), host.told);
+                assert!(host.told.contains(&(1, 0xFF0E)), "{words}: {:x?}", host.told);
                 assert!(tries < 20, "{words}: {:x?}", host.told);
                 host.run(SECOND / 4);
             }

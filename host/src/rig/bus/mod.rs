@@ -8,10 +8,12 @@
 //! | [`slcan`], [`server`] | serial line protocol and TCP port for host software |
 //! | [`adapter`], [`effect`] | queue between port and bus; which frames may be sent late |
 //! | [`pace`] | real-time pace and the report of delays |
+//! | [`alarms`] | lines about faults and emergency messages |
 //! | [`storing`] | the writing of a board's flash |
 //! | [`serve`] | the complete server, in real time |
 
 pub mod adapter;
+pub mod alarms;
 pub mod board;
 pub mod effect;
 pub mod host;

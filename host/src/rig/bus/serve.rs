@@ -13,6 +13,7 @@ use crate::base::files;
 use crate::formats::kept_file::memory::{BYTES, Memory};
 use crate::formats::leg_file::LegFile;
 use crate::rig::bus::adapter::{Adapter, Dropped, MOST_AGE};
+use crate::rig::bus::alarms::Alarms;
 use crate::rig::bus::board::Board;
 use crate::rig::bus::network::Network;
 use crate::rig::bus::pace::{Pace, judge, reachable};
@@ -69,7 +70,7 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
     // Written before any client connects, so that a file error shows before a host stores anything.
     write(options.flash.as_deref(), &mut network)?;
     if let Some(warning) =
-        judge(options.speed, reachable(&network), options.legs).map_err(ToolError::input)?
+        judge(options.speed, &reachable(&network), options.legs).map_err(ToolError::input)?
     {
         eprintln!("warning: {warning}");
     }
@@ -89,17 +90,19 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
     std::io::stdout().flush().map_err(refused)?;
     let mut adapter = Adapter::new(options.bits_per_s, options.speed);
     let mut pace = Pace::new(options.speed, Instant::now(), network.now_ns());
-    let mut alarms = vec![None; options.legs];
+    let mut alarms = vec![Alarms::default(); options.legs];
     while !stop.load(Ordering::Relaxed) {
         let now = Instant::now();
         let take = |frame, since| adapter.push(frame, since, network.effect(&frame));
         let events = server.poll(now, take);
         report(&events, &mut adapter, network.now_ns());
         let due = pace.due(now, network.now_ns()).min(TICKS_PER_LOOK);
+        let mut sent_by_boards = Vec::new();
         for _ in 0..due {
             adapter.tick(&mut network, Instant::now(), |sent| {
                 if sent.sender > 0 {
                     server.tell(&sent.frame);
+                    sent_by_boards.push(*sent);
                 }
             });
         }
@@ -109,12 +112,13 @@ pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptio
             let reports = [second.report(options.speed), not_carried_out(adapter.take_dropped())];
             reports.iter().flatten().for_each(|report| eprintln!("last second: {report}"));
         }
-        for (place, (board, reported)) in network.boards().iter().zip(&mut alarms).enumerate() {
-            let alarm = board.rig.alarm();
-            if let Some(code) = alarm.filter(|_| alarm != *reported) {
-                eprintln!("leg {}: {} ({:#06x}): {}", place + 1, code.name(), code.number(), code.words());
-            }
-            *reported = alarm;
+        for (leg, (board, alarms)) in (1..).zip(network.boards().iter().zip(&mut alarms)) {
+            let fault = alarms.fault(board.rig.alarm());
+            let messages = sent_by_boards
+                .iter()
+                .filter(|sent| sent.sender == leg && board.is_emergency(&sent.frame))
+                .filter_map(|sent| alarms.emergency(&sent.frame));
+            fault.into_iter().chain(messages).for_each(|line| eprintln!("leg {leg}: {line}"));
         }
         if network.boards().iter_mut().fold(false, |kept, board| board.flashing().take_kept() | kept) {
             write(options.flash.as_deref(), &mut network)?;

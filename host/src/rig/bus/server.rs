@@ -10,6 +10,7 @@ use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
 use scarab::bus::Frame;
+use socket2::{SockRef, TcpKeepalive};
 
 use crate::rig::bus::slcan::{BELL, DONE, Heard, Line, TAKEN, tell};
 
@@ -21,6 +22,10 @@ const MOST_AT_ONCE: usize = 4096;
 const MOST_CONNECTIONS: usize = 8;
 /// Time for a refused connection to read the reason.
 const REFUSED_FOR: Duration = Duration::from_secs(1);
+/// A connection without a byte for this time is probed; without an answer it ends after all probes.
+const QUIET: Duration = Duration::from_secs(5);
+const PROBE: Duration = Duration::from_secs(1);
+const PROBES: u32 = 5;
 
 /// Event of a connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,7 +93,8 @@ pub struct Server {
 }
 
 impl Connection {
-    /// Reads and processes bytes. Returns whether no more are pending.
+    /// Reads and processes bytes. Returns whether no more are pending: a read that does not fill its buffer
+    /// has emptied the socket.
     fn hear(
         &mut self,
         client: Option<SocketAddr>,
@@ -97,11 +103,14 @@ impl Connection {
         let mut bytes = [0; MOST_AT_ONCE];
         let is_client = client == Some(self.peer);
         let gone = |why| Err(What::Gone(why, is_client));
-        let mut ended = None;
+        let (mut ended, mut is_drained) = (None, false);
         if self.heard.is_empty() {
             match self.stream.read(&mut bytes) {
                 Ok(0) => ended = Some("end of the connection"),
-                Ok(count) => self.heard.extend(&bytes[..count]),
+                Ok(count) => {
+                    is_drained = count < MOST_AT_ONCE;
+                    self.heard.extend(&bytes[..count]);
+                }
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                     return Ok(error.kind() == ErrorKind::WouldBlock);
                 }
@@ -131,7 +140,7 @@ impl Connection {
                 }
             }
         }
-        ended.map_or(Ok(false), gone)
+        ended.map_or(Ok(is_drained), gone)
     }
 
     /// Sends pending bytes, as many as the other side accepts.
@@ -149,6 +158,20 @@ impl Connection {
         }
         if self.out.len() > MOST_UNREAD { Err("4 MB left unread") } else { Ok(()) }
     }
+}
+
+/// Options of a connection. Without keep-alive a client whose machine or cable is gone would hold the channel
+/// for ever.
+fn set_up(stream: &TcpStream) -> std::io::Result<()> {
+    stream.set_nonblocking(true)?;
+    stream.set_nodelay(true)?;
+    let socket = SockRef::from(stream);
+    socket
+        .set_tcp_keepalive(&TcpKeepalive::new().with_time(QUIET).with_interval(PROBE).with_retries(PROBES))?;
+    // Unacknowledged frames replace the probes.
+    #[cfg(target_os = "linux")]
+    socket.set_tcp_user_timeout(Some(QUIET + PROBE * PROBES))?;
+    Ok(())
 }
 
 impl Server {
@@ -193,7 +216,7 @@ impl Server {
         }
         // Accepted after the client was read, so that a client that has ended does not block the next one.
         while let Ok((stream, peer)) = self.listener.accept() {
-            if stream.set_nonblocking(true).is_err() || stream.set_nodelay(true).is_err() {
+            if set_up(&stream).is_err() {
                 continue;
             }
             if let Some(client) = &self.client {
@@ -279,5 +302,81 @@ impl Server {
             false
         });
         events
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    /// A server and its client, which has opened the channel.
+    fn opened() -> (Server, TcpStream, Instant) {
+        let mut server = Server::new(([127, 0, 0, 1], 0).into()).expect("a free port");
+        let mut client = TcpStream::connect(server.address().expect("it listens")).expect("it listens");
+        client.write_all(b"C\rS8\rO\r").expect("a connection");
+        let now = Instant::now();
+        while server.client.is_none() {
+            server.poll(now, |_, _| true);
+        }
+        // The last poll left its bytes unread.
+        server.poll(now, |_, _| true);
+        (server, client, now)
+    }
+
+    /// Waits until the client's bytes have arrived.
+    fn pending(server: &Server) {
+        let stream = &server.client.as_ref().expect("a client").stream;
+        while stream.peek(&mut [0; 1]).is_err() {
+            std::thread::sleep(MS / 10);
+        }
+    }
+
+    #[test]
+    fn frames_that_arrive_at_every_poll_do_not_age() {
+        let (mut server, mut client, begin) = opened();
+        let mut ages = Vec::new();
+        for round in 1..=10 {
+            client.write_all(b"t20120F00\r").expect("a connection");
+            pending(&server);
+            let now = begin + round * 30 * MS;
+            server.poll(now, |_, since| {
+                ages.push(now - since);
+                true
+            });
+        }
+        // Each was sent after the previous poll, 30 ms before.
+        assert_eq!(ages, [30 * MS; 10]);
+    }
+
+    #[test]
+    fn bytes_left_in_the_socket_age_from_the_last_time_it_was_empty() {
+        let (mut server, mut client, begin) = opened();
+        // More than two reads take.
+        client.write_all(&b"t20120F00\r".repeat(1000)).expect("a connection");
+        let mut ages = Vec::new();
+        for round in 1..=3 {
+            pending(&server);
+            std::thread::sleep(20 * MS);
+            let now = begin + round * 30 * MS;
+            server.poll(now, |_, since| {
+                ages.push(now - since);
+                true
+            });
+        }
+        assert_eq!((ages.len(), ages[0], ages[999]), (1000, 30 * MS, 90 * MS));
+    }
+
+    #[test]
+    fn a_client_whose_cable_is_cut_is_missed() {
+        let (server, _client, _) = opened();
+        let socket = SockRef::from(&server.client.as_ref().expect("a client").stream);
+        assert!(socket.keepalive().expect("a socket"));
+        assert_eq!(socket.tcp_keepalive_time().expect("a socket"), QUIET);
+        assert_eq!(socket.tcp_keepalive_interval().expect("a socket"), PROBE);
+        assert_eq!(socket.tcp_keepalive_retries().expect("a socket"), PROBES);
+        #[cfg(target_os = "linux")]
+        assert_eq!(socket.tcp_user_timeout().expect("a socket"), Some(10 * PROBE));
     }
 }
