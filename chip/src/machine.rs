@@ -15,7 +15,7 @@ use std::rc::Rc;
 
 use scarab_host::base::error::ToolError;
 use unicorn_engine::unicorn_const::{Arch, HookType, MemType, Mode, Prot};
-use unicorn_engine::{ArmCpuModel, Context, RegisterARM as Register, Unicorn};
+use unicorn_engine::{ArmCpuModel, RegisterARM as Register, Unicorn};
 
 use crate::chip::Chip;
 use crate::image::{FLASH, FLASH_BYTES, Image};
@@ -83,7 +83,7 @@ pub enum End {
 
 /// Processor, peripherals and plant, saved.
 pub struct Snapshot {
-    context: Context,
+    registers: Vec<u32>,
     memory: Vec<u8>,
     chip: Chip,
     rest: u64,
@@ -300,10 +300,9 @@ impl Machine {
         let (ram, ccm) = memory.split_at_mut(RAM_BYTES);
         self.core.mem_read(RAM.into(), ram).map_err(broken("a read of its memory"))?;
         self.core.mem_read(CCM.into(), ccm).map_err(broken("a read of its memory"))?;
-        let context = self.core.context_init().map_err(broken("to save its registers"))?;
         let state = self.core.get_data();
         Ok(Snapshot {
-            context,
+            registers: registers().map(|register| read(&self.core, register)).collect(),
             memory,
             chip: state.chip.clone(),
             rest: state.rest,
@@ -316,12 +315,16 @@ impl Machine {
     /// Returns to a saved state, of this machine or of another with the same image.
     ///
     /// # Errors
-    /// Unicorn cannot restore its registers.
+    /// Unicorn refuses a register or the memory.
     pub fn restore(&mut self, saved: &Snapshot) -> Result<(), ToolError> {
         let (ram, ccm) = saved.memory.split_at(RAM_BYTES);
         self.core.mem_write(RAM.into(), ram).map_err(broken("a write of its memory"))?;
         self.core.mem_write(CCM.into(), ccm).map_err(broken("a write of its memory"))?;
-        self.core.context_restore(&saved.context).map_err(broken("to restore its registers"))?;
+        for (register, value) in registers().zip(&saved.registers) {
+            self.core.reg_write(register, u64::from(*value)).map_err(broken("a register"))?;
+        }
+        let status = get(&self.core, Register::XPSR);
+        put(&mut self.core, Register::APSR_NZCV, status & 0xF000_0000);
         let state = self.core.get_data_mut();
         state.chip = saved.chip.clone();
         (state.rest, state.resume) = (saved.rest, Some(saved.resume));
@@ -539,6 +542,42 @@ fn interrupt(core: &mut Core<'_>, pc: u32) -> Option<u32> {
 /// Registers of a frame but for PC and status.
 const STACKED: [Register; 6] =
     [Register::R0, Register::R1, Register::R2, Register::R3, Register::R12, Register::LR];
+
+/// Registers that a saved machine holds; Unicorn's own saved contexts belong to one instance.
+const SAVED: [Register; 21] = [
+    Register::CONTROL,
+    Register::XPSR_NZCVQG,
+    Register::R0,
+    Register::R1,
+    Register::R2,
+    Register::R3,
+    Register::R4,
+    Register::R5,
+    Register::R6,
+    Register::R7,
+    Register::R8,
+    Register::R9,
+    Register::R10,
+    Register::R11,
+    Register::R12,
+    Register::SP,
+    Register::LR,
+    Register::PRIMASK,
+    Register::BASEPRI,
+    Register::FAULTMASK,
+    Register::FPSCR,
+];
+
+/// All saved registers, as Unicorn's numbers.
+fn registers() -> impl Iterator<Item = i32> {
+    SAVED.into_iter().map(|register| register as i32).chain((0..32).map(single))
+}
+
+/// Value of a saved register; the program status is read whole.
+fn read(core: &Core<'_>, register: i32) -> u32 {
+    let register = if register == Register::XPSR_NZCVQG as i32 { Register::XPSR as i32 } else { register };
+    core.reg_read(register).map_or(0, |value| value as u32)
+}
 
 /// Number of a single-precision register for Unicorn.
 fn single(number: i32) -> i32 {

@@ -1,6 +1,7 @@
 //! Exceptions, sleep, faults, reset and saved machines, with small programs of a few instructions.
 
 use std::rc::Rc;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use scarab_chip::chip::Chip;
 use scarab_chip::image::Image;
@@ -15,6 +16,13 @@ const RAM: u32 = 0x2000_0000;
 const STIR: u32 = 0xE000_EF00;
 const ISER: u32 = 0xE000_E100;
 const IPR: u32 = 0xE000_E400;
+
+/// Only one Unicorn at a time: several in threads of one process crash.
+static ONE: Mutex<()> = Mutex::new(());
+
+fn alone() -> MutexGuard<'static, ()> {
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A program under construction: vectors, then code.
 struct Program {
@@ -100,6 +108,7 @@ fn enable(program: &mut Program, interrupt: u32, priority: u32) {
 
 #[test]
 fn an_interrupt_returns_with_all_registers_and_floats() {
+    let _alone = alone();
     let mut program = Program::new();
     enable(&mut program, 10, 0x20);
     // vmov.f32 s0, #1.0; movs r4, #7
@@ -121,11 +130,14 @@ fn an_interrupt_returns_with_all_registers_and_floats() {
 
 #[test]
 fn a_higher_level_preempts_and_a_masked_one_waits() {
+    let _alone = alone();
     let mut program = Program::new();
     enable(&mut program, 8, 0x40);
     enable(&mut program, 12, 0x20);
     // movs r2, #0x30; msr basepri, r2
-    program.put(&[0x2230, 0xF382, 0x8811]).store(STIR, 8).store(STIR, 12).store(RAM, 1);
+    program.put(&[0x2230, 0xF382, 0x8811]).store(STIR, 8).store(STIR, 12);
+    // A branch ends the block: interrupts come between blocks.
+    program.put(&[0xE7FF]).store(RAM, 1);
     // movs r2, #0; msr basepri, r2
     program.put(&[0x2200, 0xF382, 0x8811]).halt();
     program.handler(24).store(RAM + 4, 2).put(&[0x4770]);
@@ -141,6 +153,7 @@ fn a_higher_level_preempts_and_a_masked_one_waits() {
 
 #[test]
 fn a_sleeping_processor_wakes_for_a_timer_and_sleeps_on() {
+    let _alone = alone();
     let mut program = Program::new();
     // Clock of TIM5 at 16 MHz; prescaler 16, top 999: every millisecond.
     program.store(0x4002_3840, 1 << 3);
@@ -162,6 +175,7 @@ fn a_sleeping_processor_wakes_for_a_timer_and_sleeps_on() {
 
 #[test]
 fn an_access_without_memory_is_a_hard_fault_with_its_address() {
+    let _alone = alone();
     let mut program = Program::new();
     // ldr r1, [r0]
     program.constant(0, 0x6000_0000).put(&[0x6801]).halt();
@@ -177,6 +191,7 @@ fn an_access_without_memory_is_a_hard_fault_with_its_address() {
 
 #[test]
 fn the_watchdog_resets_a_program_that_does_not_feed_it() {
+    let _alone = alone();
     let mut program = Program::new();
     program.store(0x4000_3000, 0x5555).store(0x4000_3008, 99).store(0x4000_3000, 0xCCCC).halt();
     let mut machine = program.machine();
@@ -189,6 +204,7 @@ fn the_watchdog_resets_a_program_that_does_not_feed_it() {
 
 #[test]
 fn a_fault_within_a_hard_fault_locks_up() {
+    let _alone = alone();
     let mut program = Program::new();
     program.constant(0, 0x6000_0000).put(&[0x6801]);
     program.handler(3).put(&[0x6801]).halt();
@@ -201,6 +217,7 @@ fn a_fault_within_a_hard_fault_locks_up() {
 
 #[test]
 fn a_restored_machine_runs_as_the_first_one_did() {
+    let _alone = alone();
     let mut program = Program::new();
     // adds r4, #1; str r4, [r0]; b
     program.constant(0, RAM).put(&[0x2400, 0x3401, 0x6004, 0xE7FC]);

@@ -150,7 +150,7 @@ mod tests {
         let access = &mut Access { now: 1000, findings: &mut findings };
         drivers.set_enabled(true, access);
         access.now += READY;
-        let mut ask = |drivers: &mut Drivers, word: u16, access: &mut Access<'_>| {
+        let ask = |drivers: &mut Drivers, word: u16, access: &mut Access<'_>| {
             access.now += 10_000;
             drivers.frame(&Sent { word, ..FRAME }, [true, false], access)
         };
