@@ -1,5 +1,6 @@
 //! Command line of `cargo chip`.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::rc::Rc;
@@ -17,7 +18,7 @@ use crate::machine::Options;
 use crate::report::ChipReport;
 use crate::session::{Session, Step};
 use crate::time::seconds;
-use crate::{faults, hangs, sampling, stops, store_cuts};
+use crate::{faults, hangs, sampling, serve, stops, store_cuts};
 
 /// Runs the flash image on a model of its microcontroller.
 #[derive(Parser, Debug)]
@@ -37,6 +38,8 @@ enum Command {
     Sampling(Common),
     /// Cut the power at every word of a save and within an erase.
     StoreCuts(Common),
+    /// Put the image on the simulated bus, for existing host software.
+    Serve(ServeArguments),
     /// Inject rows of the fault catalogue.
     Faults(FaultArguments),
     /// Let each level hang and watch the watchdog.
@@ -88,6 +91,18 @@ struct StopArguments {
 }
 
 #[derive(Args, Debug)]
+struct ServeArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Address of the port that speaks slcan.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:29536")]
+    slcan: SocketAddr,
+    /// Serve for so many simulated seconds instead of for ever.
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+}
+
+#[derive(Args, Debug)]
 struct FaultArguments {
     #[command(flatten)]
     common: Common,
@@ -123,6 +138,7 @@ pub fn main() -> ExitCode {
         Command::Stops(arguments) => run_stops(&arguments),
         Command::Sampling(common) => run_sampling(&common),
         Command::StoreCuts(common) => run_store_cuts(&common),
+        Command::Serve(arguments) => run_serve(&arguments),
         Command::Faults(arguments) => run_faults(&arguments),
         Command::Hangs(arguments) => run_hangs(&arguments),
     };
@@ -140,7 +156,7 @@ impl Common {
     fn session(&self) -> Result<Session, ToolError> {
         let leg = LegFile::load_for_image(&self.leg, false)?;
         let options =
-            build::Options { leg: leg.clone(), log: false, brake_resistor: false, board_volts: None };
+            build::Options { leg: leg.clone(), log: false, brake_resistor: true, board_volts: None };
         let path = match &self.image {
             Some(path) => path.clone(),
             None => build::build(&options)?,
@@ -162,6 +178,7 @@ fn run(arguments: &RunArguments) -> Result<bool, ToolError> {
     let begun = Instant::now();
     let common = &arguments.common;
     let mut session = common.session()?;
+    session.prints = true;
     let outcome = operate(&mut session, arguments);
     if let Some(path) = &arguments.records {
         files::write(path, &session.probe.text())?;
@@ -307,6 +324,20 @@ fn run_store_cuts(common: &Common) -> Result<bool, ToolError> {
     report.violations.iter().for_each(|violation| println!("violation: {violation}"));
     common.write(&report)?;
     Ok(report.violations.is_empty())
+}
+
+fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {
+    let mut session = arguments.common.session()?;
+    session.boot()?;
+    for step in [Step::Calibrate, Step::Reference] {
+        session.step(step)?;
+    }
+    // A host enables; the leg is let go where it was moved to.
+    session.hold_switch(true);
+    session.machine.chip_mut().can.connected = false;
+    serve::serve(&mut session, arguments.slcan, arguments.seconds)?;
+    print_findings(&session);
+    Ok(crate::report::findings(&session).0.is_empty())
 }
 
 fn run_faults(arguments: &FaultArguments) -> Result<bool, ToolError> {

@@ -20,6 +20,7 @@
 //! | [`stops`], [`sampling`] | emergency stops over the PWM period; sampling instants |
 //! | [`store_cuts`], [`hangs`] | power cuts within flash operations; levels that hang |
 //! | [`faults`] | rows of the fault catalogue |
+//! | [`serve`] | the image on the simulated bus, for existing host software |
 //! | [`cli`] | the command line |
 
 #![expect(
@@ -41,6 +42,7 @@ pub mod plant;
 pub mod report;
 pub mod rtt;
 pub mod sampling;
+pub mod serve;
 pub mod session;
 pub mod stops;
 pub mod store_cuts;

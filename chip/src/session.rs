@@ -48,7 +48,13 @@ pub struct Session {
     pub leg: LegFile,
     /// Resets so far.
     pub resets: Vec<ResetReason>,
+    /// Whether records of the timeline are printed as they come.
+    pub prints: bool,
 }
+
+/// Records that are printed as they come.
+const TIMELINE: [&str; 9] =
+    ["boot", "crash", "refused", "gate_driver", "state", "not_enabled", "fault", "axis_fault", "calibration"];
 
 impl Session {
     /// Powers a board with this image and leg.
@@ -60,7 +66,7 @@ impl Session {
         let plant = Plant::new(&leg.description::<JOINTS>()?, &drives, seed);
         let machine = Machine::new(image, Chip::new(plant, seed), options)?;
         let probe = Probe::new(&machine)?;
-        Ok(Self { machine, probe, leg: leg.clone(), resets: Vec::new() })
+        Ok(Self { machine, probe, leg: leg.clone(), resets: Vec::new(), prints: false })
     }
 
     /// Present time.
@@ -90,9 +96,21 @@ impl Session {
                 // Nothing runs until the power is back.
                 End::PowerCut => return Ok(()),
             }
+            let from = self.probe.lines.len();
             self.probe.poll(&mut self.machine);
+            if self.prints {
+                self.print(from);
+            }
         }
         Ok(())
+    }
+
+    fn print(&self, from: usize) {
+        for (at, line) in &self.probe.lines[from..] {
+            if line.split(' ').next().is_some_and(|kind| TIMELINE.contains(&kind)) {
+                println!("{:9.3} s  {line}", seconds(*at));
+            }
+        }
     }
 
     /// Runs until a record of this kind with these words comes.

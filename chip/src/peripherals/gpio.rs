@@ -30,6 +30,26 @@ struct Port {
     /// Pins with a level from outside, and those levels.
     driven: u32,
     levels: u32,
+    /// Levels as the inputs see them.
+    inputs: u32,
+}
+
+impl Port {
+    /// Computes the levels that the inputs see.
+    fn look(&mut self) {
+        self.inputs = 0;
+        for pin in 0..16 {
+            let bit = match self.mode >> (2 * pin) & 3 {
+                // An analog pin's input is off.
+                3 => 0,
+                // An open drain that is not pulled down follows the outside.
+                1 if self.kind >> pin & 1 == 0 || self.output >> pin & 1 == 0 => self.output >> pin & 1,
+                _ if self.driven >> pin & 1 == 1 => self.levels >> pin & 1,
+                _ => u32::from(self.pull >> (2 * pin) & 3 == 1),
+            };
+            self.inputs |= bit << pin;
+        }
+    }
 }
 
 /// State of all ports.
@@ -64,6 +84,7 @@ impl Gpio {
                 _ => (0, 0, 0),
             };
             *port = Port { mode, speed, pull, driven: port.driven, levels: port.levels, ..Port::default() };
+            port.look();
         }
     }
 
@@ -102,24 +123,7 @@ impl Gpio {
     /// Level of a pin as its input sees it.
     #[must_use]
     pub fn level(&self, (port, pin): Pin) -> bool {
-        self.inputs(index(port)) >> pin & 1 == 1
-    }
-
-    fn inputs(&self, port: usize) -> u32 {
-        let port = &self.ports[port];
-        let mut value = 0;
-        for pin in 0..16 {
-            let bit = match port.mode >> (2 * pin) & 3 {
-                // An analog pin's input is off.
-                3 => 0,
-                // An open drain that is not pulled down follows the outside.
-                1 if port.kind >> pin & 1 == 0 || port.output >> pin & 1 == 0 => port.output >> pin & 1,
-                _ if port.driven >> pin & 1 == 1 => port.levels >> pin & 1,
-                _ => u32::from(port.pull >> (2 * pin) & 3 == 1),
-            };
-            value |= bit << pin;
-        }
-        value
+        self.ports[index(port)].inputs >> pin & 1 == 1
     }
 
     /// Reads a register of a port, by the offset from port A.
@@ -131,7 +135,7 @@ impl Gpio {
             0x04 => port.kind,
             0x08 => port.speed,
             0x0C => port.pull,
-            0x10 => self.inputs(number),
+            0x10 => port.inputs,
             0x14 => port.output,
             0x18 | 0x1C => 0,
             0x20 => port.functions[0],
@@ -166,6 +170,7 @@ impl Gpio {
             0x24 => port.functions[1] = value,
             other => access.refuse(NO_REGISTER, name(number, other)),
         }
+        port.look();
     }
 }
 

@@ -54,8 +54,7 @@ impl Outputs {
     pub fn follow(&mut self, timer: &Timer, now: Ticks) -> (i32, u32) {
         let main = timer.main_output() & MOE != 0;
         let (mut edges, mut count) = (0, 0);
-        for (channel, reference) in self.references.iter_mut().enumerate() {
-            let level = timer.reference(channel, now);
+        for (reference, level) in self.references.iter_mut().zip(timer.references(now)) {
             if level != reference.level {
                 edges += if level { 1 } else { -1 };
                 count += 1;
@@ -93,12 +92,13 @@ impl Outputs {
         }
         let dead = dead_time(timer.main_output()) * timer.dead_time_clock();
         let mut next = NEVER;
+        let place = timer.runs().then(|| timer.place(now));
         for (channel, reference) in self.references.iter().enumerate() {
             if reference.since + dead > now {
                 next = next.min(reference.since + dead);
             }
-            if let (true, Some([rise, fall])) = (timer.runs(), timer.edges(channel)) {
-                next = next.min(timer.next(if reference.level { fall } else { rise }, now));
+            if let (Some(place), Some([rise, fall])) = (&place, timer.edges(channel)) {
+                next = next.min(place.next(if reference.level { fall } else { rise }));
             }
         }
         next

@@ -66,6 +66,24 @@ pub enum Event {
     Match,
 }
 
+/// Place of a running counter: start and phase of the present count.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    begun: Ticks,
+    length: Ticks,
+    period: u64,
+    phase: u64,
+}
+
+impl Place {
+    /// First instant after the present count at which the phase becomes this one.
+    #[must_use]
+    pub fn next(&self, phase: u64) -> Ticks {
+        let left = if phase > self.phase { phase - self.phase } else { phase + self.period - self.phase };
+        self.begun + left * self.length
+    }
+}
+
 /// State of one timer.
 #[derive(Clone, Debug)]
 pub struct Timer {
@@ -198,12 +216,16 @@ impl Timer {
     /// First instant after another at which the phase becomes this one.
     #[must_use]
     pub fn next(&self, phase: u64, after: Ticks) -> Ticks {
+        self.place(after).next(phase)
+    }
+
+    /// Place of a running counter at an instant, from which several instants are computed.
+    #[must_use]
+    pub fn place(&self, at: Ticks) -> Place {
         let (length, period) = (self.count_length(), self.period());
-        let passed = (after - self.origin) / length;
-        let present = (self.phase + passed) % period;
-        let left = (phase + period - present) % period;
-        let left = if left == 0 { period } else { left };
-        self.origin + (passed + left) * length
+        let passed = (at - self.origin) / length;
+        let phase = (self.phase + passed) % period;
+        Place { begun: self.origin + passed * length, length, period, phase }
     }
 
     fn counter_of(&self, phase: u64) -> u32 {
@@ -253,19 +275,23 @@ impl Timer {
         }
     }
 
-    /// Level of a channel's reference at an instant.
+    /// Levels of the references of channels 1 to 3 at an instant.
     #[must_use]
-    pub fn reference(&self, channel: usize, now: Ticks) -> bool {
-        let (phase, compare) = (self.phase(now), u64::from(self.acting.compare[channel]));
+    pub fn references(&self, now: Ticks) -> [bool; 3] {
+        let phase = self.phase(now);
         let counter = u64::from(self.counter_of(phase));
-        // RM0090 17.4.7: in mode 1 active below the value while rising, and up to it while falling.
-        let below = if self.is_falling(now) { counter <= compare } else { counter < compare };
-        match self.mode(channel) {
-            5 => true,
-            6 => below,
-            7 => !below,
-            _ => false,
-        }
+        let falling = self.is_centred() && phase >= self.top();
+        core::array::from_fn(|channel| {
+            let compare = u64::from(self.acting.compare[channel]);
+            // RM0090 17.4.7: in mode 1 active below the value while rising, and up to it while falling.
+            let below = if falling { counter <= compare } else { counter < compare };
+            match self.mode(channel) {
+                5 => true,
+                6 => below,
+                7 => !below,
+                _ => false,
+            }
+        })
     }
 
     /// Enable and polarity bits of a channel's outputs.
@@ -328,11 +354,12 @@ impl Timer {
             return NEVER;
         }
         let mut due = NEVER;
+        let place = self.place(self.processed);
         if self.kind == Kind::Advanced || self.dier & 1 != 0 || self.has_buffered() || !self.is_centred() {
-            due = self.next_end(self.processed);
+            due = self.next_end(&place);
         }
         if let Some(phase) = self.trigger_phase() {
-            due = due.min(self.next(phase, self.processed));
+            due = due.min(place.next(phase));
         }
         for channel in (0..4).filter(|channel| self.dier >> (channel + 1) & 1 == 1) {
             due = due.min(self.next_match(channel, self.processed));
@@ -340,9 +367,9 @@ impl Timer {
         due
     }
 
-    fn next_end(&self, after: Ticks) -> Ticks {
-        let zero = self.next(0, after);
-        if self.is_centred() { zero.min(self.next(self.top(), after)) } else { zero }
+    fn next_end(&self, place: &Place) -> Ticks {
+        let zero = place.next(0);
+        if self.is_centred() { zero.min(place.next(self.top())) } else { zero }
     }
 
     /// Next match of a channel; both directions count.
@@ -361,11 +388,12 @@ impl Timer {
 
     /// Processes the events of one instant, at which one is due.
     pub fn pass(&mut self, now: Ticks, mut report: impl FnMut(Event)) {
-        let trigger = self.trigger_phase().is_some_and(|phase| self.next(phase, self.processed) == now);
+        let place = self.place(self.processed);
+        let trigger = self.trigger_phase().is_some_and(|phase| place.next(phase) == now);
         let matches = (0..4).any(|channel| {
             self.dier >> (channel + 1) & 1 == 1 && self.next_match(channel, self.processed) == now
         });
-        let ends = self.next_end(self.processed) == now;
+        let ends = self.next_end(&place) == now;
         self.processed = now;
         if matches {
             self.collect_matches(now);
@@ -500,12 +528,17 @@ impl Timer {
         access: &mut Access<'_>,
     ) -> u32 {
         let mask = if self.kind == Kind::Advanced { advanced } else { general };
-        access.implemented(value, mask, &self.named(register))
+        self.masked(value, mask, register, access)
+    }
+
+    /// Value without reserved bits; the name is composed only for a finding.
+    fn masked(&self, value: u32, mask: u32, register: &str, access: &mut Access<'_>) -> u32 {
+        if value & !mask == 0 { value } else { access.implemented(value, mask, &self.named(register)) }
     }
 
     fn counts(&self, value: u32, register: &str, access: &mut Access<'_>) -> u32 {
         let mask = if self.kind == Kind::Wide { u32::MAX } else { 0xFFFF };
-        access.implemented(value, mask, &self.named(register))
+        self.masked(value, mask, register, access)
     }
 
     /// Writes a register; `position` is that of the encoder at this timer. Returns whether the counter's
@@ -542,7 +575,7 @@ impl Timer {
                 self.ccer = value;
             }
             CNT => self.write_counter(value, position, access),
-            PSC => self.psc = access.implemented(value, 0xFFFF, &self.named("PSC")),
+            PSC => self.psc = self.masked(value, 0xFFFF, "PSC", access),
             ARR => {
                 self.arr = self.counts(value, "ARR", access);
                 if self.cr1 & 0x80 == 0 {
@@ -552,7 +585,7 @@ impl Timer {
                 }
             }
             RCR if self.kind == Kind::Advanced => {
-                self.rcr = access.implemented(value, 0xFF, &self.named("RCR"));
+                self.rcr = self.masked(value, 0xFF, "RCR", access);
             }
             0x34..=0x40 => self.write_compare((offset as usize - 0x34) / 4, value, access),
             BDTR if self.kind == Kind::Advanced => self.write_break(value, access),
@@ -568,7 +601,7 @@ impl Timer {
 
     fn write_control(&mut self, value: u32, position: u16, access: &mut Access<'_>) -> bool {
         let now = access.now;
-        let mut value = access.implemented(value, 0x3FF, &self.named("CR1"));
+        let mut value = self.masked(value, 0x3FF, "CR1", access);
         if self.runs() && (value ^ self.cr1) & 0x60 != 0 && (self.cr1 & 0x60 == 0 || value & 0x60 == 0) {
             access.refuse("alignment changed while the counter runs", self.named("CR1"));
             value = value & !0x60 | self.cr1 & 0x60;
@@ -595,7 +628,7 @@ impl Timer {
     }
 
     fn write_slave(&mut self, value: u32, position: u16, access: &mut Access<'_>) {
-        let value = access.implemented(value, 0xFFF7, &self.named("SMCR"));
+        let value = self.masked(value, 0xFFF7, "SMCR", access);
         if !matches!(value & 7, 0 | 1..=3 | 6) || value & 0xFF80 != 0 || value & 7 == 6 && value & 0x70 != 0 {
             access.refuse(NOT_MODELLED, self.named("SMCR"));
         }
@@ -618,7 +651,7 @@ impl Timer {
 
     fn write_mode(&mut self, index: usize, value: u32, access: &mut Access<'_>) {
         let name = ["CCMR1", "CCMR2"][index];
-        let value = access.implemented(value, 0xFFFF, &self.named(name));
+        let value = self.masked(value, 0xFFFF, name, access);
         let changed = value ^ self.ccmr[index];
         for half in 0..2 {
             let channel = 2 * index + half;
@@ -660,7 +693,7 @@ impl Timer {
     }
 
     fn write_break(&mut self, value: u32, access: &mut Access<'_>) {
-        let value = access.implemented(value, 0xFFFF, &self.named("BDTR"));
+        let value = self.masked(value, 0xFFFF, "BDTR", access);
         let locked = match self.lock() {
             0 => 0,
             1 => 0x73FF,
@@ -765,8 +798,8 @@ mod tests {
         let setup = [(CR1, 0xE0), (ARR, 100), (CCMR1, 0x78), (0x34, 40), (EGR, 1), (CR1, 0xE1)];
         setup.into_iter().for_each(|(offset, value)| bench.write(0, offset, value));
         assert_eq!(bench.timer.edges(0), Some([40, 160]));
-        assert!(!bench.timer.reference(0, 78) && bench.timer.reference(0, 80));
-        assert!(bench.timer.reference(0, 318) && !bench.timer.reference(0, 320));
+        assert!(!bench.timer.references(78)[0] && bench.timer.references(80)[0]);
+        assert!(bench.timer.references(318)[0] && !bench.timer.references(320)[0]);
         bench.write(100, 0x34, 60);
         assert_eq!(bench.timer.compare(0), 40);
         bench.run(200);
