@@ -116,6 +116,7 @@ impl Gpio {
         } else {
             state.levels &= !(1 << pin)
         }
+        state.look();
         let after = self.level((port, pin));
         (before != after).then_some(after)
     }
