@@ -313,10 +313,12 @@ fn run_store_cuts(common: &Common) -> Result<bool, ToolError> {
     let mut session = common.session()?;
     session.boot()?;
     let report = store_cuts::run(&mut session)?;
-    println!(
-        "save of {} words, each cut: {} starts with the old value, {} with the new one",
-        report.words, report.found[0], report.found[1]
-    );
+    for save in &report.saves {
+        println!(
+            "{} of {} words, power cut at each and once after: {} starts with the value before, {} with the new one",
+            save.save, save.words, save.found[0], save.found[1]
+        );
+    }
     println!(
         "{} cuts within an erase: {} starts with the old value, {} with the default",
         report.erasures, report.found_after_erasure[0], report.found_after_erasure[1]

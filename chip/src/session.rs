@@ -276,13 +276,40 @@ impl Session {
         Err(ToolError::Refused(format!("node {node} refuses {index:04x}:{sub} = {value:#x}: {answer:02x?}")))
     }
 
+    /// Writes a request that changes the flash ("save", "load") and waits for its emergency messages: FF0D while
+    /// it is under way, 0000 at its end. Returns at a power cut too.
+    ///
+    /// # Errors
+    /// The node refuses the request, fails, or does not end in time.
+    pub fn store(&mut self, index: u16, word: [u8; 4], longest: f64) -> Result<(), ToolError> {
+        self.write_object(1, index, 1, u32::from_le_bytes(word), 0.5)?;
+        let end = self.now() + ticks(longest);
+        while self.now() < end && !self.machine.chip().flash.is_cut {
+            let sent = &self.machine.chip().can.sent;
+            let codes = sent.iter().filter(|(_, frame)| frame.id() == 0x81 && frame.data().len() == 8);
+            let codes: Vec<u16> =
+                codes.map(|(_, frame)| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect();
+            if codes.contains(&0x5530) {
+                return Err(ToolError::Refused("the board reports that it could not store (5530)".into()));
+            }
+            if codes.iter().skip_while(|code| **code != 0xFF0D).any(|code| *code == 0) {
+                return Ok(());
+            }
+            self.run(POLL_S)?;
+        }
+        if self.machine.chip().flash.is_cut {
+            return Ok(());
+        }
+        Err(ToolError::input(format!("{index:04x} does not end within {longest} s")))
+    }
+
     /// Reads a value of up to four bytes from an object.
     ///
     /// # Errors
     /// The node refuses it or does not answer.
-    pub fn read_object(&mut self, node: u16, index: u16, sub: u8) -> Result<u32, ToolError> {
+    pub fn read_object(&mut self, node: u16, index: u16, sub: u8, longest: f64) -> Result<u32, ToolError> {
         let [low, high] = index.to_le_bytes();
-        let answer = self.ask(node, [0x40, low, high, sub, 0, 0, 0, 0], 0.5)?;
+        let answer = self.ask(node, [0x40, low, high, sub, 0, 0, 0, 0], longest)?;
         let value = u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
         match answer[0] {
             0x43 => Ok(value),
