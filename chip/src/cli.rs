@@ -1,0 +1,402 @@
+//! Command line of `cargo chip`.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::rc::Rc;
+use std::time::Instant;
+
+use clap::{Args, Parser, Subcommand};
+use scarab_host::base::error::ToolError;
+use scarab_host::base::files;
+use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_host::image::build;
+use serde::Serialize;
+
+use crate::image::Image;
+use crate::machine::Options;
+use crate::report::ChipReport;
+use crate::session::{Session, Step};
+use crate::time::seconds;
+use crate::{faults, hangs, sampling, serve, stops, store_cuts};
+
+/// Runs the flash image on a model of its microcontroller.
+#[derive(Parser, Debug)]
+#[command(name = "cargo chip", version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Start the board and operate it at its contacts.
+    Run(RunArguments),
+    /// Open the emergency stop's contact at many phases of the PWM period.
+    Stops(StopArguments),
+    /// Measure the sampling instants of both axes.
+    Sampling(Common),
+    /// Cut the power at every word of a save and within an erase.
+    StoreCuts(Common),
+    /// Put the image on the simulated bus, for existing host software.
+    Serve(ServeArguments),
+    /// Inject rows of the fault catalogue.
+    Faults(FaultArguments),
+    /// Let each level hang and watch the watchdog.
+    Hangs(HangArguments),
+}
+
+/// Image, leg, time and seed.
+#[derive(Args, Clone, Debug)]
+struct Common {
+    /// Shipped leg or leg file, for image and plant.
+    #[arg(long, default_value = DEFAULT_LEG)]
+    leg: String,
+    /// Image (ELF) for that leg; built unless given.
+    #[arg(long)]
+    image: Option<PathBuf>,
+    /// Seed of the sensors' noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Cycles per instruction, 1 to 2.
+    #[arg(long, default_value_t = 1.34, value_parser = factor)]
+    time_factor: f64,
+    /// Write the result as JSON here.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+struct RunArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Steps, in order.
+    #[arg(long = "do", value_enum, value_delimiter = ',')]
+    steps: Vec<Step>,
+    /// Write the image's records as text here.
+    #[arg(long, value_name = "FILE")]
+    records: Option<PathBuf>,
+    /// Run on for so many seconds after the last step.
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    seconds: f64,
+}
+
+#[derive(Args, Debug)]
+struct StopArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Phases in each situation.
+    #[arg(long, default_value_t = 100)]
+    phases: u32,
+}
+
+#[derive(Args, Debug)]
+struct ServeArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Address of the port that speaks slcan.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:29536")]
+    slcan: SocketAddr,
+    /// Serve for so many simulated seconds instead of for ever.
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+}
+
+#[derive(Args, Debug)]
+struct FaultArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Runs of each row.
+    #[arg(long, default_value_t = 20)]
+    seeds: u32,
+    /// Rows, such as X1; all unless given.
+    #[arg(long, value_delimiter = ',')]
+    rows: Vec<String>,
+}
+
+#[derive(Args, Debug)]
+struct HangArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Frequency of the watchdog's oscillator, Hz: 17000 to 47000.
+    #[arg(long, default_value_t = 32_000)]
+    oscillator_hz: u64,
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(factor) if (1.0..=2.0).contains(&factor) => Ok(factor),
+        _ => Err(format!("`{text}` is not within 1 to 2")),
+    }
+}
+
+/// Runs the program.
+#[must_use]
+pub fn main() -> ExitCode {
+    let outcome = match Arguments::parse().command {
+        Command::Run(arguments) => run(&arguments),
+        Command::Stops(arguments) => run_stops(&arguments),
+        Command::Sampling(common) => run_sampling(&common),
+        Command::StoreCuts(common) => run_store_cuts(&common),
+        Command::Serve(arguments) => run_serve(&arguments),
+        Command::Faults(arguments) => run_faults(&arguments),
+        Command::Hangs(arguments) => run_hangs(&arguments),
+    };
+    match outcome {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(3),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+impl Common {
+    fn session(&self) -> Result<Session, ToolError> {
+        let leg = LegFile::load_for_image(&self.leg, false)?;
+        let options =
+            build::Options { leg: leg.clone(), log: false, brake_resistor: true, board_volts: None };
+        let path = match &self.image {
+            Some(path) => path.clone(),
+            None => build::build(&options)?,
+        };
+        let image: Rc<Image> = Image::load(&path)?;
+        let options = Options { time_factor: self.time_factor, ..Options::default() };
+        Session::new(&image, &leg, &options, self.seed)
+    }
+
+    fn write(&self, result: &impl Serialize) -> Result<(), ToolError> {
+        let Some(path) = &self.json else { return Ok(()) };
+        let text =
+            serde_json::to_string_pretty(result).map_err(|error| ToolError::cannot_write(path, &error))?;
+        files::write(path, &(text + "\n"))
+    }
+}
+
+fn run(arguments: &RunArguments) -> Result<bool, ToolError> {
+    let begun = Instant::now();
+    let common = &arguments.common;
+    let mut session = common.session()?;
+    session.prints = true;
+    let outcome = operate(&mut session, arguments);
+    if let Some(path) = &arguments.records {
+        files::write(path, &session.probe.text())?;
+    }
+    if let Err(error) = outcome {
+        print_findings(&session);
+        return Err(error);
+    }
+    let identified = arguments.steps.contains(&Step::Identify);
+    let report = ChipReport::new(&mut session, identified, common.time_factor, common.seed)?;
+    print_run(&report, begun.elapsed().as_secs_f64());
+    common.write(&report)?;
+    Ok(report.findings.is_empty() && report.verdict != "refused" && report.missed_current_ticks == 0)
+}
+
+fn operate(session: &mut Session, arguments: &RunArguments) -> Result<(), ToolError> {
+    session.boot()?;
+    for step in &arguments.steps {
+        session.begin_measurement();
+        session.step(*step)?;
+        let [hip, knee] = session.position_deg();
+        println!("{:9.3} s  {step:?} done; joints {hip:.2} {knee:.2} degrees", seconds(session.now()));
+    }
+    session.run(arguments.seconds)
+}
+
+fn print_findings(session: &Session) {
+    let (unknown, known) = crate::report::findings(session);
+    for finding in &unknown {
+        println!(
+            "finding: {}: {} at {:#010x} in {} ({} times)",
+            finding.register, finding.what, finding.pc, finding.function, finding.count
+        );
+    }
+    for (finding, reason) in &known {
+        println!("known finding: {}: {} ({reason})", finding.register, finding.what);
+    }
+}
+
+fn print_run(report: &ChipReport, wall_s: f64) {
+    for finding in &report.findings {
+        println!(
+            "finding: {}: {} at {:#010x} in {} ({} times)",
+            finding.register, finding.what, finding.pc, finding.function, finding.count
+        );
+    }
+    for (finding, reason) in &report.known_findings {
+        println!("known finding: {}: {} ({reason})", finding.register, finding.what);
+    }
+    for base in &report.base_parameters {
+        println!("{:>6} {:?} sigma {:?} {}", base.name, base.value, base.sigma, base.unit);
+    }
+    println!(
+        "verdict {}{}",
+        report.verdict,
+        report.reasons.iter().map(|why| format!(", {why}")).collect::<String>()
+    );
+    println!("interrupt          per second   instructions mean   worst   latency us   longest us");
+    for (name, used) in &report.interrupts {
+        println!(
+            "{name:<18} {:>10.1} {:>19.1} {:>7} {:>12.2} {:>12.2}",
+            used.per_second,
+            used.mean_instructions,
+            used.worst_instructions,
+            used.worst_latency_us,
+            used.longest_us
+        );
+    }
+    let load = &report.load;
+    println!(
+        "load: {:.1} %, level 0 {:.1} %, servo {:.1} %, bus {:.1} %, housekeeping {:.1} %, thread {:.1} %",
+        100.0 * load.total,
+        100.0 * load.level0,
+        100.0 * load.servo,
+        100.0 * load.bus,
+        100.0 * load.housekeeping,
+        100.0 * load.thread
+    );
+    println!(
+        "missed: {} current ticks, {} servo ticks; conversions lost {}; stack {} of {} bytes; records {} read, {} lost; resets {}",
+        report.missed_current_ticks,
+        report.servo_missed,
+        report.lost_conversions,
+        report.stack[0],
+        report.stack[1],
+        report.records[0],
+        report.records[1],
+        report.resets.len()
+    );
+    println!(
+        "simulated {:.3} s in {wall_s:.2} s: {:.2} of real time, {:.1} M instructions/s",
+        report.simulated_s,
+        report.simulated_s / wall_s,
+        1e-6 * report.instructions as f64 / wall_s
+    );
+}
+
+fn run_stops(arguments: &StopArguments) -> Result<bool, ToolError> {
+    let common = &arguments.common;
+    let mut session = common.session()?;
+    session.boot()?;
+    let report = stops::run(&mut session, arguments.phases, common.time_factor)?;
+    for situation in &report.situations {
+        println!(
+            "{:<12} {} stops, a bridge on at {}: off after {:.2} us mean, {:.2} us worst, for good {:.2} us; on again {} ({:.2} us), stayed on {}",
+            situation.name,
+            situation.phases,
+            situation.armed,
+            situation.mean_us,
+            situation.worst_us,
+            situation.worst_final_us,
+            situation.on_again,
+            situation.longest_again_us,
+            situation.stayed_on
+        );
+    }
+    common.write(&report)?;
+    Ok(report.is_sound())
+}
+
+/// A session with the drive enabled.
+fn enabled(common: &Common) -> Result<Session, ToolError> {
+    let mut session = common.session()?;
+    session.boot()?;
+    for step in [Step::Calibrate, Step::Reference, Step::Enable] {
+        session.step(step)?;
+    }
+    Ok(session)
+}
+
+fn run_store_cuts(common: &Common) -> Result<bool, ToolError> {
+    let mut session = common.session()?;
+    session.boot()?;
+    let report = store_cuts::run(&mut session)?;
+    for save in &report.saves {
+        println!(
+            "{} of {} words, power cut at each and once after: {} starts with the value before, {} with the new one",
+            save.save, save.words, save.found[0], save.found[1]
+        );
+    }
+    println!(
+        "{} cuts within an erase: {} starts with the old value, {} with the default",
+        report.erasures, report.found_after_erasure[0], report.found_after_erasure[1]
+    );
+    report.violations.iter().for_each(|violation| println!("violation: {violation}"));
+    common.write(&report)?;
+    Ok(report.violations.is_empty())
+}
+
+fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {
+    let mut session = arguments.common.session()?;
+    session.boot()?;
+    for step in [Step::Calibrate, Step::Reference] {
+        session.step(step)?;
+    }
+    // A host enables; the leg is let go where it was moved to.
+    session.hold_switch(true);
+    session.machine.chip_mut().can.connected = false;
+    serve::serve(&mut session, arguments.slcan, arguments.seconds)?;
+    print_findings(&session);
+    Ok(crate::report::findings(&session).0.is_empty())
+}
+
+fn run_faults(arguments: &FaultArguments) -> Result<bool, ToolError> {
+    let mut session = enabled(&arguments.common)?;
+    let resting = session.save()?;
+    session.press_start()?;
+    session.run(6.0)?;
+    let moving = session.save()?;
+    let reports = faults::run(&mut session, &resting, &moving, arguments.seeds, &arguments.rows)?;
+    for report in &reports {
+        println!(
+            "{:<3} {:<50} missed {} of {}, worst {:.3} ms, deadline {:.3} ms",
+            report.id, report.fault, report.missed, report.runs, report.worst_ms, report.deadline_ms
+        );
+        report.complaints.iter().take(3).for_each(|complaint| println!("      {complaint}"));
+    }
+    arguments.common.write(&reports)?;
+    Ok(reports.iter().all(|report| report.missed == 0))
+}
+
+fn run_hangs(arguments: &HangArguments) -> Result<bool, ToolError> {
+    let mut session = enabled(&arguments.common)?;
+    let saved = session.save()?;
+    let reports = hangs::run(&mut session, &saved, arguments.oscillator_hz)?;
+    for report in &reports {
+        let time = |time: Option<f64>| time.map_or("never".to_owned(), |time| format!("after {time:.3} ms"));
+        println!(
+            "{:<18} bridges off {}, reset {}{}",
+            report.level,
+            time(report.released_ms),
+            time(report.reset_ms),
+            if report.on_again { ", on again" } else { "" }
+        );
+    }
+    arguments.common.write(&reports)?;
+    Ok(reports.iter().all(|report| !report.on_again))
+}
+
+fn run_sampling(common: &Common) -> Result<bool, ToolError> {
+    let mut session = enabled(common)?;
+    let mut reports = sampling::measure(&mut session, "rest", 0.5)?;
+    session.press_start()?;
+    session.run(4.0)?;
+    reports.extend(sampling::measure(&mut session, "motion", 4.0)?);
+    for report in &reports {
+        println!(
+            "{:<8} axis {}: {} conversions, trigger {:.1} to {:.1} ns and hold {:.1} to {:.1} ns after the middle; edges of the other bridge before {}",
+            report.situation,
+            report.axis,
+            report.conversions,
+            report.trigger_ns[0],
+            report.trigger_ns[1],
+            report.hold_ns[0],
+            report.hold_ns[1],
+            report.disturbed
+        );
+    }
+    common.write(&reports)?;
+    Ok(true)
+}

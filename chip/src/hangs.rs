@@ -1,0 +1,86 @@
+//! Hangs of each level: the watchdog must reset the board within its time, bridges off before.
+
+use serde::Serialize;
+
+use scarab_host::base::error::ToolError;
+
+use crate::machine::{End, Snapshot};
+use crate::peripherals::rcc::ResetReason;
+use crate::session::Session;
+use crate::time::{seconds, ticks};
+
+/// Levels that may hang, with their exceptions; 0 is the thread.
+const LEVELS: [(&str, u8); 7] = [
+    ("current interrupt", 16 + 18),
+    ("servo", 16 + 77),
+    ("clock", 16 + 50),
+    ("bus receive", 16 + 20),
+    ("bus", 16 + 19),
+    ("housekeeping", 16 + 72),
+    ("thread", 0),
+];
+/// Longest time that is watched, s.
+const LONGEST_S: f64 = 0.2;
+
+/// Hang of one level.
+#[derive(Clone, Debug, Serialize)]
+pub struct HangReport {
+    /// Level.
+    pub level: &'static str,
+    /// Time until both bridges were off, ms; `None` if they stayed on.
+    pub released_ms: Option<f64>,
+    /// Time until the watchdog's reset, ms; `None` if none came.
+    pub reset_ms: Option<f64>,
+    /// A bridge went on again after the first release and before the reset.
+    pub on_again: bool,
+}
+
+/// Lets each level hang, from a saved machine that is enabled.
+///
+/// # Errors
+/// The model does not know what the processor does.
+pub fn run(
+    session: &mut Session,
+    enabled: &Snapshot,
+    oscillator_hz: u64,
+) -> Result<Vec<HangReport>, ToolError> {
+    LEVELS
+        .into_iter()
+        .map(|(level, exception)| hang(session, enabled, level, exception, oscillator_hz))
+        .collect()
+}
+
+fn hang(
+    session: &mut Session,
+    enabled: &Snapshot,
+    level: &'static str,
+    exception: u8,
+    oscillator_hz: u64,
+) -> Result<HangReport, ToolError> {
+    session.machine.restore(enabled)?;
+    let begun = session.now();
+    let chip = session.machine.chip_mut();
+    chip.iwdg.oscillator_hz = oscillator_hz;
+    chip.reschedule();
+    chip.plant.switchings = Some(Vec::new());
+    session.machine.hang(Some(exception));
+    let end = session.machine.run(begun + ticks(LONGEST_S))?;
+    let reset = session.now();
+    let mut armed = [0, 1].map(|axis| enabled.chip().plant.axes[axis].is_armed());
+    let (mut released, mut on_again) = (None, false);
+    let switchings = session.machine.chip_mut().plant.switchings.take().unwrap_or_default();
+    for switching in switchings.iter().filter(|switching| switching.at <= reset) {
+        armed[switching.axis] = switching.on;
+        if armed == [false; 2] {
+            released = released.or(Some(switching.at));
+        }
+        on_again |= released.is_some() && switching.on;
+    }
+    let since = |at| 1e3 * seconds(at - begun);
+    Ok(HangReport {
+        level,
+        released_ms: released.map(since),
+        reset_ms: (end == End::Reset(ResetReason::Watchdog)).then(|| since(reset)),
+        on_again,
+    })
+}

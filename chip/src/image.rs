@@ -1,0 +1,142 @@
+//! The flash image: bytes of its sections, names of its functions, lengths of its blocks.
+
+use std::path::Path;
+use std::rc::Rc;
+
+use object::elf::{FileHeader32, PT_LOAD};
+use object::read::elf::{ElfFile32, FileHeader, ProgramHeader};
+use object::{Endianness, Object, ObjectSymbol, SymbolKind};
+use scarab_host::base::error::ToolError;
+
+/// Address of the flash, and the size that an image may have; sectors 10 and 11 follow.
+pub const FLASH: u32 = 0x0800_0000;
+/// Size of the flash without the sectors for stored data.
+pub const FLASH_BYTES: usize = 768 * 1024;
+
+/// Symbol of the image.
+#[derive(Clone, Debug)]
+struct Symbol {
+    address: u32,
+    size: u32,
+    name: String,
+}
+
+/// A flash image, as the linker wrote it.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// Whole file, for the decoder of records.
+    pub elf: Vec<u8>,
+    /// Content of the flash.
+    pub flash: Vec<u8>,
+    functions: Vec<Symbol>,
+    objects: Vec<Symbol>,
+}
+
+impl Image {
+    /// Reads an image.
+    ///
+    /// # Errors
+    /// The file cannot be read or is no image of the board.
+    pub fn load(path: &Path) -> Result<Rc<Self>, ToolError> {
+        let elf = std::fs::read(path)
+            .map_err(|error| ToolError::input(format!("{}: cannot be read: {error}", path.display())))?;
+        Self::parse(elf).map(Rc::new).map_err(|reason| {
+            ToolError::input(format!("{}: not an image of the board: {reason}", path.display()))
+        })
+    }
+
+    /// Parses an ELF file.
+    ///
+    /// # Errors
+    /// Names what is missing.
+    pub fn parse(elf: Vec<u8>) -> Result<Self, String> {
+        let mut flash = vec![0xFF; FLASH_BYTES];
+        let (mut functions, mut objects) = (Vec::new(), Vec::new());
+        {
+            let header = FileHeader32::<Endianness>::parse(&*elf).map_err(|error| error.to_string())?;
+            let endian = header.endian().map_err(|error| error.to_string())?;
+            let segments = header.program_headers(endian, &*elf).map_err(|error| error.to_string())?;
+            for segment in segments.iter().filter(|segment| segment.p_type(endian) == PT_LOAD) {
+                let bytes = segment.data(endian, &*elf).map_err(|()| "damaged segment")?;
+                let at = segment.p_paddr(endian).wrapping_sub(FLASH) as usize;
+                if bytes.is_empty() {
+                    continue;
+                }
+                let slot = flash.get_mut(at..at + bytes.len()).ok_or("a segment lies outside the flash")?;
+                slot.copy_from_slice(bytes);
+            }
+            let file = ElfFile32::<Endianness>::parse(&*elf).map_err(|error| error.to_string())?;
+            for symbol in file.symbols() {
+                let Ok(name) = symbol.name() else { continue };
+                let entry = |address: u64| Symbol {
+                    address: address as u32,
+                    size: symbol.size() as u32,
+                    name: name.to_owned(),
+                };
+                match symbol.kind() {
+                    SymbolKind::Text => functions.push(entry(symbol.address() & !1)),
+                    SymbolKind::Data => objects.push(entry(symbol.address())),
+                    _ => {}
+                }
+            }
+        }
+        functions.sort_by_key(|symbol| symbol.address);
+        Ok(Self { elf, flash, functions, objects })
+    }
+
+    /// An image without names, from its first bytes.
+    #[must_use]
+    pub fn of_bytes(bytes: &[u8]) -> Self {
+        let mut flash = vec![0xFF; FLASH_BYTES];
+        flash[..bytes.len()].copy_from_slice(bytes);
+        Self { elf: Vec::new(), flash, functions: Vec::new(), objects: Vec::new() }
+    }
+
+    /// Word of the flash.
+    #[must_use]
+    pub fn word(&self, address: u32) -> Option<u32> {
+        let at = address.checked_sub(FLASH)? as usize;
+        self.flash.get(at..at + 4).map(|bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
+    }
+
+    /// Name of the function at an address, or the address.
+    #[must_use]
+    pub fn function(&self, address: u32) -> String {
+        let after = self.functions.partition_point(|symbol| symbol.address <= address);
+        match after.checked_sub(1).and_then(|index| self.functions.get(index)) {
+            Some(symbol) if address < symbol.address + symbol.size.max(2) => {
+                format!("{:#}", rustc_demangle::demangle(&symbol.name))
+            }
+            _ => format!("{address:#010x}"),
+        }
+    }
+
+    /// Address of a symbol by its exact name.
+    #[must_use]
+    pub fn address(&self, name: &str) -> Option<u32> {
+        let mut all = self.objects.iter().chain(&self.functions);
+        all.find(|symbol| symbol.name == name).map(|symbol| symbol.address)
+    }
+
+    /// Addresses of all halfwords with a value, which may be instructions.
+    #[must_use]
+    pub fn find(&self, halfword: u16) -> Vec<u32> {
+        let bytes = halfword.to_le_bytes();
+        let halves = self.flash.chunks_exact(2).enumerate();
+        halves.filter(|(_, half)| *half == bytes).map(|(index, _)| FLASH + 2 * index as u32).collect()
+    }
+
+    /// Number of instructions in a block of code.
+    #[must_use]
+    pub fn instructions(&self, address: u32, size: u32) -> u32 {
+        let at = address.wrapping_sub(FLASH) as usize;
+        let (mut place, mut count) = (0, 0);
+        while place < size as usize {
+            // The upper five bits of the first halfword tell the length (ARMv7-M, A5.1).
+            let upper = self.flash.get(at + place + 1).copied().unwrap_or(0) >> 3;
+            place += if upper >= 0b11101 { 4 } else { 2 };
+            count += 1;
+        }
+        count
+    }
+}

@@ -1,0 +1,50 @@
+//! A model of the STM32F405 that runs Scarab's unmodified flash image over hal-sim's motors and leg.
+//!
+//! Why: the board layer, the tasks and the interrupts run nowhere else before a real board. The image's own
+//! instructions execute on the Unicorn engine; peripherals, interrupt controller and time are modelled here,
+//! from the reference manual and not from the firmware. Whatever silicon would refuse is a finding.
+//!
+//! | module | content |
+//! | --- | --- |
+//! | [`time`] | ticks of 1/336 MHz |
+//! | [`findings`] | violated rules, with function and reason |
+//! | [`nvic`], [`system`] | interrupt controller, system control block |
+//! | [`peripherals`] | one file each |
+//! | [`plant`] | motors, shunts, encoders, supply, leg at the pins |
+//! | [`chip`] | all of it: address map, events, interrupt lines |
+//! | [`image`], [`load`] | the ELF; use of the processor |
+//! | [`machine`] | the processor core around the chip; save and restore |
+//! | [`rtt`] | records of the image, as a debug probe reads them |
+//! | [`session`] | an operator at the contacts: calibrate, reference, enable, identify |
+//! | [`report`] | results as JSON |
+//! | [`stops`], [`sampling`] | emergency stops over the PWM period; sampling instants |
+//! | [`store_cuts`], [`hangs`] | power cuts within flash operations; levels that hang |
+//! | [`faults`] | rows of the fault catalogue |
+//! | [`serve`] | the image on the simulated bus, for existing host software |
+//! | [`cli`] | the command line |
+
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the model runs on the host only and may use std's mathematics"
+)]
+
+pub mod chip;
+pub mod cli;
+pub mod faults;
+pub mod findings;
+pub mod hangs;
+pub mod image;
+pub mod load;
+pub mod machine;
+pub mod nvic;
+pub mod peripherals;
+pub mod plant;
+pub mod report;
+pub mod rtt;
+pub mod sampling;
+pub mod serve;
+pub mod session;
+pub mod stops;
+pub mod store_cuts;
+pub mod system;
+pub mod time;

@@ -1,0 +1,168 @@
+//! Use of the processor: time and instructions of every exception level, latencies, sleep.
+//!
+//! The time of an interrupt is its own: without the interrupts that preempt it, from its entry to its return.
+
+use crate::nvic::EXCEPTIONS;
+use crate::time::Ticks;
+
+/// Use by one exception; 0 is the thread.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Use {
+    /// Entries.
+    pub entries: u64,
+    /// Own time.
+    pub ticks: Ticks,
+    /// Own instructions, all and the most of one entry.
+    pub instructions: u64,
+    /// Most instructions of one entry.
+    pub worst: u64,
+    /// Longest time from pending to entry.
+    pub latency: Ticks,
+    /// Longest time from entry to return, preemption included.
+    pub longest: Ticks,
+}
+
+/// An exception in progress.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    exception: usize,
+    begun: Ticks,
+    instructions: u64,
+}
+
+/// Use of the processor since the last [`Load::clear`].
+#[derive(Clone, Debug)]
+pub struct Load {
+    /// Instructions so far.
+    pub instructions: u64,
+    /// Time asleep.
+    pub asleep: Ticks,
+    /// Basic blocks so far.
+    pub blocks: u64,
+    uses: Vec<Use>,
+    frames: Vec<Frame>,
+    since: Ticks,
+    counted: u64,
+    cleared: Ticks,
+}
+
+impl Load {
+    /// Nothing used yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            instructions: 0,
+            asleep: 0,
+            blocks: 0,
+            uses: vec![Use::default(); EXCEPTIONS],
+            frames: Vec::new(),
+            since: 0,
+            counted: 0,
+            cleared: 0,
+        }
+    }
+
+    /// Starts a new period of measurement; exceptions in progress go on.
+    pub fn clear(&mut self, now: Ticks) {
+        self.settle(now);
+        self.uses.fill(Use::default());
+        (self.asleep, self.cleared) = (0, now);
+    }
+
+    /// Forgets exceptions in progress, as a reset does.
+    pub fn reset(&mut self, now: Ticks) {
+        self.settle(now);
+        self.frames.clear();
+    }
+
+    fn settle(&mut self, now: Ticks) {
+        let exception = self.frames.last().map_or(0, |frame| frame.exception);
+        let instructions = self.instructions - self.counted;
+        let used = &mut self.uses[exception];
+        used.ticks += now - self.since;
+        used.instructions += instructions;
+        if let Some(frame) = self.frames.last_mut() {
+            frame.instructions += instructions;
+        }
+        (self.since, self.counted) = (now, self.instructions);
+    }
+
+    /// Enters an exception that was pending since an instant.
+    pub fn enter(&mut self, exception: u8, pended: Ticks, now: Ticks) {
+        self.settle(now);
+        let exception = usize::from(exception);
+        let used = &mut self.uses[exception];
+        used.entries += 1;
+        used.latency = used.latency.max(now.saturating_sub(pended));
+        self.frames.push(Frame { exception, begun: now, instructions: 0 });
+    }
+
+    /// Leaves the newest exception.
+    pub fn leave(&mut self, now: Ticks) {
+        self.settle(now);
+        let Some(frame) = self.frames.pop() else { return };
+        let used = &mut self.uses[frame.exception];
+        used.worst = used.worst.max(frame.instructions);
+        used.longest = used.longest.max(now - frame.begun);
+    }
+
+    /// Adds a sleep.
+    pub fn sleep(&mut self, duration: Ticks) {
+        self.asleep += duration;
+        // The thread sleeps; its own time does not include it.
+        self.since += duration;
+    }
+
+    /// Use by an exception since the last [`Load::clear`].
+    #[must_use]
+    pub fn of(&self, exception: u8) -> Use {
+        self.uses[usize::from(exception)]
+    }
+
+    /// Share of the time since the last [`Load::clear`] that an exception used.
+    #[must_use]
+    pub fn share(&self, exception: u8, now: Ticks) -> f64 {
+        self.of(exception).ticks as f64 / (now - self.cleared).max(1) as f64
+    }
+
+    /// Time since the last [`Load::clear`].
+    #[must_use]
+    pub fn measured(&self, now: Ticks) -> Ticks {
+        (now - self.cleared).max(1)
+    }
+
+    /// Share of the time since the last [`Load::clear`] in which the processor was awake.
+    #[must_use]
+    pub fn awake(&self, now: Ticks) -> f64 {
+        1.0 - self.asleep as f64 / (now - self.cleared).max(1) as f64
+    }
+}
+
+impl Default for Load {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interrupts_time_is_without_those_that_preempt_it() {
+        let mut load = Load::new();
+        load.enter(77, 90, 100);
+        load.instructions = 10;
+        load.enter(34, 110, 120);
+        load.instructions = 15;
+        load.leave(125);
+        load.instructions = 22;
+        load.leave(150);
+        load.sleep(50);
+        load.settle(200);
+        let servo = load.of(77);
+        assert_eq!((servo.ticks, servo.worst, servo.latency, servo.longest), (45, 17, 10, 50));
+        assert_eq!((load.of(34).ticks, load.of(34).worst), (5, 5));
+        assert_eq!((load.asleep, load.of(0).ticks), (50, 100));
+    }
+}

@@ -1,0 +1,766 @@
+//! The processor core (Unicorn) with the chip around it: exceptions, sleep, stalls, faults, reset.
+//!
+//! Time is instructions times a factor. The block hook adds the time of a basic block before it runs, then
+//! processes due events, then takes an interrupt if one preempts. So an interrupt comes at a block's boundary,
+//! late by at most one block, and a register access within a block sees the time of the block's end.
+//!
+//! Unicorn leaves exceptions to its user. An entry stores a frame of 8 or, with floating point in use, 26
+//! words; a return with an EXC_RETURN address is reported by Unicorn as interrupt 8. After the program status
+//! changes, Unicorn rebuilds its cached flags only where APSR_NZCV is written too.
+//!
+//! Known limits: the floating-point frame is always stored, never lazily; an entry costs 12 cycles, a return
+//! 10, a tail-chained one 6. Memory protection and the process stack are not modelled.
+
+use std::rc::Rc;
+
+use scarab_host::base::error::ToolError;
+use unicorn_engine::unicorn_const::{Arch, HookType, MemType, Mode, Prot};
+use unicorn_engine::{ArmCpuModel, RegisterARM as Register, Unicorn};
+
+use crate::chip::Chip;
+use crate::image::{FLASH, FLASH_BYTES, Image};
+use crate::nvic::{HARD_FAULT, NMI, SUPERVISOR_CALL};
+use crate::peripherals::debug::{SYSTEM_BYTES, SYSTEM_MEMORY, system_memory};
+use crate::peripherals::flash;
+use crate::peripherals::rcc::ResetReason;
+use crate::system::{PRIVATE, fault};
+use crate::time::{NEVER, Ticks};
+
+const RAM: u32 = 0x2000_0000;
+const RAM_BYTES: usize = 128 * 1024;
+const CCM: u32 = 0x1000_0000;
+const CCM_BYTES: usize = 64 * 1024;
+const PERIPHERALS: u32 = 0x4000_0000;
+const PERIPHERAL_BYTES: u64 = 0x8_0000;
+const PRIVATE_BYTES: u64 = 0x10_0000;
+
+/// Cycles of an exception's entry, its return, and a tail-chained entry.
+const ENTRY: Ticks = 12;
+const RETURN: Ticks = 10;
+const CHAINED: Ticks = 6;
+/// Fraction bits of the time of an instruction.
+const FRACTION: u32 = 16;
+/// Instructions that are found by their code: send event, wait for event.
+const SEND_EVENT: u16 = 0xBF40;
+const WAIT_FOR_EVENT: u16 = 0xBF20;
+
+type Core<'a> = Unicorn<'a, State>;
+
+/// State that the hooks share.
+struct State {
+    chip: Chip,
+    image: Rc<Image>,
+    /// Size and number of instructions of each block in flash, by half its address.
+    blocks: Vec<(u16, u16)>,
+    /// Time of an instruction, fractions of a tick, and the part of a tick that has passed.
+    cost: u64,
+    rest: u64,
+    cycle: Ticks,
+    factor: f64,
+    until: Ticks,
+    /// Address at which the processor continues after a stop.
+    resume: Option<u32>,
+    /// The time of the block at the resume address was added before the stop.
+    paid: bool,
+    asleep: bool,
+    fault: Option<(u32, u32)>,
+    locked_up: bool,
+    /// Exception whose code makes no progress any more; 0 is the thread.
+    hung: Option<u8>,
+    broken: Option<String>,
+}
+
+/// Reason why a run ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The requested time was reached.
+    Time,
+    /// The chip was reset; it has started again.
+    Reset(ResetReason),
+    /// Power was cut within a flash operation; the machine must be started again.
+    PowerCut,
+}
+
+/// Processor, peripherals and plant, saved.
+pub struct Snapshot {
+    registers: Vec<u32>,
+    memory: Vec<u8>,
+    chip: Chip,
+    rest: u64,
+    resume: u32,
+    paid: bool,
+    asleep: bool,
+}
+
+impl Snapshot {
+    /// The saved chip.
+    #[must_use]
+    pub const fn chip(&self) -> &Chip {
+        &self.chip
+    }
+}
+
+/// The microcontroller on its board.
+pub struct Machine {
+    core: Core<'static>,
+}
+
+/// Options of a machine.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Cycles per instruction.
+    pub time_factor: f64,
+    /// Factory version: major, minor, voltage.
+    pub version: [u8; 3],
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { time_factor: 1.34, version: [3, 6, 56] }
+    }
+}
+
+fn broken(what: &str) -> impl Fn(unicorn_engine::uc_error) -> ToolError + '_ {
+    move |error| ToolError::input(format!("the processor model refuses {what}: {error:?}"))
+}
+
+impl Machine {
+    /// A machine after power-on.
+    ///
+    /// # Errors
+    /// Unicorn cannot be set up.
+    pub fn new(image: &Rc<Image>, chip: Chip, options: &Options) -> Result<Self, ToolError> {
+        let state = State::new(Rc::clone(image), chip, options.time_factor);
+        let mut core = Unicorn::new_with_data(Arch::ARM, Mode::THUMB | Mode::MCLASS, state)
+            .map_err(broken("its architecture"))?;
+        core.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32).map_err(broken("a Cortex-M4"))?;
+        map_memory(&mut core, options).map_err(broken("its memory"))?;
+        map_registers(&mut core).map_err(broken("its registers"))?;
+        add_hooks(&mut core).map_err(broken("its hooks"))?;
+        let mut machine = Self { core };
+        machine.start();
+        Ok(machine)
+    }
+
+    /// The chip.
+    #[must_use]
+    pub fn chip(&self) -> &Chip {
+        &self.core.get_data().chip
+    }
+
+    /// The chip, mutable.
+    pub fn chip_mut(&mut self) -> &mut Chip {
+        &mut self.core.get_data_mut().chip
+    }
+
+    /// The image.
+    #[must_use]
+    pub fn image(&self) -> &Rc<Image> {
+        &self.core.get_data().image
+    }
+
+    /// Changes the cycles per instruction.
+    pub fn set_time_factor(&mut self, factor: f64) {
+        let state = self.core.get_data_mut();
+        state.factor = factor;
+        state.follow_clock(true);
+    }
+
+    /// Lets the code of an exception hang from now on: its time passes without progress. 0 is the thread.
+    pub fn hang(&mut self, exception: Option<u8>) {
+        self.core.get_data_mut().hung = exception;
+    }
+
+    /// Reads memory of the chip.
+    pub fn memory(&self, address: u32, bytes: &mut [u8]) -> bool {
+        self.core.mem_read(address.into(), bytes).is_ok()
+    }
+
+    /// Writes memory of the chip.
+    pub fn set_memory(&mut self, address: u32, bytes: &[u8]) -> bool {
+        self.core.mem_write(address.into(), bytes).is_ok()
+    }
+
+    /// Starts from the reset vector.
+    fn start(&mut self) {
+        let image = Rc::clone(self.image());
+        put(&mut self.core, Register::CONTROL, 0);
+        for mask in [Register::PRIMASK, Register::BASEPRI, Register::FAULTMASK] {
+            put(&mut self.core, mask, 0);
+        }
+        put(&mut self.core, Register::XPSR_NZCVQG, 1 << 24);
+        put(&mut self.core, Register::APSR_NZCV, 0);
+        put(&mut self.core, Register::LR, u32::MAX);
+        put(&mut self.core, Register::SP, image.word(FLASH).unwrap_or(0));
+        let state = self.core.get_data_mut();
+        state.resume = Some(image.word(FLASH + 4).unwrap_or(0) & !1);
+        (state.paid, state.asleep, state.locked_up, state.fault) = (false, false, false, None);
+        state.hung = None;
+        state.follow_clock(true);
+    }
+
+    /// Resets the chip as its pin does, and starts again.
+    pub fn reset(&mut self, reason: ResetReason) {
+        self.chip_mut().reset(reason);
+        self.start();
+    }
+
+    /// Loses memory, as a power cut does, and starts again; flash cells and plant stay.
+    pub fn power_cycle(&mut self) {
+        self.core.get_data_mut().chip.rcc = crate::peripherals::rcc::Rcc::new();
+        let noise: Vec<u8> = (0..RAM_BYTES).map(|place| (place as u8).wrapping_mul(0x9D) ^ 0xA5).collect();
+        self.set_memory(RAM, &noise);
+        self.set_memory(CCM, &noise[..CCM_BYTES]);
+        self.reset(ResetReason::PowerOn);
+    }
+
+    /// Runs until an instant.
+    ///
+    /// # Errors
+    /// The model does not know what the processor does.
+    pub fn run(&mut self, until: Ticks) -> Result<End, ToolError> {
+        loop {
+            let state = self.core.get_data_mut();
+            state.until = until;
+            if let Some(reason) = state.chip.reset_request {
+                self.reset(reason);
+                return Ok(End::Reset(reason));
+            }
+            if state.chip.flash.is_cut {
+                return Ok(End::PowerCut);
+            }
+            if state.chip.now >= until {
+                return Ok(End::Time);
+            }
+            self.step()?;
+        }
+    }
+
+    /// Runs until something stops the processor.
+    fn step(&mut self) -> Result<(), ToolError> {
+        let state = self.core.get_data_mut();
+        let mut pc = state.resume.take().unwrap_or(0);
+        if state.asleep {
+            match sleep(&mut self.core, pc) {
+                Woken::Stopped => {
+                    self.core.get_data_mut().resume = Some(pc);
+                    return Ok(());
+                }
+                Woken::Entered(handler) => pc = handler,
+                Woken::Continues => {}
+            }
+        }
+        let outcome = self.core.emu_start(u64::from(pc | 1), u64::from(u32::MAX), 0, 0);
+        let state = self.core.get_data_mut();
+        if let Some(what) = state.broken.take() {
+            return Err(ToolError::input(what));
+        }
+        if state.fault.is_some() {
+            return self.take_fault();
+        }
+        match outcome {
+            _ if state.resume.is_some() => Ok(()),
+            Ok(()) => Err(self.lost("the processor stopped without a reason")),
+            Err(error) => Err(self.lost(&format!("the processor stopped: {error:?}"))),
+        }
+    }
+
+    fn lost(&self, what: &str) -> ToolError {
+        let pc = get(&self.core, Register::PC);
+        ToolError::input(format!("{what} at {pc:#010x} ({})", self.image().function(pc)))
+    }
+
+    /// Enters the hard fault; within one the processor locks up.
+    fn take_fault(&mut self) -> Result<(), ToolError> {
+        let state = self.core.get_data_mut();
+        let Some((status, address)) = state.fault.take() else { return Ok(()) };
+        let pc = get(&self.core, Register::PC);
+        let state = self.core.get_data_mut();
+        state.chip.system.faults[0] |= status;
+        state.chip.system.faults[1] |= 1 << 30;
+        if status & fault::DATA == fault::DATA {
+            state.chip.system.fault_address = address;
+        }
+        if state.chip.nvic.running() < 0 {
+            (state.locked_up, state.asleep, state.resume) = (true, true, Some(pc));
+            return Ok(());
+        }
+        state.chip.nvic.pend(HARD_FAULT, state.chip.now);
+        let handler = enter(&mut self.core, HARD_FAULT, pc);
+        self.core.get_data_mut().resume = Some(handler);
+        Ok(())
+    }
+
+    /// Saves processor, peripherals and plant.
+    ///
+    /// # Errors
+    /// Unicorn cannot save its registers.
+    pub fn save(&self) -> Result<Snapshot, ToolError> {
+        let mut memory = vec![0; RAM_BYTES + CCM_BYTES];
+        let (ram, ccm) = memory.split_at_mut(RAM_BYTES);
+        self.core.mem_read(RAM.into(), ram).map_err(broken("a read of its memory"))?;
+        self.core.mem_read(CCM.into(), ccm).map_err(broken("a read of its memory"))?;
+        let state = self.core.get_data();
+        Ok(Snapshot {
+            registers: registers().map(|register| read(&self.core, register)).collect(),
+            memory,
+            chip: state.chip.clone(),
+            rest: state.rest,
+            resume: state.resume.unwrap_or(0),
+            paid: state.paid,
+            asleep: state.asleep,
+        })
+    }
+
+    /// Returns to a saved state, of this machine or of another with the same image.
+    ///
+    /// # Errors
+    /// Unicorn refuses a register or the memory.
+    pub fn restore(&mut self, saved: &Snapshot) -> Result<(), ToolError> {
+        let (ram, ccm) = saved.memory.split_at(RAM_BYTES);
+        self.core.mem_write(RAM.into(), ram).map_err(broken("a write of its memory"))?;
+        self.core.mem_write(CCM.into(), ccm).map_err(broken("a write of its memory"))?;
+        for (register, value) in registers().zip(&saved.registers) {
+            self.core.reg_write(register, u64::from(*value)).map_err(broken("a register"))?;
+        }
+        let status = get(&self.core, Register::XPSR);
+        put(&mut self.core, Register::APSR_NZCV, status & 0xF000_0000);
+        let state = self.core.get_data_mut();
+        state.chip = saved.chip.clone();
+        (state.rest, state.resume) = (saved.rest, Some(saved.resume));
+        (state.paid, state.asleep, state.locked_up) = (saved.paid, saved.asleep, false);
+        (state.fault, state.hung) = (None, None);
+        state.follow_clock(true);
+        Ok(())
+    }
+}
+
+impl State {
+    fn new(image: Rc<Image>, chip: Chip, factor: f64) -> Self {
+        Self {
+            chip,
+            image,
+            blocks: vec![(0, 0); FLASH_BYTES / 2],
+            cost: 0,
+            rest: 0,
+            cycle: 0,
+            factor,
+            until: 0,
+            resume: None,
+            paid: false,
+            asleep: false,
+            fault: None,
+            locked_up: false,
+            hung: None,
+            broken: None,
+        }
+    }
+
+    /// Computes the time of an instruction again after the clock changed.
+    fn follow_clock(&mut self, anyway: bool) {
+        let cycle = self.chip.rcc.cycle();
+        if anyway || cycle != self.cycle {
+            self.cycle = cycle;
+            self.cost = (self.factor * cycle as f64 * f64::from(1_u32 << FRACTION)).round() as u64;
+        }
+    }
+
+    /// Adds the time of a block.
+    #[inline]
+    fn pay(&mut self, address: u32, size: u32) {
+        let instructions = self.instructions(address, size);
+        self.chip.load.instructions += instructions;
+        self.chip.load.blocks += 1;
+        let passed = self.rest + instructions * self.cost;
+        self.chip.now += passed >> FRACTION;
+        self.rest = passed & ((1 << FRACTION) - 1);
+    }
+
+    #[inline]
+    fn instructions(&mut self, address: u32, size: u32) -> u64 {
+        let Some(known) = self.blocks.get_mut((address.wrapping_sub(FLASH) / 2) as usize) else {
+            return u64::from(size / 3).max(1);
+        };
+        if u32::from(known.0) != size {
+            *known = (size as u16, self.image.instructions(address, size) as u16);
+        }
+        known.1.into()
+    }
+
+    /// Stalls the processor while the flash is changed: events go on, nothing executes.
+    fn stall(&mut self) {
+        let stall = core::mem::take(&mut self.chip.flash.stall);
+        let end = self.chip.now + stall;
+        while self.chip.now < end && self.chip.reset_request.is_none() {
+            self.chip.now = end.min(self.chip.due.max(self.chip.now));
+            self.chip.advance();
+        }
+    }
+
+    fn must_stop(&self) -> bool {
+        self.chip.now >= self.until || self.chip.reset_request.is_some() || self.chip.flash.is_cut
+    }
+}
+
+fn get(core: &Core<'_>, register: Register) -> u32 {
+    core.reg_read(register).map_or(0, |value| value as u32)
+}
+
+fn put(core: &mut Core<'_>, register: Register, value: u32) {
+    if core.reg_write(register, u64::from(value)).is_err() {
+        core.get_data_mut().broken = Some(format!("register {register:?} cannot be written"));
+    }
+}
+
+fn map_memory(core: &mut Core<'_>, options: &Options) -> Result<(), unicorn_engine::uc_error> {
+    let image = Rc::clone(&core.get_data().image);
+    core.mem_map(FLASH.into(), FLASH_BYTES as u64, Prot::READ | Prot::EXEC)?;
+    core.mem_write(FLASH.into(), &image.flash)?;
+    // The flash appears at address 0 too.
+    core.mem_map(0, FLASH_BYTES as u64, Prot::READ | Prot::EXEC)?;
+    core.mem_write(0, &image.flash)?;
+    for (address, bytes) in [(RAM, RAM_BYTES), (CCM, CCM_BYTES)] {
+        core.mem_map(address.into(), bytes as u64, Prot::READ | Prot::WRITE)?;
+        core.mem_write(address.into(), &vec![0xA5; bytes])?;
+    }
+    core.mem_map(SYSTEM_MEMORY.into(), SYSTEM_BYTES as u64, Prot::READ)?;
+    core.mem_write(SYSTEM_MEMORY.into(), &system_memory(options.version))
+}
+
+fn map_registers(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
+    core.mmio_map(
+        PERIPHERALS.into(),
+        PERIPHERAL_BYTES,
+        Some(|core: &mut Core<'_>, offset: u64, _: usize| {
+            u64::from(core.get_data_mut().chip.read(PERIPHERALS + offset as u32))
+        }),
+        Some(|core: &mut Core<'_>, offset: u64, size: usize, value: u64| {
+            let state = core.get_data_mut();
+            state.chip.write(PERIPHERALS + offset as u32, value as u32, size);
+            state.follow_clock(false);
+            if state.chip.flash.stall > 0 {
+                state.stall();
+            }
+        }),
+    )?;
+    core.mmio_map(
+        PRIVATE.into(),
+        PRIVATE_BYTES,
+        Some(|core: &mut Core<'_>, offset: u64, size: usize| {
+            u64::from(core.get_data_mut().chip.read_private(offset as u32, size))
+        }),
+        Some(|core: &mut Core<'_>, offset: u64, size: usize, value: u64| {
+            core.get_data_mut().chip.write_private(offset as u32, size, value as u32);
+        }),
+    )?;
+    core.mmio_map(
+        flash::FIRST.into(),
+        Chip::stored_bytes() as u64,
+        Some(|core: &mut Core<'_>, offset: u64, size: usize| {
+            u64::from(core.get_data_mut().chip.load_stored(offset as u32, size))
+        }),
+        Some(|core: &mut Core<'_>, offset: u64, size: usize, value: u64| {
+            let state = core.get_data_mut();
+            state.chip.program_stored(offset as u32, size, value as u32);
+            state.stall();
+        }),
+    )
+}
+
+fn add_hooks(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
+    core.add_block_hook(1, 0, |core, address, size| on_block(core, address as u32, size))?;
+    core.add_intr_hook(|core, number| on_interrupt(core, number))?;
+    core.add_insn_invalid_hook(on_invalid)?;
+    for address in core.get_data().image.find(SEND_EVENT) {
+        core.add_code_hook(address.into(), address.into(), |core, _, _| {
+            core.get_data_mut().chip.event = true;
+        })?;
+    }
+    core.add_mem_hook(HookType::MEM_UNMAPPED | HookType::MEM_PROT, 1, 0, |core, kind, address, _, _| {
+        let status = match kind {
+            MemType::FETCH_UNMAPPED | MemType::FETCH_PROT => fault::FETCH,
+            _ => fault::DATA,
+        };
+        core.get_data_mut().fault = Some((status, address as u32));
+        false
+    })?;
+    Ok(())
+}
+
+/// Before a basic block: time, events, stop, interrupts.
+fn on_block(core: &mut Core<'_>, address: u32, size: u32) {
+    let state = core.get_data_mut();
+    if core::mem::take(&mut state.paid) {
+        // Counted before the stop.
+    } else {
+        state.pay(address, size);
+    }
+    state.chip.findings.pc = address;
+    if state.chip.now >= state.chip.due {
+        state.chip.advance();
+    }
+    if state.must_stop() {
+        (state.resume, state.paid) = (Some(address), true);
+        stop(core);
+        return;
+    }
+    if state.chip.nvic.ready() != 0
+        && let Some(handler) = interrupt(core, address)
+    {
+        return put(core, Register::PC, handler | 1);
+    }
+    let state = core.get_data();
+    if state.hung == Some(state.chip.nvic.current()) {
+        // The same block again, without running it.
+        put(core, Register::PC, address | 1);
+    }
+}
+
+fn stop(core: &mut Core<'_>) {
+    if let Err(error) = core.emu_stop() {
+        core.get_data_mut().broken = Some(format!("the processor model does not stop: {error:?}"));
+    }
+}
+
+/// Priority at which the processor runs, masks included.
+fn running(core: &Core<'_>) -> i16 {
+    let running = core.get_data().chip.nvic.running();
+    let base = get(core, Register::BASEPRI) as i16 & 0xF0;
+    let running = if base > 0 { running.min(base) } else { running };
+    let running = if get(core, Register::PRIMASK) & 1 == 1 { running.min(0) } else { running };
+    if get(core, Register::FAULTMASK) & 1 == 1 { running.min(-1) } else { running }
+}
+
+/// Enters the interrupt that preempts code at `pc`, if one does; returns its handler.
+fn interrupt(core: &mut Core<'_>, pc: u32) -> Option<u32> {
+    let nvic = &core.get_data().chip.nvic;
+    nvic.preempting(nvic.running())?;
+    let exception = core.get_data().chip.nvic.preempting(running(core))?;
+    Some(enter(core, exception, pc))
+}
+
+/// Registers of a frame but for PC and status.
+const STACKED: [Register; 6] =
+    [Register::R0, Register::R1, Register::R2, Register::R3, Register::R12, Register::LR];
+
+/// Registers that a saved machine holds; Unicorn's own saved contexts belong to one instance.
+const SAVED: [Register; 21] = [
+    Register::CONTROL,
+    Register::XPSR_NZCVQG,
+    Register::R0,
+    Register::R1,
+    Register::R2,
+    Register::R3,
+    Register::R4,
+    Register::R5,
+    Register::R6,
+    Register::R7,
+    Register::R8,
+    Register::R9,
+    Register::R10,
+    Register::R11,
+    Register::R12,
+    Register::SP,
+    Register::LR,
+    Register::PRIMASK,
+    Register::BASEPRI,
+    Register::FAULTMASK,
+    Register::FPSCR,
+];
+
+/// All saved registers, as Unicorn's numbers.
+fn registers() -> impl Iterator<Item = i32> {
+    SAVED.into_iter().map(|register| register as i32).chain((0..32).map(single))
+}
+
+/// Value of a saved register; the program status is read whole.
+fn read(core: &Core<'_>, register: i32) -> u32 {
+    let register = if register == Register::XPSR_NZCVQG as i32 { Register::XPSR as i32 } else { register };
+    core.reg_read(register).map_or(0, |value| value as u32)
+}
+
+/// Number of a single-precision register for Unicorn.
+fn single(number: i32) -> i32 {
+    Register::S0 as i32 + number
+}
+
+/// Stores a frame and enters an exception; returns its handler.
+fn enter(core: &mut Core<'_>, exception: u8, pc: u32) -> u32 {
+    let status = get(core, Register::XPSR) | 1 << 24;
+    let floats = get(core, Register::CONTROL) & 4 != 0;
+    let sp = get(core, Register::SP);
+    let odd = sp >> 2 & 1;
+    let mut frame = Vec::with_capacity(26);
+    frame.extend(STACKED.map(|register| get(core, register)));
+    frame.extend([pc & !1, status & !(1 << 9) | odd << 9]);
+    if floats {
+        frame.extend((0..16).map(|number| core.reg_read(single(number)).map_or(0, |value| value as u32)));
+        frame.extend([get(core, Register::FPSCR), 0]);
+    }
+    let sp = sp.wrapping_sub(4 * odd + 4 * frame.len() as u32);
+    let bytes: Vec<u8> = frame.iter().flat_map(|word| word.to_le_bytes()).collect();
+    let stored = core.mem_write(sp.into(), &bytes).is_ok();
+    put(core, Register::SP, sp);
+    let nested = core.get_data().chip.nvic.depth() > 0;
+    let link = if nested { 0xFFFF_FFF1 } else { 0xFFFF_FFF9_u32 } & !if floats { 0x10 } else { 0 };
+    let mut exception = exception;
+    if !stored {
+        let state = core.get_data_mut();
+        state.chip.system.faults[0] |= fault::STACKING;
+        state.chip.system.faults[1] |= 1 << 30;
+        exception = HARD_FAULT;
+    }
+    vector(core, exception, status, link, ENTRY)
+}
+
+/// Makes an exception active after its frame was stored; returns its handler.
+fn vector(core: &mut Core<'_>, exception: u8, status: u32, link: u32, cycles: Ticks) -> u32 {
+    let state = core.get_data_mut();
+    let chip = &mut state.chip;
+    let pended = chip.nvic.pended.get(usize::from(exception)).copied().unwrap_or(chip.now);
+    chip.now += cycles * state.cycle;
+    chip.nvic.enter(exception);
+    chip.load.enter(exception, pended, chip.now);
+    chip.event = true;
+    let table = if chip.system.vectors == 0 { FLASH } else { chip.system.vectors };
+    let handler = state.image.word(table + 4 * u32::from(exception)).unwrap_or(0);
+    // Interrupted conditional blocks are restored from the frame.
+    put(core, Register::XPSR_NZCVQG, status & 0xF80F_0000 | 1 << 24 | u32::from(exception));
+    put(core, Register::CONTROL, 0);
+    put(core, Register::APSR_NZCV, status & 0xF000_0000);
+    put(core, Register::LR, link);
+    handler & !1
+}
+
+/// Events that Unicorn reports by number: 2 supervisor call, 8 return from an exception.
+fn on_interrupt(core: &mut Core<'_>, number: u32) {
+    match number {
+        8 => {
+            let link = get(core, Register::PC) | 1;
+            let pc = leave(core, link);
+            put(core, Register::PC, pc | 1);
+        }
+        2 => {
+            let pc = get(core, Register::PC);
+            let now = core.get_data().chip.now;
+            core.get_data_mut().chip.nvic.pend(SUPERVISOR_CALL, now);
+            let handler = enter(core, SUPERVISOR_CALL, pc);
+            put(core, Register::PC, handler | 1);
+        }
+        _ => {
+            core.get_data_mut().fault = Some((fault::INSTRUCTION, 0));
+            stop(core);
+        }
+    }
+}
+
+/// Leaves an exception, or enters the next one with the same frame; returns the address to continue at.
+fn leave(core: &mut Core<'_>, link: u32) -> u32 {
+    let state = core.get_data_mut();
+    let now = state.chip.now;
+    let left = state.chip.nvic.leave(now);
+    state.chip.load.leave(now);
+    state.chip.event = true;
+    if left != Some(NMI) {
+        put(core, Register::FAULTMASK, 0);
+    }
+    let next = core.get_data().chip.nvic.preempting(running(core));
+    if let Some(next) = next {
+        let status = get(core, Register::XPSR);
+        return vector(core, next, status, link, CHAINED);
+    }
+    let floats = link & 0x10 == 0;
+    let sp = get(core, Register::SP);
+    let mut bytes = [0; 4 * 26];
+    let bytes = &mut bytes[..4 * if floats { 26 } else { 8 }];
+    if core.mem_read(sp.into(), bytes).is_err() {
+        core.get_data_mut().fault = Some((fault::STACKING, 0));
+        stop(core);
+        return link;
+    }
+    let word = |index: usize| u32::from_le_bytes([0, 1, 2, 3].map(|byte| bytes[4 * index + byte]));
+    for (index, register) in STACKED.into_iter().enumerate() {
+        put(core, register, word(index));
+    }
+    if floats {
+        for number in 0..16 {
+            let value = word(8 + number as usize);
+            if core.reg_write(single(number), value.into()).is_err() {
+                core.get_data_mut().broken = Some("a floating-point register cannot be written".into());
+            }
+        }
+        put(core, Register::FPSCR, word(24));
+    }
+    let (pc, status) = (word(6), word(7));
+    put(core, Register::SP, sp + bytes.len() as u32 + 4 * (status >> 9 & 1));
+    put(core, Register::XPSR_NZCVQG, status & !(1 << 9));
+    put(core, Register::CONTROL, if floats { 4 } else { 0 });
+    put(core, Register::APSR_NZCV, status & 0xF000_0000);
+    let state = core.get_data_mut();
+    state.chip.now += RETURN * state.cycle;
+    pc & !1
+}
+
+/// End of a sleep.
+enum Woken {
+    /// The program goes on.
+    Continues,
+    /// An interrupt's handler goes on.
+    Entered(u32),
+    /// The run ends while asleep.
+    Stopped,
+}
+
+/// Instructions that Unicorn does not execute: wait for event, and unknown ones.
+fn on_invalid(core: &mut Core<'_>) -> bool {
+    let pc = get(core, Register::PC);
+    let mut code = [0; 2];
+    let is_wait = core.mem_read(u64::from(pc.wrapping_sub(2)), &mut code).is_ok()
+        && u16::from_le_bytes(code) == WAIT_FOR_EVENT;
+    if !is_wait {
+        core.get_data_mut().fault = Some((fault::INSTRUCTION, 0));
+        return false;
+    }
+    match sleep(core, pc) {
+        Woken::Continues => {}
+        Woken::Entered(handler) => put(core, Register::PC, handler | 1),
+        Woken::Stopped => {
+            let state = core.get_data_mut();
+            (state.resume, state.asleep, state.paid) = (Some(pc), true, false);
+            stop(core);
+        }
+    }
+    true
+}
+
+/// Sleeps until an event; `pc` is the address after the instruction.
+fn sleep(core: &mut Core<'_>, pc: u32) -> Woken {
+    loop {
+        let state = core.get_data_mut();
+        state.asleep = false;
+        if state.locked_up {
+            // Only a reset helps.
+        } else if core::mem::take(&mut state.chip.event) || state.hung == Some(0) {
+            return Woken::Continues;
+        } else if state.chip.nvic.ready() != 0 {
+            if state.chip.wakes_when_pending() {
+                return Woken::Continues;
+            }
+            if let Some(handler) = interrupt(core, pc) {
+                return Woken::Entered(handler);
+            }
+        }
+        let state = core.get_data_mut();
+        if state.must_stop() {
+            state.asleep = true;
+            return Woken::Stopped;
+        }
+        let begun = state.chip.now;
+        let next = state.chip.due.min(state.until).max(begun);
+        debug_assert!(next != NEVER);
+        state.chip.now = next;
+        state.chip.load.sleep(next - begun);
+        state.chip.debug.woke(begun, next);
+        state.chip.advance();
+    }
+}

@@ -1,0 +1,348 @@
+//! Flash interface, and sectors 10 and 11, which hold stored data (RM0090 3.5 to 3.9; times DS8626 table 42).
+//!
+//! Programming clears bits of one word, erasing sets those of a sector. Both need the keys, the right mode and
+//! a width that matches PSIZE; otherwise an error flag rises and nothing changes. While an operation runs the
+//! single bank cannot be read: the processor stalls, timers and converters go on. Power can be cut within any
+//! operation: a word is then a random mix of old and new, a sector reads as noise.
+//!
+//! Known limits: contents of the caches are not modelled, except that reading a sector that was erased while
+//! the data cache was on and not reset since is a finding.
+
+use rand_core::Rng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::findings::{Access, NO_REGISTER};
+use crate::time::{TICK_HZ, Ticks};
+
+/// Address of sector 10.
+pub const FIRST: u32 = 0x080C_0000;
+/// Bytes of a sector.
+pub const SECTOR: usize = 128 * 1024;
+/// Sectors that the model can change: 10 and 11.
+const NUMBERS: [u32; 2] = [10, 11];
+
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+const LOCKED: u32 = 1 << 31;
+const PROGRAM: u32 = 1;
+const ERASE: u32 = 1 << 1;
+const START: u32 = 1 << 16;
+/// Errors: sequence, parallelism, alignment, write protection.
+const SEQUENCE: u32 = 1 << 7;
+const PARALLELISM: u32 = 1 << 6;
+const ALIGNMENT: u32 = 1 << 5;
+const PROTECTED: u32 = 1 << 4;
+
+/// Typical durations of a word and of a sector of 128 KB, words of 32 bits.
+const WORD: Ticks = 16 * TICK_HZ / 1_000_000;
+const ERASURE: Ticks = TICK_HZ;
+
+/// Power cut within a later operation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cut {
+    /// While this word is programmed, counted from now.
+    Word(u64),
+    /// At this share of the next erasure.
+    Erasure(f64),
+}
+
+/// State of the flash interface.
+#[derive(Clone, Debug)]
+pub struct Flash {
+    access: u32,
+    status: u32,
+    control: u32,
+    keys: [u32; 2],
+    /// Keys were wrong: locked until a reset.
+    refused: bool,
+    cells: Vec<u8>,
+    /// Sectors erased while the data cache was on and not reset since.
+    stale: [bool; 2],
+    /// Time for which the processor stalls.
+    pub stall: Ticks,
+    /// Words programmed and sectors erased so far.
+    pub words: u64,
+    /// Erased sectors so far.
+    pub erasures: u64,
+    /// Next power cut.
+    pub cut: Option<Cut>,
+    /// Power was cut.
+    pub is_cut: bool,
+    noise: Xoshiro256PlusPlus,
+}
+
+impl Flash {
+    /// Erased sectors; `noise` decides how cells look after a power cut.
+    #[must_use]
+    pub fn new(noise: Xoshiro256PlusPlus) -> Self {
+        Self {
+            access: 0,
+            status: 0,
+            control: LOCKED,
+            keys: [0; 2],
+            refused: false,
+            cells: vec![0xFF; NUMBERS.len() * SECTOR],
+            stale: [false; 2],
+            stall: 0,
+            words: 0,
+            erasures: 0,
+            cut: None,
+            is_cut: false,
+            noise,
+        }
+    }
+
+    /// Resets the registers; cells stay.
+    pub fn reset(&mut self) {
+        (self.access, self.status, self.control, self.refused) = (0, 0, LOCKED, false);
+        (self.stale, self.stall, self.is_cut, self.cut) = ([false; 2], 0, false, None);
+    }
+
+    /// Bytes of both sectors.
+    pub fn cells_mut(&mut self) -> &mut [u8] {
+        &mut self.cells
+    }
+
+    /// Checks wait states against the processor's clock (RM0090 table 10, supply of 2.7 V and more).
+    pub fn check_wait_states(&self, processor_hz: u64, access: &mut Access<'_>) {
+        if processor_hz > 30_000_000 * (1 + u64::from(self.access & 7)) {
+            access.refuse("too few wait states for the clock", "FLASH_ACR");
+        }
+    }
+
+    /// Reads a register.
+    pub fn read(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
+        match offset {
+            0x00 => self.access,
+            0x0C => self.status,
+            0x10 => self.control,
+            0x14 => 0x0FFF_AAED,
+            0x04 | 0x08 => 0,
+            _ => {
+                access.refuse(NO_REGISTER, format!("FLASH+{offset:#x}"));
+                0
+            }
+        }
+    }
+
+    /// Writes a register.
+    pub fn write(&mut self, offset: u32, value: u32, access: &mut Access<'_>) {
+        match offset {
+            0x00 => self.write_access(access.implemented(value, 0x1F07, "FLASH_ACR"), access),
+            0x04 => self.write_key(value, access),
+            0x0C => self.status &= !(access.implemented(value, 0xF3, "FLASH_SR") & 0xF3),
+            0x10 => self.write_control(value, access),
+            0x08 | 0x14 => access.refuse("option bytes written", format!("FLASH+{offset:#x}")),
+            _ => access.refuse(NO_REGISTER, format!("FLASH+{offset:#x}")),
+        }
+    }
+
+    fn write_access(&mut self, value: u32, access: &mut Access<'_>) {
+        for (enable, reset) in [(1 << 9, 1 << 11), (1 << 10, 1 << 12)] {
+            if value & reset != 0 && self.access & enable != 0 {
+                access.refuse("cache reset while it is on", "FLASH_ACR");
+            }
+        }
+        if value & 1 << 12 != 0 {
+            self.stale = [false; 2];
+        }
+        self.access = value;
+    }
+
+    fn write_key(&mut self, value: u32, access: &mut Access<'_>) {
+        if self.control & LOCKED == 0 {
+            self.refused = true;
+            self.control |= LOCKED;
+            return access.refuse("key written while unlocked: locked until a reset", "FLASH_KEYR");
+        }
+        self.keys = [self.keys[1], value];
+        if value == KEYS[0] {
+            return;
+        }
+        if self.keys == KEYS && !self.refused {
+            self.control &= !LOCKED;
+        } else {
+            self.refused = true;
+            access.refuse("wrong key: locked until a reset", "FLASH_KEYR");
+        }
+        self.keys = [0; 2];
+    }
+
+    fn write_control(&mut self, value: u32, access: &mut Access<'_>) {
+        let value = access.implemented(value, 0x8301_037F, "FLASH_CR");
+        if self.control & LOCKED != 0 {
+            return access.refuse("control register written while locked", "FLASH_CR");
+        }
+        self.control = value & !START;
+        if value & START == 0 {
+            return;
+        }
+        if value & (PROGRAM | ERASE | 1 << 2) != ERASE {
+            return access.refuse("start without a sector erase", "FLASH_CR");
+        }
+        match NUMBERS.iter().position(|&number| number == value >> 3 & 0xF) {
+            Some(sector) => self.erase(sector),
+            None => {
+                self.status |= PROTECTED;
+                access.refuse("erase of a sector of the image", "FLASH_CR");
+            }
+        }
+    }
+
+    fn erase(&mut self, sector: usize) {
+        let cells = &mut self.cells[sector * SECTOR..(sector + 1) * SECTOR];
+        self.erasures += 1;
+        self.stale[sector] = self.access & 1 << 10 != 0;
+        self.stall += ERASURE;
+        if let Some(Cut::Erasure(share)) = self.cut {
+            self.stall = (self.stall as f64 * share) as Ticks;
+            (self.cut, self.is_cut) = (None, true);
+            return self.noise.fill_bytes(cells);
+        }
+        cells.fill(0xFF);
+    }
+
+    /// Reads bytes of the sectors, little-endian.
+    pub fn load(&self, offset: u32, size: usize, access: &mut Access<'_>) -> u32 {
+        let offset = offset as usize;
+        if self.access & 1 << 10 != 0 && self.stale.get(offset / SECTOR) == Some(&true) {
+            access.refuse("read of an erased sector through a data cache that was not reset", "FLASH_ACR");
+        }
+        let bytes = self.cells.get(offset..offset + size).unwrap_or_default();
+        bytes.iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte))
+    }
+
+    /// Programs a word of the sectors.
+    pub fn store(&mut self, offset: u32, size: usize, value: u32, access: &mut Access<'_>) {
+        if self.control & (LOCKED | PROGRAM | ERASE) != PROGRAM {
+            self.status |= SEQUENCE;
+            return access.refuse("flash written without keys or programming mode", "FLASH_CR");
+        }
+        if 8 * size as u32 != 8 << (self.control >> 8 & 3) {
+            self.status |= PARALLELISM;
+            return access.refuse("width of a flash write differs from PSIZE", "FLASH_CR");
+        }
+        if !(offset as usize).is_multiple_of(size) {
+            self.status |= ALIGNMENT;
+            return access.refuse("flash write is not aligned", "FLASH_SR");
+        }
+        let range = offset as usize..offset as usize + size;
+        let Some(cells) = self.cells.get_mut(range) else { return };
+        self.words += 1;
+        self.stall += WORD;
+        let cut = match &mut self.cut {
+            Some(Cut::Word(0)) => true,
+            Some(Cut::Word(left)) => {
+                *left -= 1;
+                false
+            }
+            _ => false,
+        };
+        let mut raised = false;
+        for (cell, byte) in cells.iter_mut().zip(value.to_le_bytes()) {
+            raised |= byte & !*cell != 0;
+            let programmed = *cell & byte;
+            let changed = if cut { (*cell ^ programmed) & self.noise.next_u32() as u8 } else { 0xFF };
+            *cell ^= (*cell ^ programmed) & changed;
+        }
+        if raised {
+            access.refuse("bit programmed from 0 to 1 without an erase", "FLASH");
+        }
+        if cut {
+            (self.cut, self.is_cut) = (None, true);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::findings::Findings;
+    use rand_xoshiro::rand_core::SeedableRng;
+
+    struct Bench {
+        flash: Flash,
+        findings: Findings,
+    }
+
+    impl Bench {
+        fn new() -> Self {
+            let noise = Xoshiro256PlusPlus::seed_from_u64(1);
+            Self { flash: Flash::new(noise), findings: Findings::default() }
+        }
+
+        fn write(&mut self, offset: u32, value: u32) {
+            self.flash.write(offset, value, &mut Access { now: 0, findings: &mut self.findings });
+        }
+
+        fn store(&mut self, offset: u32, size: usize, value: u32) {
+            self.flash.store(offset, size, value, &mut Access { now: 0, findings: &mut self.findings });
+        }
+
+        fn load(&mut self, offset: u32) -> u32 {
+            self.flash.load(offset, 4, &mut Access { now: 0, findings: &mut self.findings })
+        }
+
+        fn unlock(&mut self) {
+            KEYS.into_iter().for_each(|key| self.write(4, key));
+        }
+    }
+
+    #[test]
+    fn a_word_is_programmed_with_keys_mode_and_width_only() {
+        let mut bench = Bench::new();
+        bench.store(8, 4, 0x1234_5678);
+        assert_eq!((bench.load(8), bench.flash.status), (u32::MAX, SEQUENCE));
+        bench.unlock();
+        bench.write(0x10, PROGRAM);
+        bench.store(8, 4, 0x1234_5678);
+        assert_eq!((bench.load(8), bench.flash.status), (u32::MAX, SEQUENCE | PARALLELISM));
+        bench.write(0x10, PROGRAM | 2 << 8);
+        bench.store(8, 4, 0x1234_5678);
+        assert_eq!((bench.load(8), bench.flash.stall), (0x1234_5678, WORD));
+        assert!(!bench.findings.has("bit programmed from 0 to 1 without an erase"));
+        bench.store(8, 4, 0x0000_FFFF);
+        assert_eq!(bench.load(8), 0x0000_5678);
+        assert!(bench.findings.has("bit programmed from 0 to 1 without an erase"));
+    }
+
+    #[test]
+    fn a_wrong_key_locks_until_a_reset() {
+        let mut bench = Bench::new();
+        bench.write(4, KEYS[1]);
+        bench.unlock();
+        assert_ne!(bench.flash.control & LOCKED, 0);
+        bench.flash.reset();
+        bench.unlock();
+        assert_eq!(bench.flash.control & LOCKED, 0);
+    }
+
+    #[test]
+    fn an_erase_sets_one_sector_and_stalls_for_a_second() {
+        let mut bench = Bench::new();
+        bench.flash.cells_mut().fill(0);
+        bench.unlock();
+        bench.write(0x10, ERASE | 2 << 8 | 11 << 3);
+        bench.write(0x10, ERASE | 2 << 8 | 11 << 3 | START);
+        assert_eq!((bench.load(0), bench.load(SECTOR as u32)), (0, u32::MAX));
+        assert_eq!(bench.flash.stall, ERASURE);
+        bench.write(0x10, ERASE | 2 << 8 | 3 << 3 | START);
+        assert!(bench.findings.has("erase of a sector of the image"));
+    }
+
+    #[test]
+    fn a_power_cut_mixes_a_word_and_makes_noise_of_a_sector() {
+        let mut bench = Bench::new();
+        bench.unlock();
+        bench.write(0x10, PROGRAM | 2 << 8);
+        bench.flash.cut = Some(Cut::Word(1));
+        bench.store(0, 4, 0);
+        assert!(!bench.flash.is_cut);
+        bench.store(4, 4, 0);
+        assert!(bench.flash.is_cut && bench.load(0) == 0);
+        assert!(bench.load(4) != 0 && bench.load(4) != u32::MAX);
+        bench.write(0x10, ERASE | 2 << 8 | 10 << 3);
+        bench.flash.cut = Some(Cut::Erasure(0.5));
+        bench.write(0x10, ERASE | 2 << 8 | 10 << 3 | START);
+        assert!(bench.load(0x100) != u32::MAX && bench.load(SECTOR as u32) == u32::MAX);
+    }
+}

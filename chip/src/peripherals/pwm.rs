@@ -1,0 +1,171 @@
+//! Outputs of an advanced timer (RM0090 17.3.11 to 17.3.13): complementary outputs with dead time.
+//!
+//! ```text
+//! reference  ____________|^^^^^^^^^^^^^^^^^|____________
+//! output     _______________|^^^^^^^^^^^^^^|____________      on one dead time after the reference's rise
+//! complement ^^^^^^^^^^^^|____________________|^^^^^^^^^      on one dead time after its fall
+//! ```
+//!
+//! Without main output both are at their idle level, or not driven; then the gate drivers' pull-downs hold
+//! them low.
+
+use crate::peripherals::timer::{MOE, Timer};
+use crate::time::{NEVER, Ticks};
+
+/// Reference of one channel since its last edge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Reference {
+    level: bool,
+    since: Ticks,
+}
+
+/// Pins of a half bridge: high side, low side.
+pub type Pins = [bool; 2];
+
+/// Outputs of channels 1 to 3.
+#[derive(Clone, Debug, Default)]
+pub struct Outputs {
+    references: [Reference; 3],
+    /// Whether each pin is connected to its channel, as bits of channel and side.
+    connected: [Pins; 3],
+    main: bool,
+}
+
+/// Dead time of a register value, clocks of the dead-time generator (RM0090 17.4.18).
+#[must_use]
+pub fn dead_time(code: u32) -> u64 {
+    let code = u64::from(code & 0xFF);
+    match code >> 5 {
+        0..=3 => code,
+        4 | 5 => (64 + (code & 0x3F)) * 2,
+        6 => (32 + (code & 0x1F)) * 8,
+        _ => (32 + (code & 0x1F)) * 16,
+    }
+}
+
+impl Outputs {
+    /// Sets which pins are connected to the timer.
+    pub fn connect(&mut self, connected: [Pins; 3]) {
+        self.connected = connected;
+    }
+
+    /// Follows the timer to an instant, after its registers changed or an edge was due. Returns the edges of
+    /// references: rising ones less falling ones, and their number.
+    pub fn follow(&mut self, timer: &Timer, now: Ticks) -> (i32, u32) {
+        let main = timer.main_output() & MOE != 0;
+        let (mut edges, mut count) = (0, 0);
+        for (reference, level) in self.references.iter_mut().zip(timer.references(now)) {
+            if level != reference.level {
+                edges += if level { 1 } else { -1 };
+                count += 1;
+            }
+            if level != reference.level || main && !self.main {
+                *reference = Reference { level, since: now };
+            }
+        }
+        self.main = main;
+        if main { (edges, count) } else { (0, 0) }
+    }
+
+    /// Levels of the pins at an instant up to which the outputs followed.
+    #[must_use]
+    pub fn pins(&self, timer: &Timer, now: Ticks) -> [Pins; 3] {
+        let dead = dead_time(timer.main_output()) * timer.dead_time_clock();
+        core::array::from_fn(|channel| {
+            let reference = self.references[channel];
+            let levels = if self.main {
+                driven(timer.outputs(channel), reference.level, now >= reference.since + dead)
+            } else if timer.main_output() & 1 << 10 != 0 {
+                timer.idle_levels(channel)
+            } else {
+                [false; 2]
+            };
+            core::array::from_fn(|side| levels[side] && self.connected[channel][side])
+        })
+    }
+
+    /// Next instant at which a pin may change.
+    #[must_use]
+    pub fn next_change(&self, timer: &Timer, now: Ticks) -> Ticks {
+        if !self.main {
+            return NEVER;
+        }
+        let dead = dead_time(timer.main_output()) * timer.dead_time_clock();
+        let mut next = NEVER;
+        let place = timer.runs().then(|| timer.place(now));
+        for (channel, reference) in self.references.iter().enumerate() {
+            if reference.since + dead > now {
+                next = next.min(reference.since + dead);
+            }
+            if let (Some(place), Some([rise, fall])) = (&place, timer.edges(channel)) {
+                next = next.min(place.next(if reference.level { fall } else { rise }));
+            }
+        }
+        next
+    }
+
+    /// Whether the main output is on.
+    #[must_use]
+    pub const fn is_on(&self) -> bool {
+        self.main
+    }
+}
+
+/// Levels of both outputs from enable and polarity bits, the reference, and whether the dead time is over.
+fn driven(bits: u32, reference: bool, settled: bool) -> Pins {
+    let active = match (bits & 1 == 1, bits >> 2 & 1 == 1) {
+        (true, true) => [reference && settled, !reference && settled],
+        (true, false) => [reference, false],
+        (false, true) => [false, reference],
+        (false, false) => [false, false],
+    };
+    [active[0] ^ (bits >> 1 & 1 == 1), active[1] ^ (bits >> 3 & 1 == 1)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::findings::{Access, Findings};
+    use crate::peripherals::timer::Kind;
+
+    #[test]
+    fn dead_time_codes_have_four_ranges() {
+        assert_eq!([20, 127, 128, 191, 192, 224, 255].map(dead_time), [20, 127, 128, 254, 256, 512, 1008]);
+    }
+
+    #[test]
+    fn both_switches_of_a_half_bridge_are_off_for_the_dead_time() {
+        let mut timer = Timer::new("TIM1", Kind::Advanced);
+        timer.set_clock(2, 0);
+        let mut findings = Findings::default();
+        let setup = [
+            (0x00, 0xE0),
+            (0x2C, 3500),
+            (0x18, 0x7878),
+            (0x34, 1000),
+            (0x14, 1),
+            (0x20, 0x555),
+            (0x44, MOE | 0xC00 | 20),
+            (0x00, 0xE1),
+        ];
+        for (offset, value) in setup {
+            timer.write(offset, value, 0, &mut Access { now: 0, findings: &mut findings });
+        }
+        let mut outputs = Outputs::default();
+        outputs.connect([[true; 2]; 3]);
+        outputs.follow(&timer, 0);
+        let mut changes = Vec::new();
+        let mut now = 0;
+        while changes.len() < 5 {
+            let before = outputs.pins(&timer, now)[0];
+            now = outputs.next_change(&timer, now);
+            outputs.follow(&timer, now);
+            let after = outputs.pins(&timer, now)[0];
+            if before != after {
+                changes.push((now / 2, after));
+            }
+        }
+        let (high, low, off) = ([true, false], [false, true], [false; 2]);
+        assert_eq!(changes, [(20, low), (1000, off), (1020, high), (6000, off), (6020, low)]);
+    }
+}

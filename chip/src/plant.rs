@@ -1,0 +1,641 @@
+//! The board and its leg around the chip: hal-sim's motors, shunts, counters, supply and leg at the pins.
+//!
+//! The pins of both bridges decide each step, so switching is not averaged and nothing is assumed about the
+//! firmware's period: edges, dead time and main output are those of the timers, and a shunt is read at the
+//! instant at which the converter holds it.
+//!
+//! ```text
+//! electric   from edge to edge of the pins, bus voltage constant for at most a quarter of a PWM period
+//! mechanic   every 1/24 ms: leg by the mean torque; between, the rotors turn at constant speed
+//! ```
+//!
+//! A calibration needs motors that are free of their gears. So the plant begins with free rotors and a leg that
+//! a fixture holds; [`Plant::couple`] mounts the gears. A hand holds joints, or moves them.
+//! Known limits: a hand is stronger than every motor.
+
+use core::f64::consts::{PI, TAU};
+
+use hal_sim::conventions::Anatomy;
+use hal_sim::description::LegDescription;
+use hal_sim::drive::axis::{PERIOD_S, QUARTER_S};
+use hal_sim::drive::counter::Counter;
+use hal_sim::drive::description::{
+    AxisDescription, CompleteDescription, CouplingDescription, EncoderWiring, SupplyDescription,
+};
+use hal_sim::drive::motor::{Direction, Motor, Terminal};
+use hal_sim::drive::shunts::ShuntState;
+use hal_sim::drive::supply::Supply;
+use hal_sim::end_stop;
+use hal_sim::leg::{Leg, LegState};
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::peripherals::pwm::{Outputs, Pins};
+use crate::peripherals::timer::Timer;
+use crate::time::{NEVER, TICK_HZ, Ticks, seconds, ticks};
+
+/// Joints of the leg, and axes of the board.
+pub const JOINTS: usize = 2;
+/// Length of a mechanical step, 1/24 ms.
+pub const STEP: Ticks = TICK_HZ / 24_000;
+const QUARTER: Ticks = STEP / 4;
+/// Free rotor: inertia, kg m^2; dry friction, N m; viscous friction, N m s/rad.
+const FREE: [f64; 3] = [1e-4, 0.01, 1e-4];
+/// Conduction time at which an amplifier has long settled, s.
+const SETTLED: f64 = 1.0;
+/// Code of a thermistor at 38 degrees Celsius.
+const WARM: u16 = 1400;
+/// Edges of a bridge that are remembered.
+const REMEMBERED: usize = 16;
+/// Standard deviation of the bus voltage's code.
+const BUS_NOISE_CODES: f64 = 1.0;
+
+/// Falsification of a shunt's code.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShuntFault {
+    /// Always this code.
+    Stuck(u16),
+    /// Added codes.
+    Offset(f64),
+}
+
+/// Falsification of an encoder.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EncoderFault {
+    /// Position at which the counter stands.
+    pub frozen: Option<u16>,
+    /// Counts added to every position.
+    pub added: i32,
+    /// No index pulses.
+    pub no_index: bool,
+}
+
+/// Main output of a bridge that went on or off at the pins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Switching {
+    /// Instant.
+    pub at: Ticks,
+    /// Axis.
+    pub axis: usize,
+    /// Whether it went on.
+    pub on: bool,
+}
+
+/// Pins of a bridge that changed: when, and the edges of its references.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edges {
+    /// Instant.
+    pub at: Ticks,
+    /// Number of references that changed.
+    pub count: u32,
+    /// Rising ones less falling ones.
+    pub rising: i32,
+}
+
+/// One axis with its motor.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    description: AxisDescription,
+    output_of: [usize; 3],
+    motor: Motor,
+    counter: Counter,
+    /// Rotor's angle at the last mechanical step, rad, and its speed since then, rad/s.
+    angle: f64,
+    speed: f64,
+    /// Rotor's angle less that of the gear; `None` while the rotor is free.
+    mounting: Option<f64>,
+    cogging: f64,
+    impulse: f64,
+    heat: f64,
+    slopes: [f64; 3],
+    pins: [Pins; 3],
+    /// Instants from which the low sides conduct.
+    low_since: [Option<Ticks>; 3],
+    edges: [Edges; REMEMBERED],
+    /// Whether the main output is on and the gate drivers follow.
+    is_armed: bool,
+    /// Last instant at which a high side was on.
+    pub last_high: Ticks,
+    /// Falsified shunts B and C.
+    pub shunt_faults: [Option<ShuntFault>; 2],
+    /// Falsified encoder.
+    pub encoder_fault: EncoderFault,
+    /// Output with a broken wire.
+    pub open: Option<usize>,
+}
+
+impl Axis {
+    fn new(description: &AxisDescription, angle: f64) -> Self {
+        let mut output_of = [0; 3];
+        for (output, phase) in description.wiring.phases.iter().enumerate() {
+            output_of[*phase] = output;
+        }
+        let electrical = electrical(description, angle);
+        Self {
+            description: *description,
+            output_of,
+            motor: Motor::new(&description.motor, description.bridge.on_resistance, electrical),
+            counter: Counter::new(&description.counter, description.wiring.encoder, angle),
+            angle,
+            speed: 0.0,
+            mounting: None,
+            cogging: 0.0,
+            impulse: 0.0,
+            heat: 0.0,
+            slopes: [0.0; 3],
+            pins: [[false; 2]; 3],
+            low_since: [None; 3],
+            edges: [Edges { at: 0, count: 0, rising: 0 }; REMEMBERED],
+            is_armed: false,
+            last_high: 0,
+            shunt_faults: [None; 2],
+            encoder_fault: EncoderFault::default(),
+            open: description.wiring.open,
+        }
+    }
+
+    /// Whether any switch is on.
+    #[must_use]
+    pub fn is_on(&self) -> bool {
+        self.pins.as_flattened().contains(&true)
+    }
+
+    /// Whether the main output is on and the gate drivers follow.
+    #[must_use]
+    pub const fn is_armed(&self) -> bool {
+        self.is_armed
+    }
+
+    /// Currents into the motor's phases, A.
+    #[must_use]
+    pub fn currents(&self) -> [f64; 3] {
+        self.motor.currents()
+    }
+
+    /// Rotor's speed, rad/s.
+    #[must_use]
+    pub const fn speed(&self) -> f64 {
+        self.speed
+    }
+
+    /// Edges of the bridge that lie within a window before an instant, the dead time included.
+    #[must_use]
+    pub fn edges_within(&self, window: Ticks, before: Ticks) -> (u32, i32) {
+        let dead = ticks(self.description.bridge.dead_time);
+        let within =
+            |edges: &&Edges| edges.count > 0 && edges.at <= before && edges.at + dead + window >= before;
+        let inside = self.edges.iter().filter(within);
+        inside.fold((0, 0), |(count, rising), edges| (count + edges.count, rising + edges.rising))
+    }
+
+    fn remember(&mut self, edges: Edges) {
+        self.edges.rotate_right(1);
+        self.edges[0] = edges;
+    }
+
+    fn set_pins(&mut self, pins: [Pins; 3], now: Ticks) {
+        let high = |pins: &[Pins; 3]| pins.iter().any(|pins| pins[0]);
+        if high(&self.pins) || high(&pins) {
+            self.last_high = now;
+        }
+        for (output, pins) in pins.iter().enumerate() {
+            let low = pins[1] && !pins[0];
+            self.low_since[output] = if low { self.low_since[output].or(Some(now)) } else { None };
+        }
+        self.pins = pins;
+    }
+
+    fn terminal(&self, output: usize, bus: f64) -> Terminal {
+        if self.open == Some(output) {
+            return Terminal::Off(f64::NEG_INFINITY, f64::INFINITY);
+        }
+        match self.pins[output] {
+            [true, false] => Terminal::Held(bus),
+            [false, true] => Terminal::Held(0.0),
+            // The driver turns both switches off where both are requested.
+            _ => {
+                let drop = self.description.bridge.diode_drop;
+                Terminal::Off(-drop, bus + drop)
+            }
+        }
+    }
+
+    /// Advances the motor with constant pins; returns the charge drawn from the bus.
+    fn step(&mut self, bus: f64, duration: f64) -> f64 {
+        let terminals = self.output_of.map(|output| self.terminal(output, bus));
+        let before = self.motor.currents();
+        let speed = f64::from(self.description.motor.pole_pairs) * self.speed;
+        let moved = self.motor.advance(&terminals, speed, duration);
+        let after = self.motor.currents();
+        let mut charge = 0.0;
+        for phase in 0..3 {
+            charge += match terminals[phase] {
+                Terminal::Held(voltage) if voltage > 0.0 => moved.charge[phase],
+                Terminal::Held(_) => 0.0,
+                // The upper diode leads back into the bus.
+                Terminal::Off(..) => moved.charge[phase].min(0.0),
+            };
+            self.slopes[phase] = (after[phase] - before[phase]) / duration;
+        }
+        self.impulse += moved.impulse + self.cogging * duration;
+        self.heat += moved.heat;
+        charge
+    }
+
+    fn set_rotor(&mut self, angle: f64, speed: f64) {
+        (self.angle, self.speed) = (angle, speed);
+        self.motor.set_angle(electrical(&self.description, angle));
+        self.cogging = self.motor.cogging(angle + 0.5 * speed * PERIOD_S);
+    }
+
+    fn shunt_state(&self, channel: usize, disturbance: f64, now: Ticks) -> ShuntState {
+        let output = channel + 1;
+        let phase = self.description.wiring.phases[output];
+        let current = self.motor.currents()[phase];
+        // With the low switch off, a shunt carries the low diode's current, which flows into the motor.
+        let by_diode = if current > 0.0 { SETTLED } else { 0.0 };
+        let sign = if self.description.wiring.shunts_inverted[channel] { -1.0 } else { 1.0 };
+        ShuntState {
+            current: sign * current,
+            slope: sign * self.slopes[phase],
+            conducting: self.low_since[output].map_or(by_diode, |since| seconds(now - since)),
+            disturbance,
+        }
+    }
+
+    /// Instants within the next step at which the index line rises and falls, if it does.
+    fn index_pulse(&self, now: Ticks) -> Vec<(Ticks, bool)> {
+        if self.speed == 0.0 || self.encoder_fault.no_index {
+            return Vec::new();
+        }
+        let width = TAU / self.description.counter.counts;
+        let travel = self.speed * PERIOD_S;
+        let from = (self.angle - self.description.counter.index).rem_euclid(TAU);
+        let mut events = Vec::new();
+        // Both ends of the pulse, also one turn away.
+        for (end, inside) in [(0.0, self.speed > 0.0), (width, self.speed < 0.0)] {
+            for turn in [-TAU, 0.0, TAU] {
+                let distance = end + turn - from;
+                let share = distance / travel;
+                if share > 0.0 && share <= 1.0 {
+                    events.push((now + (share * STEP as f64) as Ticks, inside));
+                }
+            }
+        }
+        events.sort_unstable();
+        events
+    }
+}
+
+fn electrical(description: &AxisDescription, angle: f64) -> Direction {
+    Direction::of(f64::from(description.motor.pole_pairs) * angle + description.motor.electrical_zero)
+}
+
+/// Motion of the hand: joints to an angle (rad, anatomical) by a half cosine, then held.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Hand {
+    from: [f64; JOINTS],
+    to: [f64; JOINTS],
+    begun: Ticks,
+    duration: Ticks,
+}
+
+/// Timer and outputs of one bridge.
+pub type Bridge<'a> = (&'a Timer, &'a mut Outputs);
+
+/// The board's surroundings.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    /// Axes with their motors.
+    pub axes: [Axis; JOINTS],
+    /// Bus of the bridges.
+    pub supply: Supply,
+    /// Duty of the brake resistor; 0 without one.
+    pub brake: f64,
+    source: SupplyDescription,
+    coupling: CouplingDescription,
+    leg: Leg<JOINTS>,
+    description: LegDescription<JOINTS>,
+    state: LegState<JOINTS>,
+    anatomy: [Anatomy; JOINTS],
+    mirrored: f64,
+    hand: Option<Hand>,
+    noise: Xoshiro256PlusPlus,
+    /// Instant up to which the motors were advanced, and of the last mechanical step.
+    electric: Ticks,
+    mechanic: Ticks,
+    /// Edges of the index lines within the present step: instant, axis, level.
+    index_edges: Vec<(Ticks, usize, bool)>,
+    /// Codes of the thermistors: bridge 0, bridge 1, chopper.
+    pub thermistors: [u16; 3],
+    /// Whether the enable line lets the gates follow.
+    gates: bool,
+    /// A half bridge had both switches requested.
+    pub shoot_through: u64,
+    /// Main outputs that went on or off, if they are to be recorded.
+    pub switchings: Option<Vec<Switching>>,
+}
+
+impl Plant {
+    /// Free rotors at rest; the leg held at its anatomical zero.
+    #[must_use]
+    pub fn new(leg: &LegDescription<JOINTS>, drives: &CompleteDescription<JOINTS>, seed: u64) -> Self {
+        let anatomy = leg.joints.map(|joint| Anatomy::of(&joint));
+        let state = LegState {
+            angles: core::array::from_fn(|joint| anatomy[joint].to_joint_angle(0.0)),
+            rates: [0.0; JOINTS],
+        };
+        // Rotors at some angle that is no special one.
+        let axes = core::array::from_fn(|axis| Axis::new(&drives.axes[axis], 0.4 + 0.7 * axis as f64));
+        Self {
+            axes,
+            supply: Supply::new(&drives.supply),
+            brake: 0.0,
+            source: drives.supply,
+            coupling: drives.coupling,
+            leg: Leg::new(leg),
+            description: *leg,
+            state,
+            anatomy,
+            mirrored: if leg.mirrored { -1.0 } else { 1.0 },
+            hand: None,
+            noise: Xoshiro256PlusPlus::seed_from_u64(seed),
+            electric: 0,
+            mechanic: 0,
+            index_edges: Vec::new(),
+            thermistors: [WARM; 3],
+            gates: false,
+            shoot_through: 0,
+            switchings: None,
+        }
+    }
+
+    /// Mounts the gears: from now on the rotors turn the leg, which a hand holds where it is.
+    pub fn couple(&mut self, now: Ticks) {
+        let position = self.position();
+        for (joint, axis) in self.axes.iter_mut().enumerate() {
+            axis.mounting = Some(axis.angle - axis.description.ratio * self.mirrored * position[joint]);
+            axis.speed = 0.0;
+        }
+        self.hand = Some(Hand { from: position, to: position, begun: now, duration: 0 });
+    }
+
+    /// Moves the joints to these angles (rad, anatomical) within a duration, and holds them there.
+    pub fn move_by_hand(&mut self, to: [f64; JOINTS], now: Ticks, duration: f64) {
+        let duration = ticks(duration);
+        self.hand = Some(Hand { from: self.position(), to, begun: now, duration });
+    }
+
+    /// Lets the leg go.
+    pub fn let_go(&mut self) {
+        self.hand = None;
+    }
+
+    /// Whether a hand holds the leg.
+    #[must_use]
+    pub const fn is_held(&self) -> bool {
+        self.hand.is_some()
+    }
+
+    /// Joint angles, rad, anatomical.
+    #[must_use]
+    pub fn position(&self) -> [f64; JOINTS] {
+        core::array::from_fn(|joint| self.anatomy[joint].to_anatomical_angle(self.state.angles[joint]))
+    }
+
+    /// Joint rates, rad/s, anatomical.
+    #[must_use]
+    pub fn velocity(&self) -> [f64; JOINTS] {
+        core::array::from_fn(|joint| self.anatomy[joint].flip(self.state.rates[joint]))
+    }
+
+    /// Sets the bus and its source to a voltage at once.
+    pub fn set_bus(&mut self, voltage: f64) {
+        self.supply = Supply::new(&SupplyDescription { voltage, ..self.source });
+    }
+
+    /// Lets the gates follow their inputs, or holds them low.
+    pub fn set_gates(&mut self, gates: bool) {
+        self.gates = gates;
+    }
+
+    /// Position of an encoder at an instant, quadrature counts.
+    pub fn encoder(&mut self, axis: usize, now: Ticks) -> u16 {
+        let since = seconds(now.saturating_sub(self.mechanic));
+        let axis = &mut self.axes[axis];
+        let fault = axis.encoder_fault;
+        let position = axis.counter.read(axis.angle + axis.speed * since).0;
+        fault.frozen.unwrap_or(position).wrapping_add(fault.added as u16)
+    }
+
+    /// Whether the index line of an axis is high at the last mechanical step.
+    #[must_use]
+    pub fn index_level(&self, axis: usize) -> bool {
+        let axis = &self.axes[axis];
+        let width = TAU / axis.description.counter.counts;
+        let missing =
+            axis.encoder_fault.no_index || axis.description.wiring.encoder == EncoderWiring::Missing;
+        !missing && (axis.angle - axis.description.counter.index).rem_euclid(TAU) < width
+    }
+
+    /// Advances the motors to an instant.
+    pub fn advance(&mut self, now: Ticks, bridges: &mut [Bridge<'_>; JOINTS]) {
+        while self.electric < now {
+            let end = now.min(self.electric + QUARTER);
+            let (bus, mut charge) = (self.supply.voltage(), 0.0);
+            for (axis, bridge) in self.axes.iter_mut().zip(bridges.iter_mut()) {
+                charge += Self::advance_axis(
+                    axis,
+                    bridge,
+                    self.electric,
+                    end,
+                    bus,
+                    self.gates,
+                    &mut self.shoot_through,
+                );
+            }
+            self.supply.advance(charge, self.brake, seconds(end - self.electric));
+            self.electric = end;
+        }
+        self.refresh(now, bridges);
+    }
+
+    /// Reads the pins again after registers changed at this instant.
+    pub fn refresh(&mut self, now: Ticks, bridges: &mut [Bridge<'_>; JOINTS]) {
+        for (index, (axis, bridge)) in self.axes.iter_mut().zip(bridges.iter_mut()).enumerate() {
+            Self::read_pins(axis, bridge, now, self.gates, &mut self.shoot_through);
+            let armed = bridge.1.is_on() && self.gates;
+            if armed != axis.is_armed {
+                axis.is_armed = armed;
+                if let Some(switchings) = &mut self.switchings {
+                    switchings.push(Switching { at: now, axis: index, on: armed });
+                }
+            }
+        }
+    }
+
+    fn read_pins(axis: &mut Axis, bridge: &mut Bridge<'_>, now: Ticks, gates: bool, both: &mut u64) {
+        let (rising, count) = bridge.1.follow(bridge.0, now);
+        if count > 0 {
+            axis.remember(Edges { at: now, count, rising });
+        }
+        let pins = if gates { bridge.1.pins(bridge.0, now) } else { [[false; 2]; 3] };
+        *both += pins.iter().filter(|pins| pins[0] && pins[1]).count() as u64;
+        axis.set_pins(pins, now);
+    }
+
+    fn advance_axis(
+        axis: &mut Axis,
+        bridge: &mut Bridge<'_>,
+        from: Ticks,
+        end: Ticks,
+        bus: f64,
+        gates: bool,
+        both: &mut u64,
+    ) -> f64 {
+        let (mut now, mut charge) = (from, 0.0);
+        while now < end {
+            let next = bridge.1.next_change(bridge.0, now).min(end);
+            charge += axis.step(bus, seconds(next - now));
+            now = next;
+            if now < end {
+                Self::read_pins(axis, bridge, now, gates, both);
+            }
+        }
+        charge
+    }
+
+    /// Instant of the next mechanical step or edge of an index line.
+    #[must_use]
+    pub fn due(&self) -> Ticks {
+        let edge = self.index_edges.first().map_or(NEVER, |(at, ..)| *at);
+        edge.min(self.mechanic + STEP)
+    }
+
+    /// Processes what is due: an edge of an index line (axis, level), or a mechanical step.
+    pub fn pass(&mut self, now: Ticks, bridges: &mut [Bridge<'_>; JOINTS]) -> Option<(usize, bool)> {
+        if let Some(&(at, axis, level)) = self.index_edges.first()
+            && at <= now
+        {
+            self.index_edges.remove(0);
+            return Some((axis, level));
+        }
+        self.advance(now, bridges);
+        self.step(now);
+        None
+    }
+
+    /// Moves leg and rotors by the mean torque since the last step.
+    fn step(&mut self, now: Ticks) {
+        let torque: [f64; JOINTS] = core::array::from_fn(|axis| self.axes[axis].impulse / PERIOD_S);
+        self.mechanic = now;
+        self.move_leg(&torque, now);
+        let (position, velocity) = (self.position(), self.velocity());
+        self.index_edges.clear();
+        for (joint, axis) in self.axes.iter_mut().enumerate() {
+            let (angle, speed) = match axis.mounting {
+                Some(offset) => {
+                    let turns = axis.description.ratio * self.mirrored;
+                    (offset + turns * position[joint], turns * velocity[joint])
+                }
+                None => turn_freely(axis, torque[joint]),
+            };
+            axis.motor.warm(axis.heat, PERIOD_S);
+            (axis.impulse, axis.heat) = (0.0, 0.0);
+            axis.set_rotor(angle, speed);
+            let edges = axis.index_pulse(now);
+            self.index_edges.extend(edges.into_iter().map(|(at, level)| (at, joint, level)));
+        }
+        self.index_edges.sort_unstable();
+    }
+
+    fn move_leg(&mut self, torque: &[f64; JOINTS], now: Ticks) {
+        if let Some(hand) = &self.hand {
+            let share = match hand.duration {
+                0 => 1.0,
+                duration => ((now - hand.begun) as f64 / duration as f64).clamp(0.0, 1.0),
+            };
+            // Position and speed of a half cosine.
+            let ((sine, cosine), moving) = ((PI * share).sin_cos(), share < 1.0);
+            for joint in 0..JOINTS {
+                let way = hand.to[joint] - hand.from[joint];
+                let position = hand.from[joint] + 0.5 * (1.0 - cosine) * way;
+                let rate = if moving { 0.5 * PI * sine * way / seconds(hand.duration) } else { 0.0 };
+                self.state.angles[joint] = self.anatomy[joint].to_joint_angle(position);
+                self.state.rates[joint] = self.anatomy[joint].flip(rate);
+            }
+            return;
+        }
+        if self.axes.iter().any(|axis| axis.mounting.is_none()) {
+            return;
+        }
+        let (position, velocity) = (self.position(), self.velocity());
+        let acting = core::array::from_fn(|joint| {
+            let motor = self.mirrored * self.axes[joint].description.ratio * torque[joint];
+            let stops = self.description.joints[joint].stops;
+            let stopped = end_stop::torque(stops, position[joint], velocity[joint]);
+            self.anatomy[joint].flip(motor + stopped)
+        });
+        self.leg.advance(&mut self.state, &acting, &acting, PERIOD_S);
+    }
+
+    /// Code of a converter's channel at an instant up to which the motors were advanced; `gains` are those of
+    /// both axes' amplifiers.
+    pub fn code(&mut self, channel: u32, now: Ticks, gains: [f64; JOINTS]) -> u16 {
+        match channel {
+            10 => self.shunt(0, 0, now, gains),
+            11 => self.shunt(0, 1, now, gains),
+            13 => self.shunt(1, 0, now, gains),
+            12 => self.shunt(1, 1, now, gains),
+            6 => {
+                let noise: f64 = StandardNormal.sample(&mut self.noise);
+                self.supply.code(BUS_NOISE_CODES * noise)
+            }
+            15 => self.thermistors[0],
+            4 => self.thermistors[1],
+            5 => self.thermistors[2],
+            _ => 0,
+        }
+    }
+
+    fn shunt(&mut self, axis: usize, channel: usize, now: Ticks, gains: [f64; JOINTS]) -> u16 {
+        let disturbance = self.disturbance(axis, now);
+        let this = &self.axes[axis];
+        let channel = if this.description.wiring.shunts_exchanged { 1 - channel } else { channel };
+        let mut shunts = this.description.shunts;
+        // The state is that of the hold itself.
+        (shunts.delay, shunts.gain) = (0.0, gains[axis]);
+        let fault = this.shunt_faults[channel];
+        if let Some(ShuntFault::Offset(codes)) = fault {
+            shunts.offset_codes[channel] += codes;
+        }
+        let state = this.shunt_state(channel, disturbance, now);
+        let code = shunts.code(channel, &state, &mut self.noise);
+        if let Some(ShuntFault::Stuck(stuck)) = fault { stuck } else { code }
+    }
+
+    /// Error of an axis' shunts by edges of the other bridge in the window before the hold, A.
+    fn disturbance(&self, axis: usize, now: Ticks) -> f64 {
+        if self.coupling.ampere_per_edge == 0.0 {
+            return 0.0;
+        }
+        let (_, rising) = self.axes[1 - axis].edges_within(ticks(self.coupling.window), now);
+        self.coupling.ampere_per_edge * f64::from(rising)
+    }
+
+    /// Longest slice of the motors' integration, s.
+    #[must_use]
+    pub const fn slice_s() -> f64 {
+        QUARTER_S
+    }
+}
+
+/// Angle and speed of a free rotor after a step under this torque, N m.
+fn turn_freely(axis: &Axis, torque: f64) -> (f64, f64) {
+    let [inertia, dry, viscous] = FREE;
+    let angle = axis.angle + axis.speed * PERIOD_S;
+    let driven = axis.speed + PERIOD_S / inertia * (torque - viscous * axis.speed);
+    let dry = PERIOD_S / inertia * dry;
+    (angle, driven - driven.clamp(-dry, dry))
+}

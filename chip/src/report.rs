@@ -1,0 +1,198 @@
+//! Results of a run as JSON.
+
+use std::collections::BTreeMap;
+
+use scarab_host::base::error::ToolError;
+use scarab_host::report::BaseReport;
+use scarab_host::run::trace::report::run_report;
+use serde::Serialize;
+
+use crate::findings::Finding;
+use crate::session::Session;
+use crate::time::{TICK_HZ, microseconds, seconds};
+
+/// Interrupts of the image: name, exception number.
+pub const LEVELS: [(&str, u8); 9] = [
+    ("stop", 16 + 10),
+    ("current_interrupt", 16 + 18),
+    ("index_0", 16 + 23),
+    ("index_1", 16 + 40),
+    ("servo", 16 + 77),
+    ("clock", 16 + 50),
+    ("bus_receive", 16 + 20),
+    ("bus", 16 + 19),
+    ("housekeeping", 16 + 72),
+];
+
+/// Shares of the processor's time.
+#[derive(Clone, Debug, Serialize)]
+pub struct LoadReport {
+    /// Time awake.
+    pub total: f64,
+    /// Current loops, index pulses and the emergency stop's contact.
+    pub level0: f64,
+    /// Servo.
+    pub servo: f64,
+    /// Bus, both levels.
+    pub bus: f64,
+    /// Housekeeping and its clock.
+    pub housekeeping: f64,
+    /// Thread.
+    pub thread: f64,
+}
+
+/// Use by one interrupt.
+#[derive(Clone, Debug, Serialize)]
+pub struct InterruptReport {
+    /// Entries per second.
+    pub per_second: f64,
+    /// Mean instructions of an entry.
+    pub mean_instructions: f64,
+    /// Most instructions of an entry, without preempting interrupts.
+    pub worst_instructions: u64,
+    /// Longest time from pending to entry, us.
+    pub worst_latency_us: f64,
+    /// Longest time from entry to return, preemption included, us.
+    pub longest_us: f64,
+}
+
+/// Result of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChipReport {
+    /// `accepted`, `refused`, or `none` without an identification.
+    pub verdict: String,
+    /// Reasons for a refusal.
+    pub reasons: Vec<String>,
+    /// Base parameters.
+    pub base_parameters: Vec<BaseReport>,
+    /// Findings that are not known to be harmless.
+    pub findings: Vec<Finding>,
+    /// Harmless findings with their reason.
+    pub known_findings: Vec<(Finding, &'static str)>,
+    /// Missed ticks by the image's own count.
+    pub missed_current_ticks: u32,
+    /// Missed servo ticks by the image's own count.
+    pub servo_missed: u32,
+    /// Conversions that were overwritten before they were read.
+    pub lost_conversions: u64,
+    /// Shares of the processor's time since the last step began.
+    pub load: LoadReport,
+    /// Use by interrupt since the last step began.
+    pub interrupts: BTreeMap<&'static str, InterruptReport>,
+    /// Most instructions by interrupt.
+    pub worst_instructions: BTreeMap<&'static str, u64>,
+    /// Emergency stops, if they were run.
+    pub stop: Option<crate::stops::StopReport>,
+    /// Resets.
+    pub resets: Vec<String>,
+    /// Deepest use of the stack, bytes, and its size.
+    pub stack: [u32; 2],
+    /// Records read and lost.
+    pub records: [u64; 2],
+    /// Simulated time, s.
+    pub simulated_s: f64,
+    /// Instructions executed.
+    pub instructions: u64,
+    /// Cycles per instruction.
+    pub time_factor: f64,
+    /// Seed.
+    pub seed: u64,
+}
+
+/// Findings of a session, split into unknown and known ones.
+#[must_use]
+pub fn findings(session: &Session) -> (Vec<Finding>, Vec<(Finding, &'static str)>) {
+    let image = session.machine.image();
+    let mut unknown = session.machine.chip().findings.list(|pc| image.function(pc));
+    let mut known = Vec::new();
+    unknown.retain(|finding| match finding.known() {
+        Some(reason) => {
+            known.push((finding.clone(), reason));
+            false
+        }
+        None => true,
+    });
+    (unknown, known)
+}
+
+/// Shares of the processor's time.
+#[must_use]
+pub fn load(session: &Session) -> LoadReport {
+    let chip = session.machine.chip();
+    let share = |names: &[&str]| {
+        let levels = LEVELS.iter().filter(|(name, _)| names.contains(name));
+        levels.map(|(_, exception)| chip.load.share(*exception, chip.now)).sum()
+    };
+    LoadReport {
+        total: chip.load.awake(chip.now),
+        level0: share(&["stop", "current_interrupt", "index_0", "index_1"]),
+        servo: share(&["servo"]),
+        bus: share(&["bus_receive", "bus"]),
+        housekeeping: share(&["housekeeping", "clock"]),
+        thread: chip.load.share(0, chip.now),
+    }
+}
+
+/// Use of the processor by interrupt.
+#[must_use]
+pub fn interrupts(session: &Session) -> BTreeMap<&'static str, InterruptReport> {
+    let chip = session.machine.chip();
+    let measured = chip.load.measured(chip.now);
+    let report = |exception: u8| {
+        let used = chip.load.of(exception);
+        InterruptReport {
+            per_second: used.entries as f64 * TICK_HZ as f64 / measured as f64,
+            mean_instructions: used.instructions as f64 / used.entries.max(1) as f64,
+            worst_instructions: used.worst,
+            worst_latency_us: microseconds(used.latency),
+            longest_us: microseconds(used.longest),
+        }
+    };
+    LEVELS.into_iter().map(|(name, exception)| (name, report(exception))).collect()
+}
+
+impl ChipReport {
+    /// Report of a session.
+    ///
+    /// # Errors
+    /// The records belong to another leg.
+    pub fn new(
+        session: &mut Session,
+        identified: bool,
+        time_factor: f64,
+        seed: u64,
+    ) -> Result<Self, ToolError> {
+        session.probe.trace.finish();
+        let run = if identified { Some(run_report(&session.probe.trace, &session.leg)?) } else { None };
+        let (unknown, known) = findings(session);
+        let interrupts = interrupts(session);
+        let loops = session.probe.trace.statistics.loops();
+        let chip = session.machine.chip();
+        Ok(Self {
+            verdict: run.as_ref().map_or_else(|| "none".into(), |run| run.verdict.into()),
+            reasons: run
+                .as_ref()
+                .map_or_else(Vec::new, |run| run.reasons.iter().map(ToString::to_string).collect()),
+            base_parameters: run.map_or_else(Vec::new, |run| run.base_parameters),
+            findings: unknown,
+            known_findings: known,
+            missed_current_ticks: loops.as_ref().map_or(0, |loops| loops.current_missed),
+            servo_missed: loops.as_ref().map_or(0, |loops| loops.servo_missed),
+            lost_conversions: chip.adcs.iter().map(|adc| adc.lost[0] + adc.lost[1]).sum(),
+            load: load(session),
+            worst_instructions: interrupts
+                .iter()
+                .map(|(name, used)| (*name, used.worst_instructions))
+                .collect(),
+            interrupts,
+            stop: None,
+            resets: session.resets.iter().map(|reason| format!("{reason:?}")).collect(),
+            stack: loops.as_ref().map_or([0; 2], |loops| [loops.stack_used, loops.stack_bytes]),
+            records: [session.probe.trace.records, session.probe.trace.lost()],
+            simulated_s: seconds(chip.now),
+            instructions: chip.load.instructions,
+            time_factor,
+            seed,
+        })
+    }
+}

@@ -1,0 +1,61 @@
+//! Sampling instants of both axes, measured in the image, and edges of the other bridge before them.
+
+use serde::Serialize;
+
+use scarab_host::base::error::ToolError;
+
+use crate::chip::Sampling;
+use crate::session::Session;
+use crate::time::{TICK_HZ, Ticks};
+
+/// Sampling of one axis in one situation.
+#[derive(Clone, Debug, Serialize)]
+pub struct SamplingReport {
+    /// Situation.
+    pub situation: &'static str,
+    /// Axis.
+    pub axis: usize,
+    /// Conversions.
+    pub conversions: usize,
+    /// Time from the middle of the lower zero vector to the trigger, ns: least and greatest.
+    pub trigger_ns: [f64; 2],
+    /// Time from that middle to the hold, ns: least and greatest.
+    pub hold_ns: [f64; 2],
+    /// Conversions with an edge of the other bridge within 1.2 us before the hold.
+    pub disturbed: usize,
+}
+
+fn nanoseconds(ticks: Ticks) -> f64 {
+    1e9 * ticks as f64 / TICK_HZ as f64
+}
+
+/// Measures for a time, s.
+///
+/// # Errors
+/// The model does not know what the processor does.
+pub fn measure(
+    session: &mut Session,
+    situation: &'static str,
+    duration: f64,
+) -> Result<Vec<SamplingReport>, ToolError> {
+    session.machine.chip_mut().samplings = Some(Vec::new());
+    session.run(duration)?;
+    let samplings = session.machine.chip_mut().samplings.take().unwrap_or_default();
+    Ok((0..2).map(|axis| report(situation, axis, &samplings)).collect())
+}
+
+fn report(situation: &'static str, axis: usize, samplings: &[Sampling]) -> SamplingReport {
+    let own: Vec<&Sampling> = samplings.iter().filter(|sampling| sampling.axis == axis).collect();
+    let range = |of: fn(&Sampling) -> Ticks| {
+        let values = own.iter().map(|sampling| nanoseconds(of(sampling)));
+        values.fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], value| [low.min(value), high.max(value)])
+    };
+    SamplingReport {
+        situation,
+        axis,
+        conversions: own.len(),
+        trigger_ns: range(|sampling| sampling.trigger - sampling.middle),
+        hold_ns: range(|sampling| sampling.hold - sampling.middle),
+        disturbed: own.iter().filter(|sampling| sampling.edges > 0).count(),
+    }
+}

@@ -1,0 +1,329 @@
+//! An operator at the board: contacts, gears and hands, guided by the records that the image sends.
+//!
+//! The steps are those of docs/board.md. Motors are calibrated free of their gears; then the gears are mounted
+//! while the leg is held at its zero, the reference is taken, and the leg is moved by hand into its range.
+
+use std::rc::Rc;
+
+use scarab::bus::Frame;
+use scarab_host::base::error::ToolError;
+use scarab_host::formats::leg_file::LegFile;
+use scarab_host::rig::pair::start_position;
+
+use crate::chip::{Chip, ENABLING, START};
+use crate::image::Image;
+use crate::machine::{End, Machine, Options, Snapshot};
+use crate::peripherals::rcc::ResetReason;
+use crate::plant::{JOINTS, Plant};
+use crate::rtt::{Probe, field};
+use crate::time::{Ticks, seconds, ticks};
+
+/// Interval in which the probe reads, s.
+const POLL_S: f64 = 1e-3;
+/// Longest calibration of one motor, s.
+const CALIBRATION_S: f64 = 60.0;
+/// Longest identification, s.
+const IDENTIFICATION_S: f64 = 180.0;
+
+/// Step of a session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Step {
+    /// Calibrate both motors.
+    Calibrate,
+    /// Mount the gears, take the reference, move the leg into its range.
+    Reference,
+    /// Enable the drive; the leg holds its pose.
+    Enable,
+    /// Identify the leg.
+    Identify,
+}
+
+/// Image, board, leg and operator.
+pub struct Session {
+    /// The microcontroller.
+    pub machine: Machine,
+    /// The probe.
+    pub probe: Probe,
+    /// The leg.
+    pub leg: LegFile,
+    /// Resets so far.
+    pub resets: Vec<ResetReason>,
+    /// Whether records of the timeline are printed as they come.
+    pub prints: bool,
+}
+
+/// Records that are printed as they come.
+const TIMELINE: [&str; 9] =
+    ["boot", "crash", "refused", "gate_driver", "state", "not_enabled", "fault", "axis_fault", "calibration"];
+
+impl Session {
+    /// Powers a board with this image and leg.
+    ///
+    /// # Errors
+    /// The leg cannot be simulated, or the image sends no records.
+    pub fn new(image: &Rc<Image>, leg: &LegFile, options: &Options, seed: u64) -> Result<Self, ToolError> {
+        let drives = leg.complete_description::<JOINTS>()?;
+        let plant = Plant::new(&leg.description::<JOINTS>()?, &drives, seed);
+        let machine = Machine::new(image, Chip::new(plant, seed), options)?;
+        let probe = Probe::new(&machine)?;
+        Ok(Self { machine, probe, leg: leg.clone(), resets: Vec::new(), prints: false })
+    }
+
+    /// Present time.
+    #[must_use]
+    pub fn now(&self) -> Ticks {
+        self.machine.chip().now
+    }
+
+    /// Runs for a time, s.
+    ///
+    /// # Errors
+    /// The model does not know what the processor does.
+    pub fn run(&mut self, duration: f64) -> Result<(), ToolError> {
+        self.run_until(self.now() + ticks(duration))
+    }
+
+    /// Runs until an instant.
+    ///
+    /// # Errors
+    /// The model does not know what the processor does.
+    pub fn run_until(&mut self, end: Ticks) -> Result<(), ToolError> {
+        while self.now() < end {
+            let next = end.min(self.now() + ticks(POLL_S));
+            match self.machine.run(next)? {
+                End::Reset(reason) => self.resets.push(reason),
+                End::Time => {}
+                // Nothing runs until the power is back.
+                End::PowerCut => return Ok(()),
+            }
+            let from = self.probe.lines.len();
+            self.probe.poll(&mut self.machine);
+            if self.prints {
+                self.print(from);
+            }
+        }
+        Ok(())
+    }
+
+    fn print(&self, from: usize) {
+        for (at, line) in &self.probe.lines[from..] {
+            if line.split(' ').next().is_some_and(|kind| TIMELINE.contains(&kind)) {
+                println!("{:9.3} s  {line}", seconds(*at));
+            }
+        }
+    }
+
+    /// Runs until a record of this kind with these words comes.
+    ///
+    /// # Errors
+    /// No such record comes in time.
+    pub fn wait(&mut self, kind: &str, words: &[&str], longest: f64) -> Result<String, ToolError> {
+        let (from, end) = (self.probe.lines.len(), self.now() + ticks(longest));
+        while self.now() < end {
+            self.run(POLL_S)?;
+            if let Some(line) = self.probe.find(from, kind, words) {
+                return Ok(line.to_owned());
+            }
+        }
+        let last: Vec<&str> = self.probe.lines.iter().rev().take(6).map(|(_, line)| line.as_str()).collect();
+        let wanted = words.join(" ");
+        Err(ToolError::input(format!(
+            "no record `{kind} {wanted}` within {longest} s at {:.3} s; the last ones: {last:#?}",
+            seconds(self.now())
+        )))
+    }
+
+    fn set(&mut self, pin: (char, u32), level: bool) {
+        self.machine.chip_mut().set_pin(pin, level);
+    }
+
+    /// Holds or releases the enabling switch.
+    pub fn hold_switch(&mut self, held: bool) {
+        self.set(ENABLING, held);
+    }
+
+    /// Presses the start button for 0.1 s.
+    ///
+    /// # Errors
+    /// The model does not know what the processor does.
+    pub fn press_start(&mut self) -> Result<(), ToolError> {
+        self.set(START, true);
+        self.run(0.1)?;
+        self.set(START, false);
+        Ok(())
+    }
+
+    /// Starts the board and waits until its contacts were seen open.
+    ///
+    /// # Errors
+    /// The image sends no record of its start.
+    pub fn boot(&mut self) -> Result<(), ToolError> {
+        self.wait("boot", &[], 1.0)?;
+        self.run(0.2)
+    }
+
+    /// Counts load and lost conversions from now on.
+    pub fn begin_measurement(&mut self) {
+        let now = self.now();
+        let chip = self.machine.chip_mut();
+        chip.load.clear(now);
+        chip.adcs.iter_mut().for_each(|adc| adc.lost = [0; 2]);
+    }
+
+    /// Runs a step.
+    ///
+    /// # Errors
+    /// The image refuses it, or does not answer.
+    pub fn step(&mut self, step: Step) -> Result<(), ToolError> {
+        match step {
+            Step::Calibrate => self.calibrate(),
+            Step::Reference => self.reference(),
+            Step::Enable => self.enable(),
+            Step::Identify => self.identify(),
+        }
+    }
+
+    fn calibrate(&mut self) -> Result<(), ToolError> {
+        self.hold_switch(true);
+        self.run(0.2)?;
+        self.press_start()?;
+        for _ in 0..JOINTS {
+            let line = self.wait("calibration", &[], CALIBRATION_S)?;
+            if field(&line, "result") != Some("done") {
+                return Err(ToolError::Refused(format!("the calibration was refused: {line}")));
+            }
+        }
+        self.run(0.1)?;
+        self.hold_switch(false);
+        self.run(0.2)
+    }
+
+    fn reference(&mut self) -> Result<(), ToolError> {
+        let now = self.now();
+        self.machine.chip_mut().plant.couple(now);
+        self.run(0.2)?;
+        let from = self.probe.lines.len();
+        self.press_start()?;
+        self.run(1.0)?;
+        if self.probe.find(from, "request", &["name=reference", "accepted=true"]).is_none() {
+            return Err(ToolError::Refused("the reference was refused".into()));
+        }
+        // By hand into the range.
+        let to = start_position(&self.leg);
+        let now = self.now();
+        self.machine.chip_mut().plant.move_by_hand(to, now, 1.0);
+        self.run(1.3)
+    }
+
+    fn enable(&mut self) -> Result<(), ToolError> {
+        self.hold_switch(true);
+        self.wait("state", &["drive=operation_enabled"], 2.0)?;
+        self.machine.chip_mut().plant.let_go();
+        self.run(0.3)
+    }
+
+    fn identify(&mut self) -> Result<(), ToolError> {
+        self.press_start()?;
+        self.wait("verdict", &[], IDENTIFICATION_S)?;
+        self.wait("end", &[], 10.0)?;
+        self.run(0.1)
+    }
+
+    /// Joint angles, degrees, anatomical.
+    #[must_use]
+    pub fn position_deg(&self) -> [f64; JOINTS] {
+        self.machine.chip().plant.position().map(f64::to_degrees)
+    }
+
+    /// Sends a request to a node's object dictionary and returns the answer.
+    ///
+    /// # Errors
+    /// No answer comes in time.
+    pub fn ask(&mut self, node: u16, request: [u8; 8], longest: f64) -> Result<[u8; 8], ToolError> {
+        self.machine.chip_mut().can.sent.clear();
+        self.machine.chip_mut().send_frame(Frame::new(0x600 + node, &request));
+        let end = self.now() + ticks(longest);
+        while self.now() < end && !self.machine.chip().flash.is_cut {
+            self.run(POLL_S)?;
+            let answers = self.machine.chip().can.sent.iter();
+            let mut answers = answers.filter(|(_, frame)| frame.id() == 0x580 + node);
+            if let Some((_, frame)) = answers.next() {
+                let mut answer = [0; 8];
+                answer[..frame.data().len()].copy_from_slice(frame.data());
+                return Ok(answer);
+            }
+        }
+        Err(ToolError::input(format!("node {node} does not answer {request:02x?} within {longest} s")))
+    }
+
+    /// Writes a value of four bytes to an object.
+    ///
+    /// # Errors
+    /// The node refuses it or does not answer.
+    pub fn write_object(
+        &mut self,
+        node: u16,
+        index: u16,
+        sub: u8,
+        value: u32,
+        longest: f64,
+    ) -> Result<(), ToolError> {
+        let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+        let answer = self.ask(node, [0x23, low, high, sub, a, b, c, d], longest)?;
+        if answer[0] == 0x60 {
+            return Ok(());
+        }
+        Err(ToolError::Refused(format!("node {node} refuses {index:04x}:{sub} = {value:#x}: {answer:02x?}")))
+    }
+
+    /// Writes a request that changes the flash ("save", "load") and waits for its emergency messages: FF0D while
+    /// it is under way, 0000 at its end. Returns at a power cut too.
+    ///
+    /// # Errors
+    /// The node refuses the request, fails, or does not end in time.
+    pub fn store(&mut self, index: u16, word: [u8; 4], longest: f64) -> Result<(), ToolError> {
+        self.write_object(1, index, 1, u32::from_le_bytes(word), 0.5)?;
+        let end = self.now() + ticks(longest);
+        while self.now() < end && !self.machine.chip().flash.is_cut {
+            let sent = &self.machine.chip().can.sent;
+            let codes = sent.iter().filter(|(_, frame)| frame.id() == 0x81 && frame.data().len() == 8);
+            let codes: Vec<u16> =
+                codes.map(|(_, frame)| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect();
+            if codes.contains(&0x5530) {
+                return Err(ToolError::Refused("the board reports that it could not store (5530)".into()));
+            }
+            if codes.iter().skip_while(|code| **code != 0xFF0D).any(|code| *code == 0) {
+                return Ok(());
+            }
+            self.run(POLL_S)?;
+        }
+        if self.machine.chip().flash.is_cut {
+            return Ok(());
+        }
+        Err(ToolError::input(format!("{index:04x} does not end within {longest} s")))
+    }
+
+    /// Reads a value of up to four bytes from an object.
+    ///
+    /// # Errors
+    /// The node refuses it or does not answer.
+    pub fn read_object(&mut self, node: u16, index: u16, sub: u8, longest: f64) -> Result<u32, ToolError> {
+        let [low, high] = index.to_le_bytes();
+        let answer = self.ask(node, [0x40, low, high, sub, 0, 0, 0, 0], longest)?;
+        let value = u32::from_le_bytes([answer[4], answer[5], answer[6], answer[7]]);
+        match answer[0] {
+            0x43 => Ok(value),
+            0x4B => Ok(value & 0xFFFF),
+            0x4F => Ok(value & 0xFF),
+            _ => Err(ToolError::Refused(format!("node {node} refuses {index:04x}:{sub}: {answer:02x?}"))),
+        }
+    }
+
+    /// Saves the machine.
+    ///
+    /// # Errors
+    /// Unicorn cannot save its registers.
+    pub fn save(&self) -> Result<Snapshot, ToolError> {
+        self.machine.save()
+    }
+}

@@ -1,0 +1,240 @@
+//! Exceptions, sleep, faults, reset and saved machines, with small programs of a few instructions.
+
+use std::rc::Rc;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use scarab_chip::chip::Chip;
+use scarab_chip::image::Image;
+use scarab_chip::machine::{End, Machine, Options};
+use scarab_chip::peripherals::rcc::ResetReason;
+use scarab_chip::plant::Plant;
+use scarab_chip::time::{TICK_HZ, Ticks, ticks};
+use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
+
+const RAM: u32 = 0x2000_0000;
+/// Address of the software trigger of interrupts, of the interrupt enables, and of the priorities.
+const STIR: u32 = 0xE000_EF00;
+const ISER: u32 = 0xE000_E100;
+const IPR: u32 = 0xE000_E400;
+
+/// Only one Unicorn at a time: several in threads of one process crash.
+static ONE: Mutex<()> = Mutex::new(());
+
+fn alone() -> MutexGuard<'static, ()> {
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A program under construction: vectors, then code.
+struct Program {
+    vectors: Vec<u32>,
+    code: Vec<u16>,
+}
+
+impl Program {
+    const START: u32 = 0x0800_0200;
+
+    fn new() -> Self {
+        Self { vectors: vec![Self::START | 1; 128], code: Vec::new() }
+    }
+
+    fn here(&self) -> u32 {
+        Self::START + 2 * self.code.len() as u32
+    }
+
+    fn put(&mut self, code: &[u16]) -> &mut Self {
+        self.code.extend(code);
+        self
+    }
+
+    /// Loads a constant: `movw`, `movt`.
+    fn constant(&mut self, register: u16, value: u32) -> &mut Self {
+        for (opcode, half) in [(0xF240, value & 0xFFFF), (0xF2C0, value >> 16)] {
+            let half = half as u16;
+            let first = opcode | (half >> 11 & 1) << 10 | half >> 12;
+            self.put(&[first, (half >> 8 & 7) << 12 | register << 8 | half & 0xFF]);
+        }
+        self
+    }
+
+    /// Stores a constant at an address: uses r0 and r1.
+    fn store(&mut self, address: u32, value: u32) -> &mut Self {
+        // str r1, [r0]
+        self.constant(0, address).constant(1, value).put(&[0x6001])
+    }
+
+    fn halt(&mut self) -> &mut Self {
+        self.put(&[0xE7FE])
+    }
+
+    /// Places the next code as the handler of an exception.
+    fn handler(&mut self, exception: usize) -> &mut Self {
+        self.vectors[exception] = self.here() | 1;
+        self
+    }
+
+    fn machine(&self) -> Machine {
+        let mut bytes: Vec<u8> = Vec::new();
+        let mut vectors = self.vectors.clone();
+        vectors[0] = RAM + 0x1_0000;
+        bytes.extend(vectors.iter().flat_map(|vector| vector.to_le_bytes()));
+        bytes.extend(self.code.iter().flat_map(|half| half.to_le_bytes()));
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let plant = Plant::new(
+            &leg.description().expect("two joints"),
+            &leg.complete_description().expect("motors"),
+            1,
+        );
+        let image = Rc::new(Image::of_bytes(&bytes));
+        Machine::new(&image, Chip::new(plant, 1), &Options::default()).expect("Unicorn")
+    }
+}
+
+fn word(machine: &Machine, address: u32) -> u32 {
+    let mut bytes = [0; 4];
+    assert!(machine.memory(address, &mut bytes));
+    u32::from_le_bytes(bytes)
+}
+
+fn run(machine: &mut Machine, duration: f64) -> End {
+    let until = machine.chip().now + ticks(duration);
+    machine.run(until).expect("runs")
+}
+
+/// Enables an interrupt with a priority.
+fn enable(program: &mut Program, interrupt: u32, priority: u32) {
+    program.store(IPR + (interrupt & !3), priority << (8 * (interrupt % 4)));
+    program.store(ISER + 4 * (interrupt / 32), 1 << (interrupt % 32));
+}
+
+#[test]
+fn an_interrupt_returns_with_all_registers_and_floats() {
+    let _alone = alone();
+    let mut program = Program::new();
+    enable(&mut program, 10, 0x20);
+    // vmov.f32 s0, #1.0; movs r4, #7
+    program.put(&[0xEEB7, 0x0A00, 0x2407]).store(STIR, 10);
+    // nop; nop; vadd.f32 s0, s0, s0; vmov r2, s0
+    program.put(&[0xBF00, 0xE7FF, 0xEE30, 0x0A00, 0xEE10, 0x2A10]);
+    // str r2, [r0]; str r4, [r0, #4]
+    program.constant(0, RAM).put(&[0x6002, 0x6044]).halt();
+    program.handler(26);
+    // vmov.f32 s0, #2.0; movs r2, #9; str r2, [r0, #8]; bx lr
+    program.put(&[0xEEB0, 0x0A00]).constant(0, RAM).put(&[0x2209, 0x6082, 0x4770]);
+    let mut machine = program.machine();
+    assert_eq!(run(&mut machine, 1e-4), End::Time);
+    assert_eq!(word(&machine, RAM), 2.0_f32.to_bits(), "float registers are restored");
+    assert_eq!((word(&machine, RAM + 4), word(&machine, RAM + 8)), (7, 9));
+    assert_eq!(machine.chip().load.of(26).entries, 1);
+    assert_eq!(machine.chip().nvic.depth(), 0);
+}
+
+#[test]
+fn a_higher_level_preempts_and_a_masked_one_waits() {
+    let _alone = alone();
+    let mut program = Program::new();
+    enable(&mut program, 8, 0x40);
+    enable(&mut program, 12, 0x20);
+    // movs r2, #0x30; msr basepri, r2
+    program.put(&[0x2230, 0xF382, 0x8811]).store(STIR, 8).store(STIR, 12);
+    // A branch ends the block: interrupts come between blocks.
+    program.put(&[0xE7FF]).store(RAM, 1);
+    // movs r2, #0; msr basepri, r2
+    program.put(&[0x2200, 0xF382, 0x8811]).halt();
+    program.handler(24).store(RAM + 4, 2).put(&[0x4770]);
+    // The handler of the higher level stores what the masked code has not yet written.
+    program.handler(28).constant(0, RAM).put(&[0x6802, 0x6082, 0x4770]);
+    let mut machine = program.machine();
+    machine.set_memory(RAM, &[0; 16]);
+    run(&mut machine, 1e-4);
+    assert_eq!(word(&machine, RAM + 4), 2);
+    assert_eq!(word(&machine, RAM + 8), 0, "level 0x20 came before the store, in spite of the mask");
+    assert_eq!((machine.chip().load.of(24).entries, machine.chip().load.of(28).entries), (1, 1));
+}
+
+#[test]
+fn a_sleeping_processor_wakes_for_a_timer_and_sleeps_on() {
+    let _alone = alone();
+    let mut program = Program::new();
+    // Clock of TIM5 at 16 MHz; prescaler 16, top 999: every millisecond.
+    program.store(0x4002_3840, 1 << 3);
+    for (offset, value) in [(0x28, 15), (0x2C, 999), (0x14, 1), (0x10, 0), (0x0C, 1), (0x00, 1)] {
+        program.store(0x4000_0C00 + offset, value);
+    }
+    enable(&mut program, 50, 0x20);
+    let top = program.here();
+    // wfe; b top
+    program.put(&[0xBF20, 0xE7FD]);
+    assert_eq!(program.here(), top + 4);
+    program.handler(66).store(0x4000_0C10, 0).put(&[0x4770]);
+    let mut machine = program.machine();
+    run(&mut machine, 0.1005);
+    assert_eq!(machine.chip().load.of(66).entries, 100);
+    assert!(machine.chip().load.awake(machine.chip().now) < 0.05);
+    assert!(machine.chip().findings.is_empty(), "{:?}", machine.chip().findings);
+}
+
+#[test]
+fn an_access_without_memory_is_a_hard_fault_with_its_address() {
+    let _alone = alone();
+    let mut program = Program::new();
+    // ldr r1, [r0]
+    program.constant(0, 0x6000_0000).put(&[0x6801]).halt();
+    program.handler(3).constant(0, 0xE000_ED28).put(&[0x6802, 0x6903]);
+    // str r2, [r0]; str r3, [r0, #4]; ldr r2, [sp, #24]; str r2, [r0, #8]
+    program.constant(0, RAM).put(&[0x6002, 0x6043, 0x9A06, 0x6082]).halt();
+    let mut machine = program.machine();
+    run(&mut machine, 1e-4);
+    assert_eq!(word(&machine, RAM), 1 << 9 | 1 << 15);
+    assert_eq!(word(&machine, RAM + 4), 0x6000_0000);
+    assert_eq!(word(&machine, RAM + 8), Program::START + 8);
+}
+
+#[test]
+fn the_watchdog_resets_a_program_that_does_not_feed_it() {
+    let _alone = alone();
+    let mut program = Program::new();
+    program.store(0x4000_3000, 0x5555).store(0x4000_3008, 99).store(0x4000_3000, 0xCCCC).halt();
+    let mut machine = program.machine();
+    assert_eq!(run(&mut machine, 1.0), End::Reset(ResetReason::Watchdog));
+    // 100 counts of 4 periods of 32 kHz.
+    let expected = TICK_HZ / 80;
+    assert!(machine.chip().now.abs_diff(expected) < TICK_HZ / 10_000, "{}", machine.chip().now);
+    assert_eq!(machine.chip_mut().read(0x4002_3874) >> 26, 0b1011);
+}
+
+#[test]
+fn a_fault_within_a_hard_fault_locks_up() {
+    let _alone = alone();
+    let mut program = Program::new();
+    program.constant(0, 0x6000_0000).put(&[0x6801]);
+    program.handler(3).put(&[0x6801]).halt();
+    let mut machine = program.machine();
+    assert_eq!(run(&mut machine, 1e-3), End::Time);
+    let before = machine.chip().load.instructions;
+    assert_eq!(run(&mut machine, 1e-3), End::Time);
+    assert_eq!(machine.chip().load.instructions, before);
+}
+
+#[test]
+fn a_restored_machine_runs_as_the_first_one_did() {
+    let _alone = alone();
+    let mut program = Program::new();
+    // adds r4, #1; str r4, [r0]; b
+    program.constant(0, RAM).put(&[0x2400, 0x3401, 0x6004, 0xE7FC]);
+    let mut machine = program.machine();
+    run(&mut machine, 3e-5);
+    let saved = machine.save().expect("saved");
+    let state = |machine: &Machine| -> (Ticks, u64, u32) {
+        (machine.chip().now, machine.chip().load.instructions, word(machine, RAM))
+    };
+    run(&mut machine, 4e-5);
+    let first = state(&machine);
+    machine.restore(&saved).expect("restored");
+    run(&mut machine, 1e-5);
+    run(&mut machine, 3e-5);
+    assert_eq!(state(&machine), first);
+    let mut other = program.machine();
+    other.restore(&saved).expect("restored");
+    run(&mut other, 4e-5);
+    assert_eq!(state(&other), first);
+}
