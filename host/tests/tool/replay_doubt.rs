@@ -94,7 +94,7 @@ fn coarse_encoders_widen_sigma_by_their_bias_and_are_refused_where_a_lower_bandw
     }
 }
 
-/// The same samples on another clock: interpolated at `rate_hz`, or with every second stamp a twentieth late.
+/// Samples on another clock: interpolated at `rate_hz`, or with every second stamp a twentieth late.
 fn on_another_clock(samples: &[[f64; 5]], rate_hz: Option<f64>) -> Vec<[f64; 5]> {
     let Some(rate_hz) = rate_hz else {
         let period = samples[1][0] - samples[0][0];

@@ -133,10 +133,7 @@ impl<'a> Look<'a> {
             if look.held(values, u, &[]).share > HELD_ANGLE {
                 continue;
             }
-            // The steps of an interpolated column are hidden: its typical change is as large as they are.
-            let typical = median(&mut changes(values));
-            for run in frozen_runs(recording, values).filter(|run| ends_in_jump(values, run, u.max(typical)))
-            {
+            for run in frozen_runs(recording, values).filter(|run| ends_in_jump(values, run, u)) {
                 is_frozen[run].fill(true);
             }
         }

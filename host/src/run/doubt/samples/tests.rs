@@ -201,23 +201,6 @@ fn frozen_stretches_are_excluded() {
 }
 
 #[test]
-fn a_coarse_angle_on_another_clock_is_not_frozen() {
-    // An encoder of 12 bits behind a slow swing; its samples are interpolated onto stamps up to 20 us away.
-    let mut slow = recording(0.0, 0.3);
-    let angle: Vec<f64> =
-        slow.time_s.iter().map(|time| (0.3 * (1.5 * time).sin() / 2.9e-3).round() * 2.9e-3).collect();
-    let mut noise = Noise(3);
-    for (sample, pair) in angle.windows(2).enumerate() {
-        let share = 0.01 * noise.next().abs();
-        slow.joints[0].position_rad[sample] = pair[0] + share * (pair[1] - pair[0]);
-    }
-    slow.joints[0].position_rad[STEPS - 1] = angle[STEPS - 1];
-    let screened = found(&slow);
-    assert!(screened.spans.is_empty(), "{:?}", screened.spans);
-    assert!(screened.findings.iter().all(|finding| !finding.refuses), "{:?}", screened.findings);
-}
-
-#[test]
 fn a_torque_that_stands_still_alone_is_frozen() {
     let mut frozen = recording(3.8e-4, 0.3);
     let torque = &mut frozen.joints[0].torque_nm;
