@@ -40,6 +40,9 @@ const RETURN: Ticks = 10;
 const CHAINED: Ticks = 6;
 /// Fraction bits of the time of an instruction.
 const FRACTION: u32 = 16;
+/// Floating point is in use (FPCA). Unicorn's Cortex-M4 also looks at the bit of larger cores (SFPA): without it the
+/// next floating-point instruction would begin a new context and clear the status register's flags.
+const FLOATS: u32 = 1 << 2 | 1 << 3;
 /// Instructions that are found by their code: send event, wait for event.
 const SEND_EVENT: u16 = 0xBF40;
 const WAIT_FOR_EVENT: u16 = 0xBF20;
@@ -694,7 +697,7 @@ fn leave(core: &mut Core<'_>, link: u32) -> u32 {
     let (pc, status) = (word(6), word(7));
     put(core, Register::SP, sp + bytes.len() as u32 + 4 * (status >> 9 & 1));
     put(core, Register::XPSR_NZCVQG, status & !(1 << 9));
-    put(core, Register::CONTROL, if floats { 4 } else { 0 });
+    put(core, Register::CONTROL, if floats { FLOATS } else { 0 });
     put(core, Register::APSR_NZCV, status & 0xF000_0000);
     let state = core.get_data_mut();
     state.chip.now += RETURN * state.cycle;

@@ -106,6 +106,8 @@ pub struct Axis {
     /// Rotor's angle less that of the gear; `None` while the rotor is free.
     mounting: Option<f64>,
     cogging: f64,
+    /// Mean torque in the last step, N m.
+    torque: f64,
     impulse: f64,
     heat: f64,
     slopes: [f64; 3],
@@ -141,6 +143,7 @@ impl Axis {
             speed: 0.0,
             mounting: None,
             cogging: 0.0,
+            torque: 0.0,
             impulse: 0.0,
             heat: 0.0,
             slopes: [0.0; 3],
@@ -171,6 +174,18 @@ impl Axis {
     #[must_use]
     pub fn currents(&self) -> [f64; 3] {
         self.motor.currents()
+    }
+
+    /// Torque of the motor at the joint, mean over the last mechanical step, N m.
+    #[must_use]
+    pub fn joint_torque(&self) -> f64 {
+        self.description.ratio * self.torque
+    }
+
+    /// Amplitudes of the currents along and across the magnets' axis, A.
+    #[must_use]
+    pub fn rotor_currents(&self) -> [f64; 2] {
+        self.motor.rotor_currents()
     }
 
     /// Rotor's speed, rad/s.
@@ -542,7 +557,7 @@ impl Plant {
                 None => turn_freely(axis, torque[joint]),
             };
             axis.motor.warm(axis.heat, PERIOD_S);
-            (axis.impulse, axis.heat) = (0.0, 0.0);
+            (axis.torque, axis.impulse, axis.heat) = (torque[joint], 0.0, 0.0);
             axis.set_rotor(angle, speed);
             let edges = axis.index_pulse(now);
             self.index_edges.extend(edges.into_iter().map(|(at, level)| (at, joint, level)));

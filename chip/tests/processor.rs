@@ -174,6 +174,45 @@ fn a_sleeping_processor_wakes_for_a_timer_and_sleeps_on() {
 }
 
 #[test]
+fn frequent_interrupts_leave_a_computation_alone() {
+    let _alone = alone();
+    let mut program = Program::new();
+    program.store(0x4002_3840, 1 << 3);
+    // Every 149 counts of 16 MHz.
+    for (offset, value) in [(0x28, 0), (0x2C, 148), (0x14, 1), (0x10, 0), (0x0C, 1)] {
+        program.store(0x4000_0C00 + offset, value);
+    }
+    enable(&mut program, 50, 0x20);
+    program.constant(0, RAM).put(&[0x2200, 0x6002, 0x2100]);
+    // vmov s1, #1.0; vsub s0, s1, s1; vsub s16, s1, s1
+    program.put(&[0xEEF7, 0x0A00, 0xEE30, 0x0AE0, 0xEE30, 0x8AE0]);
+    program.store(0x4000_0C00, 1).constant(0, RAM).put(&[0x2100]);
+    let top = program.here();
+    // ldr r2, [r0]; adds r2, #1; str r2, [r0]; b next; adds r1, #1; str r1, [r0, #4]; b next
+    program.put(&[0x6802, 0x3201, 0x6002, 0xE7FF, 0x3101, 0x6041, 0xE7FF]);
+    // vadd s0, s0, s1; vstr s0, [r0, #8]; b next; vadd s16, s16, s1; vstr s16, [r0, #12]
+    program.put(&[0xEE30, 0x0A20, 0xED80, 0x0A02, 0xE7FF, 0xEE38, 0x8A20, 0xED80, 0x8A03]);
+    // vcmp.f32 s0, s16; b next; vmrs APSR_nzcv, fpscr; b next; it ne; strne r1, [r0, #16]
+    program.put(&[0xEEB4, 0x0A48, 0xE7FF, 0xEEF1, 0xFA10, 0xE7FF, 0xBF18, 0x6101]);
+    // b top
+    let back = (i64::from(top) - i64::from(program.here()) - 4) / 2;
+    program.put(&[0xE000 | (back as u16 & 0x7FF)]);
+    program.handler(66).store(0x4000_0C10, 0);
+    // vmov s0, #2.0; vmov s1, #2.0; vcmp s0, #0; movs r2, #0; bx lr
+    program.put(&[0xEEB0, 0x0A00, 0xEEF0, 0x0A00, 0xEEB5, 0x0A40, 0x2200, 0x4770]);
+    let mut machine = program.machine();
+    machine.set_memory(RAM, &[0; 32]);
+    run(&mut machine, 5e-3);
+    let count = word(&machine, RAM);
+    assert!(count > 500 && machine.chip().load.of(66).entries > 400, "{count}");
+    let floats = [8, 12].map(|offset| f32::from_bits(word(&machine, RAM + offset)));
+    // The last round may be incomplete.
+    assert!(word(&machine, RAM + 4).abs_diff(count) <= 1, "{} {count}", word(&machine, RAM + 4));
+    assert!(floats.iter().all(|float| (float - count as f32).abs() <= 1.0), "{floats:?} {count}");
+    assert_eq!(word(&machine, RAM + 16), 0, "floats differed {floats:?} {count}");
+}
+
+#[test]
 fn an_access_without_memory_is_a_hard_fault_with_its_address() {
     let _alone = alone();
     let mut program = Program::new();
