@@ -40,8 +40,8 @@ const RETURN: Ticks = 10;
 const CHAINED: Ticks = 6;
 /// Fraction bits of the time of an instruction.
 const FRACTION: u32 = 16;
-/// Floating point is in use (FPCA). Unicorn's Cortex-M4 also looks at the bit of larger cores (SFPA): without it the
-/// next floating-point instruction would begin a new context and clear the status register's flags.
+/// Floating point is in use (FPCA). Unicorn's Cortex-M4 also looks at the bit of larger cores (SFPA). Without
+/// it the next floating-point instruction would begin a new context and clear the status register's flags.
 const FLOATS: u32 = 1 << 2 | 1 << 3;
 /// Instructions that are found by their code: send event, wait for event.
 const SEND_EVENT: u16 = 0xBF40;
@@ -514,7 +514,7 @@ fn on_block(core: &mut Core<'_>, address: u32, size: u32) {
     }
     let state = core.get_data();
     if state.hung == Some(state.chip.nvic.current()) {
-        // The same block again, without running it.
+        // A hung level returns to its block and never runs it.
         put(core, Register::PC, address | 1);
     }
 }

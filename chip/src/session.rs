@@ -6,6 +6,7 @@
 use std::rc::Rc;
 
 use scarab::bus::Frame;
+use scarab::safety::NoticeCode;
 use scarab_host::base::error::ToolError;
 use scarab_host::formats::leg_file::LegFile;
 use scarab_host::rig::pair::start_position;
@@ -289,10 +290,10 @@ impl Session {
             let codes = sent.iter().filter(|(_, frame)| frame.id() == 0x81 && frame.data().len() == 8);
             let codes: Vec<u16> =
                 codes.map(|(_, frame)| u16::from_le_bytes([frame.data()[0], frame.data()[1]])).collect();
-            if codes.contains(&0x5530) {
+            if codes.contains(&NoticeCode::StoreFailed.number()) {
                 return Err(ToolError::Refused("the board reports that it could not store (5530)".into()));
             }
-            if codes.iter().skip_while(|code| **code != 0xFF0D).any(|code| *code == 0) {
+            if codes.iter().skip_while(|code| **code != NoticeCode::Storing.number()).any(|code| *code == 0) {
                 return Ok(());
             }
             self.run(POLL_S)?;

@@ -56,7 +56,7 @@ const HOST: [(&str, &[&str]); 10] = [
 const OPEN: [&str; 4] = ["units", "real", "place", "checksum"];
 
 /// Source folders of all crates.
-const SOURCES: [&str; 5] = ["src", "hal-sim/src", "host/src", "paper/src", "emulated/src"];
+const SOURCES: [&str; 6] = ["src", "hal-sim/src", "host/src", "paper/src", "emulated/src", "chip/src"];
 
 /// Firmware modules that the simulated hardware may use. The other crates may use all.
 const PLANT: [&str; 2] = ["hal", "units"];
