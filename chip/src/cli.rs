@@ -181,7 +181,7 @@ fn run(arguments: &RunArguments) -> Result<bool, ToolError> {
     session.prints = true;
     let outcome = operate(&mut session, arguments);
     if let Some(path) = &arguments.records {
-        files::write(path, &session.probe.text())?;
+        files::write(path, session.probe.text())?;
     }
     if let Err(error) = outcome {
         print_findings(&session);

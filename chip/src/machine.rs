@@ -472,7 +472,7 @@ fn map_registers(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
 
 fn add_hooks(core: &mut Core<'_>) -> Result<(), unicorn_engine::uc_error> {
     core.add_block_hook(1, 0, |core, address, size| on_block(core, address as u32, size))?;
-    core.add_intr_hook(|core, number| on_interrupt(core, number))?;
+    core.add_intr_hook(on_interrupt)?;
     core.add_insn_invalid_hook(on_invalid)?;
     for address in core.get_data().image.find(SEND_EVENT) {
         core.add_code_hook(address.into(), address.into(), |core, _, _| {

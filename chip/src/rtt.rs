@@ -56,8 +56,8 @@ impl Probe {
             return;
         }
         let mut bytes = Vec::new();
-        let parts = if writer > reader { vec![reader..writer] } else { vec![reader..size, 0..writer] };
-        for part in parts {
+        let parts = if writer > reader { [reader..writer, 0..0] } else { [reader..size, 0..writer] };
+        for part in parts.into_iter().filter(|part| !part.is_empty()) {
             let start = bytes.len();
             bytes.resize(start + part.len(), 0);
             machine.memory(buffer + part.start, &mut bytes[start..]);

@@ -55,10 +55,10 @@ impl Spi {
             0x00 | 0x04 => self.control[offset as usize / 4],
             0x08 => {
                 let busy = self.answer.is_some();
-                u32::from(self.full) * RXNE
-                    | u32::from(!busy) * TXE
-                    | u32::from(self.overrun) * OVR
-                    | u32::from(busy) * BSY
+                (u32::from(self.full) * RXNE)
+                    | (u32::from(!busy) * TXE)
+                    | (u32::from(self.overrun) * OVR)
+                    | (u32::from(busy) * BSY)
             }
             0x0C => {
                 (self.full, self.overrun) = (false, false);
