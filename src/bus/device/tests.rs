@@ -167,6 +167,20 @@ impl Bench {
 }
 
 #[test]
+fn a_host_does_not_start_an_identification_of_the_operators_leg() {
+    let identifies = |order: &LegOrder<2>| matches!(order.request, Some(LegRequest::Identify { .. }));
+    let mut bench = Bench::new();
+    bench.drive = DriveState::OperationEnabled;
+    bench.write(1, 0x2100, 1, 1, 1);
+    assert!(!bench.device.is_hosted() && !bench.orders.iter().any(identifies));
+    // The same write starts one where the host controls the leg.
+    let mut bench = Bench::new();
+    bench.enable();
+    bench.write(1, 0x2100, 1, 1, 1);
+    assert!(bench.device.is_hosted() && bench.orders.iter().any(identifies));
+}
+
+#[test]
 fn a_reset_of_all_nodes_stops_the_leg_and_ends_host_control() {
     let mut bench = Bench::new();
     bench.enable();

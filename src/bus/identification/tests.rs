@@ -105,7 +105,11 @@ fn a_copy_answers_every_object_like_the_original() {
     found.take(&ACCEPTED, ACCEPTED.0);
     let mut forgotten = found.clone();
     forgotten.forget();
+    assert_eq!((Results::verdict(&found), Results::verdict(&forgotten)), (ACCEPTED.0, None));
     assert_eq!(forgotten, ResultsCopy::nothing());
+    let refusal = Some(Verdict::refused(Reason::Contact));
+    forgotten.take(&Numbers(refusal), refusal);
+    assert_eq!(Results::verdict(&forgotten), refusal);
     let mut compared = 0;
     for row in ROWS.iter().filter(|row| (0x2100..0x2140).contains(&row.index)) {
         for object in (row.sub..row.sub + row.subs).map(|sub| Object::at(row.index, sub)) {

@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! u  step of a column: 5 % quantile of its changes      R  range of a torque      D = max(0.01 R, 0.99 u)
+//!    of an angle: or of the changes between its repeated values, if these are larger
 //! a  samples within D of an extreme                      b  samples in the next band of width D
 //! e  samples equal to the extreme                        c  other samples within D (coarse columns: b)
 //!
@@ -61,6 +62,8 @@ const HARMLESS_HOLD_S: f64 = 0.0045;
 const LONGEST_HOLD_S: f64 = 0.1;
 /// Largest lost share of a recording: the rest would be a biased choice (as of disturbed rows).
 const LARGEST_LOSS: f64 = 1.0 / 3.0;
+/// Levels from which a column shows the step between them.
+const LEAST_LEVELS: usize = 20;
 /// Steps from which a column is coarse: 12 bits at the joint, and a share of a torque's range.
 const COARSE_RAD: f64 = 1.5e-3;
 const COARSE_SHARE: f64 = 0.01;
@@ -117,7 +120,7 @@ impl<'a> Look<'a> {
             .zip(described_rad)
             .map(|(values, &described_rad)| {
                 let encoder = Encoder::of(values, described_rad).map_or(0.0, |encoder| encoder.step_rad);
-                step(values).max(encoder)
+                step(values).max(level_step(values)).max(encoder)
             })
             .collect();
         let is_moving = moving(recording, &angle_steps);
@@ -586,6 +589,13 @@ fn changes(values: &[f64]) -> Vec<f64> {
 pub(super) fn step(values: &[f64]) -> f64 {
     let changes = changes(values);
     changes.get(changes.len() / 20).copied().unwrap_or(0.0)
+}
+
+/// Step between the levels of a column, the values that repeat: the sensor's last bit, also where the column was
+/// interpolated to another clock, which leaves changes of parts of a bit. Zero for a column with few levels.
+fn level_step(values: &[f64]) -> f64 {
+    let levels: Vec<f64> = runs(values).filter(|run| run.len() > 1).map(|run| values[run.start]).collect();
+    if levels.len() < LEAST_LEVELS { 0.0 } else { step(&levels) }
 }
 
 /// Median; zero for an empty list.

@@ -64,6 +64,35 @@ fn clean_columns_have_no_finding_whatever_their_noise_and_steps() {
 }
 
 #[test]
+fn coarse_angles_interpolated_to_another_clock_are_neither_held_nor_frozen() {
+    // Slow enough that the angle repeats itself for up to 30 ms between two counts.
+    let mut coarse = recording(0.0, 0.3);
+    for (angle, time) in coarse.joints[0].position_rad.iter_mut().zip(&coarse.time_s) {
+        *angle = (0.15 * (3.1 * time).sin() / 2.9e-3).round() * 2.9e-3;
+    }
+    let series = &coarse.joints[0];
+    for step_s in [0.001, 0.0021, 0.0033, 0.004] {
+        let time_s: Vec<f64> =
+            (0..).map(|sample| 0.0007 + f64::from(sample) * step_s).take_while(|time| *time < 19.9).collect();
+        let onto = |values: &[f64]| -> Vec<f64> {
+            let at = |time: &f64| {
+                let (before, part) = ((time / 0.002) as usize, (time / 0.002).fract());
+                values[before] + part * (values[before + 1] - values[before])
+            };
+            time_s.iter().map(at).collect()
+        };
+        let joints =
+            vec![JointSeries { position_rad: onto(&series.position_rad), torque_nm: onto(&series.torque_nm) }];
+        let screened = found(&Recording { time_s: time_s.clone(), joints, ..coarse.clone() });
+        assert!(
+            screened.findings.iter().all(|finding| finding.name == QUANTISED),
+            "{step_s} s: {:?}",
+            screened.findings
+        );
+    }
+}
+
+#[test]
 fn a_gravity_torque_with_a_broad_peak_is_no_limit() {
     // Swings up to the horizontal, without noise: a peak of the fourth order.
     let mut swing = recording(0.0, 0.0);
