@@ -29,6 +29,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::base::error::{EXIT_REFUSED, ToolError};
+use crate::base::names::BY_CARGO;
 use crate::base::output;
 
 /// Identifies legs, simulated or recorded. Exit codes: 0 accepted, 3 refused, 2 bad input.
@@ -104,8 +105,6 @@ enum Command {
 const HELP_WIDTH: usize = 100;
 /// Arguments of `cargo sim` without any.
 const MAIN_JOB: [&str; 5] = ["identify", "--figures", "target/sim", "--report", "target/sim/report.html"];
-/// First word that `cargo sim` passes: without a command the main job runs.
-const BY_CARGO: &str = "--by-cargo";
 /// Commands to try after the main job.
 const NEXT: &str = "
 next:

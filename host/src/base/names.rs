@@ -3,6 +3,9 @@
 use scarab::ident::{Estimator, Plan};
 use scarab::model::Parameter;
 
+/// First word that `cargo sim` passes: without a command the main job runs.
+pub const BY_CARGO: &str = "--by-cargo";
+
 /// Name of a parameter in reports.
 #[must_use]
 pub fn parameter_name(joint: usize, parameter: Parameter) -> String {

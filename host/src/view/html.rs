@@ -22,6 +22,7 @@ use jiff::{Timestamp, Unit};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::base::error::ToolError;
+use crate::base::names::BY_CARGO;
 use crate::base::number::Number;
 use crate::base::precision;
 use crate::formats::leg_file::LegFile;
@@ -53,7 +54,8 @@ impl Circumstances {
         let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
         let now =
             stated.and_then(|seconds| Timestamp::from_second(seconds).ok()).unwrap_or_else(Timestamp::now);
-        let words: Vec<String> = std::env::args().skip(1).map(quoted).collect();
+        let words: Vec<String> =
+            std::env::args().skip(1).filter(|word| word != BY_CARGO).map(quoted).collect();
         Self {
             time_utc: now.round(Unit::Second).unwrap_or(now).to_string(),
             command: format!("cargo sim {}", words.join(" ")).trim_end().to_owned(),

@@ -173,7 +173,7 @@ fn a_host_does_not_start_an_identification_of_the_operators_leg() {
     bench.drive = DriveState::OperationEnabled;
     bench.write(1, 0x2100, 1, 1, 1);
     assert!(!bench.device.is_hosted() && !bench.orders.iter().any(identifies));
-    // The same write starts one where the host controls the leg.
+    // Where the host controls the leg, this write starts one.
     let mut bench = Bench::new();
     bench.enable();
     bench.write(1, 0x2100, 1, 1, 1);

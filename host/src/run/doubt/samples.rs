@@ -591,8 +591,8 @@ pub(super) fn step(values: &[f64]) -> f64 {
     changes.get(changes.len() / 20).copied().unwrap_or(0.0)
 }
 
-/// Step between the levels of a column, the values that repeat: the sensor's last bit, also where the column was
-/// interpolated to another clock, which leaves changes of parts of a bit. Zero for a column with few levels.
+/// Step between the levels of a column, which are its repeated values: the sensor's last bit. It is that also
+/// after interpolation to another clock, which leaves changes of parts of a bit. Zero with few levels.
 fn level_step(values: &[f64]) -> f64 {
     let levels: Vec<f64> = runs(values).filter(|run| run.len() > 1).map(|run| values[run.start]).collect();
     if levels.len() < LEAST_LEVELS { 0.0 } else { step(&levels) }

@@ -81,8 +81,10 @@ fn coarse_angles_interpolated_to_another_clock_are_neither_held_nor_frozen() {
             };
             time_s.iter().map(at).collect()
         };
-        let joints =
-            vec![JointSeries { position_rad: onto(&series.position_rad), torque_nm: onto(&series.torque_nm) }];
+        let joints = vec![JointSeries {
+            position_rad: onto(&series.position_rad),
+            torque_nm: onto(&series.torque_nm),
+        }];
         let screened = found(&Recording { time_s: time_s.clone(), joints, ..coarse.clone() });
         assert!(
             screened.findings.iter().all(|finding| finding.name == QUANTISED),
