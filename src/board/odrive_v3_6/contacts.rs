@@ -1,7 +1,7 @@
 //! Contacts: emergency stop, enabling switch, start button, and the fault line of the gate drivers.
 //!
 //! All operator contacts are closed to 3.3 V for "go", so a broken wire means "stop". The emergency stop on
-//! GPIO5 (PC4) has no noise filter on the board. A contact open for a microsecond stops, and only the
+//! GPIO5 (PC4) has no noise filter on the board. A contact open for half a microsecond stops, and only the
 //! operator can restart. The gate drivers' fault line must be low for as long. Why: `safety::interlock`.
 //!
 //! Each current tick reads the contact. In addition, its opening raises an interrupt above all others, which
@@ -18,7 +18,7 @@ fn is_high(letter: u8, number: u32) -> bool {
     load(port(letter) + IDR) >> number & 1 == 1
 }
 
-/// Whether the emergency stop's contact (GPIO5) is open, and was for a microsecond.
+/// Whether the emergency stop's contact (GPIO5) is open, and was in 16 reads in a row.
 #[inline(always)]
 pub fn emergency_stop() -> bool {
     stays_active(|| !is_high(b'C', 4))
@@ -35,7 +35,7 @@ pub(super) fn stop_came() -> bool {
     open
 }
 
-/// Whether a gate driver reports a fault, and did for a microsecond; only true where the gate drivers are on.
+/// Whether a gate driver reports a fault in 16 reads in a row; only true where the gate drivers are on.
 #[inline(always)]
 pub fn gate_fault() -> bool {
     stays_active(|| !is_high(b'D', 2))
