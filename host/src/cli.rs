@@ -184,7 +184,7 @@ fn run(command: &Command) -> Result<u8, ToolError> {
 mod tests {
     use clap::{CommandFactory, Parser};
 
-    use super::{Cli, arguments};
+    use super::{BY_CARGO, Cli, arguments};
 
     fn help(mut command: clap::Command) -> String {
         command.render_long_help().to_string()
@@ -211,6 +211,13 @@ mod tests {
         }
         let wide = help(cli).lines().find(|line| line.chars().count() > super::HELP_WIDTH).map(str::to_owned);
         assert_eq!(wide, None);
+    }
+
+    #[test]
+    fn cargo_sim_passes_the_word_that_starts_the_main_job() {
+        let config: toml::Table = include_str!("../../.cargo/config.toml").parse().expect("a configuration");
+        let alias = config["alias"]["sim"].as_str().expect("an alias");
+        assert!(alias.ends_with(&format!("-- {BY_CARGO}")), "{alias}");
     }
 
     /// Every path argument needs a type that states its use; otherwise the check would miss it.

@@ -1,7 +1,7 @@
 //! Contacts: emergency stop, enabling switch, start button, and the fault line of the gate drivers.
 //!
 //! All operator contacts are closed to 3.3 V for "go", so a broken wire means "stop". The emergency stop on
-//! GPIO5 (PC4) has no noise filter on the board. A contact open for half a microsecond stops, and only the
+//! GPIO5 (PC4) has no noise filter on the board. A contact open for 0.5 us stops, and only the
 //! operator can restart. The gate drivers' fault line must be low for as long. Why: `safety::interlock`.
 //!
 //! Each current tick reads the contact. In addition, its opening raises an interrupt above all others, which

@@ -24,7 +24,8 @@
 //! Saturated and frozen stretches are excluded ([`Screened::spans`]) while they are few. A held column is
 //! late by half of its holding time on average, and is refused. Cost: linear in the samples, but for two
 //! sorts. Known limits: a drive at its own limit gives the same torque column as a sensor at its limit; its
-//! rows are excluded although they are right.
+//! rows are excluded although they are right. An angle that was interpolated keeps its count here, but
+//! may have none in `encoder.rs`; its sigma then lacks the bias by the encoder's steps.
 
 use std::ops::Range;
 
