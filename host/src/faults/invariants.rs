@@ -14,7 +14,8 @@ use crate::rig::faulty_board::{Edges, PERIODS_PER_S, Rig};
 
 /// Longest damping: 300 ms, and one servo tick until its end is visible.
 const LONGEST_DAMPING: u64 = PERIODS_PER_S * 3 / 10 + 12;
-/// Largest excursion beyond its range to which a joint is driven, rad (0.5 degrees).
+/// Largest excursion to which a joint is driven, rad: beyond its range, or beyond where it rested outside.
+/// The monitor permits the same 0.5 degrees.
 pub const MARGIN_RAD: f64 = 0.008_727;
 /// Largest torque of a servo tick relative to the cap: ripple, and a step of the current.
 const TORQUE_MARGIN: f64 = 1.1;
@@ -75,6 +76,9 @@ pub struct Invariants<const N: usize> {
     /// Angles at the last enabling, rad, and the motion within which lost counts are detected, rad.
     enabled_at: [f64; N],
     turn: [f64; N],
+    /// Angles when the drive was last off or braking, rad. A leg that rests outside its range is enabled to
+    /// return.
+    off_at: [f64; N],
     broken: Vec<String>,
 }
 
@@ -99,6 +103,7 @@ impl<const N: usize> Invariants<N> {
             astray: 0,
             enabled_at: [0.0; N],
             turn: core::array::from_fn(|joint| LOST_TURNS * TAU / leg.joints[joint].encoder.ratio),
+            off_at: [0.0; N],
             broken: Vec::new(),
         }
     }
@@ -132,14 +137,17 @@ impl<const N: usize> Invariants<N> {
             }
         }
         // A braking motor is not driven: the leg's weight may lower it.
-        if switching && self.scope.range && !rig.is_braking() {
-            let position = rig.world.anatomical_position();
+        let position = rig.world.anatomical_position();
+        if !switching || rig.is_braking() {
+            self.off_at = position;
+        } else if self.scope.range {
             let beyond = |joint: usize| {
-                let [low, high] = self.range[joint];
-                position[joint] < low - MARGIN_RAD || position[joint] > high + MARGIN_RAD
+                let ([low, high], off_at) = (self.range[joint], self.off_at[joint]);
+                position[joint] < low.min(off_at) - MARGIN_RAD
+                    || position[joint] > high.max(off_at) + MARGIN_RAD
             };
             if (0..N).any(beyond) {
-                self.note(rig, "driven beyond a joint's range");
+                self.note(rig, "driven beyond a joint's range, or farther out than it rested");
             }
         }
         match (self.released, switching) {
