@@ -64,6 +64,16 @@ def off(joints):
         joint.write(0x6040, 0, 0x00, "<H")
 
 
+def is_up_again(joints):
+    """Resets and requests again until the leg is enabled: it may swing for a while. Returns whether it is."""
+    end = time.monotonic() + BACK_WITHIN_S
+    while time.monotonic() < end:
+        off(joints)
+        if is_up(joints, ENABLE_WITHIN_S):
+            return True
+    return False
+
+
 def ranges(path):
     """Reads the joints' ranges of a leg file, rad."""
     with open(path, encoding="utf-8") as file:
@@ -161,8 +171,7 @@ def main():
     arguments = parser.parse_args()
     count, dice, limits = arguments.poses, random.Random(arguments.seed), ranges(arguments.leg)
     leg = Leg(arguments.address)
-    off(leg.joints)
-    if not is_up(leg.joints, 10):
+    if not is_up_again(leg.joints):
         raise SystemExit(f"not enabled at the start: {reason(leg.joints)}")
     outsiders = 0
     refused, silent, locked = 0, [], []
@@ -182,17 +191,12 @@ def main():
         print(f"{where}: not enabled; {'; '.join(why) or 'NO REASON'}", flush=True)
         if not why:
             silent.append(where)
-        end = time.monotonic() + BACK_WITHIN_S
-        while time.monotonic() < end:
-            off(leg.joints)
-            if is_up(leg.joints, ENABLE_WITHIN_S):
-                arrive(leg.joints, limits, where)
-                break
-        else:
+        if not is_up_again(leg.joints):
             locked.append(where)
             print(f"{where}: LOCKED OUT", flush=True)
             # No other pose can be tried from here.
             break
+        arrive(leg.joints, limits, where)
     off(leg.joints)
     leg.close()
     print(f"{number} poses, {outsiders} rests outside the range, {refused} not enabled at once, {len(silent)} of them without a reason, {len(locked)} locked out")
