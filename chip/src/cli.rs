@@ -15,10 +15,10 @@ use serde::Serialize;
 
 use crate::image::Image;
 use crate::machine::Options;
-use crate::report::ChipReport;
+use crate::report::{ChipReport, LEVELS, LoadReport};
 use crate::session::{Session, Step};
 use crate::time::seconds;
-use crate::{faults, hangs, sampling, serve, stops, store_cuts};
+use crate::{faults, hangs, sampling, serve, situations, stops, store_cuts};
 
 /// Runs the flash image on a model of its microcontroller.
 #[derive(Parser, Debug)]
@@ -38,6 +38,8 @@ enum Command {
     Sampling(Common),
     /// Cut the power at every word of a save and within an erase.
     StoreCuts(Common),
+    /// Measure the load in each situation: idle, calibrating, holding, identifying, following a host.
+    Load(LoadArguments),
     /// Put the image on the simulated bus, for existing host software.
     Serve(ServeArguments),
     /// Inject rows of the fault catalogue.
@@ -91,6 +93,15 @@ struct StopArguments {
 }
 
 #[derive(Args, Debug)]
+struct LoadArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Write the instructions of each function here, as CSV.
+    #[arg(long, value_name = "FILE")]
+    profile: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
 struct ServeArguments {
     #[command(flatten)]
     common: Common,
@@ -138,6 +149,7 @@ pub fn main() -> ExitCode {
         Command::Stops(arguments) => run_stops(&arguments),
         Command::Sampling(common) => run_sampling(&common),
         Command::StoreCuts(common) => run_store_cuts(&common),
+        Command::Load(arguments) => run_load(&arguments),
         Command::Serve(arguments) => run_serve(&arguments),
         Command::Faults(arguments) => run_faults(&arguments),
         Command::Hangs(arguments) => run_hangs(&arguments),
@@ -326,6 +338,45 @@ fn run_store_cuts(common: &Common) -> Result<bool, ToolError> {
     report.violations.iter().for_each(|violation| println!("violation: {violation}"));
     common.write(&report)?;
     Ok(report.violations.is_empty())
+}
+
+fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
+    let mut session = arguments.common.session()?;
+    let found = situations::run(&mut session, arguments.profile.is_some())?;
+    println!("mean and most instructions of each interrupt, and shares of the processor");
+    let names: Vec<String> = found.iter().map(|situation| format!("{:>14}", situation.name)).collect();
+    println!("{:<18}{}", "", names.concat());
+    for (name, _) in LEVELS {
+        let cells = found.iter().map(|situation| {
+            let used = &situation.interrupts[name];
+            format!("{:>7.0} {:>6}", used.mean_instructions, used.worst_instructions)
+        });
+        println!("{name:<18}{}", cells.collect::<String>());
+    }
+    let shares: [(&str, fn(&LoadReport) -> f64); 6] = [
+        ("level 0", |load| load.level0),
+        ("servo", |load| load.servo),
+        ("bus", |load| load.bus),
+        ("housekeeping", |load| load.housekeeping),
+        ("thread", |load| load.thread),
+        ("in all", |load| load.total),
+    ];
+    for (name, share) in shares {
+        let cells = found.iter().map(|situation| format!("{:>12.1} %", 100.0 * share(&situation.load)));
+        println!("{name:<18}{}", cells.collect::<String>());
+    }
+    if let Some(path) = &arguments.profile {
+        let mut text = String::from("situation,exception,instructions,function\n");
+        for situation in &found {
+            for (exception, function, instructions) in &situation.profile {
+                text.push_str(&format!("{},{exception},{instructions},\"{function}\"\n", situation.name));
+            }
+        }
+        files::write(path, &text)?;
+    }
+    arguments.common.write(&found)?;
+    print_findings(&session);
+    Ok(crate::report::findings(&session).0.is_empty())
 }
 
 fn run_serve(arguments: &ServeArguments) -> Result<bool, ToolError> {

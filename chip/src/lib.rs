@@ -44,6 +44,7 @@ pub mod rtt;
 pub mod sampling;
 pub mod serve;
 pub mod session;
+pub mod situations;
 pub mod stops;
 pub mod store_cuts;
 pub mod system;

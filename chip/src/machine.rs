@@ -11,6 +11,7 @@
 //! Known limits: the floating-point frame is always stored, never lazily; an entry costs 12 cycles, a return
 //! 10, a tail-chained one 6. Memory protection and the process stack are not modelled.
 
+use std::collections::HashMap;
 use std::rc::Rc;
 
 use scarab_host::base::error::ToolError;
@@ -71,6 +72,8 @@ struct State {
     /// Exception whose code makes no progress any more; 0 is the thread.
     hung: Option<u8>,
     broken: Option<String>,
+    /// Instructions by exception and block, if they are counted.
+    profile: Option<HashMap<(u8, u32), u64>>,
 }
 
 /// Reason why a run ended.
@@ -172,6 +175,25 @@ impl Machine {
     /// Lets the code of an exception hang from now on: its time passes without progress. 0 is the thread.
     pub fn hang(&mut self, exception: Option<u8>) {
         self.core.get_data_mut().hung = exception;
+    }
+
+    /// Counts the instructions of each function from now on.
+    pub fn begin_profile(&mut self) {
+        self.core.get_data_mut().profile = Some(HashMap::new());
+    }
+
+    /// Instructions since [`Machine::begin_profile`] by exception and function, most first.
+    #[must_use]
+    pub fn profile(&self) -> Vec<(u8, String, u64)> {
+        let state = self.core.get_data();
+        let mut functions: HashMap<(u8, String), u64> = HashMap::new();
+        for (&(exception, address), instructions) in state.profile.iter().flatten() {
+            *functions.entry((exception, state.image.function(address))).or_default() += instructions;
+        }
+        let mut functions: Vec<_> =
+            functions.into_iter().map(|((exception, name), count)| (exception, name, count)).collect();
+        functions.sort_by(|a, b| b.2.cmp(&a.2).then_with(|| (a.0, &a.1).cmp(&(b.0, &b.1))));
+        functions
     }
 
     /// Reads memory of the chip.
@@ -356,6 +378,7 @@ impl State {
             locked_up: false,
             hung: None,
             broken: None,
+            profile: None,
         }
     }
 
@@ -374,6 +397,9 @@ impl State {
         let instructions = self.instructions(address, size);
         self.chip.load.instructions += instructions;
         self.chip.load.blocks += 1;
+        if let Some(profile) = &mut self.profile {
+            *profile.entry((self.chip.nvic.current(), address)).or_default() += instructions;
+        }
         let passed = self.rest + instructions * self.cost;
         self.chip.now += passed >> FRACTION;
         self.rest = passed & ((1 << FRACTION) - 1);

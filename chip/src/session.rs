@@ -269,8 +269,26 @@ impl Session {
         value: u32,
         longest: f64,
     ) -> Result<(), ToolError> {
+        self.write_sized(node, index, sub, value, 4, longest)
+    }
+
+    /// Writes a value of 1, 2 or 4 bytes to an object.
+    ///
+    /// # Errors
+    /// The node refuses it or does not answer.
+    pub fn write_sized(
+        &mut self,
+        node: u16,
+        index: u16,
+        sub: u8,
+        value: u32,
+        bytes: u8,
+        longest: f64,
+    ) -> Result<(), ToolError> {
         let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
-        let answer = self.ask(node, [0x23, low, high, sub, a, b, c, d], longest)?;
+        // An expedited download names the number of bytes without data (CiA 301, 7.2.4.3.3).
+        let command = 0x23 | (4 - bytes) << 2;
+        let answer = self.ask(node, [command, low, high, sub, a, b, c, d], longest)?;
         if answer[0] == 0x60 {
             return Ok(());
         }

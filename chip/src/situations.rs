@@ -1,0 +1,179 @@
+//! The processor's load in each situation of operation, from start to a host that moves the leg.
+
+use std::collections::BTreeMap;
+
+use scarab::bus::Frame;
+use scarab_host::base::error::ToolError;
+use serde::Serialize;
+
+use crate::report::{InterruptReport, LoadReport, interrupts, load};
+use crate::session::{Session, Step};
+use crate::time::ticks;
+
+/// Duration of a situation that does not end by itself, s.
+const MEASURED_S: f64 = 1.0;
+/// Cycle of the host, s, and of its other frames on the wire.
+const CYCLE_S: f64 = 1e-3;
+/// Times per cycle at which the wire is filled.
+const FILLINGS: i32 = 8;
+/// Way of the targets to either side, increments of 6064, and its frequency, Hz.
+const WAY: f64 = 20_000.0;
+const MOTION_HZ: f64 = 0.5;
+/// Bit of a COB-ID that disables its PDO.
+const DISABLED: u32 = 1 << 31;
+/// COB-ID of the targets, and of frames that concern no node of this board.
+const TARGETS: u16 = 0x301;
+const OTHER: u16 = 0x5FF;
+/// Longest time for an answer, s.
+const ANSWER_S: f64 = 0.5;
+
+/// Load in one situation.
+#[derive(Clone, Debug, Serialize)]
+pub struct Situation {
+    /// Situation.
+    pub name: &'static str,
+    /// Shares of the processor's time.
+    pub load: LoadReport,
+    /// Use by interrupt.
+    pub interrupts: BTreeMap<&'static str, InterruptReport>,
+    /// Instructions by level and function, most first, if they were counted.
+    #[serde(skip)]
+    pub profile: Vec<(u8, String, u64)>,
+}
+
+/// Measures idle, calibrating, holding, identifying and following, from a session that has just been powered.
+///
+/// # Errors
+/// The image does not reach a situation.
+pub fn run(session: &mut Session, profiled: bool) -> Result<Vec<Situation>, ToolError> {
+    let mut found = Vec::new();
+    session.boot()?;
+    begin(session, profiled);
+    session.run(MEASURED_S)?;
+    end(session, "idle", &mut found);
+
+    begin(session, profiled);
+    session.step(Step::Calibrate)?;
+    end(session, "calibrating", &mut found);
+
+    session.step(Step::Reference)?;
+    session.step(Step::Enable)?;
+    begin(session, profiled);
+    session.run(MEASURED_S)?;
+    end(session, "holding", &mut found);
+
+    begin(session, profiled);
+    session.step(Step::Identify)?;
+    end(session, "identifying", &mut found);
+
+    let start = take_over(session)?;
+    // The first cycles bring the leg into the motion.
+    follow(session, start, 0.1)?;
+    begin(session, profiled);
+    follow(session, start, MEASURED_S)?;
+    end(session, "following", &mut found);
+    Ok(found)
+}
+
+fn begin(session: &mut Session, profiled: bool) {
+    session.begin_measurement();
+    if profiled {
+        session.machine.begin_profile();
+    }
+}
+
+fn end(session: &Session, name: &'static str, found: &mut Vec<Situation>) {
+    found.push(Situation {
+        name,
+        load: load(session),
+        interrupts: interrupts(session),
+        profile: session.machine.profile(),
+    });
+}
+
+/// A host with the compact mapping (docs/bus.md) enables both joints; returns their positions.
+fn take_over(session: &mut Session) -> Result<[i32; 2], ToolError> {
+    session.machine.chip_mut().send_frame(Frame::new(0, &[1, 0]));
+    session.run(0.1)?;
+    for node in [1_u16, 2] {
+        let mut write = |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes, ANSWER_S);
+        for place in 1..4 {
+            write(0x1800 + place, 1, DISABLED | (0x180 + 0x100 * u32::from(place) + u32::from(node)), 4)?;
+        }
+        let mut targets = [0x0007_0020; 2];
+        targets[usize::from(node) - 1] = 0x607A_0020;
+        let feedback = [0x6041_0010, 0x6064_0020, 0x2010_0010];
+        for (base, id, objects) in
+            [(0x1800, 0x180 + u32::from(node), &feedback[..]), (0x1401, TARGETS.into(), &targets[..])]
+        {
+            write(base, 1, DISABLED | id, 4)?;
+            write(base + 0x200, 0, 0, 1)?;
+            write(base, 2, 1, 1)?;
+            for (sub, object) in (1..).zip(objects) {
+                write(base + 0x200, sub, *object, 4)?;
+            }
+            write(base + 0x200, 0, objects.len() as u32, 1)?;
+            write(base, 1, id, 4)?;
+        }
+        write(0x60C2, 1, 1, 1)?;
+    }
+    for (word, state) in [(0x6, 0x21), (0x7, 0x23), (0xF, 0x27)] {
+        for node in [1, 2] {
+            session.write_sized(node, 0x6040, 0, word, 2, ANSWER_S)?;
+        }
+        for node in [1, 2] {
+            reach(session, node, state)?;
+        }
+    }
+    let mut positions = [0; 2];
+    for (node, position) in (1..).zip(&mut positions) {
+        let value = session.read_object(node, 0x6064, 0, ANSWER_S)?;
+        session.write_sized(node, 0x607A, 0, value, 4, ANSWER_S)?;
+        session.write_sized(node, 0x6060, 0, 8, 1, ANSWER_S)?;
+        *position = value.cast_signed();
+    }
+    Ok(positions)
+}
+
+/// Waits until a node's statusword shows a state.
+fn reach(session: &mut Session, node: u16, state: u32) -> Result<(), ToolError> {
+    let until = session.now() + ticks(2.0);
+    while session.now() < until {
+        if session.read_object(node, 0x6041, 0, ANSWER_S)? & 0x6F == state {
+            return Ok(());
+        }
+        session.run(5e-3)?;
+    }
+    Err(ToolError::Refused(format!("node {node} does not reach state {state:#04x}")))
+}
+
+/// Sends SYNC and targets at 1 kHz; frames for others fill the rest of the wire.
+fn follow(session: &mut Session, start: [i32; 2], duration: f64) -> Result<(), ToolError> {
+    session.machine.chip_mut().can.sent.clear();
+    let cycles = (duration / CYCLE_S) as u32;
+    for cycle in 0..cycles {
+        let time = f64::from(cycle) * CYCLE_S;
+        let offset = WAY * (1.0 - (std::f64::consts::TAU * MOTION_HZ * time).cos());
+        let mut targets = [0; 8];
+        for (bytes, start) in targets.chunks_exact_mut(4).zip(start) {
+            bytes.copy_from_slice(&(start + offset as i32).to_le_bytes());
+        }
+        let waiting = &mut session.machine.chip_mut().can.partner;
+        // The first frame may be on the wire.
+        let next = waiting.len().min(1);
+        waiting.insert(next, Frame::new(TARGETS, &targets));
+        waiting.insert(next, Frame::new(0x80, &[]));
+        for _ in 0..FILLINGS {
+            while session.machine.chip().can.partner.len() < 3 {
+                session.machine.chip_mut().send_frame(Frame::new(OTHER, &[0x55; 8]));
+            }
+            session.run(CYCLE_S / f64::from(FILLINGS))?;
+        }
+    }
+    let sent = &session.machine.chip().can.sent;
+    let feedback = sent.iter().filter(|(_, frame)| frame.id() & !3 == 0x180).count();
+    if feedback as u32 + 4 < 2 * cycles {
+        return Err(ToolError::Refused(format!("{feedback} of {} feedback frames came", 2 * cycles)));
+    }
+    Ok(())
+}
