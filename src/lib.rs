@@ -5,7 +5,7 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`real`], [`units`] | the only access to `libm` and `micromath`; unit newtypes |
+//! | [`real`], [`units`] | the only access to `libm`; unit newtypes |
 //! | [`hal`] | the ports a board provides |
 //! | [`model`] | serial chain, Newton-Euler, regressor, friction, base parameters |
 //! | [`motion`] | Fourier excitation, gait, ramps, and the proof that they stay within limits |

@@ -1,4 +1,4 @@
-//! The only access to `libm` and `micromath`: scalars in both precisions and their functions.
+//! The only access to `libm`: scalars in both precisions and their functions.
 //!
 //! Why one access: std's inherent `f32::sqrt` silently replaces any trait method of that name in tests. The
 //! host would then test other code than the board runs. Also, `libm::sinf` and `libm::cosf` compute in double
@@ -15,9 +15,7 @@
 //! The polynomials are Moshier's (Cephes, 1984-1992). The error of [`sin_cos`] holds for arguments up to
 //! 8,192; beyond that the result is NaN.
 //!
-//! For `f64` all functions are those of `libm`. [`fast_sin_cos`] is `micromath`'s, wrong by up to 1.1e-3,
-//! offered for the current loop's Park angle only. [`sin_cos_of_turns`] is faster: 44 instructions against 81
-//! (`scripts/count-instructions`).
+//! For `f64` all functions are those of `libm`.
 
 use nalgebra::RealField;
 
@@ -51,17 +49,6 @@ pub trait Real: RealField + Copy {
 #[must_use]
 pub fn sin_cos<T: Real>(angle: T) -> (T, T) {
     angle.door_sin_cos()
-}
-
-/// Sine and cosine of an angle in rad, -32..=32, wrong by up to 1.1e-3 each (parabolas, `micromath` 2.1).
-///
-/// Calls the wrapper type, not the trait: where `std` is linked its inherent
-/// methods would win over the trait's.
-#[must_use]
-#[inline(never)]
-pub fn fast_sin_cos(angle: f32) -> (f32, f32) {
-    let (sine, cosine) = micromath::F32(angle).sin_cos();
-    (sine.0, cosine.0)
 }
 
 /// Sine and cosine of an angle in units of 2^-32 turns, wrong by up to 1.2e-7 each: no reduction needed.
@@ -300,20 +287,6 @@ mod tests {
                 worst.max((f64::from(sine) - true_sine).abs()).max((f64::from(cosine) - true_cosine).abs());
         }
         assert!(worst < 1.2e-7, "worst error {worst:e}");
-    }
-
-    #[test]
-    fn fast_sine_and_cosine_stay_within_their_stated_error_and_no_better() {
-        let mut worst = 0.0_f64;
-        for step in -100_000..=100_000 {
-            let angle = step as f32 * 32e-5;
-            let (sine, cosine) = fast_sin_cos(angle);
-            let (true_sine, true_cosine) = sin_cos(f64::from(angle));
-            worst =
-                worst.max((f64::from(sine) - true_sine).abs()).max((f64::from(cosine) - true_cosine).abs());
-        }
-        // A smaller error would mean that std's function is in use.
-        assert!((1.0e-3..1.1e-3).contains(&worst), "worst error {worst:e}");
     }
 
     #[test]

@@ -14,12 +14,10 @@
 //! rad/s, or 0.2 V of back-EMF at 5 mV s. Quantisation: 8,192 counts and 7 pole pairs make 0.31 electrical
 //! degrees per count, uniform to +-0.15. A quadrature current of 1 A then reads as 2.7 mA of direct current.
 //!
-//! [`Sine::Exact`] errs by up to 1.2e-7, [`Sine::Fast`] by up to 1.1e-3. The angle is an integer, so no range
-//! reduction remains. On a processor with single-cycle multiplication the exact sine is the cheaper one and
-//! therefore the default. A tick turns two vectors in 500 instructions with it, in 522 with the fast one.
+//! Sine and cosine err by up to 1.2e-7; the angle is an integer, so no range reduction remains.
 
 use crate::hal::CURRENT_RATE_HZ;
-use crate::real::{fast_sin_cos, sin_cos_of_turns};
+use crate::real::sin_cos_of_turns;
 
 /// One turn in units of an [`ElectricalAngle`].
 const TURN: f32 = 4_294_967_296.0;
@@ -29,16 +27,6 @@ const TICK_S: f32 = 1.0 / CURRENT_RATE_HZ as f32;
 const TRACKING_RAD_PER_S: f32 = 1000.0;
 const TRACKING_POSITION: f32 = 2.0 * TRACKING_RAD_PER_S * TICK_S;
 const TRACKING_SPEED: f32 = (TRACKING_RAD_PER_S * TICK_S) * (TRACKING_RAD_PER_S * TICK_S);
-
-/// Selects the sine and cosine used in the current loop's rotations.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Sine {
-    /// Parabolas of `micromath`, error up to 1.1e-3.
-    Fast,
-    /// Minimax polynomials, error up to 1.2e-7.
-    #[default]
-    Exact,
-}
 
 /// Angle from phase A to the magnets' flux, in units of 2^-32 turns; wraps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -91,11 +79,8 @@ impl ElectricalAngle {
     /// Sine and cosine.
     #[must_use]
     #[inline(always)]
-    pub fn rotation(self, sine: Sine) -> Rotation {
-        let (sine, cosine) = match sine {
-            Sine::Fast => fast_sin_cos(self.0.cast_signed() as f32 * RADIAN_PER_UNIT),
-            Sine::Exact => sin_cos_of_turns(self.0),
-        };
+    pub fn rotation(self) -> Rotation {
+        let (sine, cosine) = sin_cos_of_turns(self.0);
         Rotation { sine, cosine }
     }
 
@@ -243,14 +228,12 @@ mod tests {
     }
 
     #[test]
-    fn a_quarter_turn_has_sine_one_by_either_way() {
-        for (sine, error) in [(Sine::Fast, 1.1e-3), (Sine::Exact, 1.2e-7)] {
-            for quarter in 0..8 {
-                let rotation = ElectricalAngle::from_turns(quarter as f32 / 4.0).rotation(sine);
-                let expected = [0.0, 1.0, 0.0, -1.0];
-                assert!((rotation.sine - expected[quarter % 4]).abs() < error);
-                assert!((rotation.cosine - expected[(quarter + 1) % 4]).abs() < error);
-            }
+    fn a_quarter_turn_has_sine_one() {
+        for quarter in 0..8 {
+            let rotation = ElectricalAngle::from_turns(quarter as f32 / 4.0).rotation();
+            let expected = [0.0, 1.0, 0.0, -1.0];
+            assert!((rotation.sine - expected[quarter % 4]).abs() < 1.2e-7);
+            assert!((rotation.cosine - expected[(quarter + 1) % 4]).abs() < 1.2e-7);
         }
     }
 

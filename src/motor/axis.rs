@@ -216,7 +216,7 @@ impl Axis {
         self.speed.track(angle);
         // Both rotations of a tick together share the constants of their polynomials.
         let [rotor, acting] =
-            [angle, self.speed.ahead(angle, DELAY_PERIODS)].map(|angle| angle.rotation(constants.sine));
+            [angle, self.speed.ahead(angle, DELAY_PERIODS)].map(|angle| angle.rotation());
         let currents = constants.sense.currents(sample.shunt_codes, constants.zeros);
         let switching = request != BridgeRequest::Released;
         self.measured = match currents {
@@ -316,11 +316,21 @@ impl Axis {
     /// Takes the means of count and current since the last call, in the joint's sense. Both cover the same
     /// ticks and so belong to one instant, 2.5 ticks (104 us) before the last of six. Without a tick since
     /// then, returns the newest values.
-    ///
-    /// Each call also compares the voltages with currents and speed ([`ModelWatch`]). A fault found here acts
-    /// from the next tick on.
     pub fn joint_sample(&mut self) -> JointSample {
-        // Checked every 64 ms.
+        let sample = self.window.mean().unwrap_or(JointSample {
+            encoder_counts: self.counts,
+            current: self.measured.q * self.constants.current_sign,
+            doubtful: false,
+        });
+        self.window = Window::EMPTY;
+        JointSample { doubtful: core::mem::take(&mut self.disbelieved), ..sample }
+    }
+
+    /// Compares voltages with currents and speed ([`ModelWatch`]), index pulses with the counter, and the
+    /// constants with their checksum. Called once per servo period, halfway between two joint samples, so
+    /// that no tick has both to do. A fault found here acts from the next tick on.
+    pub fn check(&mut self) {
+        // Every 64 ms.
         self.unchecked = self.unchecked.wrapping_add(1);
         if self.unchecked == 0 && self.constants.checksum() != self.checksum {
             self.found(AxisFault::Parameters);
@@ -342,7 +352,6 @@ impl Axis {
                 speed_rad_per_s: self.speed.rad_per_s(),
                 place: self.place,
                 angle,
-                sine: self.constants.sine,
             };
             if let Some(fault) = self.model_watch.look(&self.constants.model, &shown) {
                 if fault == AxisFault::EncoderFrozen {
@@ -353,13 +362,6 @@ impl Axis {
                 self.found(fault);
             }
         }
-        let sample = self.window.mean().unwrap_or(JointSample {
-            encoder_counts: self.counts,
-            current: self.measured.q * self.constants.current_sign,
-            doubtful: false,
-        });
-        self.window = Window::EMPTY;
-        JointSample { doubtful: core::mem::take(&mut self.disbelieved), ..sample }
     }
 }
 

@@ -18,7 +18,7 @@
 
 use super::SenseScale;
 use crate::hal::CURRENT_RATE_HZ;
-use crate::real::{clamp, is_finite};
+use crate::real::{clamp, min};
 use crate::units::Volt;
 
 /// Greatest duty of the resistor.
@@ -45,10 +45,12 @@ impl Chopper {
     /// Duty of the resistor at a bus voltage, 0..=0.95.
     #[must_use]
     pub fn duty(&self, bus: Volt) -> f32 {
-        if !is_finite(bus.0) {
+        let duty = (bus.0 - self.begin.0) * self.per_volt;
+        // Also where it is not a number.
+        if !(duty > 0.0) || duty == f32::INFINITY {
             return 0.0;
         }
-        clamp((bus.0 - self.begin.0) * self.per_volt, 0.0, GREATEST_BRAKE_DUTY)
+        min(duty, GREATEST_BRAKE_DUTY)
     }
 }
 
@@ -77,6 +79,10 @@ impl BrakeBudget {
     /// Returns the duty the resistor may have in a current tick, and subtracts it from the budget.
     #[must_use]
     pub fn spend(&mut self, wanted: f32) -> f32 {
+        // Nearly always.
+        if wanted == 0.0 && self.left_s == Self::WHOLE_S {
+            return 0.0;
+        }
         let duty = if self.used_up { 0.0 } else { wanted };
         self.left_s = clamp(self.left_s + (Self::GIVEN_BACK - duty) * Self::TICK_S, 0.0, Self::WHOLE_S);
         self.used_up = !(self.left_s > if self.used_up { 0.5 * Self::WHOLE_S } else { 0.0 });

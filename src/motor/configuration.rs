@@ -2,7 +2,7 @@
 
 use super::{
     BridgeTiming, Calibration, CountScale, CurrentGains, DeadTime, ElectricalAngle, EncoderSetting,
-    ModelLimits, Modulator, MotorConstants, SenseScale, ShuntWatch, Sine,
+    ModelLimits, Modulator, MotorConstants, SenseScale, ShuntWatch,
 };
 use crate::checksum::Checksum;
 use crate::hal::CURRENT_RATE_HZ;
@@ -55,8 +55,6 @@ pub struct AxisConfiguration {
     pub bandwidth: Hertz,
     /// Whether cross-coupling and back-EMF are fed forward.
     pub feedforward: bool,
-    /// Sine used for the Park rotations.
-    pub sine: Sine,
     /// Greatest quadrature current the axis requests from the motor.
     pub current_limit: Ampere,
     /// Length of the current vector above which the outputs go off.
@@ -164,7 +162,6 @@ pub(super) struct Constants {
     /// Sign from the joint's sense to the electrical one.
     pub current_sign: f32,
     pub greatest_step: i32,
-    pub sine: Sine,
     pub gains: CurrentGains,
     pub modulator: Modulator,
     pub model: ModelLimits,
@@ -236,7 +233,6 @@ impl Constants {
             flexion_sign: signs[1],
             current_sign: (signs[0] * signs[1]) as f32,
             greatest_step: configuration.greatest_step()?,
-            sine: configuration.sine,
             gains,
             modulator: configuration.modulator()?,
             model: ModelLimits::new(configuration, &motor, scale),

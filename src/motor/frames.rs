@@ -114,7 +114,7 @@ impl<Q: Quantity> Rotating<Q> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motor::{ElectricalAngle, Sine};
+    use crate::motor::ElectricalAngle;
     use crate::real::sin_cos;
     use crate::units::Ampere;
 
@@ -157,7 +157,7 @@ mod tests {
             (back.a - phases.a).abs().0.max((back.b - phases.b).abs().0).max((back.c - phases.c).abs().0);
         assert!(worst < 3e-6);
         for step in 0..100 {
-            let rotor = ElectricalAngle::from_turns(step as f32 / 100.0).rotation(Sine::Exact);
+            let rotor = ElectricalAngle::from_turns(step as f32 / 100.0).rotation();
             let there = phases.to_stationary().to_rotating(rotor).to_stationary(rotor);
             assert!((there.alpha - phases.to_stationary().alpha).abs().0 < 3e-6);
         }
@@ -167,7 +167,7 @@ mod tests {
     fn a_vector_that_turns_with_the_rotor_stands_still_in_its_frame() {
         for step in 0..360 {
             let angle = (step as f32).to_radians();
-            let rotor = ElectricalAngle::from_turns(step as f32 / 360.0).rotation(Sine::Exact);
+            let rotor = ElectricalAngle::from_turns(step as f32 / 360.0).rotation();
             let ahead =
                 balanced(4.0, angle + core::f32::consts::FRAC_PI_2).to_stationary().to_rotating(rotor);
             assert!(ahead.d.abs().0 < 4e-6 && (ahead.q.0 - 4.0).abs() < 4e-6, "{step}: {ahead:?}");
@@ -178,7 +178,7 @@ mod tests {
     fn power_is_three_halves_of_the_product_of_the_vectors() {
         let (volts, amperes) = (balanced(10.0, 0.9), balanced(3.0, 0.4));
         let phases = volts.a.0 * amperes.a.0 + volts.b.0 * amperes.b.0 + volts.c.0 * amperes.c.0;
-        let rotor = ElectricalAngle::from_turns(0.17).rotation(Sine::Exact);
+        let rotor = ElectricalAngle::from_turns(0.17).rotation();
         let (v, i) = (volts.to_stationary().to_rotating(rotor), amperes.to_stationary().to_rotating(rotor));
         assert!((1.5 * (v.d.0 * i.d.0 + v.q.0 * i.q.0) - phases).abs() < 3e-5);
     }

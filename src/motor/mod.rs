@@ -35,7 +35,7 @@ pub mod sense;
 pub mod shunt_watch;
 pub mod transmission;
 
-pub use angle::{CountScale, ElectricalAngle, Rotation, Sine, SpeedTracker};
+pub use angle::{CountScale, ElectricalAngle, Rotation, SpeedTracker};
 pub use axis::{Axis, AxisFault, AxisRequest, BridgeRequest};
 pub use calibration::{
     Calibration, CalibrationSettings, CalibrationStep, Calibrator, EncoderSetting, Phase, Refusal,

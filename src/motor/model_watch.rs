@@ -60,7 +60,7 @@
 
 use super::axis::AxisFault;
 use super::configuration::AxisConfiguration;
-use super::{CountScale, CurrentLoop, ElectricalAngle, MotorConstants, Rotating, Sine, Stationary};
+use super::{CountScale, CurrentLoop, ElectricalAngle, MotorConstants, Rotating, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
 use crate::real::{abs, clamp, max, min, sqrt};
 use crate::units::Ampere;
@@ -173,8 +173,6 @@ pub struct Shown<'a> {
     pub place: i32,
     /// Electrical angle of that position.
     pub angle: ElectricalAngle,
-    /// Sine that the axis uses.
-    pub sine: Sine,
 }
 
 /// Model check of one axis; see the module's equations.
@@ -307,7 +305,7 @@ impl ModelWatch {
         if step * self.way < 0.0 || self.periods > LONGEST_TURN {
             (self.sum, self.way, self.periods) = (Self::EMPTY.sum, 0.0, 0);
         }
-        let seen = residual.to_stationary(now.angle.rotation(now.sine));
+        let seen = residual.to_stationary(now.angle.rotation());
         let left = 1.0 - abs(self.way);
         let way = abs(step);
         let add = |sum: f32, part: f32, share: f32| sum + part * share;
@@ -362,7 +360,7 @@ mod tests {
         current: Rotating<Ampere>,
         angle: ElectricalAngle,
     ) -> Shown<'a> {
-        Shown { current_loop, current, speed_rad_per_s: 0.0, place: 0, angle, sine: Sine::Exact }
+        Shown { current_loop, current, speed_rad_per_s: 0.0, place: 0, angle }
     }
 
     #[test]
@@ -459,7 +457,7 @@ mod tests {
                 let angle = ElectricalAngle::from_turns(turns);
                 let drift = if *period < 150 { 0.0 } else { size };
                 let residual =
-                    Stationary { alpha: drift, beta: 0.0 }.to_rotating(angle.rotation(Sine::Exact));
+                    Stationary { alpha: drift, beta: 0.0 }.to_rotating(angle.rotation());
                 let held = Rotating { d: Volt(residual.d), q: Volt(residual.q) };
                 let none = Rotating { d: Ampere::ZERO, q: Ampere::ZERO };
                 let current_loop = CurrentLoop::holding(held);

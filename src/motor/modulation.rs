@@ -39,10 +39,11 @@
 
 use super::{Phases, Stationary};
 use crate::hal::{BRIDGE_CLOCK_HZ, CURRENT_RATE_HZ, SHUNT_TRIGGER_CLOCKS};
-use crate::real::clamp;
 use crate::units::{Ampere, Second, Volt};
 
 const ONE_OVER_SQRT_3: f32 = 0.577_350_26;
+/// Units of one band of dead-time compensation: the currents at which a conversion to `i32` saturates.
+const BAND: f32 = 2_147_483_648.0;
 
 /// Times that the bridge and the converter need in a PWM period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,7 +88,10 @@ pub struct Modulator {
     circle_per_bus: f32,
     /// Duty lost to dead time; 0 without compensation.
     dead_duty: f32,
-    per_band: f32,
+    /// The same in units of [`BAND`].
+    dead_duty_per_unit: f32,
+    /// Units of [`BAND`] per ampere.
+    units_per_ampere: f32,
     duty_step: f32,
 }
 
@@ -98,14 +102,14 @@ impl Modulator {
         let rate = CURRENT_RATE_HZ as f32;
         let before = timing.dead_time.0 + timing.settling.0;
         let greatest_duty = 1.0 - 2.0 * rate * before.max(timing.conversion.0);
-        let (dead_duty, per_band) = match dead_time {
+        let (dead_duty, units_per_ampere) = match dead_time {
             DeadTime::Uncompensated => (0.0, 0.0),
-            DeadTime::Compensated { band } => (timing.dead_time.0 * rate, 1.0 / band.0),
+            DeadTime::Compensated { band } => (timing.dead_time.0 * rate, BAND / band.0),
         };
         let times = [timing.dead_time, timing.settling, timing.conversion];
         let sensible = times.iter().all(|time| (0.0..1.0).contains(&time.0))
             && greatest_duty >= 0.5
-            && (0.0..=100.0).contains(&per_band)
+            && (0.0..=100.0 * BAND).contains(&units_per_ampere)
             && (0.0..=0.01).contains(&timing.duty_step)
             && dead_duty < 0.1;
         let circle_per_bus = (greatest_duty - 2.0 * dead_duty) * ONE_OVER_SQRT_3;
@@ -113,7 +117,8 @@ impl Modulator {
             greatest_duty,
             circle_per_bus,
             dead_duty,
-            per_band,
+            dead_duty_per_unit: dead_duty / BAND,
+            units_per_ampere,
             duty_step: timing.duty_step,
         })
     }
@@ -151,11 +156,14 @@ impl Modulator {
         if shift > room {
             shift = room;
         }
-        let current =
-            Stationary { alpha: target.alpha.0 * self.per_band, beta: target.beta.0 * self.per_band };
+        let current = Stationary {
+            alpha: target.alpha.0 * self.units_per_ampere,
+            beta: target.beta.0 * self.units_per_ampere,
+        };
         let current = current.to_phases();
-        let given = |wanted: f32, current_in_bands: f32| {
-            wanted + shift + self.dead_duty * clamp(current_in_bands, -1.0, 1.0)
+        // The conversion to an integer saturates at plus and minus one band.
+        let given = |wanted: f32, current: f32| {
+            wanted + shift + self.dead_duty_per_unit * (current as i32) as f32
         };
         let duties = [given(a, current.a), given(b, current.b), given(c, current.c)];
         // Bounds on all three duties: smallest minus and largest plus the full dead time. Mostly these are
@@ -168,7 +176,7 @@ impl Modulator {
     /// Makes every further duty NaN. Host only; row N1 of docs/safety.md.
     #[cfg(not(target_os = "none"))]
     pub(super) const fn spoil(&mut self) {
-        self.dead_duty = f32::NAN;
+        (self.dead_duty, self.dead_duty_per_unit) = (f32::NAN, f32::NAN);
     }
 
     /// Clamps to 0 and the greatest duty. NaN stays NaN, for the caller's check.

@@ -3,7 +3,7 @@
 //! Tests against the simulated hardware, which resolves every edge and shares no code with this crate,
 //! are in `hal-sim/tests/`.
 
-use super::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale, Sine};
+use super::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale};
 use crate::hal::{AxisCommand, AxisSample};
 use crate::real::{sin_cos, sqrt};
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
@@ -20,7 +20,6 @@ pub(crate) const CONFIGURATION: AxisConfiguration = AxisConfiguration {
     flexion: Direction::Up,
     bandwidth: Hertz(1000.0),
     feedforward: true,
-    sine: Sine::Exact,
     current_limit: Ampere(40.0),
     overcurrent: Ampere(55.0),
     bus: [Volt(20.0), Volt(58.0)],

@@ -166,6 +166,11 @@ impl<const N: usize> CurrentLoops<N> {
         }
         apply(axis, &command, signals, hardware);
         this.ticks += 1;
+        if this.ticks == TICKS_PER_SERVO / 2
+            && let Some(running) = this.stage.axis_mut()
+        {
+            running.check();
+        }
         if this.ticks >= TICKS_PER_SERVO {
             this.ticks = 0;
             if let Some(running) = this.stage.axis_mut()
@@ -186,7 +191,9 @@ impl<const N: usize> CurrentLoops<N> {
         if let Some(ticks) = signals.statistics.current_ticks.get(axis) {
             ticks.count();
         }
-        signals.statistics.see_bus(tick.sample.bus_code);
+        if axis == 0 {
+            signals.statistics.see_bus(tick.sample.bus_code);
+        }
     }
 
     /// Sets the brake resistor, which stays off without a bus voltage. One missing reading is tolerated, as

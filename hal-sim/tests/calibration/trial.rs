@@ -12,7 +12,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use scarab::hal::AxisCommand;
 use scarab::motor::{
     AxisConfiguration, BridgeTiming, Calibration, CalibrationSettings, CalibrationStep, Calibrator, DeadTime,
-    Direction, Refusal, SenseScale, Sine, StoredCalibration,
+    Direction, Refusal, SenseScale, StoredCalibration,
 };
 use scarab::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
 
@@ -106,7 +106,6 @@ impl Trial {
             flexion: Direction::Up,
             bandwidth: Hertz(1000.0),
             feedforward: true,
-            sine: Sine::default(),
             current_limit: Ampere(40.0),
             overcurrent: Ampere(58.0),
             bus: [Volt(20.0), Volt(58.0)],

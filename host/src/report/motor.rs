@@ -73,8 +73,6 @@ pub struct RippleReport {
     pub speed_rad_s: f64,
     /// Requested current, A.
     pub current_a: f64,
-    /// `fast` or `exact`.
-    pub sine: &'static str,
     /// Whether dead time is compensated.
     pub compensated: bool,
     /// Whether the sensors have the board's noise.

@@ -9,7 +9,7 @@
 
 use super::{ElectricalAngle, Reading, Refusal, Stationary};
 use crate::hal::CURRENT_RATE_HZ;
-use crate::motor::{Rotation, Sine};
+use crate::motor::Rotation;
 use crate::units::{Ampere, Volt};
 
 const INTEGRAL_V_PER_A: f32 = 10.0 / CURRENT_RATE_HZ as f32;
@@ -24,7 +24,7 @@ pub(super) struct Hold {
 
 impl Hold {
     pub(super) fn along(angle: ElectricalAngle) -> Self {
-        Self { axis: angle.rotation(Sine::Exact), target_a: 0.0, volts: 0.0 }
+        Self { axis: angle.rotation(), target_a: 0.0, volts: 0.0 }
     }
 
     /// Runs one tick: moves the target towards `target` and adapts the voltage. The target's slope follows

@@ -59,7 +59,7 @@ mod zeros;
 
 use super::configuration::{AxisConfiguration, AxisError, Direction};
 use super::{
-    CountScale, CurrentGains, ElectricalAngle, Modulator, MotorConstants, Rotating, SenseScale, Sine,
+    CountScale, CurrentGains, ElectricalAngle, Modulator, MotorConstants, Rotating, SenseScale,
     Stationary,
 };
 use crate::hal::{AxisCommand, AxisSample};
@@ -108,7 +108,6 @@ struct Bench {
     encoder: EncoderSetting,
     bus_codes: [u16; 2],
     overcurrent_square: f32,
-    sine: Sine,
 }
 
 /// Input of a stage in one tick.
@@ -179,7 +178,6 @@ impl Calibrator {
             encoder: EncoderSetting::of(configuration),
             bus_codes: configuration.bus_codes(),
             overcurrent_square: configuration.overcurrent.0 * configuration.overcurrent.0,
-            sine: configuration.sine,
         };
         Ok(Self {
             bench,

@@ -35,7 +35,7 @@ use super::field::FieldWay;
 use super::track::{Followed, Track};
 use super::{Outcome, Reading, Refusal};
 use crate::hal::CURRENT_RATE_HZ;
-use crate::motor::{CurrentGains, CurrentLoop, ElectricalAngle, Rotating, Sine};
+use crate::motor::{CurrentGains, CurrentLoop, ElectricalAngle, Rotating};
 use crate::units::Volt;
 
 const REST_TICKS: u32 = CURRENT_RATE_HZ / 5;
@@ -146,7 +146,7 @@ impl Scan {
             }
         }
         let target = bench.settings.current * share;
-        let frame = self.field().minus(ElectricalAngle::from_turns(0.25)).rotation(Sine::Exact);
+        let frame = self.field().minus(ElectricalAngle::from_turns(0.25)).rotation();
         let voltage = self.current_loop.voltage(
             &self.gains,
             target,

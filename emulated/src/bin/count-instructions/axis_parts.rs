@@ -8,7 +8,7 @@ use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use scarab::motor::{
     CountScale, CurrentGains, CurrentLoop, ElectricalAngle, Modulator, MotorConstants, Rotating, SenseScale,
-    Sine, SpeedTracker, Stationary,
+    SpeedTracker, Stationary,
 };
 use scarab::units::{Ampere, Henry, Ohm, Volt};
 
@@ -16,18 +16,17 @@ use crate::counter::{Tally, count, heading};
 use crate::motor::CONFIGURATION;
 
 /// Parts of a tick, and their number in a tick.
-const PARTS: [(&str, u32); 11] = [
+const PARTS: [(&str, u32); 10] = [
     ("encoder step to place and angle", 1),
     ("speed tracking", 1),
     ("two shunt codes to current vector", 1),
-    ("sine and cosine, exact; twice", 2),
+    ("sine and cosine; twice", 2),
     ("Park", 1),
     ("PI in d and q, feedforward, anti-windup", 1),
     ("Park back; voltage and target", 2),
     ("space vectors, zero vector, dead time", 1),
     ("  not in the sum: the same, dead time not given back", 0),
     ("  not in the sum: PI at the voltage limit", 0),
-    ("  not in the sum: sine and cosine, micromath", 0),
 ];
 
 /// Prints the parts, and the remainder of the whole.
@@ -68,14 +67,14 @@ fn parts() -> Option<[Tally; PARTS.len()]> {
         let (instructions, angle) = count(|| scale.angle(scale.moved(black_box(place), black_box(13))));
         push(instructions);
         push(count(|| black_box(&mut tracker).track(black_box(angle))).0);
-        let rotor = angle.rotation(Sine::Exact);
+        let rotor = angle.rotation();
         let currents = Rotating { d: Ampere(0.5), q: Ampere(20.0) }.to_stationary(rotor);
         let phases = currents.to_phases();
         let codes = [phases.b, phases.c].map(|current| (2048.0 + current.0 / 0.0403) as u16);
         let (instructions, vector) = count(|| sense.currents(black_box(codes), black_box([2048.0; 2])));
         push(instructions);
         let vector = vector.unwrap_or_default();
-        push(count(|| black_box(angle).rotation(Sine::Exact)).0);
+        push(count(|| black_box(angle).rotation()).0);
         let (instructions, measured) = count(|| black_box(vector).to_rotating(black_box(rotor)));
         push(instructions);
         let mut voltage = |target: f32, limit: f32| {
@@ -92,7 +91,6 @@ fn parts() -> Option<[Tally; PARTS.len()]> {
             push(count(|| modulator.duties(black_box(given), black_box(1.0 / 48.0), black_box(currents))).0);
         }
         push(voltage(40.0, 3.0).0);
-        push(count(|| black_box(angle).rotation(Sine::Fast)).0);
     }
     Some(tallies)
 }

@@ -5,7 +5,7 @@ use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use scarab::hal::{AxisCommand, AxisSample};
 use scarab::motor::{
-    Axis, AxisConfiguration, AxisRequest, Calibration, CalibrationSettings, CalibrationStep, Calibrator, Sine,
+    Axis, AxisConfiguration, AxisRequest, Calibration, CalibrationSettings, CalibrationStep, Calibrator,
 };
 use scarab::units::{Ampere, Volt};
 
@@ -30,21 +30,15 @@ fn tick(axis: &mut Axis, sample: &AxisSample, request: AxisRequest) -> AxisComma
 
 /// Prints the tables; returns whether the bounds are met.
 pub fn report() -> bool {
-    let mut kept = true;
-    for (name, sine) in [("exact sine", Sine::Exact), ("micromath's sine", Sine::Fast)] {
-        let configuration = AxisConfiguration { sine, ..CONFIGURATION };
-        let mut motor = Motor::at_rest();
-        hprintln!("\nOne axis, 24 kHz, {}", name);
-        heading("instructions");
-        let mut tally = Tally::default();
-        let Some(calibration) = calibrated(&mut motor, &configuration, &mut tally) else { return false };
-        tally.print("calibration, a tick");
-        let Some(all) = ticks(&mut motor, &configuration, &calibration) else { return false };
-        kept &= all.print_against("axis tick, all of them", MOST_INSTRUCTIONS);
-        if sine == CONFIGURATION.sine {
-            axis_parts::report(&all);
-        }
-    }
+    let mut motor = Motor::at_rest();
+    hprintln!("\nOne axis, 24 kHz");
+    heading("instructions");
+    let mut tally = Tally::default();
+    let Some(calibration) = calibrated(&mut motor, &CONFIGURATION, &mut tally) else { return false };
+    tally.print("calibration, a tick");
+    let Some(all) = ticks(&mut motor, &CONFIGURATION, &calibration) else { return false };
+    let kept = all.print_against("axis tick, all of them", MOST_INSTRUCTIONS);
+    axis_parts::report(&all);
     kept
 }
 
@@ -73,7 +67,7 @@ pub fn calibrated(
 
 /// Counts the ticks at every speed; `None` where the axis faulted.
 fn ticks(motor: &mut Motor, configuration: &AxisConfiguration, calibration: &Calibration) -> Option<Tally> {
-    let (mut all, mut joint) = (Tally::default(), Tally::default());
+    let (mut all, mut check, mut joint) = (Tally::default(), Tally::default(), Tally::default());
     motor.driven = true;
     for (speed, current) in SPEEDS {
         motor.speed_rad_per_s = speed;
@@ -89,6 +83,9 @@ fn ticks(motor: &mut Motor, configuration: &AxisConfiguration, calibration: &Cal
             let (instructions, command) = count(|| tick(&mut axis, black_box(&sample), black_box(request)));
             tally.push(instructions);
             sample = motor.period(command);
+            if step % 6 == 2 {
+                check.push(count(|| black_box(&mut axis).check()).0);
+            }
             if step % 6 == 5 {
                 joint.push(count(|| black_box(&mut axis).joint_sample()).0);
             }
@@ -100,6 +97,7 @@ fn ticks(motor: &mut Motor, configuration: &AxisConfiguration, calibration: &Cal
         hprintln!("{:<41} {:>6} {:>8} {:>8}", "axis tick at rad/s", speed as i32, tally.mean(), tally.most());
         all.add(&tally);
     }
+    check.print("model of voltages, once per 4 kHz tick");
     joint.print("joint sample, once per 4 kHz tick");
     Some(all)
 }

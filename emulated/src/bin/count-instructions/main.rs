@@ -1,8 +1,7 @@
 //! Counts instructions on the emulated microcontroller.
 //!
-//! Counted work: one axis' tick and its parts, the same steps of the crate `foc`, the whole current
-//! interrupt, a leg's 4 kHz tick. Further work: the steps of its identification, the iterations of the
-//! default swarm, the frames of the bus.
+//! Counted work: one axis' tick and its parts, the whole current interrupt, a leg's 4 kHz tick, the steps of
+//! its identification, the iterations of the default swarm, the frames of the bus.
 //!
 //! Why instructions: the emulator executes exactly the same number every time, and models neither flash wait
 //! states nor pipeline. `scripts/count-instructions` builds and runs this image
@@ -27,7 +26,6 @@ mod motor;
 #[path = "../../../../examples/damped_oscillation/objective.rs"]
 mod objective;
 mod own_objective;
-mod peers;
 mod swarm;
 
 use cortex_m_semihosting::{debug, hprintln};
@@ -37,7 +35,6 @@ fn main() -> ! {
     let kept = counter::start() && {
         let mut account = account::Account::default();
         let axis = copies::report() & axis_tick::report() & interrupt::report(&mut account);
-        peers::report();
         let search = leg::model().and_then(|model| {
             leg_tick::report(&model, &mut account)?;
             identification::report(&model, &mut account)

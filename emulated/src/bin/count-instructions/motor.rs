@@ -4,7 +4,7 @@
 //! current loop is verified on the simulated hardware, not here.
 
 use scarab::hal::{AxisCommand, AxisSample};
-use scarab::motor::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale, Sine};
+use scarab::motor::{AxisConfiguration, BridgeTiming, DeadTime, Direction, SenseScale};
 use scarab::real::sin_cos;
 use scarab::units::{Ampere, Hertz, RadianPerSecond, Volt, Weber};
 
@@ -20,7 +20,6 @@ pub const CONFIGURATION: AxisConfiguration = AxisConfiguration {
     flexion: Direction::Up,
     bandwidth: Hertz(1000.0),
     feedforward: true,
-    sine: Sine::Exact,
     current_limit: Ampere(40.0),
     overcurrent: Ampere(60.0),
     bus: [Volt(10.0), Volt(58.0)],

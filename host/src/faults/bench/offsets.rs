@@ -73,6 +73,7 @@ fn run(
         command = axis.tick(&sample(period, &command), asked(period));
         commands.push(command);
         if (period + 1).is_multiple_of(PERIODS_PER_TICK as usize) {
+            axis.check();
             joint.push(axis.joint_sample());
         }
     }

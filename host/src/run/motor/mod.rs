@@ -3,7 +3,7 @@
 //! | part | measurement |
 //! | --- | --- |
 //! | [`step`] | current steps at rest and at three speeds, with and without feedforward, against the design |
-//! | [`ripple`] | torque ripple: fast against exact sine, with and without dead-time compensation |
+//! | [`ripple`] | torque ripple, with and without dead-time compensation |
 //! | [`limit`] | a target beyond the voltage limit, and the recovery |
 //! | [`regeneration`] | a spinning inertia braked, with and without the chopper |
 //!

@@ -2,11 +2,11 @@
 //!
 //! Uses the torque of each PWM period over whole turns of the rotor, without cogging. Reported are its rms
 //! about the mean, and its sixth harmonic per electrical turn, which dead time causes. The measurement is
-//! made with the board's noise and with noise-free sensors, which shows the effect of the sine.
+//! made with the board's noise and with noise-free sensors.
 
 use core::f64::consts::TAU;
 
-use scarab::motor::{DeadTime, Sine};
+use scarab::motor::DeadTime;
 
 use crate::base::error::ToolError;
 use crate::report::motor::RippleReport;
@@ -29,9 +29,7 @@ pub fn measure(bench: &Bench) -> Result<Vec<RippleReport>, ToolError> {
     for speed in SPEEDS.map(|speed| speed.min(bench.top_speed)) {
         for noise in [false, true] {
             for compensated in [true, false] {
-                for sine in [Sine::Fast, Sine::Exact] {
-                    reports.push(one(bench, speed, sine, compensated, noise)?);
-                }
+                reports.push(one(bench, speed, compensated, noise)?);
             }
         }
     }
@@ -41,13 +39,11 @@ pub fn measure(bench: &Bench) -> Result<Vec<RippleReport>, ToolError> {
 fn one(
     bench: &Bench,
     speed: f64,
-    sine: Sine,
     compensated: bool,
     noise: bool,
 ) -> Result<RippleReport, ToolError> {
     let mut bench = bench.clone();
     bench.axis.motor.cogging = 0.0;
-    bench.configuration.sine = sine;
     if !compensated {
         bench.configuration.dead_time = DeadTime::Uncompensated;
     }
@@ -77,7 +73,6 @@ fn one(
     Ok(RippleReport {
         speed_rad_s: speed,
         current_a: current,
-        sine: if sine == Sine::Fast { "fast" } else { "exact" },
         compensated,
         noise,
         torque_percent: 100.0 * spread(sum, squares) / mean,

@@ -209,7 +209,7 @@ fn ripple(area: &Area<'_>, report: &MotorReport) -> Result<(), DrawingError> {
         let y = 14 + 20 * index as i32;
         let compensated =
             if ripple.compensated { "dead time compensated" } else { "dead time not compensated" };
-        let words = format!("{:.0} rad/s, {} sine, {compensated}", ripple.speed_rad_s, ripple.sine);
+        let words = format!("{:.0} rad/s, {compensated}", ripple.speed_rad_s);
         text(&area, (12, y), 12, HPos::Left, words)?;
         for (value, style, offset) in [(ripple.torque_percent, rms, -3), (ripple.sixth_percent, sixth, 3)] {
             let end = 330 + (440.0 * value / largest) as i32;

@@ -5,7 +5,7 @@
 
 use super::analog;
 use crate::leg::{DeratingRamps, LegDescription, MotorDescription};
-use crate::motor::{AxisConfiguration, BridgeTiming, CalibrationSettings, DeadTime, Direction, Sine};
+use crate::motor::{AxisConfiguration, BridgeTiming, CalibrationSettings, DeadTime, Direction};
 use crate::units::{Ampere, Hertz, RadianPerSecond, Volt};
 
 /// Bandwidth of the current loops.
@@ -76,7 +76,6 @@ pub fn axis(
         flexion: Direction::Up,
         bandwidth: BANDWIDTH,
         feedforward: true,
-        sine: Sine::default(),
         current_limit: current,
         overcurrent: OVERCURRENT,
         bus: bus(divider),

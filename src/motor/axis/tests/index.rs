@@ -59,6 +59,8 @@ fn one_wrong_index_pulse_changes_no_command_and_takes_nothing() {
                 for tick in 0..3 * TURN {
                     assert_eq!(bench.tick(request), twin.tick(request), "{speed} rad/s, tick {tick}");
                     if tick % 6 == 5 {
+                        bench.axis.check();
+                        twin.axis.check();
                         assert_eq!(bench.axis.joint_sample(), twin.axis.joint_sample());
                     }
                 }

@@ -19,6 +19,7 @@ impl Bench {
                 spoil(&mut self.sample);
                 self.tick(request);
             }
+            self.axis.check();
             let _ = self.axis.joint_sample();
             if let Some(fault) = self.axis.fault() {
                 return Some((period, fault));
@@ -97,6 +98,7 @@ fn a_sound_axis_brakes_for_as_long_as_the_other_one_needs_it() {
             assert_eq!(bench.axis.brake(&bench.sample), AxisCommand::BRAKE, "{speed} rad/s, tick {tick}");
             bench.sample = bench.motor.period(AxisCommand::BRAKE);
             if tick % 6 == 5 {
+                bench.axis.check();
                 let _ = bench.axis.joint_sample();
             }
         }
@@ -202,6 +204,7 @@ fn a_warm_motor_that_is_reversed_again_and_again_raises_nothing() {
             let current = 38.0 * crate::real::sin_cos(time * 44.0).0 as f32;
             bench.tick(ask(if step % 3000 < 1500 { current } else { -0.5 * current }));
             if step % 6 == 5 {
+                bench.axis.check();
                 let _ = bench.axis.joint_sample();
             }
             assert_eq!(bench.axis.fault(), None, "{resistance} {flux} {inductance} at {time} s");
