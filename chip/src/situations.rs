@@ -96,7 +96,8 @@ fn take_over(session: &mut Session) -> Result<[i32; 2], ToolError> {
     session.machine.chip_mut().send_frame(Frame::new(0, &[1, 0]));
     session.run(0.1)?;
     for node in [1_u16, 2] {
-        let mut write = |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes, ANSWER_S);
+        let mut write =
+            |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes, ANSWER_S);
         for place in 1..4 {
             write(0x1800 + place, 1, DISABLED | (0x180 + 0x100 * u32::from(place) + u32::from(node)), 4)?;
         }

@@ -426,7 +426,7 @@ fn still<const N: usize>(status: &LegStatus<N>, refusal: Refusal) -> bool {
         RefusalReason::NoTransition => false,
         _ => joint.drive == DriveState::SwitchedOn,
     };
-    lasts && joint.drive != DriveState::OperationEnabled
+    lasts && !joint.drive.is_enabled()
 }
 
 #[cfg(test)]

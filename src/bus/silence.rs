@@ -101,6 +101,8 @@ impl Cycle {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Silence {
     cycles: [Cycle; KINDS],
+    /// Instant after which the host is silent; `None` without an armed kind.
+    silent_us: Option<u64>,
 }
 
 impl Silence {
@@ -113,27 +115,34 @@ impl Silence {
             let is_late = |other: &&mut Cycle| other.is_armed() && now_us > other.last_us + other.time_us();
             self.cycles.iter_mut().filter(is_late).for_each(|other| *other = Cycle::default());
         }
+        self.plan();
     }
 
     /// Whether the host has just fallen silent; reported once, until it is cyclic again.
     pub fn begins(&mut self, now_us: u64) -> bool {
-        let (mut last_us, mut time_us, mut slowest_us) = (0, u64::MAX, 0);
-        for cycle in self.cycles.iter().filter(|cycle| cycle.is_armed()) {
-            last_us = last_us.max(cycle.last_us);
-            time_us = time_us.min(cycle.time_us());
-            slowest_us = slowest_us.max(SLOWEST_PERIODS * u64::from(cycle.mean_us));
-        }
-        // Without an armed kind the time never ends.
-        let begins = now_us > last_us.saturating_add(time_us.max(slowest_us));
+        let begins = self.silent_us.is_some_and(|silent_us| now_us > silent_us);
         if begins {
             *self = Self::default();
         }
         begins
     }
 
+    /// Computes the instant of silence, so that each check is one comparison.
+    fn plan(&mut self) {
+        let (mut last_us, mut time_us, mut slowest_us) = (0, u64::MAX, 0);
+        for cycle in self.cycles.iter().filter(|cycle| cycle.is_armed()) {
+            last_us = last_us.max(cycle.last_us);
+            time_us = time_us.min(cycle.time_us());
+            slowest_us = slowest_us.max(SLOWEST_PERIODS * u64::from(cycle.mean_us));
+        }
+        let is_armed = time_us < u64::MAX;
+        self.silent_us = is_armed.then(|| last_us.saturating_add(time_us.max(slowest_us)));
+    }
+
     /// Restarts the timeout after a time in which nothing could be received.
     pub fn wait(&mut self, now_us: u64) {
         self.cycles.iter_mut().for_each(|cycle| cycle.last_us = cycle.last_us.max(now_us));
+        self.plan();
     }
 }
 

@@ -18,6 +18,15 @@ pub enum Activity {
     Follow,
 }
 
+impl Activity {
+    /// Whether the leg follows the commands of a host.
+    #[must_use]
+    #[inline]
+    pub const fn follows_host(self) -> bool {
+        matches!(self, Self::Follow)
+    }
+}
+
 /// Phase of an identification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IdentifyPhase {

@@ -14,7 +14,7 @@ use crate::hal::Sample;
 use crate::ident::{Cause, Change, Verdict};
 use crate::motion::{Motion, MotionState, Periodic, Ramp};
 use crate::real::min;
-use crate::safety::{DriveState, PowerRequest, RETURN_SPEED};
+use crate::safety::{PowerRequest, RETURN_SPEED};
 use crate::servo::{LogAverager, LogSample, SERVO_RATE_HZ, Servo, ServoCommand, ServoOutput};
 use crate::units::{RadianPerSecond, RadianPerSecondSquared};
 
@@ -184,7 +184,7 @@ impl<const N: usize> Control<N> {
         [refused, took_update]: [bool; 2],
     ) -> ControlOutput<N> {
         self.motion_tick = self.motion_tick.saturating_add(1);
-        if servo.decision.state != DriveState::OperationEnabled {
+        if !servo.decision.state.is_enabled() {
             // Without power the commanded pose follows the joints: enabling must not cause a motion.
             self.activity = Activity::Idle;
             self.models.interrupt();
@@ -209,10 +209,10 @@ impl<const N: usize> Control<N> {
     /// Whether the request is permitted. A new activity starts only from rest, because its approach does.
     fn may_begin(&self, request: &ControlRequest<N>, host: Option<&Host<'_, N>>) -> bool {
         let still = match host {
-            Some(host) if self.activity == Activity::Follow => host.following.is_still(),
+            Some(host) if self.activity.follows_host() => host.following.is_still(),
             _ => self.motion.state_at(self.motion_tick).velocity_rad_per_s.iter().all(|&speed| speed == 0.0),
         };
-        let enabled = self.servo.state() == DriveState::OperationEnabled;
+        let enabled = self.servo.state().is_enabled();
         match request {
             ControlRequest::Power(_) => true,
             ControlRequest::TakeUpdate => self.is_update_offered(),

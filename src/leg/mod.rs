@@ -145,7 +145,7 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
     #[must_use]
     pub fn joint_status(&self, joint: usize, output: &ControlOutput<N>) -> Option<JointStatus> {
         let torque = self.control.torque(joint, self.sample.as_ref()?)?;
-        let follows = self.control.activity() == Activity::Follow;
+        let follows = self.control.activity().follows_host();
         self.following.status(joint, torque, follows, output)
     }
 

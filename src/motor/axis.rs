@@ -215,8 +215,7 @@ impl Axis {
         let angle = self.angle();
         self.speed.track(angle);
         // Both rotations of a tick together share the constants of their polynomials.
-        let [rotor, acting] =
-            [angle, self.speed.ahead(angle, DELAY_PERIODS)].map(|angle| angle.rotation());
+        let [rotor, acting] = [angle, self.speed.ahead(angle, DELAY_PERIODS)].map(|angle| angle.rotation());
         let currents = constants.sense.currents(sample.shunt_codes, constants.zeros);
         let switching = request != BridgeRequest::Released;
         self.measured = match currents {

@@ -45,12 +45,12 @@ impl Chopper {
     /// Duty of the resistor at a bus voltage, 0..=0.95.
     #[must_use]
     pub fn duty(&self, bus: Volt) -> f32 {
-        let duty = (bus.0 - self.begin.0) * self.per_volt;
-        // Also where it is not a number.
-        if !(duty > 0.0) || duty == f32::INFINITY {
+        let above = bus.0 - self.begin.0;
+        // Nearly always, and where the voltage is not a number.
+        if !(above > 0.0) || above == f32::INFINITY {
             return 0.0;
         }
-        min(duty, GREATEST_BRAKE_DUTY)
+        min(above * self.per_volt, GREATEST_BRAKE_DUTY)
     }
 }
 

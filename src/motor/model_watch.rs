@@ -456,8 +456,7 @@ mod tests {
                 let turns = sign * period.saturating_sub(90) as f32 * 0.024_9;
                 let angle = ElectricalAngle::from_turns(turns);
                 let drift = if *period < 150 { 0.0 } else { size };
-                let residual =
-                    Stationary { alpha: drift, beta: 0.0 }.to_rotating(angle.rotation());
+                let residual = Stationary { alpha: drift, beta: 0.0 }.to_rotating(angle.rotation());
                 let held = Rotating { d: Volt(residual.d), q: Volt(residual.q) };
                 let none = Rotating { d: Ampere::ZERO, q: Ampere::ZERO };
                 let current_loop = CurrentLoop::holding(held);

@@ -162,9 +162,8 @@ impl Modulator {
         };
         let current = current.to_phases();
         // The conversion to an integer saturates at plus and minus one band.
-        let given = |wanted: f32, current: f32| {
-            wanted + shift + self.dead_duty_per_unit * (current as i32) as f32
-        };
+        let given =
+            |wanted: f32, current: f32| wanted + shift + self.dead_duty_per_unit * (current as i32) as f32;
         let duties = [given(a, current.a), given(b, current.b), given(c, current.c)];
         // Bounds on all three duties: smallest minus and largest plus the full dead time. Mostly these are
         // within range.

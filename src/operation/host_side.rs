@@ -9,8 +9,8 @@ use super::signals::Signals;
 use crate::bus::device::{LegOrder, LegRequest, LegStatus};
 use crate::hal::{Hardware, Sample};
 use crate::leg::{
-    Activity, Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand,
-    JointStatus, Permission, Plan, PowerRequest, Refusal,
+    Control, ControlOutput, ControlRequest, DriveState, Fault, Following, Host, JointCommand, JointStatus,
+    Permission, Plan, PowerRequest, Refusal,
 };
 use crate::units::{NewtonMetre, Volt};
 
@@ -164,9 +164,7 @@ impl<const N: usize> HostSide<N> {
         }
         match request {
             Some(ControlRequest::Power(power)) if !power.enables() => request,
-            _ if state == DriveState::OperationEnabled => {
-                Some(ControlRequest::Power(PowerRequest::QuickStop))
-            }
+            _ if state.is_enabled() => Some(ControlRequest::Power(PowerRequest::QuickStop)),
             // A step that was requested while the switch was still held.
             _ => None,
         }
@@ -202,7 +200,7 @@ impl<const N: usize> HostSide<N> {
         let mut joints = [JointStatus::NONE; N];
         for (joint, slot) in joints.iter_mut().enumerate() {
             let torque = self.torque.get(joint).copied().unwrap_or(NewtonMetre::ZERO);
-            let status = self.following.status(joint, torque, activity == Activity::Follow, output);
+            let status = self.following.status(joint, torque, activity.follows_host(), output);
             *slot = JointStatus { bus: self.bus(signals), ..status.unwrap_or(JointStatus::NONE) };
         }
         let status = LegStatus {

@@ -173,7 +173,7 @@ impl<const N: usize> Monitor<N> {
     /// Joints that are returning into their range.
     #[must_use]
     pub fn returns(&self) -> [bool; N] {
-        self.returns.map(|ends| ends.is_some() && self.state == DriveState::OperationEnabled)
+        self.returns.map(|ends| ends.is_some() && self.state.is_enabled())
     }
 
     /// Codes of the limits that a decision applied to each joint.
@@ -215,7 +215,7 @@ impl<const N: usize> Monitor<N> {
                     None => state,
                     Some(power) => {
                         let asked = state.after(Event::Asked(power), self.damp_ticks);
-                        let enables = asked == DriveState::OperationEnabled && asked != state;
+                        let enables = asked.is_enabled() && asked != state;
                         if enables {
                             refused = self.refusal(observation);
                             self.begin_return(observation);

@@ -118,6 +118,13 @@ impl DriveState {
         }
     }
 
+    /// Whether the joints follow their commands.
+    #[must_use]
+    #[inline]
+    pub const fn is_enabled(self) -> bool {
+        matches!(self, Self::OperationEnabled)
+    }
+
     /// The latched fault, or the one being reacted to.
     #[must_use]
     pub const fn fault(self) -> Option<Fault> {

@@ -266,7 +266,7 @@ impl Axis {
 
     /// Whether both this joint and the leg are enabled.
     pub(super) fn is_powered(&self) -> bool {
-        self.own == DriveState::OperationEnabled && self.status.drive == DriveState::OperationEnabled
+        self.own.is_enabled() && self.status.drive.is_enabled()
     }
 
     /// Handles a controlword.
@@ -373,7 +373,7 @@ impl Axis {
             Some(Mode::CyclicVelocity | Mode::CyclicTorque) => (self.is_powered(), false),
             _ => (false, false),
         };
-        let waits = self.own == DriveState::OperationEnabled && !self.is_powered();
+        let waits = self.own.is_enabled() && !self.is_powered();
         state_bits(self.own)
             | bit(is_ready, 4)
             | bit(is_ready, 9)

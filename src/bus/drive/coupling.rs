@@ -63,11 +63,11 @@ impl Coupling {
                 || is_stopping
                 || has_gone_down && is_above
                 // A quick stop without power ends at once.
-                || wants_stop && drive != DriveState::OperationEnabled;
+                || wants_stop && !drive.is_enabled();
             if follows {
                 axis.own = drive;
             }
-            stops |= wants_stop && drive == DriveState::OperationEnabled;
+            stops |= wants_stop && drive.is_enabled();
             lowest = lowest.min(level(axis.own));
         }
         match drive {

@@ -6,7 +6,6 @@ use crate::bus::abort::Abort;
 use crate::bus::dictionary::Object;
 use crate::bus::emergency::ErrorReport;
 use crate::bus::objects::{Lost, Objects};
-use crate::leg::DriveState;
 
 /// Low bytes of a signed number.
 macro_rules! bits {
@@ -173,7 +172,7 @@ impl Objects for Axis {
     }
 
     fn misses_host(&self) -> bool {
-        self.settings.watches && self.commanded && self.own == DriveState::OperationEnabled
+        self.settings.watches && self.commanded && self.own.is_enabled()
     }
 
     fn reset(&mut self) {

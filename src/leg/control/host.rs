@@ -1,6 +1,6 @@
 //! Control by a host: while the drive is enabled, `Follow` replaces `Idle`.
 
-use super::{Activity, Control, DriveState};
+use super::{Activity, Control};
 use crate::leg::follow::{Commanded, Following, JointCommand};
 use crate::motion::{Motion, MotionState};
 
@@ -20,10 +20,10 @@ impl<const N: usize> Control<N> {
     /// Follows the host's commands if the drive is enabled and no other activity runs.
     pub(super) fn obey(&mut self, host: Option<&mut Host<'_, N>>) -> Option<Commanded<N>> {
         let Host { following, commands, cancel } = host?;
-        if self.servo.state() != DriveState::OperationEnabled {
+        if !self.servo.state().is_enabled() {
             return None;
         }
-        if *cancel && self.activity != Activity::Follow {
+        if *cancel && !self.activity.follows_host() {
             following.begin(commands, &self.motion.state_at(self.motion_tick));
             self.activity = Activity::Follow;
         }
@@ -31,7 +31,7 @@ impl<const N: usize> Control<N> {
             following.begin(commands, &MotionState::at_rest(self.motion.end_rad()));
             self.activity = Activity::Follow;
         }
-        if self.activity != Activity::Follow {
+        if !self.activity.follows_host() {
             return None;
         }
         self.models.want(commands.iter().all(|command| command.feedforward));

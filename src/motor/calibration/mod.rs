@@ -59,8 +59,7 @@ mod zeros;
 
 use super::configuration::{AxisConfiguration, AxisError, Direction};
 use super::{
-    CountScale, CurrentGains, ElectricalAngle, Modulator, MotorConstants, Rotating, SenseScale,
-    Stationary,
+    CountScale, CurrentGains, ElectricalAngle, Modulator, MotorConstants, Rotating, SenseScale, Stationary,
 };
 use crate::hal::{AxisCommand, AxisSample};
 use crate::units::{Ampere, Hertz, Ohm, Volt, Weber};

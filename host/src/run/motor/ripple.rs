@@ -36,12 +36,7 @@ pub fn measure(bench: &Bench) -> Result<Vec<RippleReport>, ToolError> {
     Ok(reports)
 }
 
-fn one(
-    bench: &Bench,
-    speed: f64,
-    compensated: bool,
-    noise: bool,
-) -> Result<RippleReport, ToolError> {
+fn one(bench: &Bench, speed: f64, compensated: bool, noise: bool) -> Result<RippleReport, ToolError> {
     let mut bench = bench.clone();
     bench.axis.motor.cogging = 0.0;
     if !compensated {
