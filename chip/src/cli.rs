@@ -426,7 +426,7 @@ fn run_hangs(arguments: &HangArguments) -> Result<bool, ToolError> {
         );
     }
     arguments.common.write(&reports)?;
-    Ok(reports.iter().all(|report| !report.on_again))
+    Ok(reports.iter().all(hangs::HangReport::is_sound))
 }
 
 fn run_sampling(common: &Common) -> Result<bool, ToolError> {

@@ -88,7 +88,7 @@ pub struct Modulator {
     circle_per_bus: f32,
     /// Duty lost to dead time; 0 without compensation.
     dead_duty: f32,
-    /// The same in units of [`BAND`].
+    /// Duty lost to dead time per unit of [`BAND`].
     dead_duty_per_unit: f32,
     /// Units of [`BAND`] per ampere.
     units_per_ampere: f32,

@@ -162,6 +162,7 @@ impl Timer {
             self.clock = clock;
             self.rest = 0;
             self.origin = now;
+            (self.processed, self.matched) = (self.processed.max(now), self.matched.max(now));
         }
     }
 
@@ -742,6 +743,17 @@ mod tests {
             }
             events
         }
+    }
+
+    #[test]
+    fn a_clock_that_changes_between_two_events_goes_on_from_there() {
+        let mut bench = Bench::new(Kind::General);
+        for (offset, value) in [(PSC, 9), (ARR, 99), (EGR, 1), (SR, 0), (DIER, 1), (CR1, 1)] {
+            bench.write(0, offset, value);
+        }
+        bench.run(2000);
+        bench.timer.set_clock(21, 3000);
+        assert_eq!(bench.timer.due(), 3000 + 50 * 10 * 21);
     }
 
     #[test]
