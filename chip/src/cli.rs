@@ -9,6 +9,7 @@ use std::time::Instant;
 use clap::{Args, Parser, Subcommand};
 use scarab_host::base::error::ToolError;
 use scarab_host::base::files;
+use scarab_host::base::number::Number;
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
 use scarab_host::image::build;
 use serde::Serialize;
@@ -241,7 +242,8 @@ fn print_run(report: &ChipReport, wall_s: f64) {
         println!("known finding: {}: {} ({reason})", finding.register, finding.what);
     }
     for base in &report.base_parameters {
-        println!("{:>6} {:?} sigma {:?} {}", base.name, base.value, base.sigma, base.unit);
+        let show = |number: Number| number.known().map_or("-".to_owned(), |value| format!("{value:.6}"));
+        println!("{:>6} {:>11} +- {} {}", base.name, show(base.value), show(base.sigma), base.unit);
     }
     println!(
         "verdict {}{}",
