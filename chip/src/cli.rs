@@ -451,5 +451,5 @@ fn run_sampling(common: &Common) -> Result<bool, ToolError> {
         );
     }
     common.write(&reports)?;
-    Ok(true)
+    Ok(reports.iter().all(sampling::SamplingReport::is_sound))
 }

@@ -25,6 +25,19 @@ pub struct SamplingReport {
     pub disturbed: usize,
 }
 
+/// Documented instant of the trigger after the middle (docs/motor.md), and a clock of the timer, ns.
+const TRIGGER_NS: f64 = 119.0;
+const CLOCK_NS: f64 = 6.0;
+
+impl SamplingReport {
+    /// Whether every conversion began at the documented instant, without an edge of the other bridge before.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let is_right = |at: &f64| (at - TRIGGER_NS).abs() < CLOCK_NS;
+        self.conversions > 0 && self.disturbed == 0 && self.trigger_ns.iter().all(is_right)
+    }
+}
+
 fn nanoseconds(ticks: Ticks) -> f64 {
     1e9 * ticks as f64 / TICK_HZ as f64
 }
