@@ -15,7 +15,7 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use scarab::ident::recorder::STILL_SPEED;
+use scarab::ident::record::recorder::STILL_SPEED;
 use scarab::ident::{
     Ends, Estimator, Factor, FilteredRows, LARGEST_STILL_SHARE, Plan, Record, Recorder, RowModel, Smoothed,
     prior_parameters,

@@ -2,7 +2,7 @@
 //!
 //! Why: a known load needs no new identification. Parameters of bodies fixed to one another add up, so one
 //! addition puts a load on a model or takes it off. A load of known mass is also the reference for torque
-//! constants ([`crate::ident::scale`]).
+//! constants ([`crate::ident::solve::scale`]).
 //!
 //! ```text
 //! delta: M = m     H = m r     I = m (r.r E - r r')      about the origin of the link's joint frame

@@ -1,8 +1,9 @@
 //! Checks of the architecture: allowed dependencies between modules, and a few rules that no compiler checks.
 //!
-//! A module here is one at the top of `src/` or `host/src/`. The tables below are the design's; a change to
-//! them is a change of the architecture and belongs in a commit of its own. Comments do not count as a use,
-//! unit tests do. A test that needs more modules than its own may use lives in `tests/`.
+//! A module here is one at the top of `src/` or `host/src/`, or a folder of `src/ident/`. The tables below
+//! are the design's; a change to them is a change of the architecture and belongs in a commit of its own.
+//! Comments do not count as a use, unit tests do. A test that needs more modules than its own may use lives
+//! in `tests/`.
 
 mod tokens;
 
@@ -36,6 +37,15 @@ const FIRMWARE: [(&str, &[&str]); 19] = [
     ("operation", &["hal", "motor", "leg", "safety", "servo", "trace", "bus"]),
     ("board", &["hal", "motor", "leg", "bus", "task"]),
     ("task", &["hal", "motor", "leg", "operation", "safety", "servo", "trace", "store", "bus", "board"]),
+];
+
+/// Folders of `ident`: each uses only folders above it.
+const IDENT: [(&str, &[&str]); 5] = [
+    ("signal", &[]),
+    ("record", &["signal"]),
+    ("solve", &["signal", "record"]),
+    ("judge", &["signal", "record", "solve"]),
+    ("monitor", &["signal", "record", "solve", "judge"]),
 ];
 
 /// Modules of the host tool: each uses only modules above it, so there is no cycle.
@@ -87,18 +97,22 @@ const LARGEST_LINE_COUNT: usize = 900;
 #[test]
 fn every_module_uses_only_the_modules_that_the_design_allows() {
     let mut offences = Vec::new();
-    for (folder, table, open) in [("src", &FIRMWARE[..], &OPEN[..]), ("host/src", &HOST, &[])] {
+    for (folder, root, table, open) in [
+        ("src", "crate", &FIRMWARE[..], &OPEN[..]),
+        ("src/ident", "ident", &IDENT, &[]),
+        ("host/src", "crate", &HOST, &[]),
+    ] {
         for file in source_files(folder) {
             let inside = &file.path[folder.len() + 1..];
             let module = module_of(inside);
-            if module == "lib" || module == "main" {
+            if ["lib", "main", "mod"].contains(&module) {
                 continue;
             }
             let Some((_, allowed)) = table.iter().find(|(name, _)| *name == module) else {
                 offences.push(format!("{}: module `{module}` is not in the table", file.path));
                 continue;
             };
-            for used in modules_used(&file.text, module_depth(inside), table) {
+            for used in modules_used(&file.text, module_depth(inside), root, table) {
                 if used.text != module && !open.contains(&used.text) && !allowed.contains(&used.text) {
                     offences
                         .push(format!("{}:{}: `{module}` may not use `{}`", file.path, used.line, used.text));
@@ -110,10 +124,13 @@ fn every_module_uses_only_the_modules_that_the_design_allows() {
 }
 
 #[test]
-fn every_module_of_the_host_tool_stands_below_those_that_it_uses() {
-    for (place, (module, allowed)) in HOST.iter().enumerate() {
-        for used in *allowed {
-            assert!(HOST[..place].iter().any(|(name, _)| name == used), "`{module}` uses `{used}` below it");
+fn every_module_of_the_host_tool_and_of_ident_stands_below_those_that_it_uses() {
+    for table in [&HOST[..], &IDENT] {
+        for (place, (module, allowed)) in table.iter().enumerate() {
+            for used in *allowed {
+                let is_above = table[..place].iter().any(|(name, _)| name == used);
+                assert!(is_above, "`{module}` uses `{used}` below it");
+            }
         }
     }
 }
@@ -122,7 +139,7 @@ fn every_module_of_the_host_tool_stands_below_those_that_it_uses() {
 fn the_swarm_needs_the_maths_door_and_nothing_else_of_the_crate() {
     let mut offences = Vec::new();
     for file in source_files("src/swarm") {
-        for used in modules_used(&file.text, module_depth(&file.path["src/".len()..]), &FIRMWARE) {
+        for used in modules_used(&file.text, module_depth(&file.path["src/".len()..]), "crate", &FIRMWARE) {
             if !["swarm", "real"].contains(&used.text) {
                 offences.push(format!("{}:{}: `swarm` may not use `{}`", file.path, used.line, used.text));
             }
@@ -381,7 +398,7 @@ fn no_file_names_a_path_of_one_machine() {
 #[test]
 fn a_use_is_found_in_groups_paths_and_through_super() {
     let used = |source: &str, depth| -> Vec<String> {
-        modules_used(source, depth, &FIRMWARE).iter().map(|token| token.text.to_owned()).collect()
+        modules_used(source, depth, "crate", &FIRMWARE).iter().map(|token| token.text.to_owned()).collect()
     };
     assert_eq!(
         used("use crate::{leg::Leg, model::{chain, servo as s}, swarm};", 1),
@@ -394,6 +411,22 @@ fn a_use_is_found_in_groups_paths_and_through_super() {
         used("//! [`crate::leg`]\nuse heapless::Vec; // crate::ident\nlet s = \"crate::bus\";", 1),
         [""; 0]
     );
+}
+
+#[test]
+fn a_use_inside_ident_is_found_and_so_is_an_item_that_is_not_named_by_its_folder() {
+    let used = |source: &str, depth| -> Vec<String> {
+        modules_used(source, depth, "ident", &IDENT).iter().map(|token| token.text.to_owned()).collect()
+    };
+    assert_eq!(used("use crate::ident::{judge::verdict, solve}; use crate::model;", 2), ["judge", "solve"]);
+    assert_eq!(used("use crate::{ident::record::rows::Ends, leg};", 2), ["record"]);
+    assert_eq!(
+        used("use super::super::super::ident::solve; use super::super::monitor;", 2),
+        ["solve", "monitor"]
+    );
+    assert_eq!(used("use super::factor::Factor; use super::judge::held_out;", 2), [""; 0]);
+    assert_eq!(used("use super::judge::held_out;", 1), ["judge"]);
+    assert_eq!(used("use crate::ident::Verdict; use super::super::Factor;", 2), ["Verdict", "Factor"]);
 }
 
 #[test]
@@ -469,29 +502,32 @@ fn module_of(inside: &str) -> &str {
     inside.split(['/', '.']).next().unwrap_or(inside)
 }
 
-/// Depth of a file's module below the crate's root: 1 for a top module, 2 for a file in it. The path begins
-/// below the source folder.
+/// Depth of a file's module below the root of its table: 1 for a module of the table, 2 for a file in it. The
+/// path begins below the root's folder.
 fn module_depth(inside: &str) -> usize {
     inside.split('/').count() - usize::from(inside.ends_with("/mod.rs"))
 }
 
-/// Every module that a file at `depth` names from the crate's root, by `crate::` or by enough `super::`.
-fn modules_used<'a>(source: &'a str, depth: usize, table: &Table) -> Vec<Token<'a>> {
+/// Every module of `table` that a file at `depth` names below `root`, by `root::` or by enough `super::`.
+fn modules_used<'a>(source: &'a str, depth: usize, root: &str, table: &Table) -> Vec<Token<'a>> {
     let all = tokens(source);
-    let mut used = named_below(&all, "crate");
+    let mut used = named_below(&all, root);
     for start in 0..all.len() {
         let supers = all[start..].chunks(2).take_while(|pair| {
             pair.first().is_some_and(|t| t.text == "super") && pair.get(1).is_some_and(|t| t.text == "::")
         });
-        if supers.count() >= depth {
+        if supers.count() == depth {
             let after = start + 2 * depth;
-            used.extend(names_at(&all[after..]).into_iter().filter(|name| name.text != "*"));
+            used.extend(names_at(&all[after..]).into_iter().filter(|name| !["*", root].contains(&name.text)));
         }
     }
     // The crate's own items (macros, constants) are not modules. In an inline module `super` may
     // mean the module itself, so there only a module's name counts. `crate::*` would allow
-    // everything and always counts.
-    used.retain(|name| name.text == "*" || table.iter().any(|(module, _)| *module == name.text));
+    // everything and always counts. An item that `ident` re-exports may come from any of its folders,
+    // so every name below `ident` counts.
+    if root == "crate" {
+        used.retain(|name| name.text == "*" || table.iter().any(|(module, _)| *module == name.text));
+    }
     used
 }
 

@@ -2,7 +2,7 @@
 
 use std::mem::size_of;
 
-use scarab::ident::window::{ROOM, Window};
+use scarab::ident::record::window::{ROOM, Window};
 use scarab::ident::{Estimate, HeldOut, Record, Recorder, RowFilter, Solver, SwarmSearch};
 use scarab::leg::{Control, Identification, Leg, ModelMonitor};
 use scarab_host::rig::pair::{PENDING, TAPS};

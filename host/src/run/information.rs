@@ -8,7 +8,7 @@
 //!
 //! No unbiased estimator of these parameters has a smaller variance. Rows of a sticking joint are excluded.
 
-use scarab::ident::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE, Row};
+use scarab::ident::record::packed::{self, LARGEST_COLUMNS, LARGEST_SIZE, Row};
 use scarab::real::{exp, sign, sqrt};
 
 use crate::leg::background::StribeckTruth;

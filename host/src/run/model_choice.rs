@@ -1,6 +1,6 @@
 //! Model terms of each joint: requested, used, and why.
 //!
-//! The firmware decides (`scarab::ident::selection`, `scarab::ident::stribeck`). This module
+//! The firmware decides (`scarab::ident::solve::selection`, `scarab::ident::record::stribeck`). This module
 //! converts leg files to its choices and its decisions to words.
 //!
 //! | `offset` | `asymmetric_coulomb` | constant column |
@@ -11,7 +11,9 @@
 //! | off | off | absent |
 //! | on | on | rejected: both are one column |
 
-use scarab::ident::{Choice, Constant, Estimate, Selection, selection, stribeck};
+use scarab::ident::record::stribeck;
+use scarab::ident::solve::selection;
+use scarab::ident::{Choice, Constant, Estimate, Selection};
 use scarab::model::{Parameter, Standing};
 
 use crate::base::names::asymmetry_name;

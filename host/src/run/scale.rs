@@ -1,7 +1,7 @@
 //! Scale and load of a simulated run: a second run with a known mass, and a known load.
 //!
 //! Why here: the board identifies one leg as it hangs. A second run with a known mass determines
-//! the torque constants (`scarab::ident::scale`). It compares the records of two identifications,
+//! the torque constants (`scarab::ident::solve::scale`). It compares the records of two identifications,
 //! each through the whole firmware on the same simulated leg; attaching the mass between them is
 //! the operator's part. The first run is then solved again with corrected torques, by the same
 //! solver and verdict. A known load is subtracted from the records in the same way.

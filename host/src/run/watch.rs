@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use hal_sim::world::TICK_S;
-use scarab::ident::stribeck::combination;
+use scarab::ident::record::stribeck::combination;
 use scarab::ident::{
     Ends, FilteredRows, LARGEST_STILL_SHARE, Reason, Recorder, RowFilter, RowModel, Smoothed, Smoother,
     Solver, Verdict,

@@ -2,7 +2,7 @@
 
 use crate::command::{Folder, MUJOCO, base, fit, reasons, scarab};
 use crate::pendulum::{Motion, TRUTH, leg};
-use scarab::ident::recorder::SMOOTHING_BANDWIDTHS;
+use scarab::ident::record::recorder::SMOOTHING_BANDWIDTHS;
 use scarab::ident::{Kernel, LowPass};
 use scarab::real::sqrt;
 use serde_json::Value;

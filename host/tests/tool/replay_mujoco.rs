@@ -7,7 +7,7 @@
 
 use crate::command::{Folder, MUJOCO, Table, base, fit, scarab};
 use scarab::ident::LowPass;
-use scarab::ident::recorder::{LARGEST_STILL_SHARE, STILL_SPEED};
+use scarab::ident::record::recorder::{LARGEST_STILL_SHARE, STILL_SPEED};
 use scarab::real::sqrt;
 use std::path::Path;
 

@@ -32,7 +32,7 @@ pub mod samples;
 pub mod stamps;
 
 use nalgebra::Vector3;
-use scarab::ident::recorder::STILL_SPEED;
+use scarab::ident::record::recorder::STILL_SPEED;
 use scarab::ident::{KernelError, RowModel};
 use scarab::model::AnatomicalJoint;
 

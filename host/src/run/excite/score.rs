@@ -14,7 +14,7 @@
 //! leg that hangs where it needs none. This was tried: the hip stayed between 5 and 29 degrees.
 //!
 //! A row counts unless the joint stands still in too much of its window, the rule of
-//! `ident::record`. Shares of stillness come from speeds at 100 Hz, linear in between, and the
+//! `ident::record::recorder`. Shares of stillness come from speeds at 100 Hz, linear in between, and the
 //! magnitude of the low-pass. The filters themselves are omitted: a curve's harmonics lie in their
 //! flat band ([`crate::run::excite::design`] ensures it).
 //!

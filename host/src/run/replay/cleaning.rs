@@ -1,6 +1,6 @@
 //! Replaces outliers of a recording at its own rate: resampling would smear each over its neighbours.
 //!
-//! The filter is the board's ([`scarab::ident::hampel`]). Two cases occur in recordings only:
+//! The filter is the board's ([`scarab::ident::signal::hampel`]). Two cases occur in recordings only:
 //!
 //! - Recordings slower than [`SPARSEST_HZ`]: vibrations of the machine are as fast as its samples, and
 //!   neighbours do not predict them. Of a correct recording at 200 Hz 2 to 3 % would count as outliers. Only
@@ -8,7 +8,7 @@
 //! - Coarse sensors: a last bit that flickers at rest is not an outlier. Deviations within [`QUANTA`] steps
 //!   of the sensor stay.
 
-use scarab::ident::hampel::{Cleaned, Hampel, Quantity};
+use scarab::ident::signal::hampel::{Cleaned, Hampel, Quantity};
 
 use crate::formats::recording::Recording;
 

@@ -1,0 +1,204 @@
+//! Tests of the fit: on the motion identified from and on held-out motions.
+//!
+//! ```text
+//! expected^2 = v S + tr(R Cov R') / n         noise through the filter, and the parameters' uncertainty
+//! error^2   <= expected^2 q(n m S) + (harmless share * rms torque)^2
+//! ```
+//!
+//! v is the variance of a 500 Hz sample's noise, from its own scatter (`noise`). S is the sum of h^2; n rows
+//! are worth m S independent ones each. q is the quantile of chi-square over its degrees of freedom. Neither
+//! side uses the training's residual, so a bad training widens no limit. Only where v is unknown (samples
+//! from another grid) the training's residual takes its place, times `largest_error_ratio`.
+
+use super::{Evidence, Reason, Test, Thresholds, VerdictBuilder};
+use crate::ident::judge::residual::Residual;
+use crate::ident::record::recorder::{Record, RowModel};
+use crate::ident::solve::estimate::Estimate;
+use crate::model::Parameter;
+use crate::real::{self, Real};
+
+/// A held-out motion.
+#[derive(Clone, Copy, Debug)]
+pub struct Unused<'a, T, const N: usize, const B: usize> {
+    /// Record of the motion.
+    pub record: &'a Record<T, N, B>,
+    /// Residual in order of time.
+    pub residual: &'a Residual<T, N>,
+}
+
+impl<T: Real> Thresholds<T> {
+    /// Judges the fit to the motion identified from.
+    pub fn judge_residual<const N: usize, const B: usize>(
+        &self,
+        training: &Record<T, N, B>,
+        values: &[T; B],
+        builder: &mut VerdictBuilder<'_, T>,
+    ) {
+        for (joint, size) in training.torque.iter().enumerate() {
+            let Some(error) = training.torque_error(joint, values) else { continue }; // the joint never moved: unexcited
+            let mut limit = self.largest_error_share * size.root_mean_square;
+            if let Some(noise) = training.filtered_noise(joint) {
+                let allowed = self.allowed(training, joint, noise * noise, self.largest_misfit_share);
+                limit = real::min(limit, allowed);
+            }
+            builder.at_most(Reason::Residual, Test::TrainingError, Some(joint), None, error, limit);
+        }
+    }
+
+    /// Largest error of a joint's filtered torque; `expected` is its variance by noise and uncertainty.
+    fn allowed<const N: usize, const B: usize>(
+        &self,
+        record: &Record<T, N, B>,
+        joint: usize,
+        expected: T,
+        harmless: T,
+    ) -> T {
+        let freedom = T::of(f64::from(record.rows[joint])) * real::min(record.row_information, T::one());
+        let systematic = harmless * record.torque[joint].root_mean_square;
+        real::sqrt(expected * self.variance_ratio(freedom) + systematic * systematic)
+    }
+
+    /// Judges the prediction of a held-out motion: no worse than noise and parameter covariance predict.
+    pub fn judge_validation<const N: usize, const B: usize>(
+        &self,
+        training: &Record<T, N, B>,
+        motion: usize,
+        record: &Record<T, N, B>,
+        estimate: &Estimate<T, B>,
+        builder: &mut VerdictBuilder<'_, T>,
+    ) {
+        let (values, at) = (&estimate.values, Some(motion));
+        builder.at_most(
+            Reason::Input,
+            Test::NotFinite,
+            None,
+            at,
+            T::of(f64::from(record.rejected)),
+            T::zero(),
+        );
+        for joint in 0..N {
+            if training.rows[joint] == 0 {
+                continue; // unexcited
+            }
+            let size = record.torque[joint].root_mean_square;
+            let uncertain = record.uncertainty(joint, estimate);
+            let share = if size > T::zero() { uncertain / size } else { T::zero() };
+            let limit = self.largest_uncertainty_share;
+            builder.at_most(Reason::Unexcited, Test::PredictedUncertainty, Some(joint), at, share, limit);
+            let error = record.torque_error(joint, values).unwrap_or(T::LARGEST);
+            let limit = match record.filtered_noise(joint) {
+                Some(noise) => {
+                    let expected = noise * noise + uncertain * uncertain;
+                    self.allowed(record, joint, expected, self.harmless_error_share)
+                }
+                None => training.torque_error(joint, values).map_or(T::zero(), |expected| {
+                    self.largest_error_ratio * expected + self.harmless_error_share * size
+                }),
+            };
+            let limit = real::min(limit, self.largest_error_share * size);
+            builder.at_most(Reason::Validation, Test::ValidationError, Some(joint), at, error, limit);
+        }
+    }
+
+    /// Judges whether the torque shows inertia and friction, which the angle alone cannot give. A torque
+    /// without them is a recorded command, or the joint carries no moving load.
+    pub fn judge_measurement<const N: usize, const B: usize>(
+        &self,
+        model: &RowModel<T, N, B>,
+        training: &Record<T, N, B>,
+        values: &[T; B],
+        builder: &mut VerdictBuilder<'_, T>,
+    ) {
+        let mut dynamic = *values;
+        for (base, value) in dynamic.iter_mut().enumerate() {
+            if let Some((_, Parameter::HX | Parameter::HY | Parameter::HZ | Parameter::M | Parameter::OFF)) =
+                model.base.independent(base)
+            {
+                *value = T::zero();
+            }
+        }
+        for (joint, size) in training.torque.iter().enumerate() {
+            let rows = T::of(f64::from(training.rows[joint].max(1)));
+            let part = real::sqrt(training.factors[joint].without_right().excess(&dynamic) / rows);
+            let value =
+                if size.root_mean_square > T::zero() { part / size.root_mean_square } else { T::zero() };
+            let limit = self.smallest_dynamic_share;
+            // A joint at rest already failed a test with the right reason.
+            let moved = size.speed >= self.smallest_speed && training.rows[joint] > 0;
+            builder.note(Evidence {
+                reason: Reason::NotAMeasurement,
+                test: Test::DynamicShare,
+                joint: Some(joint),
+                motion: None,
+                value,
+                limit,
+                passed: !moved || value >= limit,
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ident::record::dropped::Selection;
+    use crate::ident::record::factor::Factor;
+    use crate::ident::record::outliers::Outliers;
+    use crate::ident::record::recorder::TorqueSize;
+
+    #[test]
+    fn a_prediction_is_uncertain_by_its_share_of_the_torque() {
+        let mut factor = Factor::<f64, 2>::new();
+        factor.insert(&[3.0, 0.0], 0.0);
+        let record = Record::<f64, 1, 2> {
+            factors: [factor],
+            torque: [TorqueSize { mean_absolute: 3.0, root_mean_square: 4.0, speed: 1.0 }],
+            rows: [1],
+            rejected: 0,
+            row_information: 1.0,
+            noise: [0.0],
+            outliers: Outliers::none(),
+            stribeck: [None],
+            selection: Selection::all(),
+        };
+        let mut estimate = Estimate::<f64, 2>::nothing();
+        (estimate.covariance[0][0], estimate.determined) = (0.25, [true; 2]);
+        let mut shares = [0.0; 1];
+        let mut note = |evidence: &Evidence<f64>| {
+            if evidence.test == Test::PredictedUncertainty {
+                shares = [evidence.value];
+            }
+        };
+        let mut builder = VerdictBuilder::new(&mut note);
+        Thresholds::default().judge_validation(&record, 0, &record, &estimate, &mut builder);
+        // Sigma 0.5 in a column of 3: 1.5 of 4 N m.
+        assert_eq!(shares, [0.375]);
+    }
+
+    #[test]
+    fn the_error_allowed_is_that_of_noise_and_the_harmless_share_together() {
+        let record = |row_information| Record::<f64, 1, 2> {
+            factors: [Factor::new()],
+            torque: [TorqueSize { mean_absolute: 5.0, root_mean_square: 6.0, speed: 1.0 }],
+            rows: [400],
+            rejected: 0,
+            row_information,
+            noise: [0.0],
+            outliers: Outliers::none(),
+            stribeck: [None],
+            selection: Selection::all(),
+        };
+        // 400 rows worth 0.25 independent ones each: 100 degrees of freedom;
+        // chi-square's 0.999 quantile is 149.449.
+        let thresholds = Thresholds { noise_quantile: 3.090_2, ..Thresholds::<f64>::default() };
+        let allowed = |information, harmless| thresholds.allowed(&record(information), 0, 0.04, harmless);
+        let noise = 0.04 * 1.494_49;
+        // Wilson and Hilferty's approximation is good to 0.6 % of the square.
+        assert!((allowed(0.25, 0.0) / real::sqrt(noise) - 1.0).abs() < 4e-3);
+        // A harmless share of 2 % of 6 N m.
+        let both = real::sqrt(noise + 0.12 * 0.12);
+        assert!((allowed(0.25, 0.02) / both - 1.0).abs() < 4e-3);
+        // No row is worth more than one.
+        assert_eq!(allowed(3.0, 0.0).to_bits(), allowed(1.0, 0.0).to_bits());
+    }
+}

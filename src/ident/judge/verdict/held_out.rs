@@ -1,0 +1,138 @@
+//! Tests of the held-out residual: its course in time and the geometry errors it shows.
+
+use super::{Evidence, Reason, Test, Thresholds, Unused, VerdictBuilder};
+use crate::ident::judge::alignment::{Direction, Misalignment};
+use crate::real::{self, Real};
+
+impl<T: Real> Thresholds<T> {
+    /// Judges the slow part of a held-out residual: noise, or small. With much noise this is the sharper
+    /// test: the part that neighbouring half seconds share contains no noise.
+    pub fn judge_colour<const N: usize, const B: usize>(
+        &self,
+        motion: usize,
+        unused: &Unused<'_, T, N, B>,
+        builder: &mut VerdictBuilder<'_, T>,
+    ) {
+        for (joint, residual) in unused.residual.joints.iter().enumerate() {
+            let noise = Some(unused.record.noise[joint]).filter(|&noise| noise > T::zero());
+            let share = if noise.is_some() { self.harmless_error_share } else { self.largest_error_share };
+            let harmless = share * unused.record.torque[joint].root_mean_square;
+            let limit = real::max(harmless, residual.slow_by_chance(self.noise_quantile, noise));
+            let at = (Some(joint), Some(motion));
+            builder.at_most(
+                Reason::Validation,
+                Test::SlowResidual,
+                at.0,
+                at.1,
+                residual.slow(noise.is_some()),
+                limit,
+            );
+        }
+    }
+
+    /// Judges contact: one long stretch of errors in all joints, in a motion that
+    /// is otherwise predicted well.
+    pub fn judge_contact<const N: usize, const B: usize>(
+        &self,
+        motion: usize,
+        unused: &Unused<'_, T, N, B>,
+        builder: &mut VerdictBuilder<'_, T>,
+    ) {
+        let residual = unused.residual;
+        let (wild, rows) = residual
+            .joints
+            .iter()
+            .fold((0_u32, 0_u32), |(wild, rows), joint| (wild + joint.wild, rows + joint.rows));
+        // A wrong model has errors everywhere: that is not contact.
+        let elsewhere = T::of(f64::from(rows)) * T::of(0.5) < T::of(f64::from(wild));
+        let value = residual.longest_common_s;
+        let limit = self.longest_disturbance_s;
+        builder.note(Evidence {
+            reason: Reason::Contact,
+            test: Test::CommonDisturbance,
+            joint: None,
+            motion: Some(motion),
+            value,
+            limit,
+            passed: value <= limit || elsewhere,
+        });
+    }
+
+    /// Judges the lengths and zeros that the held-out motions ask for: significant, and larger than the
+    /// tolerance with which lengths and zeros are known. The worse of the two values counts, alone or beside
+    /// the other directions.
+    ///
+    /// With unknown noise, sigma comes from the model's own errors, which are not white; the tolerance is
+    /// then three times as wide.
+    pub fn judge_alignment(
+        &self,
+        found: &Misalignment<T>,
+        noise_is_known: bool,
+        builder: &mut VerdictBuilder<'_, T>,
+    ) {
+        let (test, tolerance) = match found.direction {
+            Direction::Length => (Test::LinkLength, self.largest_length_error),
+            Direction::Zero => (Test::EncoderZero, self.largest_zero_error),
+        };
+        let tolerance = if noise_is_known { tolerance } else { T::of(3.0) * tolerance };
+        let limit = |sigma: T| real::max(tolerance, self.noise_quantile * sigma);
+        let (mut value, mut allowed) = (found.delta, limit(found.sigma));
+        if let Some((delta, sigma)) = found.beside
+            && real::abs(delta) * allowed > real::abs(value) * limit(sigma)
+        {
+            (value, allowed) = (delta, limit(sigma));
+        }
+        builder.note(Evidence {
+            reason: Reason::Residual,
+            test,
+            joint: Some(found.joint),
+            motion: None,
+            value,
+            limit: allowed,
+            passed: real::abs(value) <= allowed,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Value, limit and pass for a link's length, from its estimates alone and beside the other directions.
+    fn judged(alone: [f64; 2], beside: Option<[f64; 2]>, noise_is_known: bool) -> (f64, f64, bool) {
+        let thresholds =
+            Thresholds { noise_quantile: 5.0, largest_length_error: 0.03, ..Thresholds::default() };
+        let [delta, sigma] = alone;
+        let found = Misalignment {
+            direction: Direction::Length,
+            joint: 1,
+            delta,
+            sigma,
+            beside: beside.map(|[delta, sigma]| (delta, sigma)),
+        };
+        let mut seen = None;
+        let mut note = |evidence: &Evidence<f64>| seen = Some(*evidence);
+        thresholds.judge_alignment(&found, noise_is_known, &mut VerdictBuilder::new(&mut note));
+        let evidence = seen.expect("one piece of evidence");
+        assert_eq!((evidence.test, evidence.joint), (Test::LinkLength, Some(1)));
+        (evidence.value, evidence.limit, evidence.passed)
+    }
+
+    #[test]
+    fn of_a_length_alone_and_beside_the_others_the_one_that_says_more_is_judged() {
+        // As shares of the limit: 0.5 alone, 2 beside; 0.8 alone, 0.5 beside; in a
+        // tie the value alone is judged.
+        assert_eq!(judged([0.015, 0.001], Some([-0.06, 0.002]), true), (-0.06, 0.03, false));
+        assert_eq!(judged([0.024, 0.001], Some([0.05, 0.02]), true), (0.024, 0.03, true));
+        assert_eq!(judged([0.015, 0.0], Some([-0.015, 0.0]), true), (0.015, 0.03, true));
+        assert_eq!(judged([0.04, 0.001], None, true), (0.04, 0.03, false));
+    }
+
+    #[test]
+    fn noise_widens_the_limit_of_a_length() {
+        // Five sigmas of 0.01; three times the tolerance for unknown noise.
+        assert_eq!(judged([0.04, 0.01], None, true), (0.04, 0.05, true));
+        let (_, limit, passed) = judged([0.08, 0.001], None, false);
+        assert!((limit - 0.09).abs() < 1e-12 && passed);
+    }
+}
