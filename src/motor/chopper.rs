@@ -18,7 +18,7 @@
 
 use super::SenseScale;
 use crate::hal::CURRENT_RATE_HZ;
-use crate::real::{clamp, min};
+use crate::real::{clamp, is_finite, min};
 use crate::units::Volt;
 
 /// Greatest duty of the resistor.
@@ -45,12 +45,17 @@ impl Chopper {
     /// Duty of the resistor at a bus voltage, 0..=0.95.
     #[must_use]
     pub fn duty(&self, bus: Volt) -> f32 {
-        let above = bus.0 - self.begin.0;
-        // Nearly always, and where the voltage is not a number.
-        if !(above > 0.0) || above == f32::INFINITY {
+        if bus.0 > self.begin.0 { self.ramp(bus) } else { 0.0 }
+    }
+
+    /// Duty above the ramp's begin; seldom needed.
+    #[cold]
+    #[inline(never)]
+    fn ramp(&self, bus: Volt) -> f32 {
+        if !is_finite(bus.0) {
             return 0.0;
         }
-        min(above * self.per_volt, GREATEST_BRAKE_DUTY)
+        min((bus.0 - self.begin.0) * self.per_volt, GREATEST_BRAKE_DUTY)
     }
 }
 

@@ -143,12 +143,27 @@ fn the_converters_sample_the_shunts_of_the_board() {
     assert_eq!(registers.bits(ADC[0] + 0x38, 20, 2), 3);
     assert_eq!([0, 5, 10, 15].map(|place| sequence >> place & 0x1F), [6, 15, 4, 5]);
     assert_eq!(registers.bits(ADC[0] + 0x04, 8, 1), 1, "scan");
-    // Only ADC3 interrupts, at the end of either kind; all resolve 12 bits, right-aligned.
+    // ADC2 and ADC3 interrupt, at the end of either kind; all resolve 12 bits, right-aligned.
     let interrupts = ADC.map(|adc| registers.bits(adc + 0x04, 5, 3));
-    assert_eq!(interrupts, [0, 0, 0b101]);
+    assert_eq!(interrupts, [0, 0b101, 0b101]);
     for adc in ADC {
         assert_eq!((registers.bits(adc + 0x04, 24, 2), registers.bits(adc + 0x08, 11, 1)), (0, 0));
         assert_eq!(registers.bits(adc + 0x08, 0, 1), 1);
+    }
+}
+
+#[test]
+fn a_silent_converter_is_shown_by_the_other_one() {
+    let (injected, regular) = (converters::JEOC, converters::EOC);
+    for (ends, axes) in [
+        ([0, 0], [None, None]),
+        ([injected; 2], [Some(true), None]),
+        ([regular; 2], [None, Some(true)]),
+        ([injected | regular; 2], [Some(true), Some(true)]),
+        ([injected, 0], [Some(false), None]),
+        ([0, regular], [None, Some(false)]),
+    ] {
+        assert_eq!(converters::finished_axes(ends), axes);
     }
 }
 

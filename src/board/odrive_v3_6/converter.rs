@@ -1,7 +1,7 @@
 //! Results of the converters, read in the interrupt at the end of conversion.
 
 use super::registers::{load, store};
-use super::settings::converters::{BASES, DR, EOC, JDR1, JEOC, SR, cleared};
+use super::settings::converters::{BASES, DR, ENDS, JDR1, JEOC, SR, cleared, finished_axes};
 
 const ADC1: u32 = BASES[0];
 const ADC2: u32 = BASES[1];
@@ -11,14 +11,26 @@ const ADC3: u32 = BASES[2];
 /// it returns.
 #[inline(always)]
 pub fn finished() -> [Option<bool>; 2] {
-    // ADC3, whose interrupt is awaited, is read first: a conversion that ends between both loads is then seen
-    // whole at the next call.
-    let status = load(ADC3 + SR);
-    let other = load(ADC2 + SR);
-    let seen = status & (JEOC | EOC);
-    store(ADC3 + SR, cleared(seen));
-    store(ADC2 + SR, cleared(seen));
-    [JEOC, EOC].map(|flag| (status & flag != 0).then_some(other & flag != 0))
+    let seen = ends();
+    // Both converters end in the same cycle, which may lie between the loads.
+    let seen = if seen[0] == seen[1] { [seen[0]; 2] } else { ends_again() };
+    let any = seen[0] | seen[1];
+    store(ADC2 + SR, cleared(any));
+    store(ADC3 + SR, cleared(any));
+    finished_axes(seen)
+}
+
+/// Ends of ADC2 and of ADC3.
+#[inline(always)]
+fn ends() -> [u32; 2] {
+    [load(ADC2 + SR) & ENDS, load(ADC3 + SR) & ENDS]
+}
+
+/// Ends some cycles later; they still differ only if a converter is silent.
+#[cold]
+#[inline(never)]
+fn ends_again() -> [u32; 2] {
+    ends()
 }
 
 /// Whether bus voltage and thermistors were converted since the last call. Their scan ends after the shunts'

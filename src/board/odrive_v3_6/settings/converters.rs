@@ -1,12 +1,13 @@
 //! ADC1 to ADC3: currents of both axes at the middle of their zero vectors, supply and temperatures.
 //!
 //! ```text
-//! TIM1 trigger -> injected: ADC2 B, ADC3 C of axis 0; ADC1 bus voltage, thermistors   interrupt from ADC3
-//! TIM8 trigger -> regular:  ADC2 B, ADC3 C of axis 1                                  interrupt from ADC3
+//! TIM1 trigger -> injected: ADC2 B, ADC3 C of axis 0; ADC1 bus voltage, thermistors
+//! TIM8 trigger -> regular:  ADC2 B, ADC3 C of axis 1
 //! clock 84 MHz / 4 = 21 MHz; 3 + 12 cycles = 0.71 us
 //! ```
 //!
-//! Both shunts of an axis are sampled in the same cycle. Axis 1 uses the bus voltage of half a period ago.
+//! Both shunts of an axis are sampled in the same cycle. ADC2 and ADC3 raise one interrupt, so that each shows
+//! the other's silence. Axis 1 uses the bus voltage of half a period ago.
 //! Source: `Board/v3/Src/adc.c:81-218`, `board.cpp:431-440`, `Inc/main.h:83-90` (on axis 1 PC3 is B and PC2
 //! is C); registers RM0090 13.13, triggers tables 68 and 69.
 
@@ -35,7 +36,12 @@ pub const SHUNTS: [[u32; 2]; 2] = [[10, 11], [13, 12]];
 /// Channels of bus voltage, bridge of axis 0, bridge of axis 1, chopper.
 pub const SLOW: [u32; 4] = [6, 15, 4, 5];
 
+/// Ends of either kind.
+pub const ENDS: u32 = JEOC | EOC;
+
 const ON: u32 = 1;
+/// Interrupts at the end of regular and injected conversions.
+const INTERRUPTS: u32 = 1 << 5 | 1 << 7;
 /// Injected conversions by TIM1's trigger (number 1), rising edge.
 const INJECTED: u32 = 0b0001 << 16 | 0b01 << 20;
 /// Regular conversions by TIM8's trigger (number 14), rising edge.
@@ -58,14 +64,13 @@ pub const CONVERTERS: [Write; 19] = [
     adc!(1, "SMPR2", 0x10, SLOW_SAMPLING[1]),
     adc!(1, "JSQR", 0x38, 3 << 20 | SLOW[0] | SLOW[1] << 5 | SLOW[2] << 10 | SLOW[3] << 15),
     adc!(1, "CR2", 0x08, ON),
-    adc!(2, "CR1", 0x04, 0),
+    adc!(2, "CR1", 0x04, INTERRUPTS),
     adc!(2, "SMPR1", 0x0C, 0),
     adc!(2, "JSQR", 0x38, SHUNTS[0][0] << 15),
     adc!(2, "SQR1", 0x2C, 0),
     adc!(2, "SQR3", 0x34, SHUNTS[1][0]),
     adc!(2, "CR2", 0x08, ON),
-    // Interrupts at the end of regular and injected conversions.
-    adc!(3, "CR1", 0x04, 1 << 5 | 1 << 7),
+    adc!(3, "CR1", 0x04, INTERRUPTS),
     adc!(3, "SMPR1", 0x0C, 0),
     adc!(3, "JSQR", 0x38, SHUNTS[0][1] << 15),
     adc!(3, "SQR1", 0x2C, 0),
@@ -80,6 +85,17 @@ pub const TRIGGERED: [Write; 3] = [
     adc!(2, "CR2", 0x08, ON | INJECTED | REGULAR),
     adc!(3, "CR2", 0x08, ON | INJECTED | REGULAR),
 ];
+
+/// Axes with an end in ADC2 or ADC3; `Some(true)` where both have one.
+#[inline(always)]
+#[must_use]
+pub const fn finished_axes([one, other]: [u32; 2]) -> [Option<bool>; 2] {
+    let (any, both) = (one | other, one & other);
+    [
+        if any & JEOC != 0 { Some(both & JEOC != 0) } else { None },
+        if any & EOC != 0 { Some(both & EOC != 0) } else { None },
+    ]
+}
 
 /// Value that clears flags of a status register: zeros clear, ones do nothing (rc_w0), so a flag raised
 /// meanwhile is not lost.
