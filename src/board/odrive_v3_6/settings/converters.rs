@@ -6,8 +6,8 @@
 //! clock 84 MHz / 4 = 21 MHz; 3 + 12 cycles = 0.71 us
 //! ```
 //!
-//! Both shunts of an axis are sampled in the same cycle. ADC2 and ADC3 raise one interrupt, so that each shows
-//! the other's silence. Axis 1 uses the bus voltage of half a period ago.
+//! Both shunts of an axis are sampled in the same cycle. ADC2 and ADC3 raise one interrupt, so each shows the
+//! other's silence. Axis 1 uses the bus voltage of half a period ago.
 //! Source: `Board/v3/Src/adc.c:81-218`, `board.cpp:431-440`, `Inc/main.h:83-90` (on axis 1 PC3 is B and PC2
 //! is C); registers RM0090 13.13, triggers tables 68 and 69.
 
