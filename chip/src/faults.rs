@@ -108,13 +108,13 @@ const ROWS: [Row; 17] = [
     },
     Row {
         id: "C1",
-        fault: "current offset jumps by 12 A",
+        fault: "current offset jumps by 20 A",
         situation: Situation::Motion,
         expected: Expected::Released,
         deadline_s: 50e-3,
         inject: |chip, random| {
             let (axis, channel) = shunt(random);
-            chip.plant.axes[axis].shunt_faults[channel] = Some(ShuntFault::Offset(300.0));
+            chip.plant.axes[axis].shunt_faults[channel] = Some(ShuntFault::Offset(500.0));
         },
         later: None,
     },
