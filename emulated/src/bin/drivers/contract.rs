@@ -3,8 +3,6 @@
 //! The program writes the number of each step that it reaches to `DRIVERS_STEP`, and waits until `DRIVERS_GO`
 //! holds that number. Results are in `DRIVERS_RESULTS`. Only the processor's step runs in the emulator too.
 
-/// Number of results; those of the processor come first.
-pub const WORDS: usize = 160;
 /// Results of the processor's step.
 pub const PROCESSOR_WORDS: usize = 128;
 

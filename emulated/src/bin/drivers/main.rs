@@ -21,7 +21,10 @@ mod steps;
 
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use contract::{PROCESSOR_WORDS, Place, Step, WORDS};
+use contract::{PROCESSOR_WORDS, Place, Step};
+
+/// Number of results; those of the processor come first.
+const WORDS: usize = PROCESSOR_WORDS + 32;
 
 #[expect(unsafe_code, reason = "the check finds the symbol by its name")]
 #[unsafe(no_mangle)]

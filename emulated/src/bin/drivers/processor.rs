@@ -82,12 +82,12 @@ fn special() -> u32 {
     sum
 }
 
-/// Sets levels: call 0x80, system 0xF0, SPI2 0x20, SPI1 and USART1 0x40.
+/// Sets levels: call 0x10, system 0xF0, SPI2 0x20, SPI1 and USART1 0x40.
 fn prepare() {
     // SAFETY: taken once; no interrupt is enabled before its level is set.
     unsafe {
         let mut core = cortex_m::Peripherals::steal();
-        core.SCB.set_priority(SystemHandler::SVCall, 0x80);
+        core.SCB.set_priority(SystemHandler::SVCall, 0x10);
         core.SCB.set_priority(SystemHandler::PendSV, 0xF0);
         for (which, level) in [(Interrupt::SPI1, 0x40), (Interrupt::SPI2, 0x20), (Interrupt::USART1, 0x40)] {
             core.NVIC.set_priority(which, level);
