@@ -252,7 +252,8 @@ fn an_access_without_memory_is_a_hard_fault_with_its_address() {
 fn the_watchdog_resets_a_program_that_does_not_feed_it() {
     let _alone = alone();
     let mut program = Program::new();
-    program.store(0x4000_3000, 0x5555).store(0x4000_3008, 99).store(0x4000_3000, 0xCCCC).halt();
+    program.store(0x4000_3000, 0x5555).store(0x4000_3008, 99);
+    program.store(0x4000_3000, 0xCCCC).store(0x4000_3000, 0xAAAA).halt();
     let mut machine = program.machine();
     assert_eq!(run(&mut machine, 1.0), End::Reset(ResetReason::Watchdog));
     // 100 counts of 4 periods of 32 kHz.

@@ -313,6 +313,19 @@ impl Timer {
         [8, 9].map(|bit| self.cr2 >> (bit + 2 * channel) & 1 == 1)
     }
 
+    /// Share of a period in which a channel's reference is active; only PWM modes have one.
+    #[must_use]
+    pub fn duty(&self, channel: usize) -> f64 {
+        let counts = self.acting.top as f64 + f64::from(u8::from(!self.is_centred()));
+        let below = (f64::from(self.acting.compare[channel]) / counts).clamp(0.0, 1.0);
+        match self.mode(channel) {
+            5 => 1.0,
+            6 => below,
+            7 => 1.0 - below,
+            _ => 0.0,
+        }
+    }
+
     /// Acting compare value of a channel.
     #[must_use]
     pub fn compare(&self, channel: usize) -> u32 {

@@ -39,9 +39,10 @@ static NOTED: AtomicU32 = AtomicU32::new(0);
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    processor::run();
+    let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!("taken once"));
+    processor::run(&mut core);
     reach(Step::Processor);
-    steps::run()
+    steps::run(core)
 }
 
 /// Tells the check that a step is done, and waits for its release.

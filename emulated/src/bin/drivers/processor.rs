@@ -5,6 +5,7 @@
 
 use core::arch::{asm, naked_asm};
 
+use cortex_m::Peripherals;
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::{NVIC, SCB};
 use cortex_m::register::{basepri, primask};
@@ -19,11 +20,11 @@ const STATE: *const u32 = 0xE000_ED04 as *const u32;
 const LEAVES: u32 = 1 << 31;
 
 /// Runs everything; the notes are the results.
-pub fn run() {
+pub fn run(core: &mut Peripherals) {
     note(computation::integers());
     note(computation::floats());
     note(special());
-    prepare();
+    prepare(core);
     nested();
     masked();
     grouped();
@@ -83,10 +84,9 @@ fn special() -> u32 {
 }
 
 /// Sets levels: call 0x10, system 0xF0, SPI2 0x20, SPI1 and USART1 0x40.
-fn prepare() {
-    // SAFETY: taken once; no interrupt is enabled before its level is set.
+fn prepare(core: &mut Peripherals) {
+    // SAFETY: no interrupt is enabled before its level is set.
     unsafe {
-        let mut core = cortex_m::Peripherals::steal();
         core.SCB.set_priority(SystemHandler::SVCall, 0x10);
         core.SCB.set_priority(SystemHandler::PendSV, 0xF0);
         for (which, level) in [(Interrupt::SPI1, 0x40), (Interrupt::SPI2, 0x20), (Interrupt::USART1, 0x40)] {
@@ -150,11 +150,12 @@ fn grouped() {
 fn called() {
     note(0xA000_0004);
     let (mut first, last): (u32, u32);
+    // Bit 3 of CONTROL, which a Cortex-M4 lacks, is set in Unicorn, so both floating-point bits are cleared.
     // SAFETY: the handler keeps every register but r0. Floats in s0 and s16 survive it.
     unsafe {
         asm!(
             "vmov s0, r1", "vmov s16, r2", "svc 7", "vmov r1, s0", "vmov r2, s16", "eor r0, r0, r1",
-            "eor r0, r0, r2", "mrs r3, control", "bic r3, r3, #4", "msr control, r3", "isb",
+            "eor r0, r0, r2", "mrs r3, control", "bic r3, r3, #12", "msr control, r3", "isb",
             "push {{r4}}", "svc 9", "pop {{r4}}", "eor r0, r0, r3",
             inout("r0") 0x1111_1111 => first, inout("r1") 0x3F80_0000_u32 => last,
             inout("r2") 0x4000_0001_u32 => _, out("r3") _, out("r12") _, out("s0") _, out("s16") _,

@@ -35,9 +35,10 @@ bind_interrupts!(struct Interrupts {
 });
 
 /// Runs all steps.
-pub fn run() -> ! {
+pub fn run(mut core: cortex_m::Peripherals) -> ! {
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
     let p = embassy_stm32::init(configuration());
-    count_cycles();
     clocks(&p);
     pins(p.PA0, p.PA1, p.PA15, p.PB2);
     block_on(edge(p.PC4, p.EXTI4));
@@ -71,13 +72,6 @@ fn configuration() -> Config {
     config.rcc.apb1_pre = APBPrescaler::DIV4;
     config.rcc.apb2_pre = APBPrescaler::DIV2;
     config
-}
-
-fn count_cycles() {
-    if let Some(mut core) = cortex_m::Peripherals::take() {
-        core.DCB.enable_trace();
-        core.DWT.enable_cycle_counter();
-    }
 }
 
 /// Result of a function, and the processor cycles that it takes.
@@ -170,6 +164,8 @@ fn analog(
     mut bus: Peri<'_, peripherals::PA6>,
     mut warm: Peri<'_, peripherals::PC5>,
 ) {
+    // The bus recovers from the brake resistor's load.
+    block_for(Duration::from_millis(2));
     let mut adc = Adc::new(converter.reborrow());
     let codes = (0..16).map(|_| u32::from(adc.blocking_read(&mut bus, SampleTime::CYCLES84)));
     give(Place::Bus, codes.sum());
