@@ -439,7 +439,6 @@ impl Chip {
         let on = connected && timer.runs() && timer.outputs(3) & 1 == 1;
         let (low, high) = (timer.compare(2), timer.compare(3));
         self.plant.brake = if on { timer.duty(3) } else { 0.0 };
-        // The low side is on in mode 1, the high side in mode 2.
         if on && timer.outputs(2) & 1 == 1 && low > high {
             self.findings.add("both sides of the brake resistor's half bridge on", "TIM2_CCR3");
         }
@@ -641,10 +640,6 @@ impl Chip {
                 }
             }
             0x24 => {
-                if value >> 8 & 1 == 1 {
-                    (self.adcs, self.common) = Default::default();
-                    self.update_adc();
-                }
                 for index in (0..JOINTS).filter(|index| value >> index & 1 == 1) {
                     self.advance_plant();
                     self.timers[index].reset();

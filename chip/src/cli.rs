@@ -451,7 +451,10 @@ fn run_hangs(arguments: &HangArguments) -> Result<bool, ToolError> {
 fn run_drivers(arguments: &DriverArguments) -> Result<bool, ToolError> {
     let built = arguments.image.clone().map_or_else(drivers::build, Ok)?;
     let rows = drivers::check(&built)?;
-    println!("{:<10} | {:<56} | {:<56} | verdict", "peripheral", "what the driver was told", "what the model shows");
+    println!(
+        "{:<10} | {:<56} | {:<56} | verdict",
+        "peripheral", "what the driver was told", "what the model shows"
+    );
     for row in &rows {
         println!("{:<10} | {:<56} | {:<56} | {}", row.peripheral, row.told, row.shown, row.verdict());
     }

@@ -32,7 +32,7 @@ mod computation;
 #[path = "../../emulated/src/bin/drivers/contract.rs"]
 mod contract;
 
-use contract::{FED, PROCESSOR_WORDS, Place, STORED, Step};
+use contract::{FED, STORED, WORDS};
 
 const PACKAGE: [&str; 9] = [
     "--quiet",
@@ -116,11 +116,22 @@ pub fn check(path: &Path) -> Result<Vec<Row>, ToolError> {
     Ok(check.rows)
 }
 
+/// Addresses of the program's words.
+#[derive(Clone, Copy)]
+struct Symbols {
+    step: u32,
+    go: u32,
+    count: u32,
+    results: u32,
+}
+
 struct Check {
     machine: Machine,
-    /// Addresses of step, release and results.
-    symbols: [u32; 3],
+    symbols: Symbols,
     rows: Vec<Row>,
+    /// Steps, results and findings so far.
+    step: u32,
+    results: u32,
     findings: usize,
 }
 
@@ -130,13 +141,18 @@ impl Check {
         let leg = LegFile::load(DEFAULT_LEG)?;
         let drives = leg.complete_description::<JOINTS>()?;
         let plant = Plant::new(&leg.description::<JOINTS>()?, &drives, 1);
-        let mut symbols = [0; 3];
-        for (address, name) in symbols.iter_mut().zip(["DRIVERS_STEP", "DRIVERS_GO", "DRIVERS_RESULTS"]) {
+        let symbol = |name: &str| {
             let missing = || ToolError::input(format!("{}: no symbol {name}", path.display()));
-            *address = image.address(name).ok_or_else(missing)?;
-        }
+            image.address(name).ok_or_else(missing)
+        };
+        let symbols = Symbols {
+            step: symbol("DRIVERS_STEP")?,
+            go: symbol("DRIVERS_GO")?,
+            count: symbol("DRIVERS_COUNT")?,
+            results: symbol("DRIVERS_RESULTS")?,
+        };
         let machine = Machine::new(&image, Chip::new(plant, 1), &Options::default())?;
-        Ok(Self { machine, symbols, rows: Vec::new(), findings: 0 })
+        Ok(Self { machine, symbols, rows: Vec::new(), step: 0, results: 0, findings: 0 })
     }
 
     fn run(&mut self, path: &Path) -> Result<(), ToolError> {
@@ -157,31 +173,42 @@ impl Check {
         u32::from_le_bytes(bytes)
     }
 
-    fn result(&self, place: Place) -> u32 {
-        self.word(self.symbols[2] + 4 * place as u32)
+    /// Next results.
+    fn take<const N: usize>(&mut self) -> [u32; N] {
+        let first = self.results;
+        self.results += N as u32;
+        core::array::from_fn(|index| self.word(self.symbols.results + 4 * (first + index as u32)))
     }
 
-    fn seconds(&self, place: Place) -> f64 {
-        f64::from(self.result(place)) / CLOCK_HZ
-    }
-
-    /// Lets the program go on from a step until the next one, at most for a time, s.
-    fn go(&mut self, from: u32, step: Step, longest: f64) -> Result<(), ToolError> {
-        self.machine.set_memory(self.symbols[1], &from.to_le_bytes());
+    /// Lets the program go on until its next step, at most for a time, s; `with` is added to the release.
+    fn next(&mut self, longest: f64, with: u32) -> Result<(), ToolError> {
+        self.machine.set_memory(self.symbols.go, &(self.step | with).to_le_bytes());
         let end = self.machine.chip().now + ticks(longest);
         while self.machine.chip().now < end {
-            self.machine.run(self.machine.chip().now + ticks(POLL_S))?;
-            if self.word(self.symbols[0]) == step as u32 {
+            self.pass(POLL_S)?;
+            if self.word(self.symbols.step) == self.step + 1 {
+                self.step += 1;
                 return Ok(());
             }
         }
-        let last = self.word(self.symbols[0]);
-        self.note_findings(&format!("step {last}"));
-        Err(ToolError::input(format!("{step:?} is not reached within {longest} s, last step {last}")))
+        self.note_findings("last step");
+        Err(ToolError::input(format!("step {} is not reached within {longest} s", self.step + 1)))
+    }
+
+    /// Runs for a time, s.
+    fn pass(&mut self, duration: f64) -> Result<End, ToolError> {
+        self.machine.run(self.machine.chip().now + ticks(duration))
     }
 
     fn row(&mut self, peripheral: &'static str, told: &str, shown: String, agrees: bool) {
         self.rows.push(Row { peripheral, told: told.to_owned(), shown, agrees, reason: None });
+    }
+
+    /// Gives the last row's reason, if it differs.
+    fn explain(&mut self, reason: &'static str) {
+        if let Some(row) = self.rows.last_mut().filter(|row| !row.agrees) {
+            row.reason = Some(reason);
+        }
     }
 
     /// Adds a row for findings since the last call.
@@ -189,8 +216,9 @@ impl Check {
         let image = self.machine.image();
         let list = self.machine.chip().findings.list(|pc| image.function(pc));
         let new = list.iter().filter(|finding| finding.known().is_none()).skip(self.findings);
-        let texts: Vec<String> =
-            new.map(|finding| format!("{}: {} in {}", finding.register, finding.what, finding.function)).collect();
+        let texts: Vec<String> = new
+            .map(|finding| format!("{}: {} in {}", finding.register, finding.what, finding.function))
+            .collect();
         self.findings += texts.len();
         if !texts.is_empty() {
             let told = format!("{peripheral}: registers as silicon allows");
@@ -199,42 +227,37 @@ impl Check {
     }
 
     fn processor(&mut self, path: &Path) -> Result<(), ToolError> {
-        self.go(0, Step::Processor, 0.1)?;
-        let words: Vec<u32> =
-            (0..PROCESSOR_WORDS as u32).map(|index| self.word(self.symbols[2] + 4 * index)).collect();
-        let expected = [computation::integers(), computation::floats()];
-        let shown = format!("{:08x} {:08x}, host {:08x} {:08x}", words[0], words[1], expected[0], expected[1]);
+        self.next(0.1, 0)?;
+        let words: [u32; WORDS] = self.take();
+        self.results = self.word(self.symbols.count);
+        let (count, expected) = (self.results as usize, [computation::integers(), computation::floats()]);
+        let shown = format!("{:08x?}, host {expected:08x?}", &words[..2]);
         self.row("processor", "integers and floats", shown, words[..2] == expected);
-        let used = words.iter().rposition(|word| *word != 0).map_or(0, |last| last + 1);
-        match emulated(path, self.symbols)? {
-            None => self.row("processor", "exceptions as in QEMU", "no QEMU on this machine".into(), true),
-            Some(other) => {
-                let differ: Vec<String> = (0..PROCESSOR_WORDS)
-                    .filter(|index| words[*index] != other[*index])
-                    .map(|index| format!("[{index}] {:08x}, QEMU {:08x}", words[index], other[index]))
-                    .collect();
-                let shown = format!("{used} words, {} differ {}", differ.len(), differ.join("; "));
-                self.row("processor", "exceptions as in QEMU", shown, differ.is_empty());
-            }
-        }
+        let Some(other) = emulated(path, self.symbols)? else {
+            self.row("processor", "exceptions as in QEMU", "no QEMU on this machine".into(), true);
+            return Ok(());
+        };
+        let differ: Vec<String> = (0..count)
+            .filter(|index| words[*index] != other[*index])
+            .map(|index| format!("[{index}] {:08x}, QEMU {:08x}", words[index], other[index]))
+            .collect();
+        let shown = format!("{} words, {} differ {}", count, differ.len(), differ.join("; "));
+        self.row("processor", "exceptions as in QEMU", shown, differ.is_empty());
         self.note_findings("processor");
         Ok(())
     }
 
     fn clocks(&mut self) -> Result<(), ToolError> {
-        self.go(Step::Processor as u32, Step::Clocks, 0.1)?;
+        self.next(0.1, 0)?;
+        let told = self.take::<5>().map(u64::from);
         let rcc = &self.machine.chip().rcc;
         let timer = |bus| TICK_HZ / rcc.timer_cycle(bus);
         let shown = [rcc.processor_hz(), rcc.bus_hz(1), rcc.bus_hz(2), timer(1), timer(2)];
-        let told = [Place::Clock0, Place::Clock1, Place::Clock2, Place::Clock3, Place::Clock4]
-            .map(|place| u64::from(self.result(place)));
         let mhz = |hz: [u64; 5]| hz.map(|hz| format!("{}", hz as f64 * 1e-6)).join(", ");
         self.row("RCC", &format!("{} MHz", mhz(told)), format!("{} MHz", mhz(shown)), told == shown);
-        for (told, place, expected) in [
-            ("block_for 10 ms on TIM4", Place::Blocked, 10e-3),
-            ("Timer::after 5 ms on TIM4", Place::Awaited, 5e-3),
-        ] {
-            let taken = self.seconds(place);
+        for (told, expected) in [("block_for 10 ms on TIM4", 10e-3), ("Timer::after 5 ms on TIM4", 5e-3)] {
+            let [cycles] = self.take();
+            let taken = f64::from(cycles) / CLOCK_HZ;
             // Up to a tick of 1 us earlier or later, and some hundred instructions.
             let agrees = (expected - 1e-6..expected + 12e-6).contains(&taken);
             self.row("time", told, format!("{:.4} ms by the cycle counter", 1e3 * taken), agrees);
@@ -244,7 +267,7 @@ impl Check {
     }
 
     fn pins(&mut self) -> Result<(), ToolError> {
-        self.go(Step::Clocks as u32, Step::Pins, 0.1)?;
+        self.next(0.1, 0)?;
         let gpio = &self.machine.chip().gpio;
         let modes = [('A', 0), ('A', 1), ('A', 15), ('B', 2)].map(|pin| gpio.mode(pin));
         let levels = [('A', 0), ('A', 1)].map(|pin| gpio.level(pin));
@@ -255,21 +278,27 @@ impl Check {
         let chip = self.machine.chip_mut();
         chip.set_pin(('B', 2), true);
         chip.set_pin(('A', 1), false);
-        self.go(Step::Pins as u32, Step::Edge, 0.1)?;
-        let levels = self.result(Place::Levels);
+        self.next(0.1, 0)?;
+        let [levels] = self.take();
         // Open drain: low while driven, then as the outside.
         let told = "pulled up 1, down 0, PB2 0 then 1, PA1 0 then 0 from outside, PA0 set 1";
         self.row("GPIO", told, format!("read {levels:07b} from the last"), levels == 0b100_1001);
-        self.machine.set_memory(self.symbols[1], &(Step::Edge as u32).to_le_bytes());
+        self.machine.set_memory(self.symbols.go, &self.step.to_le_bytes());
         let mut steps = Vec::new();
         for level in [true, false, true] {
             self.machine.chip_mut().set_pin(STOP, level);
-            self.machine.run(self.machine.chip().now + ticks(2e-4))?;
-            steps.push(self.word(self.symbols[0]) == Step::Seen as u32);
+            self.pass(2e-4)?;
+            steps.push(self.word(self.symbols.step) == self.step + 1);
         }
+        self.step += 1;
         let entries = self.machine.chip().load.of(16 + 10).entries;
         let shown = format!("woken at edges {steps:?}, {entries} interrupts of EXTI4");
-        self.row("EXTI", "wait for a rising edge of PC4", shown, steps == [false, false, true] && entries == 1);
+        self.row(
+            "EXTI",
+            "wait for a rising edge of PC4",
+            shown,
+            steps == [false, false, true] && entries == 1,
+        );
         self.note_findings("GPIO, EXTI");
         Ok(())
     }
@@ -277,12 +306,15 @@ impl Check {
     /// Complementary outputs: period, widths and gaps in clocks of the timer.
     fn waveform(&mut self) -> Result<Option<[Ticks; 5]>, ToolError> {
         self.machine.chip_mut().plant.axes[0].pin_changes = Some(Vec::new());
-        self.machine.run(self.machine.chip().now + ticks(3e-4))?;
+        self.pass(3e-4)?;
         let changes = self.machine.chip_mut().plant.axes[0].pin_changes.take().unwrap_or_default();
         let changes: Vec<(Ticks, [bool; 2])> = changes.iter().map(|(at, pins)| (at / 2, pins[0])).collect();
-        let Some(first) = changes.iter().position(|(_, pins)| *pins == [true, false]) else { return Ok(None) };
+        let Some(first) = changes.iter().position(|(_, pins)| *pins == [true, false]) else {
+            return Ok(None);
+        };
         // High side on, off, low side on, off, high side on.
-        let Some([on, off, low, end, again]) = changes.get(first..first + 5).and_then(|five| five.first_chunk())
+        let Some([on, off, low, end, again]) =
+            changes.get(first..first + 5).and_then(|five| five.first_chunk())
         else {
             return Ok(None);
         };
@@ -293,13 +325,10 @@ impl Check {
     }
 
     fn bridge(&mut self) -> Result<(), ToolError> {
-        for (from, step, hz, place, dead, centred) in [
-            (Step::Seen, Step::Edges, 20_000, Place::Top, 100, false),
-            (Step::Edges, Step::Centred, 24_000, Place::CentredTop, 300, true),
-        ] {
-            self.go(from as u32, step, 0.1)?;
+        for (hz, dead, centred) in [(20_000, 100, false), (24_000, 300, true)] {
+            self.next(0.1, 0)?;
             let widths = self.waveform()?;
-            let top = u64::from(self.result(place));
+            let [top] = self.take().map(u64::from);
             let (period, duty) = if centred { (2 * top, 2 * (top / 4)) } else { (top, top / 4) };
             let expected = [period, duty - dead, period - duty - dead, dead, dead];
             let alignment = if centred { "centre" } else { "edge" };
@@ -312,38 +341,60 @@ impl Check {
             let actual = 168e6 / period as f64;
             let told = format!("at most {hz} Hz (\"rounds towards slower\")");
             self.row("TIM1", &told, format!("{actual:.1} Hz"), actual <= f64::from(hz));
-            if centred && let Some(row) = self.rows.last_mut() {
-                row.reason = Some("driver: it writes ARR - 1 where a centre-aligned period is 2 ARR (RM0090 17.3.2)");
+            if centred {
+                self.explain(
+                    "driver: ARR is one too small, as a centre-aligned period is 2 ARR (RM0090 17.3.2)",
+                );
             }
         }
-        self.go(Step::Centred as u32, Step::Chopper, 0.1)?;
+        self.next(0.1, 0)?;
         let duty = self.machine.chip().plant.brake;
-        self.row("TIM2", "PB11 at 1 kHz, 30 %", format!("brake at {:.2} %", 100.0 * duty), (duty - 0.3).abs() < 1e-3);
+        self.row(
+            "TIM2",
+            "PB11 at 1 kHz, 30 %",
+            format!("brake at {:.2} %", 100.0 * duty),
+            (duty - 0.3).abs() < 1e-3,
+        );
         self.note_findings("TIM1, TIM2");
         Ok(())
     }
 
     fn analog(&mut self) -> Result<(), ToolError> {
-        self.go(Step::Chopper as u32, Step::Analog, 0.1)?;
+        self.next(0.1, 0)?;
         // 12 bits over 3.3 V behind the board's divider.
-        let read = f64::from(self.result(Place::Bus)) / 16.0 * 3.3 / 4096.0 * 19.0;
+        let [short, long, sum] = self.take();
+        let read = f64::from(sum) / 16.0 * 3.3 / 4096.0 * 19.0;
         let volt = self.machine.chip().plant.supply.voltage();
         let code = u32::from(self.machine.chip().plant.thermistors[0]);
-        let [long, short] = [Place::Warm, Place::WarmShort].map(|place| self.result(place));
-        self.row("ADC1", "mean of 16 codes of PA6", format!("{read:.3} V of {volt:.3} V"), (read - volt).abs() < 0.02);
-        self.row("ADC1", "PC5 with 12 and 8 bits", format!("{long} and {short} of {code}"), long == code && short == code >> 4);
+        self.row(
+            "ADC1",
+            "mean of 16 codes of PA6",
+            format!("{read:.3} V of {volt:.3} V"),
+            (read - volt).abs() < 0.02,
+        );
+        self.row(
+            "ADC1",
+            "PC5 with 8 and 12 bits",
+            format!("{short} and {long} of {code}"),
+            long == code && short == code >> 4,
+        );
         self.note_findings("ADC1");
         Ok(())
     }
 
     fn gates(&mut self) -> Result<(), ToolError> {
-        self.go(Step::Analog as u32, Step::Gates, 0.1)?;
-        let answer = self.result(Place::Answer);
+        self.next(0.1, 0)?;
+        let [answer, cycles] = self.take();
         let frames = self.machine.chip().drivers.frames;
         let shown = format!("{answer:#06x}, frames {frames:?}");
-        self.row("SPI3", "control register 1 = 0x2a9, read back", shown, answer == 0x12A9 && frames == [3, 0]);
+        self.row(
+            "SPI3",
+            "control register 1 = 0x2a9, read back",
+            shown,
+            answer == 0x12A9 && frames == [3, 0],
+        );
         // 42 MHz / 16 are the fastest clock up to 2.6 MHz by the driver's table.
-        let (taken, wire) = (self.seconds(Place::FrameCycles), 16.0 / 2.625e6);
+        let (taken, wire) = (f64::from(cycles) / CLOCK_HZ, 16.0 / 2.625e6);
         let shown = format!("{:.2} us for {:.2} us on the wire", 1e6 * taken, 1e6 * wire);
         self.row("SPI3", "16 bits at 2.6 MHz", shown, (wire..wire + 1e-6).contains(&taken));
         self.note_findings("SPI3");
@@ -351,49 +402,57 @@ impl Check {
     }
 
     fn frames(&mut self) -> Result<(), ToolError> {
-        self.go(Step::Gates as u32, Step::Sent, 0.1)?;
+        self.next(0.1, 0)?;
         let can = &self.machine.chip().can;
         let sent: Vec<Frame> = can.sent.iter().map(|(_, frame)| *frame).collect();
-        let shown = format!("{} bit/s, {sent:?}", can.rate());
-        let agrees = sent == [Frame::new(0x123, &[1, 2, 3])] && can.rate() == 1_000_000;
-        self.row("CAN1", "1 Mbit/s, frame 123 of 3 bytes", shown, agrees);
+        let texts: Vec<String> =
+            sent.iter().map(|frame| format!("{:x} {:x?}", frame.id(), frame.data())).collect();
+        let shown = format!("{} bit/s, {}", can.rate(), texts.join(", "));
+        let agrees =
+            sent == [Frame::new(0x123, &[1, 2, 3]), Frame::new(0x124, &[])] && can.rate() == 1_000_000;
+        self.row("CAN1", "1 Mbit/s, frames 123 with bytes 1, 2, 3 and 124", shown, agrees);
         self.machine.chip_mut().send_frame(Frame::new(0x45A, &[9, 8, 7, 6, 5]));
-        self.go(Step::Sent as u32, Step::Received, 0.1)?;
-        let read = [Place::Identifier, Place::Length, Place::Low, Place::High].map(|place| self.result(place));
+        self.next(0.1, 0)?;
+        let read: [u32; 4] = self.take();
         let shown = format!("read {read:x?}");
         self.row("CAN1", "frame 45a of 5 bytes from the partner", shown, read == [0x45A, 5, 0x0607_0809, 5]);
         self.machine.chip_mut().can.connected = false;
         self.machine.chip_mut().can.sent.clear();
-        self.go(Step::Received as u32, Step::Alone, 0.1)?;
-        let error = self.result(Place::Error);
+        self.next(0.1, 0)?;
+        let [repeated, error, replaced] = self.take();
         self.row("CAN1", "error without a partner: not acknowledged", format!("kind {error}"), error == 1);
-        let [repeated, replaced] = [Place::Repeated, Place::Replaced].map(|place| self.result(place));
         let told = "frame of an identifier that was sent before: accepted";
         self.row("CAN1", told, format!("accepted {repeated}"), repeated == 1);
-        self.row("CAN1", "50 replaces 300 of 300, 123, 100", format!("{replaced:x} replaced"), replaced == 0x300);
+        self.row(
+            "CAN1",
+            "50 replaces 300 of 300, 124, 100",
+            format!("{replaced:x} replaced"),
+            replaced == 0x300,
+        );
         self.machine.chip_mut().can.connected = true;
-        self.machine.run(self.machine.chip().now + ticks(2e-3))?;
+        self.pass(2e-3)?;
         let sent: Vec<u16> = self.machine.chip().can.sent.iter().map(|(_, frame)| frame.id()).collect();
-        self.row("CAN1", "then 50, 100, 123 leave", format!("{sent:x?}"), sent == [0x50, 0x100, 0x123]);
+        self.row("CAN1", "then 50, 100, 124 leave", format!("{sent:x?}"), sent == [0x50, 0x100, 0x124]);
         self.note_findings("CAN1");
         Ok(())
     }
 
     fn flash(&mut self) -> Result<(), ToolError> {
-        self.go(Step::Alone as u32, Step::Erase, 0.1)?;
+        self.next(0.1, 0)?;
         self.machine.chip_mut().flash.cells_mut()[128 * 1024..].fill(0);
-        self.go(Step::Erase as u32, Step::Erased, 5.0)?;
+        self.next(5.0, 0)?;
         let blank = self.machine.chip_mut().flash.cells_mut()[128 * 1024..].iter().all(|cell| *cell == 0xFF);
-        self.go(Step::Erased as u32, Step::Written, 0.1)?;
-        let outcomes = self.result(Place::Flash);
+        self.next(0.1, 0)?;
+        let [erase, read, write, outcomes] = self.take();
         let cells = &self.machine.chip_mut().flash.cells_mut()[128 * 1024 + 0x40..][..16];
-        let words: Vec<u32> =
-            cells.chunks_exact(4).map(|cell| u32::from_le_bytes([cell[0], cell[1], cell[2], cell[3]])).collect();
-        let read = self.result(Place::Blank);
+        let words: Vec<u32> = cells
+            .chunks_exact(4)
+            .map(|cell| u32::from_le_bytes([cell[0], cell[1], cell[2], cell[3]]))
+            .collect();
         let shown = format!("blank {blank}, {words:08x?}, outcomes {outcomes:05b}");
         let agrees = blank && words == STORED && outcomes == 0b1_1111 && read == u32::MAX;
         self.row("FLASH", "sector 11 erased, 4 words written and read", shown, agrees);
-        let [erase, write] = [Place::EraseCycles, Place::WriteCycles].map(|place| self.seconds(place));
+        let [erase, write] = [erase, write].map(|cycles| f64::from(cycles) / CLOCK_HZ);
         // DS8626 table 42: typical times; the driver erases by bytes and programs by words.
         let shown = format!("{erase:.3} s, {:.1} us a word", 1e6 * write / 4.0);
         let agrees = (2.0..2.01).contains(&erase) && (16e-6..20e-6).contains(&(write / 4.0));
@@ -403,21 +462,22 @@ impl Check {
     }
 
     fn watchdog(&mut self) -> Result<(), ToolError> {
-        self.go(Step::Written as u32, Step::Watchdog, 0.1)?;
-        let saved = self.machine.save()?;
-        for (fed, told, expected) in
-            [(FED, "100 ms, started and fed", 0.1), (0, "100 ms, started without a feed", 0.512)]
-        {
+        self.next(0.1, 0)?;
+        let (saved, step) = (self.machine.save()?, self.step);
+        for (fed, told) in [(FED, "100 ms, started and fed"), (0, "100 ms, started without a feed")] {
             self.machine.restore(&saved)?;
-            self.go(fed | Step::Watchdog as u32, Step::Bites, 0.1)?;
+            self.step = step;
+            self.next(0.1, fed)?;
             let begun = self.machine.chip().now;
-            let end = self.machine.run(begun + TICK_HZ)?;
+            let end = self.pass(1.0)?;
             let taken = seconds(self.machine.chip().now - begun);
             let shown = format!("{end:?} after {:.2} ms", 1e3 * taken);
-            let is_right = end == End::Reset(ResetReason::Watchdog) && (taken - expected).abs() < 1e-3;
-            self.row("IWDG", told, shown, is_right && fed != 0);
-            if is_right && fed == 0 && let Some(row) = self.rows.last_mut() {
-                row.reason = Some("driver: a start counts from 0xFFF, only a feed loads the reload value (RM0090 21.3)");
+            let agrees = end == End::Reset(ResetReason::Watchdog) && (taken - 0.1).abs() < 1e-3;
+            self.row("IWDG", told, shown, agrees);
+            if (taken - 0.512).abs() < 1e-3 && fed == 0 {
+                self.explain(
+                    "driver: a start counts from 0xFFF; only a feed loads the reload value (RM0090 21.3)",
+                );
             }
         }
         self.note_findings("IWDG");
@@ -426,13 +486,14 @@ impl Check {
 }
 
 /// Results of the processor's step in QEMU, read by its monitor. `None` without QEMU.
-fn emulated(path: &Path, symbols: [u32; 3]) -> Result<Option<Vec<u32>>, ToolError> {
+fn emulated(path: &Path, symbols: Symbols) -> Result<Option<Vec<u32>>, ToolError> {
     for wait in [1, 3, 10] {
         let mut command = Command::new(EMULATOR);
         command.args(MACHINE).arg(path).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
         let Ok(mut emulator) = command.spawn() else { return Ok(None) };
         std::thread::sleep(Duration::from_secs(wait));
-        let asked = format!("xp /1xw {:#x}\nxp /{PROCESSOR_WORDS}xw {:#x}\nquit\n", symbols[0], symbols[2]);
+        let Symbols { step, results, .. } = symbols;
+        let asked = format!("xp /1xw {step:#x}\nxp /{WORDS}xw {results:#x}\nquit\n");
         let failed = |error: std::io::Error| ToolError::input(format!("{EMULATOR}: {error}"));
         if let Some(mut input) = emulator.stdin.take() {
             input.write_all(asked.as_bytes()).map_err(failed)?;
@@ -443,7 +504,7 @@ fn emulated(path: &Path, symbols: [u32; 3]) -> Result<Option<Vec<u32>>, ToolErro
         }
         emulator.wait().map_err(failed)?;
         let words = words(&said);
-        if words.len() == 1 + PROCESSOR_WORDS && words[0] == Step::Processor as u32 {
+        if words.len() == 1 + WORDS && words[0] == 1 {
             return Ok(Some(words[1..].to_vec()));
         }
     }

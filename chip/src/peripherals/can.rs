@@ -196,7 +196,10 @@ impl Can {
             return;
         }
         let waiting = (0..3).filter(|index| self.mailboxes[*index].order.is_some());
-        let own = waiting.map(|index| self.turn(index)).min().map(|(_, index)| (self.mailboxes[index].frame(), Sender::Mailbox(index)));
+        let own = waiting
+            .map(|index| self.turn(index))
+            .min()
+            .map(|(_, index)| (self.mailboxes[index].frame(), Sender::Mailbox(index)));
         let partner = self.partner.front().filter(|_| self.fits()).map(|frame| (*frame, Sender::Partner));
         let first = match (own, partner) {
             (Some(own), Some(partner)) if partner.0.id() < own.0.id() => Some(partner),

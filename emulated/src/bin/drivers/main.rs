@@ -6,7 +6,7 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`contract`] | steps, results and their symbols; also compiled into the check |
+//! | [`contract`] | steps and results; also compiled into the check |
 //! | [`computation`] | arithmetic whose words every machine gives; also compiled into the check |
 //! | [`processor`] | exceptions; compared with the emulator |
 //! | [`steps`] | drivers, one step each |
@@ -21,60 +21,59 @@ mod steps;
 
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use contract::{PROCESSOR_WORDS, Place, Step};
+use contract::WORDS;
 
-/// Number of results; those of the processor come first.
-const WORDS: usize = PROCESSOR_WORDS + 32;
+/// Declares a word or words that the check finds by name.
+macro_rules! shared {
+    ($($name:ident: $type:ty = $value:expr;)*) => {$(
+        #[expect(unsafe_code, reason = "the check finds the symbol by its name")]
+        #[unsafe(no_mangle)]
+        static $name: $type = $value;
+    )*};
+}
 
-#[expect(unsafe_code, reason = "the check finds the symbol by its name")]
-#[unsafe(no_mangle)]
-static DRIVERS_STEP: AtomicU32 = AtomicU32::new(0);
-#[expect(unsafe_code, reason = "the check finds the symbol by its name")]
-#[unsafe(no_mangle)]
-static DRIVERS_GO: AtomicU32 = AtomicU32::new(0);
-#[expect(unsafe_code, reason = "the check finds the symbol by its name")]
-#[unsafe(no_mangle)]
-static DRIVERS_RESULTS: [AtomicU32; WORDS] = [const { AtomicU32::new(0) }; WORDS];
-static NOTED: AtomicU32 = AtomicU32::new(0);
+shared! {
+    DRIVERS_STEP: AtomicU32 = AtomicU32::new(0);
+    DRIVERS_GO: AtomicU32 = AtomicU32::new(0);
+    DRIVERS_COUNT: AtomicU32 = AtomicU32::new(0);
+    DRIVERS_RESULTS: [AtomicU32; WORDS] = [const { AtomicU32::new(0) }; WORDS];
+}
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!("taken once"));
+    let Some(mut core) = cortex_m::Peripherals::take() else { stop() };
     processor::run(&mut core);
-    reach(Step::Processor);
+    reach();
     steps::run(core)
 }
 
-/// Tells the check that a step is done, and waits for its release.
-fn reach(step: Step) -> u32 {
-    DRIVERS_STEP.store(step as u32, Relaxed);
+/// Tells the check that a step is done, and waits for its release, which is returned.
+fn reach() -> u32 {
+    let step = 1 + DRIVERS_STEP.fetch_add(1, Relaxed);
     loop {
         let go = DRIVERS_GO.load(Relaxed);
-        if go & 0xFF >= step as u32 {
+        if go & 0xFF >= step {
             return go;
         }
     }
 }
 
-/// Stores a result.
-fn give(place: Place, value: u32) {
-    if let Some(result) = DRIVERS_RESULTS.get(place as usize) {
+/// Appends a result.
+fn give(value: u32) {
+    let index = DRIVERS_COUNT.fetch_add(1, Relaxed) as usize;
+    if let Some(result) = DRIVERS_RESULTS.get(index) {
         result.store(value, Relaxed);
     }
 }
 
-/// Adds a result of the processor's step.
-fn note(value: u32) {
-    let index = NOTED.fetch_add(1, Relaxed) as usize;
-    if let Some(result) = DRIVERS_RESULTS[..PROCESSOR_WORDS].get(index) {
-        result.store(value, Relaxed);
+/// Ends the program: the check waits in vain for its next step.
+fn stop() -> ! {
+    loop {
+        core::hint::spin_loop();
     }
 }
 
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    DRIVERS_STEP.store(u32::MAX, Relaxed);
-    loop {
-        core::hint::spin_loop();
-    }
+    stop()
 }

@@ -1,6 +1,6 @@
 //! Exceptions: what runs when, and what each handler sees (ARMv7-M Architecture Reference Manual, B1.5).
 //!
-//! Every handler notes its number and the interrupt control register as it enters and leaves. The notes are the
+//! Every handler gives its number and the interrupt control register as it enters and leaves. These words show the
 //! order of preemption, late arrival and tail-chaining. Barriers after each request make the order defined.
 
 use core::arch::{asm, naked_asm};
@@ -13,17 +13,17 @@ use cortex_m_rt::exception;
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::Interrupt;
 
-use super::{computation, note};
+use super::{computation, give};
 
 /// Interrupt control and state: active and pending exception, base level, pending flags.
 const STATE: *const u32 = 0xE000_ED04 as *const u32;
 const LEAVES: u32 = 1 << 31;
 
-/// Runs everything; the notes are the results.
+/// Runs everything; their words are the results.
 pub fn run(core: &mut Peripherals) {
-    note(computation::integers());
-    note(computation::floats());
-    note(special());
+    give(computation::integers());
+    give(computation::floats());
+    give(special());
     prepare(core);
     nested();
     masked();
@@ -31,12 +31,13 @@ pub fn run(core: &mut Peripherals) {
     called();
     disabled();
     slept();
+    give(exclusive());
 }
 
-/// Notes a number with the state of the interrupt controller.
+/// Gives a number with the state of the interrupt controller.
 fn see(what: u32) {
     // SAFETY: reading the register has no effect.
-    note(what << 16 ^ unsafe { STATE.read_volatile() });
+    give(what << 16 ^ unsafe { STATE.read_volatile() });
 }
 
 fn barrier() {
@@ -79,7 +80,7 @@ fn special() -> u32 {
             out("s7") _,
         );
     }
-    note(flags);
+    give(flags);
     sum
 }
 
@@ -98,14 +99,14 @@ fn prepare(core: &mut Peripherals) {
 
 /// A level is preempted by a higher one, and followed by an equal one before a lower one.
 fn nested() {
-    note(0xA000_0001);
+    give(0xA000_0001);
     pend(Interrupt::SPI1);
     see(1);
 }
 
 /// Base priority and the interrupt mask hold requests back; a cleared request never runs.
 fn masked() {
-    note(0xA000_0002);
+    give(0xA000_0002);
     // SAFETY: no critical section depends on these masks here.
     unsafe {
         basepri::write(0x40);
@@ -118,7 +119,7 @@ fn masked() {
         pend_system();
         pend(Interrupt::SPI2);
         see(3);
-        note(u32::from(primask::read().is_active()));
+        give(u32::from(primask::read().is_active()));
         cortex_m::interrupt::enable();
         barrier();
         cortex_m::interrupt::disable();
@@ -134,7 +135,7 @@ fn masked() {
 
 /// With three bits of sub-priority, levels 0x20 and 0x40 are one group: no preemption, but an order.
 fn grouped() {
-    note(0xA000_0003);
+    give(0xA000_0003);
     const CONTROL: *mut u32 = 0xE000_ED0C as *mut u32;
     // SAFETY: the key allows the write; only the split of priorities changes.
     unsafe { CONTROL.write_volatile(0x05FA_0600) };
@@ -148,7 +149,7 @@ fn grouped() {
 
 /// Supervisor calls: stacked registers, returned value, aligned stack, floats in use or not.
 fn called() {
-    note(0xA000_0004);
+    give(0xA000_0004);
     let (mut first, last): (u32, u32);
     // Bit 3 of CONTROL, which a Cortex-M4 lacks, is set in Unicorn, so both floating-point bits are cleared.
     // SAFETY: the handler keeps every register but r0. Floats in s0 and s16 survive it.
@@ -162,15 +163,15 @@ fn called() {
         );
     }
     first ^= last;
-    note(first);
+    give(first);
 }
 
 /// A request outlives a disabled interrupt; a cleared one does not.
 fn disabled() {
-    note(0xA000_0005);
+    give(0xA000_0005);
     NVIC::mask(Interrupt::SPI1);
     pend(Interrupt::SPI1);
-    note(u32::from(NVIC::is_pending(Interrupt::SPI1)) | u32::from(NVIC::is_enabled(Interrupt::SPI1)) << 1);
+    give(u32::from(NVIC::is_pending(Interrupt::SPI1)) | u32::from(NVIC::is_enabled(Interrupt::SPI1)) << 1);
     see(7);
     NVIC::unpend(Interrupt::SPI1);
     // SAFETY: its level is set.
@@ -181,7 +182,7 @@ fn disabled() {
 
 /// A masked request ends a wait for an interrupt, and an event one for an event.
 fn slept() {
-    note(0xA000_0006);
+    give(0xA000_0006);
     cortex_m::interrupt::disable();
     pend(Interrupt::SPI2);
     cortex_m::asm::wfi();
@@ -194,29 +195,43 @@ fn slept() {
     see(10);
 }
 
+/// Whether a store-exclusive fails after a call (bit 0) and after an interrupt (bit 1): both clear the reservation.
+fn exclusive() -> u32 {
+    let mut word = 5_u32;
+    let (called, interrupted): (u32, u32);
+    // SAFETY: the word is this function's. The handler of the call keeps every register but r0; number 36 in the
+    // trigger register requests SPI2.
+    unsafe {
+        asm!("ldrex r1, [{0}]", "svc 3", "strex {1}, r1, [{0}]", "ldrex r1, [{0}]", "str {3}, [{2}]", "dsb", "isb",
+            "strex {3}, r1, [{0}]", in(reg) &raw mut word, out(reg) called, in(reg) 0xE000_EF00_u32,
+            inout(reg) 36 => interrupted, out("r0") _, out("r1") _);
+    }
+    called | interrupted << 1
+}
+
 #[interrupt]
 fn SPI1() {
     see(0x101);
     pend_system();
     pend(Interrupt::USART1);
-    note(u32::from(NVIC::is_pending(Interrupt::USART1)) | u32::from(NVIC::is_active(Interrupt::SPI1)) << 1);
+    give(u32::from(NVIC::is_pending(Interrupt::USART1)) | u32::from(NVIC::is_active(Interrupt::SPI1)) << 1);
     pend(Interrupt::SPI2);
     // Another value in the registers of the interrupted code.
     // SAFETY: declared as changed; those that a callee keeps are untouched.
     unsafe { asm!("vmov s0, {0}", "vcmp.f32 s0, #0", in(reg) 7, out("s0") _) };
-    note(LEAVES | 0x101);
+    give(LEAVES | 0x101);
 }
 
 #[interrupt]
 fn SPI2() {
     see(0x102);
-    note(LEAVES | 0x102);
+    give(LEAVES | 0x102);
 }
 
 #[interrupt]
 fn USART1() {
     see(0x103);
-    note(LEAVES | 0x103);
+    give(LEAVES | 0x103);
 }
 
 #[exception]
@@ -224,25 +239,25 @@ fn PendSV() {
     see(0x104);
     // SAFETY: the handler keeps every register but r0.
     unsafe { asm!("svc 5", inout("r0") 3 => _, out("r1") _, out("r2") _, out("r3") _, out("r12") _) };
-    note(LEAVES | 0x104);
+    give(LEAVES | 0x104);
 }
 
 /// Supervisor call: hands the frame and the return code on.
 #[unsafe(naked)]
 #[unsafe(export_name = "SVCall")]
 extern "C" fn supervisor_call() {
-    naked_asm!("mrs r0, msp", "mov r1, lr", "push {{r0, lr}}", "bl {noted}", "pop {{r0, pc}}", noted = sym noted)
+    naked_asm!("mrs r0, msp", "mov r1, lr", "push {{r0, lr}}", "bl {called_with}", "pop {{r0, pc}}", called_with = sym called_with)
 }
 
-/// Notes return code, alignment, stacked registers and the call's number; the caller's r0 becomes their sum.
-extern "C" fn noted(frame: *mut u32, code: u32) {
+/// Gives return code, alignment, stacked registers and the call's number; the caller's r0 becomes their sum.
+extern "C" fn called_with(frame: *mut u32, code: u32) {
     see(0x105);
-    note(code);
+    give(code);
     // SAFETY: the processor stored eight words there; the word before the return address is the call.
     unsafe {
         let call = (frame.add(6).read() as *const u16).sub(1).read();
         let status = frame.add(7).read();
-        note(status & 0x0000_03FF | u32::from(call & 0xFF) << 24 | u32::from(frame as u32 % 8 == 0) << 16);
+        give(status & 0x0000_03FF | u32::from(call & 0xFF) << 24 | u32::from(frame as u32 % 8 == 0) << 16);
         frame.write(frame.read().wrapping_add(code) ^ u32::from(call));
     }
 }

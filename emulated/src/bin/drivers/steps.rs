@@ -23,8 +23,8 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Config, Peri, Peripherals, bind_interrupts, interrupt, peripherals};
 use embassy_time::{Duration, Timer, block_for};
 
-use super::contract::{FED, Place, STORED, Step};
-use super::{give, reach};
+use super::contract::{FED, STORED};
+use super::{give, reach, stop};
 
 bind_interrupts!(struct Interrupts {
     EXTI4 => exti::InterruptHandler<interrupt::typelevel::EXTI4>;
@@ -84,14 +84,14 @@ fn timed<T>(function: impl FnOnce() -> T) -> (T, u32) {
 fn clocks(p: &Peripherals) {
     let clocks = rcc::clocks(&p.RCC);
     let hz = |clock: &MaybeHertz| clock.to_hertz().map_or(0, |hertz| hertz.0);
-    give(Place::Clock0, hz(&clocks.sys));
-    give(Place::Clock1, hz(&clocks.pclk1));
-    give(Place::Clock2, hz(&clocks.pclk2));
-    give(Place::Clock3, hz(&clocks.pclk1_tim));
-    give(Place::Clock4, hz(&clocks.pclk2_tim));
-    give(Place::Blocked, timed(|| block_for(Duration::from_millis(10))).1);
-    give(Place::Awaited, timed(|| block_on(Timer::after(Duration::from_millis(5)))).1);
-    reach(Step::Clocks);
+    give(hz(&clocks.sys));
+    give(hz(&clocks.pclk1));
+    give(hz(&clocks.pclk2));
+    give(hz(&clocks.pclk1_tim));
+    give(hz(&clocks.pclk2_tim));
+    give(timed(|| block_for(Duration::from_millis(10))).1);
+    give(timed(|| block_on(Timer::after(Duration::from_millis(5)))).1);
+    reach();
 }
 
 fn pins(
@@ -110,16 +110,16 @@ fn pins(
     let down = Input::new(pulled, Pull::Down).is_high();
     let read = Input::new(read, Pull::Down);
     let before = read.is_high();
-    reach(Step::Pins);
+    reach();
     let levels = [up, down, before, read.is_high(), held, open.is_high(), pushed.is_set_high()];
-    give(Place::Levels, levels.iter().rev().fold(0, |word, level| word << 1 | u32::from(*level)));
+    give(levels.iter().rev().fold(0, |word, level| word << 1 | u32::from(*level)));
 }
 
 async fn edge(pin: Peri<'_, peripherals::PC4>, line: Peri<'_, peripherals::EXTI4>) {
     let mut input = ExtiInput::new(pin, line, Pull::None, Interrupts);
-    reach(Step::Edge);
+    reach();
     input.wait_for_rising_edge().await;
-    reach(Step::Seen);
+    reach();
 }
 
 /// Channel 1 with a dead time, edge-aligned at 20 kHz, then centre-aligned at 24 kHz.
@@ -129,22 +129,22 @@ fn bridge(
     mut low: Peri<'_, peripherals::PB13>,
 ) {
     let modes = [
-        (CountingMode::EdgeAlignedUp, 20_000, 100, Place::Top, Step::Edges),
-        (CountingMode::CenterAlignedBothInterrupts, 24_000, 300, Place::CentredTop, Step::Centred),
+        (CountingMode::EdgeAlignedUp, 20_000, 100),
+        (CountingMode::CenterAlignedBothInterrupts, 24_000, 300),
     ];
-    for (mode, hz, dead, place, step) in modes {
+    for (mode, hz, dead) in modes {
         let high = PwmPin::new(high.reborrow(), OutputType::PushPull);
         let low = ComplementaryPwmPin::new(low.reborrow(), OutputType::PushPull);
         let timer = timer.reborrow();
         let (high, low, hz) = (Some(high), Some(low), Hertz(hz));
         let mut pwm = ComplementaryPwm::new(timer, high, low, None, None, None, None, None, None, hz, mode);
         let top = pwm.get_max_duty();
-        give(place, top);
+        give(top);
         pwm.set_dead_time(dead);
         pwm.set_duty(Channel::Ch1, top / 4);
         pwm.enable(Channel::Ch1);
         block_for(Duration::from_millis(1));
-        reach(step);
+        reach();
     }
 }
 
@@ -156,7 +156,7 @@ fn chopper(timer: Peri<'_, peripherals::TIM2>, pin: Peri<'_, peripherals::PB11>)
     pwm.ch4().set_duty_cycle_percent(30);
     pwm.ch4().enable();
     block_for(Duration::from_millis(3));
-    reach(Step::Chopper);
+    reach();
 }
 
 fn analog(
@@ -166,15 +166,14 @@ fn analog(
 ) {
     // The bus recovers from the brake resistor's load.
     block_for(Duration::from_millis(2));
-    let mut adc = Adc::new(converter.reborrow());
-    let codes = (0..16).map(|_| u32::from(adc.blocking_read(&mut bus, SampleTime::CYCLES84)));
-    give(Place::Bus, codes.sum());
-    give(Place::Warm, adc.blocking_read(&mut warm, SampleTime::CYCLES144).into());
-    drop(adc);
-    let short = AdcConfig { resolution: Some(Resolution::BITS8) };
-    let mut adc = Adc::new_with_config(converter, short);
-    give(Place::WarmShort, adc.blocking_read(&mut warm, SampleTime::CYCLES144).into());
-    reach(Step::Analog);
+    for resolution in [Resolution::BITS8, Resolution::BITS12] {
+        let configuration = AdcConfig { resolution: Some(resolution) };
+        let mut adc = Adc::new_with_config(converter.reborrow(), configuration);
+        give(adc.blocking_read(&mut warm, SampleTime::CYCLES144).into());
+    }
+    let mut adc = Adc::new(converter);
+    give((0..16).map(|_| u32::from(adc.blocking_read(&mut bus, SampleTime::CYCLES84))).sum());
+    reach();
 }
 
 /// Frames of a DRV8301: second edge, 16 bits. 2.6 MHz.
@@ -197,14 +196,21 @@ fn gate_driver(mut spi: Spi<'_, Blocking, spi::mode::Master>, mut select: Output
         block_for(Duration::from_micros(2));
         (answer, cycles) = (if outcome.is_ok() { words[0].into() } else { u32::MAX }, taken);
     }
-    give(Place::Answer, answer);
-    give(Place::FrameCycles, cycles);
-    reach(Step::Gates);
+    give(answer);
+    give(cycles);
+    reach();
 }
 
 fn frame(identifier: u16, data: &[u8]) -> Frame {
-    let frame = Frame::new_standard(identifier, data);
-    frame.unwrap_or_else(|_| unreachable!("eleven bits and at most eight bytes"))
+    let Ok(frame) = Frame::new_standard(identifier, data) else { stop() };
+    frame
+}
+
+fn identifier(of: Id) -> u32 {
+    match of {
+        Id::Standard(identifier) => identifier.as_raw().into(),
+        Id::Extended(identifier) => identifier.as_raw() | 1 << 31,
+    }
 }
 
 async fn frames(mut bus: Can<'_>) {
@@ -212,30 +218,30 @@ async fn frames(mut bus: Can<'_>) {
     bus.set_bitrate(1_000_000);
     bus.enable().await;
     bus.write(&frame(0x123, &[1, 2, 3])).await;
+    bus.write(&frame(0x124, &[])).await;
     bus.flush_all().await;
-    reach(Step::Sent);
+    reach();
     if let Ok(envelope) = bus.read().await {
         let (header, data) = (envelope.frame.header(), envelope.frame.raw_data());
-        let word = |from: usize| data[from..from + 4].iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte));
-        give(Place::Identifier, match header.id() {
-            Id::Standard(identifier) => identifier.as_raw().into(),
-            Id::Extended(identifier) => identifier.as_raw() | 1 << 31,
-        });
-        give(Place::Length, header.len().into());
-        give(Place::Low, word(0));
-        give(Place::High, word(4));
+        let word = |from: usize| {
+            data[from..from + 4].iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
+        };
+        give(identifier(*header.id()));
+        give(header.len().into());
+        give(word(0));
+        give(word(4));
     }
-    reach(Step::Received);
+    reach();
     alone(&mut bus).await;
-    reach(Step::Alone);
+    reach();
 }
 
 /// Nobody acknowledges: an error is reported; a more urgent frame replaces the least urgent of three.
 async fn alone(bus: &mut Can<'_>) {
     bus.write(&frame(0x300, &[])).await;
-    // A frame with this identifier was sent from a mailbox that has been empty since.
-    give(Place::Repeated, bus.try_write(&frame(0x123, &[])).is_ok().into());
-    give(Place::Error, match bus.read().await {
+    // The second mailbox sent a frame with this identifier before and is empty.
+    give(bus.try_write(&frame(0x124, &[])).is_ok().into());
+    give(match bus.read().await {
         Err(BusError::Acknowledge) => 1,
         Err(_) => 2,
         Ok(_) => 3,
@@ -245,43 +251,39 @@ async fn alone(bus: &mut Can<'_>) {
     block_for(Duration::from_millis(1));
     let replaced = bus.try_write(&frame(0x050, &[]));
     let replaced = replaced.ok().and_then(|status| status.dequeued_frame().copied());
-    if let Some(Id::Standard(identifier)) = replaced.map(|frame| *frame.id()) {
-        give(Place::Replaced, identifier.as_raw().into());
-    }
+    give(replaced.map_or(0, |frame| identifier(*frame.id())));
 }
 
 /// Sector 11.
 fn stored(mut flash: Flash<'_, flash::Blocking>) {
     const SECTOR: u32 = 0xE_0000;
-    reach(Step::Erase);
+    reach();
     let (erased, cycles) = timed(|| flash.blocking_erase(SECTOR, SECTOR + 0x2_0000));
-    give(Place::EraseCycles, cycles);
-    reach(Step::Erased);
+    give(cycles);
+    reach();
     let mut bytes = [0; 16];
     let blank = flash.blocking_read(SECTOR + 0x1_FFF0, &mut bytes);
-    give(Place::Blank, bytes.iter().fold(u32::MAX, |all, byte| all & (0xFFFF_FF00 | u32::from(*byte))));
+    give(bytes.iter().fold(u32::MAX, |all, byte| all & (0xFFFF_FF00 | u32::from(*byte))));
     for (place, word) in bytes.chunks_exact_mut(4).zip(STORED) {
         place.copy_from_slice(&word.to_le_bytes());
     }
     let (written, cycles) = timed(|| flash.blocking_write(SECTOR + 0x40, &bytes));
-    give(Place::WriteCycles, cycles);
+    give(cycles);
     let mut back = [0; 16];
     let read = flash.blocking_read(SECTOR + 0x40, &mut back);
     let outcomes = [erased.is_ok(), blank.is_ok(), written.is_ok(), read.is_ok(), back == bytes];
-    give(Place::Flash, outcomes.iter().rev().fold(0, |word, outcome| word << 1 | u32::from(*outcome)));
-    reach(Step::Written);
+    give(outcomes.iter().rev().fold(0, |word, outcome| word << 1 | u32::from(*outcome)));
+    reach();
 }
 
 /// 100 ms.
 fn watchdog(unit: Peri<'_, peripherals::IWDG>) -> ! {
     let mut watchdog = IndependentWatchdog::new(unit, 100_000);
-    let fed = reach(Step::Watchdog) & FED != 0;
+    let fed = reach() & FED != 0;
     watchdog.unleash();
     if fed {
         watchdog.pet();
     }
-    reach(Step::Bites);
-    loop {
-        core::hint::spin_loop();
-    }
+    reach();
+    stop()
 }
