@@ -372,7 +372,8 @@ fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
         });
         println!("{name:<18}{}", cells.collect::<String>());
     }
-    let shares: [(&str, fn(&LoadReport) -> f64); 6] = [
+    type Share = fn(&LoadReport) -> f64;
+    let shares: [(&str, Share); 6] = [
         ("level 0", |load| load.level0),
         ("servo", |load| load.servo),
         ("bus", |load| load.bus),

@@ -317,14 +317,16 @@ mod tests {
     }
 
     #[test]
-    fn an_erase_sets_one_sector_and_stalls_for_a_second() {
+    fn an_erase_sets_one_sector_and_stalls_for_a_second_by_words_or_two_by_bytes() {
         let mut bench = Bench::new();
         bench.flash.cells_mut().fill(0);
         bench.unlock();
         bench.write(0x10, ERASE | 2 << 8 | 11 << 3);
         bench.write(0x10, ERASE | 2 << 8 | 11 << 3 | START);
         assert_eq!((bench.load(0), bench.load(SECTOR as u32)), (0, u32::MAX));
-        assert_eq!(bench.flash.stall, ERASURE);
+        assert_eq!(bench.flash.stall, TICK_HZ);
+        bench.write(0x10, ERASE | 11 << 3 | START);
+        assert_eq!(bench.flash.stall, 3 * TICK_HZ);
         bench.write(0x10, ERASE | 2 << 8 | 3 << 3 | START);
         assert!(bench.findings.has("erase of a sector of the image"));
     }

@@ -832,6 +832,17 @@ mod tests {
     }
 
     #[test]
+    fn a_duty_is_below_the_compare_value_in_mode_1_and_above_it_in_mode_2() {
+        let mut bench = Bench::new(Kind::Wide);
+        for (offset, value) in [(ARR, 99), (CCMR2, 0x6060), (0x3C, 30), (0x40, 200)] {
+            bench.write(0, offset, value);
+        }
+        assert_eq!([2, 3].map(|channel| bench.timer.duty(channel)), [0.3, 1.0]);
+        bench.write(0, CCMR2, 0x4070);
+        assert_eq!([2, 3].map(|channel| bench.timer.duty(channel)), [0.7, 0.0]);
+    }
+
+    #[test]
     fn an_encoder_counts_all_four_edges_in_mode_3_and_wraps() {
         let mut bench = Bench::new(Kind::General);
         bench.position = 100;

@@ -59,7 +59,7 @@ pub fn integers() -> u32 {
             a / (b >> (step % 32)).max(1),
             (a as i32).wrapping_div((b as i32 >> (step % 29)) | 1) as u32,
             (a as i32).wrapping_rem((b as i32 >> (step % 29)) | 1) as u32,
-            (u64::from(a) * u64::from(b) >> 32) as u32,
+            ((u64::from(a) * u64::from(b)) >> 32) as u32,
             ((i64::from(a as i32) * i64::from(b as i32)) >> (step % 64)) as u32,
             (state / (u64::from(b) | 1)) as u32,
             (a as i32).saturating_add(b as i32) as u32,
