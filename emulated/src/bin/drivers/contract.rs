@@ -1,8 +1,7 @@
 //! Agreement between the program and its check (`cargo chip drivers`).
 //!
-//! The program counts its steps in `DRIVERS_STEP` and waits at each until `DRIVERS_GO` has caught up; it appends
-//! results to `DRIVERS_RESULTS` and counts them in `DRIVERS_COUNT`. Only the first step, that of the processor, runs
-//! in the emulator too.
+//! The program counts its steps in `DRIVERS_STEP` and waits at each until `DRIVERS_GO` has caught up. Results
+//! go to `DRIVERS_RESULTS`, their number to `DRIVERS_COUNT`. The first step, the processor's, runs in QEMU too.
 
 /// Capacity for results.
 pub const WORDS: usize = 128;

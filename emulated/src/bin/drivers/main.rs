@@ -1,4 +1,4 @@
-//! A foreign program for the model of the microcontroller (`cargo chip drivers`): embassy-stm32's drivers only.
+//! A foreign program for the model of the chip (`cargo chip drivers`): embassy-stm32's drivers alone.
 //!
 //! Why: model and firmware were written from the same reading of the reference manual, so a shared mistake
 //! would not show. Here the drivers of another project set the registers, and the check compares what their

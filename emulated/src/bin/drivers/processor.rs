@@ -1,7 +1,7 @@
 //! Exceptions: what runs when, and what each handler sees (ARMv7-M Architecture Reference Manual, B1.5).
 //!
-//! Every handler gives its number and the interrupt control register as it enters and leaves. These words show the
-//! order of preemption, late arrival and tail-chaining. Barriers after each request make the order defined.
+//! Every handler gives its number and the interrupt control register as it enters and leaves: the order of
+//! preemption and tail-chaining. Barriers after each request make that order defined.
 
 use core::arch::{asm, naked_asm};
 
@@ -55,7 +55,7 @@ fn pend_system() {
     barrier();
 }
 
-/// Instructions that the compiler does not choose: saturation, packed halves, fused products, roots, roundings.
+/// Instructions that the compiler seldom chooses: saturation, packed halves, fused products, roots.
 fn special() -> u32 {
     let (mut sum, flags): (u32, u32);
     // SAFETY: registers only; the status register is written back as it was after a reset.
@@ -195,12 +195,13 @@ fn slept() {
     see(10);
 }
 
-/// Whether a store-exclusive fails after a call (bit 0) and after an interrupt (bit 1): both clear the reservation.
+/// Whether a store-exclusive fails after a call (bit 0) and after an interrupt (bit 1), as both clear the
+/// reservation.
 fn exclusive() -> u32 {
     let mut word = 5_u32;
     let (called, interrupted): (u32, u32);
-    // SAFETY: the word is this function's. The handler of the call keeps every register but r0; number 36 in the
-    // trigger register requests SPI2.
+    // SAFETY: the word is this function's. The call's handler keeps every register but r0. 36 in the trigger
+    // register requests SPI2.
     unsafe {
         asm!("ldrex r1, [{0}]", "svc 3", "strex {1}, r1, [{0}]", "ldrex r1, [{0}]", "str {3}, [{2}]", "dsb", "isb",
             "strex {3}, r1, [{0}]", in(reg) &raw mut word, out(reg) called, in(reg) 0xE000_EF00_u32,

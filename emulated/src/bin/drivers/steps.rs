@@ -1,4 +1,4 @@
-//! The drivers, one step each, as their documentation shows them; only blocking ones, or futures polled in place.
+//! The drivers, one step each, as their documentation shows them: blocking, or futures polled in place.
 
 use cortex_m::peripheral::DWT;
 use embassy_futures::block_on;
