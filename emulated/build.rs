@@ -10,7 +10,9 @@ fn main() {
     }
     println!("cargo::rustc-link-search={}/..", env!("CARGO_MANIFEST_DIR"));
     let emulated = env::var_os("CARGO_FEATURE_EMULATED").is_some();
+    let drivers = env::var_os("CARGO_FEATURE_DRIVERS").is_some();
     let image = if emulated { "emulated" } else { "count-instructions" };
+    let image = if drivers { "drivers" } else { image };
     println!("cargo::rerun-if-changed=src/bin/{image}/layout.x");
     println!("cargo::rustc-link-search={}/src/bin/{image}", env!("CARGO_MANIFEST_DIR"));
     println!("cargo::rustc-link-arg-bins=-Tlink.x");

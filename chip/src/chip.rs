@@ -437,9 +437,9 @@ impl Chip {
         let timer = &self.timers[2];
         let connected = self.gpio.mode(CHOPPER_PIN) == Mode::Alternate(1);
         let on = connected && timer.runs() && timer.outputs(3) & 1 == 1;
-        let (low, high, top) = (timer.compare(2), timer.compare(3), timer.top() as f64);
-        self.plant.brake = if on { (1.0 - f64::from(high) / top).clamp(0.0, 1.0) } else { 0.0 };
-        if on && low > high {
+        let (low, high) = (timer.compare(2), timer.compare(3));
+        self.plant.brake = if on { timer.duty(3) } else { 0.0 };
+        if on && timer.outputs(2) & 1 == 1 && low > high {
             self.findings.add("both sides of the brake resistor's half bridge on", "TIM2_CCR3");
         }
     }

@@ -1,7 +1,7 @@
 //! Command line of `cargo chip`.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::rc::Rc;
 use std::time::Instant;
@@ -19,7 +19,7 @@ use crate::machine::Options;
 use crate::report::{ChipReport, LEVELS, LoadReport};
 use crate::session::{Session, Step};
 use crate::time::seconds;
-use crate::{faults, hangs, sampling, serve, situations, stops, store_cuts};
+use crate::{drivers, faults, hangs, sampling, serve, situations, stops, store_cuts};
 
 /// Runs the flash image on a model of its microcontroller.
 #[derive(Parser, Debug)]
@@ -47,6 +47,8 @@ enum Command {
     Faults(FaultArguments),
     /// Let each level hang and watch the watchdog.
     Hangs(HangArguments),
+    /// Check the model with a program of embassy-stm32's drivers alone.
+    Drivers(DriverArguments),
 }
 
 /// Image, leg, time and seed.
@@ -135,6 +137,16 @@ struct HangArguments {
     oscillator_hz: u64,
 }
 
+#[derive(Args, Debug)]
+struct DriverArguments {
+    /// Program (ELF); built unless given.
+    #[arg(long)]
+    image: Option<PathBuf>,
+    /// Write the result as JSON here.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
 fn factor(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(factor) if (1.0..=2.0).contains(&factor) => Ok(factor),
@@ -154,6 +166,7 @@ pub fn main() -> ExitCode {
         Command::Serve(arguments) => run_serve(&arguments),
         Command::Faults(arguments) => run_faults(&arguments),
         Command::Hangs(arguments) => run_hangs(&arguments),
+        Command::Drivers(arguments) => run_drivers(&arguments),
     };
     match outcome {
         Ok(true) => ExitCode::SUCCESS,
@@ -180,11 +193,15 @@ impl Common {
     }
 
     fn write(&self, result: &impl Serialize) -> Result<(), ToolError> {
-        let Some(path) = &self.json else { return Ok(()) };
-        let text =
-            serde_json::to_string_pretty(result).map_err(|error| ToolError::cannot_write(path, &error))?;
-        files::write(path, &(text + "\n"))
+        write(self.json.as_deref(), result)
     }
+}
+
+/// Writes a result as JSON, if a file is given.
+fn write(path: Option<&Path>, result: &impl Serialize) -> Result<(), ToolError> {
+    let Some(path) = path else { return Ok(()) };
+    let text = serde_json::to_string_pretty(result).map_err(|error| ToolError::cannot_write(path, &error))?;
+    files::write(path, &(text + "\n"))
 }
 
 fn run(arguments: &RunArguments) -> Result<bool, ToolError> {
@@ -355,7 +372,8 @@ fn run_load(arguments: &LoadArguments) -> Result<bool, ToolError> {
         });
         println!("{name:<18}{}", cells.collect::<String>());
     }
-    let shares: [(&str, fn(&LoadReport) -> f64); 6] = [
+    type Share = fn(&LoadReport) -> f64;
+    let shares: [(&str, Share); 6] = [
         ("level 0", |load| load.level0),
         ("servo", |load| load.servo),
         ("bus", |load| load.bus),
@@ -429,6 +447,20 @@ fn run_hangs(arguments: &HangArguments) -> Result<bool, ToolError> {
     }
     arguments.common.write(&reports)?;
     Ok(reports.iter().all(hangs::HangReport::is_sound))
+}
+
+fn run_drivers(arguments: &DriverArguments) -> Result<bool, ToolError> {
+    let built = arguments.image.clone().map_or_else(drivers::build, Ok)?;
+    let rows = drivers::check(&built)?;
+    println!(
+        "{:<10} | {:<56} | {:<56} | verdict",
+        "peripheral", "what the driver was told", "what the model shows"
+    );
+    for row in &rows {
+        println!("{:<10} | {:<56} | {:<56} | {}", row.peripheral, row.told, row.shown, row.verdict());
+    }
+    write(arguments.json.as_deref(), &rows)?;
+    Ok(rows.iter().all(drivers::Row::is_sound))
 }
 
 fn run_sampling(common: &Common) -> Result<bool, ToolError> {

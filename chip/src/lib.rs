@@ -20,6 +20,7 @@
 //! | [`stops`], [`sampling`] | emergency stops over the PWM period; sampling instants |
 //! | [`store_cuts`], [`hangs`] | power cuts within flash operations; levels that hang |
 //! | [`faults`] | rows of the fault catalogue |
+//! | [`drivers`] | another project's drivers on the model, against their documentation |
 //! | [`serve`] | the image on the simulated bus, for existing host software |
 //! | [`cli`] | the command line |
 
@@ -30,6 +31,7 @@
 
 pub mod chip;
 pub mod cli;
+pub mod drivers;
 pub mod faults;
 pub mod findings;
 pub mod hangs;

@@ -47,6 +47,8 @@ const FLOATS: u32 = 1 << 2 | 1 << 3;
 /// Instructions that are found by their code: send event, wait for event.
 const SEND_EVENT: u16 = 0xBF40;
 const WAIT_FOR_EVENT: u16 = 0xBF20;
+/// Instruction at which Unicorn stops.
+const WAIT_FOR_INTERRUPT: u16 = 0xBF30;
 
 type Core<'a> = Unicorn<'a, State>;
 
@@ -285,6 +287,12 @@ impl Machine {
         }
         match outcome {
             _ if state.resume.is_some() => Ok(()),
+            Ok(()) if code_before(&self.core, get(&self.core, Register::PC)) == Some(WAIT_FOR_INTERRUPT) => {
+                let pc = get(&self.core, Register::PC);
+                let state = self.core.get_data_mut();
+                (state.resume, state.asleep, state.paid) = (Some(pc), true, false);
+                Ok(())
+            }
             Ok(()) => Err(self.lost("the processor stopped without a reason")),
             Err(error) => Err(self.lost(&format!("the processor stopped: {error:?}"))),
         }
@@ -551,11 +559,16 @@ fn stop(core: &mut Core<'_>) {
     }
 }
 
-/// Priority at which the processor runs, masks included.
-fn running(core: &Core<'_>) -> i16 {
+/// Priority at which the processor runs, base priority included.
+fn based(core: &Core<'_>) -> i16 {
     let running = core.get_data().chip.nvic.running();
     let base = get(core, Register::BASEPRI) as i16 & 0xF0;
-    let running = if base > 0 { running.min(base) } else { running };
+    if base > 0 { running.min(base) } else { running }
+}
+
+/// Priority at which the processor runs, masks included.
+fn running(core: &Core<'_>) -> i16 {
+    let running = based(core);
     let running = if get(core, Register::PRIMASK) & 1 == 1 { running.min(0) } else { running };
     if get(core, Register::FAULTMASK) & 1 == 1 { running.min(-1) } else { running }
 }
@@ -671,6 +684,11 @@ fn on_interrupt(core: &mut Core<'_>, number: u32) {
         }
         2 => {
             let pc = get(core, Register::PC);
+            if !core.get_data().chip.nvic.preempts(SUPERVISOR_CALL, running(core)) {
+                // A call that cannot run is a hard fault (B1.5.5).
+                core.get_data_mut().fault = Some((0, 0));
+                return stop(core);
+            }
             let now = core.get_data().chip.now;
             core.get_data_mut().chip.nvic.pend(SUPERVISOR_CALL, now);
             let handler = enter(core, SUPERVISOR_CALL, pc);
@@ -740,13 +758,17 @@ enum Woken {
     Stopped,
 }
 
+/// Halfword before an address.
+fn code_before(core: &Core<'_>, pc: u32) -> Option<u16> {
+    let mut code = [0; 2];
+    core.mem_read(pc.wrapping_sub(2).into(), &mut code).ok()?;
+    Some(u16::from_le_bytes(code))
+}
+
 /// Instructions that Unicorn does not execute: wait for event, and unknown ones.
 fn on_invalid(core: &mut Core<'_>) -> bool {
     let pc = get(core, Register::PC);
-    let mut code = [0; 2];
-    let is_wait = core.mem_read(u64::from(pc.wrapping_sub(2)), &mut code).is_ok()
-        && u16::from_le_bytes(code) == WAIT_FOR_EVENT;
-    if !is_wait {
+    if code_before(core, pc) != Some(WAIT_FOR_EVENT) {
         core.get_data_mut().fault = Some((fault::INSTRUCTION, 0));
         return false;
     }
@@ -762,21 +784,26 @@ fn on_invalid(core: &mut Core<'_>) -> bool {
     true
 }
 
-/// Sleeps until an event; `pc` is the address after the instruction.
+/// Sleeps until an event, or an interrupt that would preempt but for its mask (ARMv7-M B1.5.17, B1.5.18); `pc` is
+/// the address after the instruction.
 fn sleep(core: &mut Core<'_>, pc: u32) -> Woken {
+    let for_interrupt = code_before(core, pc) == Some(WAIT_FOR_INTERRUPT);
     loop {
         let state = core.get_data_mut();
         state.asleep = false;
         if state.locked_up {
             // Only a reset helps.
-        } else if core::mem::take(&mut state.chip.event) || state.hung == Some(0) {
+        } else if !for_interrupt && core::mem::take(&mut state.chip.event) || state.hung == Some(0) {
             return Woken::Continues;
         } else if state.chip.nvic.ready() != 0 {
-            if state.chip.wakes_when_pending() {
+            if !for_interrupt && state.chip.wakes_when_pending() {
                 return Woken::Continues;
             }
             if let Some(handler) = interrupt(core, pc) {
                 return Woken::Entered(handler);
+            }
+            if for_interrupt && core.get_data().chip.nvic.preempting(based(core)).is_some() {
+                return Woken::Continues;
             }
         }
         let state = core.get_data_mut();

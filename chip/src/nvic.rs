@@ -12,6 +12,10 @@ pub const NMI: u8 = 2;
 pub const HARD_FAULT: u8 = 3;
 /// Supervisor call.
 pub const SUPERVISOR_CALL: u8 = 11;
+/// Request for a system service (PendSV).
+pub const PENDING_SERVICE: u8 = 14;
+/// System timer.
+pub const SYSTEM_TICK: u8 = 15;
 /// Priority of the thread.
 pub const THREAD: i16 = 256;
 
@@ -75,6 +79,25 @@ impl Nvic {
         }
     }
 
+    /// Withdraws a request.
+    pub fn unpend(&mut self, exception: u8) {
+        self.pending &= !(1 << exception);
+    }
+
+    /// Interrupt control and state register (B3.2.4): active and first pending exception, pending system
+    /// exceptions. Known limit, also QEMU's: the base priority does not hide the pending one, as silicon does.
+    #[must_use]
+    pub fn state(&self) -> u32 {
+        let pending = |exception: u8| u32::from(self.is_pending(exception));
+        u32::from(self.current())
+            | u32::from(self.depth() <= 1) << 11
+            | u32::from(self.preempting(THREAD).unwrap_or(0)) << 12
+            | u32::from(self.pending >> 16 != 0) << 22
+            | pending(SYSTEM_TICK) << 26
+            | pending(PENDING_SERVICE) << 28
+            | pending(NMI) << 31
+    }
+
     /// Priority of an exception; a smaller number preempts.
     #[must_use]
     pub fn priority(&self, exception: u8) -> i16 {
@@ -111,6 +134,12 @@ impl Nvic {
             }
         }
         best.filter(|&(priority, _)| self.group_of(priority) < running).map(|(_, exception)| exception)
+    }
+
+    /// Whether an exception would preempt code at this priority.
+    #[must_use]
+    pub fn preempts(&self, exception: u8, running: i16) -> bool {
+        self.group_of(self.priority(exception)) < running
     }
 
     /// Enters an exception.
@@ -248,6 +277,22 @@ mod tests {
         nvic.set_line(18, false, 10);
         nvic.leave(11);
         assert!(!nvic.is_pending(34));
+    }
+
+    #[test]
+    fn the_state_names_the_first_pending_exception_by_priority() {
+        let mut nvic = with(&[(18, 0x40), (77, 0x20)]);
+        assert_eq!(nvic.state(), 1 << 11);
+        nvic.write(0xD20, 4, 0x00F0_0000, 0);
+        nvic.pend(PENDING_SERVICE, 0);
+        assert_eq!(nvic.state(), 1 << 28 | 14 << 12 | 1 << 11);
+        nvic.pend(16 + 18, 0);
+        nvic.pend(16 + 77, 0);
+        assert_eq!(nvic.state(), 1 << 28 | 1 << 22 | (16 + 77) << 12 | 1 << 11);
+        nvic.enter(16 + 18);
+        nvic.enter(16 + 77);
+        nvic.unpend(PENDING_SERVICE);
+        assert_eq!(nvic.state(), 16 + 77);
     }
 
     #[test]

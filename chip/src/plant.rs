@@ -119,6 +119,8 @@ pub struct Axis {
     is_armed: bool,
     /// Last instant at which a high side was on.
     pub last_high: Ticks,
+    /// Pins that changed, if they are to be recorded.
+    pub pin_changes: Option<Vec<(Ticks, [Pins; 3])>>,
     /// Falsified shunts B and C.
     pub shunt_faults: [Option<ShuntFault>; 2],
     /// Falsified encoder.
@@ -152,6 +154,7 @@ impl Axis {
             edges: [Edges { at: 0, count: 0, rising: 0 }; REMEMBERED],
             is_armed: false,
             last_high: 0,
+            pin_changes: None,
             shunt_faults: [None; 2],
             encoder_fault: EncoderFault::default(),
             open: description.wiring.open,
@@ -217,6 +220,11 @@ impl Axis {
         for (output, pins) in pins.iter().enumerate() {
             let low = pins[1] && !pins[0];
             self.low_since[output] = if low { self.low_since[output].or(Some(now)) } else { None };
+        }
+        if let Some(changes) = &mut self.pin_changes
+            && pins != self.pins
+        {
+            changes.push((now, pins));
         }
         self.pins = pins;
     }

@@ -2,7 +2,7 @@
 
 use crate::chip::Chip;
 use crate::findings::NOT_MODELLED;
-use crate::nvic::NMI;
+use crate::nvic::{NMI, PENDING_SERVICE, SYSTEM_TICK};
 use crate::peripherals::rcc::ResetReason;
 
 /// First address of the private range.
@@ -45,7 +45,7 @@ impl Chip {
             0x1004 => self.debug.cycles(self.now),
             0xE004 => 2,
             0xED00 => 0x410F_C241,
-            0xED04 => self.interrupt_state(),
+            0xED04 => self.nvic.state(),
             0xED08 => system.vectors,
             0xED0C => 0xFA05_0000 | system.group << 8,
             0xED10 => system.control,
@@ -80,21 +80,17 @@ impl Chip {
         }
     }
 
-    fn interrupt_state(&self) -> u32 {
-        let pending = self.nvic.ready() & !0xFFFF;
-        let first = if pending == 0 { 0 } else { pending.trailing_zeros() };
-        u32::from(self.nvic.current()) | first << 12 | u32::from(pending != 0) << 22
-    }
-
     /// Writes a register of the private range.
     pub fn write_private(&mut self, offset: u32, size: usize, value: u32) {
         match offset {
             0x1000 => self.debug.enable(None, Some(value & 1 == 1), self.now),
             0x1004 => self.debug.set_cycles(value, self.now),
             0xED04 => {
-                for (bit, exception) in [(31, NMI), (28, 14), (26, 15)] {
+                for (bit, exception) in [(31, NMI), (28, PENDING_SERVICE), (26, SYSTEM_TICK)] {
                     if value >> bit & 1 == 1 {
                         self.nvic.pend(exception, self.now);
+                    } else if exception != NMI && value >> (bit - 1) & 1 == 1 {
+                        self.nvic.unpend(exception);
                     }
                 }
             }

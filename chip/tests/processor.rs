@@ -174,6 +174,26 @@ fn a_sleeping_processor_wakes_for_a_timer_and_sleeps_on() {
 }
 
 #[test]
+fn a_wait_for_an_interrupt_ends_though_it_is_masked() {
+    let _alone = alone();
+    let mut program = Program::new();
+    program.store(0x4002_3840, 1 << 3);
+    for (offset, value) in [(0x28, 15), (0x2C, 999), (0x14, 1), (0x10, 0), (0x0C, 1), (0x00, 1)] {
+        program.store(0x4000_0C00 + offset, value);
+    }
+    enable(&mut program, 50, 0x20);
+    // cpsid i; wfi; the mark; cpsie i
+    program.put(&[0xB672, 0xBF30]).store(RAM, 5).put(&[0xB662]).halt();
+    program.handler(66).constant(0, RAM).put(&[0x6802, 0x6042]).store(0x4000_0C10, 0).put(&[0x4770]);
+    let mut machine = program.machine();
+    machine.set_memory(RAM, &[0; 8]);
+    run(&mut machine, 0.5e-3);
+    assert_eq!(word(&machine, RAM), 0);
+    run(&mut machine, 1e-3);
+    assert_eq!((word(&machine, RAM), word(&machine, RAM + 4)), (5, 5));
+}
+
+#[test]
 fn frequent_interrupts_leave_a_computation_alone() {
     let _alone = alone();
     let mut program = Program::new();
@@ -232,13 +252,27 @@ fn an_access_without_memory_is_a_hard_fault_with_its_address() {
 fn the_watchdog_resets_a_program_that_does_not_feed_it() {
     let _alone = alone();
     let mut program = Program::new();
-    program.store(0x4000_3000, 0x5555).store(0x4000_3008, 99).store(0x4000_3000, 0xCCCC).halt();
+    program.store(0x4000_3000, 0x5555).store(0x4000_3008, 99);
+    program.store(0x4000_3000, 0xCCCC).store(0x4000_3000, 0xAAAA).halt();
     let mut machine = program.machine();
     assert_eq!(run(&mut machine, 1.0), End::Reset(ResetReason::Watchdog));
     // 100 counts of 4 periods of 32 kHz.
     let expected = TICK_HZ / 80;
     assert!(machine.chip().now.abs_diff(expected) < TICK_HZ / 10_000, "{}", machine.chip().now);
     assert_eq!(machine.chip_mut().read(0x4002_3874) >> 26, 0b1011);
+}
+
+#[test]
+fn a_supervisor_call_that_cannot_run_is_a_hard_fault() {
+    let _alone = alone();
+    let mut program = Program::new();
+    // cpsid i; svc 0
+    program.put(&[0xB672, 0xDF00]).halt();
+    program.handler(11).store(RAM, 11).halt();
+    program.handler(3).store(RAM, 3).halt();
+    let mut machine = program.machine();
+    run(&mut machine, 1e-4);
+    assert_eq!(word(&machine, RAM), 3);
 }
 
 #[test]

@@ -17,7 +17,7 @@ use crate::time::{NEVER, TICK_HZ, Ticks};
 pub const COUNT: usize = 3;
 /// Sampling times, clocks.
 const SAMPLING: [u64; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
-/// Clocks of a conversion of 12 bits after the hold.
+/// Clocks of a conversion of 12 bits after the hold; two less for each step of the resolution.
 const CONVERSION: u64 = 12;
 /// Time from switching on to the first conversion: 3 us.
 const SETTLING: Ticks = 3 * TICK_HZ / 1_000_000;
@@ -103,6 +103,11 @@ impl Adc {
         (channel, SAMPLING[(code & 7) as usize])
     }
 
+    /// Bits less than 12 of a result (RES).
+    fn dropped(&self) -> u32 {
+        2 * (self.cr[0] >> 24 & 3)
+    }
+
     fn length(&self, injected: bool) -> usize {
         if self.cr[0] & SCAN == 0 {
             return 1;
@@ -113,7 +118,7 @@ impl Adc {
     fn begin(&mut self, injected: bool, rank: usize, now: Ticks, clock: Ticks) {
         let (_, sampling) = self.channel(injected, rank);
         let hold = now + sampling * clock;
-        let end = hold + CONVERSION * clock;
+        let end = hold + (CONVERSION - u64::from(self.dropped())) * clock;
         self.running = Some(Running { injected, rank, hold, end, code: None });
     }
 
@@ -191,7 +196,10 @@ impl Adc {
     }
 
     fn store(&mut self, injected: bool, rank: usize, code: u16) {
-        let code = if self.cr[1] & 1 << 11 != 0 { u32::from(code) << 4 } else { u32::from(code) };
+        // To the left, 6 bits are aligned within a byte (RM0090 13.4).
+        let (code, dropped) = (u32::from(code) >> self.dropped(), self.dropped());
+        let left = if dropped == 6 { 2 } else { 4 + dropped };
+        let code = if self.cr[1] & 1 << 11 != 0 { code << left } else { code };
         let last = rank + 1 == self.length(injected);
         if injected {
             self.results[rank] = code.wrapping_sub(self.offsets[rank]) & 0xFFFF;
@@ -387,6 +395,14 @@ mod tests {
         assert_eq!(bench.adc.results[..2], [106, 104]);
         assert_eq!(bench.adc.sr, JEOC | JSTRT);
         assert!(bench.findings.is_empty(), "{:?}", bench.findings);
+    }
+
+    #[test]
+    fn a_resolution_of_8_bits_drops_four_and_takes_four_clocks_less() {
+        let mut bench = Bench::new(&[(0x04, 2 << 24), (0x38, 6 << 15), (0x08, 1 | 1 << 16 | 1 << 20)]);
+        bench.trigger(2000, Trigger::First);
+        assert_eq!(bench.run(), [(2048, Some(6)), (2048 + 8 * CLOCK, None)]);
+        assert_eq!(bench.adc.results[0], 106 >> 4);
     }
 
     #[test]

@@ -34,6 +34,12 @@ struct Mailbox {
 }
 
 impl Mailbox {
+    /// Completes or withdraws the request, whose bit (TXRQ) falls.
+    fn empty(&mut self) {
+        (self.order, self.abort) = (None, false);
+        self.registers[0] &= !1;
+    }
+
     fn frame(&self) -> Frame {
         let [identifier, length, low, high] = self.registers;
         let mut bytes = [0; 8];
@@ -68,8 +74,11 @@ pub struct Can {
     /// Error counters of transmission and reception, last error code.
     errors: [u32; 2],
     last_error: u32,
+    /// An error was detected whose interrupt is enabled (ERRI).
+    error: bool,
     bus_off: bool,
     initialising: bool,
+    asleep: bool,
     /// Instant at which a change of mode, or the recovery from bus-off, is complete.
     joins: Ticks,
     recovers: Ticks,
@@ -107,8 +116,10 @@ impl Can {
             tsr: 0,
             errors: [0; 2],
             last_error: 0,
+            error: false,
             bus_off: false,
             initialising: false,
+            asleep: true,
             joins: NEVER,
             recovers: NEVER,
             mailboxes: [Mailbox::default(); 3],
@@ -159,15 +170,24 @@ impl Can {
     }
 
     fn takes_part(&self) -> bool {
-        self.mcr & (INRQ | SLEEP) == 0 && !self.initialising && !self.bus_off
+        self.mcr & (INRQ | SLEEP) == 0 && !(self.initialising || self.asleep || self.bus_off)
     }
 
     /// Makes the controller bus-off, as errors on the wire do.
     pub fn go_bus_off(&mut self, now: Ticks) {
+        let before = self.status();
         (self.bus_off, self.errors, self.on_wire) = (true, [0, 0], None);
         if self.mcr & ABOM != 0 {
             self.recovers = now + 128 * 11 * self.bit();
         }
+        self.detect(before);
+    }
+
+    /// Raises the error interrupt's flag after a detected error (RM0090 32.9.2, ERRI); `before` is the error
+    /// status before it.
+    fn detect(&mut self, before: u32) {
+        let risen = self.status() & !before & 7;
+        self.error |= risen & self.ier >> 8 != 0 || self.last_error != 0 && self.ier >> 11 & 1 == 1;
     }
 
     /// Puts the next frame on the wire if it is idle.
@@ -175,13 +195,11 @@ impl Can {
         if self.on_wire.is_some() || !self.takes_part() {
             return;
         }
-        let own = (0..3).filter_map(|index| {
-            let mailbox = &self.mailboxes[index];
-            let order = mailbox.order?;
-            let key = if self.mcr & TXFP != 0 { order } else { u64::from(mailbox.registers[0] >> 21) };
-            Some((key, index))
-        });
-        let own = own.min().map(|(_, index)| (self.mailboxes[index].frame(), Sender::Mailbox(index)));
+        let waiting = (0..3).filter(|index| self.mailboxes[*index].order.is_some());
+        let own = waiting
+            .map(|index| self.turn(index))
+            .min()
+            .map(|(_, index)| (self.mailboxes[index].frame(), Sender::Mailbox(index)));
         let partner = self.partner.front().filter(|_| self.fits()).map(|frame| (*frame, Sender::Partner));
         let first = match (own, partner) {
             (Some(own), Some(partner)) if partner.0.id() < own.0.id() => Some(partner),
@@ -203,6 +221,7 @@ impl Can {
     pub fn pass(&mut self, now: Ticks) {
         if now >= self.joins {
             (self.joins, self.initialising) = (NEVER, self.mcr & INRQ != 0);
+            self.asleep = self.mcr & SLEEP != 0;
         }
         if now >= self.recovers {
             (self.recovers, self.bus_off) = (NEVER, false);
@@ -224,12 +243,13 @@ impl Can {
 
     /// Ends the transmission of a mailbox.
     fn finish(&mut self, index: usize, frame: Frame, now: Ticks) {
+        let before = self.status();
         let acknowledged = self.fits();
         let mailbox = &mut self.mailboxes[index];
         if acknowledged {
             self.errors[0] = self.errors[0].saturating_sub(1);
             self.tsr |= 3 << (8 * index);
-            mailbox.order = None;
+            mailbox.empty();
             self.last_error = 0;
             self.sent.push((now, frame));
             return;
@@ -241,10 +261,10 @@ impl Can {
         }
         self.tsr |= 8 << (8 * index);
         if mailbox.abort || self.mcr & NART != 0 {
-            mailbox.order = None;
+            mailbox.empty();
             self.tsr = self.tsr & !(3 << (8 * index)) | 1 << (8 * index);
         }
-        mailbox.abort &= mailbox.order.is_some();
+        self.detect(before);
     }
 
     fn receive(&mut self, frame: Frame) {
@@ -296,15 +316,11 @@ impl Can {
             let enabled = |bit: u32| self.ier >> (bit + shift) & 1 == 1;
             enabled(1) && !fifo.frames.is_empty() || enabled(2) && fifo.full || enabled(3) && fifo.overrun
         };
-        let flags = self.status();
-        let error = [(1, 8), (2, 9), (4, 10)]
-            .into_iter()
-            .any(|(flag, bit)| flags & flag != 0 && self.ier >> bit & 1 == 1);
         [
             self.ier & 1 != 0 && self.tsr & 0x0001_0101 != 0,
             queue(0, 0),
             queue(1, 3),
-            error && self.ier >> 15 & 1 == 1,
+            self.error && self.ier >> 15 & 1 == 1,
         ]
     }
 
@@ -320,10 +336,21 @@ impl Can {
             | receive << 24
     }
 
+    /// Transmit status register. Its code names an empty mailbox, or the one that is sent last.
     fn transmit_status(&self) -> u32 {
-        let empty =
-            (0..3).fold(0, |bits, index| bits | u32::from(self.mailboxes[index].order.is_none()) << index);
-        self.tsr | empty << 26 | (empty.trailing_zeros().min(2)) << 24
+        let empty = |index: &usize| self.mailboxes[*index].order.is_none();
+        let code = (0..3).find(empty).or_else(|| (0..3).max_by_key(|index| self.turn(*index))).unwrap_or(0);
+        (0..3).fold(self.tsr | (code as u32) << 24, |bits, index| {
+            let abort = u32::from(self.mailboxes[index].abort) << (8 * index + 7);
+            bits | u32::from(empty(&index)) << (26 + index) | abort
+        })
+    }
+
+    /// Order in which a mailbox is sent: by request, or by identifier and number.
+    fn turn(&self, index: usize) -> (u64, usize) {
+        let mailbox = &self.mailboxes[index];
+        let identifier = u64::from(mailbox.registers[0] >> 21);
+        (if self.mcr & TXFP != 0 { mailbox.order.unwrap_or(0) } else { identifier }, index)
     }
 
     fn queue_status(&self, queue: usize) -> u32 {
@@ -350,7 +377,12 @@ impl Can {
     pub fn read(&mut self, offset: u32, access: &mut Access<'_>) -> u32 {
         match offset {
             0x00 => self.mcr,
-            0x04 => u32::from(self.initialising) | self.mcr & SLEEP | 0xC00,
+            0x04 => {
+                u32::from(self.initialising)
+                    | u32::from(self.asleep) << 1
+                    | u32::from(self.error) << 2
+                    | 0xC00
+            }
             0x08 => self.transmit_status(),
             0x0C | 0x10 => self.queue_status((offset as usize - 0xC) / 4),
             0x14 => self.ier,
@@ -377,7 +409,7 @@ impl Can {
     pub fn write(&mut self, offset: u32, value: u32, access: &mut Access<'_>) {
         match offset {
             0x00 => self.write_control(access.implemented(value, 0x1_80FF, "CAN_MCR"), access),
-            0x04 => {}
+            0x04 => self.error &= value & 1 << 2 == 0,
             0x08 => self.write_transmit_status(value),
             0x0C | 0x10 => self.write_queue((offset as usize - 0xC) / 4, value),
             0x14 => self.ier = access.implemented(value, 0x0003_8F7F, "CAN_IER"),
@@ -404,14 +436,17 @@ impl Can {
         if value & 1 << 15 != 0 {
             return self.reset();
         }
+        let changed = (value ^ self.mcr) & (INRQ | SLEEP) != 0;
         self.mcr = value;
+        self.asleep |= value & SLEEP != 0;
         if value & INRQ != 0 && value & SLEEP == 0 {
+            self.asleep = false;
             // A frame on the wire is completed first.
             self.joins = self.on_wire.as_ref().map_or(access.now, |(.., end)| *end);
             if self.on_wire.is_none() {
                 (self.initialising, self.joins) = (true, NEVER);
             }
-        } else if value & INRQ == 0 && self.initialising {
+        } else if changed && value & INRQ == 0 && (self.initialising || self.asleep) {
             // Eleven recessive bits.
             self.joins = access.now + 11 * self.bit();
         }
@@ -428,7 +463,7 @@ impl Can {
                     self.on_wire.as_ref().is_some_and(|(sender, ..)| *sender == Sender::Mailbox(index));
                 mailbox.abort = leaving;
                 if !leaving {
-                    mailbox.order = None;
+                    mailbox.empty();
                     self.tsr = self.tsr & !(3 << shift) | 1 << shift;
                 }
             }
@@ -582,6 +617,50 @@ mod tests {
         bench.write(0x08, 1 << 7);
         bench.run(TICK_HZ / 100);
         assert_eq!(bench.read(8) >> 26 & 7, 0b111);
+    }
+
+    #[test]
+    fn a_detected_error_raises_its_flag_until_a_one_clears_it() {
+        let mut bench = Bench::new();
+        bench.can.connected = false;
+        bench.write(0x14, 1 << 11 | 1 << 15);
+        bench.write(0x180, 0x10 << 21 | 1);
+        bench.run(TICK_HZ / 10_000);
+        assert!(bench.can.requests()[3] && bench.read(4) & 4 != 0);
+        bench.write(0x04, 4);
+        assert!(!bench.can.requests()[3]);
+        bench.run(TICK_HZ / 10_000);
+        assert!(bench.can.requests()[3]);
+    }
+
+    #[test]
+    fn the_code_names_the_mailbox_that_is_sent_last_and_an_abort_waits_for_the_wire() {
+        let mut bench = Bench::new();
+        bench.can.connected = false;
+        bench.write(0x00, 0);
+        for (index, identifier) in [0x300, 0x200, 0x100].into_iter().enumerate() {
+            assert_eq!(bench.read(8) >> 24 & 3, index as u32);
+            bench.write(0x180 + 16 * index as u32, identifier << 21 | 1);
+        }
+        assert_eq!(bench.read(8) >> 24 & 3, 0);
+        bench.write(0x08, 1 << 7);
+        assert_eq!(bench.read(8) >> 26 & 7, 0);
+        assert_eq!(bench.read(8) & 1 << 7, 1 << 7);
+        bench.run(TICK_HZ / 5000);
+        assert_eq!((bench.read(8) >> 26 & 7, bench.read(8) & 1 << 7, bench.read(0x180) & 1), (1, 0, 0));
+    }
+
+    #[test]
+    fn the_controller_leaves_its_sleep_after_eleven_bits() {
+        let mut bench = Bench::new();
+        bench.write(0x00, SLEEP);
+        assert_eq!(bench.read(4) & 3, 2);
+        bench.write(0x00, 0);
+        bench.run(10 * TICK_HZ / 1_000_000);
+        bench.write(0x00, 0);
+        assert_eq!(bench.read(4) & 3, 2);
+        bench.run(TICK_HZ / 1_000_000);
+        assert_eq!(bench.read(4) & 3, 0);
     }
 
     #[test]

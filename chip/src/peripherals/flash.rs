@@ -32,9 +32,9 @@ const PARALLELISM: u32 = 1 << 6;
 const ALIGNMENT: u32 = 1 << 5;
 const PROTECTED: u32 = 1 << 4;
 
-/// Typical durations of a word and of a sector of 128 KB, words of 32 bits.
+/// Typical durations of a word, and of a sector of 128 KB by the width that is programmed at once (PSIZE).
 const WORD: Ticks = 16 * TICK_HZ / 1_000_000;
-const ERASURE: Ticks = TICK_HZ;
+const ERASURES: [Ticks; 4] = [2 * TICK_HZ, 13 * TICK_HZ / 10, TICK_HZ, TICK_HZ];
 
 /// Power cut within a later operation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -192,7 +192,7 @@ impl Flash {
         let cells = &mut self.cells[sector * SECTOR..(sector + 1) * SECTOR];
         self.erasures += 1;
         self.stale[sector] = self.access & 1 << 10 != 0;
-        self.stall += ERASURE;
+        self.stall += ERASURES[(self.control >> 8 & 3) as usize];
         if let Some(Cut::Erasure(share)) = self.cut {
             self.stall = (self.stall as f64 * share) as Ticks;
             (self.cut, self.is_cut) = (None, true);
@@ -317,14 +317,16 @@ mod tests {
     }
 
     #[test]
-    fn an_erase_sets_one_sector_and_stalls_for_a_second() {
+    fn an_erase_sets_one_sector_and_stalls_for_a_second_by_words_or_two_by_bytes() {
         let mut bench = Bench::new();
         bench.flash.cells_mut().fill(0);
         bench.unlock();
         bench.write(0x10, ERASE | 2 << 8 | 11 << 3);
         bench.write(0x10, ERASE | 2 << 8 | 11 << 3 | START);
         assert_eq!((bench.load(0), bench.load(SECTOR as u32)), (0, u32::MAX));
-        assert_eq!(bench.flash.stall, ERASURE);
+        assert_eq!(bench.flash.stall, TICK_HZ);
+        bench.write(0x10, ERASE | 11 << 3 | START);
+        assert_eq!(bench.flash.stall, 3 * TICK_HZ);
         bench.write(0x10, ERASE | 2 << 8 | 3 << 3 | START);
         assert!(bench.findings.has("erase of a sector of the image"));
     }

@@ -102,9 +102,8 @@ impl Iwdg {
                 self.unlocked = false;
                 match key {
                     0xAAAA => self.feed(now),
-                    0xCCCC if !self.runs => {
-                        (self.runs, self.count, self.since) = (true, self.reload.into(), now);
-                    }
+                    // A start counts from the present value, 0xFFF without a feed before (RM0090 21.3).
+                    0xCCCC if !self.runs => (self.runs, self.since) = (true, now),
                     0xCCCC => {}
                     _ => access.refuse("unknown key", "IWDG_KR"),
                 }
@@ -159,6 +158,15 @@ mod tests {
         write(&mut iwdg, &mut findings, TICK_HZ / 100, 0, 0xAAAA);
         assert_eq!(iwdg.due(), TICK_HZ * 26 / 1000);
         assert!(findings.is_empty());
+    }
+
+    #[test]
+    fn a_start_without_a_feed_counts_from_the_reset_value() {
+        let (mut iwdg, mut findings) = (Iwdg::new(), Findings::default());
+        for (offset, value) in [(0, 0x5555), (4, 0), (8, 127), (0, 0xCCCC)] {
+            write(&mut iwdg, &mut findings, 0, offset, value);
+        }
+        assert_eq!(iwdg.due(), TICK_HZ * 512 / 1000);
     }
 
     #[test]

@@ -313,6 +313,19 @@ impl Timer {
         [8, 9].map(|bit| self.cr2 >> (bit + 2 * channel) & 1 == 1)
     }
 
+    /// Share of a period in which a channel's reference is active; only PWM modes have one.
+    #[must_use]
+    pub fn duty(&self, channel: usize) -> f64 {
+        let counts = self.acting.top as f64 + f64::from(u8::from(!self.is_centred()));
+        let below = (f64::from(self.acting.compare[channel]) / counts).clamp(0.0, 1.0);
+        match self.mode(channel) {
+            5 => 1.0,
+            6 => below,
+            7 => 1.0 - below,
+            _ => 0.0,
+        }
+    }
+
     /// Acting compare value of a channel.
     #[must_use]
     pub fn compare(&self, channel: usize) -> u32 {
@@ -816,6 +829,17 @@ mod tests {
         assert_eq!(bench.timer.compare(0), 40);
         bench.run(200);
         assert_eq!(bench.timer.compare(0), 60);
+    }
+
+    #[test]
+    fn a_duty_is_below_the_compare_value_in_mode_1_and_above_it_in_mode_2() {
+        let mut bench = Bench::new(Kind::Wide);
+        for (offset, value) in [(ARR, 99), (CCMR2, 0x6060), (0x3C, 30), (0x40, 200)] {
+            bench.write(0, offset, value);
+        }
+        assert_eq!([2, 3].map(|channel| bench.timer.duty(channel)), [0.3, 1.0]);
+        bench.write(0, CCMR2, 0x4070);
+        assert_eq!([2, 3].map(|channel| bench.timer.duty(channel)), [0.7, 0.0]);
     }
 
     #[test]

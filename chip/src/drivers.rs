@@ -1,0 +1,505 @@
+//! A foreign program on the model: embassy-stm32's drivers against what the model's pins and registers show.
+//!
+//! Why: the model and the firmware come from one reading of the reference manual. The program
+//! (`emulated/src/bin/drivers`) sets registers only through another project's drivers. Each row of the result
+//! compares what a driver's documentation promises with the model, in physical units. Its computations and
+//! exceptions also run on the host and on QEMU.
+//! Known limits: no driver with DMA; QEMU shares its instruction translator with Unicorn, so it is independent
+//! for exceptions only.
+
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::rc::Rc;
+use std::time::Duration;
+
+use scarab::bus::Frame;
+use scarab_host::base::error::ToolError;
+use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile};
+use scarab_host::image::build::{firmware_build, run, target_directory};
+use serde::Serialize;
+
+use crate::chip::{Chip, STOP};
+use crate::image::Image;
+use crate::machine::{End, Machine, Options};
+use crate::peripherals::gpio::Mode;
+use crate::peripherals::rcc::ResetReason;
+use crate::plant::{JOINTS, Plant};
+use crate::time::{TICK_HZ, Ticks, seconds, ticks};
+
+#[path = "../../emulated/src/bin/drivers/computation.rs"]
+mod computation;
+#[path = "../../emulated/src/bin/drivers/contract.rs"]
+mod contract;
+
+use contract::{FED, STORED, WORDS};
+
+const PACKAGE: &str = "--quiet --profile image --package scarab-emulated --bin drivers --features drivers";
+/// Path of the program below the target directory.
+const IMAGE: &str = "firmware/thumbv7em-none-eabihf/image/drivers";
+const EMULATOR: &str = "qemu-system-arm";
+const MACHINE: &str = "-M netduinoplus2 -display none -serial null -monitor stdio -icount shift=3 -kernel";
+/// Interval between two looks at the program's step, s.
+const POLL_S: f64 = 1e-5;
+/// Processor clock that the program sets, Hz.
+const CLOCK_HZ: f64 = 168e6;
+
+/// Comparison of one promise with the model.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Peripheral.
+    pub peripheral: &'static str,
+    /// What the driver was told.
+    pub told: String,
+    /// What the model shows.
+    pub shown: String,
+    /// Whether both agree.
+    pub agrees: bool,
+    /// Reason where they need not: the driver breaks its own promise on silicon too, or nothing was compared.
+    pub reason: Option<&'static str>,
+}
+
+impl Row {
+    /// Whether model and promise agree, or need not.
+    #[must_use]
+    pub const fn is_sound(&self) -> bool {
+        self.agrees || self.reason.is_some()
+    }
+
+    /// Verdict in words.
+    #[must_use]
+    pub fn verdict(&self) -> &'static str {
+        if self.agrees { "equal" } else { self.reason.unwrap_or("DIFFERS") }
+    }
+}
+
+/// Builds the program.
+///
+/// # Errors
+/// The compiler is missing or refuses.
+pub fn build() -> Result<PathBuf, ToolError> {
+    run(firmware_build(false).args(PACKAGE.split(' ')), "scripts/firmware-build")?;
+    Ok(target_directory().join(IMAGE))
+}
+
+/// Runs the program and compares.
+///
+/// # Errors
+/// The program does not reach a step, or the model does not know what the processor does.
+pub fn check(path: &Path) -> Result<Vec<Row>, ToolError> {
+    let mut check = Check::new(path)?;
+    if let Err(error) = check.run(path) {
+        check.row("program", "reaches every step", error.to_string(), false);
+    }
+    Ok(check.rows)
+}
+
+/// Addresses of the program's words.
+#[derive(Clone, Copy)]
+struct Symbols {
+    step: u32,
+    go: u32,
+    count: u32,
+    results: u32,
+}
+
+struct Check {
+    machine: Machine,
+    symbols: Symbols,
+    rows: Vec<Row>,
+    /// Steps, results and findings so far.
+    step: u32,
+    results: u32,
+    findings: usize,
+}
+
+impl Check {
+    fn new(path: &Path) -> Result<Self, ToolError> {
+        let image: Rc<Image> = Image::load(path)?;
+        let leg = LegFile::load(DEFAULT_LEG)?;
+        let drives = leg.complete_description::<JOINTS>()?;
+        let plant = Plant::new(&leg.description::<JOINTS>()?, &drives, 1);
+        let symbol = |name: &str| {
+            let missing = || ToolError::input(format!("{}: no symbol {name}", path.display()));
+            image.address(name).ok_or_else(missing)
+        };
+        let symbols = Symbols {
+            step: symbol("DRIVERS_STEP")?,
+            go: symbol("DRIVERS_GO")?,
+            count: symbol("DRIVERS_COUNT")?,
+            results: symbol("DRIVERS_RESULTS")?,
+        };
+        let machine = Machine::new(&image, Chip::new(plant, 1), &Options::default())?;
+        Ok(Self { machine, symbols, rows: Vec::new(), step: 0, results: 0, findings: 0 })
+    }
+
+    fn run(&mut self, path: &Path) -> Result<(), ToolError> {
+        self.processor(path)?;
+        self.clocks()?;
+        self.pins()?;
+        self.bridge()?;
+        self.analog()?;
+        self.gates()?;
+        self.frames()?;
+        self.flash()?;
+        self.watchdog()
+    }
+
+    fn word(&self, address: u32) -> u32 {
+        let mut bytes = [0; 4];
+        self.machine.memory(address, &mut bytes);
+        u32::from_le_bytes(bytes)
+    }
+
+    /// Next results.
+    fn take<const N: usize>(&mut self) -> [u32; N] {
+        let first = self.results;
+        self.results += N as u32;
+        core::array::from_fn(|index| self.word(self.symbols.results + 4 * (first + index as u32)))
+    }
+
+    /// Lets the program go on until its next step, at most for a time, s; `with` is added to the release.
+    fn next(&mut self, longest: f64, with: u32) -> Result<(), ToolError> {
+        self.machine.set_memory(self.symbols.go, &(self.step | with).to_le_bytes());
+        let end = self.machine.chip().now + ticks(longest);
+        while self.machine.chip().now < end {
+            self.pass(POLL_S)?;
+            if self.word(self.symbols.step) == self.step + 1 {
+                self.step += 1;
+                return Ok(());
+            }
+        }
+        self.note_findings("last step");
+        Err(ToolError::input(format!("step {} is not reached within {longest} s", self.step + 1)))
+    }
+
+    /// Runs for a time, s.
+    fn pass(&mut self, duration: f64) -> Result<End, ToolError> {
+        self.machine.run(self.machine.chip().now + ticks(duration))
+    }
+
+    fn row(&mut self, peripheral: &'static str, told: &str, shown: String, agrees: bool) {
+        self.rows.push(Row { peripheral, told: told.to_owned(), shown, agrees, reason: None });
+    }
+
+    /// Gives the last row's reason, if it differs.
+    fn explain(&mut self, reason: &'static str) {
+        if let Some(row) = self.rows.last_mut().filter(|row| !row.agrees) {
+            row.reason = Some(reason);
+        }
+    }
+
+    /// Adds a row for findings since the last call.
+    fn note_findings(&mut self, peripheral: &str) {
+        let image = self.machine.image();
+        let list = self.machine.chip().findings.list(|pc| image.function(pc));
+        let new = list.iter().filter(|finding| finding.known().is_none()).skip(self.findings);
+        let texts: Vec<String> = new
+            .map(|finding| format!("{}: {} in {}", finding.register, finding.what, finding.function))
+            .collect();
+        self.findings += texts.len();
+        if !texts.is_empty() {
+            let told = format!("{peripheral}: registers as silicon allows");
+            self.row("findings", &told, texts.join("; "), false);
+        }
+    }
+
+    fn processor(&mut self, path: &Path) -> Result<(), ToolError> {
+        self.next(0.1, 0)?;
+        let words: [u32; WORDS] = self.take();
+        self.results = self.word(self.symbols.count);
+        let (count, expected) = (self.results as usize, [computation::integers(), computation::floats()]);
+        let shown = format!("{:08x?}, host {expected:08x?}", &words[..2]);
+        self.row("processor", "integers and floats", shown, words[..2] == expected);
+        let Some(other) = emulated(path, self.symbols)? else {
+            self.row("processor", "exceptions as in QEMU", "no QEMU on this machine".into(), false);
+            self.explain("skipped");
+            return Ok(());
+        };
+        let differ: Vec<String> = (0..count)
+            .filter(|index| words[*index] != other[*index])
+            .map(|index| format!("[{index}] {:08x}, QEMU {:08x}", words[index], other[index]))
+            .collect();
+        let shown = format!("{} words, {} differ {}", count, differ.len(), differ.join("; "));
+        self.row("processor", "exceptions as in QEMU", shown, differ.is_empty());
+        self.note_findings("processor");
+        Ok(())
+    }
+
+    fn clocks(&mut self) -> Result<(), ToolError> {
+        self.next(0.1, 0)?;
+        let told = self.take::<5>().map(u64::from);
+        let rcc = &self.machine.chip().rcc;
+        let timer = |bus| TICK_HZ / rcc.timer_cycle(bus);
+        let shown = [rcc.processor_hz(), rcc.bus_hz(1), rcc.bus_hz(2), timer(1), timer(2)];
+        let mhz = |hz: [u64; 5]| hz.map(|hz| format!("{}", hz as f64 * 1e-6)).join(", ");
+        self.row("RCC", &format!("{} MHz", mhz(told)), format!("{} MHz", mhz(shown)), told == shown);
+        for (told, expected) in [("block_for 10 ms on TIM4", 10e-3), ("Timer::after 5 ms on TIM4", 5e-3)] {
+            let [cycles] = self.take();
+            let taken = f64::from(cycles) / CLOCK_HZ;
+            // Up to a tick of 1 us earlier or later, and some hundred instructions.
+            let agrees = (expected - 1e-6..expected + 12e-6).contains(&taken);
+            self.row("time", told, format!("{:.4} ms by the cycle counter", 1e3 * taken), agrees);
+        }
+        self.note_findings("RCC");
+        Ok(())
+    }
+
+    fn pins(&mut self) -> Result<(), ToolError> {
+        self.next(0.1, 0)?;
+        let gpio = &self.machine.chip().gpio;
+        let modes = [('A', 0), ('A', 1), ('A', 15), ('B', 2)].map(|pin| gpio.mode(pin));
+        let levels = [('A', 0), ('A', 1)].map(|pin| gpio.level(pin));
+        let expected = [Mode::Output, Mode::Output, Mode::Analog, Mode::Input];
+        let shown = format!("{modes:?}, PA0 {}, PA1 {}", levels[0], levels[1]);
+        let told = "PA0 high, PA1 open and pulled up, PA15 dropped, PB2 input";
+        self.row("GPIO", told, shown, modes == expected && levels == [true; 2]);
+        let chip = self.machine.chip_mut();
+        chip.set_pin(('B', 2), true);
+        chip.set_pin(('A', 1), false);
+        self.next(0.1, 0)?;
+        let [levels] = self.take();
+        // Open drain: low while driven, then as the outside.
+        let told = "pulled up 1, down 0, PB2 0 then 1, PA1 0 then 0 from outside, PA0 set 1";
+        self.row("GPIO", told, format!("read {levels:07b} from the last"), levels == 0b100_1001);
+        self.machine.set_memory(self.symbols.go, &self.step.to_le_bytes());
+        let mut steps = Vec::new();
+        for level in [true, false, true] {
+            self.machine.chip_mut().set_pin(STOP, level);
+            self.pass(2e-4)?;
+            steps.push(self.word(self.symbols.step) == self.step + 1);
+        }
+        self.step += 1;
+        let entries = self.machine.chip().load.of(16 + 10).entries;
+        let shown = format!("woken at edges {steps:?}, {entries} interrupts of EXTI4");
+        self.row(
+            "EXTI",
+            "wait for a rising edge of PC4",
+            shown,
+            steps == [false, false, true] && entries == 1,
+        );
+        self.note_findings("GPIO, EXTI");
+        Ok(())
+    }
+
+    /// Complementary outputs: period, widths and gaps in clocks of the timer.
+    fn waveform(&mut self) -> Result<Option<[Ticks; 5]>, ToolError> {
+        self.machine.chip_mut().plant.axes[0].pin_changes = Some(Vec::new());
+        self.pass(3e-4)?;
+        let changes = self.machine.chip_mut().plant.axes[0].pin_changes.take().unwrap_or_default();
+        let changes: Vec<(Ticks, [bool; 2])> = changes.iter().map(|(at, pins)| (at / 2, pins[0])).collect();
+        let Some(first) = changes.iter().position(|(_, pins)| *pins == [true, false]) else {
+            return Ok(None);
+        };
+        // High side on, off, low side on, off, high side on.
+        let Some([on, off, low, end, again]) =
+            changes.get(first..first + 5).and_then(|five| five.first_chunk())
+        else {
+            return Ok(None);
+        };
+        let widths = [again.0 - on.0, off.0 - on.0, end.0 - low.0, low.0 - off.0, again.0 - end.0];
+        let order = [off, low, end, again].map(|(_, pins)| *pins);
+        let right = order == [[false; 2], [false, true], [false; 2], [true, false]];
+        Ok(right.then_some(widths))
+    }
+
+    fn bridge(&mut self) -> Result<(), ToolError> {
+        for (hz, dead, centred) in [(20_000, 100, false), (24_000, 300, true)] {
+            self.next(0.1, 0)?;
+            let widths = self.waveform()?;
+            let [top] = self.take().map(u64::from);
+            let (period, duty) = if centred { (2 * top, 2 * (top / 4)) } else { (top, top / 4) };
+            let expected = [period, duty - dead, period - duty - dead, dead, dead];
+            let alignment = if centred { "centre" } else { "edge" };
+            let told = format!("{alignment}-aligned {hz} Hz, duty 25 %, dead time {dead} clocks");
+            let shown = widths.map_or("no such outputs".into(), |[period, high, low, gap, other]| {
+                let hz = 168e6 / period as f64;
+                format!("{hz:.1} Hz; high {high}, low {low}, gaps {gap} and {other} clocks")
+            });
+            self.row("TIM1", &told, shown, widths == Some(expected));
+            let actual = 168e6 / period as f64;
+            let told = format!("at most {hz} Hz (\"rounds towards slower\")");
+            self.row("TIM1", &told, format!("{actual:.1} Hz"), actual <= f64::from(hz));
+            if centred {
+                self.explain(
+                    "driver: ARR is one too small, as a centre-aligned period is 2 ARR (RM0090 17.3.2)",
+                );
+            }
+        }
+        self.next(0.1, 0)?;
+        let duty = self.machine.chip().plant.brake;
+        self.row(
+            "TIM2",
+            "PB11 at 1 kHz, 30 %",
+            format!("brake at {:.2} %", 100.0 * duty),
+            (duty - 0.3).abs() < 1e-3,
+        );
+        self.note_findings("TIM1, TIM2");
+        Ok(())
+    }
+
+    fn analog(&mut self) -> Result<(), ToolError> {
+        self.next(0.1, 0)?;
+        // 12 bits over 3.3 V behind the board's divider.
+        let [short, long, sum] = self.take();
+        let read = f64::from(sum) / 16.0 * 3.3 / 4096.0 * 19.0;
+        let volt = self.machine.chip().plant.supply.voltage();
+        let code = u32::from(self.machine.chip().plant.thermistors[0]);
+        self.row(
+            "ADC1",
+            "mean of 16 codes of PA6",
+            format!("{read:.3} V of {volt:.3} V"),
+            (read - volt).abs() < 0.02,
+        );
+        self.row(
+            "ADC1",
+            "PC5 with 8 and 12 bits",
+            format!("{short} and {long} of {code}"),
+            long == code && short == code >> 4,
+        );
+        self.note_findings("ADC1");
+        Ok(())
+    }
+
+    fn gates(&mut self) -> Result<(), ToolError> {
+        self.next(0.1, 0)?;
+        let [answer, cycles] = self.take();
+        let frames = self.machine.chip().drivers.frames;
+        let shown = format!("{answer:#06x}, frames {frames:?}");
+        self.row(
+            "SPI3",
+            "control register 1 = 0x2a9, read back",
+            shown,
+            answer == 0x12A9 && frames == [3, 0],
+        );
+        // 42 MHz / 16 are the fastest clock up to 2.6 MHz by the driver's table.
+        let (taken, wire) = (f64::from(cycles) / CLOCK_HZ, 16.0 / 2.625e6);
+        let shown = format!("{:.2} us for {:.2} us on the wire", 1e6 * taken, 1e6 * wire);
+        self.row("SPI3", "16 bits at 2.6 MHz", shown, (wire..wire + 1e-6).contains(&taken));
+        self.note_findings("SPI3");
+        Ok(())
+    }
+
+    fn frames(&mut self) -> Result<(), ToolError> {
+        self.next(0.1, 0)?;
+        let can = &self.machine.chip().can;
+        let sent: Vec<Frame> = can.sent.iter().map(|(_, frame)| *frame).collect();
+        let texts: Vec<String> =
+            sent.iter().map(|frame| format!("{:x} {:x?}", frame.id(), frame.data())).collect();
+        let shown = format!("{} bit/s, {}", can.rate(), texts.join(", "));
+        let agrees =
+            sent == [Frame::new(0x123, &[1, 2, 3]), Frame::new(0x124, &[])] && can.rate() == 1_000_000;
+        self.row("CAN1", "1 Mbit/s, frames 123 with bytes 1, 2, 3 and 124", shown, agrees);
+        self.machine.chip_mut().send_frame(Frame::new(0x45A, &[9, 8, 7, 6, 5]));
+        self.next(0.1, 0)?;
+        let read: [u32; 4] = self.take();
+        let shown = format!("read {read:x?}");
+        self.row("CAN1", "frame 45a of 5 bytes from the partner", shown, read == [0x45A, 5, 0x0607_0809, 5]);
+        self.machine.chip_mut().can.connected = false;
+        self.machine.chip_mut().can.sent.clear();
+        self.next(0.1, 0)?;
+        let [repeated, error, replaced] = self.take();
+        self.row("CAN1", "error without a partner: not acknowledged", format!("kind {error}"), error == 1);
+        let told = "frame of an identifier that was sent before: accepted";
+        self.row("CAN1", told, format!("accepted {repeated}"), repeated == 1);
+        self.row(
+            "CAN1",
+            "50 replaces 300 of 300, 124, 100",
+            format!("{replaced:x} replaced"),
+            replaced == 0x300,
+        );
+        self.machine.chip_mut().can.connected = true;
+        self.pass(2e-3)?;
+        let sent: Vec<u16> = self.machine.chip().can.sent.iter().map(|(_, frame)| frame.id()).collect();
+        self.row("CAN1", "then 50, 100, 124 leave", format!("{sent:x?}"), sent == [0x50, 0x100, 0x124]);
+        self.note_findings("CAN1");
+        Ok(())
+    }
+
+    fn flash(&mut self) -> Result<(), ToolError> {
+        self.next(0.1, 0)?;
+        self.machine.chip_mut().flash.cells_mut()[128 * 1024..].fill(0);
+        self.next(5.0, 0)?;
+        let blank = self.machine.chip_mut().flash.cells_mut()[128 * 1024..].iter().all(|cell| *cell == 0xFF);
+        self.next(0.1, 0)?;
+        let [erase, read, write, outcomes] = self.take();
+        let cells = &self.machine.chip_mut().flash.cells_mut()[128 * 1024 + 0x40..][..16];
+        let words: Vec<u32> = cells
+            .chunks_exact(4)
+            .map(|cell| u32::from_le_bytes([cell[0], cell[1], cell[2], cell[3]]))
+            .collect();
+        let shown = format!("blank {blank}, {words:08x?}, outcomes {outcomes:05b}");
+        let agrees = blank && words == STORED && outcomes == 0b1_1111 && read == u32::MAX;
+        self.row("FLASH", "sector 11 erased, 4 words written and read", shown, agrees);
+        let [erase, write] = [erase, write].map(|cycles| f64::from(cycles) / CLOCK_HZ);
+        // DS8626 table 42: typical times; the driver erases by bytes and programs by words.
+        let shown = format!("{erase:.3} s, {:.1} us a word", 1e6 * write / 4.0);
+        let agrees = (2.0..2.01).contains(&erase) && (16e-6..20e-6).contains(&(write / 4.0));
+        self.row("FLASH", "erase by bytes 2 s, word 16 us", shown, agrees);
+        self.note_findings("FLASH");
+        Ok(())
+    }
+
+    fn watchdog(&mut self) -> Result<(), ToolError> {
+        self.next(0.1, 0)?;
+        let (saved, step) = (self.machine.save()?, self.step);
+        for (fed, told, expected) in
+            [(FED, "100 ms, started and fed", 0.1), (0, "100 ms, started without a feed", 0.512)]
+        {
+            self.machine.restore(&saved)?;
+            self.step = step;
+            self.next(0.1, fed)?;
+            let begun = self.machine.chip().now;
+            let end = self.pass(1.0)?;
+            let taken = seconds(self.machine.chip().now - begun);
+            let shown = format!("{end:?} after {:.2} ms", 1e3 * taken);
+            let is_right = end == End::Reset(ResetReason::Watchdog) && (taken - expected).abs() < 1e-3;
+            self.row("IWDG", told, shown, is_right && fed != 0);
+            if is_right {
+                self.explain(
+                    "driver: a start counts from 0xFFF, only a feed loads the reload value (RM0090 21.3)",
+                );
+            }
+        }
+        self.note_findings("IWDG");
+        Ok(())
+    }
+}
+
+/// Results of the processor's step in QEMU, read by its monitor. `None` without QEMU.
+fn emulated(path: &Path, symbols: Symbols) -> Result<Option<Vec<u32>>, ToolError> {
+    for wait in [1, 3, 10] {
+        let mut command = Command::new(EMULATOR);
+        command
+            .args(MACHINE.split(' '))
+            .arg(path)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null());
+        let Ok(mut emulator) = command.spawn() else { return Ok(None) };
+        std::thread::sleep(Duration::from_secs(wait));
+        let Symbols { step, results, .. } = symbols;
+        let asked = format!("xp /1xw {step:#x}\nxp /{WORDS}xw {results:#x}\nquit\n");
+        let failed = |error: std::io::Error| ToolError::input(format!("{EMULATOR}: {error}"));
+        if let Some(mut input) = emulator.stdin.take() {
+            input.write_all(asked.as_bytes()).map_err(failed)?;
+        }
+        let mut said = String::new();
+        if let Some(mut output) = emulator.stdout.take() {
+            output.read_to_string(&mut said).map_err(failed)?;
+        }
+        emulator.wait().map_err(failed)?;
+        let words = words(&said);
+        if words.len() == 1 + WORDS && words[0] == 1 {
+            return Ok(Some(words[1..].to_vec()));
+        }
+    }
+    Err(ToolError::input(format!("{EMULATOR} does not reach the end of the processor's step")))
+}
+
+/// Words of a dump: lines `address: 0x... 0x...`.
+fn words(said: &str) -> Vec<u32> {
+    let lines = said.lines().filter_map(|line| line.split_once(": 0x"));
+    let texts = lines.flat_map(|(_, rest)| rest.split_whitespace());
+    texts.filter_map(|text| u32::from_str_radix(text.trim_start_matches("0x"), 16).ok()).collect()
+}
