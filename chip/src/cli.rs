@@ -454,10 +454,10 @@ fn run_drivers(arguments: &DriverArguments) -> Result<bool, ToolError> {
     let rows = drivers::check(&built)?;
     println!(
         "{:<10} | {:<56} | {:<56} | verdict",
-        "peripheral", "what the driver was told", "what the model shows"
+        "peripheral", "what the driver was asked for", "what the model shows"
     );
     for row in &rows {
-        println!("{:<10} | {:<56} | {:<56} | {}", row.peripheral, row.told, row.shown, row.verdict());
+        println!("{:<10} | {:<56} | {:<56} | {}", row.peripheral, row.asked, row.shown, row.verdict());
     }
     write(arguments.json.as_deref(), &rows)?;
     Ok(rows.iter().all(drivers::Row::is_sound))

@@ -9,7 +9,7 @@
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -49,8 +49,8 @@ const CLOCK_HZ: f64 = 168e6;
 pub struct Row {
     /// Peripheral.
     pub peripheral: &'static str,
-    /// What the driver was told.
-    pub told: String,
+    /// What the driver was asked for.
+    pub asked: String,
     /// What the model shows.
     pub shown: String,
     /// Whether both agree.
@@ -85,7 +85,7 @@ pub fn build() -> Result<PathBuf, ToolError> {
 /// Runs the program and compares.
 ///
 /// # Errors
-/// The program does not reach a step, or the model does not know what the processor does.
+/// The program cannot be read or lacks a symbol, or the model does not know what the processor does.
 pub fn check(path: &Path) -> Result<Vec<Row>, ToolError> {
     let mut check = Check::new(path)?;
     if let Err(error) = check.run(path) {
@@ -178,8 +178,8 @@ impl Check {
         self.machine.run(self.machine.chip().now + ticks(duration))
     }
 
-    fn row(&mut self, peripheral: &'static str, told: &str, shown: String, agrees: bool) {
-        self.rows.push(Row { peripheral, told: told.to_owned(), shown, agrees, reason: None });
+    fn row(&mut self, peripheral: &'static str, asked: &str, shown: String, agrees: bool) {
+        self.rows.push(Row { peripheral, asked: asked.to_owned(), shown, agrees, reason: None });
     }
 
     /// Gives the last row's reason, if it differs.
@@ -199,8 +199,8 @@ impl Check {
             .collect();
         self.findings += texts.len();
         if !texts.is_empty() {
-            let told = format!("{peripheral}: registers as silicon allows");
-            self.row("findings", &told, texts.join("; "), false);
+            let asked = format!("{peripheral}: registers as silicon allows");
+            self.row("findings", &asked, texts.join("; "), false);
         }
     }
 
@@ -208,6 +208,9 @@ impl Check {
         self.next(0.1, 0)?;
         let words: [u32; WORDS] = self.take();
         self.results = self.word(self.symbols.count);
+        if self.results as usize > WORDS {
+            return Err(ToolError::input(format!("{} results, room for {WORDS}", self.results)));
+        }
         let (count, expected) = (self.results as usize, [computation::integers(), computation::floats()]);
         let shown = format!("{:08x?}, host {expected:08x?}", &words[..2]);
         self.row("processor", "integers and floats", shown, words[..2] == expected);
@@ -228,18 +231,18 @@ impl Check {
 
     fn clocks(&mut self) -> Result<(), ToolError> {
         self.next(0.1, 0)?;
-        let told = self.take::<5>().map(u64::from);
+        let asked = self.take::<5>().map(u64::from);
         let rcc = &self.machine.chip().rcc;
         let timer = |bus| TICK_HZ / rcc.timer_cycle(bus);
         let shown = [rcc.processor_hz(), rcc.bus_hz(1), rcc.bus_hz(2), timer(1), timer(2)];
         let mhz = |hz: [u64; 5]| hz.map(|hz| format!("{}", hz as f64 * 1e-6)).join(", ");
-        self.row("RCC", &format!("{} MHz", mhz(told)), format!("{} MHz", mhz(shown)), told == shown);
-        for (told, expected) in [("block_for 10 ms on TIM4", 10e-3), ("Timer::after 5 ms on TIM4", 5e-3)] {
+        self.row("RCC", &format!("{} MHz", mhz(asked)), format!("{} MHz", mhz(shown)), asked == shown);
+        for (asked, expected) in [("block_for 10 ms on TIM4", 10e-3), ("Timer::after 5 ms on TIM4", 5e-3)] {
             let [cycles] = self.take();
             let taken = f64::from(cycles) / CLOCK_HZ;
             // Up to a tick of 1 us earlier or later, and some hundred instructions.
             let agrees = (expected - 1e-6..expected + 12e-6).contains(&taken);
-            self.row("time", told, format!("{:.4} ms by the cycle counter", 1e3 * taken), agrees);
+            self.row("time", asked, format!("{:.4} ms by the cycle counter", 1e3 * taken), agrees);
         }
         self.note_findings("RCC");
         Ok(())
@@ -252,16 +255,16 @@ impl Check {
         let levels = [('A', 0), ('A', 1)].map(|pin| gpio.level(pin));
         let expected = [Mode::Output, Mode::Output, Mode::Analog, Mode::Input];
         let shown = format!("{modes:?}, PA0 {}, PA1 {}", levels[0], levels[1]);
-        let told = "PA0 high, PA1 open and pulled up, PA15 dropped, PB2 input";
-        self.row("GPIO", told, shown, modes == expected && levels == [true; 2]);
+        let asked = "PA0 high, PA1 open and pulled up, PA15 dropped, PB2 input";
+        self.row("GPIO", asked, shown, modes == expected && levels == [true; 2]);
         let chip = self.machine.chip_mut();
         chip.set_pin(('B', 2), true);
         chip.set_pin(('A', 1), false);
         self.next(0.1, 0)?;
         let [levels] = self.take();
         // Open drain: low while driven, then as the outside.
-        let told = "pulled up 1, down 0, PB2 0 then 1, PA1 0 then 0 from outside, PA0 set 1";
-        self.row("GPIO", told, format!("read {levels:07b} from the last"), levels == 0b100_1001);
+        let asked = "pulled up 1, down 0, PB2 0 then 1, PA1 0 then 0 from outside, PA0 set 1";
+        self.row("GPIO", asked, format!("read {levels:07b} from the last"), levels == 0b100_1001);
         self.machine.set_memory(self.symbols.go, &self.step.to_le_bytes());
         let mut steps = Vec::new();
         for level in [true, false, true] {
@@ -311,16 +314,16 @@ impl Check {
             let (period, duty) = if centred { (2 * top, 2 * (top / 4)) } else { (top, top / 4) };
             let expected = [period, duty - dead, period - duty - dead, dead, dead];
             let alignment = if centred { "centre" } else { "edge" };
-            let told = format!("{alignment}-aligned {hz} Hz, duty 25 %, dead time {dead} clocks");
+            let asked = format!("{alignment}-aligned {hz} Hz, duty 25 %, dead time {dead} clocks");
             let shown = widths.map_or("no such outputs".into(), |[period, high, low, gap, other]| {
                 let hz = 168e6 / period as f64;
                 format!("{hz:.1} Hz; high {high}, low {low}, gaps {gap} and {other} clocks")
             });
-            self.row("TIM1", &told, shown, widths == Some(expected));
-            let actual = 168e6 / period as f64;
-            let told = format!("at most {hz} Hz (\"rounds towards slower\")");
-            self.row("TIM1", &told, format!("{actual:.1} Hz"), actual <= f64::from(hz));
-            if centred {
+            self.row("TIM1", &asked, shown, widths == Some(expected));
+            let actual = widths.map_or(0.0, |[period, ..]| 168e6 / period as f64);
+            let asked = format!("at most {hz} Hz (\"rounds towards slower\")");
+            self.row("TIM1", &asked, format!("{actual:.1} Hz"), actual <= f64::from(hz));
+            if centred && widths == Some(expected) && actual < 1.001 * f64::from(hz) {
                 self.explain(
                     "driver: ARR is one too small, as a centre-aligned period is 2 ARR (RM0090 17.3.2)",
                 );
@@ -400,8 +403,8 @@ impl Check {
         self.next(0.1, 0)?;
         let [repeated, error, replaced] = self.take();
         self.row("CAN1", "error without a partner: not acknowledged", format!("kind {error}"), error == 1);
-        let told = "frame of an identifier that was sent before: accepted";
-        self.row("CAN1", told, format!("accepted {repeated}"), repeated == 1);
+        let asked = "frame of an identifier that was sent before: accepted";
+        self.row("CAN1", asked, format!("accepted {repeated}"), repeated == 1);
         self.row(
             "CAN1",
             "50 replaces 300 of 300, 124, 100",
@@ -443,7 +446,7 @@ impl Check {
     fn watchdog(&mut self) -> Result<(), ToolError> {
         self.next(0.1, 0)?;
         let (saved, step) = (self.machine.save()?, self.step);
-        for (fed, told, expected) in
+        for (fed, asked, expected) in
             [(FED, "100 ms, started and fed", 0.1), (0, "100 ms, started without a feed", 0.512)]
         {
             self.machine.restore(&saved)?;
@@ -454,7 +457,7 @@ impl Check {
             let taken = seconds(self.machine.chip().now - begun);
             let shown = format!("{end:?} after {:.2} ms", 1e3 * taken);
             let is_right = end == End::Reset(ResetReason::Watchdog) && (taken - expected).abs() < 1e-3;
-            self.row("IWDG", told, shown, is_right && fed != 0);
+            self.row("IWDG", asked, shown, is_right && fed != 0);
             if is_right {
                 self.explain(
                     "driver: a start counts from 0xFFF, only a feed loads the reload value (RM0090 21.3)",
@@ -480,21 +483,29 @@ fn emulated(path: &Path, symbols: Symbols) -> Result<Option<Vec<u32>>, ToolError
         std::thread::sleep(Duration::from_secs(wait));
         let Symbols { step, results, .. } = symbols;
         let asked = format!("xp /1xw {step:#x}\nxp /{WORDS}xw {results:#x}\nquit\n");
-        let failed = |error: std::io::Error| ToolError::input(format!("{EMULATOR}: {error}"));
-        if let Some(mut input) = emulator.stdin.take() {
-            input.write_all(asked.as_bytes()).map_err(failed)?;
-        }
-        let mut said = String::new();
-        if let Some(mut output) = emulator.stdout.take() {
-            output.read_to_string(&mut said).map_err(failed)?;
-        }
-        emulator.wait().map_err(failed)?;
+        let said = ask(&mut emulator, &asked);
+        // Still running only after an error.
+        let _ = emulator.kill();
+        let _ = emulator.wait();
+        let said = said.map_err(|error| ToolError::input(format!("{EMULATOR}: {error}")))?;
         let words = words(&said);
         if words.len() == 1 + WORDS && words[0] == 1 {
             return Ok(Some(words[1..].to_vec()));
         }
     }
     Err(ToolError::input(format!("{EMULATOR} does not reach the end of the processor's step")))
+}
+
+/// Sends commands to the emulator's monitor and returns all that it prints.
+fn ask(emulator: &mut Child, commands: &str) -> std::io::Result<String> {
+    if let Some(mut input) = emulator.stdin.take() {
+        input.write_all(commands.as_bytes())?;
+    }
+    let mut said = String::new();
+    if let Some(mut output) = emulator.stdout.take() {
+        output.read_to_string(&mut said)?;
+    }
+    Ok(said)
 }
 
 /// Words of a dump: lines `address: 0x... 0x...`.

@@ -25,8 +25,9 @@ const LEVELS: [(&str, u8); 7] = [
 ];
 /// Longest time that is watched, s.
 const LONGEST_S: f64 = 0.2;
-/// Longest time of the watchdog, s, at 17 kHz of its oscillator (RM0090 21; the catalogue's K3).
-const WATCHDOG_S: f64 = 31e-3;
+/// Clocks of the oscillator from a feed to the reset, and longest time between two feeds, ms.
+const WATCHDOG_CLOCKS: f64 = 512.0;
+const FEEDING_MS: f64 = 4.0;
 
 /// Hang of one level.
 #[derive(Clone, Debug, Serialize)]
@@ -37,6 +38,8 @@ pub struct HangReport {
     pub released_ms: Option<f64>,
     /// Time until the watchdog's reset, ms; `None` if none came.
     pub reset_ms: Option<f64>,
+    /// Longest time until the reset with this oscillator, ms.
+    pub longest_ms: f64,
     /// A bridge went on again after the first release and before the reset.
     pub on_again: bool,
 }
@@ -45,9 +48,11 @@ impl HangReport {
     /// Whether the board was reset in time with its bridges off, or went on if only the thread hung.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        let in_time = |time: Option<f64>| time.is_some_and(|ms| ms <= 1e3 * WATCHDOG_S);
-        let is_reset = in_time(self.reset_ms) && in_time(self.released_ms);
-        !self.on_again && (is_reset || self.level == "thread" && self.reset_ms.is_none())
+        if self.level == "thread" {
+            return self.reset_ms.is_none() && self.released_ms.is_none() && !self.on_again;
+        }
+        let in_time = |time: Option<f64>| time.is_some_and(|ms| ms <= self.longest_ms);
+        in_time(self.reset_ms) && in_time(self.released_ms) && !self.on_again
     }
 }
 
@@ -99,6 +104,7 @@ fn hang(
         level,
         released_ms: released.map(since),
         reset_ms: (end == End::Reset(ResetReason::Watchdog)).then(|| since(reset)),
+        longest_ms: FEEDING_MS + 1e3 * WATCHDOG_CLOCKS / oscillator_hz as f64 + 0.1,
         on_again,
     })
 }

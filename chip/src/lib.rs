@@ -17,6 +17,7 @@
 //! | [`rtt`] | records of the image, as a debug probe reads them |
 //! | [`session`] | an operator at the contacts: calibrate, reference, enable, identify |
 //! | [`report`] | results as JSON |
+//! | [`situations`] | the processor's load, from idle to a host at 1 kHz |
 //! | [`stops`], [`sampling`] | emergency stops over the PWM period; sampling instants |
 //! | [`store_cuts`], [`hangs`] | power cuts within flash operations; levels that hang |
 //! | [`faults`] | rows of the fault catalogue |

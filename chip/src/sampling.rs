@@ -25,21 +25,27 @@ pub struct SamplingReport {
     pub disturbed: usize,
 }
 
-/// Documented instant of the trigger after the middle (docs/motor.md), and a clock of the timer, ns.
+/// Documented instant of the trigger after the middle (docs/motor.md), three clocks of the converter until it
+/// holds, and a clock of the timer, ns.
 const TRIGGER_NS: f64 = 119.0;
+const SAMPLING_NS: f64 = 3e9 / 21e6;
 const CLOCK_NS: f64 = 6.0;
 
 impl SamplingReport {
     /// Whether every conversion began at the documented instant, without an edge of the other bridge before.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        let is_right = |at: &f64| (at - TRIGGER_NS).abs() < CLOCK_NS;
-        self.conversions > 0 && self.disturbed == 0 && self.trigger_ns.iter().all(is_right)
+        let are_right =
+            |times: [f64; 2], expected: f64| times.iter().all(|at| (at - expected).abs() < CLOCK_NS);
+        self.conversions > 0
+            && self.disturbed == 0
+            && are_right(self.trigger_ns, TRIGGER_NS)
+            && are_right(self.hold_ns, TRIGGER_NS + SAMPLING_NS)
     }
 }
 
-fn nanoseconds(ticks: Ticks) -> f64 {
-    1e9 * ticks as f64 / TICK_HZ as f64
+fn nanoseconds(difference: Ticks) -> f64 {
+    1e9 * difference.cast_signed() as f64 / TICK_HZ as f64
 }
 
 /// Measures for a time, s.
@@ -60,15 +66,18 @@ pub fn measure(
 fn report(situation: &'static str, axis: usize, samplings: &[Sampling]) -> SamplingReport {
     let own: Vec<&Sampling> = samplings.iter().filter(|sampling| sampling.axis == axis).collect();
     let range = |of: fn(&Sampling) -> Ticks| {
-        let values = own.iter().map(|sampling| nanoseconds(of(sampling)));
-        values.fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], value| [low.min(value), high.max(value)])
+        // Negative before the middle.
+        let values = own.iter().map(|sampling| nanoseconds(of(sampling).wrapping_sub(sampling.middle)));
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value: f64| {
+            [low.min(value), high.max(value)]
+        })
     };
     SamplingReport {
         situation,
         axis,
         conversions: own.len(),
-        trigger_ns: range(|sampling| sampling.trigger - sampling.middle),
-        hold_ns: range(|sampling| sampling.hold - sampling.middle),
+        trigger_ns: range(|sampling| sampling.trigger),
+        hold_ns: range(|sampling| sampling.hold),
         disturbed: own.iter().filter(|sampling| sampling.edges > 0).count(),
     }
 }

@@ -1,6 +1,7 @@
 //! The processor's load in each situation of operation, from start to a host that moves the leg.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use scarab::bus::Frame;
 use scarab_host::base::error::ToolError;
@@ -12,11 +13,13 @@ use crate::time::ticks;
 
 /// Duration of a situation that does not end by itself, s.
 const MEASURED_S: f64 = 1.0;
-/// Cycle of the host, s, and of its other frames on the wire.
+/// Cycle of the host, s.
 const CYCLE_S: f64 = 1e-3;
+/// Cycles before the measurement.
+const LEAD: u32 = 100;
 /// Times per cycle at which the wire is filled.
 const FILLINGS: i32 = 8;
-/// Way of the targets to either side, increments of 6064, and its frequency, Hz.
+/// Amplitude of the targets, increments of 6064, and frequency, Hz.
 const WAY: f64 = 20_000.0;
 const MOTION_HZ: f64 = 0.5;
 /// Bit of a COB-ID that disables its PDO.
@@ -36,7 +39,7 @@ pub struct Situation {
     pub load: LoadReport,
     /// Use by interrupt.
     pub interrupts: BTreeMap<&'static str, InterruptReport>,
-    /// Instructions by level and function, most first, if they were counted.
+    /// Instructions by exception and function, most first, if they were counted.
     #[serde(skip)]
     pub profile: Vec<(u8, String, u64)>,
 }
@@ -68,9 +71,9 @@ pub fn run(session: &mut Session, profiled: bool) -> Result<Vec<Situation>, Tool
 
     let start = take_over(session)?;
     // The first cycles bring the leg into the motion.
-    follow(session, start, 0.1)?;
+    follow(session, start, 0..LEAD)?;
     begin(session, profiled);
-    follow(session, start, MEASURED_S)?;
+    follow(session, start, LEAD..LEAD + (MEASURED_S / CYCLE_S) as u32)?;
     end(session, "following", &mut found);
     Ok(found)
 }
@@ -149,10 +152,10 @@ fn reach(session: &mut Session, node: u16, state: u32) -> Result<(), ToolError> 
 }
 
 /// Sends SYNC and targets at 1 kHz; frames for others fill the rest of the wire.
-fn follow(session: &mut Session, start: [i32; 2], duration: f64) -> Result<(), ToolError> {
+fn follow(session: &mut Session, start: [i32; 2], cycles: Range<u32>) -> Result<(), ToolError> {
     session.machine.chip_mut().can.sent.clear();
-    let cycles = (duration / CYCLE_S) as u32;
-    for cycle in 0..cycles {
+    let expected = 2 * cycles.len();
+    for cycle in cycles {
         let time = f64::from(cycle) * CYCLE_S;
         let offset = WAY * (1.0 - (std::f64::consts::TAU * MOTION_HZ * time).cos());
         let mut targets = [0; 8];
@@ -173,8 +176,8 @@ fn follow(session: &mut Session, start: [i32; 2], duration: f64) -> Result<(), T
     }
     let sent = &session.machine.chip().can.sent;
     let feedback = sent.iter().filter(|(_, frame)| frame.id() & !3 == 0x180).count();
-    if feedback as u32 + 4 < 2 * cycles {
-        return Err(ToolError::Refused(format!("{feedback} of {} feedback frames came", 2 * cycles)));
+    if feedback + 4 < expected {
+        return Err(ToolError::Refused(format!("{feedback} of {expected} feedback frames came")));
     }
     Ok(())
 }

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Each folder uses only those above it; `tests/structure` enforces the order. Inside this module an item is
-//! named by its folder. Other modules take it from here.
+//! named by its folder. Other modules use the re-exports below where one exists.
 //!
 //! All code is generic over the scalar: the board runs it in `f32`, tests check it in `f64`.
 

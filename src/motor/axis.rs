@@ -19,16 +19,16 @@
 //! | encoder step that no motor makes | second in a row |
 //! | shunt code constant while its phase's target changes ([`ShuntWatch`]) | fourth tick |
 //! | current offset wrong at enabling ([`ShuntWatch`]) | not enabled |
-//! | two wrong index pulses at one position, or none for over two turns (`index.rs`) | next joint sample |
+//! | two wrong index pulses at one position, or none for over two turns (`index.rs`) | next check |
 //!
 //! During one tick of tolerance the previous tick's duties are repeated. A single implausible encoder step
 //! marks the joint sample as doubtful; three within 10 ms are a fault of the servo (`safety::Monitor`). The
 //! index is also checked while the outputs are off. Outputs stay off until [`Axis::clear_fault`]; with a lost
 //! rotor position the motor brakes instead, unless the outputs are requested off.
 //!
-//! Once per joint sample the voltages are compared with currents and speed ([`ModelWatch`]). An open phase
-//! and a drifted current-sensor offset turn the outputs off. A frozen counter turns the motor into a passive
-//! brake ([`Axis::brake`]), so that a leg does not drop when its encoder fails.
+//! Once per servo period ([`Axis::check`]) voltages are compared with currents and speed ([`ModelWatch`]). An
+//! open phase and a drifted current-sensor offset turn the outputs off. A frozen counter turns the motor into
+//! a passive brake ([`Axis::brake`]), so that a leg does not drop when its encoder fails.
 //!
 //! **Limit of braking.** A shorted motor carries `w flux / sqrt(R^2 + w^2 L^2)`. The outputs go off with an
 //! overcurrent fault where that exceeds the overcurrent bound, or where the measured current does. On the
@@ -93,7 +93,7 @@ pub struct Axis {
     shunt_watch: ShuntWatch,
     /// Checksum of the constants at construction.
     checksum: Checksum,
-    /// Joint samples since the last check of that checksum; wraps at 256.
+    /// Calls of [`Axis::check`] since that checksum was compared; wraps at 256.
     unchecked: u8,
     last: AxisCommand,
     doubtful: bool,

@@ -14,7 +14,7 @@
 //! 0.25 ms, or six periods. The limit of 0.95 is the greatest duty that ODrive's firmware allows the
 //! resistor. A bus voltage that is not finite gives duty 0; the axes turn off on it.
 //! Source: the ramp of ODrive v0.5.6 (`dc_bus_overvoltage_ramp`).
-//! Cost: 4 operations.
+//! Cost: one comparison below the ramp.
 
 use super::SenseScale;
 use crate::hal::CURRENT_RATE_HZ;
@@ -48,7 +48,7 @@ impl Chopper {
         if bus.0 > self.begin.0 { self.ramp(bus) } else { 0.0 }
     }
 
-    /// Duty above the ramp's begin; seldom needed.
+    /// Duty above `begin`.
     #[cold]
     #[inline(never)]
     fn ramp(&self, bus: Volt) -> f32 {
@@ -84,7 +84,7 @@ impl BrakeBudget {
     /// Returns the duty the resistor may have in a current tick, and subtracts it from the budget.
     #[must_use]
     pub fn spend(&mut self, wanted: f32) -> f32 {
-        // Nearly always.
+        // Usual case: a full budget and no demand.
         if wanted == 0.0 && self.left_s == Self::WHOLE_S {
             return 0.0;
         }

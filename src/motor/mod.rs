@@ -8,7 +8,7 @@
 //! | part | what it is |
 //! | --- | --- |
 //! | [`Phases`], [`Stationary`], [`Rotating`] | Clarke and Park as types |
-//! | [`ElectricalAngle`], [`SpeedTracker`] | counts to angle and speed; fast and exact sine |
+//! | [`ElectricalAngle`], [`SpeedTracker`] | counts to angle and speed; sine and cosine |
 //! | [`SenseScale`] | two shunt codes to a current vector, or an error at the rails |
 //! | [`CurrentLoop`] | PI in d and q, feedforward, voltage limit, anti-windup |
 //! | [`Modulator`] | space vectors, sampling window for the shunts, dead time |

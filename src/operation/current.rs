@@ -7,7 +7,8 @@
 //! A bridge switches only for an axis with a calibration (or under calibration), with a target of the servo,
 //! while the inhibit word is clear and the servo answers. The stop's interrupt may come between any two
 //! instructions of a tick. So the inhibit word is read again, with interrupts masked, at the moment of
-//! enabling the outputs ([`apply`]).
+//! enabling the outputs ([`apply`]). Three ticks after each joint sample an axis checks itself
+//! ([`Axis::check`](crate::motor::Axis::check)).
 //!
 //! While the flash is written ([`Cause::Storing`]) nothing switches, not even the brake resistor, and the
 //! processor may stall. The joints' motion during an erasure is unknown, so their zeros are discarded and the
@@ -191,6 +192,7 @@ impl<const N: usize> CurrentLoops<N> {
         if let Some(ticks) = signals.statistics.current_ticks.get(axis) {
             ticks.count();
         }
+        // Both axes see the same reading.
         if axis == 0 {
             signals.statistics.see_bus(tick.sample.bus_code);
         }

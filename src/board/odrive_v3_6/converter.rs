@@ -12,7 +12,7 @@ const ADC3: u32 = BASES[2];
 #[inline(always)]
 pub fn finished() -> [Option<bool>; 2] {
     let seen = ends();
-    // Both converters end in the same cycle, which may lie between the loads.
+    // Both converters end in the same cycle. If it lies between the two loads, a second look shows both.
     let seen = if seen[0] == seen[1] { [seen[0]; 2] } else { ends_again() };
     let any = seen[0] | seen[1];
     store(ADC2 + SR, cleared(any));
@@ -26,7 +26,7 @@ fn ends() -> [u32; 2] {
     [load(ADC2 + SR) & ENDS, load(ADC3 + SR) & ENDS]
 }
 
-/// Ends some cycles later; they still differ only if a converter is silent.
+/// Reads the ends again. They still differ only if a converter is silent.
 #[cold]
 #[inline(never)]
 fn ends_again() -> [u32; 2] {

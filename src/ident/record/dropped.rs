@@ -1,6 +1,6 @@
 //! Columns of a record that are held at zero, and the chi-square that each candidate explains.
 //!
-//! [`crate::ident::solve::selection`] decides; the record only keeps the decisions.
+//! [`crate::ident::solve::selection`] decides; the record only stores the decisions.
 
 use super::row_model::RowModel;
 use crate::model::Parameter;

@@ -8,7 +8,7 @@
 //! | `search` | beetle swarm in the box | |
 //! | `constrained` | least squares in the box: the swarm's reference | Stark and Parker 1995 |
 //! | `completion` | fourteen parameters of every joint in closed form, each with its status | |
-//! | `consistent` | the nearest leg that can exist | Nesterov and Nemirovskii 1994 |
+//! | `consistent` | the nearest physically consistent leg | Nesterov and Nemirovskii 1994 |
 //! | `scale` | torque constants from two records, without and with a known mass | Gautier and Briot 2014 |
 //! | `solver` | one identification with all these steps, in slices | |
 

@@ -23,7 +23,7 @@ use crate::motor::calibration::INDEX_WIDTH;
 
 /// The capturing interrupt may be late by a PWM period divided by this: 10 us.
 const LATENCY: i32 = 4;
-/// Joint samples within two counts after which the rotor counts as resting: 4 ms.
+/// Checks within two counts after which the rotor counts as resting: 4 ms.
 const REST_SAMPLES: u8 = 16;
 
 /// An index pulse, or the position where wrong ones are expected.
@@ -72,7 +72,7 @@ impl IndexWatch {
         }
     }
 
-    /// Whether the rotor position is lost. Called with each joint sample; `longest` counts may pass without a
+    /// Whether the rotor position is lost. Called once per servo period; `longest` counts may pass without a
     /// right pulse.
     pub(super) fn is_lost(&mut self, counts: i32, scale: &CountScale, longest: u32) -> bool {
         let since = |at: i32| counts.wrapping_sub(at).unsigned_abs();

@@ -140,6 +140,19 @@ fn tick_at(now: u32, sample: AxisSample) -> Tick {
 }
 
 #[test]
+fn an_axis_checks_itself_in_every_servo_period() {
+    let mut bench = Bench::new(&CONFIGURATION);
+    bench.run(TICKS_PER_SERVO);
+    bench.loops.axis_state_mut(1).and_then(AxisState::axis_mut).expect("running").upset(0, 3);
+    // The checksum of the constants is compared in every 256th check.
+    bench.run(256 * TICKS_PER_SERVO);
+    let is_seen = |(axis, outcome): &(usize, Outcome)| {
+        *axis == 1 && matches!(outcome, Outcome::Fault { fault: AxisFault::Parameters, .. })
+    };
+    assert!(bench.outcomes.iter().any(is_seen), "{:?}", bench.outcomes);
+}
+
+#[test]
 fn the_brake_resistor_has_no_duty_while_the_flash_is_written() {
     let mut bench = Bench::new(&CONFIGURATION);
     for motor in &mut bench.motors {

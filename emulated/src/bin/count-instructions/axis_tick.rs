@@ -97,7 +97,7 @@ fn ticks(motor: &mut Motor, configuration: &AxisConfiguration, calibration: &Cal
         hprintln!("{:<41} {:>6} {:>8} {:>8}", "axis tick at rad/s", speed as i32, tally.mean(), tally.most());
         all.add(&tally);
     }
-    check.print("model of voltages, once per 4 kHz tick");
+    check.print("checks of voltages and index, once per 4 kHz tick");
     joint.print("joint sample, once per 4 kHz tick");
     Some(all)
 }

@@ -47,7 +47,7 @@ fn main() -> ! {
     steps::run(core)
 }
 
-/// Tells the check that a step is done, and waits for its release, which is returned.
+/// Reports a finished step and waits for its release, which is returned.
 fn reach() -> u32 {
     let step = 1 + DRIVERS_STEP.fetch_add(1, Relaxed);
     loop {

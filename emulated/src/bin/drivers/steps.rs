@@ -236,7 +236,7 @@ async fn frames(mut bus: Can<'_>) {
     reach();
 }
 
-/// Nobody acknowledges: an error is reported; a more urgent frame replaces the least urgent of three.
+/// No node acknowledges: an error is reported; a more urgent frame replaces the least urgent of three.
 async fn alone(bus: &mut Can<'_>) {
     bus.write(&frame(0x300, &[])).await;
     // The second mailbox sent a frame with this identifier before and is empty.

@@ -72,8 +72,10 @@ fn run(
     for period in 0..PERIODS {
         command = axis.tick(&sample(period, &command), asked(period));
         commands.push(command);
-        if (period + 1).is_multiple_of(PERIODS_PER_TICK as usize) {
+        if (period + 1) % PERIODS_PER_TICK as usize == PERIODS_PER_TICK as usize / 2 {
             axis.check();
+        }
+        if (period + 1).is_multiple_of(PERIODS_PER_TICK as usize) {
             joint.push(axis.joint_sample());
         }
     }

@@ -56,7 +56,7 @@ macro_rules! adc {
 }
 
 /// Turns all converters on and sets channels and sequences; nothing triggers them yet. Settling takes 3 us.
-pub const CONVERTERS: [Write; 19] = [
+pub const CONVERTERS: [Write; 20] = [
     Write::whole("ADC_CCR", COMMON, 0b01 << 16),
     // Scan mode: four injected conversions per trigger.
     adc!(1, "CR1", 0x04, 1 << 8),
@@ -70,6 +70,7 @@ pub const CONVERTERS: [Write; 19] = [
     adc!(2, "SQR1", 0x2C, 0),
     adc!(2, "SQR3", 0x34, SHUNTS[1][0]),
     adc!(2, "CR2", 0x08, ON),
+    adc!(2, "SR", SR, 0),
     adc!(3, "CR1", 0x04, INTERRUPTS),
     adc!(3, "SMPR1", 0x0C, 0),
     adc!(3, "JSQR", 0x38, SHUNTS[0][1] << 15),

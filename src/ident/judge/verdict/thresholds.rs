@@ -46,7 +46,8 @@ pub struct Thresholds<T> {
     pub smallest_dynamic_share: T,
     /// Tolerated relative error of a link's length, whatever its significance.
     pub largest_length_error: T,
-    /// Tolerated error of an encoder's zero, rad, whatever its significance.
+    /// Tolerated error of an encoder's zero, rad, whatever its significance: 2 degrees, as a pose that is
+    /// aligned by hand.
     pub largest_zero_error: T,
     /// Longest error in all joints at once, s: a push lasts half a second, a step on the floor longer.
     pub longest_disturbance_s: T,
@@ -73,7 +74,7 @@ impl<T: Real> Default for Thresholds<T> {
             largest_uncertainty_share: T::of(0.3),
             smallest_dynamic_share: T::of(0.02),
             largest_length_error: T::of(0.03),
-            largest_zero_error: T::of(0.026),
+            largest_zero_error: T::of(0.035),
             longest_disturbance_s: T::of(1.0),
             largest_replaced_share: T::of(0.1),
             largest_disturbed_share: T::of(1.0 / 3.0),
