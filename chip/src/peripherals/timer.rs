@@ -717,6 +717,11 @@ impl Timer {
             access.refuse("locked bits written", self.named("BDTR"));
         }
         self.bdtr = value & !locked | self.bdtr & locked;
+        // Silicon obeys; a half-bridge behind the pins would not survive it.
+        let pairs = self.ccer & self.ccer >> 2 & 0x111;
+        if self.bdtr & MOE != 0 && self.bdtr & 0xFF == 0 && pairs != 0 {
+            access.refuse("complementary outputs enabled without dead time", self.named("BDTR"));
+        }
     }
 }
 
@@ -860,6 +865,11 @@ mod tests {
     #[test]
     fn locked_bits_reserved_bits_and_a_running_counter_are_protected() {
         let mut bench = Bench::new(Kind::Advanced);
+        bench.write(0, CCER, 0b101);
+        bench.write(0, BDTR, MOE | 20);
+        assert!(!bench.findings.has("complementary outputs enabled without dead time"));
+        bench.write(0, BDTR, MOE);
+        assert!(bench.findings.has("complementary outputs enabled without dead time"));
         bench.write(0, BDTR, 1 << 8 | 20);
         bench.write(0, BDTR, 1 << 8 | 30);
         assert_eq!(bench.timer.main_output() & 0xFF, 20);

@@ -21,11 +21,11 @@ impl Bench {
                 if tick == 2 {
                     self.axis.check();
                 }
+                if let Some(fault) = self.axis.fault() {
+                    return Some((period, fault));
+                }
             }
             let _ = self.axis.joint_sample();
-            if let Some(fault) = self.axis.fault() {
-                return Some((period, fault));
-            }
         }
         None
     }
