@@ -26,6 +26,9 @@ const DAMPING_S: f64 = 0.35;
 /// PWM period, s.
 const PERIOD_S: f64 = 1.0 / 24e3;
 
+/// Exception of the servo.
+const SERVO: u8 = 16 + 77;
+
 /// Situation in which a fault comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Situation {
@@ -68,7 +71,7 @@ fn shunt(random: &mut Xoshiro256PlusPlus) -> (usize, usize) {
     (axis(random), random.next_u32() as usize % 2)
 }
 
-const ROWS: [Row; 17] = [
+const ROWS: [Row; 20] = [
     Row {
         id: "E1",
         fault: "encoder frozen in motion",
@@ -217,6 +220,43 @@ const ROWS: [Row; 17] = [
             session.machine.chip_mut().set_pin(STOP, !bounces || count % 7 < 3);
             bounces
         }),
+    },
+    Row {
+        id: "X3",
+        fault: "supply cut in motion, then back: starts off",
+        situation: Situation::Motion,
+        expected: Expected::Released,
+        // The cut itself comes a period after the beginning.
+        deadline_s: 2.0 * PERIOD_S,
+        inject: |_, _| {},
+        later: Some(|session, _, _| {
+            session.machine.power_cycle();
+            false
+        }),
+    },
+    Row {
+        id: "K3",
+        fault: "servo hangs",
+        situation: Situation::Motion,
+        expected: Expected::Released,
+        deadline_s: 4e-3 + 512.0 / 32e3,
+        inject: |_, _| {},
+        later: Some(|session, _, _| {
+            session.machine.hang(Some(SERVO));
+            false
+        }),
+    },
+    Row {
+        id: "B2",
+        fault: "controller goes bus-off while the operator has control",
+        situation: Situation::Motion,
+        expected: Expected::Nothing,
+        deadline_s: 0.0,
+        inject: |chip, _| {
+            let now = chip.now;
+            chip.can.go_bus_off(now);
+        },
+        later: None,
     },
     Row {
         id: "K4",
