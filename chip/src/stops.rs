@@ -15,6 +15,9 @@ use crate::time::{Ticks, microseconds, ticks};
 
 /// Time that is watched after the contact opened, s.
 const WATCHED_S: f64 = 2e-3;
+/// Longest time until both bridges are off for good, us, at up to two cycles per instruction. A tick alone
+/// takes up to a PWM period of 42 us.
+const LONGEST_US: f64 = 1.0;
 
 /// Stops in one situation.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -49,12 +52,13 @@ pub struct StopReport {
 }
 
 impl StopReport {
-    /// Whether every stop ended with both bridges off.
+    /// Whether every stop ended with both bridges off, by its own interrupt and not by a later tick.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        self.situations
-            .iter()
-            .all(|situation| situation.armed > 0 && situation.stayed_on == 0 && situation.on_again == 0)
+        self.situations.iter().all(|situation| {
+            let is_off = situation.stayed_on == 0 && situation.on_again == 0;
+            situation.armed > 0 && is_off && situation.worst_final_us <= LONGEST_US
+        })
     }
 }
 
