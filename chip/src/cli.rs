@@ -221,7 +221,8 @@ fn run(arguments: &RunArguments) -> Result<bool, ToolError> {
     let report = ChipReport::new(&mut session, identified, common.time_factor, common.seed)?;
     print_run(&report, begun.elapsed().as_secs_f64());
     common.write(&report)?;
-    Ok(report.findings.is_empty() && report.verdict != "refused" && report.missed_current_ticks == 0)
+    let is_sound = report.findings.is_empty() && report.missed_current_ticks == 0;
+    Ok(is_sound && report.verdict != "refused" && report.agrees_with_the_plant())
 }
 
 fn operate(session: &mut Session, arguments: &RunArguments) -> Result<(), ToolError> {
@@ -260,7 +261,14 @@ fn print_run(report: &ChipReport, wall_s: f64) {
     }
     for base in &report.base_parameters {
         let show = |number: Number| number.known().map_or("-".to_owned(), |value| format!("{value:.6}"));
-        println!("{:>6} {:>11} +- {} {}", base.name, show(base.value), show(base.sigma), base.unit);
+        println!(
+            "{:>6} {:>11} +- {} {}, off by {:+.2} of the leg file's sigma",
+            base.name,
+            show(base.value),
+            show(base.sigma),
+            base.unit,
+            report.errors.get(&base.name).copied().unwrap_or(f64::NAN)
+        );
     }
     println!(
         "verdict {}{}",

@@ -3,9 +3,8 @@
 //! Why: the model and the firmware come from one reading of the reference manual. The program
 //! (`emulated/src/bin/drivers`) sets registers only through another project's drivers. Each row of the result
 //! compares what a driver's documentation promises with the model, in physical units. Its computations and
-//! exceptions also run on the host and on QEMU.
-//! Known limits: no driver with DMA; QEMU shares its instruction translator with Unicorn, so it is independent
-//! for exceptions only.
+//! exceptions also run on the host and on QEMU. Known limits: no driver with DMA; QEMU shares its instruction
+//! translator with Unicorn, so it is independent for exceptions only.
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};

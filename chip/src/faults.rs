@@ -1,9 +1,9 @@
 //! Rows of the fault catalogue injected into the chip's pins, converters and peripherals, image unmodified.
 //!
-//! Each run starts from a saved machine that holds its pose or follows the exciting motion, at an instant drawn
-//! from the seed. Deadlines are measured at the pins: release of both bridges, or the active short circuit (no
-//! high side for a PWM period). Faults that damp first are measured at the record of the reaction and must end
-//! with both bridges off.
+//! Each run starts from a saved machine that holds its pose or follows the exciting motion, at an instant
+//! drawn from the seed. Deadlines are measured at the pins: release of both bridges, or the active short
+//! circuit (no high side for a PWM period). Faults that damp first are measured at the record of the reaction
+//! and must end with both bridges off.
 
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -1,7 +1,7 @@
 //! Hangs of each level: the watchdog must reset the board within its time, bridges off at the latest then.
 //!
-//! The thread identifies and sends records. Nothing that keeps the leg safe runs there, so its hang is no reason
-//! for a reset.
+//! The thread identifies and sends records. Nothing that keeps the leg safe runs there, so its hang is no
+//! reason for a reset.
 
 use serde::Serialize;
 

@@ -1,8 +1,9 @@
 //! The processor core (Unicorn) with the chip around it: exceptions, sleep, stalls, faults, reset.
 //!
 //! Time is instructions times a factor. The block hook adds the time of a basic block before it runs, then
-//! processes due events, then takes an interrupt if one preempts. So an interrupt comes at a block's boundary,
-//! late by at most one block, and a register access within a block sees the time of the block's end.
+//! processes due events, then takes an interrupt if one preempts. So an interrupt comes at a block's
+//! boundary, late by at most one block, and a register access within a block sees the time of the block's
+//! end.
 //!
 //! Unicorn leaves exceptions to its user. An entry stores a frame of 8 or, with floating point in use, 26
 //! words; a return with an EXC_RETURN address is reported by Unicorn as interrupt 8. After the program status
@@ -784,8 +785,8 @@ fn on_invalid(core: &mut Core<'_>) -> bool {
     true
 }
 
-/// Sleeps until an event, or an interrupt that would preempt but for its mask (ARMv7-M B1.5.17, B1.5.18); `pc` is
-/// the address after the instruction.
+/// Sleeps until an event, or an interrupt that would preempt but for its mask (ARMv7-M B1.5.17, B1.5.18);
+/// `pc` is the address after the instruction.
 fn sleep(core: &mut Core<'_>, pc: u32) -> Woken {
     let for_interrupt = code_before(core, pc) == Some(WAIT_FOR_INTERRUPT);
     loop {

@@ -85,7 +85,8 @@ impl Nvic {
     }
 
     /// Interrupt control and state register (B3.2.4): active and first pending exception, pending system
-    /// exceptions. Known limit, also QEMU's: the base priority does not hide the pending one, as silicon does.
+    /// exceptions. Known limit, also QEMU's: the base priority does not hide the pending one, as silicon
+    /// does.
     #[must_use]
     pub fn state(&self) -> u32 {
         let pending = |exception: u8| u32::from(self.is_pending(exception));

@@ -9,9 +9,9 @@
 //! mechanic   every 1/24 ms: leg by the mean torque; between, the rotors turn at constant speed
 //! ```
 //!
-//! A calibration needs motors that are free of their gears. So the plant begins with free rotors and a leg that
-//! a fixture holds; [`Plant::couple`] mounts the gears. A hand holds joints, or moves them.
-//! Known limits: a hand is stronger than every motor.
+//! A calibration needs motors that are free of their gears. So the plant begins with free rotors and a leg
+//! that a fixture holds; [`Plant::couple`] mounts the gears. A hand holds joints, or moves them. Known
+//! limits: a hand is stronger than every motor.
 
 use core::f64::consts::{PI, TAU};
 

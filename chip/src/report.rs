@@ -3,8 +3,12 @@
 use std::collections::BTreeMap;
 
 use scarab_host::base::error::ToolError;
-use scarab_host::report::BaseReport;
+use scarab_host::formats::leg_file::LegFile;
+use scarab_host::report::{BaseReport, RunReport};
+use scarab_host::rig::options::SimulationOptions;
+use scarab_host::run::identify::identify_one;
 use scarab_host::run::trace::report::run_report;
+use scarab_host::with_leg_size;
 use serde::Serialize;
 
 use crate::findings::Finding;
@@ -65,6 +69,8 @@ pub struct ChipReport {
     pub reasons: Vec<String>,
     /// Base parameters.
     pub base_parameters: Vec<BaseReport>,
+    /// Error of each base parameter against the plant, over the sigma that the leg file's torque noise gives.
+    pub errors: BTreeMap<String, f64>,
     /// Findings that are not known to be harmless.
     pub findings: Vec<Finding>,
     /// Harmless findings with their reason.
@@ -151,7 +157,30 @@ pub fn interrupts(session: &Session) -> BTreeMap<&'static str, InterruptReport> 
     LEVELS.into_iter().map(|(name, exception)| (name, report(exception))).collect()
 }
 
+/// Errors of base parameters. Truth and sigma are those of an identification of the simulated leg: a trace
+/// does not hold the truth, and the plant of this model has less noise than a machine.
+fn errors(leg: &LegFile, run: &RunReport, seed: u64) -> Result<BTreeMap<String, f64>, ToolError> {
+    let options = &SimulationOptions::of_seed(seed);
+    let (simulated, _) = with_leg_size!(leg, identify_one(leg, options, None))?;
+    let pairs = run.base_parameters.iter().filter_map(|base| {
+        let other = simulated.base_parameters.iter().find(|other| other.name == base.name)?;
+        let error = base.value.known()? - other.truth.known()?;
+        Some((base.name.clone(), error / other.sigma.known()?))
+    });
+    let errors: BTreeMap<_, _> = pairs.collect();
+    if errors.len() == run.base_parameters.len() {
+        return Ok(errors);
+    }
+    Err(ToolError::input("the simulated leg has other base parameters than the image"))
+}
+
 impl ChipReport {
+    /// Whether every base parameter is within one sigma of the plant's.
+    #[must_use]
+    pub fn agrees_with_the_plant(&self) -> bool {
+        self.errors.values().all(|error| error.abs() <= 1.0)
+    }
+
     /// Report of a session.
     ///
     /// # Errors
@@ -164,6 +193,10 @@ impl ChipReport {
     ) -> Result<Self, ToolError> {
         session.probe.trace.finish();
         let run = if identified { Some(run_report(&session.probe.trace, &session.leg)?) } else { None };
+        let errors = match &run {
+            Some(run) => errors(&session.leg, run, seed)?,
+            None => BTreeMap::new(),
+        };
         let (unknown, known) = findings(session);
         let interrupts = interrupts(session);
         let loops = session.probe.trace.statistics.loops();
@@ -173,6 +206,7 @@ impl ChipReport {
             reasons: run
                 .as_ref()
                 .map_or_else(Vec::new, |run| run.reasons.iter().map(ToString::to_string).collect()),
+            errors,
             base_parameters: run.map_or_else(Vec::new, |run| run.base_parameters),
             findings: unknown,
             known_findings: known,

@@ -1,7 +1,7 @@
 //! Records of the image, read from its memory as a debug probe does, and decoded by the host tool.
 //!
-//! The image's transport (SEGGER RTT) is a ring buffer in memory: its control block names buffer, size, and the
-//! positions of writer and reader. A probe reads up to the writer's position and moves the reader's.
+//! The image's transport (SEGGER RTT) is a ring buffer in memory: its control block names buffer, size, and
+//! the positions of writer and reader. A probe reads up to the writer's position and moves the reader's.
 
 use scarab_host::base::error::ToolError;
 use scarab_host::formats::trace::Decoder;

@@ -1,7 +1,8 @@
 //! An operator at the board: contacts, gears and hands, guided by the records that the image sends.
 //!
-//! The steps are those of docs/board.md. Motors are calibrated free of their gears; then the gears are mounted
-//! while the leg is held at its zero, the reference is taken, and the leg is moved by hand into its range.
+//! The steps are those of docs/board.md. Motors are calibrated free of their gears; then the gears are
+//! mounted while the leg is held at its zero, the reference is taken, and the leg is moved by hand into its
+//! range.
 
 use std::rc::Rc;
 
@@ -295,8 +296,8 @@ impl Session {
         Err(ToolError::Refused(format!("node {node} refuses {index:04x}:{sub} = {value:#x}: {answer:02x?}")))
     }
 
-    /// Writes a request that changes the flash ("save", "load") and waits for its emergency messages: FF0D while
-    /// it is under way, 0000 at its end. Returns at a power cut too.
+    /// Writes a request that changes the flash ("save", "load") and waits for its emergency messages: FF0D
+    /// while it is under way, 0000 at its end. Returns at a power cut too.
     ///
     /// # Errors
     /// The node refuses the request, fails, or does not end in time.

@@ -151,16 +151,21 @@ fn a_higher_level_preempts_and_a_masked_one_waits() {
     assert_eq!((machine.chip().load.of(24).entries, machine.chip().load.of(28).entries), (1, 1));
 }
 
-#[test]
-fn a_sleeping_processor_wakes_for_a_timer_and_sleeps_on() {
-    let _alone = alone();
+/// Begins a program with TIM5's interrupt every millisecond: clock 16 MHz, prescaler 16, top 999.
+fn every_millisecond() -> Program {
     let mut program = Program::new();
-    // Clock of TIM5 at 16 MHz; prescaler 16, top 999: every millisecond.
     program.store(0x4002_3840, 1 << 3);
     for (offset, value) in [(0x28, 15), (0x2C, 999), (0x14, 1), (0x10, 0), (0x0C, 1), (0x00, 1)] {
         program.store(0x4000_0C00 + offset, value);
     }
     enable(&mut program, 50, 0x20);
+    program
+}
+
+#[test]
+fn a_sleeping_processor_wakes_for_a_timer_and_sleeps_on() {
+    let _alone = alone();
+    let mut program = every_millisecond();
     let top = program.here();
     // wfe; b top
     program.put(&[0xBF20, 0xE7FD]);
@@ -176,12 +181,7 @@ fn a_sleeping_processor_wakes_for_a_timer_and_sleeps_on() {
 #[test]
 fn a_wait_for_an_interrupt_ends_though_it_is_masked() {
     let _alone = alone();
-    let mut program = Program::new();
-    program.store(0x4002_3840, 1 << 3);
-    for (offset, value) in [(0x28, 15), (0x2C, 999), (0x14, 1), (0x10, 0), (0x0C, 1), (0x00, 1)] {
-        program.store(0x4000_0C00 + offset, value);
-    }
-    enable(&mut program, 50, 0x20);
+    let mut program = every_millisecond();
     // cpsid i; wfi; the mark; cpsie i
     program.put(&[0xB672, 0xBF30]).store(RAM, 5).put(&[0xB662]).halt();
     program.handler(66).constant(0, RAM).put(&[0x6802, 0x6042]).store(0x4000_0C10, 0).put(&[0x4770]);

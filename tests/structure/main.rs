@@ -262,7 +262,7 @@ const LARGEST_COMMENT_WIDTH: usize = 110;
 #[test]
 fn comments_begin_with_their_subject_and_are_at_most_110_columns_wide() {
     let mut offences = Vec::new();
-    for folder in ["src", "hal-sim", "host", "paper", "emulated", "tests", "examples"] {
+    for folder in ["src", "hal-sim", "host", "paper", "emulated", "chip", "tests", "examples"] {
         for file in source_files(folder) {
             for (number, line) in file.text.lines().enumerate() {
                 if let Some(why) = comment_offence(line) {

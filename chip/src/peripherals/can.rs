@@ -1,10 +1,10 @@
 //! CAN1 (RM0090 32) on a wire with one partner: modes, mailboxes, filters, queues, errors.
 //!
-//! One frame at a time is on the wire, for the time of its bits; of the waiting ones the lowest identifier goes
-//! first. A partner acknowledges frames while it is connected and has the same bit rate. Without one a frame is
-//! repeated, and the transmit error counter stops at error passive. Refused: timing outside initialisation,
-//! filters outside their own initialisation, a request in a mailbox that is not empty.
-//! Known limits: data frames with 11-bit identifiers; no time stamps, no silent or loop-back mode.
+//! One frame at a time is on the wire, for the time of its bits; of the waiting ones the lowest identifier
+//! goes first. A partner acknowledges frames while it is connected and has the same bit rate. Without one a
+//! frame is repeated, and the transmit error counter stops at error passive. Refused: timing outside
+//! initialisation, filters outside their own initialisation, a request in a mailbox that is not empty. Known
+//! limits: data frames with 11-bit identifiers; no time stamps, no silent or loop-back mode.
 
 use std::collections::VecDeque;
 

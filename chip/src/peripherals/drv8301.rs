@@ -4,8 +4,8 @@
 //! frame   bit 15 read, bits 14..11 register, bits 10..0 data; the answer comes with the next frame
 //! ```
 //!
-//! A driver answers 10 ms after it was enabled and loses its registers when it is disabled. Its second control
-//! register sets the gain of the shunt amplifiers. Disabled drivers hold all gates low.
+//! A driver answers 10 ms after it was enabled and loses its registers when it is disabled. Its second
+//! control register sets the gain of the shunt amplifiers. Disabled drivers hold all gates low.
 
 use crate::findings::Access;
 use crate::peripherals::spi::Sent;

@@ -1,9 +1,9 @@
 //! Flash interface, and sectors 10 and 11, which hold stored data (RM0090 3.5 to 3.9; times DS8626 table 42).
 //!
-//! Programming clears bits of one word, erasing sets those of a sector. Both need the keys, the right mode and
-//! a width that matches PSIZE; otherwise an error flag rises and nothing changes. While an operation runs the
-//! single bank cannot be read: the processor stalls, timers and converters go on. Power can be cut within any
-//! operation: a word is then a random mix of old and new, a sector reads as noise.
+//! Programming clears bits of one word, erasing sets those of a sector. Both need the keys, the right mode
+//! and a width that matches PSIZE; otherwise an error flag rises and nothing changes. While an operation runs
+//! the single bank cannot be read: the processor stalls, timers and converters go on. Power can be cut within
+//! any operation: a word is then a random mix of old and new, a sector reads as noise.
 //!
 //! Known limits: contents of the caches are not modelled, except that reading a sector that was erased while
 //! the data cache was on and not reset since is a finding.

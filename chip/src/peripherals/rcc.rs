@@ -1,8 +1,9 @@
 //! Reset and clock control, and the power controller's register that it depends on (RM0090 5.4, 7.3).
 //!
-//! Oscillators and PLL become ready after a delay. Refused: a PLL without a running source or changed while on,
-//! a switch to a clock that is not ready, bus clocks above their limits, and more than 144 MHz at scale 2.
-//! A dead crystal never becomes ready; one that dies later raises the clock security's interrupt if enabled.
+//! Oscillators and PLL become ready after a delay. Refused: a PLL without a running source or changed while
+//! on, a switch to a clock that is not ready, bus clocks above their limits, and more than 144 MHz at scale
+//! 2. A dead crystal never becomes ready; one that dies later raises the clock security's interrupt if
+//! enabled.
 
 use crate::findings::{Access, NO_REGISTER};
 use crate::time::{NEVER, TICK_HZ, Ticks};

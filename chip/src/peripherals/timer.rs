@@ -5,8 +5,8 @@
 //! output. The phase is the number of counts within a period:
 //!
 //! ```text
-//! up                phase 0 .. ARR         counter = phase                 update where the phase returns to 0
-//! centre-aligned    phase 0 .. 2 ARR - 1   counter = phase, then 2 ARR - phase; ends at 0 and ARR
+//! up                phase 0 .. ARR         counter = phase                 update where the phase returns to
+//! 0 centre-aligned    phase 0 .. 2 ARR - 1   counter = phase, then 2 ARR - phase; ends at 0 and ARR
 //! ```
 //!
 //! At each end the repetition counter decides whether the update happens: buffered values are taken over and
