@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use scarab::bus::Frame;
 use scarab_host::base::error::ToolError;
+use scarab_host::rig::bus::host::{TARGETS, compact_mapping};
 use serde::Serialize;
 
 use crate::report::{InterruptReport, LoadReport, interrupts, load};
@@ -22,10 +23,7 @@ const FILLINGS: i32 = 8;
 /// Amplitude of the targets, increments of 6064, and frequency, Hz.
 const WAY: f64 = 20_000.0;
 const MOTION_HZ: f64 = 0.5;
-/// Bit of a COB-ID that disables its PDO.
-const DISABLED: u32 = 1 << 31;
-/// COB-ID of the targets, and of frames that concern no node of this board.
-const TARGETS: u16 = 0x301;
+/// COB-ID of frames that concern no node of this board.
 const OTHER: u16 = 0x5FF;
 /// Longest time for an answer, s.
 const ANSWER_S: f64 = 0.5;
@@ -101,23 +99,8 @@ fn take_over(session: &mut Session) -> Result<[i32; 2], ToolError> {
     for node in [1_u16, 2] {
         let mut write =
             |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes, ANSWER_S);
-        for place in 1..4 {
-            write(0x1800 + place, 1, DISABLED | (0x180 + 0x100 * u32::from(place) + u32::from(node)), 4)?;
-        }
-        let mut targets = [0x0007_0020; 2];
-        targets[usize::from(node) - 1] = 0x607A_0020;
-        let feedback = [0x6041_0010, 0x6064_0020, 0x2010_0010];
-        for (base, id, objects) in
-            [(0x1800, 0x180 + u32::from(node), &feedback[..]), (0x1401, TARGETS.into(), &targets[..])]
-        {
-            write(base, 1, DISABLED | id, 4)?;
-            write(base + 0x200, 0, 0, 1)?;
-            write(base, 2, 1, 1)?;
-            for (sub, object) in (1..).zip(objects) {
-                write(base + 0x200, sub, *object, 4)?;
-            }
-            write(base + 0x200, 0, objects.len() as u32, 1)?;
-            write(base, 1, id, 4)?;
+        for (index, sub, value, bytes) in compact_mapping(usize::from(node) - 1) {
+            write(index, sub, value, bytes)?;
         }
         write(0x60C2, 1, 1, 1)?;
     }

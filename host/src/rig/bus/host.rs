@@ -29,7 +29,7 @@ const NUMBER: u16 = 0x70;
 const START: u16 = 0;
 const SYNC: u16 = 0x80;
 /// COB-ID of both joints' targets; hip and knee take their half each.
-const TARGETS: u16 = 0x301;
+pub const TARGETS: u16 = 0x301;
 const WORDS: u16 = 0x200;
 const REQUEST: u16 = 0x600;
 const ANSWER: u16 = 0x580;
@@ -54,6 +54,28 @@ pub struct Speaks {
     pub words: bool,
     /// Servo ticks between two heartbeats; 0 for none.
     pub heartbeat: u64,
+}
+
+/// Writes to a joint's object dictionary that set the compact mapping (docs/bus.md): index, subindex, value,
+/// size.
+#[must_use]
+pub fn compact_mapping(joint: usize) -> Vec<(u16, u8, u32, u8)> {
+    let node = NODES[joint];
+    let mut targets = [0x0007_0020; JOINTS];
+    targets[joint] = 0x607A_0020;
+    let mut writes: Vec<_> = (1..4)
+        .map(|place| (0x1800 + place, 1, UNUSED | u32::from(0x180 + 0x100 * place + node), 4))
+        .collect();
+    let feedback = [0x6041_0010, 0x6064_0020, 0x2010_0010];
+    for (place, identifier, objects) in
+        [(0x1800, u32::from(0x180 + node), &feedback[..]), (0x1401, TARGETS.into(), &targets)]
+    {
+        let mapping = place + 0x200;
+        writes.extend([(place, 1, UNUSED | identifier, 4), (mapping, 0, 0, 1), (place, 2, 1, 1)]);
+        writes.extend((1..).zip(objects).map(|(sub, object)| (mapping, sub, *object, 4)));
+        writes.extend([(mapping, 0, objects.len() as u32, 1), (place, 1, identifier, 4)]);
+    }
+    writes
 }
 
 /// One leg, one bus, one host.
@@ -262,28 +284,12 @@ impl Host {
         self.network.send(Frame::new(START, &[1, 0]));
         self.run(4);
         for (joint, node) in NODES.into_iter().enumerate() {
-            for place in 1..4 {
-                self.write(node, 0x1800 + place, 1, UNUSED | u32::from(0x180 + 0x100 * place + node), 4)?;
+            for (index, sub, value, size) in compact_mapping(joint) {
+                self.write(node, index, sub, value, size)?;
             }
-            let mut targets = [0x0007_0020; JOINTS];
-            targets[joint] = 0x607A_0020;
-            self.map(node, 0x1800, 0x180 + node, &[0x6041_0010, 0x6064_0020, 0x2010_0010])?;
-            self.map(node, 0x1401, TARGETS, &targets)?;
             self.write(node, 0x6060, 0, 8, 1)?;
         }
         Ok(())
-    }
-
-    fn map(&mut self, node: u16, place: u16, identifier: u16, objects: &[u32]) -> Result<(), ToolError> {
-        let (mapping, identifier) = (place + 0x200, u32::from(identifier));
-        self.write(node, place, 1, UNUSED | identifier, 4)?;
-        self.write(node, mapping, 0, 0, 1)?;
-        self.write(node, place, 2, 1, 1)?;
-        for (sub, object) in (1..).zip(objects) {
-            self.write(node, mapping, sub, *object, 4)?;
-        }
-        self.write(node, mapping, 0, objects.len() as u32, 1)?;
-        self.write(node, place, 1, identifier, 4)
     }
 
     /// Enables the leg, then moves it back and forth until the host stops sending.
