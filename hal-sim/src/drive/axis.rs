@@ -56,7 +56,7 @@ pub struct Axis {
     angle: f64,
     speed: f64,
     cogging: f64,
-    /// Slopes of the phase currents at the end of the last step, A/s.
+    /// Slopes of the phase currents in the last step of a period, A/s.
     slopes: [f64; 3],
     /// Error of both shunts at the next sample, A.
     disturbance: f64,
@@ -190,8 +190,8 @@ impl Axis {
         let mut flow = AxisFlow { impulse: self.cogging * QUARTER_S, ..AxisFlow::default() };
         while now < end {
             self.bridge.pass(now);
-            let next = self.bridge.next_edge(now, end);
-            let step = self.step(bus, now, next - now);
+            let next = self.bridge.next_edge(end);
+            let step = self.step(bus, next - now, self.quarter == QUARTERS && next >= end);
             flow.impulse += step.impulse;
             flow.charge += step.charge;
             flow.heat += step.heat;
@@ -202,18 +202,21 @@ impl Axis {
         flow
     }
 
-    /// Advances from one edge to the next.
-    fn step(&mut self, bus: f64, now: f64, duration: f64) -> AxisFlow {
+    /// Advances from one edge to the next. Only the last step of the axis' period stores the slopes.
+    fn step(&mut self, bus: f64, duration: f64, last: bool) -> AxisFlow {
         let terminals = self.output_of.map(|output| {
             if self.description.wiring.open == Some(output) {
                 return Terminal::Off(f64::NEG_INFINITY, f64::INFINITY);
             }
-            self.bridge.output(output, now, bus)
+            self.bridge.output(output, bus)
         });
         let speed = f64::from(self.description.motor.pole_pairs) * self.speed;
         let before = self.currents();
         let moved = self.motor.advance(&terminals, speed, duration);
-        let after = self.currents();
+        if last {
+            let after = self.currents();
+            self.slopes = core::array::from_fn(|phase| (after[phase] - before[phase]) / duration);
+        }
         let mut charge = 0.0;
         for phase in 0..3 {
             charge += match terminals[phase] {
@@ -222,7 +225,6 @@ impl Axis {
                 // The upper diode leads back into the bus.
                 Terminal::Off(..) => moved.charge[phase].min(0.0),
             };
-            self.slopes[phase] = (after[phase] - before[phase]) / duration;
         }
         AxisFlow { impulse: moved.impulse, charge, heat: moved.heat }
     }

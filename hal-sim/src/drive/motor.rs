@@ -54,15 +54,22 @@ impl Direction {
         Self { cosine, sine }
     }
 
-    /// Direction after a small turn (rad): exact to 1e-9 for 0.1 rad.
+    /// Direction of a small angle (rad): exact to 1e-9 for 0.1 rad.
     #[must_use]
-    pub fn turned(&self, angle: f64) -> Self {
+    pub fn small(angle: f64) -> Self {
         let square = angle * angle;
-        let sine = angle * (1.0 - square / 6.0 * (1.0 - square / 20.0));
-        let cosine = 1.0 - square / 2.0 * (1.0 - square / 12.0);
         Self {
-            cosine: self.cosine * cosine - self.sine * sine,
-            sine: self.sine * cosine + self.cosine * sine,
+            cosine: 1.0 - square / 2.0 * (1.0 - square / 12.0),
+            sine: angle * (1.0 - square / 6.0 * (1.0 - square / 20.0)),
+        }
+    }
+
+    /// This direction turned by another one's angle.
+    #[must_use]
+    pub fn turned(&self, by: &Self) -> Self {
+        Self {
+            cosine: self.cosine * by.cosine - self.sine * by.sine,
+            sine: self.sine * by.cosine + self.cosine * by.sine,
         }
     }
 
@@ -227,7 +234,8 @@ impl Motor {
     /// Step with all terminals at known voltages: midpoint rule.
     fn driven(&mut self, voltages: &[f64; 3], speed: f64, duration: f64) -> Flow {
         let driving = pair(voltages);
-        let middle = self.angle.turned(0.5 * speed * duration);
+        let half_turn = Direction::small(0.5 * speed * duration);
+        let middle = self.angle.turned(&half_turn);
         let start = self.currents;
         let half: Pair = core::array::from_fn(|part| {
             self.flux[part] + 0.5 * duration * (driving[part] - self.resistance * start[part])
@@ -236,7 +244,7 @@ impl Motor {
         for part in 0..2 {
             self.flux[part] += duration * (driving[part] - self.resistance * currents[part]);
         }
-        self.set_angle(middle.turned(0.5 * speed * duration));
+        self.set_angle(middle.turned(&half_turn));
         self.flow(&half, &currents, duration)
     }
 
@@ -244,7 +252,7 @@ impl Motor {
     #[inline(never)]
     fn partly_off(&mut self, terminals: &[Terminal; 3], speed: f64, duration: f64) -> Flow {
         let start = self.currents;
-        let end = self.angle.turned(speed * duration);
+        let end = self.angle.turned(&Direction::small(speed * duration));
         let all_off = terminals.iter().all(|terminal| matches!(terminal, Terminal::Off(..)));
         if all_off
             && phases(&start).iter().all(|current| current.abs() < NO_CURRENT)

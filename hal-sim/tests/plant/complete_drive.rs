@@ -274,8 +274,8 @@ fn edges_alone_are_steps_fine_enough() {
         let mut now = 0.0;
         while now < PERIOD_S {
             bridge.pass(now);
-            let next = bridge.next_edge(now, PERIOD_S);
-            let terminals = core::array::from_fn(|output| bridge.output(output, now, BUS));
+            let next = bridge.next_edge(PERIOD_S);
+            let terminals = core::array::from_fn(|output| bridge.output(output, BUS));
             for _ in 0..100 {
                 impulse += motor.advance(&terminals, 7.0 * speed, (next - now) / 100.0).impulse;
             }
