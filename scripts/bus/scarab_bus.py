@@ -60,6 +60,22 @@ def until(what, condition, longest_s=20.0):
         time.sleep(0.002)
 
 
+def send_until(what, send, condition, longest_s=20.0):
+    """Sends, and sends again every second, until a condition holds.
+
+    On a busy machine `serve` drops SYNC and PDOs that waited for more than 100 ms; no answer shows it.
+    """
+    end = time.monotonic() + longest_s
+    while time.monotonic() < end:
+        send()
+        again = min(time.monotonic() + 1.0, end)
+        while time.monotonic() < again:
+            if condition():
+                return
+            time.sleep(0.002)
+    raise SystemExit(f"waited {longest_s} s for: {what}")
+
+
 class Joint:
     """A node of the bus by its number, without a data sheet."""
 

@@ -9,7 +9,14 @@ import struct
 import sys
 import time
 
-from scarab_bus import HOST, Heartbeat, Joint, MICRO, connect, enable, until
+from scarab_bus import HOST, Heartbeat, Joint, MICRO, connect, enable, send_until, until
+
+# Emergency: the host was silent for 100 ms, and attempts of a motion that this machine may disturb so.
+HOST_SILENT, ATTEMPTS = 0xFF0F, 5
+
+
+class HostSilent(Exception):
+    """The nodes report that this host fell silent."""
 
 
 def set_up(joint):
@@ -31,14 +38,11 @@ def sync(network, joints, position):
         joint.sent.clear()
 
     def is_answered():
-        # On a busy machine `serve` drops a SYNC with targets that waited for more than 100 ms.
-        if time.monotonic() > is_answered.again:
-            network.send_message(0x80, b"")
-            is_answered.again = time.monotonic() + 1.0
+        if any(HOST_SILENT in joint.emergencies for joint in joints):
+            raise HostSilent
         return all(len(joint.sent) == 4 for joint in joints)
 
-    is_answered.again = 0.0
-    until("the PDOs after SYNC", is_answered)
+    send_until("the PDOs after SYNC", lambda: network.send_message(0x80, b""), is_answered)
     if position:
         return [joint.pdo(0x1801, "<ii")[0] * MICRO for joint in joints]
     return [joint.pdo(0x1800, "<H")[0] for joint in joints]
@@ -52,9 +56,14 @@ def profile_position(network, joints):
         joint.write(0x6081, 0, 500_000)
     begin = sync(network, joints, True)
     goals = [place + 0.15 for place in begin]
-    for joint, goal in zip(joints, goals):
-        network.send_message(0x300 + joint.number, struct.pack("<i", round(goal / MICRO)))
-        network.send_message(0x200 + joint.number, struct.pack("<H", 0x3F))
+
+    def send():
+        for joint, goal in zip(joints, goals):
+            network.send_message(0x300 + joint.number, struct.pack("<i", round(goal / MICRO)))
+            for word in (0x2F, 0x3F):
+                network.send_message(0x200 + joint.number, struct.pack("<H", word))
+
+    send_until("acknowledged set-points", send, lambda: all(joint.read(0x6041, 0, "<H") & 1 << 12 for joint in joints))
     # The previous target is reported as reached until the leg has taken this one.
     time.sleep(0.05)
     for joint in joints:
@@ -69,22 +78,42 @@ def profile_velocity(network, joints):
     """Commands a velocity by PDO, then halt."""
     joint = joints[0]
     joint.write(0x6060, 0, 3, "<b")
-    network.send_message(0x400 + joint.number, struct.pack("<i", -200_000))
-    until("0.2 rad/s", lambda: abs(joint.read(0x606C, 0, "<i") + 200_000) < 40_000)
-    network.send_message(0x200 + joint.number, struct.pack("<H", 0x10F))
-    until("halt", lambda: joint.read(0x6041, 0, "<H") & 1 << 10 and abs(joint.read(0x606C, 0, "<i")) < 20_000)
-    network.send_message(0x400 + joint.number, struct.pack("<i", 0))
-    network.send_message(0x200 + joint.number, struct.pack("<H", 0x0F))
+
+    def velocity(micro_rad):
+        network.send_message(0x400 + joint.number, struct.pack("<i", micro_rad))
+
+    def word(value):
+        network.send_message(0x200 + joint.number, struct.pack("<H", value))
+
+    send_until("0.2 rad/s", lambda: velocity(-200_000), lambda: abs(joint.read(0x606C, 0, "<i") + 200_000) < 40_000)
+    send_until("halt", lambda: word(0x10F),
+               lambda: joint.read(0x6041, 0, "<H") & 1 << 10 and abs(joint.read(0x606C, 0, "<i")) < 20_000)
+    send_until("velocity 0", lambda: velocity(0), lambda: joint.read(0x60FF, 0, "<i") == 0)
+    send_until("the end of halt", lambda: word(0x0F), lambda: joint.read(0x6040, 0, "<H") == 0x0F)
     print("profile velocity: followed and halted")
 
 
-def cyclic_position(network, joints, seconds=3.0, period_s=0.01):
-    """Commands positions by PDO of type 1, taken at SYNC, every 10 ms as far as this machine can."""
+def cyclic_position(network, joints):
+    """Repeats the cyclic motion if this machine paused for 100 ms, which the nodes must report as a silent host."""
     for joint in joints:
         joint.set_up_pdo(0x1401, 0x300 + joint.number, 1, [0x607A0020])
         joint.write(0x60C2, 1, 10, "<B")
         # This host is not real-time.
         joint.write(0x6066, 0, 1000, "<H")
+    for _ in range(ATTEMPTS):
+        try:
+            return cyclic_motion(network, joints)
+        except HostSilent:
+            print("cyclic position: this machine paused, the nodes report a silent host; again")
+        for joint in joints:
+            joint.emergencies.clear()
+        network.nmt.state = "OPERATIONAL"
+        enable(joints)
+    raise SystemExit(f"cyclic position: a silent host in {ATTEMPTS} of {ATTEMPTS} attempts")
+
+
+def cyclic_motion(network, joints, seconds=3.0, period_s=0.01):
+    """Commands positions by PDO of type 1, taken at SYNC, every 10 ms as far as this machine can."""
     begin = [joint.position() for joint in joints]
     for joint, place in zip(joints, begin):
         joint.write(0x607A, 0, round(place / MICRO), "<i")
