@@ -90,6 +90,7 @@ fn runs_of_the_sweep_and_of_two_faults_are_repeated_alone() {
 
 /// Every row is included, also those with their own bench.
 #[test]
+#[ignore = "a minute on two cores; a step of .ci/run"]
 fn every_detector_that_is_switched_off_is_noticed() {
     // Faults that appear only in motion need more than its first second: whole identifications.
     let report = report("--seconds 300 --seeds 16 --blind", 0);
