@@ -37,6 +37,7 @@ use scarab::motion::Periodic;
 use scarab::units::Second;
 use scarab_host::base::error::ToolError;
 use scarab_host::base::number::Number;
+use scarab_host::base::table::Table;
 use scarab_host::formats::leg_file::geometry::SetupError;
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile, Switch};
 use scarab_host::leg::motions::{EXCITATION_CYCLES, most_informative};
@@ -48,7 +49,7 @@ use super::chain::{LEG, median, run_all};
 use super::seeds::ReportSeed;
 use super::swarm_bench::{Bench, SHARE, Trial};
 use super::{PaperOptions, Part, Section};
-use crate::markdown::{Table, percent};
+use crate::digits::percent;
 
 /// Runs per row by default.
 const RUNS: u64 = 100;
@@ -223,8 +224,7 @@ fn recorded<const N: usize, const B: usize>(
 }
 
 fn words(report: &ConvergenceReport) -> String {
-    let mut table = Table::new(&[
-        "problem",
+    let mut table = Table::default().label("problem").numbers([
         "unknowns",
         "over rows: reached, %",
         "iterations, median",
@@ -255,7 +255,10 @@ fn words(report: &ConvergenceReport) -> String {
     let runs = report.rows.first().map_or(0, |row| row.runs);
     format!(
         "Default beetle swarm, cold start, {} precision, {runs} runs of each row over {} exciting motions, each with noise of \
-         its own; iterations to J / J_opt - 1 <= {:.0e}, failures counted as endless.\n\n{table}",
-        "single", report.motions, report.tolerance
+         its own; iterations to J / J_opt - 1 <= {:.0e}, failures counted as endless.\n\n{}",
+        "single",
+        report.motions,
+        report.tolerance,
+        table.to_markdown()
     )
 }

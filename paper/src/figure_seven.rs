@@ -12,6 +12,7 @@ use scarab::ident::Plan;
 use scarab_host::base::error::ToolError;
 use scarab_host::base::names::plan_name;
 use scarab_host::base::number::Number;
+use scarab_host::base::table::Table;
 use scarab_host::leg::motions::EXCITATION_CYCLES;
 use serde::Serialize;
 
@@ -22,8 +23,8 @@ use super::printed::FIGURE_SEVEN;
 use super::seeds::ReportSeed;
 use super::verification::{self, ROTATION_DEG};
 use super::{PaperOptions, Part, Section};
+use crate::digits::{number, percent};
 use crate::figures::chain::{Curve, JointTorque, Level, drawn};
-use crate::markdown::{Table, number, percent};
 
 /// Runs per method and noise level by default.
 const RUNS: u64 = 10;
@@ -230,8 +231,7 @@ fn is_plain(line: &FitLine) -> bool {
 }
 
 fn words(report: &VerificationReport) -> String {
-    let mut table = Table::new(&[
-        "joint, method",
+    let mut table = Table::default().label("joint, method").numbers([
         "mean abs torque, N m",
         "RMS, N m",
         "% of it, noise-free",
@@ -257,10 +257,9 @@ fn words(report: &VerificationReport) -> String {
             percent(Some(paper.percent)),
         ]);
     }
-    let mut heads = vec!["noise, %".to_owned()];
-    heads
-        .extend(PLANS.iter().flat_map(|&plan| (1..=JOINTS).map(move |j| format!("{} {j}", plan_name(plan)))));
-    let mut over_noise = Table::new(&heads.iter().map(String::as_str).collect::<Vec<_>>());
+    let heads =
+        PLANS.iter().flat_map(|&plan| (1..=JOINTS).map(move |joint| format!("{} {joint}", plan_name(plan))));
+    let mut over_noise = Table::default().label("noise, %").numbers(heads);
     let per_level = PLANS.len() * JOINTS;
     let plain: Vec<_> = report.lines.iter().filter(|line| is_plain(line)).collect();
     for lines in plain.chunks(per_level) {
@@ -282,10 +281,12 @@ fn words(report: &VerificationReport) -> String {
          6.5 s; joint 1, of which they say nothing, turns by {ROTATION_DEG} degrees either way. Held still, the links alone \
          would load the joints with {} N m on average: along gravity, joint 1 hardly feels the walking leg, and its torque \
          here is mostly its own friction and inertia.\n\n\
-         At {NOISE_PERCENT} % noise:\n\n{table}\n{servo}\
-         Error against the noise-free torque in percent of its mean size, by joint:\n\n{over_noise}",
+         At {NOISE_PERCENT} % noise:\n\n{}\n{servo}\
+         Error against the noise-free torque in percent of its mean size, by joint:\n\n{}",
         report.leg,
         report.runs,
         links.join(", "),
+        table.to_markdown(),
+        over_noise.to_markdown(),
     )
 }

@@ -23,12 +23,12 @@
 pub mod chain;
 pub mod contenders;
 pub mod convergence;
+pub mod digits;
 pub mod figure_five;
 pub mod figure_seven;
 pub mod figures;
 pub mod goals;
 pub mod load_change;
-pub mod markdown;
 pub mod printed;
 pub mod problems;
 pub mod ranks;

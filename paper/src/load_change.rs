@@ -17,6 +17,7 @@ use scarab::ident::Plan;
 use scarab::model::{INERTIAL_PARAMETERS, Payload, RigidBody};
 use scarab_host::base::error::ToolError;
 use scarab_host::base::number::Number;
+use scarab_host::base::table::Table;
 use scarab_host::formats::leg_file::geometry::SetupError;
 use scarab_host::formats::leg_file::{LegFile, LinkParameters};
 use scarab_host::leg::setup;
@@ -27,7 +28,7 @@ use super::chain::{self, ChainOptions, ChainRun, JOINTS, NOISE_PERCENT, ROOM, me
 use super::printed::TABLE_FIVE;
 use super::seeds::ReportSeed;
 use super::{PaperOptions, Part, Section};
-use crate::markdown::{Table, number, percent};
+use crate::digits::{number, percent};
 
 /// Pairs of runs by default.
 const RUNS: u64 = 20;
@@ -239,8 +240,7 @@ fn torque(leg: &LegFile, load: &Payload<f64>, pairs: &[Pair]) -> Result<Vec<Load
 }
 
 fn words(report: &LoadReport) -> String {
-    let mut changes = Table::new(&[
-        "",
+    let mut changes = Table::default().label("").numbers([
         "truth before",
         "true change",
         "found change",
@@ -261,7 +261,8 @@ fn words(report: &LoadReport) -> String {
             format!("{:.0}", 100.0 * line.told_share),
         ]);
     }
-    let mut torques = Table::new(&["parameters", "joint 1, %", "joint 2, %", "joint 3, %"]);
+    let mut torques =
+        Table::default().label("parameters").numbers(["joint 1, %", "joint 2, %", "joint 3, %"]);
     for set in &report.torque {
         let cells = set.percent_of_truth.map(|value| percent(value.known()));
         torques.row(core::iter::once(set.parameters.to_owned()).chain(cells));
@@ -270,17 +271,19 @@ fn words(report: &LoadReport) -> String {
     let changing = report.lines.iter().filter(|line| line.true_change.known() != Some(0.0)).count();
     format!(
         "{} kg at x {x}, y {y}, z {z} m of the third link, unknown to the firmware; {} pairs of runs, {} % noise, one-time, \
-         medians. Of Table V's 20 parameters {} change ({}), of the {} base parameters {changing}; SI units.\n\n{changes}\n\
+         medians. Of Table V's 20 parameters {} change ({}), of the {} base parameters {changing}; SI units.\n\n{}\n\
          The mass by the difference of HX2R: {} \u{b1} {} kg.\n\n\
          Torque of the loaded chain on the verification motion, error against the noise-free torque in percent of its mean \
-         size:\n\n{torques}",
+         size:\n\n{}",
         report.load_kg,
         report.runs,
         report.noise_percent,
         report.changed_of_table_v.len(),
         report.changed_of_table_v.join(" "),
         report.lines.len(),
+        changes.to_markdown(),
         number(report.mass_found_kg[0]),
         number(report.mass_found_kg[1]),
+        torques.to_markdown(),
     )
 }

@@ -1,6 +1,7 @@
 //! Table IV: searches on the test functions, compared with the paper's printed results.
 
 use scarab_host::base::error::ToolError;
+use scarab_host::base::table::Table;
 use serde_json::Map;
 
 use super::contenders::{Algorithm, ITERATIONS};
@@ -9,7 +10,6 @@ use super::problems::{CASES, Case, Reading};
 use super::searches::{self, TOLERANCES};
 use super::statistics::Row;
 use super::{PaperOptions, Part, Section};
-use crate::markdown::Table;
 
 /// Runs of each row by default.
 const RUNS: u64 = 100;
@@ -54,11 +54,6 @@ pub fn section(options: &PaperOptions) -> Result<Section, ToolError> {
         figures: Vec::new(),
         json,
     })
-}
-
-fn headed(header: impl IntoIterator<Item = String>) -> Table {
-    let header: Vec<String> = header.into_iter().collect();
-    Table::new(&header.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
 fn find<'r>(
@@ -113,8 +108,9 @@ fn evaluations(row: &Row, default: Option<u32>) -> String {
 fn matrix(rows: &[Row], tolerance: f64, title: &str, cell: fn(&Row, Option<u32>) -> String) -> String {
     let run: Vec<_> =
         Algorithm::ALL.into_iter().filter(|one| rows.iter().any(|row| row.algorithm == *one)).collect();
-    let header = [format!("{title}: function (D)")].into_iter();
-    let mut table = headed(header.chain(run.iter().map(|algorithm| algorithm.id().to_owned())));
+    let mut table = Table::default()
+        .label(format!("{title}: function (D)"))
+        .numbers(run.iter().map(|algorithm| algorithm.id()));
     for case in &CASES {
         let row = |algorithm| find(rows, case, algorithm, tolerance, "f64");
         let default = row(Algorithm::Bso).and_then(|row| row.evaluations_median);
@@ -122,13 +118,12 @@ fn matrix(rows: &[Row], tolerance: f64, title: &str, cell: fn(&Row, Option<u32>)
             run.iter().map(|algorithm| row(*algorithm).map_or_else(String::new, |row| cell(row, default)));
         table.row([name(case)].into_iter().chain(cells));
     }
-    table.to_string().trim_end().to_owned()
+    table.to_markdown().trim_end().to_owned()
 }
 
 /// Compares the paper's iterations for f1 to f4 in the plane with ours.
 fn beside_the_paper(rows: &[Row]) -> String {
-    let header = ["iterations to 0.1", "f1", "f2", "f3", "f4"].map(str::to_owned);
-    let mut table = headed(header);
+    let mut table = Table::default().label("iterations to 0.1").numbers(["f1", "f2", "f3", "f4"]);
     let cases = ["f1", "f2", "f3", "f4"].map(|id| {
         CASES.iter().find(|case| case.id == id && case.dimension == 2 && case.reading == Reading::Intended)
     });
@@ -145,7 +140,7 @@ fn beside_the_paper(rows: &[Row]) -> String {
         table.row(ours(algorithm));
     }
     table.row(ours(Algorithm::Bso));
-    table.to_string().trim_end().to_owned()
+    table.to_markdown().trim_end().to_owned()
 }
 
 /// Cases in which another search needs fewer evaluations than the default swarm although the latter
@@ -188,8 +183,8 @@ fn comparisons(rows: &[Row]) -> String {
 
 /// Compares the default swarm in single and double precision.
 fn precisions(rows: &[Row]) -> String {
-    let header = ["bso to 0.1: function (D)", "f64", "success", "f32", "success"].map(str::to_owned);
-    let mut table = headed(header);
+    let mut table =
+        Table::default().label("bso to 0.1: function (D)").numbers(["f64", "success", "f32", "success"]);
     for case in &CASES {
         let cells = ["f64", "f32"].map(|precision| {
             find(rows, case, Algorithm::Bso, TOLERANCES[0], precision)
@@ -197,14 +192,14 @@ fn precisions(rows: &[Row]) -> String {
         });
         table.row([name(case)].into_iter().chain(cells.into_iter().flatten()));
     }
-    table.to_string().trim_end().to_owned()
+    table.to_markdown().trim_end().to_owned()
 }
 
 /// Table of the goals of the default swarm.
 fn goals(rows: &[Row]) -> String {
-    let header =
-        ["bso, goal: function (D)", "at most", "f64", "reached", "f32", "reached"].map(str::to_owned);
-    let mut table = headed(header);
+    let mut table = Table::default()
+        .label("bso, goal: function (D)")
+        .numbers(["at most", "f64", "reached", "f32", "reached"]);
     for goal in GOALS {
         let cells = ["f64", "f32"].map(|precision| {
             goal.row(rows, precision).map_or_else(Default::default, |row| {
@@ -218,5 +213,5 @@ fn goals(rows: &[Row]) -> String {
         ];
         table.row(first.into_iter().chain(cells.into_iter().flatten()));
     }
-    table.to_string().trim_end().to_owned()
+    table.to_markdown().trim_end().to_owned()
 }

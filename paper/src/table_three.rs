@@ -13,11 +13,11 @@ use std::fmt::Write;
 
 use scarab::swarm::{Objective, TestFunction, TestProblem};
 use scarab_host::base::error::ToolError;
+use scarab_host::base::table::Table;
 use serde::Serialize;
 use serde_json::Map;
 
 use super::{Part, Section};
-use crate::markdown::Table;
 
 /// Points of the grid along each axis.
 const GRID_POINTS: u32 = 1001;
@@ -107,8 +107,14 @@ struct Found {
 /// Table, text and JSON of this part.
 pub fn section() -> Result<Section, ToolError> {
     let found = ENTRIES.iter().map(find).collect::<Result<Vec<_>, _>>()?;
-    let heads = ["function, D = 2", "box", "f_min listed", "found", "at x", "y", "on 51 x 51 points"];
-    let mut table = Table::new(&heads);
+    let mut table = Table::default().label("function, D = 2").numbers([
+        "box",
+        "f_min listed",
+        "found",
+        "at x",
+        "y",
+        "on 51 x 51 points",
+    ]);
     for (entry, found) in ENTRIES.iter().zip(&found) {
         let reading = if entry.reading == "printed" { " as printed" } else { "" };
         let [x, y] = found.minimiser;
@@ -122,7 +128,7 @@ pub fn section() -> Result<Section, ToolError> {
             decimals(found.coarse_grid_minimum, 4),
         ]);
     }
-    let mut markdown = table.to_string();
+    let mut markdown = table.to_markdown();
     write!(
         markdown,
         "\nLeast values by a grid of {GRID_POINTS} x {GRID_POINTS} points and a compass search from \

@@ -15,6 +15,7 @@ use scarab::ident::Plan;
 use scarab_host::base::error::ToolError;
 use scarab_host::base::names::plan_name;
 use scarab_host::base::number::Number;
+use scarab_host::base::table::Table;
 use scarab_host::report::RunReport;
 use serde::Serialize;
 
@@ -23,7 +24,7 @@ use super::printed::{Printed, TABLE_FIVE, TABLE_SIX};
 use super::ranks::Ranks;
 use super::seeds::ReportSeed;
 use super::{PaperOptions, Part, Section};
-use crate::markdown::{Table, number, percent};
+use crate::digits::{number, percent};
 
 /// Runs of each method by default.
 const RUNS: u64 = 20;
@@ -247,8 +248,7 @@ fn base_line(printed: &Printed, methods: &[Vec<&RunReport>; 2]) -> Option<BaseLi
 }
 
 fn words(report: &TablesReport) -> String {
-    let mut five = Table::new(&[
-        "",
+    let mut five = Table::default().label("").numbers([
         "paper: real",
         "identified",
         "error, % as printed",
@@ -280,8 +280,7 @@ fn words(report: &TablesReport) -> String {
             percent(line.sequential.error_percent.known()),
         ]);
     }
-    let mut six = Table::new(&[
-        "",
+    let mut six = Table::default().label("").numbers([
         "paper: real",
         "identified",
         "error, % as printed",
@@ -321,7 +320,7 @@ fn words(report: &TablesReport) -> String {
         "{} runs of each method, {} % torque noise, leg `{}`; medians over the runs, \u{b1} the reported standard deviation; \
          errors are those of single runs. Accepted: {} one-time, {} sequential. SI units.\n\n\
          The 20 parameters of Table V have rank {}, all 30 of three links {}, {} where one joint moves at a time and its own \
-         torque is read; with rotors, friction and offsets {} of {} are determined. Alone are measured: {} ({}).\n\n**Table V**\n\n{five}\n**Table VI**\n\n{six}",
+         torque is read; with rotors, friction and offsets {} of {} are determined. Alone are measured: {} ({}).\n\n**Table V**\n\n{}\n**Table VI**\n\n{}",
         report.runs,
         report.noise_percent,
         report.leg,
@@ -334,5 +333,7 @@ fn words(report: &TablesReport) -> String {
         rank.columns,
         alone.join(" "),
         alone.len(),
+        five.to_markdown(),
+        six.to_markdown(),
     )
 }

@@ -8,5 +8,5 @@ pub mod output;
 pub mod precision;
 pub mod random;
 pub mod stats;
-pub mod text_table;
+pub mod table;
 pub mod toml_fault;

@@ -167,7 +167,7 @@ pub fn finish(run: &RunReport, common: &Common, preface: &str) -> Result<u8, Too
     output::print(preface)?;
     tables::print_run(run)?;
     if common.parameters {
-        output::print(&format!("\n{}", tables::parameters(run)))?;
+        output::print(&format!("\n{}", tables::all_parameters(run)))?;
     }
     Ok(if run.accepted() { EXIT_ACCEPTED } else { EXIT_REFUSED })
 }

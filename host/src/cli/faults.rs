@@ -101,11 +101,9 @@ fn page(leg: &LegFile, report: &CampaignReport, found: &Campaign) -> Result<Stri
             figures::faults::drawn(format!("{}-{}.svg", outcome.fault, outcome.seed), &what, recording)
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let rows: Vec<_> = report.rows.iter().map(|row| row.cells().to_vec()).collect();
     let campaign = html::faults::Campaign {
         verdict: if report.is_good() { "nothing missed" } else { "failures" },
-        head: &report.head(),
-        rows: &rows,
+        table: &report.table(),
         notes: &report.notes(),
         runs: &lines,
         figures: &figures,
@@ -194,7 +192,7 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
     let simulated = if arguments.full && arguments.hours == 0.0 { FULL_HOURS } else { arguments.hours };
     let hours = if simulated > 0.0 { Some(hours(&leg, simulated)?) } else { None };
     let report = CampaignReport::new(&options.rows, &found, hours);
-    output::print(&report.table())?;
+    output::print(&report.table().to_text())?;
     output::print(&report.notes())?;
     if !found.left_out.is_empty() {
         output::print(&format!(
@@ -216,7 +214,7 @@ pub fn run(arguments: &FaultsArguments) -> Result<u8, ToolError> {
         write_json(path, &report)?;
     }
     if let Some(path) = &arguments.docs {
-        document::replace(path, DOCUMENT[0], DOCUMENT[1], &report.markdown())?;
+        document::replace(path, DOCUMENT[0], DOCUMENT[1], &report.table().to_markdown())?;
     }
     if let Some(path) = &arguments.report {
         let page = page(&leg, &report, &found)?;

@@ -115,7 +115,8 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
     let kept = arguments.model.kept(leg)?;
     let mut replayed = with_leg_size!(leg, replay(leg, options))?;
     arguments.model.compare(kept.as_ref(), &mut replayed.run);
-    let code = finish(&replayed.run, &arguments.common, &tables::sources(&replayed.sources))?;
+    let sources = format!("{}{}\n\n", tables::sources(&replayed.sources).to_text(), tables::SOURCES);
+    let code = finish(&replayed.run, &arguments.common, &sources)?;
     draw(leg, &arguments.common, &replayed.run, &replayed.series, &replayed.sources)?;
     arguments.model.save(leg, &replayed.run, replayed.bandwidth_hz)?;
     Ok(code)

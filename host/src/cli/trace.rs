@@ -83,7 +83,7 @@ fn report(arguments: &TraceArguments, trace: &Trace) -> Result<u8, ToolError> {
     }
     tables::print_run(&run)?;
     if arguments.parameters {
-        output::print(&format!("\n{}", tables::parameters(&run)))?;
+        output::print(&format!("\n{}", tables::all_parameters(&run)))?;
     }
     let (figures, page) = (arguments.figures.as_deref(), arguments.report.as_deref());
     if figures.is_some() || page.is_some() {

@@ -1,10 +1,10 @@
-//! Report of a campaign: table, JSON and lines for a document.
+//! Report of a campaign: table, notes and JSON.
 
 use scarab::safety::FaultCode;
 use serde::Serialize;
 
 use crate::base::number::Number;
-use crate::base::text_table::headed;
+use crate::base::table::{Cell, Table, cells};
 use crate::faults::campaign::Campaign;
 use crate::faults::detectors::{DetectorReport, detectors};
 use crate::faults::entry::{Entry, Head, instead};
@@ -164,46 +164,26 @@ impl CampaignReport {
             && self.rows.iter().all(|row| !row.is_noticed() && row.false_alarms == 0)
     }
 
-    /// Names of the table's columns.
+    /// Table of the rows.
     #[must_use]
-    pub const fn head(&self) -> [&'static str; 11] {
-        HEAD
-    }
-
-    /// Table for a terminal.
-    #[must_use]
-    pub fn table(&self) -> String {
-        let mut table = headed(&HEAD);
-        for row in &self.rows {
-            table.add_row(row.cells().to_vec());
-        }
-        format!("{table}\n")
-    }
-
-    /// Table for a document.
-    #[must_use]
-    pub fn markdown(&self) -> String {
-        let mut text = format!("| {} |\n|{}\n", HEAD.join(" | "), " --- |".repeat(HEAD.len()));
-        for row in &self.rows {
-            text.push_str(&format!("| {} |\n", row.cells().join(" | ")));
-        }
-        text
+    pub fn table(&self) -> Table {
+        let mut table = Table::of_class("any")
+            .text(["fault", "what"])
+            .numbers(["runs", "seen"])
+            .text(["worst / deadline, ms"])
+            .styled("words")
+            .text(["state (reached)"])
+            .numbers([
+                "missed",
+                "not to be seen",
+                "smallest seen",
+                "false alarms",
+                "detected of detectable (not detectable)",
+            ]);
+        self.rows.iter().for_each(|row| table.row(row.cells()));
+        table
     }
 }
-
-const HEAD: [&str; 11] = [
-    "fault",
-    "what",
-    "runs",
-    "seen",
-    "worst / deadline, ms",
-    "state (reached)",
-    "missed",
-    "not to be seen",
-    "smallest seen",
-    "false alarms",
-    "detected of detectable (not detectable)",
-];
 
 fn number(value: Number, digits: usize) -> String {
     value.known().map_or_else(|| "-".into(), |value| format!("{value:.digits$}"))
@@ -235,24 +215,23 @@ impl RowReport {
     }
 
     /// Cells of the row's line in the table.
-    #[must_use]
-    pub fn cells(&self) -> [String; 11] {
+    fn cells(&self) -> [Cell; 11] {
         let smallest = match self.smallest_seen.known() {
             Some(value) if !self.unit.is_empty() => format!("{value:.1} {}", self.unit),
             _ => "-".into(),
         };
-        [
-            self.fault.into(),
-            self.what.into(),
-            self.runs.to_string(),
-            self.detected.to_string(),
+        cells![
+            self.fault,
+            self.what,
+            self.runs,
+            self.detected,
             self.times(),
             match self.state_instead {
                 None => format!("{} ({})", self.state, self.state_reached),
                 Some(instead) => format!("{}; here {instead} ({})", self.state, self.state_reached),
             },
-            self.missed.to_string(),
-            self.undetectable_by_design.to_string(),
+            self.missed,
+            self.undetectable_by_design,
             smallest,
             if self.judges_false_alarms { self.false_alarms.to_string() } else { "-".into() },
             format!("{} ({})", percent(self.detected_of_detectable), percent(self.not_detectable())),

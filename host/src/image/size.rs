@@ -6,7 +6,7 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SymbolKind};
 use serde::Serialize;
 
 use crate::base::error::ToolError;
-use crate::base::text_table::headed;
+use crate::base::table::{Table, cells};
 
 /// Flash limit of an image, bytes: a quarter of the chip's. Speed has priority over size
 /// (docs/board.md, section 1).
@@ -133,38 +133,28 @@ impl ImageSize {
     /// Formats the size as tables.
     #[must_use]
     pub fn text(&self) -> String {
-        let mut sections = headed(&["section", "flash", "memory", "core-coupled"]);
+        let mut sections = Table::default().label("section").numbers(["flash", "memory", "core-coupled"]);
         let cell = |bytes: u64| if bytes == 0 { String::new() } else { bytes.to_string() };
         for section in &self.sections {
-            sections.add_row(vec![
-                section.name.clone(),
+            sections.row(cells![
+                &section.name,
                 cell(section.flash),
                 cell(section.memory),
                 cell(section.core_coupled),
             ]);
         }
-        sections.add_row(vec![
-            "in all".to_owned(),
-            self.flash().to_string(),
-            self.memory().to_string(),
-            self.core_coupled().to_string(),
-        ]);
-        sections.add_row(vec![
-            "at most".to_owned(),
-            FLASH_GOAL.to_string(),
-            MEMORY_GOAL.to_string(),
-            CORE_COUPLED.to_string(),
-        ]);
+        sections.row(cells!["in all", self.flash(), self.memory(), self.core_coupled()]);
+        sections.row(cells!["at most", FLASH_GOAL, MEMORY_GOAL, CORE_COUPLED]);
         let list = |title: &str, symbols: &[Symbol]| {
-            let mut table = headed(&["bytes", title]);
+            let mut table = Table::default().numbers(["bytes"]).text([title]);
             for symbol in symbols {
-                table.add_row(vec![symbol.bytes.to_string(), symbol.name.clone()]);
+                table.row(cells![symbol.bytes, &symbol.name]);
             }
-            table.trim_fmt()
+            table.to_text()
         };
         format!(
-            "{}\n\nstack set aside: {} bytes\n\n{}\n\n{}\n",
-            sections.trim_fmt(),
+            "{}\nstack set aside: {} bytes\n\n{}\n{}",
+            sections.to_text(),
             self.stack,
             list("largest functions and constants", &self.code),
             list("largest variables", &self.variables)

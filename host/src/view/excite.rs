@@ -1,9 +1,7 @@
 //! Report of a motion in words and tables.
 
-use comfy_table::{CellAlignment, Table};
-
 use crate::base::number::number;
-use crate::base::text_table::headed;
+use crate::base::table::{Table, cells};
 use crate::report::excite::ExciteReport;
 
 /// Formats the report for standard output.
@@ -44,8 +42,7 @@ fn noise(report: &ExciteReport) -> String {
 }
 
 fn joints(report: &ExciteReport) -> String {
-    let mut rows = headed(&[
-        "joint",
+    let mut table = Table::default().label("joint").numbers([
         "angle deg",
         "of",
         "deg/s",
@@ -60,8 +57,8 @@ fn joints(report: &ExciteReport) -> String {
     ]);
     let range = |[low, high]: [f64; 2]| format!("{low:.1}..{high:.1}");
     for joint in &report.joints {
-        rows.add_row(vec![
-            joint.name.clone(),
+        table.row(cells![
+            &joint.name,
             range(joint.angle_deg),
             range(joint.range_deg),
             format!("{:.0}", joint.speed_deg_s),
@@ -75,44 +72,46 @@ fn joints(report: &ExciteReport) -> String {
             format!("{:.1}", 100.0 * joint.lost_share),
         ]);
     }
-    finished(rows, 1..12)
+    table.to_text()
 }
 
 fn base_parameters(report: &ExciteReport) -> String {
-    let mut rows = headed(&[
-        "base parameter",
-        "assumed",
-        "expected sigma",
-        "unit",
-        "systematic",
-        "over a random motion's",
-    ]);
+    let mut table = Table::default()
+        .label("base parameter")
+        .numbers(["assumed", "expected sigma"])
+        .unit()
+        .numbers(["systematic", "over a random motion's"]);
     for base in &report.base_parameters {
         let expected = &base.expected;
-        rows.add_row(vec![
-            expected.name.clone(),
+        table.row(cells![
+            &expected.name,
             number(expected.assumed.into()),
             number(expected.sigma.into()),
-            expected.unit.clone(),
+            &expected.unit,
             number(expected.systematic.into()),
             base.ratio_to_random.known().map_or_else(|| "-".into(), |ratio| format!("{ratio:.2}")),
         ]);
     }
-    finished(rows, [1, 2, 4, 5])
+    table.to_text()
 }
 
 fn parameters(report: &ExciteReport) -> String {
-    let mut rows = headed(&["parameter", "status", "expected sigma", "unit", "grouped with"]);
+    let mut table = Table::default()
+        .label("parameter")
+        .text(["status"])
+        .numbers(["expected sigma"])
+        .unit()
+        .text(["grouped with"]);
     for parameter in &report.parameters {
-        rows.add_row(vec![
-            parameter.name.clone(),
-            parameter.status.into(),
+        table.row(cells![
+            &parameter.name,
+            parameter.status,
             number(parameter.sigma),
-            parameter.unit.into(),
+            parameter.unit,
             parameter.grouped_with.join(" "),
         ]);
     }
-    finished(rows, [2])
+    table.to_text()
 }
 
 fn information(report: &ExciteReport) -> String {
@@ -140,13 +139,4 @@ fn information(report: &ExciteReport) -> String {
         }
     }
     text
-}
-
-fn finished(mut rows: Table, numbers: impl IntoIterator<Item = usize>) -> String {
-    for index in numbers {
-        if let Some(column) = rows.column_mut(index) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    rows.trim_fmt() + "\n"
 }

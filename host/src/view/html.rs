@@ -13,7 +13,7 @@ pub mod faults;
 mod generic;
 mod head;
 mod limits;
-mod parameters;
+pub mod parameters;
 mod results;
 pub mod seeds;
 mod verdict;
@@ -25,6 +25,7 @@ use crate::base::error::ToolError;
 use crate::base::names::BY_CARGO;
 use crate::base::number::Number;
 use crate::base::precision;
+use crate::base::table::typeset;
 use crate::formats::leg_file::LegFile;
 use crate::report::{RunReport, Source};
 use crate::view::figures::{Figure, Group};
@@ -137,14 +138,6 @@ fn drawing(figure: &Figure) -> Markup {
     }
 }
 
-/// Formats digits with a true minus sign; a dash if unknown.
-fn typeset(digits: &str) -> String {
-    match digits {
-        "-" => "\u{2013}".into(),
-        known => known.replace('-', "\u{2212}"),
-    }
-}
-
 /// Formats three significant digits.
 fn number(value: Number) -> String {
     typeset(&precision::plain(value))
@@ -173,12 +166,7 @@ fn joint_name(leg: &LegFile, joint: usize) -> String {
 
 /// Formats a number with its sign.
 fn signed(value: f64) -> String {
-    format!("{value:+.1}").replace('-', "\u{2212}")
-}
-
-/// Typesets a unit with raised exponents: `kg m2` becomes `kg m²`.
-fn unit(plain: &str) -> String {
-    plain.replace("m2", "m\u{b2}").replace(' ', "\u{a0}")
+    typeset(&format!("{value:+.1}"))
 }
 
 /// `1 thing`, `2 things`.

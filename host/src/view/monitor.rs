@@ -3,7 +3,7 @@
 use crate::base::error::ToolError;
 use crate::base::number::{Number, number};
 use crate::base::output::say;
-use crate::base::text_table::headed;
+use crate::base::table::{Table, cells};
 use crate::report::monitor::{MonitorRun, MonitorRuns};
 
 /// Prints a run in a few lines.
@@ -51,18 +51,19 @@ fn print_run(run: &MonitorRun) -> Result<(), ToolError> {
         if update.right { "" } else { ", which is wrong" },
         compared.join(", ")
     );
-    let mut table = headed(&["  change of", "value", "sigma", "unit", "truth"]);
+    let mut table =
+        Table::default().label("  change of").numbers(["value", "sigma"]).unit().numbers(["truth"]);
     for value in &update.values {
-        table.add_row(vec![
+        table.row(cells![
             format!("  {}", value.name),
             number(value.value),
             number(value.sigma),
-            value.unit.into(),
+            value.unit,
             number(value.truth),
         ]);
     }
-    if !update.values.is_empty() {
-        say!("{}", table.trim_fmt());
+    if !table.is_empty() {
+        say!("{}", table.to_text().trim_end());
     }
     let energies =
         |values: &[Number]| values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(" ");
@@ -123,7 +124,10 @@ pub fn print_runs(report: &MonitorRuns) -> Result<(), ToolError> {
     let again = changed.iter().filter(|run| run.alarm_after_update).count();
     say!("another alarm within a minute of the update: {again}");
     let right: Vec<_> = updates.iter().filter(|update| update.right).collect();
-    let mut table = headed(&["change of", "truth", "mean", "spread", "rms sigma", "worst error", "unit"]);
+    let mut table = Table::default()
+        .label("change of")
+        .numbers(["truth", "mean", "spread", "rms sigma", "worst error"])
+        .unit();
     for value in right.first().map_or(&[][..], |update| &update.values) {
         let same: Vec<_> =
             right.iter().flat_map(|update| &update.values).filter(|other| other.name == value.name).collect();
@@ -132,16 +136,16 @@ pub fn print_runs(report: &MonitorRuns) -> Result<(), ToolError> {
         let (mean, spread) = mean_and_spread(&found);
         let truth = value.truth.known();
         let worst = truth.map(|truth| found.iter().map(|value| (value - truth).abs()).fold(0.0, f64::max));
-        table.add_row(vec![
-            value.name.clone(),
+        table.row(cells![
+            &value.name,
             number(value.truth),
             number(mean.into()),
             number(spread.into()),
             number((sigma / same.len().max(1) as f64).sqrt().into()),
             number(worst.into()),
-            value.unit.into(),
+            value.unit,
         ]);
     }
-    say!("{}", table.trim_fmt());
+    say!("{}", table.to_text().trim_end());
     Ok(())
 }

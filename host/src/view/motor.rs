@@ -1,6 +1,6 @@
 //! Formats the measurements of `motor` as tables.
 
-use crate::base::text_table::headed;
+use crate::base::table::{Table, cells};
 use crate::report::motor::MotorReport;
 
 /// Formats all tables.
@@ -15,19 +15,23 @@ pub fn tables(report: &MotorReport) -> String {
         ampere(from),
         ampere(to)
     );
-    let mut table =
-        headed(&["speed, rad/s", "feedforward", "rise, ms", "overshoot, %", "coupling, %", "error, A"]);
+    let mut table = Table::default().numbers(["speed, rad/s"]).text(["feedforward"]).numbers([
+        "rise, ms",
+        "overshoot, %",
+        "coupling, %",
+        "error, A",
+    ]);
     let designed = &report.designed;
-    table.add_row(vec![
-        "designed".to_owned(),
-        String::new(),
+    table.row(cells![
+        "designed",
+        "",
         rise(designed.rise_ms),
         format!("{:.1}", designed.overshoot_percent),
-        "0.0".into(),
-        "0.00".into(),
+        "0.0",
+        "0.00",
     ]);
     for step in &report.steps {
-        table.add_row(vec![
+        table.row(cells![
             format!("{:.0}", step.speed_rad_s),
             yes(step.feedforward),
             rise(step.shape.rise_ms),
@@ -37,18 +41,13 @@ pub fn tables(report: &MotorReport) -> String {
         ]);
     }
     let current = report.ripple.first().map_or(0.0, |ripple| ripple.current_a);
-    text += &format!("{}\n\ntorque ripple at {} A, no cogging\n", table.trim_fmt(), ampere(current));
-    let mut table = headed(&[
-        "speed, rad/s",
-        "sensor noise",
-        "dead time given back",
-        "torque, % rms",
-        "6th harmonic, %",
-        "mean, %",
-        "direct, A rms",
-    ]);
+    text += &format!("{}\ntorque ripple at {} A, no cogging\n", table.to_text(), ampere(current));
+    let mut table = Table::default()
+        .numbers(["speed, rad/s"])
+        .text(["sensor noise", "dead time given back"])
+        .numbers(["torque, % rms", "6th harmonic, %", "mean, %", "direct, A rms"]);
     for ripple in &report.ripple {
-        table.add_row(vec![
+        table.row(cells![
             format!("{:.0}", ripple.speed_rad_s),
             yes(ripple.noise),
             yes(ripple.compensated),
@@ -59,23 +58,21 @@ pub fn tables(report: &MotorReport) -> String {
         ]);
     }
     let asked = report.limit.first().map_or(0.0, |limit| limit.asked_a);
-    text += &format!(
-        "{}\n\nvoltage limit: {} A asked for 100 ms, and then less\n",
-        table.trim_fmt(),
-        ampere(asked)
-    );
-    let mut table = headed(&[
-        "speed, rad/s",
-        "supply, V",
-        "reached, A",
-        "then, A",
-        "direct, A",
-        "recovery, ms",
-        "overshoot, A",
-        "released",
-    ]);
+    text +=
+        &format!("{}\nvoltage limit: {} A asked for 100 ms, and then less\n", table.to_text(), ampere(asked));
+    let mut table = Table::default()
+        .numbers([
+            "speed, rad/s",
+            "supply, V",
+            "reached, A",
+            "then, A",
+            "direct, A",
+            "recovery, ms",
+            "overshoot, A",
+        ])
+        .text(["released"]);
     for limit in &report.limit {
-        table.add_row(vec![
+        table.row(cells![
             format!("{:.0}", limit.speed_rad_s),
             format!("{:.0}", limit.supply_v),
             format!("{:.1}", limit.reached_a),
@@ -88,26 +85,22 @@ pub fn tables(report: &MotorReport) -> String {
     }
     let current = report.regeneration.first().map_or(0.0, |braking| braking.current_a);
     let words = format!("braking with {} A from the joint's top speed", ampere(current));
-    text += &format!("{}\n\n{words}\n", table.trim_fmt());
-    let mut table = headed(&[
-        "chopper",
-        "highest bus, V",
-        "motion, J",
-        "given back, J",
-        "brake resistor, J",
-        "released by",
-    ]);
+    text += &format!("{}\n{words}\n", table.to_text());
+    let mut table = Table::default()
+        .text(["chopper"])
+        .numbers(["highest bus, V", "motion, J", "given back, J", "brake resistor, J"])
+        .text(["released by"]);
     for braking in &report.regeneration {
-        table.add_row(vec![
+        table.row(cells![
             yes(braking.chopper),
             format!("{:.1}", braking.highest_bus_v),
             format!("{:.1}", braking.motion_j),
             format!("{:.1}", braking.returned_j),
             format!("{:.1}", braking.brake_j),
-            braking.fault.unwrap_or("-").into(),
+            braking.fault.unwrap_or("-"),
         ]);
     }
-    text + &table.trim_fmt() + "\n"
+    text + &table.to_text()
 }
 
 /// Formats whole amperes without decimals.
@@ -119,6 +112,6 @@ fn rise(ms: Option<f64>) -> String {
     ms.map_or("never".into(), |ms| format!("{ms:.3}"))
 }
 
-fn yes(value: bool) -> String {
-    if value { "yes" } else { "no" }.into()
+const fn yes(value: bool) -> &'static str {
+    if value { "yes" } else { "no" }
 }

@@ -1,13 +1,11 @@
 //! Statistics of many runs: errors over their bounds, coverage, searches, and the spread of parameters that
 //! torque does not determine.
 
-use comfy_table::Table;
-
 use crate::base::error::ToolError;
 use crate::base::number::number;
 use crate::base::output::say;
 use crate::base::stats::{quantile, rms};
-use crate::base::text_table::headed;
+use crate::base::table::{Table, cells};
 use crate::report::scale::summary;
 use crate::report::{ConsistentSearchReport, RunReport, RunsReport};
 
@@ -20,8 +18,7 @@ type Search = fn(&RunReport) -> Option<&ConsistentSearchReport>;
 
 /// Prints both searches, then the parameters that torque alone does not determine.
 fn print_searches(runs: &[RunReport]) -> Result<(), ToolError> {
-    let mut table = headed(&[
-        "search for a leg that can exist",
+    let mut table = Table::default().label("search for a leg that can exist").numbers([
         "excess <= 0.5",
         "worst excess",
         "within 125 iterations",
@@ -47,8 +44,8 @@ fn print_searches(runs: &[RunReport]) -> Result<(), ToolError> {
         let iterations = column(&|run| f64::from(run.iterations));
         let evaluations = column(&|run| f64::from(run.evaluations));
         let of = |count: usize| format!("{count} of {}", all.len());
-        table.add_row(vec![
-            name.to_owned(),
+        table.row(cells![
+            name,
             of(excess.iter().filter(|excess| **excess <= EXCESS).count()),
             number(excess.iter().copied().fold(f64::NEG_INFINITY, f64::max).into()),
             of(to_half.iter().filter(|iterations| **iterations <= f64::from(ITERATIONS)).count()),
@@ -58,20 +55,18 @@ fn print_searches(runs: &[RunReport]) -> Result<(), ToolError> {
             quantile(iterations, 0.95).to_string(),
             quantile(evaluations.clone(), 0.5).to_string(),
             quantile(evaluations, 0.95).to_string(),
-            all.iter().map(|run| run.steps).max().unwrap_or(0).to_string(),
+            all.iter().map(|run| run.steps).max().unwrap_or(0),
             of(all.iter().filter(|run| run.consistent == Some(false)).count()),
         ]);
     }
-    say!("\n{table}");
+    say!("\n{}", table.to_text().trim_end());
     hidden(runs)
 }
 
 /// Parameters from the prior or in a group: their distance and the prior's distance from the truth.
 fn hidden(runs: &[RunReport]) -> Result<(), ToolError> {
     let Some(first) = runs.first() else { return Ok(()) };
-    let mut table = headed(&[
-        "what torque cannot tell",
-        "status",
+    let mut table = Table::default().label("what torque cannot tell").text(["status"]).numbers([
         "truth",
         "rms error: prior",
         "base values, completed",
@@ -91,9 +86,9 @@ fn hidden(runs: &[RunReport]) -> Result<(), ToolError> {
             continue;
         }
         let between: Vec<f64> = base.iter().zip(&full).map(|(base, full)| base - full).collect();
-        table.add_row(vec![
-            parameter.name.clone(),
-            parameter.status.into(),
+        table.row(cells![
+            &parameter.name,
+            parameter.status,
             number(truth.into()),
             number(rms(prior).into()),
             number(rms(base).into()),
@@ -101,16 +96,15 @@ fn hidden(runs: &[RunReport]) -> Result<(), ToolError> {
             number(rms(between).into()),
         ]);
     }
-    if table.row_count() > 0 {
-        say!("\n{table}");
+    if !table.is_empty() {
+        say!("\n{}", table.to_text().trim_end());
     }
     Ok(())
 }
 
 /// Table of the errors relative to the bound, for each base parameter.
 fn spread_table(report: &RunsReport) -> Table {
-    let mut table = headed(&[
-        "base parameter",
+    let mut table = Table::default().label("base parameter").numbers([
         "truth",
         "rms sigma",
         "bso rmse / CRB",
@@ -138,8 +132,8 @@ fn spread_table(report: &RunsReport) -> Table {
         let bounds = rms(of(&|run| named(run, &base.name)?.cramer_rao.known()));
         let bound = if bounds > 0.0 { bounds } else { bound };
         let bias = swarm.iter().map(|value| value - truth).sum::<f64>() / swarm.len().max(1) as f64;
-        table.add_row(vec![
-            base.name.clone(),
+        table.row(cells![
+            &base.name,
             number(truth.into()),
             number(rms(sigma).into()),
             format!("{:.2}", rms(swarm.iter().map(|value| value - truth)) / bound),
@@ -169,14 +163,13 @@ pub fn print_runs(report: &RunsReport) -> Result<(), ToolError> {
     let runs = &report.runs;
     let Some(first) = runs.first() else { return Ok(()) };
     say!("{}: {} runs, prior {}, plan {}\n", first.leg, runs.len(), first.prior, first.plan);
-    say!("{}\n", spread_table(report));
+    say!("{}", spread_table(report).to_text());
     say!(
         "sigma covers {:.1} % within one and {:.1} % within three (68.3, 99.7 for a normal distribution)",
         coverage(report, 1.0),
         coverage(report, 3.0)
     );
-    let mut fits = headed(&[
-        "motion",
+    let mut fits = Table::default().label("motion").numbers([
         "joint",
         "% of mean abs, noise-free: median",
         "worst",
@@ -188,15 +181,15 @@ pub fn print_runs(report: &RunsReport) -> Result<(), ToolError> {
         };
         let truth = of(&|fit| fit.percent_of_mean_abs_vs_truth.known());
         let measured = of(&|fit| fit.percent_of_mean_abs.known());
-        fits.add_row(vec![
-            fit.motion.clone(),
-            fit.joint.to_string(),
+        fits.row(cells![
+            &fit.motion,
+            fit.joint,
             format!("{:.3}", quantile(truth.clone(), 0.5)),
             format!("{:.3}", quantile(truth.clone(), 1.0)),
             format!("{:.3}", quantile(measured.clone(), 0.5)),
         ]);
     }
-    say!("\n{fits}\n");
+    say!("\n{}", fits.to_text());
     let excess: Vec<f64> = runs.iter().filter_map(|run| run.bso.excess_chi2.known()).collect();
     let to_half: Vec<f64> =
         runs.iter().map(|run| run.bso.iterations_to_half_chi2.map_or(f64::INFINITY, f64::from)).collect();

@@ -1,29 +1,37 @@
-//! Formats the report of a run as plain tables.
+//! Tables of a run's report, for the terminal and the page, and its text.
+
+use std::collections::BTreeMap;
 
 use crate::base::error::ToolError;
 use crate::base::number::{Number, number};
 use crate::base::output::print;
-use crate::base::precision::{plain, sigma, value};
-use crate::base::text_table::{align_numbers, headed, text};
+use crate::base::precision::{exact, plain, sigma, value};
+use crate::base::table::{Cell, Table, cells};
 use crate::report::disturbances::StribeckReport;
+use crate::report::series::Role;
 use crate::report::{
-    AddedMassReport, ComparisonReport, ConsistentSearchReport, FitReport, RunReport, Source,
+    AddedMassReport, BaseReport, ComparisonReport, ConsistentSearchReport, FitReport, ParameterReport,
+    RunReport, Source,
 };
+use crate::view::html::parameters::{badge, bar};
 
 /// Table of the base parameters: value, sigma with its parts, truth and error in sigma.
 #[must_use]
-pub fn base_parameters(run: &RunReport) -> String {
-    let mut rows = headed(&[
-        "base parameter",
-        "value",
-        "sigma",
-        "of noise",
-        "of misfit",
-        "unit",
-        "truth",
-        "error/sigma",
-        "= sum of",
-    ]);
+pub fn base_parameters(run: &RunReport) -> Table {
+    let any = |known: fn(&BaseReport) -> Number| {
+        run.base_parameters.iter().any(|base| known(base).known().is_some())
+    };
+    let (misfit, truth) = (any(|base| base.sigma_misfit), any(|base| base.truth));
+    let mut table = Table::default()
+        .label("base parameter")
+        .numbers(["value", "sigma"])
+        .numbers_if(misfit, ["of noise", "of misfit"])
+        .unit()
+        .numbers_if(truth, ["truth", "error/sigma"])
+        .numbers_if(any(|base| base.cramer_rao), ["Cram\u{e9}r-Rao"])
+        .html_only()
+        .text(["= sum of"])
+        .styled("terms");
     for base in &run.base_parameters {
         let off = match (base.value.known(), base.truth.known(), base.sigma.known()) {
             (Some(found), Some(truth), Some(deviation)) if deviation > 0.0 => {
@@ -31,118 +39,131 @@ pub fn base_parameters(run: &RunReport) -> String {
             }
             _ => "-".into(),
         };
-        let terms: Vec<String> =
-            base.terms
-                .iter()
-                .map(|(name, factor)| {
-                    if *factor == 1.0 { name.clone() } else { format!("{} {name}", number((*factor).into())) }
-                })
-                .collect();
-        rows.add_row(vec![
-            base.name.clone(),
+        table.row(cells![
+            &base.name,
             value(base.value, base.sigma),
             sigma(base.sigma),
             sigma(base.sigma_noise),
             sigma(base.sigma_misfit),
-            base.unit.into(),
+            base.unit,
             value(base.truth, base.sigma),
             off,
-            if terms.len() > 1 { terms.join(" + ").replace("+ -", "- ") } else { String::new() },
+            sigma(Number(base.cramer_rao.known().filter(|bound| *bound > 0.0))),
+            Cell::typeset(terms(&base.terms)),
         ]);
     }
-    align_numbers(&mut rows, [1, 2, 3, 4, 6, 7]);
-    let misfit = run.base_parameters.iter().any(|base| base.sigma_misfit.known().is_some());
-    let known = run.base_parameters.iter().any(|base| base.truth.known().is_some());
-    let absent: Vec<usize> = [(misfit, [3, 4]), (known, [6, 7])]
-        .into_iter()
-        .filter(|(is_shown, _)| !is_shown)
-        .flat_map(|(_, columns)| columns)
-        .collect();
-    text(rows, &absent)
+    table
 }
 
-/// Table of all parameters with their status.
+/// Sum of several parameters with their factors; empty for a single one.
+fn terms(terms: &BTreeMap<String, f64>) -> String {
+    if terms.len() < 2 {
+        return String::new();
+    }
+    // A computed factor of one equals one up to rounding.
+    let term = |(name, factor): (&String, &f64)| match factor {
+        factor if (factor - 1.0).abs() <= 1e-9 => name.clone(),
+        factor if (factor + 1.0).abs() <= 1e-9 => format!("-{name}"),
+        factor => format!("{} {name}", exact((*factor).into())),
+    };
+    terms.iter().map(term).collect::<Vec<_>>().join(" + ").replace("+ -", "- ")
+}
+
+/// Table of parameters with their status.
 #[must_use]
-pub fn parameters(run: &RunReport) -> String {
-    let mut rows = headed(&["parameter", "value", "sigma", "unit", "status", "grouped with", "truth"]);
-    for parameter in &run.parameters {
-        rows.add_row(vec![
-            parameter.name.clone(),
+pub fn parameters<'a>(parameters: impl Iterator<Item = &'a ParameterReport>, is_truth_known: bool) -> Table {
+    let mut table = Table::of_class("parameters")
+        .label("parameter")
+        .numbers(["value", "sigma"])
+        .unit()
+        .text(["status"])
+        .text(["value, sigma, truth, prior"])
+        .html_only()
+        .numbers_if(is_truth_known, ["truth"])
+        .text(["grouped with"])
+        .styled("terms");
+    for parameter in parameters {
+        table.row(cells![
+            &parameter.name,
             value(parameter.value, parameter.sigma),
             sigma(parameter.sigma),
-            parameter.unit.into(),
-            parameter.status.into(),
-            parameter.grouped_with.join(" "),
+            parameter.unit,
+            Cell::Html(parameter.status.into(), badge(parameter.status)),
+            bar(parameter),
             value(parameter.truth, parameter.sigma),
+            parameter.grouped_with.join(", "),
         ]);
     }
-    align_numbers(&mut rows, [1, 2, 6]);
-    let known = run.parameters.iter().any(|parameter| parameter.truth.known().is_some());
-    text(rows, if known { &[] } else { &[6] })
+    table
+}
+
+/// All parameters, and the meaning of their status.
+#[must_use]
+pub fn all_parameters(run: &RunReport) -> String {
+    let truth = run.parameters.iter().any(|parameter| parameter.truth.known().is_some());
+    parameters(run.parameters.iter(), truth).to_text()
         + "\nidentified: measured alone. grouped: only sums with the parameters beside it are measured, the prior \
            splits them.\nweak: measured with little certainty. prior: does not show in the torque.\n"
 }
 
-/// Table of the torque errors on all motions.
+/// Table of the torque errors on all motions; `motion` names that of a fit, `joint` a joint.
 #[must_use]
-pub fn fits(run: &RunReport) -> String {
-    let mut rows = headed(&[
-        "motion",
-        "use",
-        "joint",
-        "rms N m",
-        "% of mean abs",
-        "% of rms",
-        "set aside %",
-        "% of mean abs, noise-free",
-        "sticking %",
-    ]);
-    let mut add = |fit: &FitReport, role: &str| {
-        rows.add_row(vec![
-            fit.motion.clone(),
-            role.into(),
-            fit.joint.to_string(),
+pub fn fits(
+    run: &RunReport,
+    motion: impl Fn(&FitReport, Role) -> String,
+    joint: impl Fn(usize) -> String,
+) -> Table {
+    let all = || {
+        let training = run.training.iter().map(|fit| (fit, Role::Training));
+        training.chain(run.validation.iter().map(|fit| (fit, Role::Validation)))
+    };
+    let known = all().any(|(fit, _)| fit.percent_of_mean_abs_vs_truth.known().is_some());
+    let mut table = Table::default()
+        .text(["motion", "use", "joint"])
+        .numbers(["rms, N m", "% of mean abs", "% of rms", "set aside, %"])
+        .numbers_if(known, ["% of mean abs, noise-free", "sticking, %"]);
+    let percent = |share: Number| number(Number(share.known().map(|share| 100.0 * share)));
+    for (fit, role) in all() {
+        table.row(cells![
+            motion(fit, role),
+            role.name(),
+            joint(fit.joint),
             number(fit.rms_nm),
             number(fit.percent_of_mean_abs),
             number(fit.percent_of_rms),
-            number(Number(fit.disturbed_share.known().map(|share| 100.0 * share))),
+            percent(fit.disturbed_share),
             number(fit.percent_of_mean_abs_vs_truth),
-            number(Number(fit.sticking_share.known().map(|share| 100.0 * share))),
+            percent(fit.sticking_share),
         ]);
-    };
-    run.training.iter().for_each(|fit| add(fit, "training"));
-    run.validation.iter().for_each(|fit| add(fit, "validation"));
-    align_numbers(&mut rows, 3..9);
-    let mut all = run.training.iter().chain(&run.validation);
-    let known = all.any(|fit| fit.percent_of_mean_abs_vs_truth.known().is_some());
-    text(rows, if known { &[] } else { &[7, 8] })
+    }
+    table
 }
 
 /// Table of the training and validation files, with the rows used for each joint.
 #[must_use]
-pub fn sources(sources: &[Source]) -> String {
+pub fn sources(sources: &[Source]) -> Table {
     let joints = sources.first().map_or(0, |source| source.used.len());
-    let mut header = vec!["file".to_owned(), "use".into(), "from s".into(), "length s".into(), "Hz".into()];
-    (1..=joints).for_each(|joint| header.extend([format!("rows {joint}"), format!("still {joint}")]));
-    let mut rows = headed(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    let mut table = Table::default()
+        .text(["file", "use"])
+        .numbers(["from, s", "length, s", "rate, Hz"])
+        .numbers((1..=joints).flat_map(|joint| [format!("rows {joint}"), format!("still {joint}")]));
     for source in sources {
-        let mut cells = vec![
+        let cells = cells![
             source.file.display().to_string(),
-            source.role.into(),
+            source.role,
             format!("{:.2}", source.start_s),
             format!("{:.2}", source.duration_s),
             format!("{:.0}", source.rate_hz),
         ];
-        for used in &source.used {
-            cells.extend([used.to_string(), (source.rows - used).to_string()]);
-        }
-        rows.add_row(cells);
+        let counts = source.used.iter().flat_map(|used| cells![*used, source.rows - used]);
+        table.row(cells.into_iter().chain(counts));
     }
-    align_numbers(&mut rows, 2..5 + 2 * joints);
-    text(rows, &[])
-        + "rows: filtered to 50 a second and used for that joint's torque; still: left out, because friction at rest \
-           is undetermined.\n\n"
+    table
 }
+
+/// Meaning of the rows in the table of the files.
+pub const SOURCES: &str = "rows: filtered to 50 a second and used for that joint's torque; still: left out, because \
+                           friction at rest is undetermined.";
 
 /// Prints one run.
 pub fn print_run(run: &RunReport) -> Result<(), ToolError> {
@@ -164,8 +185,8 @@ fn run_text(run: &RunReport) -> String {
             number(run.condition)
         ),
         String::new(),
-        base_parameters(run),
-        fits(run),
+        base_parameters(run).to_text(),
+        fits(run, |fit, _| fit.motion.clone(), |joint| joint.to_string()).to_text(),
         search_line(run),
     ];
     lines.push(consistent_line(run));

@@ -3,32 +3,35 @@
 use maud::{Markup, html};
 
 use crate::base::number::Number;
+use crate::base::table::{Table, cells};
 use crate::formats::leg_file::LegFile;
-use crate::report::RunReport;
-use crate::report::model_choice::ModelChoiceReport;
-use crate::view::html::{exact, joint_name, measured, number, sigma};
+use crate::report::{ComparisonReport, RunReport};
+use crate::view::html::{exact, joint_name, measured, number, sigma, signed};
 
 /// Terms of each joint's model, with identified Stribeck and directional friction.
 pub fn model(run: &RunReport, leg: &LegFile) -> Markup {
-    let row = |choice: &ModelChoiceReport| {
-        html! { tr {
-            td { (joint_name(leg, choice.joint)) } td { (term(choice.option)) } td { (asked(choice.asked)) }
-            td { (if choice.used == "on" { "yes" } else { "no" }) }
-            td.n { (number(choice.gain_chi2)) } td.n { (exact(choice.limit_chi2)) } td.words { (choice.why) }
-        } }
-    };
+    let mut terms = Table::of_class("choices")
+        .text(["joint", "term", "leg file", "used"])
+        .numbers(["explains, chi-square units", "limit"])
+        .text(["why"])
+        .styled("words");
+    for choice in &run.model_choice {
+        terms.row(cells![
+            joint_name(leg, choice.joint),
+            term(choice.option),
+            asked(choice.asked),
+            if choice.used == "on" { "yes" } else { "no" },
+            number(choice.gain_chi2),
+            exact(choice.limit_chi2),
+            &choice.why,
+        ]);
+    }
     html! { @if !run.model_choice.is_empty() {
         section {
             h2 { "What the model includes" }
             p { "The leg file rules a term in or out, or leaves it to the data: then it is used if it explains at least as many \
                 chi-square units as the limit." }
-            div.wide { table.choices {
-                thead { tr {
-                    th scope="col" { "joint" } th scope="col" { "term" } th scope="col" { "leg file" } th scope="col" { "used" }
-                    th.n scope="col" { "explains, chi-square units" } th.n scope="col" { "limit" } th scope="col" { "why" }
-                } }
-                tbody { @for choice in &run.model_choice { (row(choice)) } }
-            } }
+            (terms.to_html())
             @for found in &run.stribeck {
                 p { "Stribeck friction of the " (joint_name(leg, found.joint)) ": static friction exceeds Coulomb friction by "
                     (measured(found.surplus_nm, found.surplus_sigma_nm)) " \u{b1} " (sigma(found.surplus_sigma_nm))
@@ -70,6 +73,19 @@ pub fn outliers(run: &RunReport, leg: &LegFile) -> Markup {
     let percent = |share: Option<&Number>| {
         number(Number(share.and_then(|share| share.known()).map(|share| 100.0 * share)))
     };
+    let mut table = Table::of_class("outliers").text(["joint"]).numbers([
+        "samples replaced",
+        "rows disturbed, %",
+        "longest stretch, s",
+    ]);
+    for (index, replaced) in found.replaced.iter().enumerate() {
+        table.row(cells![
+            joint_name(leg, index + 1),
+            *replaced,
+            percent(found.disturbed_share.get(index)),
+            number(found.longest_s.get(index).copied().unwrap_or(Number::UNKNOWN)),
+        ]);
+    }
     html! {
         section {
             h2 { "Outliers and disturbances" }
@@ -79,17 +95,7 @@ pub fn outliers(run: &RunReport, leg: &LegFile) -> Markup {
                 p { "Of " (found.samples) " samples of the motion identified from. Isolated outliers are replaced before the \
                     filter. Rows count as disturbed if the robust estimator gives them less than half of their weight. All joints \
                     were disturbed at once for at most " (number(found.longest_common_s)) " s." }
-                div.wide { table.outliers {
-                    thead { tr {
-                        th scope="col" { "joint" } th.n scope="col" { "samples replaced" }
-                        th.n scope="col" { "rows disturbed, %" } th.n scope="col" { "longest stretch, s" }
-                    } }
-                    tbody { @for (index, replaced) in found.replaced.iter().enumerate() { tr {
-                        td { (joint_name(leg, index + 1)) } td.n { (replaced) }
-                        td.n { (percent(found.disturbed_share.get(index))) }
-                        td.n { (number(found.longest_s.get(index).copied().unwrap_or(Number::UNKNOWN))) }
-                    } } }
-                } }
+                (table.to_html())
             }
         }
     }
@@ -103,19 +109,24 @@ pub fn comparison(run: &RunReport) -> Markup {
             p { code { (compared.model) } " of " (compared.created) ": " (compared.line) ". Squared distance "
                 (number(compared.chi2.into())) " chi-square units, limit " (number(compared.chi2_limit.into())) "." }
             @if let Some(warning) = &compared.warning { p { strong { "Warning: " } (warning) "." } }
-            div.wide { table {
-                thead { tr {
-                    th scope="col" { "base parameter" } th.n scope="col" { "stored" } th.n scope="col" { "found" }
-                    th.n scope="col" { "difference / sigma" }
-                } }
-                tbody { @for difference in &compared.differences { tr {
-                    th scope="row" { (difference.name) } td.n { (number(difference.stored.into())) }
-                    td.n { (number(difference.found.into())) } td.n { (crate::view::html::signed(difference.sigmas)) }
-                } } }
-            } }
+            (differences(compared).to_html())
             @if !compared.not_compared.is_empty() {
                 p { "In one of the two only: " (compared.not_compared.join(", ")) "." }
             }
         }
     } }
+}
+
+fn differences(compared: &ComparisonReport) -> Table {
+    let mut table =
+        Table::default().label("base parameter").numbers(["stored", "found", "difference / sigma"]);
+    for difference in &compared.differences {
+        table.row(cells![
+            &difference.name,
+            number(difference.stored.into()),
+            number(difference.found.into()),
+            signed(difference.sigmas),
+        ]);
+    }
+    table
 }

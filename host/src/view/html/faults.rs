@@ -2,23 +2,17 @@
 
 use maud::{DOCTYPE, html};
 
+use crate::base::table::Table;
 use crate::view::figures::Figure;
 use crate::view::html::{Circumstances, drawing, page_head};
-
-/// Whether a cell holds a number, a share or two numbers, which stay on one line.
-fn is_number(cell: &str) -> bool {
-    cell.chars().all(|letter| letter.is_ascii_digit() || " -/.%".contains(letter))
-}
 
 /// Results of a campaign.
 #[derive(Clone, Copy, Debug)]
 pub struct Campaign<'a> {
     /// Result in a few words.
     pub verdict: &'a str,
-    /// Names of the table's columns.
-    pub head: &'a [&'static str],
-    /// Cells of the table's rows.
-    pub rows: &'a [Vec<String>],
+    /// Results of each row of the catalogue.
+    pub table: &'a Table,
     /// Notes, a line each.
     pub notes: &'a str,
     /// Lines about repeated runs.
@@ -45,14 +39,7 @@ pub fn page(circumstances: &Circumstances, campaign: &Campaign<'_>) -> String {
                     section {
                         h2 { "What was run" }
                         p { code { (circumstances.command) } }
-                        div.wide { table.any {
-                            thead { tr { @for name in campaign.head { th scope="col" { (name) } } } }
-                            tbody {
-                                @for row in campaign.rows {
-                                    tr { @for cell in row { td.n[is_number(cell)] { (cell) } } }
-                                }
-                            }
-                        } }
+                        (campaign.table.to_html())
                     }
                     section {
                         h2 { "Notes" }

@@ -8,8 +8,9 @@ use serde_json::{Map, Value};
 
 use crate::base::error::ToolError;
 use crate::base::number::Number;
+use crate::base::table::{Table, cells, typeset};
 use crate::report::RunReport;
-use crate::view::html::{number, typeset};
+use crate::view::html::number;
 
 /// Keys with their own sections on the page.
 const KNOWN: [&str; 38] = [
@@ -97,13 +98,11 @@ pub fn section(name: &str, value: &Value) -> Markup {
 pub fn content(value: &Value, depth: usize) -> Markup {
     match value {
         Value::Array(items) if depth < DEEPEST && items.iter().any(Value::is_object) => rows(items, depth),
-        Value::Object(keys) if depth < DEEPEST => html! {
-            div.wide { table.any {
-                @for (key, value) in keys {
-                    tr { th scope="row" { (words(key)) } td { (content(value, depth + 1)) } }
-                }
-            } }
-        },
+        Value::Object(keys) if depth < DEEPEST => {
+            let mut table = Table::of_class("any").label("").text([""]);
+            keys.iter().for_each(|(key, value)| table.row(cells![words(key), content(value, depth + 1)]));
+            table.to_html()
+        }
         Value::Object(_) => html! { (value.to_string()) },
         Value::Array(items) => html! {
             @for (index, item) in items.iter().enumerate() {
@@ -130,16 +129,15 @@ fn rows(items: &[Value], depth: usize) -> Markup {
     }
     let is_number =
         |column: &str| items.iter().all(|item| item.get(column).is_none_or(|v| v.is_number() || v.is_null()));
-    html! {
-        div.wide { table.any {
-            thead { tr { @for column in &columns { th.n[is_number(column)] scope="col" { (words(column)) } } } }
-            tbody { @for item in items {
-                tr { @for column in &columns {
-                    td.n[is_number(column)] { (content(item.get(*column).unwrap_or(&Value::Null), depth + 1)) }
-                } }
-            } }
-        } }
+    let mut table = columns.iter().fold(Table::of_class("any"), |table, column| match is_number(column) {
+        true => table.numbers([words(column)]),
+        false => table.text([words(column)]),
+    });
+    for item in items {
+        let cell = |column: &&str| content(item.get(*column).unwrap_or(&Value::Null), depth + 1);
+        table.row(columns.iter().map(cell));
     }
+    table.to_html()
 }
 
 #[cfg(test)]

@@ -1,19 +1,18 @@
-//! Tables of base parameters, and of all fourteen parameters of every joint with a bar of their
+//! Sections of base parameters, and of all fourteen parameters of every joint with a bar of their
 //! uncertainty.
 
 use maud::{Markup, html};
 
-use crate::base::number::Number;
 use crate::formats::leg_file::LegFile;
 use crate::report::{ParameterReport, RunReport};
-use crate::view::html::{exact, measured, sigma, signed, unit};
+use crate::view::html::{measured, sigma};
+use crate::view::tables;
 
 /// Width and height of a bar, pixels.
 const BAR: (f64, f64) = (150.0, 16.0);
 
-/// Table of the base parameters.
+/// Section of the base parameters.
 pub fn base(run: &RunReport) -> Markup {
-    let known = run.base_parameters.iter().any(|base| base.truth.known().is_some());
     let bounded = run.base_parameters.iter().any(|base| base.cramer_rao.known().is_some());
     let misfit = run.base_parameters.iter().any(|base| base.sigma_misfit.known().is_some());
     html! {
@@ -22,58 +21,11 @@ pub fn base(run: &RunReport) -> Markup {
             @if misfit { " Sigma is the larger of its part by noise and its part by the model's misfit, with the bias of \
             the encoders and of what is in doubt." }
             @if bounded { " No unbiased estimator can have a smaller one than the Cram\u{e9}r-Rao bound." } }
-        div.wide { table {
-            thead { tr {
-                th scope="col" { "name" } th.n scope="col" { "value" } th.n scope="col" { "sigma" }
-                @if misfit { th.n scope="col" { "of noise" } th.n scope="col" { "of misfit" } }
-                th scope="col" { "unit" }
-                @if known { th.n scope="col" { "truth" } th.n scope="col" { "error / sigma" } }
-                @if bounded { th.n scope="col" { "Cram\u{e9}r-Rao" } }
-                th scope="col" { "sum of" }
-            } }
-            tbody { @for base in &run.base_parameters {
-                @let deviation = base.sigma.known().filter(|sigma| *sigma > 0.0);
-                @let off = base.value.known().zip(base.truth.known()).zip(deviation);
-                tr {
-                    th scope="row" { (base.name) }
-                    td.n { (measured(base.value, base.sigma)) } td.n { (sigma(base.sigma)) }
-                    @if misfit { td.n { (sigma(base.sigma_noise)) } td.n { (sigma(base.sigma_misfit)) } }
-                    td { (unit(base.unit)) }
-                    @if known {
-                        td.n { (measured(base.truth, base.sigma)) }
-                        td.n { @match off {
-                            Some(((value, truth), sigma)) => { (signed((value - truth) / sigma)) },
-                            None => { "\u{2013}" },
-                        } }
-                    }
-                    @if bounded { td.n { (sigma(Number(base.cramer_rao.known().filter(|bound| *bound > 0.0)))) } }
-                    td.terms { (terms(&base.terms)) }
-                }
-            } }
-        } }
+        (tables::base_parameters(run).to_html())
     }
 }
 
-fn terms(terms: &std::collections::BTreeMap<String, f64>) -> String {
-    if terms.len() < 2 {
-        return String::new();
-    }
-    let mut sum = String::new();
-    for (name, factor) in terms {
-        let sign = if *factor < 0.0 { "\u{2212}" } else { "+" };
-        if !sum.is_empty() || *factor < 0.0 {
-            sum += &format!(" {sign} ");
-        }
-        // A computed factor of one equals one up to rounding.
-        if (factor.abs() - 1.0).abs() > 1e-9 {
-            sum += &format!("{}\u{a0}", exact(factor.abs().into()));
-        }
-        sum += name;
-    }
-    sum
-}
-
-/// Table of all parameters of every joint.
+/// Tables of all parameters, one for each joint.
 pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
     let truth = run.parameters.iter().any(|parameter| parameter.truth.known().is_some());
     let joints = run.parameters.iter().map(|parameter| parameter.joint).max().unwrap_or(0);
@@ -87,26 +39,14 @@ pub fn all(run: &RunReport, leg: &LegFile) -> Markup {
             span.prior-key { "\u{25b2}" } " prior, at the edge where it lies beyond. Values have the digits that sigma supports, three without sigma." }
         @for joint in 1..=joints {
             h4 { "Joint " (joint) @if let Some(file) = leg.joints.get(joint - 1) { ": " (file.name) } }
-            div.wide { table.parameters {
-                thead { tr {
-                    th scope="col" { "name" } th.n scope="col" { "value" } th.n scope="col" { "sigma" } th scope="col" { "unit" }
-                    th scope="col" { "status" } th.bar scope="col" { "value, sigma, truth, prior" }
-                    @if truth { th.n scope="col" { "truth" } }
-                    th scope="col" { "grouped with" }
-                } }
-                tbody { @for parameter in run.parameters.iter().filter(|parameter| parameter.joint == joint) {
-                    tr {
-                        th scope="row" { (parameter.name) }
-                        td.n { (measured(parameter.value, parameter.sigma)) } td.n { (sigma(parameter.sigma)) } td { (unit(parameter.unit)) }
-                        td { span class={ "badge " (parameter.status) } { (parameter.status) } }
-                        td.bar { (bar(parameter)) }
-                        @if truth { td.n { (measured(parameter.truth, parameter.sigma)) } }
-                        td.terms { (parameter.grouped_with.join(", ")) }
-                    }
-                } }
-            } }
+            (tables::parameters(run.parameters.iter().filter(|parameter| parameter.joint == joint), truth).to_html())
         }
     }
+}
+
+/// Status of a parameter.
+pub fn badge(status: &str) -> Markup {
+    html! { span class={ "badge " (status) } { (status) } }
 }
 
 /// Half the range of a bar around the value: four sigma, including the truth if known.
@@ -121,7 +61,7 @@ fn half_range(parameter: &ParameterReport, value: f64) -> f64 {
 }
 
 /// Bar with value, sigma, truth and prior.
-fn bar(parameter: &ParameterReport) -> Markup {
+pub fn bar(parameter: &ParameterReport) -> Markup {
     let Some(value) = parameter.value.known() else {
         return html! { "\u{2013}" };
     };

@@ -2,32 +2,20 @@
 
 use maud::{Markup, html};
 
-use crate::base::number::Number;
+use crate::base::table::{Table, cells};
 use crate::formats::leg_file::LegFile;
 use crate::report::series::Role;
-use crate::report::{ConsistentSearchReport, FitReport, RunReport, Source, scale};
+use crate::report::{FitReport, RunReport, Source, scale};
 use crate::view::html::{joint_name, number};
+use crate::view::tables;
 
-/// Table of a replay's files.
+/// Section of a replay's files.
 pub fn sources(sources: &[Source]) -> Markup {
     html! {
         section {
             h2 { "Recordings" }
-            div.wide { table {
-                thead { tr {
-                    th scope="col" { "file" } th scope="col" { "use" }
-                    th.n scope="col" { "from, s" } th.n scope="col" { "length, s" } th.n scope="col" { "rate, Hz" }
-                    th.n scope="col" { "rows" } th.n scope="col" { "used, by joint" }
-                } }
-                tbody { @for source in sources { tr {
-                    td { (source.file.display()) } td { (source.role) }
-                    td.n { (format!("{:.2}", source.start_s)) } td.n { (format!("{:.2}", source.duration_s)) }
-                    td.n { (format!("{:.0}", source.rate_hz)) } td.n { (source.rows) }
-                    td.n { (source.used.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")) }
-                } } }
-            } }
-            p.note { "Rows are filtered to 50 a second. Those in which a joint stands still are not used for it: friction at \
-                rest is undetermined." }
+            (tables::sources(sources).to_html())
+            p.note { (tables::SOURCES) }
         }
     }
 }
@@ -65,40 +53,13 @@ pub fn residual_words() -> Markup {
 
 /// Table of the residuals on every motion.
 pub fn fits(run: &RunReport, leg: &LegFile) -> Markup {
-    let all = || run.training.iter().chain(&run.validation);
-    let truth = all().any(|fit| fit.percent_of_mean_abs_vs_truth.known().is_some());
     // Figures use this name for the motion identified from, too.
     let is_recorded = run.seed.is_none() && run.trace.is_none();
     let motion = |fit: &FitReport, role: Role| match role {
         Role::Training if !is_recorded => "excitation".to_owned(),
         _ => fit.motion.clone(),
     };
-    let row = |fit: &FitReport, role: Role| {
-        html! { tr {
-            td { (motion(fit, role)) } td { (role.name()) } td { (joint_name(leg, fit.joint)) }
-            td.n { (number(fit.rms_nm)) } td.n { (number(fit.percent_of_mean_abs)) } td.n { (number(fit.percent_of_rms)) }
-            td.n { (number(Number(fit.disturbed_share.known().map(|share| 100.0 * share)))) }
-            @if truth {
-                td.n { (number(fit.percent_of_mean_abs_vs_truth)) }
-                td.n { (number(Number(fit.sticking_share.known().map(|share| 100.0 * share)))) }
-            }
-        } }
-    };
-    html! {
-        h3 { "Torque errors" }
-        div.wide { table {
-            thead { tr {
-                th scope="col" { "motion" } th scope="col" { "use" } th scope="col" { "joint" }
-                th.n scope="col" { "rms, N\u{a0}m" } th.n scope="col" { "% of mean abs" } th.n scope="col" { "% of rms" }
-                th.n scope="col" { "set aside, %" }
-                @if truth { th.n scope="col" { "% of mean abs, noise-free" } th.n scope="col" { "sticking, %" } }
-            } }
-            tbody {
-                @for fit in &run.training { (row(fit, Role::Training)) }
-                @for fit in &run.validation { (row(fit, Role::Validation)) }
-            }
-        } }
-    }
+    html! { h3 { "Torque errors" } (tables::fits(run, motion, |joint| joint_name(leg, joint)).to_html()) }
 }
 
 /// Text about the search.
@@ -137,14 +98,33 @@ fn capital(words: &str) -> String {
 /// Searches for a physically consistent leg.
 pub fn consistent(run: &RunReport) -> Markup {
     let found = &run.consistent;
-    let row = |words: &str, name: &str, search: &ConsistentSearchReport| {
-        html! { tr {
-            td { (words) @if found.chosen == name { " (the result)" } } td.n { (search.iterations) } td.n { (search.evaluations) }
-            td.n { (search.steps) } td.n { (number(search.excess_chi2)) }
-            td.n { @match search.iterations_to_half_chi2 { Some(half) => { (half) }, None => { "\u{2013}" } } }
-            td { (match search.consistent { Some(true) => "yes", Some(false) => "no", None => "\u{2013}" }) }
-        } }
-    };
+    let mut table = Table::default()
+        .text(["search"])
+        .numbers([
+            "iterations",
+            "evaluations",
+            "completion steps",
+            "excess, chi-square units",
+            "iterations to half a unit",
+        ])
+        .text(["consistent"]);
+    let base = ("base values, completed by the prior", "base", &found.base);
+    let full = found.full.as_ref().map(|full| ("whole legs", "full", full));
+    for (words, name, search) in core::iter::once(base).chain(full) {
+        table.row(cells![
+            format!("{words}{}", if found.chosen == name { " (the result)" } else { "" }),
+            search.iterations,
+            search.evaluations,
+            search.steps,
+            number(search.excess_chi2),
+            search.iterations_to_half_chi2.map_or("\u{2013}".to_owned(), |half| half.to_string()),
+            match search.consistent {
+                Some(true) => "yes",
+                Some(false) => "no",
+                None => "\u{2013}",
+            },
+        ]);
+    }
     html! {
         section {
             h2 { "Physically consistent legs" }
@@ -152,45 +132,34 @@ pub fn consistent(run: &RunReport) -> Markup {
                 limits, the best costs " (number(found.optimum_over_least_squares)) " chi-square units more than least squares, \
                 the result " (number(found.result_over_least_squares)) "."
                 @if let Some(freedom) = found.degrees_of_freedom { " Of noise alone that is a chi-square of at most " (freedom) " degrees of freedom." } }
-            div.wide { table {
-                thead { tr {
-                    th scope="col" { "search" } th.n scope="col" { "iterations" } th.n scope="col" { "evaluations" }
-                    th.n scope="col" { "completion steps" } th.n scope="col" { "excess, chi-square units" }
-                    th.n scope="col" { "iterations to half a unit" } th scope="col" { "consistent" }
-                } }
-                tbody {
-                    (row("base values, completed by the prior", "base", &found.base))
-                    @if let Some(full) = &found.full { (row("whole legs", "full", full)) }
-                }
-            } }
+            (table.to_html())
         }
     }
 }
 
 /// Effect of the model on the servo.
 pub fn tracking(run: &RunReport, leg: &LegFile) -> Markup {
+    let mut table = Table::default().text(["joint"]).numbers([
+        "without the model, deg rms",
+        "with it, deg rms",
+        "smaller by",
+    ]);
+    for tracking in &run.tracking {
+        let (without, with) = (tracking.rms_deg_without_model, tracking.rms_deg_with_model);
+        let ratio = without.known().zip(with.known()).filter(|(_, with)| *with > 0.0);
+        table.row(cells![
+            joint_name(leg, tracking.joint),
+            number(without),
+            number(with),
+            ratio.map_or("\u{2013}".into(), |(without, with)| format!("{:.1} times", without / with)),
+        ]);
+    }
     html! {
         section {
             h2 { "Tracking" }
             p { "Position error on gait with a cycle of 3 s, same gains: feedback alone, and with the identified model in the \
                 feedforward." }
-            div.wide { table {
-                thead { tr {
-                    th scope="col" { "joint" } th.n scope="col" { "without the model, deg rms" }
-                    th.n scope="col" { "with it, deg rms" } th.n scope="col" { "smaller by" }
-                } }
-                tbody { @for tracking in &run.tracking {
-                    @let ratio = tracking.rms_deg_without_model.known().zip(tracking.rms_deg_with_model.known());
-                    tr {
-                        td { (joint_name(leg, tracking.joint)) }
-                        td.n { (number(tracking.rms_deg_without_model)) } td.n { (number(tracking.rms_deg_with_model)) }
-                        td.n { @match ratio {
-                            Some((without, with)) if with > 0.0 => { (format!("{:.1} times", without / with)) },
-                            _ => { "\u{2013}" },
-                        } }
-                    }
-                } }
-            } }
+            (table.to_html())
         }
     }
 }

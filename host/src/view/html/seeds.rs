@@ -4,6 +4,7 @@
 use maud::{DOCTYPE, Markup, html};
 
 use crate::base::error::ToolError;
+use crate::base::table::{Table, cells};
 use crate::formats::leg_file::LegFile;
 use crate::report::RunReport;
 use crate::report::findings::FindingReport;
@@ -98,23 +99,32 @@ const SEEDS_SHOWN: usize = 20;
 
 fn parameters(spreads: &[Spread]) -> Markup {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let mut table = Table::of_class("spread").label("name").numbers(["truth", "sigma"]).unit().numbers([
+        "mean",
+        "spread",
+        "within 1",
+        "within 3",
+        "rms error / Cram\u{e9}r-Rao",
+        "runs",
+    ]);
+    for spread in spreads {
+        table.row(cells![
+            &spread.name,
+            measured(spread.truth.into(), spread.sigma.into()),
+            sigma(spread.sigma.into()),
+            spread.unit,
+            signed(spread.mean()),
+            format!("{:.2}", spread.deviation()),
+            percent(spread.within(1.0)),
+            percent(spread.within(3.0)),
+            spread.over_bound.map_or("\u{2013}".into(), |ratio| format!("{ratio:.2}")),
+            spread.errors.len(),
+        ]);
+    }
     html! {
         p { "Each error is in units of the sigma that its own run reported. Where sigma is what it claims to be the mean is \
             near 0, the spread near 1, and 68 and 99.7 % lie within one and three." }
-        div.wide { table.spread {
-            thead { tr {
-                th scope="col" { "name" } th.n scope="col" { "truth" } th.n scope="col" { "sigma" } th scope="col" { "unit" }
-                th.n scope="col" { "mean" } th.n scope="col" { "spread" } th.n scope="col" { "within 1" }
-                th.n scope="col" { "within 3" } th.n scope="col" { "rms error / Cram\u{e9}r-Rao" } th.n scope="col" { "runs" }
-            } }
-            tbody { @for spread in spreads { tr {
-                th scope="row" { (spread.name) }
-                td.n { (measured(spread.truth.into(), spread.sigma.into())) } td.n { (sigma(spread.sigma.into())) } td { (unit(spread.unit)) }
-                td.n { (signed(spread.mean())) } td.n { (format!("{:.2}", spread.deviation())) }
-                td.n { (percent(spread.within(1.0))) } td.n { (percent(spread.within(3.0))) }
-                td.n { @match spread.over_bound { Some(ratio) => { (format!("{ratio:.2}")) }, None => { "\u{2013}" } } } td.n { (spread.errors.len()) }
-            } } }
-        } }
+        (table.to_html())
     }
 }
 
@@ -133,19 +143,18 @@ fn torque(runs: &[RunReport], leg: &LegFile) -> Markup {
         errors.sort_by(f64::total_cmp);
         errors
     };
+    let mut table = Table::default().label("motion").text(["joint"]).numbers(["median", "worst"]);
+    for case in cases {
+        let errors = errors(case);
+        table.row(cells![
+            case.0,
+            joint_name(leg, case.1),
+            number(errors.get(errors.len() / 2).copied().into()),
+            number(errors.last().copied().into()),
+        ]);
+    }
     html! {
         p { "Error of the filtered torque against the noise-free one, percent of the motion's mean absolute torque." }
-        div.wide { table {
-            thead { tr {
-                th scope="col" { "motion" } th scope="col" { "joint" } th.n scope="col" { "median" } th.n scope="col" { "worst" }
-            } }
-            tbody { @for case in cases {
-                @let errors = errors(case);
-                tr {
-                    th scope="row" { (case.0) } td { (joint_name(leg, case.1)) }
-                    td.n { (number(errors.get(errors.len() / 2).copied().into())) } td.n { (number(errors.last().copied().into())) }
-                }
-            } }
-        } }
+        (table.to_html())
     }
 }

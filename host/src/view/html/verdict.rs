@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use crate::base::number::Number;
+use crate::base::table::{Table, cells};
 use crate::formats::leg_file::LegFile;
 use crate::report::RunReport;
 use crate::report::findings::FindingReport;
@@ -145,22 +146,24 @@ pub fn tests(findings: &[FindingReport], leg: &LegFile) -> Markup {
         }
     }
     kinds.sort_by_key(|(reason, _)| findings.iter().position(|finding| finding.reason == *reason));
+    let mut table = Table::of_class("tests")
+        .text(["against", "what is tested"])
+        .styled("what")
+        .numbers(["value", "limit"])
+        .text(["where"])
+        .numbers(["passed"]);
+    kinds.iter().for_each(|kind| add_row(&mut table, findings, *kind, leg));
     html! { @if !kinds.is_empty() {
         section {
             h2 { "Tests of the verdict" }
             p { "Each kind of test, with the case that came nearest to its limit, or went farthest beyond it." }
-            div.wide { table.tests {
-                thead { tr {
-                    th scope="col" { "against" } th scope="col" { "what is tested" } th.n scope="col" { "value" }
-                    th.n scope="col" { "limit" } th scope="col" { "where" } th.n scope="col" { "passed" }
-                } }
-                tbody { @for kind in kinds { (row(findings, kind, leg)) } }
-            } }
+            (table.to_html())
         }
     } }
 }
 
-fn row(findings: &[FindingReport], (reason, test): (&str, &str), leg: &LegFile) -> Markup {
+/// Adds the case of one kind of test that is nearest to its limit.
+fn add_row(table: &mut Table, findings: &[FindingReport], (reason, test): (&str, &str), leg: &LegFile) {
     let of_kind = || findings.iter().filter(|finding| (finding.reason, finding.test) == (reason, test));
     let (all, passed) = (of_kind().count(), of_kind().filter(|finding| finding.passed).count());
     let nearest = of_kind().max_by(|one, other| {
@@ -170,18 +173,24 @@ fn row(findings: &[FindingReport], (reason, test): (&str, &str), leg: &LegFile) 
     });
     let (least, words) = meaning(test);
     let words = if words.is_empty() { test.replace('_', " ") } else { words.to_owned() };
-    html! { @if let Some(nearest) = nearest {
-        tr.failed[passed < all] {
-            td { (reason.replace('_', " ")) } td.what { (words) }
-            @if YES_OR_NO.contains(&test) {
-                td.n { (if nearest.passed { "yes" } else { "no" }) } td.n { "yes" }
-            } @else {
-                td.n { (whole(nearest.value)) } td.n { (if least { "\u{2265}\u{a0}" } else { "\u{2264}\u{a0}" }) (exact(nearest.limit)) }
-            }
-            td { (place(nearest, leg)) }
-            td.n { (passed) " of " (all) }
-        }
-    } }
+    let Some(nearest) = nearest else { return };
+    let (value, limit) = if YES_OR_NO.contains(&test) {
+        (if nearest.passed { "yes" } else { "no" }.to_owned(), "yes".to_owned())
+    } else {
+        let sign = if least { "\u{2265}" } else { "\u{2264}" };
+        (whole(nearest.value), format!("{sign}\u{a0}{}", exact(nearest.limit)))
+    };
+    table.marked_row(
+        passed < all,
+        cells![
+            reason.replace('_', " "),
+            words,
+            value,
+            limit,
+            place(nearest, leg),
+            format!("{passed} of {all}")
+        ],
+    );
 }
 
 /// Formats a count without decimals.
