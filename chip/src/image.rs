@@ -6,7 +6,7 @@ use std::rc::Rc;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile32, FileHeader, ProgramHeader};
 use object::{Endianness, Object, ObjectSymbol, SymbolKind};
-use scarab_host::base::error::ToolError;
+use scarab_host::base::error::{FileError, ToolError};
 
 /// Address of the flash, and the size that an image may have; sectors 10 and 11 follow.
 pub const FLASH: u32 = 0x0800_0000;
@@ -39,7 +39,7 @@ impl Image {
     /// The file cannot be read or is no image of the board.
     pub fn load(path: &Path) -> Result<Rc<Self>, ToolError> {
         let elf = std::fs::read(path)
-            .map_err(|error| ToolError::input(format!("{}: cannot be read: {error}", path.display())))?;
+            .map_err(|error| FileError::unreadable(path, &error))?;
         Self::parse(elf).map(Rc::new).map_err(|reason| {
             ToolError::input(format!("{}: not an image of the board: {reason}", path.display()))
         })

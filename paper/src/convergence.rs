@@ -38,7 +38,6 @@ use scarab::units::Second;
 use scarab_host::base::error::ToolError;
 use scarab_host::base::number::Number;
 use scarab_host::base::table::Table;
-use scarab_host::formats::leg_file::geometry::SetupError;
 use scarab_host::formats::leg_file::{DEFAULT_LEG, LegFile, Switch};
 use scarab_host::leg::motions::{EXCITATION_CYCLES, most_informative};
 use scarab_host::rig::options::SimulationOptions;
@@ -201,7 +200,7 @@ fn motions<const N: usize, const B: usize>(leg: &LegFile) -> Result<Vec<Periodic
     let best = |index: u64| {
         let seed = MOTION_SEED + 1000 * index;
         most_informative(&context.background.model, &limits, PERIOD, EXCITATION_CYCLES, seed, CANDIDATES)
-            .ok_or_else(|| SetupError::new(leg, "no exciting motion fits the limits").into())
+            .ok_or_else(|| leg.error("no exciting motion fits the limits").into())
     };
     (0..MOTIONS).into_par_iter().map(best).collect()
 }
@@ -219,7 +218,7 @@ fn recorded<const N: usize, const B: usize>(
     pair.enable(context.gravity);
     let record = pair
         .recorded(context.gravity, LONGEST_RUN_S)
-        .ok_or_else(|| SetupError::new(leg, format!("seed {seed}: the exciting motion was not completed")))?;
+        .ok_or_else(|| leg.error(format!("seed {seed}: the exciting motion was not completed")))?;
     Ok((context, record))
 }
 

@@ -18,7 +18,6 @@ use scarab::model::{INERTIAL_PARAMETERS, Payload, RigidBody};
 use scarab_host::base::error::ToolError;
 use scarab_host::base::number::Number;
 use scarab_host::base::table::Table;
-use scarab_host::formats::leg_file::geometry::SetupError;
 use scarab_host::formats::leg_file::{LegFile, LinkParameters};
 use scarab_host::leg::setup;
 use scarab_host::report::BaseReport;
@@ -141,13 +140,13 @@ pub fn report(runs: u64) -> Result<LoadReport, ToolError> {
 fn loaded(leg: &LegFile, load: &Payload<f64>) -> Result<LegFile, ToolError> {
     let links = setup::links::<JOINTS>(leg, |joint| joint.truth.as_ref());
     let link = links.and_then(|links| links.get(load.joint).copied());
-    let link = link.ok_or_else(|| SetupError::new(leg, "has no truth to load"))?;
+    let link = link.ok_or_else(|| leg.error("has no truth to load"))?;
     let mut sum = link.body.to_parameters();
     let added = load.parameters::<JOINTS>();
     for (value, added) in sum.iter_mut().zip(added[load.joint].iter().take(INERTIAL_PARAMETERS)) {
         *value += added;
     }
-    let body = RigidBody::from_parameters(&sum).ok_or_else(|| SetupError::new(leg, "has no mass"))?;
+    let body = RigidBody::from_parameters(&sum).ok_or_else(|| leg.error("has no mass"))?;
     let mut loaded = leg.clone();
     if let Some(truth) = loaded.joints[load.joint].truth.as_mut() {
         let inertia = &body.inertia;

@@ -17,7 +17,6 @@ use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::{Radian, Second};
 use scarab_host::base::error::ToolError;
 use scarab_host::formats::leg_file::LegFile;
-use scarab_host::formats::leg_file::geometry::SetupError;
 use scarab_host::leg::setup;
 
 use super::chain::{JOINTS, ROOM};
@@ -52,8 +51,8 @@ fn curve(leg: &LegFile) -> Result<Fourier<JOINTS>, MotionError> {
 pub fn links_alone(leg: &LegFile) -> Result<[f64; JOINTS], ToolError> {
     const INSTANTS: u32 = 1000;
     let model = setup::row_model::<JOINTS, ROOM>(leg)?;
-    let links = setup::links::<JOINTS>(leg, |joint| joint.truth.as_ref())
-        .ok_or_else(|| SetupError::new(leg, "has no truth"))?;
+    let links =
+        setup::links::<JOINTS>(leg, |joint| joint.truth.as_ref()).ok_or_else(|| leg.error("has no truth"))?;
     let bodies = prior_parameters(&links)
         .map(|joint| scarab::model::inertia::joint(&scarab::model::inertia::inertial(&joint), &[0.0; 4]));
     let values = model.base.project(&bodies);

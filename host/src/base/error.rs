@@ -1,5 +1,6 @@
 //! Errors of the tool and their exit codes.
 
+use std::fmt;
 use std::path::Path;
 
 /// Exit code of an accepted result.
@@ -35,7 +36,46 @@ impl ToolError {
 
     /// Error of a file that cannot be written.
     #[must_use]
-    pub fn cannot_write(path: &Path, error: &dyn std::fmt::Display) -> Self {
-        Self::Input(format!("{}: cannot be written: {error}", path.display()))
+    pub fn cannot_write(path: &Path, error: &dyn fmt::Display) -> Self {
+        FileError::new(path.display(), format!("cannot be written: {error}")).into()
+    }
+}
+
+/// Content of a file that cannot be used. Displays as `file:line: reason`.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{file}{}: {reason}", .line.map_or_else(String::new, |line| format!(":{line}")))]
+pub struct FileError {
+    /// Path as given, or name of the leg in it.
+    pub file: String,
+    /// Line, from 1; `None` for the whole file.
+    pub line: Option<usize>,
+    /// Description.
+    pub reason: String,
+}
+
+impl FileError {
+    /// Error of the whole file.
+    #[must_use]
+    pub fn new(file: impl fmt::Display, reason: impl fmt::Display) -> Self {
+        Self { file: file.to_string(), line: None, reason: reason.to_string() }
+    }
+
+    /// Error of a file that cannot be read.
+    #[must_use]
+    pub fn unreadable(path: &Path, error: &std::io::Error) -> Self {
+        Self::new(path.display(), format!("cannot be read ({error})"))
+    }
+
+    /// Error at a byte of the text.
+    #[must_use]
+    pub fn at(file: &str, text: &str, start: Option<usize>, reason: String) -> Self {
+        let line = |start| 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
+        Self { file: file.to_owned(), line: start.map(line), reason }
+    }
+}
+
+impl From<FileError> for ToolError {
+    fn from(error: FileError) -> Self {
+        Self::Input(error.to_string())
     }
 }

@@ -1,4 +1,5 @@
-//! Files that are written: a temporary file in the same folder, then renamed. No other module writes files.
+//! Texts that are read, and files that are written: a temporary file in the same folder, then renamed. No other
+//! module writes files.
 
 pub mod write;
 
@@ -6,10 +7,18 @@ pub use write::{NewFile, write};
 
 use std::path::{Path, PathBuf};
 
+use crate::base::error::FileError;
+
 /// Streams of the process, which may be files opened by the shell.
 const OPEN_STREAMS: [&str; 3] = ["/dev/stdout", "/dev/stderr", "/dev/fd"];
 /// Limit of followed links before a path counts as a cycle.
 const MOST_LINKS: usize = 40;
+
+/// Reads a text.
+pub fn read_text(path: &Path) -> Result<String, FileError> {
+    let bytes = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
+    String::from_utf8(bytes).map_err(|_| FileError::new(path.display(), "not a text file"))
+}
 
 /// Path without links, `.` and `..`, as far as its parts exist. All spellings of one file give the
 /// same result, whether it exists or not.

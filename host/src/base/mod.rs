@@ -9,4 +9,4 @@ pub mod precision;
 pub mod random;
 pub mod stats;
 pub mod table;
-pub mod toml_fault;
+pub mod toml_file;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 
-use crate::base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::base::error::{EXIT_ACCEPTED, EXIT_REFUSED, FileError, ToolError};
 use crate::base::output;
 use crate::cli::arguments::Output;
 use crate::cli::common::write_json;
@@ -68,8 +68,7 @@ pub fn emulate(arguments: &EmulateArguments) -> Result<u8, ToolError> {
     let identification =
         run_report(&trace, &leg).map_err(|error| ToolError::input(format!("{error}\n{attention}")))?;
     tables::print_run(&identification)?;
-    let bytes =
-        std::fs::read(&path).map_err(|error| ToolError::input(format!("{}: {error}", path.display())))?;
+    let bytes = std::fs::read(&path).map_err(|error| FileError::unreadable(&path, &error))?;
     let accepted = identification.accepted();
     let report = EmulationReport::new(identification, &loops, &bytes);
     output::print(&report.lines(loops.stack_bytes, wall.as_secs_f64()))?;
@@ -91,7 +90,7 @@ fn show(kind: CrashKind, tick: u32, image: &Path, trace: &Path) -> Result<u8, To
     output::print(&reading::preface(&reading::read(trace, Some(image), Some(&lines))?))?;
     let text = |path: &Path| {
         let bytes = std::fs::read(path);
-        let bytes = bytes.map_err(|error| ToolError::input(format!("{}: {error}", path.display())))?;
+        let bytes = bytes.map_err(|error| FileError::unreadable(&path, &error))?;
         Ok::<_, ToolError>(String::from_utf8_lossy(&bytes).into_owned())
     };
     let report = CrashReport::new(kind, &text(&lines)?, &text(&log)?, begun, image)?;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::{Args, Subcommand};
 
-use crate::base::error::{EXIT_ACCEPTED, EXIT_REFUSED, ToolError};
+use crate::base::error::{EXIT_ACCEPTED, EXIT_REFUSED, FileError, ToolError};
 use crate::base::{files, output};
 use crate::cli::arguments::{Input, Output, Updated};
 use crate::formats::kept_file::KeptFile;
@@ -61,13 +61,11 @@ fn read(path: &Path) -> Result<Option<Vec<u8>>, ToolError> {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(ToolError::input(format!("{}: {error}", path.display()))),
+        Err(error) => return Err(FileError::unreadable(path, &error).into()),
     };
     if bytes.is_empty() || !bytes.len().is_multiple_of(BYTES) || bytes.len() > BOARDS * BYTES {
-        let (file, count) = (path.display(), bytes.len());
-        return Err(ToolError::input(format!(
-            "{file}: {count} bytes; the flash of 1 to {BOARDS} boards has {BYTES} each"
-        )));
+        let reason = format!("{} bytes; the flash of 1 to {BOARDS} boards has {BYTES} each", bytes.len());
+        return Err(FileError::new(path.display(), reason).into());
     }
     Ok(Some(bytes))
 }
@@ -98,12 +96,11 @@ fn export(flash: &Path, board: usize, out: Option<&Path>) -> Result<u8, ToolErro
 
 fn import(file: &Path, flash: &Path, board: usize) -> Result<u8, ToolError> {
     let name = file.display().to_string();
-    let unreadable = |error: std::io::Error| ToolError::input(format!("{name}: cannot be read: {error}"));
-    if std::fs::metadata(file).map_err(unreadable)?.len() > LARGEST_FILE_BYTES {
-        return Err(ToolError::input(format!("{name}: too large for what a board keeps")));
+    let bytes = std::fs::metadata(file).map_err(|error| FileError::unreadable(file, &error))?.len();
+    if bytes > LARGEST_FILE_BYTES {
+        return Err(FileError::new(name, "too large for what a board keeps").into());
     }
-    let text = std::fs::read_to_string(file).map_err(unreadable)?;
-    let kept = KeptFile::parse(&text, &name)?;
+    let kept = KeptFile::parse(&files::read_text(file)?, &name)?;
     let mut bytes = read(flash)?.unwrap_or_default();
     // Boards beyond the end of the file count as erased.
     if bytes.len() < board * BYTES {

@@ -7,7 +7,6 @@ use scarab::motor::AxisConfiguration;
 
 use crate::base::error::ToolError;
 use crate::faults::catalogue::{Bounds, JOINTS};
-use crate::formats::leg_file::geometry::SetupError;
 use crate::formats::leg_file::{JointFile, LegFile, MotorFile};
 use crate::rig::board::{BUS, axis_configuration};
 use crate::rig::faulty_board::PERIODS_PER_S;
@@ -36,7 +35,7 @@ fn voltages(bounds: &mut Bounds, joint: &JointFile, motor: &MotorFile, configura
 
 pub(super) fn bounds(leg: &LegFile) -> Result<Bounds, ToolError> {
     if leg.joints.len() != JOINTS {
-        return Err(SetupError::new(leg, "faults are injected into legs of two joints").into());
+        return Err(leg.error("faults are injected into legs of two joints").into());
     }
     let mut steps = [0; JOINTS];
     let mut bounds = Bounds {
@@ -52,10 +51,7 @@ pub(super) fn bounds(leg: &LegFile) -> Result<Bounds, ToolError> {
     };
     for (joint, step) in leg.joints.iter().zip(&mut steps) {
         let motor = joint.motor.as_ref().ok_or_else(|| {
-            SetupError::new(
-                leg,
-                format!("joint `{}` has no [joint.motor]: faults need complete drives", joint.name),
-            )
+            leg.error(format!("joint `{}` has no [joint.motor]: faults need complete drives", joint.name))
         })?;
         let configuration = axis_configuration(joint, motor);
         let turns = configuration.greatest_speed.0 / (core::f32::consts::TAU * PERIODS_PER_S as f32);

@@ -24,7 +24,6 @@ use crate::faults::entry::Entry;
 use crate::faults::run::{Blind, Manner, Outcome, run};
 use crate::faults::trial::Trial;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::rig::faulty_board::{PERIODS_PER_S, Rig};
 use crate::rig::options::{DriveModel, SimulationOptions};
 use crate::rig::pair::{Context, Pair};
@@ -332,7 +331,7 @@ pub(super) fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), To
             return Ok(());
         }
     }
-    Err(SetupError::new(leg, "the operator's contacts do not begin an identification").into())
+    Err(leg.error("the operator's contacts do not begin an identification").into())
 }
 
 /// Periods of an identification from request to verdict, measured with ideal drives, which have the same
@@ -340,7 +339,7 @@ pub(super) fn begin(leg: &LegFile, rig: &mut Rig<JOINTS, BASE>) -> Result<(), To
 fn length(leg: &LegFile, context: &Context<JOINTS, BASE>, seed: u64) -> Result<u64, ToolError> {
     let ideal = Context { complete: None, ..context.clone() };
     let mut pair = Pair::new(leg, &ideal, seed)?;
-    let refused = || SetupError::new(leg, "its identification does not come to an end");
+    let refused = || leg.error("its identification does not come to an end");
     if !pair.enable(context.gravity) {
         return Err(refused().into());
     }

@@ -12,7 +12,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::base::error::ToolError;
+use crate::base::error::{FileError, ToolError};
 use crate::base::random::Random;
 use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
@@ -107,7 +107,7 @@ fn crashed(head: &Head, image: &Path, seed: u64) -> Result<Outcome, ToolError> {
     reading::read(&trace, Some(image), Some(&lines))?;
     let text = |path: &Path| {
         let bytes = std::fs::read(path);
-        let bytes = bytes.map_err(|error| ToolError::input(format!("{}: {error}", path.display())))?;
+        let bytes = bytes.map_err(|error| FileError::unreadable(path, &error))?;
         Ok::<_, ToolError>(String::from_utf8_lossy(&bytes).into_owned())
     };
     let report = CrashReport::new(kind, &text(&lines)?, &text(&log)?, begun, image)?;

@@ -11,8 +11,8 @@ use scarab::motion::{ExcitationTable, HARMONICS, MotionError, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
 use serde::{Deserialize, Serialize};
 
-use crate::base::error::ToolError;
-use crate::base::toml_fault;
+use crate::base::error::{FileError, ToolError};
+use crate::base::{files, toml_file};
 use crate::formats::leg_file::LegFile;
 use crate::report::excite::ExpectedBase;
 
@@ -140,16 +140,9 @@ impl Excitation {
     /// # Errors
     /// Names the file, and the line if one is at fault.
     pub fn load(path: &Path) -> Result<Self, ToolError> {
-        let file = path.display();
-        let text = std::fs::read_to_string(path)
-            .map_err(|fault| ToolError::input(format!("{file}: cannot be read ({fault})")))?;
-        let motion: Self = toml::from_str(&text).map_err(|fault| {
-            let before =
-                |start: usize| text.as_bytes().iter().take(start).filter(|&&byte| byte == b'\n').count();
-            let line = fault.span().map_or_else(String::new, |span| format!(":{}", 1 + before(span.start)));
-            ToolError::input(format!("{file}{line}: {}", toml_fault::reason(&fault)))
-        })?;
-        motion.check().map_err(|reason| ToolError::input(format!("{file}: {reason}")))?;
+        let file = path.display().to_string();
+        let motion: Self = toml_file::parse(&files::read_text(path)?, &file)?;
+        motion.check().map_err(|reason| FileError::new(file, reason))?;
         Ok(motion)
     }
 

@@ -26,8 +26,8 @@ pub use flash::FlashContents;
 
 use serde::Deserialize;
 
-use crate::base::error::ToolError;
-use crate::base::toml_fault;
+use crate::base::error::FileError;
+use crate::base::toml_file;
 
 /// Version of the keys.
 pub const KEPT_SCHEMA: i64 = 1;
@@ -228,24 +228,18 @@ impl KeptFile {
     ///
     /// # Errors
     /// The file is invalid; the error names the line or the part at fault.
-    pub fn parse(text: &str, file: &str) -> Result<Self, ToolError> {
-        let of_text = |fault: toml::de::Error| {
-            let reason = toml_fault::reason(&fault);
-            let line = fault.span().map(|span| 1 + text[..span.start].matches('\n').count());
-            let line = line.map_or(String::new(), |line| format!("{line}:"));
-            ToolError::input(format!("{file}:{line} {reason}"))
-        };
-        let raw: toml::Table = toml::from_str(text).map_err(of_text)?;
+    pub fn parse(text: &str, file: &str) -> Result<Self, FileError> {
+        let raw: toml::Table = toml_file::parse(text, file)?;
         match raw.get("schema") {
             Some(toml::Value::Integer(KEPT_SCHEMA)) => {}
             Some(schema) => {
                 let reason = format!("schema {schema} is unknown; this program reads {KEPT_SCHEMA}");
-                return Err(ToolError::input(format!("{file}: {reason}")));
+                return Err(FileError::new(file, reason));
             }
-            None => return Err(ToolError::input(format!("{file}: has no `schema`: not what a board keeps"))),
+            None => return Err(FileError::new(file, "has no `schema`: not what a board keeps")),
         }
-        let kept: Self = toml::from_str(text).map_err(of_text)?;
-        kept.check().map_err(|why| ToolError::input(format!("{file}: {why}")))?;
+        let kept: Self = toml_file::parse(text, file)?;
+        kept.check().map_err(|why| FileError::new(file, why))?;
         Ok(kept)
     }
 

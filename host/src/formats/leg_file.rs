@@ -42,19 +42,20 @@
 
 mod check;
 mod convert;
-mod error;
 pub mod geometry;
 mod image;
 mod motor;
 mod segments;
 mod switch;
 
-pub use error::LegFileError;
 pub use motor::{MotorFile, SupplyFile};
 pub use segments::{BodySide, SegmentsFile};
 pub use switch::Switch;
 
 use serde::{Deserialize, Serialize};
+
+use crate::base::error::FileError;
+use crate::base::toml_file;
 
 /// Default leg.
 pub const DEFAULT_LEG: &str = "x2-wearer-75kg";
@@ -372,29 +373,35 @@ impl LegFile {
     }
 
     /// Loads a shipped leg by name, or the file at a path.
-    pub fn load(name_or_path: &str) -> Result<Self, LegFileError> {
+    pub fn load(name_or_path: &str) -> Result<Self, FileError> {
         let (text, file) = Self::text(name_or_path)?;
         Self::parse(&text, &file)
     }
 
     /// Text of a shipped leg or of a file, and its name in error messages.
-    fn text(name_or_path: &str) -> Result<(String, String), LegFileError> {
+    fn text(name_or_path: &str) -> Result<(String, String), FileError> {
         if let Some((name, text)) = SHIPPED_LEGS.iter().find(|(name, _)| *name == name_or_path) {
             return Ok(((*text).to_owned(), format!("{name} (shipped)")));
         }
         let text = std::fs::read_to_string(name_or_path).map_err(|fault| {
             let names = SHIPPED_LEGS.map(|(name, _)| name).join(", ");
             let reason = format!("cannot be read ({fault}), and no shipped leg is called so ({names})");
-            LegFileError::of_file(name_or_path, reason)
+            FileError::new(name_or_path, reason)
         })?;
         Ok((text, name_or_path.to_owned()))
     }
 
     /// Parses TOML text; `file` is its name in error messages.
-    pub fn parse(text: &str, file: &str) -> Result<Self, LegFileError> {
-        let leg: Self = toml::from_str(text).map_err(|fault| LegFileError::of_text(file, text, &fault))?;
-        check::leg(&leg).map_err(|fault| LegFileError::of_value(file, text, &fault))?;
+    pub fn parse(text: &str, file: &str) -> Result<Self, FileError> {
+        let leg: Self = toml_file::parse(text, file)?;
+        check::leg(&leg).map_err(|fault| fault.in_file(file, text))?;
         Ok(leg)
+    }
+
+    /// Error about this leg.
+    #[must_use]
+    pub fn error(&self, reason: impl Into<String>) -> FileError {
+        FileError::new(&self.name, reason.into())
     }
 
     /// TOML text that [`LegFile::parse`] reads back unchanged.

@@ -14,10 +14,7 @@
 
 mod check;
 mod checksum;
-mod error;
 mod text;
-
-pub use error::ModelFileError;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -26,9 +23,10 @@ use nalgebra::SMatrix;
 use scarab::model::Parameter;
 use serde::{Deserialize, Serialize};
 
-use crate::base::error::ToolError;
+use crate::base::error::{FileError, ToolError};
+use crate::base::files;
+use crate::base::toml_file::{self, Fault, Step};
 use crate::formats::leg_file::{BodySide, DhFile, JointFile, LegFile};
-use error::Step;
 
 /// Version of the keys.
 pub const MODEL_SCHEMA: i64 = 1;
@@ -232,18 +230,15 @@ impl ModelFile {
     /// Loads and checks a model.
     ///
     /// # Errors
-    /// [`ModelFileError`] for an invalid file; [`ToolError::Refused`] for one that was edited or
+    /// [`FileError`] for an invalid file; [`ToolError::Refused`] for one that was edited or
     /// never accepted.
     pub fn load(path: &Path) -> Result<Self, ToolError> {
         let file = path.display().to_string();
-        let unreadable =
-            |fault: std::io::Error| ModelFileError::of_file(&file, format!("cannot be read ({fault})"));
-        let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
+        let bytes = std::fs::metadata(path).map_err(|error| FileError::unreadable(path, &error))?.len();
         if bytes > LARGEST_FILE_BYTES {
-            return Err(ModelFileError::of_file(&file, format!("{bytes} bytes are no model file")).into());
+            return Err(FileError::new(file, format!("{bytes} bytes are no model file")).into());
         }
-        let text = std::fs::read_to_string(path).map_err(unreadable)?;
-        Self::parse(&text, &file)
+        Self::parse(&files::read_text(path)?, &file)
     }
 
     /// Parses and checks a model; `file` is its name in error messages.
@@ -251,20 +246,19 @@ impl ModelFile {
     /// # Errors
     /// Errors of [`ModelFile::load`].
     pub fn parse(text: &str, file: &str) -> Result<Self, ToolError> {
-        let of_text = |fault| ModelFileError::of_text(file, text, &fault);
-        let of_value = |steps: &[Step], reason| ModelFileError::of_value(file, text, steps, reason);
-        let raw: toml::Table = toml::from_str(text).map_err(of_text)?;
+        let raw: toml::Table = toml_file::parse(text, file)?;
         match raw.get("schema").map(toml::Value::as_integer) {
             Some(Some(MODEL_SCHEMA)) => {}
-            None if raw.is_empty() => return Err(ModelFileError::of_file(file, "is empty".into()).into()),
-            None => return Err(ModelFileError::of_file(file, "has no `schema`: no model file".into()).into()),
+            None if raw.is_empty() => return Err(FileError::new(file, "is empty").into()),
+            None => return Err(FileError::new(file, "has no `schema`: no model file").into()),
             _ => {
                 let reason = format!("this schema is unknown; this program reads {MODEL_SCHEMA}");
-                return Err(of_value(&[Step::Key("schema")], reason).into());
+                let fault = Fault { steps: vec![Step::Key("schema")], reason };
+                return Err(fault.in_file(file, text).into());
             }
         }
-        let model: Self = toml::from_str(text).map_err(of_text)?;
-        check::model(&model).map_err(|fault| of_value(&fault.steps, fault.reason))?;
+        let model: Self = toml_file::parse(text, file)?;
+        check::model(&model).map_err(|fault| fault.in_file(file, text))?;
         let found = checksum::of(&raw);
         if model.checksum != found {
             return Err(ToolError::Refused(format!(

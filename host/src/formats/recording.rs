@@ -23,11 +23,14 @@ use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
 
+use crate::base::error::FileError;
+use crate::base::files;
+
 pub mod columns;
 mod fault;
 
-use columns::{Column, for_each_row, line_at, read_text, refuse};
-pub use fault::{Fault, RecordingError};
+use columns::{Column, for_each_row, line_at, refuse};
+pub use fault::Fault;
 
 /// Least number of samples of a recording.
 pub const MINIMUM_SAMPLES: usize = 50;
@@ -72,12 +75,12 @@ pub struct Recording {
 
 impl Recording {
     /// Reads the first `joints` joints of a CSV file.
-    pub fn read(file: &Path, joints: usize) -> Result<Self, RecordingError> {
-        Self::parse(file, &read_text(file)?, joints)
+    pub fn read(file: &Path, joints: usize) -> Result<Self, FileError> {
+        Self::parse(file, &files::read_text(file)?, joints)
     }
 
     /// Reads the first `joints` joints of a CSV text; `file` is used only in error messages.
-    pub fn parse(file: &Path, text: &str, joints: usize) -> Result<Self, RecordingError> {
+    pub fn parse(file: &Path, text: &str, joints: usize) -> Result<Self, FileError> {
         let mut recording = Self {
             file: file.to_owned(),
             time_s: Vec::new(),
@@ -121,7 +124,7 @@ impl Recording {
     }
 
     /// Splits at a fraction (0 to 1) of the duration; fails if a part is too short for a recording.
-    pub fn split(&self, fraction: f64) -> Result<(Self, Self), RecordingError> {
+    pub fn split(&self, fraction: f64) -> Result<(Self, Self), FileError> {
         let border = self.time_s.first().copied().unwrap_or(0.0) + fraction * self.duration_s();
         let at = self.time_s.partition_point(|&time| time < border);
         let part = |range: std::ops::Range<usize>| Self {
@@ -174,7 +177,7 @@ impl Recording {
     }
 
     /// Rejects stamps in another unit before they are put on a grid of seconds, which would take gigabytes.
-    fn check_rate(&self) -> Result<(), RecordingError> {
+    fn check_rate(&self) -> Result<(), FileError> {
         let step_s = self.median_step_s();
         if step_s * MINIMUM_RATE_HZ <= RATE_TOLERANCE {
             return Ok(());
@@ -193,7 +196,7 @@ impl Recording {
         }
     }
 
-    fn check_length(&self) -> Result<(), RecordingError> {
+    fn check_length(&self) -> Result<(), FileError> {
         let (samples, duration) = (self.time_s.len(), self.duration_s());
         if samples < MINIMUM_SAMPLES || duration < MINIMUM_DURATION_S {
             return Err(refuse(&self.file, None, Fault::TooShort { samples, duration }));

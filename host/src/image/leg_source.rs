@@ -11,7 +11,8 @@ use scarab::motion::{ExcitationTable, Periodic};
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::{Radian, Weber};
 
-use crate::formats::leg_file::geometry::{SetupError, chain};
+use crate::base::error::FileError;
+use crate::formats::leg_file::geometry::chain;
 use crate::formats::leg_file::{JointFile, LegFile, Side};
 use crate::leg::setup::{PriorChoice, background, base_rank, configuration};
 
@@ -24,9 +25,9 @@ const BASE: usize = 13;
 pub type Described = (LegDescription<JOINTS>, LegConfiguration<JOINTS, BASE>);
 
 /// Description of a leg of two joints with up to 13 base parameters, the capacity of the board.
-pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, SetupError> {
+pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, FileError> {
     if leg.joints.len() != JOINTS || base_rank(leg) > BASE {
-        return Err(SetupError::new(leg, "an image holds two joints with up to 13 base parameters"));
+        return Err(leg.error("an image holds two joints with up to 13 base parameters"));
     }
     let background = background::<JOINTS, BASE>(leg, PriorChoice::Default, swarm_seed)?;
     let (configuration, _) = configuration(leg, &background, Plan::default(), swarm_seed)?;
@@ -34,8 +35,7 @@ pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, SetupError>
     let mut motors =
         [MotorDescription { pole_pairs: 0, flux: Weber(0.0), counts_per_turn: 0, ratio: 0.0 }; JOINTS];
     for (slot, joint) in motors.iter_mut().zip(&leg.joints) {
-        *slot = motor(joint)
-            .map_err(|reason| SetupError::new(leg, format!("joint `{}`: {reason}", joint.name)))?;
+        *slot = motor(joint).map_err(|reason| leg.error(format!("joint `{}`: {reason}", joint.name)))?;
     }
     let model = &configuration.model;
     let joints = core::array::from_fn(|index| {

@@ -30,7 +30,7 @@ use std::path::Path;
 
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
-use crate::base::error::ToolError;
+use crate::base::error::{FileError, ToolError};
 
 /// Vectors of levels 0 and 1: converters, index pulses, servo.
 const VECTORS: [&str; 4] = ["ADC", "EXTI9_5", "EXTI15_10", "OTG_HS"];
@@ -100,7 +100,7 @@ struct Branch {
 impl Panics {
     /// Finds the locations of an image.
     pub fn of(image: &Path) -> Result<Self, ToolError> {
-        let wrong = |error: &dyn std::fmt::Display| ToolError::input(format!("{}: {error}", image.display()));
+        let wrong = |error: &dyn std::fmt::Display| FileError::new(image.display(), error);
         let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
         let file = object::File::parse(&*bytes).map_err(|error| wrong(&error))?;
         let text = file.section_by_name(".text").ok_or_else(|| wrong(&"no section .text"))?;

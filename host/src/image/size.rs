@@ -5,7 +5,7 @@ use std::path::Path;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SymbolKind};
 use serde::Serialize;
 
-use crate::base::error::ToolError;
+use crate::base::error::{FileError, ToolError};
 use crate::base::table::{Table, cells};
 
 /// Flash limit of an image, bytes: a quarter of the chip's. Speed has priority over size
@@ -65,7 +65,7 @@ pub struct ImageSize {
 impl ImageSize {
     /// Reads the size of an image.
     pub fn of(image: &Path) -> Result<Self, ToolError> {
-        let wrong = |error: &dyn std::fmt::Display| ToolError::input(format!("{}: {error}", image.display()));
+        let wrong = |error: &dyn std::fmt::Display| FileError::new(image.display(), error);
         let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
         let file = object::File::parse(&*bytes).map_err(|error| wrong(&error))?;
         let mut sections: Vec<(u64, Section)> = file.sections().filter_map(|found| section(&found)).collect();

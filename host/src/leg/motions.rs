@@ -12,8 +12,8 @@ use scarab::motion::{Fourier, HARMONICS, JointEnvelope, Motion, MotionError, Per
 use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::{Radian, Second};
 
+use crate::base::error::FileError;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 
 /// Names of the predicted motions, in the order of the leg's validation.
 pub const VALIDATION_NAMES: [&str; VALIDATION_MOTIONS] = ["gait-6.5", "gait-3", "fourier"];
@@ -47,8 +47,8 @@ pub fn motions<const N: usize, const B: usize>(
     leg: &LegFile,
     model: &RowModel<f64, N, B>,
     limits: &[JointEnvelope; N],
-) -> Result<Motions<N>, SetupError> {
-    let refuse = |motion: &str| SetupError::new(leg, format!("no {motion} motion fits the limits"));
+) -> Result<Motions<N>, FileError> {
+    let refuse = |motion: &str| leg.error(format!("no {motion} motion fits the limits"));
     let excitation = random_excitation(model, limits, EXCITATION_PERIOD, EXCITATION_CYCLES)
         .ok_or_else(|| refuse("exciting"))?;
     let unused = most_informative(model, limits, UNUSED_PERIOD, 1, UNUSED_SEED, 20)

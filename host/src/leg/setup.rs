@@ -21,7 +21,8 @@ use scarab::units::{
     RadianPerSecondSquared,
 };
 
-use crate::formats::leg_file::geometry::{SetupError, anatomy, chain};
+use crate::base::error::FileError;
+use crate::formats::leg_file::geometry::{anatomy, chain};
 use crate::formats::leg_file::{BodySide, JointFile, LegFile, LinkParameters};
 use crate::leg::background::{Background, StribeckTruth};
 use crate::leg::model_choice::{Asked, drive_choice, stribeck_choice};
@@ -123,7 +124,7 @@ fn chosen<T: Real, const N: usize, const B: usize>(
 }
 
 /// Geometry, gravity and base parameters of a leg.
-pub fn row_model<const N: usize, const B: usize>(leg: &LegFile) -> Result<RowModel<f64, N, B>, SetupError> {
+pub fn row_model<const N: usize, const B: usize>(leg: &LegFile) -> Result<RowModel<f64, N, B>, FileError> {
     let (chain, gravity) = (chain(leg)?, Vector3::from(leg.gravity));
     let base = BaseParameters::analyse(&chain, &gravity, &column_mask(leg)).map_err(|error| {
         let reason = match error {
@@ -131,7 +132,7 @@ pub fn row_model<const N: usize, const B: usize>(leg: &LegFile) -> Result<RowMod
             BaseError::NothingSeen => "no torque depends on any parameter".into(),
             BaseError::NotFinite => "a number is not finite".into(),
         };
-        SetupError::new(leg, reason)
+        leg.error(reason)
     })?;
     Ok(chosen(leg, RowModel::new(chain, gravity, base)))
 }
@@ -140,12 +141,12 @@ pub fn row_model<const N: usize, const B: usize>(leg: &LegFile) -> Result<RowMod
 pub fn device_model<const N: usize, const B: usize>(
     leg: &LegFile,
     reference: &RowModel<f64, N, B>,
-) -> Result<RowModel<f32, N, B>, SetupError> {
+) -> Result<RowModel<f32, N, B>, FileError> {
     let (chain, gravity) = (reference.chain.convert(), reference.gravity.map(|element| element as f32));
     let base = BaseParameters::analyse(&chain, &gravity, &column_mask(leg))
-        .map_err(|_| SetupError::new(leg, "base parameters cannot be told apart in single precision"))?;
+        .map_err(|_| leg.error("base parameters cannot be told apart in single precision"))?;
     if (0..B).any(|index| base.independent(index) != reference.base.independent(index)) {
-        return Err(SetupError::new(leg, "base parameters differ between single and double precision"));
+        return Err(leg.error("base parameters differ between single and double precision"));
     }
     Ok(chosen(leg, RowModel::new(chain, gravity, base)))
 }
@@ -222,7 +223,7 @@ pub fn background<const N: usize, const B: usize>(
     leg: &LegFile,
     prior: PriorChoice,
     seed: u64,
-) -> Result<Background<N, B>, SetupError> {
+) -> Result<Background<N, B>, FileError> {
     let model = row_model::<N, B>(leg)?;
     let device = device_model(leg, &model)?;
     let truth = links::<N>(leg, |joint| joint.truth.as_ref());
@@ -230,13 +231,11 @@ pub fn background<const N: usize, const B: usize>(
     let (prior, prior_name) = match prior {
         PriorChoice::None => (None, "none".to_owned()),
         PriorChoice::Default => (from_file, if from_file.is_some() { "file" } else { "none" }.to_owned()),
-        PriorChoice::File => (
-            Some(from_file.ok_or_else(|| SetupError::new(leg, "has no prior for every joint"))?),
-            "file".to_owned(),
-        ),
+        PriorChoice::File => {
+            (Some(from_file.ok_or_else(|| leg.error("has no prior for every joint"))?), "file".to_owned())
+        }
         PriorChoice::Wrong(percent) => {
-            let truth =
-                truth.ok_or_else(|| SetupError::new(leg, "a wrong prior needs a truth to be wrong about"))?;
+            let truth = truth.ok_or_else(|| leg.error("a wrong prior needs a truth to be wrong about"))?;
             (Some(wrong_prior(&truth, percent, seed)), format!("wrong:{percent}"))
         }
     };
@@ -284,7 +283,7 @@ pub fn configuration<const N: usize, const B: usize>(
     background: &Background<N, B>,
     plan: Plan,
     swarm_seed: u64,
-) -> Result<(LegConfiguration<N, B>, Motions<N>), SetupError> {
+) -> Result<(LegConfiguration<N, B>, Motions<N>), FileError> {
     let inertia = servo_inertia(leg, background)?;
     let anatomy = anatomy::<N>(leg)?;
     let joints: [JointConfiguration; N] = core::array::from_fn(|index| {
@@ -339,8 +338,8 @@ pub fn configuration<const N: usize, const B: usize>(
 fn servo_inertia<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,
-) -> Result<[f64; N], SetupError> {
+) -> Result<[f64; N], FileError> {
     let links = links::<N>(leg, |joint| joint.prior.as_ref().or(joint.truth.as_ref()))
-        .ok_or_else(|| SetupError::new(leg, "neither prior nor truth tells how heavy the leg is"))?;
+        .ok_or_else(|| leg.error("neither prior nor truth tells how heavy the leg is"))?;
     Ok(largest_inertia(&background.model.chain, &prior_parameters(&links)))
 }

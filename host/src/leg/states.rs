@@ -15,10 +15,12 @@ use std::path::{Path, PathBuf};
 use csv::StringRecord;
 use scarab::model::{AnatomicalJoint, JointState};
 
+use crate::base::error::FileError;
+use crate::base::files;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::{SetupError, anatomy};
-use crate::formats::recording::columns::{Column, for_each_row, line_at, read_text, refuse};
-use crate::formats::recording::{Fault, RecordingError};
+use crate::formats::leg_file::geometry::anatomy;
+use crate::formats::recording::Fault;
+use crate::formats::recording::columns::{Column, for_each_row, line_at, refuse};
 
 /// Convention of the angles in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +36,7 @@ impl Angles {
     ///
     /// # Errors
     /// Direction or zero offset of a joint is invalid.
-    pub fn to_chain<const N: usize>(self, leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N], SetupError> {
+    pub fn to_chain<const N: usize>(self, leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N], FileError> {
         match self {
             Self::Anatomical => anatomy(leg),
             Self::DenavitHartenberg => Ok([AnatomicalJoint::identity(); N]),
@@ -68,8 +70,8 @@ impl<const N: usize> States<N> {
     ///
     /// # Errors
     /// Names file, line and reason.
-    pub fn read(file: &Path, to_chain: &[AnatomicalJoint<f64>; N]) -> Result<Self, RecordingError> {
-        let text = read_text(file)?;
+    pub fn read(file: &Path, to_chain: &[AnatomicalJoint<f64>; N]) -> Result<Self, FileError> {
+        let text = files::read_text(file)?;
         let mut rows = Vec::new();
         let offsets = for_each_row(file, &text, find_columns::<N>, |(columns, time), row| {
             let mut numbers = [[0.0; N]; 3];
@@ -93,7 +95,7 @@ impl<const N: usize> States<N> {
 
     /// Error of a row whose torque exceeds the range of the number format.
     #[must_use]
-    pub fn out_of_range(&self, row: usize) -> RecordingError {
+    pub fn out_of_range(&self, row: usize) -> FileError {
         let line = self.offsets.get(row).map(|&offset| line_at(&self.text, offset));
         refuse(&self.file, line, Fault::OutOfRange)
     }

@@ -13,7 +13,6 @@ use scarab::safety::{DriveState, PowerRequest};
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::leg::background::Background;
 use crate::leg::board_words::axis_fault;
 use crate::leg::motions::Motions;
@@ -75,7 +74,7 @@ impl<const N: usize, const B: usize> Context<N, B> {
             motions.excitation = excitation.motion()?;
             configuration.excitation = motions.excitation;
         }
-        let unfit = |_| SetupError::new(leg, "the filter does not fit the device");
+        let unfit = |_| leg.error("the filter does not fit the device");
         let (bandwidth, rate) = (configuration.bandwidth_hz, SAMPLE_RATE_HZ as f32);
         let smoothing = Kernel::new(SMOOTHING_BANDWIDTHS as f32 * bandwidth, rate).map_err(unfit)?;
         let low_pass = LowPass::new(bandwidth, rate).map_err(unfit)?;
@@ -174,8 +173,8 @@ impl<const N: usize, const B: usize> Pair<N, B> {
         };
         world.set_current_noise(&context.current_noise(leg));
         world.place(&start_position(leg));
-        let device = DeviceLeg::new(&context.configuration)
-            .map_err(|error| SetupError::new(leg, leg_error(leg, error)))?;
+        let device =
+            DeviceLeg::new(&context.configuration).map_err(|error| leg.error(leg_error(leg, error)))?;
         let device = Box::new(device);
         let sample = world.sample();
         let board = match believed.zip(drives.as_ref()) {

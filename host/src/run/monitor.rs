@@ -16,7 +16,6 @@ use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::Second;
 
 use crate::base::error::ToolError;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::formats::leg_file::{LegFile, PushesFile};
 use crate::report::monitor::{AlarmReport, MonitorRun};
 use crate::rig::options::SimulationOptions;
@@ -75,7 +74,7 @@ fn gait<const N: usize, const B: usize>(
     context: &Context<N, B>,
     seconds: f64,
 ) -> Result<ProvedMotion<N>, ToolError> {
-    let unfit = || SetupError::new(leg, "no gait of this length fits the limits");
+    let unfit = || leg.error("no gait of this length fits the limits");
     let curve = *context.motions.validation[1].curve();
     let cycles = (seconds / f64::from(curve.period().0)).ceil() as u32 + 1;
     let motion = Periodic::new(curve, Second(1.0), cycles, SERVO_RATE_HZ).map_err(|_| unfit())?;
@@ -90,7 +89,7 @@ fn identified<const N: usize, const B: usize>(
 ) -> Result<Result<Pair<N, B>, Vec<&'static str>>, ToolError> {
     let mut pair = Pair::new(leg, context, seed)?;
     if !pair.enable(context.gravity) {
-        return Err(SetupError::new(leg, "the drive refused to be enabled at the start").into());
+        return Err(leg.error("the drive refused to be enabled at the start").into());
     }
     let mut request = Some(ControlRequest::Identify);
     while pair.leg.control().verdict().is_none() {
@@ -99,7 +98,7 @@ fn identified<const N: usize, const B: usize>(
         if (!identifying && pair.leg.control().verdict().is_none())
             || pair.ticks > ticks(LONGEST_IDENTIFICATION_S)
         {
-            return Err(SetupError::new(leg, pair.stop_words(leg)).into());
+            return Err(leg.error(pair.stop_words(leg)).into());
         }
     }
     let reasons = pair.leg.control().verdict().into_iter().flat_map(|verdict| verdict.reasons());
@@ -158,7 +157,7 @@ impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
         if matches!(self.activity(), Activity::Track(_)) {
             return Ok(());
         }
-        Err(SetupError::new(self.leg, self.pair.stop_words(self.leg)).into())
+        Err(self.leg.error(self.pair.stop_words(self.leg)).into())
     }
 
     /// Root mean square position error of all joints since the last call, degrees.
@@ -195,7 +194,7 @@ impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
         if self.pair.enable(self.context.gravity) {
             return Ok(self.pair);
         }
-        Err(SetupError::new(self.leg, "the drive refused to be enabled after a false alarm").into())
+        Err(self.leg.error("the drive refused to be enabled after a false alarm").into())
     }
 }
 
@@ -211,8 +210,7 @@ pub fn watch<const N: usize, const B: usize>(
         Err(reasons) => return Ok(MonitorRun::refused(options.seed, reasons)),
     };
     let model_monitor = pair.leg.identification().model_monitor();
-    let baseline =
-        model_monitor.baseline().ok_or_else(|| SetupError::new(leg, "an accepted model is not watched"))?;
+    let baseline = model_monitor.baseline().ok_or_else(|| leg.error("an accepted model is not watched"))?;
     let mut run = MonitorRun {
         row_sigma_nm: baseline
             .row_variance

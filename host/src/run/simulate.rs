@@ -9,7 +9,6 @@ use scarab::real::sqrt;
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::report::series::Series;
 use crate::report::{RunReport, TrackingReport};
 use crate::rig::options::SimulationOptions;
@@ -113,7 +112,7 @@ pub fn drive<'a, const N: usize, const B: usize>(
             }
         }
         if pair.ticks > largest {
-            return Err(SetupError::new(leg, "identification did not end").into());
+            return Err(leg.error("identification did not end").into());
         }
     }
 }

@@ -6,27 +6,23 @@
 
 use std::path::Path;
 
-use crate::base::error::ToolError;
+use crate::base::error::{FileError, ToolError};
 use crate::base::files;
 
 /// Replaces one place of a document; a document without it is an error.
 pub fn replace(path: &Path, kind: &str, name: &str, content: &str) -> Result<(), ToolError> {
-    let text = replaced(&read(path)?, kind, name, content).ok_or_else(|| no_place(path, kind, name))?;
+    let text =
+        replaced(&files::read_text(path)?, kind, name, content).ok_or_else(|| no_place(path, kind, name))?;
     files::write(path, text)
 }
 
 /// Returns an error if the document lacks the place.
 pub fn check(path: &Path, kind: &str, name: &str) -> Result<(), ToolError> {
-    replaced(&read(path)?, kind, name, "").map(drop).ok_or_else(|| no_place(path, kind, name))
+    replaced(&files::read_text(path)?, kind, name, "").map(drop).ok_or_else(|| no_place(path, kind, name))
 }
 
 fn no_place(path: &Path, kind: &str, name: &str) -> ToolError {
-    ToolError::input(format!("{}: has no `<!-- {kind}: {name} -->` with its end", path.display()))
-}
-
-fn read(path: &Path) -> Result<String, ToolError> {
-    std::fs::read_to_string(path)
-        .map_err(|error| ToolError::input(format!("{}: cannot be read: {error}", path.display())))
+    FileError::new(path.display(), format!("has no `<!-- {kind}: {name} -->` with its end")).into()
 }
 
 fn replaced(text: &str, kind: &str, name: &str, content: &str) -> Option<String> {

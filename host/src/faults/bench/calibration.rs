@@ -19,7 +19,6 @@ use crate::faults::bench::{Bench, outcome};
 use crate::faults::draw::AMPERE_PER_CODE;
 use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::formats::leg_file::{JointFile, LegFile, MotorFile};
 use crate::leg::board_words::axis_error;
 use crate::rig::board::{axis_configuration, calibration_settings, commission, rested};
@@ -53,8 +52,7 @@ fn one(head: &Head, leg: &LegFile, seed: u64, blind: bool) -> Result<Outcome, To
     let drives = leg.complete_description::<2>()?;
     let index = random.below(drives.axes.len() as u64) as usize;
     let joint = &leg.joints[index];
-    let motor =
-        joint.motor.as_ref().ok_or_else(|| SetupError::new(leg, "a motor for every joint is needed"))?;
+    let motor = joint.motor.as_ref().ok_or_else(|| leg.error("a motor for every joint is needed"))?;
     if random.below(5) < 2 {
         return loose(head, joint, motor, &drives.axes[index], &drives.supply, seed, &mut random, blind);
     }

@@ -20,7 +20,6 @@ use crate::faults::entry::Head;
 use crate::faults::invariants::MARGIN_RAD;
 use crate::faults::run::Outcome;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, start_position};
 
@@ -58,7 +57,7 @@ fn one(head: &Head, leg: &LegFile, context: &Context<JOINTS, BASE>, seed: u64) -
     let mut world = World::<JOINTS>::new(&leg.description()?, seed);
     world.set_current_noise(&context.current_noise(leg));
     world.place(&start_position(leg));
-    let unfit = |_| SetupError::new(leg, "the servo refuses its joints");
+    let unfit = |_| leg.error("the servo refuses its joints");
     let mut servo = Servo::new(context.configuration.joints).map_err(unfit)?;
     let mut sample = world.sample();
     let mut motion = MotionState::at_rest([0.0; JOINTS]);

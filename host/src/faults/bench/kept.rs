@@ -36,7 +36,6 @@ use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
 use crate::formats::kept_file::memory::Memory;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::rig::bus::board::Board;
 use crate::rig::bus::host::Host;
 use crate::rig::options::SimulationOptions;
@@ -90,7 +89,7 @@ pub(super) const ARMED: Bench = Bench {
 
 /// Identifies a leg and returns its model as stored.
 fn identified(leg: &LegFile, seed: u64) -> Result<KeptModel<JOINTS>, ToolError> {
-    let refused = || SetupError::new(leg, "its identification is refused");
+    let refused = || leg.error("its identification is refused");
     let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(seed))?;
     let mut pair = Pair::new(leg, &context, seed)?;
     if !pair.enable(context.gravity) {
@@ -252,7 +251,7 @@ impl Rotting {
     }
 
     fn new(leg: &LegFile) -> Result<Self, ToolError> {
-        let refused = |words: &str| ToolError::from(SetupError::new(leg, words.to_owned()));
+        let refused = |words: &str| ToolError::from(leg.error(words.to_owned()));
         let kept = [identified(leg, 1)?, identified(leg, 2)?];
         let mut longer = leg.clone();
         for joint in &mut longer.joints {

@@ -21,7 +21,6 @@ use crate::faults::catalogue::JOINTS;
 use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::rig::board::{axis_configuration, calibration_settings, rested};
 
 pub(super) const BENCH: Bench = Bench {
@@ -84,7 +83,7 @@ fn run(
 
 impl Driven {
     fn new(leg: &LegFile, index: usize) -> Result<Self, ToolError> {
-        let unfit = || SetupError::new(leg, "a motor for every joint that can be calibrated is needed");
+        let unfit = || leg.error("a motor for every joint that can be calibrated is needed");
         let drives = leg.complete_description::<JOINTS>()?;
         let joint = &leg.joints[index];
         let motor = joint.motor.as_ref().ok_or_else(unfit)?;
@@ -114,7 +113,7 @@ impl Driven {
             sample
         });
         if axis.fault().is_some() {
-            return Err(SetupError::new(leg, "its motor cannot be driven on a stand").into());
+            return Err(leg.error("its motor cannot be driven on a stand").into());
         }
         Ok(Self { configuration, calibration, first, samples, commands, joint })
     }

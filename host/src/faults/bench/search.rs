@@ -15,7 +15,6 @@ use crate::faults::catalogue::JOINTS;
 use crate::faults::entry::Head;
 use crate::faults::run::Outcome;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, Pair};
 
@@ -63,7 +62,7 @@ fn is_searching(pair: &Pair<JOINTS, BASE>) -> bool {
 
 impl Searching {
     fn new(leg: &LegFile) -> Result<Self, ToolError> {
-        let refused = |words: &str| ToolError::from(SetupError::new(leg, words.to_owned()));
+        let refused = |words: &str| ToolError::from(leg.error(words.to_owned()));
         let context = Context::<JOINTS, BASE>::new(leg, &SimulationOptions::of_seed(1))?;
         let mut pair = Pair::new(leg, &context, 1)?;
         let gravity = context.gravity;

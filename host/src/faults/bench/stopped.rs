@@ -26,7 +26,6 @@ use crate::faults::entry::Head;
 use crate::faults::invariants::{Invariants, Scope};
 use crate::faults::run::Outcome;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::rig::board::{axis_configuration, calibration_settings, rested};
 use crate::rig::faulty_board::{PERIOD_MS, PERIODS_PER_S, Rig};
 
@@ -142,7 +141,7 @@ fn calibrated(
     pressed: Option<u64>,
     blind: bool,
 ) -> Result<(u64, bool), ToolError> {
-    let unfit = || SetupError::new(leg, "a motor for every joint that can be calibrated is needed");
+    let unfit = || leg.error("a motor for every joint that can be calibrated is needed");
     let drives = leg.complete_description::<JOINTS>()?;
     let joint = &leg.joints[index];
     let motor = joint.motor.as_ref().ok_or_else(unfit)?;

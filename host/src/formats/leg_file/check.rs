@@ -8,17 +8,11 @@ use std::collections::HashSet;
 
 use nalgebra::Matrix3;
 
+use crate::base::toml_file::{Fault, Step};
 use crate::formats::leg_file::{JointFile, LegFile, LinkParameters, Switch};
 
 /// Smallest range that the firmware's limits accept.
 const SMALLEST_RANGE_DEG: f64 = 2.0;
-
-/// Rejected value and its position.
-pub(super) struct Fault {
-    pub joint: Option<usize>,
-    pub keys: Vec<&'static str>,
-    pub reason: String,
-}
 
 /// Position of a value; creates faults.
 pub(super) struct Place<'a> {
@@ -30,11 +24,12 @@ impl Place<'_> {
     pub(super) fn fault(&self, key: &'static str, complaint: &str) -> Fault {
         let keys: Vec<&'static str> = self.table.into_iter().chain([key]).collect();
         let path = keys.join(".");
-        let reason = match self.joint {
-            Some((_, name)) => format!("joint `{name}`: `{path}` {complaint}"),
-            None => format!("`{path}` {complaint}"),
+        let (mut steps, reason) = match self.joint {
+            Some((number, name)) => (joint_steps(number), format!("joint `{name}`: `{path}` {complaint}")),
+            None => (Vec::new(), format!("`{path}` {complaint}")),
         };
-        Fault { joint: self.joint.map(|(number, _)| number), keys, reason }
+        steps.extend(keys.into_iter().map(Step::Key));
+        Fault { steps, reason }
     }
 
     /// Accepts `low..=high`; rejects NaN.
@@ -61,6 +56,11 @@ impl Place<'_> {
         }
         Ok(())
     }
+}
+
+/// Path to a joint, from 0.
+pub(super) fn joint_steps(number: usize) -> Vec<Step> {
+    vec![Step::Key("joint"), Step::Entry(number)]
 }
 
 pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {

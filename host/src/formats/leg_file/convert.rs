@@ -6,9 +6,8 @@ use hal_sim::description::{
     Stribeck,
 };
 
-use crate::formats::leg_file::{
-    BodySide, JointFile, LegFile, LegFileError, LinkParameters, PushesFile, Side,
-};
+use crate::base::error::FileError;
+use crate::formats::leg_file::{BodySide, JointFile, LegFile, LinkParameters, PushesFile, Side};
 
 /// Distance of the simulated mechanical end stops from the range, degrees: wide enough for the default leg,
 /// which hangs at its anatomical zero.
@@ -23,17 +22,16 @@ impl LegFile {
     /// Description of the simulated leg. Its sensors have `current_noise_a` only: `torque_noise_percent`
     /// refers to a motion, for which the caller adds it with `World::set_current_noise`. Fails if the leg
     /// does not have `N` joints or a joint has no `truth`.
-    pub fn description<const N: usize>(&self) -> Result<LegDescription<N>, LegFileError> {
-        let refused = |reason: String| LegFileError::of_file(&self.name, reason);
+    pub fn description<const N: usize>(&self) -> Result<LegDescription<N>, FileError> {
         let mut joints = Vec::with_capacity(N);
         for joint in &self.joints {
             let truth = joint.truth.as_ref().ok_or_else(|| {
-                refused(format!("joint `{}` has no `truth`: the leg cannot be simulated", joint.name))
+                self.error(format!("joint `{}` has no `truth`: the leg cannot be simulated", joint.name))
             })?;
             joints.push(joint.description(truth));
         }
         let count = joints.len();
-        let joints = joints.try_into().map_err(|_| refused(format!("has {count} joints, not {N}")))?;
+        let joints = joints.try_into().map_err(|_| self.error(format!("has {count} joints, not {N}")))?;
         Ok(LegDescription {
             gravity: self.gravity,
             joints,

@@ -3,54 +3,35 @@
 use scarab::model::{AnatomicalJoint, Chain, DenavitHartenberg, Fingerprint};
 
 use super::{BodySide, LegFile};
-use crate::base::error::ToolError;
-
-/// Leg that cannot be used, with the reason.
-#[derive(Clone, Debug, thiserror::Error)]
-#[error("{leg}: {reason}")]
-pub struct SetupError {
-    /// Name in the leg file.
-    pub leg: String,
-    /// Reason.
-    pub reason: String,
-}
-
-impl SetupError {
-    /// Creates an error about a leg.
-    #[must_use]
-    pub fn new(leg: &LegFile, reason: impl Into<String>) -> Self {
-        Self { leg: leg.name.clone(), reason: reason.into() }
-    }
-}
+use crate::base::error::FileError;
 
 /// Kinematic chain of a leg.
-pub fn chain<const N: usize>(leg: &LegFile) -> Result<Chain<f64, N>, SetupError> {
+pub fn chain<const N: usize>(leg: &LegFile) -> Result<Chain<f64, N>, FileError> {
     let geometry: Vec<_> = leg
         .joints
         .iter()
         .map(|joint| DenavitHartenberg { alpha: joint.dh.alpha, a: joint.dh.a, d: joint.dh.d })
         .collect();
     let count = geometry.len();
-    let geometry: [_; N] = geometry
-        .try_into()
-        .map_err(|_| SetupError::new(leg, format!("{count} joints where {N} were expected")))?;
-    Chain::new(&geometry).map_err(|_| SetupError::new(leg, "a D-H number is not finite"))
+    let geometry: [_; N] =
+        geometry.try_into().map_err(|_| leg.error(format!("{count} joints where {N} were expected")))?;
+    Chain::new(&geometry).map_err(|_| leg.error("a D-H number is not finite"))
 }
 
 /// Anatomical to D-H angles of every joint.
-pub fn anatomy<const N: usize>(leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N], SetupError> {
+pub fn anatomy<const N: usize>(leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N], FileError> {
     let mut joints = [AnatomicalJoint::identity(); N];
     for (slot, joint) in joints.iter_mut().zip(&leg.joints) {
         let direction = if joint.direction < 0 { -1 } else { 1 };
         *slot = AnatomicalJoint::new(direction, joint.zero_offset_deg.to_radians())
-            .map_err(|_| SetupError::new(leg, format!("joint {}: direction or zero offset", joint.name)))?;
+            .map_err(|_| leg.error(format!("joint {}: direction or zero offset", joint.name)))?;
     }
     Ok(joints)
 }
 
 /// Fingerprint of a leg as the board computes it, sixteen hexadecimal digits.
-pub fn fingerprint(leg: &LegFile) -> Result<String, SetupError> {
-    fn of<const N: usize>(leg: &LegFile) -> Result<Fingerprint, SetupError> {
+pub fn fingerprint(leg: &LegFile) -> Result<String, FileError> {
+    fn of<const N: usize>(leg: &LegFile) -> Result<Fingerprint, FileError> {
         let mounting = if leg.side == BodySide::Left { -1.0 } else { 1.0 };
         let constants = core::array::from_fn(|joint| mounting * leg.joints[joint].torque_per_ampere as f32);
         let anatomy = anatomy::<N>(leg)?.map(|joint| joint.convert());
@@ -62,10 +43,4 @@ pub fn fingerprint(leg: &LegFile) -> Result<String, SetupError> {
         _ => of::<3>(leg),
     }?;
     Ok(format!("{:016x}", fingerprint.0))
-}
-
-impl From<SetupError> for ToolError {
-    fn from(error: SetupError) -> Self {
-        Self::Input(error.to_string())
-    }
 }

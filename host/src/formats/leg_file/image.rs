@@ -6,8 +6,10 @@
 
 use toml::{Table, Value};
 
-use crate::formats::leg_file::check::Fault;
-use crate::formats::leg_file::{LegFile, LegFileError, Side};
+use crate::base::error::FileError;
+use crate::base::toml_file::{Fault, Step};
+use crate::formats::leg_file::check::joint_steps;
+use crate::formats::leg_file::{LegFile, Side};
 
 /// Required keys of each joint.
 const JOINT: [&str; 10] = [
@@ -31,11 +33,11 @@ impl LegFile {
     ///
     /// # Errors
     /// Names the missing keys, besides the errors of [`LegFile::load`].
-    pub fn load_for_image(name_or_path: &str, side_is_given: bool) -> Result<Self, LegFileError> {
+    pub fn load_for_image(name_or_path: &str, side_is_given: bool) -> Result<Self, FileError> {
         let (text, file) = Self::text(name_or_path)?;
         let leg = Self::parse(&text, &file)?;
         match left_out(&leg, &text, side_is_given) {
-            Some(fault) => Err(LegFileError::of_value(&file, &text, &fault)),
+            Some(fault) => Err(fault.in_file(&file, &text)),
             None => Ok(leg),
         }
     }
@@ -46,7 +48,7 @@ fn left_out(leg: &LegFile, text: &str, side_is_given: bool) -> Option<Fault> {
     let table = text.parse::<Table>().ok()?;
     if !side_is_given && !table.contains_key("side") {
         let reason = "`side` is missing: an image has to know whether the drives are mounted mirrored; it is \"right\" or \"left\"";
-        return Some(Fault { joint: None, keys: vec!["side"], reason: reason.to_owned() });
+        return Some(Fault { steps: vec![Step::Key("side")], reason: reason.to_owned() });
     }
     let stated = table.get("joint").and_then(Value::as_array)?;
     leg.joints.iter().zip(stated).enumerate().find_map(|(number, (joint, stated))| {
@@ -66,7 +68,7 @@ fn left_out(leg: &LegFile, text: &str, side_is_given: bool) -> Option<Fault> {
             faults.push(format!("{list} {verb} missing: an image takes no default for what moves a person"));
         }
         let reason = format!("joint `{}`: {}", joint.name, faults.join("; "));
-        (!faults.is_empty()).then_some(Fault { joint: Some(number), keys: Vec::new(), reason })
+        (!faults.is_empty()).then_some(Fault { steps: joint_steps(number), reason })
     })
 }
 

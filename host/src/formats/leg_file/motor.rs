@@ -11,8 +11,10 @@ use hal_sim::drive::description::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::formats::leg_file::check::{Fault, Place};
-use crate::formats::leg_file::{JointFile, LegFile, LegFileError, Side};
+use crate::base::error::FileError;
+use crate::base::toml_file::Fault;
+use crate::formats::leg_file::check::Place;
+use crate::formats::leg_file::{JointFile, LegFile, Side};
 
 /// Least time constant of a winding, s; below it the board cannot measure an inductance within its
 /// PWM periods.
@@ -221,12 +223,11 @@ impl MotorFile {
 impl LegFile {
     /// Complete drives of the simulated leg. Fails if the leg does not have `N` joints or a joint
     /// has no motor.
-    pub fn complete_description<const N: usize>(&self) -> Result<CompleteDescription<N>, LegFileError> {
-        let refused = |reason: String| LegFileError::of_file(&self.name, reason);
+    pub fn complete_description<const N: usize>(&self) -> Result<CompleteDescription<N>, FileError> {
         let mut axes = Vec::with_capacity(N);
         for joint in &self.joints {
             let motor = joint.motor.as_ref().ok_or_else(|| {
-                refused(format!(
+                self.error(format!(
                     "joint `{}` has no `[joint.motor]`: its complete drive cannot be simulated",
                     joint.name
                 ))
@@ -234,7 +235,7 @@ impl LegFile {
             axes.push(motor.axis(joint));
         }
         let count = axes.len();
-        let axes = axes.try_into().map_err(|_| refused(format!("has {count} joints, not {N}")))?;
+        let axes = axes.try_into().map_err(|_| self.error(format!("has {count} joints, not {N}")))?;
         Ok(CompleteDescription::new(axes, self.supply.description()))
     }
 }

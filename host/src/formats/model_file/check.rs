@@ -6,9 +6,9 @@
 use scarab::model::{PARAMETERS_PER_JOINT, Parameter};
 
 use crate::base::names::{asymmetry_name, parameter_name};
+use crate::base::toml_file::{Fault, Step};
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::fingerprint;
-use crate::formats::model_file::error::{Fault, Step};
 use crate::formats::model_file::{
     BaseSet, LARGEST_BASE_SET, ModelFile, StoredBase, StoredParameter, padded, parameter_of,
 };

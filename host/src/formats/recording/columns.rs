@@ -1,17 +1,11 @@
 //! CSV by column names: the header is parsed once, then every row is checked against it.
 
-use std::fs;
 use std::path::Path;
 
 use csv::StringRecord;
 
-use crate::formats::recording::fault::{Fault, RecordingError};
-
-/// Reads the text of a file.
-pub(crate) fn read_text(file: &Path) -> Result<String, RecordingError> {
-    let bytes = fs::read(file).map_err(|error| refuse(file, None, Fault::Unreadable(error)))?;
-    String::from_utf8(bytes).map_err(|_| refuse(file, None, Fault::NotText))
-}
+use crate::base::error::FileError;
+use crate::formats::recording::fault::Fault;
 
 /// Passes the header to `find` and every row after it to `take`; returns the byte offset of each row.
 pub(crate) fn for_each_row<C>(
@@ -19,7 +13,7 @@ pub(crate) fn for_each_row<C>(
     text: &str,
     mut find: impl FnMut(&StringRecord) -> Result<C, Fault>,
     mut take: impl FnMut(&C, &StringRecord) -> Result<(), Fault>,
-) -> Result<Vec<usize>, RecordingError> {
+) -> Result<Vec<usize>, FileError> {
     if text.lines().all(|line| line.trim().is_empty() || line.starts_with('#')) {
         return Err(refuse(file, None, Fault::Empty));
     }
@@ -57,8 +51,8 @@ pub(crate) fn for_each_row<C>(
     }
 }
 
-pub(crate) fn refuse(file: &Path, line: Option<usize>, fault: Fault) -> RecordingError {
-    RecordingError { file: file.to_owned(), line, fault }
+pub(crate) fn refuse(file: &Path, line: Option<usize>, fault: Fault) -> FileError {
+    FileError { file: file.display().to_string(), line, reason: fault.to_string() }
 }
 
 /// Line, from 1, of the first row at or after a byte of the text.

@@ -1,32 +1,12 @@
-//! Errors of recordings: every rejection in plain words, with its position.
+//! Faults of recordings in plain words.
 
-use std::path::PathBuf;
-use std::{fmt, io};
+use std::fmt;
 
-use crate::base::error::ToolError;
 use crate::formats::recording::{MINIMUM_DURATION_S, MINIMUM_RATE_HZ, MINIMUM_SAMPLES};
-
-/// Reason why a file is not a recording, with its position. Displays as `file:line: reason`.
-#[derive(Debug, thiserror::Error)]
-#[error("{}{}: {fault}", .file.display(), LineSuffix(*.line))]
-pub struct RecordingError {
-    /// File as named.
-    pub file: PathBuf,
-    /// Line, from 1, header included; `None` for the whole file.
-    pub line: Option<usize>,
-    /// The reason.
-    pub fault: Fault,
-}
 
 /// Fault of a recording, in plain words.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
-    /// The file cannot be opened or read.
-    #[error("cannot be read ({0})")]
-    Unreadable(io::Error),
-    /// The bytes are not UTF-8.
-    #[error("not a text file")]
-    NotText,
     /// The file is empty or has blank lines only.
     #[error("the file is empty")]
     Empty,
@@ -125,15 +105,6 @@ pub enum Fault {
     },
 }
 
-/// Suffix `:12` of the file's name, or nothing.
-struct LineSuffix(Option<usize>);
-
-impl fmt::Display for LineSuffix {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.map_or(Ok(()), |line| write!(formatter, ":{line}"))
-    }
-}
-
 /// Limit of characters of a file in a message: the file may be of any kind and size.
 const EXCERPT: usize = 200;
 
@@ -194,11 +165,5 @@ struct Short(f64);
 impl fmt::Display for Short {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.0.abs() < 1e7 { write!(formatter, "{}", self.0) } else { write!(formatter, "{:e}", self.0) }
-    }
-}
-
-impl From<RecordingError> for ToolError {
-    fn from(error: RecordingError) -> Self {
-        Self::Input(error.to_string())
     }
 }

@@ -19,7 +19,7 @@ use std::path::Path;
 use object::{Object, ObjectSymbol};
 use scarab::trace::Line;
 
-use crate::base::error::ToolError;
+use crate::base::error::{FileError, ToolError};
 
 /// Kind of crash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -218,7 +218,7 @@ fn place(kind: CrashKind, crash: &Line<'_>, image: &Path) -> Result<String, Tool
 
 /// Function that contains an address.
 fn function(address: u32, image: &Path) -> Result<String, ToolError> {
-    let wrong = |error: &dyn std::fmt::Display| ToolError::input(format!("{}: {error}", image.display()));
+    let wrong = |error: &dyn std::fmt::Display| FileError::new(image.display(), error);
     let bytes = std::fs::read(image).map_err(|error| wrong(&error))?;
     let file = object::File::parse(&*bytes).map_err(|error| wrong(&error))?;
     // The lowest bit is set in addresses of Thumb functions and in return addresses.

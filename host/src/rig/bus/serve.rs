@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::base::error::ToolError;
+use crate::base::error::{FileError, ToolError};
 use crate::base::files;
 use crate::formats::kept_file::memory::{BYTES, Memory};
 use crate::formats::leg_file::LegFile;
@@ -164,11 +164,11 @@ fn not_carried_out(dropped: Dropped) -> Option<String> {
 
 /// Reads the flash of all boards; `None` if the file does not exist.
 fn read(path: &Path, legs: usize) -> Result<Option<Vec<u8>>, ToolError> {
-    let failed = |error: std::io::Error| ToolError::input(format!("{}: {error}", path.display()));
+    let failed = |error: std::io::Error| FileError::unreadable(path, &error);
     let file = match File::open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(failed(error)),
+        Err(error) => return Err(failed(error).into()),
     };
     let (mut bytes, length) = (Vec::new(), legs * BYTES);
     // A device file may have no end.
@@ -177,10 +177,8 @@ fn read(path: &Path, legs: usize) -> Result<Option<Vec<u8>>, ToolError> {
         return Ok(Some(bytes));
     }
     let found = if bytes.len() > length { format!("more than {length}") } else { bytes.len().to_string() };
-    Err(ToolError::input(format!(
-        "{}: {found} bytes, the flash of {legs} boards has {length}",
-        path.display()
-    )))
+    let reason = format!("{found} bytes, the flash of {legs} boards has {length}");
+    Err(FileError::new(path.display(), reason).into())
 }
 
 fn write<const N: usize, const B: usize>(

@@ -4,8 +4,8 @@
 //! yet measured. The design therefore states its assumption: the leg file's `prior`, or its `truth`
 //! without a prior or on request. No other key of `truth` is used.
 
+use crate::base::error::FileError;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 
 /// Description of the leg that a design uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,7 +24,7 @@ pub enum Assumption {
 ///
 /// # Errors
 /// Not every joint has a prior or truth, or the requested one.
-pub fn assumed(leg: &LegFile, assumption: Assumption) -> Result<(LegFile, &'static str), SetupError> {
+pub fn assumed(leg: &LegFile, assumption: Assumption) -> Result<(LegFile, &'static str), FileError> {
     let has = |joints: &dyn Fn(&crate::formats::leg_file::JointFile) -> bool| leg.joints.iter().all(joints);
     let prior = assumption == Assumption::Best && has(&|joint| joint.prior.is_some());
     if !prior && !has(&|joint| joint.truth.is_some()) {
@@ -34,7 +34,7 @@ pub fn assumed(leg: &LegFile, assumption: Assumption) -> Result<(LegFile, &'stat
             }
             Assumption::Truth => "has no truth for every joint",
         };
-        return Err(SetupError::new(leg, missing));
+        return Err(leg.error(missing));
     }
     let mut assumed = leg.clone();
     assumed.pushes = None;

@@ -25,7 +25,6 @@ use scarab::units::Second;
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::run::excite::candidate::{self, PER_JOINT};
 use crate::run::excite::demand::{Demand, demand};
 use crate::run::excite::score::Scorer;
@@ -116,7 +115,7 @@ pub fn candidates<const N: usize, const B: usize>(
         .collect();
     if found.is_empty() {
         let reason = "no exciting motion fits the limits of angle, speed, acceleration and torque";
-        return Err(SetupError::new(frame.leg, reason).into());
+        return Err(frame.leg.error(reason).into());
     }
     Ok(found)
 }

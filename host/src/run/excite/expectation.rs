@@ -27,7 +27,6 @@ use scarab::servo::TICKS_PER_LOG;
 
 use crate::base::error::ToolError;
 use crate::formats::leg_file::LegFile;
-use crate::formats::leg_file::geometry::SetupError;
 use crate::report::excite::Seen;
 use crate::rig::options::SimulationOptions;
 use crate::rig::pair::{Context, Pair};
@@ -82,7 +81,7 @@ pub fn rehearse<const N: usize, const B: usize>(
     let silent = Context { noise: [0.0; N], ..context.clone() };
     let mut pair = Pair::new(assumed, &silent, options.seed)?;
     if !pair.enable(context.gravity) {
-        return Err(SetupError::new(assumed, "the drive refused to be enabled at the start").into());
+        return Err(assumed.error("the drive refused to be enabled at the start").into());
     }
     let mut seen = [Seen::default(); N];
     let mut before = pair.world.anatomical_position();
@@ -101,11 +100,11 @@ pub fn rehearse<const N: usize, const B: usize>(
             Activity::Identify(IdentifyPhase::Approach | IdentifyPhase::Excite | IdentifyPhase::Settle)
         );
         if !exciting || pair.ticks as f64 * TICK_S > LONGEST_S {
-            return Err(SetupError::new(assumed, pair.stop_words(assumed)).into());
+            return Err(assumed.error(pair.stop_words(assumed)).into());
         }
     }
     let Some(solver) = pair.leg.identification().solver() else {
-        return Err(SetupError::new(assumed, "the excitation ended without a record").into());
+        return Err(assumed.error("the excitation ended without a record").into());
     };
     // The selection from data is not known beforehand: every column counts.
     let record = Record { selection: Selection::all(), ..solver.record().convert::<f64>() };

@@ -7,7 +7,7 @@ use scarab::ident::status;
 use scarab::model::{PARAMETERS_PER_JOINT, Parameter, Payload};
 use scarab::motion::Motion;
 
-use crate::base::error::ToolError;
+use crate::base::error::{FileError, ToolError};
 use crate::base::number::Number;
 use crate::formats::excitation::{Excitation, Expected, Proved, geometry};
 use crate::formats::leg_file::LegFile;
@@ -42,7 +42,7 @@ pub fn check<const N: usize, const B: usize>(
     carried: &[Payload<f64>],
 ) -> Result<(), ToolError> {
     // First: another leg's motion is the most likely mistake.
-    motion.table::<N>(leg).map_err(|reason| about(file, &reason))?;
+    motion.table::<N>(leg).map_err(|reason| FileError::new(file.display(), reason))?;
     let options = ExciteOptions {
         design: DesignOptions { duration_s: 0.0, seed: 0, evaluations: 0 },
         given: None,
@@ -51,13 +51,10 @@ pub fn check<const N: usize, const B: usize>(
         margin_percent: 0.0,
         assumption: Assumption::Best,
     };
-    Bench::<N, B>::new(leg, &options)?.given(motion).map_err(|reason| about(file, &reason))?;
+    Bench::<N, B>::new(leg, &options)?
+        .given(motion)
+        .map_err(|reason| FileError::new(file.display(), reason))?;
     Ok(())
-}
-
-/// Error about a motion's file.
-fn about(file: &Path, reason: &dyn std::fmt::Display) -> ToolError {
-    ToolError::input(format!("{}: {reason}", file.display()))
 }
 
 /// Designs a motion, or checks a given one.
@@ -70,12 +67,14 @@ pub fn excite<const N: usize, const B: usize>(
 ) -> Result<Excited, ToolError> {
     // First: another leg's motion is the most likely mistake.
     if let Some((file, given)) = &options.given {
-        given.table::<N>(leg).map_err(|reason| about(file, &reason))?;
+        given.table::<N>(leg).map_err(|reason| FileError::new(file.display(), reason))?;
     }
     let bench = Bench::<N, B>::new(leg, options)?;
     bench.require_noise()?;
     let found = match &options.given {
-        Some((file, given)) => vec![bench.given(given).map_err(|reason| about(file, &reason))?],
+        Some((file, given)) => {
+            vec![bench.given(given).map_err(|reason| FileError::new(file.display(), reason))?]
+        }
         None => design(&bench, &options.design)?,
     };
     let mut best: Option<(f64, Candidate<N>, Rehearsal<N, B>)> = None;

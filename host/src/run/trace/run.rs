@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-use crate::base::error::ToolError;
+use crate::base::error::{FileError, ToolError};
 use crate::base::files::NewFile;
 use crate::formats::trace::Decoder;
 use crate::formats::trace::events::{Event, Weight};
@@ -17,13 +17,10 @@ const LONGEST_LINE: usize = 64 * 1024;
 
 /// Reads a file, or `-` for standard input; writes the records as lines to `text`.
 pub fn read(source: &Path, image: Option<&Path>, text: Option<&Path>) -> Result<Trace, ToolError> {
-    let cannot = |path: &Path, error: &dyn std::fmt::Display| {
-        ToolError::input(format!("{}: cannot be read: {error}", path.display()))
-    };
     let decoder = match image {
         Some(path) => {
-            let bytes = std::fs::read(path).map_err(|error| cannot(path, &error))?;
-            let named = |error: ToolError| ToolError::input(format!("{}: {error}", path.display()));
+            let bytes = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
+            let named = |error: ToolError| FileError::new(path.display(), error);
             Some(Decoder::new(&bytes).map_err(named)?)
         }
         None => None,
@@ -31,7 +28,7 @@ pub fn read(source: &Path, image: Option<&Path>, text: Option<&Path>) -> Result<
     let mut input: Box<dyn Read> = if source == Path::new("-") {
         Box::new(std::io::stdin().lock())
     } else {
-        Box::new(File::open(source).map_err(|error| cannot(source, &error))?)
+        Box::new(File::open(source).map_err(|error| FileError::unreadable(source, &error))?)
     };
     let mut reader = StreamReader::new(decoder);
     if let Some(path) = text {
@@ -43,7 +40,7 @@ pub fn read(source: &Path, image: Option<&Path>, text: Option<&Path>) -> Result<
             Ok(0) => break,
             Ok(count) => reader.feed(&piece[..count])?,
             Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(cannot(source, &error)),
+            Err(error) => return Err(FileError::unreadable(source, &error).into()),
         }
     }
     reader.finish(source)
