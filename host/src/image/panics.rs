@@ -119,7 +119,7 @@ impl Panics {
             }
         }
         if VECTORS.iter().any(|vector| functions.values().all(|function| function.name != *vector)) {
-            return Err(wrong(&format!("lacks one of the vectors {}", VECTORS.join(", "))));
+            return Err(wrong(&format!("lacks one of the vectors {}", VECTORS.join(", "))).into());
         }
         Ok(Self::within(&functions, |location| source_file(&file, location)))
     }

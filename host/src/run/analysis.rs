@@ -1,10 +1,10 @@
-//! Builds the report of a run from a solver and its records.
+//! Builds the report of a run from its outcome, and the outcome from a solver and its records.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
 use scarab::ident::{
-    Choice, Estimate, Estimator, Factor, Problem, Record, SearchState, Solver, Status, Verdict,
+    Choice, Estimate, Estimator, Factor, Problem, Record, SearchState, Selection, Solver, Status, Verdict,
     least_squares_in_box, prior_parameters, status,
 };
 use scarab::model::{PARAMETERS_PER_JOINT, Parameter, Standing};
@@ -16,6 +16,7 @@ use crate::leg::background::Background;
 use crate::report::disturbances::{OutliersReport, StribeckReport};
 use crate::report::findings::FindingReport;
 use crate::report::scale::ScaleReport;
+use crate::report::trace::TraceReport;
 use crate::report::{
     BaseReport, ConsistentReport, FitReport, LeastSquaresReport, ParameterReport, RunReport, SCHEMA,
     SwarmReport, TrackingReport,
@@ -66,6 +67,49 @@ pub struct Circumstances<const B: usize> {
     pub simulated_s: f64,
     /// Computing time.
     pub wall: Duration,
+}
+
+/// Outcome of an identification, from its solver or from the records of a board.
+#[derive(Clone, Debug)]
+pub struct Outcome<const N: usize, const B: usize> {
+    /// `one-time` or `sequential`.
+    pub plan: &'static str,
+    /// Reasons for rejection.
+    pub reasons: Vec<&'static str>,
+    /// Every test of the verdict.
+    pub findings: Vec<FindingReport>,
+    /// Base parameters that the data determine.
+    pub rank: usize,
+    /// Condition number of the scaled weighted problem.
+    pub condition: Number,
+    /// Fourteen parameters of every joint.
+    pub parameters: Vec<ParameterReport>,
+    /// Values of the base parameters and their covariance.
+    pub estimate: Estimate<f32, B>,
+    /// Columns chosen by the data.
+    pub selection: Selection<f32, N, B>,
+    /// RMS torque of each joint on the motion identified from, N m.
+    pub torque_rms: [f32; N],
+    /// Stribeck friction of the joints that show it.
+    pub stribeck: Vec<StribeckReport>,
+    /// Rows and samples excluded from the motion identified from.
+    pub outliers: OutliersReport,
+    /// Residuals on the motion identified from.
+    pub training: Vec<FitReport>,
+    /// Residuals on unused motions.
+    pub validation: Vec<FitReport>,
+    /// Base parameters in closed form.
+    pub least_squares: [Number; B],
+    /// Static friction above Coulomb friction in closed form, for each of `stribeck`.
+    pub least_squares_surplus: Vec<Number>,
+    /// Cost in closed form.
+    pub least_squares_cost: Number,
+    /// Search by the swarm.
+    pub bso: SwarmReport,
+    /// Searches for a physically consistent leg.
+    pub consistent: ConsistentReport,
+    /// Further data of a board's trace.
+    pub trace: Option<TraceReport>,
 }
 
 impl<const N: usize, const B: usize> Background<N, B> {
@@ -123,7 +167,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
         Costs { least_squares: all.residual(), above: all.excess(&optimum), factor: all }
     }
 
-    /// Builds the report of a run.
+    /// Report of a run from its solver.
     #[must_use]
     pub fn report(
         &self,
@@ -137,54 +181,29 @@ impl<const N: usize, const B: usize> Background<N, B> {
         let costs = self.costs(solver);
         let cost = costs.factor.excess(&solver.search().values().map(f64::from));
         let searched = solver.search().state() == SearchState::Done;
-        let dropped = &solver.record().selection.dropped;
-        let stribeck = self.stribeck(solver, &estimate.values);
+        let record = solver.record();
+        let squares = solver.least_squares();
         let consistent = consistent::compare(self, solver, circumstances.iterations_to_half_chi2);
-        RunReport {
-            schema: SCHEMA,
-            leg: self.leg.clone(),
-            seed: circumstances.seed,
-            swarm_seed: solver.search().seed(),
-            prior: self.prior_name.clone(),
+        let outcome = Outcome {
             plan: plan_name(solver.plan()),
-            verdict: if verdict.is_accepted() { "accepted" } else { "refused" },
-            validated: !validation.is_empty(),
             reasons: verdict.reasons().map(scarab::ident::Reason::name).collect(),
             findings: self.in_context(&circumstances.findings, &consistent),
-            rank: solver.least_squares().rank(),
-            columns: self.columns - solver.record().selection.dropped_count(),
+            rank: squares.rank(),
             condition: solver.condition().into(),
             parameters: self.parameters(solver, &estimate),
-            base_parameters: self
-                .base_parameters(dropped, &estimate, circumstances.cramer_rao.as_ref())
-                .into_iter()
-                .chain(self.surpluses(&stribeck, &circumstances.surplus_cramer_rao))
-                .collect(),
-            stribeck,
-            model_choice: self.model_choice(
-                &solver.record().selection,
-                &core::array::from_fn(|joint| {
-                    let record = solver.record();
-                    (record.stribeck[joint].is_some(), record.torque[joint].root_mean_square)
-                }),
-            ),
-            asymmetric_coulomb: self.directions(dropped, &estimate),
-            temperature_c: self.temperature_c.into(),
-            outliers: OutliersReport::of(solver.record(), estimator_name(circumstances.estimator)),
+            stribeck: self.stribeck(solver, &estimate.values),
+            selection: record.selection.clone(),
+            torque_rms: core::array::from_fn(|joint| record.torque[joint].root_mean_square),
+            outliers: OutliersReport::of(record, estimator_name(circumstances.estimator)),
             training: fits(training, &estimate.values),
             validation: fits(validation, &estimate.values),
-            least_squares: LeastSquaresReport {
-                base_parameters: self
-                    .kept(dropped)
-                    .map(|base| (self.base_name(base), solver.least_squares().values[base].into()))
-                    .chain(
-                        self.stribeck(solver, &solver.least_squares().values)
-                            .into_iter()
-                            .map(|found| (surplus_name(found.joint - 1), found.surplus_nm)),
-                    )
-                    .collect(),
-                cost: costs.least_squares.into(),
-            },
+            least_squares: squares.values.map(Number::from),
+            least_squares_surplus: self
+                .stribeck(solver, &squares.values)
+                .iter()
+                .map(|found| found.surplus_nm)
+                .collect(),
+            least_squares_cost: costs.least_squares.into(),
             bso: SwarmReport {
                 seed: solver.search().seed(),
                 iterations: solver.search().iterations(),
@@ -194,16 +213,61 @@ impl<const N: usize, const B: usize> Background<N, B> {
                 iterations_to_half_chi2: circumstances.iterations_to_half_chi2.filter(|_| searched),
             },
             consistent,
+            trace: None,
+            estimate,
+        };
+        self.run_report(outcome, circumstances)
+    }
+
+    /// Report of an outcome: all of its values with their names.
+    #[must_use]
+    pub fn run_report(&self, outcome: Outcome<N, B>, circumstances: &Circumstances<B>) -> RunReport {
+        let (estimate, dropped) = (&outcome.estimate, &outcome.selection.dropped);
+        let base = self.base_parameters(dropped, estimate, circumstances.cramer_rao.as_ref());
+        let surpluses = self.surpluses(&outcome.stribeck, &circumstances.surplus_cramer_rao);
+        let squares = self.kept(dropped).map(|base| (self.base_name(base), outcome.least_squares[base]));
+        let joints = outcome.stribeck.iter().map(|found| surplus_name(found.joint - 1));
+        let shows_stribeck = |joint| outcome.stribeck.iter().any(|found| found.joint == joint + 1);
+        let sizes = core::array::from_fn(|joint| (shows_stribeck(joint), outcome.torque_rms[joint]));
+        RunReport {
+            schema: SCHEMA,
+            leg: self.leg.clone(),
+            seed: circumstances.seed,
+            swarm_seed: outcome.bso.seed,
+            prior: self.prior_name.clone(),
+            plan: outcome.plan,
+            verdict: if outcome.reasons.is_empty() { "accepted" } else { "refused" },
+            validated: !outcome.validation.is_empty(),
+            reasons: outcome.reasons,
+            findings: outcome.findings,
+            rank: outcome.rank,
+            columns: self.columns - outcome.selection.dropped_count(),
+            condition: outcome.condition,
+            parameters: outcome.parameters,
+            base_parameters: base.into_iter().chain(surpluses).collect(),
+            model_choice: self.model_choice(&outcome.selection, &sizes),
+            asymmetric_coulomb: self.directions(dropped, estimate),
+            temperature_c: self.temperature_c.into(),
+            outliers: outcome.outliers,
+            training: outcome.training,
+            validation: outcome.validation,
+            least_squares: LeastSquaresReport {
+                base_parameters: squares.chain(joints.zip(outcome.least_squares_surplus)).collect(),
+                cost: outcome.least_squares_cost,
+            },
+            bso: outcome.bso,
+            consistent: outcome.consistent,
             tracking: circumstances.tracking.clone(),
             scale: ScaleReport::default(),
             drive: circumstances.drive,
             simulated_s: circumstances.simulated_s,
             wall_s: circumstances.wall.as_secs_f64(),
-            detail: self.detail(dropped, &estimate),
+            detail: self.detail(dropped, estimate),
+            stribeck: outcome.stribeck,
             doubt: None,
             samples: None,
             compared: None,
-            trace: None,
+            trace: outcome.trace,
         }
     }
 

@@ -9,7 +9,7 @@ use scarab::ident::{Estimate, Estimator, Evidence, Plan, Reason, Selection, Stat
 use scarab::model::Parameter;
 
 use crate::base::error::ToolError;
-use crate::base::names::{estimator_name, plan_name, surplus_name};
+use crate::base::names::{estimator_name, plan_name};
 use crate::base::number::Number;
 use crate::formats::leg_file::LegFile;
 use crate::formats::trace::events::is_emulated;
@@ -20,12 +20,11 @@ use crate::leg::motions::VALIDATION_NAMES;
 use crate::leg::setup::{PriorChoice, background};
 use crate::report::disturbances::{OutliersReport, StribeckReport};
 use crate::report::findings::FindingReport;
-use crate::report::scale::ScaleReport;
 use crate::report::trace::TraceReport;
 use crate::report::{
-    ConsistentReport, ConsistentSearchReport, FitReport, LeastSquaresReport, ParameterReport, RunReport,
-    SCHEMA, SwarmReport,
+    ConsistentReport, ConsistentSearchReport, FitReport, ParameterReport, RunReport, SwarmReport,
 };
+use crate::run::analysis::{Circumstances, Outcome};
 use crate::with_leg_size;
 
 impl TraceReport {
@@ -86,43 +85,28 @@ fn of_size<const N: usize, const B: usize>(
     let found = TracedResult { background: &background, leg, records };
     let solver = records.solver.as_ref().ok_or_else(|| ToolError::input("the result has no solver"))?;
     let (estimate, dropped) = found.base(solver)?;
-    let stribeck = found.stribeck();
-    let base = background.base_parameters(&dropped, &estimate, None);
     let (training, validation): (Vec<_>, Vec<_>) = records.fits.iter().partition(|fit| fit.motion == 0);
-    let reasons = found.reasons()?;
     let samples: u32 = records.motions.iter().map(|motion| motion.samples).sum();
     let log_hz = trace.boot.as_ref().map_or(scarab::ident::SAMPLE_RATE_HZ, |boot| f64::from(boot.log_hz));
-    Ok(RunReport {
-        schema: SCHEMA,
-        leg: leg.name.clone(),
-        seed: None,
-        swarm_seed: solver.swarm_seed,
-        prior: background.prior_name.clone(),
+    let stribeck = found.stribeck();
+    let outcome = Outcome {
         plan: word(&solver.plan, &[Plan::OneTime, Plan::Sequential].map(plan_name), "plan")?,
-        verdict: if reasons.is_empty() { "accepted" } else { "refused" },
-        validated: !validation.is_empty(),
-        reasons,
+        reasons: found.reasons()?,
         findings: records.findings.iter().map(finding).collect::<Result<_, _>>()?,
         rank: solver.rank,
-        columns: background.columns - dropped.iter().filter(|dropped| **dropped).count(),
         condition: solver.condition.into(),
         parameters: found.parameters()?,
-        base_parameters: base.into_iter().chain(background.surpluses(&stribeck, &[])).collect(),
-        model_choice: found.model_choice(&dropped),
-        asymmetric_coulomb: background.directions(&dropped, &estimate),
-        temperature_c: background.temperature_c.into(),
+        selection: found.selection(dropped),
+        torque_rms: core::array::from_fn(|joint| {
+            found.training(joint).map_or(f32::NAN, |fit| fit.torque_rms_nm)
+        }),
         outliers: found.outliers(),
         training: training.into_iter().map(|fit| fit_report(fit, "fourier".into())).collect(),
         validation: validation.into_iter().map(|fit| fit_report(fit, motion_name(fit.motion))).collect(),
-        least_squares: LeastSquaresReport {
-            base_parameters: background
-                .kept(&dropped)
-                .map(|base| (background.base_name(base), found.least_squares(base)))
-                // The board does not send the static friction of the least-squares solution.
-                .chain(stribeck.iter().map(|found| (surplus_name(found.joint - 1), Number::UNKNOWN)))
-                .collect(),
-            cost: Number::UNKNOWN,
-        },
+        least_squares: core::array::from_fn(|base| found.least_squares(base)),
+        // The board does not send the static friction of the least-squares solution.
+        least_squares_surplus: vec![Number::UNKNOWN; stribeck.len()],
+        least_squares_cost: Number::UNKNOWN,
         bso: SwarmReport {
             seed: solver.swarm_seed,
             iterations: solver.iterations,
@@ -132,18 +116,13 @@ fn of_size<const N: usize, const B: usize>(
             iterations_to_half_chi2: None,
         },
         consistent: consistent(solver),
-        tracking: Vec::new(),
-        scale: ScaleReport::default(),
-        drive: None,
-        simulated_s: f64::from(samples) / log_hz,
-        wall_s: 0.0,
-        doubt: None,
-        samples: None,
-        compared: None,
-        detail: background.detail(&dropped, &estimate),
-        stribeck,
         trace: Some(TraceReport::of(trace)),
-    })
+        estimate,
+        stribeck,
+    };
+    let circumstances =
+        Circumstances { simulated_s: f64::from(samples) / log_hz, ..Circumstances::default() };
+    Ok(background.run_report(outcome, &circumstances))
 }
 
 /// Background of the leg; a prior only where the board had one.
@@ -264,21 +243,18 @@ impl<const N: usize, const B: usize> TracedResult<'_, N, B> {
     }
 
     /// The board does not send the gains of columns, except for detected Stribeck friction.
-    fn model_choice(&self, dropped: &[bool; B]) -> Vec<crate::report::model_choice::ModelChoiceReport> {
-        let found = |joint: usize| self.records.stribeck.iter().find(|record| record.joint == joint + 1);
-        let gain = |joint| {
-            Some(found(joint).map_or((f32::NAN, f32::NAN), |record| (record.gain_chi2, record.surplus_nm)))
+    fn selection(&self, dropped: [bool; B]) -> Selection<f32, N, B> {
+        let gain = |joint: usize| {
+            let found = self.records.stribeck.iter().find(|record| record.joint == joint + 1);
+            Some(found.map_or((f32::NAN, f32::NAN), |record| (record.gain_chi2, record.surplus_nm)))
         };
         let looked_for = |joint: usize| self.background.device.stribeck_choice(joint).is_possible();
-        let selection = Selection {
+        Selection {
             is_made: true,
-            dropped: *dropped,
+            dropped,
             gain: [f32::NAN; B],
             stribeck: core::array::from_fn(|joint| gain(joint).filter(|_| looked_for(joint))),
-        };
-        let size = |joint| self.training(joint).map_or(f32::NAN, |fit| fit.torque_rms_nm);
-        self.background
-            .model_choice(&selection, &core::array::from_fn(|joint| (found(joint).is_some(), size(joint))))
+        }
     }
 
     fn training(&self, joint: usize) -> Option<&Fit> {

@@ -11,8 +11,7 @@ use crate::report::findings::FindingReport;
 use crate::report::spread::Spread;
 use crate::view::figures::Figure;
 use crate::view::html::{
-    Circumstances, count, drawing, head, joint_name, measured, number, page_head, sigma, signed, unit,
-    verdict,
+    Circumstances, count, drawing, head, joint_name, measured, number, page_head, sigma, signed, verdict,
 };
 
 /// Creates the page of runs that differ in their seed.
